@@ -1,0 +1,1 @@
+"""Probabilistic bird's-eye semantic perception, from LIDAR and camera to a semantic grid."""

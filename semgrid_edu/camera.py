@@ -1,0 +1,155 @@
+"""The pinhole camera and rigid transforms, equation (1) of the paper (section 3.3)."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import ArgumentError
+
+KITTI_LIDAR_HEIGHT = 1.73
+"""Metres from the ground to the LIDAR of KITTI's car (Geiger et al., 2013, figure 1)."""
+
+
+def rigid_transform(rotation: NDArray, translation: NDArray) -> NDArray[np.float64]:
+    """Return the 4x4 transform that rotates, then shifts.
+
+    Parameters
+    ----------
+    rotation : (3, 3) float
+    translation : (3,) float, metres
+
+    Returns
+    -------
+    (4, 4) float64
+        Maps homogeneous column vectors.
+    """
+    T = np.eye(4)
+    T[:3, :3] = rotation
+    T[:3, 3] = translation
+    return T
+
+
+def invert_rigid(T: NDArray) -> NDArray[np.float64]:
+    """Return the inverse of a rigid transform, by transposing its rotation.
+
+    Parameters
+    ----------
+    T : (4, 4) float
+
+    Returns
+    -------
+    (4, 4) float64
+    """
+    rotation = T[:3, :3].T
+    return rigid_transform(rotation, -rotation @ T[:3, 3])
+
+
+def transform_points(T_target_from_source: NDArray, points: NDArray) -> NDArray:
+    """Move points from one frame to another.
+
+    Parameters
+    ----------
+    T_target_from_source : (4, 4) float
+    points : (..., 3) float
+        In the source frame, metres.
+
+    Returns
+    -------
+    (..., 3) float
+        In the target frame, metres; the type of `points`.
+    """
+    T = T_target_from_source.astype(points.dtype)
+    return points @ T[:3, :3].T + T[:3, 3]
+
+
+def lidar_from_grid(lidar_height: float) -> NDArray[np.float64]:
+    """Return T_lidar_from_grid: the same axes, the LIDAR `lidar_height` metres above the ground."""
+    return rigid_transform(np.eye(3), np.array([0.0, 0.0, -lidar_height]))
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A rectified pinhole camera and where it sits: z looks ahead, x right, y down.
+
+    Parameters
+    ----------
+    K : (3, 3) float64
+        Intrinsic matrix, pixels. The centre of the first pixel is (0, 0); u runs right, v down.
+    T_camera_from_lidar : (4, 4) float64
+        Rigid transform.
+    size : (int, int)
+        Height and width of the image, pixels.
+    lidar_height : float
+        Metres from the ground to the LIDAR.
+    """
+
+    K: NDArray[np.float64]
+    T_camera_from_lidar: NDArray[np.float64]
+    size: tuple[int, int]
+    lidar_height: float = KITTI_LIDAR_HEIGHT
+
+    def __post_init__(self) -> None:
+        """Refuse matrices of the wrong shape."""
+        if np.shape(self.K) != (3, 3):
+            raise ArgumentError("K", "a 3x3 intrinsic matrix", f"shape {np.shape(self.K)}")
+        if np.shape(self.T_camera_from_lidar) != (4, 4):
+            raise ArgumentError("T_camera_from_lidar", "a 4x4 transform", f"shape {np.shape(self.T_camera_from_lidar)}")
+
+    @property
+    def T_camera_from_grid(self) -> NDArray[np.float64]:
+        """(4, 4): from the grid frame, on the ground below the LIDAR, to the camera."""
+        return self.T_camera_from_lidar @ lidar_from_grid(self.lidar_height)
+
+    def resized(self, size: tuple[int, int]) -> "Camera":
+        """Return the camera that would have taken the same picture with another number of pixels.
+
+        Pixel centres are integers, so the image spans -1/2 .. w - 1/2 and the principal point moves as
+        c' = (c + 1/2) s - 1/2: leaving out the halves shifts every lookup by up to half a pixel.
+
+        Parameters
+        ----------
+        size : (int, int)
+            The new height and width, pixels.
+        """
+        scale_v, scale_u = size[0] / self.size[0], size[1] / self.size[1]
+        S = np.array([[scale_u, 0, (scale_u - 1) / 2], [0, scale_v, (scale_v - 1) / 2], [0, 0, 1]])
+        return replace(self, K=S @ self.K, size=tuple(size))
+
+
+def project(points: NDArray, camera: Camera) -> tuple[NDArray, NDArray[np.bool_]]:
+    """Find the pixel of each point: equation (1), (u, v, 1)^T = K (X/Z, Y/Z, 1)^T.
+
+    Parameters
+    ----------
+    points : (..., 3) float
+        X right, Y down, Z ahead, in the camera frame, metres.
+    camera : Camera
+
+    Returns
+    -------
+    pixels : (..., 2) float
+        u, v; NaN for a point that isn't in front of the camera.
+    visible : (...) bool
+        Whether the point is in front of the camera and its pixel lies among the centres of the image's
+        pixels, 0 <= u <= w - 1, 0 <= v <= h - 1, where equation (2) can interpolate.
+
+    Raises
+    ------
+    ArgumentError
+        When the last axis of `points` isn't X, Y, Z.
+
+    Examples
+    --------
+    >>> camera = Camera(np.diag([100.0, 100.0, 1.0]), np.eye(4), size=(5, 5))
+    >>> project(np.array([[0.3, 0.2, 10.0]]), camera)
+    (array([[3., 2.]]), array([ True]))
+    """
+    points = np.asarray(points)
+    if points.shape[-1:] != (3,):
+        raise ArgumentError("points", "shape (..., 3): X, Y, Z", f"shape {points.shape}")
+    depth = np.where(points[..., 2] > 0, points[..., 2], np.nan)
+    pixels = (points @ camera.K.T.astype(points.dtype))[..., :2] / depth[..., None]
+    height, width = camera.size
+    u, v = pixels[..., 0], pixels[..., 1]
+    return pixels, (u >= 0) & (u <= width - 1) & (v >= 0) & (v <= height - 1)

@@ -1,0 +1,40 @@
+"""Errors that name the file or argument, what was expected and what was found."""
+
+from pathlib import Path
+
+
+class ArgumentError(ValueError):
+    """A function was called with something it can't use.
+
+    Parameters
+    ----------
+    name : str
+        The argument at fault.
+    expected, found : object
+        What the function takes, and what it got.
+
+    Examples
+    --------
+    >>> raise ArgumentError("cell", "a positive size in metres", -0.2)
+    Traceback (most recent call last):
+    semgrid_edu.errors.ArgumentError: cell: expected a positive size in metres, found -0.2
+    """
+
+    def __init__(self, name: str, expected: object, found: object) -> None:
+        super().__init__(f"{name}: expected {expected}, found {found}")
+
+
+class DataError(ValueError):
+    """A file is missing, damaged or not what its place says it is.
+
+    Parameters
+    ----------
+    path : path-like
+        The file or folder at fault.
+    expected, found : object
+        What should be there, and what is.
+    """
+
+    def __init__(self, path: str | Path, expected: object, found: object) -> None:
+        super().__init__(f"{path}: expected {expected}, found {found}")
+        self.path = Path(path)

@@ -1,0 +1,116 @@
+"""Frame: everything one instant of a drive gives."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.camera import Camera
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import IGNORE, LabelSet
+
+LABEL_GRID = GridSpec(x_min=0.0, x_max=71.0, y_min=-15.5, y_max=15.5, cell=0.1)
+"""The fine grid, (710, 310), in which true bird's-eye labels are kept; coarser grids are pooled from it."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrameLabels:
+    """What is true at one instant, where somebody (the simulator, an annotator) knows it.
+
+    Parameters
+    ----------
+    label_set : LabelSet
+        What the numbers mean.
+    image : (h, w) uint8
+        The class of each pixel; 255 where unlabelled.
+    depth : (h, w) float32
+        Metres along the camera's z axis; NaN where there is none (sky).
+    birdseye : (710, 310) uint8
+        The class of each 0.1 m cell of `LABEL_GRID`, seen or not; 255 where unlabelled.
+    visible : (710, 310) bool
+        Whether the camera sees what stands in the cell.
+    """
+
+    label_set: LabelSet
+    image: NDArray[np.uint8]
+    depth: NDArray[np.float32]
+    birdseye: NDArray[np.uint8]
+    visible: NDArray[np.bool_]
+
+    def birdseye_on(self, spec: GridSpec) -> NDArray[np.uint8]:
+        """Pool the bird's-eye labels to a coarser grid.
+
+        A cell takes the most frequent class of what stands in it, be it one fine cell of a thin pole; where
+        nothing stands, the most frequent class of the ground.
+
+        Parameters
+        ----------
+        spec : GridSpec
+            The extent of `LABEL_GRID`, a multiple of its cell.
+
+        Returns
+        -------
+        (H, W) uint8
+            255 where no fine cell is labelled.
+
+        Raises
+        ------
+        ArgumentError
+            When `spec` isn't a coarsening of `LABEL_GRID`.
+        """
+        blocks = _blocks(self.birdseye, spec)
+        counts = np.stack([(blocks == c).sum(axis=-1) for c in range(len(self.label_set))])
+        flat = [self.label_set.index(name) for name in self.label_set.flat]
+        standing = counts.copy()
+        standing[flat] = 0
+        best = np.where(standing.any(axis=0), standing.argmax(axis=0), counts.argmax(axis=0))
+        return np.where(counts.any(axis=0), best, IGNORE).astype(np.uint8)
+
+    def visible_on(self, spec: GridSpec) -> NDArray[np.bool_]:
+        """Pool visibility to a coarser grid, (H, W) bool: a cell is seen when any part of it is."""
+        return _blocks(self.visible, spec).any(axis=-1)
+
+
+def _blocks(fine: NDArray, spec: GridSpec) -> NDArray:
+    """Return the fine cells of each cell of `spec`, (H, W, factor^2)."""
+    factor = round(spec.cell / LABEL_GRID.cell)
+    height, width = spec.shape
+    coarsening = GridSpec(spec.x_min, spec.x_max, spec.y_min, spec.y_max, LABEL_GRID.cell) == LABEL_GRID
+    if not coarsening or (height * factor, width * factor) != LABEL_GRID.shape:
+        raise ArgumentError("spec", f"a coarsening of {LABEL_GRID}", spec)
+    return fine.reshape(height, factor, width, factor).swapaxes(1, 2).reshape(height, width, -1)
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One instant of a drive.
+
+    Parameters
+    ----------
+    image : (h, w, 3) uint8 or None
+        The rectified camera image, RGB; None when the drive has no such camera folder.
+    points : (N, 4) float32
+        LIDAR returns: x forward, y left, z up in the LIDAR frame (metres), and reflectance 0..1.
+    camera : Camera
+        Calibration of the image.
+    T_world_from_lidar : (4, 4) float64
+        Where the LIDAR is. The world is the frame of the drive's first oxts packet.
+    time : float
+        Seconds since the first LIDAR scan of the drive.
+    labels : FrameLabels or None
+        The truth, where it is known.
+    """
+
+    image: NDArray[np.uint8] | None
+    points: NDArray[np.float32]
+    camera: Camera
+    T_world_from_lidar: NDArray[np.float64]
+    time: float
+    labels: FrameLabels | None = None
+
+    @property
+    def points_grid(self) -> NDArray[np.float32]:
+        """(N, 4) float32: the returns in the grid frame, so that z is the height above flat ground."""
+        shift = np.array([0, 0, self.camera.lidar_height, 0], dtype=self.points.dtype)
+        return self.points + shift

@@ -1,0 +1,129 @@
+"""Label sets: the names, colours and numbers of classes (paper, sections 3.1 and 4)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import ArgumentError
+
+IGNORE = 255
+"""Unlabelled: left out of the loss and of the metrics."""
+
+
+@dataclass(frozen=True)
+class LabelSet:
+    """The classes of a data set, in the order of their numbers.
+
+    Parameters
+    ----------
+    name : str
+        What the set is called.
+    names : tuple of str
+        One name a class; class c is `names[c]`.
+    rgb : tuple of (int, int, int)
+        One colour a class, 0..255.
+    n_semantic : int
+        The first `n_semantic` classes say what stands in a cell; the others only say that nobody knows.
+    flat : tuple of str
+        The classes that lie on the ground, so that something else can stand on them.
+
+    Examples
+    --------
+    >>> KITTI_14.index("car"), len(KITTI_14), KITTI_14.n_semantic
+    (3, 14, 10)
+    """
+
+    name: str
+    names: tuple[str, ...]
+    rgb: tuple[tuple[int, int, int], ...]
+    n_semantic: int
+    flat: tuple[str, ...]
+
+    def __len__(self) -> int:
+        """Return the number of classes, C."""
+        return len(self.names)
+
+    def index(self, name: str) -> int:
+        """Return the number of a class.
+
+        Raises
+        ------
+        ArgumentError
+            When the set has no such class.
+        """
+        if name not in self.names:
+            raise ArgumentError("name", f"a class of {self.name}: {', '.join(self.names)}", repr(name))
+        return self.names.index(name)
+
+    def colours(self, labels: NDArray) -> NDArray[np.uint8]:
+        """Paint a map of classes.
+
+        Parameters
+        ----------
+        labels : (...) int
+            Class numbers; 255 (unlabelled) is painted white.
+
+        Returns
+        -------
+        (..., 3) uint8
+            Its colours.
+        """
+        palette = np.full((256, 3), 255, dtype=np.uint8)
+        palette[: len(self)] = self.rgb
+        return palette[np.asarray(labels)]
+
+
+_KITTI_COLOURS = {
+    "road": (128, 64, 128),
+    "sidewalk": (244, 35, 232),
+    "vegetation": (107, 142, 35),
+    "car": (0, 0, 142),
+    "pedestrian": (220, 20, 60),
+    "bicycle": (119, 11, 32),
+    "building": (70, 70, 70),
+    "signage": (220, 220, 0),
+    "fence": (190, 153, 153),
+    "sky": (70, 130, 180),
+    "unknown-free": (225, 229, 232),
+    "unknown-static": (150, 120, 80),
+    "unknown-dynamic": (255, 140, 0),
+    "unknown-unobserved": (12, 16, 24),
+}
+
+KITTI_14 = LabelSet(
+    "KITTI-14",
+    names=tuple(_KITTI_COLOURS),
+    rgb=tuple(_KITTI_COLOURS.values()),
+    n_semantic=10,
+    flat=("road", "sidewalk", "vegetation"),
+)
+"""Our reading of the paper's C = 14: ten semantic classes, then the four kinds of unknown by occupancy state."""
+
+UNKNOWN_OF_STATE = (10, 11, 12, 13)
+"""KITTI-14's unknown class of each occupancy state, in the order FREE, STATIC, DYNAMIC, UNKNOWN."""
+
+_SYNTHIA_COLOURS = {
+    "void": (12, 16, 24),
+    "building": (70, 70, 70),
+    "road": (128, 64, 128),
+    "sidewalk": (244, 35, 232),
+    "fence": (190, 153, 153),
+    "vegetation": (107, 142, 35),
+    "pole": (153, 153, 153),
+    "car": (0, 0, 142),
+    "sign": (220, 220, 0),
+    "lane": (157, 234, 50),
+}
+
+SYNTHIA_10 = LabelSet(
+    "SYNTHIA-10",
+    names=tuple(_SYNTHIA_COLOURS),
+    rgb=tuple(_SYNTHIA_COLOURS.values()),
+    n_semantic=10,
+    flat=("void", "road", "sidewalk", "vegetation", "lane"),
+)
+"""The ten classes of the paper's Table 3, in its order."""
+
+LABEL_SETS = {labels.name: labels for labels in (KITTI_14, SYNTHIA_10)}
+"""Every label set by its name, as data sets on disk refer to it."""
