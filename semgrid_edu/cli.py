@@ -1,6 +1,12 @@
 """The command line, `semgrid-edu`: parses and calls, nothing else."""
 
+import sys
+from pathlib import Path
+from typing import Annotated
+
 import typer
+
+from semgrid_edu.errors import ArgumentError, DataError
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 data = typer.Typer(no_args_is_help=True, help="Make and check data.")
@@ -12,3 +18,26 @@ app.add_typer(course, name="course")
 @app.callback()
 def main() -> None:
     """Probabilistic bird's-eye semantic perception, taught notebook by notebook."""
+
+
+@data.command()
+def verify(
+    folder: Annotated[Path | None, typer.Argument(help="A folder of samples; the shipped ones by default.")] = None,
+) -> None:
+    """Check the samples against the checksums in their provenance files."""
+    from semgrid_edu.datasets.samples import samples_problems
+
+    problems = samples_problems(folder)
+    for problem in problems:
+        typer.echo(problem, err=True)
+    if problems:
+        raise typer.Exit(1)
+    typer.echo("every sample is as it was made")
+
+
+def run() -> None:
+    """Run the command line; a mistake in the input ends in one line, not in a traceback."""
+    try:
+        app()
+    except (ArgumentError, DataError) as error:
+        sys.exit(f"semgrid-edu: {error}")
