@@ -1,0 +1,29 @@
+"""One plotting vocabulary for lectures, demo and experiments; every function returns its Axes.
+
+Grids are drawn as maps with forward up, axes in metres: x upwards, y to the left, so that its axis
+decreases to the right. Arrays are never flipped: row 0 is the farthest ahead, column 0 the leftmost.
+"""
+
+from semgrid_edu.plotting.charts import confusion
+from semgrid_edu.plotting.colours import DEPTH_RANGE, STATE_COLOURS, STATE_NAMES, depth_colours, occupancy_colours
+from semgrid_edu.plotting.grids import grid_labels, grid_values, occupancy, velocity, velocity_arrows
+from semgrid_edu.plotting.images import image_labels, image_values, points_on_image
+from semgrid_edu.plotting.legends import class_legend
+
+__all__ = [
+    "DEPTH_RANGE",
+    "STATE_COLOURS",
+    "STATE_NAMES",
+    "class_legend",
+    "confusion",
+    "depth_colours",
+    "grid_labels",
+    "grid_values",
+    "image_labels",
+    "image_values",
+    "occupancy",
+    "occupancy_colours",
+    "points_on_image",
+    "velocity",
+    "velocity_arrows",
+]

@@ -1,0 +1,168 @@
+"""Bird's-eye grids as maps in metres, forward up: occupancy, velocities, classes, values (section 3.2, 3.4)."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import LabelSet
+from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, occupancy_colours
+from semgrid_edu.plotting.legends import class_legend, colour_legend
+
+ARROW_SECONDS = 0.5
+"""An arrow ends where what it stands for will be after this time."""
+
+ARROW_SPACING = 2.0
+"""Metres: one arrow for each square of this side, so that those of a car don't hide it."""
+
+
+def occupancy(spec: GridSpec, probability: NDArray, ax: Axes | None = None, legend: bool = True) -> Axes:
+    """Draw an occupancy grid; a cell mixes the colours of its states by their probabilities.
+
+    Parameters
+    ----------
+    spec : GridSpec
+    probability : (4, H, W) float
+        FREE, STATIC, DYNAMIC, UNKNOWN; sums to 1 in each cell.
+    ax : Axes, optional
+        Where to draw; a new figure when left out.
+    legend : bool
+        Whether to name the states.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ArgumentError
+        When the array doesn't fit `spec`.
+    """
+    ax = draw_map(spec, occupancy_colours(probability), ax)
+    return colour_legend(ax, STATE_NAMES, STATE_COLOURS) if legend else ax
+
+
+def velocity(spec: GridSpec, probability: NDArray, velocity: NDArray, ax: Axes) -> Axes:
+    """Add arrows to an occupancy grid, as `velocity_arrows` chooses them, long as the way in the next half second.
+
+    Parameters
+    ----------
+    spec : GridSpec
+    probability : (4, H, W) float
+        FREE, STATIC, DYNAMIC, UNKNOWN.
+    velocity : (2, H, W) float
+        Metres a second over ground, along x and y of the grid frame; NaN where nothing moves.
+    ax : Axes
+        With the grid drawn.
+
+    Returns
+    -------
+    Axes
+    """
+    start, speed = velocity_arrows(spec, probability, velocity)
+    (x, y), (vx, vy) = start.T, speed.T * ARROW_SECONDS
+    ax.quiver(y, x, vy, vx, angles="xy", scale_units="xy", scale=1.0, color="#6a1b9a", width=0.007, zorder=3)
+    note = f"arrow: way in {ARROW_SECONDS} s (5 m = {5 / ARROW_SECONDS:.0f} m/s)"
+    box = {"facecolor": "white", "alpha": 0.8, "linewidth": 0, "pad": 1.5}
+    ax.text(0.5, 0.01, note, transform=ax.transAxes, ha="center", va="bottom", fontsize="x-small", bbox=box)
+    return ax
+
+
+def velocity_arrows(
+    spec: GridSpec, probability: NDArray, velocity: NDArray
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Summarise the velocities of cells that are more DYNAMIC than not, by squares of `ARROW_SPACING`.
+
+    Parameters
+    ----------
+    spec : GridSpec
+    probability : (4, H, W) float
+    velocity : (2, H, W) float
+        Metres a second; NaN where nothing moves.
+
+    Returns
+    -------
+    start : (K, 2) float64
+        x and y of the mean of each square's moving cells, metres.
+    speed : (K, 2) float64
+        Their mean velocity, metres a second.
+    """
+    moving = np.isfinite(velocity).all(axis=0) & (probability[STATE_NAMES.index("dynamic")] > 0.5)
+    xy = spec.centers()[moving]
+    _, square = np.unique(np.floor(xy / ARROW_SPACING), axis=0, return_inverse=True)
+    count = np.maximum(np.bincount(square), 1)
+    start = [np.bincount(square, weights=column) / count for column in xy.T]
+    speed = [np.bincount(square, weights=component) / count for component in velocity[:, moving]]
+    return np.stack(start, axis=-1), np.stack(speed, axis=-1)
+
+
+def grid_labels(
+    spec: GridSpec, labels: NDArray, label_set: LabelSet, ax: Axes | None = None, legend: bool = True
+) -> Axes:
+    """Draw a map of classes, with a legend of those that occur.
+
+    Parameters
+    ----------
+    spec : GridSpec
+    labels : (H, W) int
+        Class of each cell; 255, unlabelled, is white.
+    label_set : LabelSet
+    ax : Axes, optional
+        Where to draw; a new figure when left out.
+    legend : bool
+        Whether to name the classes.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ArgumentError
+        When the array doesn't fit `spec`.
+    """
+    ax = draw_map(spec, label_set.colours(labels), ax)
+    return class_legend(ax, label_set, labels) if legend else ax
+
+
+def grid_values(spec: GridSpec, values: NDArray, name: str, ax: Axes | None = None, **style: object) -> Axes:
+    """Draw one number a cell, with a colour bar.
+
+    Parameters
+    ----------
+    spec : GridSpec
+    values : (H, W) float
+        NaN is left blank.
+    name : str
+        What the numbers are, with their unit.
+    ax : Axes, optional
+        Where to draw; a new figure when left out.
+    **style
+        Passed on to `Axes.imshow` (`vmin`, `vmax`, `cmap`).
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ArgumentError
+        When the array doesn't fit `spec`.
+    """
+    ax = draw_map(spec, values, ax, **style)
+    ax.figure.colorbar(ax.images[-1], ax=ax, label=name, shrink=0.6)
+    return ax
+
+
+def draw_map(spec: GridSpec, raster: NDArray, ax: Axes | None = None, **style: object) -> Axes:
+    """Draw an array over the grid, (H, W) or (H, W, 3), with axes in metres."""
+    if np.shape(raster)[:2] != spec.shape:
+        raise ArgumentError("raster", f"the grid's shape {spec.shape}", f"shape {np.shape(raster)}")
+    if ax is None:
+        _, ax = plt.subplots(figsize=(4.2, 6.4), layout="constrained")
+    extent = (spec.y_max, spec.y_min, spec.x_min, spec.x_max)
+    ax.imshow(raster, extent=extent, origin="upper", interpolation="nearest", **style)
+    ax.set(xlabel="y, to the left [m]", ylabel="x, forward [m]")
+    return ax

@@ -1,0 +1,133 @@
+"""What lives in the camera image: LIDAR points by depth, label overlays, scores (eq. (1), section 3.1)."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm
+from numpy.typing import NDArray
+
+from semgrid_edu.camera import project, transform_points
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.frame import Frame
+from semgrid_edu.labels import LabelSet
+from semgrid_edu.plotting.colours import DEPTH_RANGE, depth_colours
+from semgrid_edu.plotting.legends import class_legend
+
+
+def points_on_image(frame: Frame, ax: Axes | None = None, size: float = 3.0, colour_bar: bool = True) -> Axes:
+    """Draw the camera image with the LIDAR returns it sees, coloured by depth.
+
+    Parameters
+    ----------
+    frame : Frame
+        With an image.
+    ax : Axes, optional
+        Where to draw; a new figure when left out.
+    size : float
+        Of a point, points squared.
+    colour_bar : bool
+        Whether to explain the colours, in metres.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ArgumentError
+        When the frame has no image.
+    """
+    ax = draw_image(need_image(frame), ax)
+    pixels, depth = visible_points(frame)
+    ax.scatter(*pixels.T, s=size, c=depth_colours(depth) / 255, linewidths=0)
+    if colour_bar:
+        mapping = ScalarMappable(LogNorm(*DEPTH_RANGE), "plasma_r")
+        bar = ax.figure.colorbar(mapping, ax=ax, label="depth [m]", fraction=0.02, pad=0.01, extend="both")
+        bar.set_ticks([5, 10, 20, 40], labels=["5", "10", "20", "40"], minor=False)
+        bar.minorticks_off()
+    return ax
+
+
+def visible_points(frame: Frame) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return pixels, (N, 2), and depths, (N,) metres, of the returns the camera sees, the farthest first."""
+    points_camera = transform_points(frame.camera.T_camera_from_lidar, frame.points[:, :3])
+    pixels, visible = project(points_camera, frame.camera)
+    depth = points_camera[visible, 2]
+    order = np.argsort(-depth, kind="stable")
+    return pixels[visible][order], depth[order]
+
+
+def image_labels(
+    image: NDArray, labels: NDArray, label_set: LabelSet, ax: Axes | None = None, opacity: float = 0.6
+) -> Axes:
+    """Lay the classes of pixels over an image, with a legend of those that occur.
+
+    Parameters
+    ----------
+    image : (h, w, 3) uint8
+    labels : (h, w) int
+        Class of each pixel; 255, unlabelled, leaves the image as it is.
+    label_set : LabelSet
+    ax : Axes, optional
+        Where to draw; a new figure when left out.
+    opacity : float
+        0 shows the image alone, 1 the labels alone.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ArgumentError
+        When image and labels differ in size.
+    """
+    ax = draw_image(blend_labels(image, labels, label_set, opacity), ax)
+    return class_legend(ax, label_set, labels)
+
+
+def blend_labels(image: NDArray, labels: NDArray, label_set: LabelSet, opacity: float) -> NDArray[np.uint8]:
+    """Mix an image, (h, w, 3), with the colours of its labels, (h, w); unlabelled pixels stay."""
+    if image.shape[:2] != labels.shape:
+        raise ArgumentError("labels", f"the image's size {image.shape[:2]}", f"shape {labels.shape}")
+    weight = np.where(labels < len(label_set), opacity, 0.0)[..., None]
+    return np.rint((1 - weight) * image + weight * label_set.colours(labels)).astype(np.uint8)
+
+
+def image_values(values: NDArray, name: str, ax: Axes | None = None, **style: object) -> Axes:
+    """Draw one number a pixel, such as the scores of a class, with a colour bar.
+
+    Parameters
+    ----------
+    values : (h, w) float
+    name : str
+        What the numbers are, with their unit.
+    ax : Axes, optional
+        Where to draw; a new figure when left out.
+    **style
+        Passed on to `Axes.imshow` (`vmin`, `vmax`, `cmap`).
+
+    Returns
+    -------
+    Axes
+    """
+    ax = draw_image(values, ax, **style)
+    ax.figure.colorbar(ax.images[-1], ax=ax, label=name, fraction=0.02, pad=0.01)
+    return ax
+
+
+def draw_image(image: NDArray, ax: Axes | None = None, **style: object) -> Axes:
+    """Draw an image without axes; pixel (u, v) has its centre at (u, v)."""
+    if ax is None:
+        _, ax = plt.subplots(figsize=(10, 3.2), layout="constrained")
+    ax.imshow(image, **style)
+    ax.set_axis_off()
+    return ax
+
+
+def need_image(frame: Frame) -> NDArray[np.uint8]:
+    """Return the frame's image, (h, w, 3), or say that there is none."""
+    if frame.image is None:
+        raise ArgumentError("frame", "a frame with a camera image", "a frame without one")
+    return frame.image

@@ -1,0 +1,41 @@
+"""Legends: a patch and a name for every class or state that a picture shows."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from semgrid_edu.labels import LabelSet
+
+
+def class_legend(ax: Axes, label_set: LabelSet, labels: NDArray, **style: object) -> Axes:
+    """Name the classes that occur in a map of labels.
+
+    Parameters
+    ----------
+    ax : Axes
+    label_set : LabelSet
+    labels : (...) int
+        Classes as numbers; 255, unlabelled, isn't named.
+    **style
+        Passed on to `Axes.legend`.
+
+    Returns
+    -------
+    Axes
+    """
+    occurring = [c for c in np.unique(labels) if c < len(label_set)]
+    return colour_legend(ax, [label_set.names[c] for c in occurring], [label_set.rgb[c] for c in occurring], **style)
+
+
+def colour_legend(ax: Axes, names: Sequence[str], rgb: Iterable[tuple[int, int, int]], **style: object) -> Axes:
+    """Name colours, 8-bit RGB, to the right of a picture."""
+    patches = [
+        Patch(facecolor=np.divide(colour, 255), edgecolor="0.4", linewidth=0.5, label=name)
+        for name, colour in zip(names, rgb, strict=True)
+    ]
+    placing = {"loc": "upper left", "bbox_to_anchor": (1.02, 1.0), "fontsize": "small", "frameon": False}
+    ax.legend(handles=patches, **(placing | style))
+    return ax
