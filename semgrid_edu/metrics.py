@@ -1,0 +1,153 @@
+"""Pixel accuracy, class accuracy and FmIoU on labelled cells (paper, section 4.2)."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.labels import IGNORE, LabelSet
+
+
+def confusion_matrix(truth: ArrayLike, predicted: ArrayLike, n_classes: int, ignore: int = IGNORE) -> NDArray[np.int64]:
+    """Count how often each true class is called each class.
+
+    Matrices of several frames add up: the metrics of a data set are those of the sum.
+
+    Parameters
+    ----------
+    truth, predicted : (...) int
+        The class of each cell (or pixel), 0 .. n_classes - 1.
+    n_classes : int
+        C.
+    ignore : int
+        A cell whose truth is this number isn't labelled and counts nowhere, whatever is predicted there.
+
+    Returns
+    -------
+    (C, C) int64
+        Row: truth; column: prediction.
+
+    Raises
+    ------
+    ArgumentError
+        When the shapes differ, the labels aren't integers, or a labelled cell has a number outside the classes.
+
+    Examples
+    --------
+    >>> confusion_matrix([0, 0, 1, 255], [0, 1, 1, 0], n_classes=2)
+    array([[1, 1],
+           [0, 1]])
+    """
+    truth, predicted = np.asarray(truth), np.asarray(predicted)
+    if truth.shape != predicted.shape:
+        raise ArgumentError("predicted", f"the shape of truth, {truth.shape}", predicted.shape)
+    labelled = truth != ignore
+    truth, predicted = (
+        _classes("truth", truth[labelled], n_classes),
+        _classes("predicted", predicted[labelled], n_classes),
+    )
+    return np.bincount(truth * n_classes + predicted, minlength=n_classes**2).reshape(n_classes, n_classes)
+
+
+def _classes(name: str, labels: NDArray, n_classes: int) -> NDArray[np.int64]:
+    """Return the labels as int64 once they are known to be classes."""
+    if labels.size and not np.issubdtype(labels.dtype, np.integer):
+        raise ArgumentError(name, "integer classes", f"type {labels.dtype}")
+    if labels.size and not (labels.min() >= 0 and labels.max() < n_classes):
+        raise ArgumentError(name, f"classes 0..{n_classes - 1} in labelled cells", f"{labels.min()}..{labels.max()}")
+    return labels.astype(np.int64)
+
+
+def semantic_cells(confusion: ArrayLike, label_set: LabelSet) -> NDArray[np.int64]:
+    """Keep only the cells whose truth is a semantic class.
+
+    Unknown cells are the most and the easiest, since the occupancy grid names them; without them a metric
+    says how well the semantics are known. A semantic cell called unknown still counts as wrong.
+
+    Parameters
+    ----------
+    confusion : (C, C) int
+        Row: truth.
+    label_set : LabelSet
+        Its first `n_semantic` classes are the semantic ones.
+
+    Returns
+    -------
+    (C, C) int64
+        The same matrix with the rows of the other classes emptied.
+    """
+    kept = _matrix(confusion).copy()
+    if len(kept) != len(label_set):
+        raise ArgumentError(
+            "confusion", f"a row for each of the {len(label_set)} classes of {label_set.name}", len(kept)
+        )
+    kept[label_set.n_semantic :] = 0
+    return kept
+
+
+def pixel_accuracy(confusion: ArrayLike) -> float:
+    """Return the share of labelled cells that are called right, 0..1.
+
+    Parameters
+    ----------
+    confusion : (C, C) int
+        Row: truth.
+
+    Returns
+    -------
+    float
+        NaN when no cell is labelled.
+    """
+    matrix = _matrix(confusion)
+    return _ratio(np.trace(matrix), matrix.sum())
+
+
+def class_accuracy(confusion: ArrayLike) -> float:
+    """Return the mean over classes of the share of a class's cells that are called right, 0..1.
+
+    Parameters
+    ----------
+    confusion : (C, C) int
+        Row: truth.
+
+    Returns
+    -------
+    float
+        A class without truth cells is left out of the mean; NaN when no cell is labelled.
+    """
+    matrix = _matrix(confusion)
+    cells = matrix.sum(axis=1)
+    present = cells > 0
+    return _ratio((np.diag(matrix)[present] / cells[present]).sum(), present.sum())
+
+
+def frequency_weighted_iou(confusion: ArrayLike) -> float:
+    """Return FmIoU: the classes' intersections over unions, each weighed by its share of the true cells, 0..1.
+
+    Parameters
+    ----------
+    confusion : (C, C) int
+        Row: truth.
+
+    Returns
+    -------
+    float
+        sum_c n_c / N * TP_c / (n_c + m_c - TP_c), n_c true and m_c predicted cells of class c; NaN when no
+        cell is labelled.
+    """
+    matrix = _matrix(confusion)
+    cells, hits = matrix.sum(axis=1), np.diag(matrix)
+    present = cells > 0
+    union = cells + matrix.sum(axis=0) - hits
+    return _ratio((cells[present] * hits[present] / union[present]).sum(), cells.sum())
+
+
+def _matrix(confusion: ArrayLike) -> NDArray:
+    """Return the confusion matrix as an array, or say why it isn't one."""
+    matrix = np.asarray(confusion)
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
+        raise ArgumentError("confusion", "a square matrix, row: truth", f"shape {matrix.shape}")
+    return matrix
+
+
+def _ratio(part: float, whole: float) -> float:
+    return float(part / whole) if whole else float("nan")

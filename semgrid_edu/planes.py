@@ -1,0 +1,268 @@
+"""Planes above the ground and what the image says on them, equations (1) and (2) of the paper (section 3.3)."""
+
+from typing import NamedTuple
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array
+from torch import Tensor, nn
+
+from semgrid_edu.camera import Camera, project, transform_points
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+
+
+def plane_heights(n_planes: int = 20, spacing: float = 0.2) -> NDArray[np.float64]:
+    """Return the heights delta_i of the planes above the ground, the lowest on it.
+
+    Parameters
+    ----------
+    n_planes : int
+        D; the paper's 20 (section 4.1).
+    spacing : float
+        The constant d between planes, metres. The paper doesn't give it. 0.2 m is the side of the paper's
+        cells; 20 planes then reach 3.8 m, above cars, people, trucks and most signs.
+
+    Returns
+    -------
+    (D,) float64
+        Metres.
+
+    Examples
+    --------
+    >>> plane_heights(4, spacing=0.5)
+    array([0. , 0.5, 1. , 1.5])
+    """
+    if n_planes < 1:
+        raise ArgumentError("n_planes", "at least one plane", n_planes)
+    if not (np.isfinite(spacing) and spacing > 0):
+        raise ArgumentError("spacing", "a positive distance in metres", spacing)
+    return np.arange(n_planes) * float(spacing)
+
+
+def plane_pixels(spec: GridSpec, heights: ArrayLike, camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Find the pixel that sees each point of each plane: equation (1).
+
+    The point of plane i above cell j lies at (x_j, y_j, delta_i) in the grid frame, and T_camera_from_grid
+    takes it to the camera.
+
+    Parameters
+    ----------
+    spec : GridSpec
+        The cells, (H, W) of them.
+    heights : (D,) float
+        delta_i, metres above the ground.
+    camera : Camera
+
+    Returns
+    -------
+    pixels : (D, H, W, 2) float64
+        u, v; NaN behind the camera.
+    visible : (D, H, W) bool
+        In front of the camera and inside the image.
+
+    Raises
+    ------
+    ArgumentError
+        When `heights` isn't a list of finite numbers.
+    """
+    heights = np.asarray(heights, dtype=np.float64)
+    if heights.ndim != 1 or not np.isfinite(heights).all():
+        raise ArgumentError("heights", "finite metres, shape (D,)", f"shape {heights.shape}: {heights}")
+    points = np.empty((len(heights), *spec.shape, 3))
+    points[..., :2] = spec.centers()
+    points[..., 2] = heights[:, None, None]
+    return project(transform_points(camera.T_camera_from_grid, points), camera)
+
+
+def sample_planes_naive(scores: ArrayLike, pixels: NDArray, visible: NDArray) -> NDArray[np.float64]:
+    """Resample the scores on the planes: equation (2), literally, one point at a time.
+
+    p[c, i, j] = sum_n sum_m s[c, n, m] k(u_j - m) k(v_j - n), with the bilinear kernel k(t) = max(0, 1 - |t|).
+
+    Parameters
+    ----------
+    scores : (C, h, w) float
+        s, one value a class and pixel.
+    pixels : (D, H, W, 2) float
+        u, v of each point.
+    visible : (D, H, W) bool
+
+    Returns
+    -------
+    (C, D, H, W) float64
+        p; zero where a point isn't visible.
+
+    Raises
+    ------
+    ArgumentError
+        When the shapes don't agree or a visible point lies outside the image.
+
+    Examples
+    --------
+    >>> scores = np.array([[[0.0, 1.0], [2.0, 3.0]]])
+    >>> sample_planes_naive(scores, np.full((1, 1, 1, 2), 0.5), np.ones((1, 1, 1), bool))
+    array([[[[1.5]]]])
+    """
+    s = np.asarray(scores, dtype=np.float64)
+    _check_points(pixels, visible, s.shape[1:])
+    n, m = np.arange(s.shape[1]), np.arange(s.shape[2])
+    p = np.zeros((s.shape[0], *visible.shape))
+    for j in np.ndindex(visible.shape):
+        if visible[j]:
+            u, v = pixels[j]
+            p[:, *j] = _bilinear_kernel(v - n) @ s @ _bilinear_kernel(u - m)
+    return p
+
+
+def _bilinear_kernel(t: NDArray) -> NDArray:
+    return np.maximum(0, 1 - np.abs(t))
+
+
+class PlaneSampler(nn.Module):
+    """Resample scores on the planes: equation (2), fast and differentiable.
+
+    For a fixed calibration the four pixels around each point and their weights never change, so equation (2)
+    is one sparse matrix that maps pixels to points. It and its transpose, which carries gradients back, are
+    built once. Points that aren't visible are empty rows and cost nothing.
+
+    Parameters
+    ----------
+    pixels : (D, H, W, 2) float
+        u, v of each point, from `plane_pixels`.
+    visible : (D, H, W) bool
+        The points that take a value; the others take zero.
+    image_size : (int, int)
+        h, w of the scores.
+
+    Raises
+    ------
+    ArgumentError
+        When the shapes don't agree or a visible point lies outside the image.
+
+    Examples
+    --------
+    >>> sampler = PlaneSampler(np.full((1, 1, 1, 2), 0.5), np.ones((1, 1, 1), bool), image_size=(2, 2))
+    >>> sampler(torch.tensor([[[[0.0, 1.0], [2.0, 3.0]]]]))
+    tensor([[[[[1.5000]]]]])
+    """
+
+    def __init__(self, pixels: NDArray, visible: NDArray, image_size: tuple[int, int]) -> None:
+        super().__init__()
+        pixels, visible = np.asarray(pixels), np.asarray(visible)
+        _check_points(pixels, visible, image_size)
+        self.image_size = tuple(image_size)
+        self.planes_shape = visible.shape
+        matrix = _bilinear_matrix(pixels, visible, image_size)
+        self._register_matrix("matrix", matrix)
+        self._register_matrix("transpose", matrix.T.tocsr())
+
+    def _register_matrix(self, name: str, matrix: csr_array) -> None:
+        """Keep a sparse matrix as buffers: they follow the module to its device, and stay out of its weights."""
+        for part, values in zip(_SparseMatrix._fields, (matrix.indices, matrix.indptr, matrix.data), strict=True):
+            self.register_buffer(f"{name}_{part}", torch.from_numpy(values), persistent=False)
+
+    def _matrix(self, name: str) -> "_SparseMatrix":
+        return _SparseMatrix(*(getattr(self, f"{name}_{part}") for part in _SparseMatrix._fields))
+
+    def forward(self, scores: Tensor) -> Tensor:
+        """Return the planes of each image.
+
+        Parameters
+        ----------
+        scores : (B, C, h, w) float
+
+        Returns
+        -------
+        (B, C, D, H, W) float
+            Channels-last in memory, (B, D, H, W, C), as the convolution that follows likes it.
+
+        Raises
+        ------
+        ArgumentError
+            When the scores don't have the size that the sampler was built for.
+        """
+        if scores.ndim != 4 or tuple(scores.shape[2:]) != self.image_size:
+            raise ArgumentError(
+                "scores", f"shape (B, C, {self.image_size[0]}, {self.image_size[1]})", tuple(scores.shape)
+            )
+        rows = scores.permute(0, 2, 3, 1).flatten(1, 2)
+        matrix, transpose = self._matrix("matrix"), self._matrix("transpose")
+        sampled = [_SparseProduct.apply(image, matrix, transpose) for image in rows]
+        # Stacking copies, which one image, the running pipeline's case, needn't pay for.
+        planes = sampled[0][None] if len(sampled) == 1 else torch.stack(sampled)
+        return planes.unflatten(1, self.planes_shape).permute(0, 4, 1, 2, 3)
+
+
+class _SparseMatrix(NamedTuple):
+    """Compressed sparse rows: row r holds weights[offsets[r]:offsets[r + 1]] in the columns indices[...]."""
+
+    indices: Tensor
+    offsets: Tensor
+    weights: Tensor
+
+    def multiply(self, rows: Tensor) -> Tensor:
+        """Return the product with a matrix, (columns, C) -> (rows, C).
+
+        PyTorch's bag of embeddings is just that, a weighted sum of gathered rows, and several times
+        faster on a CPU than its sparse matrices.
+        """
+        weights = self.weights.to(rows.dtype)
+        return F.embedding_bag(
+            self.indices, rows, self.offsets, mode="sum", per_sample_weights=weights, include_last_offset=True
+        )
+
+
+class _SparseProduct(torch.autograd.Function):
+    """y = A x, whose gradient is A^T dL/dy; the transpose is given, so that nothing is scattered."""
+
+    @staticmethod
+    def forward(ctx, rows: Tensor, matrix: _SparseMatrix, transpose: _SparseMatrix) -> Tensor:
+        ctx.matrices = matrix, transpose
+        return matrix.multiply(rows.contiguous())
+
+    @staticmethod
+    def backward(ctx, grad: Tensor) -> tuple[Tensor, None, None]:
+        matrix, transpose = ctx.matrices
+        return _SparseProduct.apply(grad, transpose, matrix), None, None
+
+
+def _bilinear_matrix(pixels: NDArray, visible: NDArray, image_size: tuple[int, int]) -> csr_array:
+    """Return equation (2) as a matrix: a row a point, a column a pixel, four weights in each visible row."""
+    height, width = image_size
+    u, v = pixels[visible].T
+    left, top = np.floor(u), np.floor(v)
+    right_weight, lower_weight = u - left, v - top
+    # On the last column or row the far neighbour has no weight, but it must exist.
+    right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
+    indices = np.stack(
+        [top * width + left, top * width + right, bottom * width + left, bottom * width + right], axis=-1
+    )
+    weights = np.stack(
+        [
+            (1 - lower_weight) * (1 - right_weight),
+            (1 - lower_weight) * right_weight,
+            lower_weight * (1 - right_weight),
+            lower_weight * right_weight,
+        ],
+        axis=-1,
+    )
+    offsets = np.concatenate([[0], np.cumsum(4 * visible.ravel())])
+    return csr_array(
+        (weights.ravel().astype(np.float32), indices.ravel().astype(np.int32), offsets.astype(np.int32)),
+        shape=(visible.size, height * width),
+    )
+
+
+def _check_points(pixels: NDArray, visible: NDArray, image_size: tuple[int, int]) -> None:
+    """Refuse points that don't fit each other or the image."""
+    if visible.ndim != 3 or visible.dtype != bool:
+        raise ArgumentError("visible", "bool, shape (D, H, W)", f"{visible.dtype}, shape {visible.shape}")
+    if pixels.shape != (*visible.shape, 2):
+        raise ArgumentError("pixels", f"shape {(*visible.shape, 2)}", pixels.shape)
+    last = np.array(image_size)[::-1] - 1
+    seen = pixels[visible]
+    if not ((seen >= 0) & (seen <= last)).all():
+        raise ArgumentError("pixels", f"visible points in an image of {image_size} pixels", "points outside it")

@@ -1,0 +1,175 @@
+import numpy as np
+import pytest
+import torch
+import torch.nn.functional as F
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.ndimage import map_coordinates
+
+from semgrid_edu.camera import Camera
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.planes import PlaneSampler, plane_heights, plane_pixels, sample_planes_naive
+
+# Grid axes (x ahead, y left, z up) to camera axes (z ahead, x right, y down), one metre above the ground.
+LOOKING_AHEAD = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]])
+
+
+def _camera(size=(101, 201), focal=100.0):
+    K = np.array([[focal, 0, 100], [0, focal, 50], [0, 0, 1.0]])
+    return Camera(K, LOOKING_AHEAD, size, lidar_height=1.0)
+
+
+def _random_points(rng, size, shape=(2, 3, 4)):
+    """Pixels anywhere in an image of that size, its borders included, and about a quarter of them not visible."""
+    last = np.array(size)[::-1] - 1
+    pixels = rng.uniform(0, 1, (*shape, 2)) * last
+    pixels[0, 0, :3] = [[0, 0], last, [last[0], 0]]
+    visible = rng.random(shape) < 0.75
+    pixels[~visible] = np.nan
+    return pixels, visible
+
+
+def test_planes_stand_on_the_ground_at_equal_distances():
+    heights = plane_heights()
+    assert len(heights) == 20
+    assert heights[0] == 0
+    np.testing.assert_allclose(np.diff(heights), heights[1])
+
+
+def test_equation_1_by_hand():
+    # One cell, its centre 10 m ahead and 2 m to the left: X = -2, Z = 10, and Y = 1 on the ground, 0 at 1 m.
+    spec = GridSpec(x_min=9.5, x_max=10.5, y_min=1.5, y_max=2.5, cell=1.0)
+    pixels, visible = plane_pixels(spec, [0.0, 1.0], _camera())
+    np.testing.assert_allclose(pixels[:, 0, 0], [[80, 60], [80, 50]])
+    assert visible.all()
+
+
+def test_points_behind_the_camera_are_not_visible():
+    spec = GridSpec(x_min=-4, x_max=4, y_min=-1, y_max=1, cell=1.0)
+    pixels, visible = plane_pixels(spec, [1.0], _camera())
+    assert visible[0, :4].all()
+    assert not visible[0, 4:].any()
+    assert np.isnan(pixels[0, 4:]).all()
+
+
+def test_the_image_border_is_the_centre_of_its_last_pixels():
+    # At 10 m, u = 100 - 10 y: y = 10 m is the first column, y = -10 m the last one.
+    for y, inside in ((10.0, True), (-10.0, True), (10.01, False), (-10.01, False)):
+        spec = GridSpec(x_min=9.5, x_max=10.5, y_min=y - 0.5, y_max=y + 0.5, cell=1.0)
+        assert plane_pixels(spec, [1.0], _camera())[1].item() is inside
+
+
+def test_equation_2_by_hand():
+    scores = np.arange(9.0).reshape(1, 3, 3)  # row n holds 3 n, 3 n + 1, 3 n + 2
+    cases = {(0, 0): 0, (1, 2): 7, (2, 2): 8, (0.5, 0): 0.5, (0, 0.5): 1.5, (0.25, 1.5): 4.75, (1.75, 0.75): 4.0}
+    pixels = np.array(list(cases), dtype=float).reshape(1, 1, -1, 2)
+    visible = np.ones(pixels.shape[:3], dtype=bool)
+    np.testing.assert_allclose(sample_planes_naive(scores, pixels, visible).ravel(), list(cases.values()))
+
+
+def test_each_kernel_weight_by_hand():
+    scores = np.zeros((1, 3, 3))
+    scores[0, 1:, 1:] = [[1, 10], [100, 1000]]
+    # u = 1.25, v = 1.5: weights (3/4, 1/4) across and (1/2, 1/2) down.
+    value = sample_planes_naive(scores, np.full((1, 1, 1, 2), (1.25, 1.5)), np.ones((1, 1, 1), dtype=bool))
+    assert value.item() == pytest.approx(0.375 * 1 + 0.125 * 10 + 0.375 * 100 + 0.125 * 1000)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 6), st.integers(1, 7), st.integers(1, 4), st.integers(1, 3))
+def test_fast_and_literal_twins_agree(seed, h, w, n_classes, batch):
+    rng = np.random.default_rng(seed)
+    pixels, visible = _random_points(rng, (h, w))
+    scores = rng.normal(size=(batch, n_classes, h, w))
+    fast = PlaneSampler(pixels, visible, (h, w))(torch.from_numpy(scores).float()).numpy()
+    literal = np.stack([sample_planes_naive(image, pixels, visible) for image in scores])
+    assert fast.dtype == np.float32
+    np.testing.assert_allclose(fast, literal, atol=2e-6)
+    assert (fast[:, :, ~visible] == 0).all()
+
+
+def test_sampling_is_exact_to_a_thousandth_of_a_pixel():
+    # On the ramps s = u and s = v the value read is the pixel read from: an offset shows as it is.
+    rng = np.random.default_rng(0)
+    h, w = 96, 320
+    pixels, visible = _random_points(rng, (h, w), shape=(4, 20, 30))
+    v, u = np.mgrid[:h, :w].astype(np.float32)
+    read = PlaneSampler(pixels, visible, (h, w))(torch.from_numpy(np.stack([u, v]))[None])[0].numpy()
+    np.testing.assert_allclose(read[:, visible].T, pixels[visible], atol=1e-3)
+
+
+@pytest.mark.parametrize("size", [(96, 320), (7, 5)])
+def test_sampling_agrees_with_scipy_and_torch(size):
+    rng = np.random.default_rng(1)
+    pixels, visible = _random_points(rng, size, shape=(3, 8, 9))
+    scores = rng.normal(size=(2, *size)).astype(np.float32)
+    ours = PlaneSampler(pixels, visible, size)(torch.from_numpy(scores)[None])[0].numpy()
+    by_scipy = [map_coordinates(image, pixels[visible].T[::-1], order=1) for image in scores]
+    np.testing.assert_allclose(ours[:, visible], by_scipy, atol=1e-4)
+    grid = torch.from_numpy(2 * pixels[visible] / (size[1] - 1, size[0] - 1) - 1).float()
+    by_torch = F.grid_sample(torch.from_numpy(scores)[None], grid[None, None], align_corners=True)[0, :, 0]
+    np.testing.assert_allclose(ours[:, visible], by_torch, atol=1e-4)
+
+
+def test_the_gradient_is_exact():
+    rng = np.random.default_rng(2)
+    pixels, visible = _random_points(rng, (4, 5))
+    sampler = PlaneSampler(pixels, visible, (4, 5)).double()
+    scores = torch.from_numpy(rng.normal(size=(2, 3, 4, 5))).requires_grad_()
+    assert torch.autograd.gradcheck(sampler, scores)
+    assert torch.autograd.gradgradcheck(sampler, scores)
+
+
+def test_the_backward_pass_is_the_adjoint():
+    # <A x, y> = <x, A^T y> for every x and y.
+    rng = np.random.default_rng(3)
+    pixels, visible = _random_points(rng, (30, 40), shape=(5, 20, 10))
+    x = torch.from_numpy(rng.normal(size=(2, 3, 30, 40))).requires_grad_()
+    planes = PlaneSampler(pixels, visible, (30, 40)).double()(x)
+    y = torch.from_numpy(rng.normal(size=planes.shape))
+    planes.backward(y)
+    torch.testing.assert_close((planes * y).sum(), (x * x.grad).sum())
+
+
+def test_a_sampler_holds_no_weights():
+    sampler = PlaneSampler(*_random_points(np.random.default_rng(4), (4, 5)), (4, 5))
+    assert not list(sampler.parameters())
+    assert not sampler.state_dict()
+
+
+def test_nothing_visible_gives_zero():
+    sampler = PlaneSampler(np.full((1, 2, 2, 2), np.nan), np.zeros((1, 2, 2), dtype=bool), (4, 5))
+    assert (sampler(torch.ones(1, 3, 4, 5)) == 0).all()
+
+
+def test_a_drawn_world_lands_in_its_cells():
+    """Paint the ground's y coordinate in an image by a ray through each pixel: plane 0 must read it back."""
+    camera = _camera(size=(101, 201))
+    v, u = np.mgrid[51:101, :201].astype(float)
+    depth = 100.0 / (v - 50)  # where the ray meets the ground, 1 m below
+    left = np.zeros(camera.size)
+    left[51:] = -(u - 100) / 100 * depth
+    spec = GridSpec(x_min=2.0, x_max=5.0, y_min=-1.5, y_max=1.5, cell=0.5)
+    pixels, visible = plane_pixels(spec, [0.0], camera)
+    scores = torch.from_numpy(left).float()[None, None]
+    planes = PlaneSampler(pixels, visible, camera.size)(scores)[0, 0, 0]
+    np.testing.assert_allclose(planes, spec.centers()[..., 1], atol=0.01)
+
+
+def test_wrong_inputs_are_named():
+    points, visible = np.zeros((1, 2, 2, 2)), np.ones((1, 2, 2), dtype=bool)
+    with pytest.raises(ArgumentError, match="visible: expected bool"):
+        PlaneSampler(points, visible.astype(int), (4, 5))
+    with pytest.raises(ArgumentError, match=r"pixels: expected shape \(1, 2, 2, 2\)"):
+        PlaneSampler(points[..., 0], visible, (4, 5))
+    with pytest.raises(ArgumentError, match="visible points in an image"):
+        PlaneSampler(points + 4.5, visible, (4, 5))
+    with pytest.raises(ArgumentError, match=r"scores: expected shape \(B, C, 4, 5\), found \(1, 3, 5, 4\)"):
+        PlaneSampler(points, visible, (4, 5))(torch.zeros(1, 3, 5, 4))
+    with pytest.raises(ArgumentError, match="heights"):
+        plane_pixels(GridSpec.compact(), [np.nan], _camera())
+    with pytest.raises(ArgumentError, match="n_planes"):
+        plane_heights(0)
+    with pytest.raises(ArgumentError, match="spacing"):
+        plane_heights(20, spacing=0.0)
