@@ -1,0 +1,7 @@
+"""Readers of drives, labels and data sets, and the cached training set (section 4)."""
+
+from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame, load_index
+from semgrid_edu.datasets.kitti_raw import KittiRawDrive
+from semgrid_edu.datasets.truth import grid_truth
+
+__all__ = ["DatasetIndex", "KittiRawDrive", "LabelledFrame", "grid_truth", "load_index"]

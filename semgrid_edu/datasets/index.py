@@ -1,0 +1,123 @@
+"""The table of contents of a data set: its labelled frames, to learn from or to test (section 4)."""
+
+import json
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from semgrid_edu.datasets.kitti_raw import KittiRawDrive
+from semgrid_edu.datasets.reading import read_text
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.labels import LABEL_SETS, LabelSet
+
+INDEX_FILE = "dataset.json"
+
+
+class LabelledFrame(NamedTuple):
+    """Where a labelled frame is: frame number `frame` of `KittiRawDrive(root, date, drive)`."""
+
+    date: str
+    drive: str
+    frame: int
+
+
+@dataclass(frozen=True)
+class DatasetIndex:
+    """What a data set holds.
+
+    Parameters
+    ----------
+    root : Path
+        Its folder, which holds the dates.
+    name : str
+    label_set : LabelSet
+    splits : dict of str to tuple of LabelledFrame
+        Such as "train" and "test"; no drive is in two of them.
+    """
+
+    root: Path
+    name: str
+    label_set: LabelSet
+    splits: dict[str, tuple[LabelledFrame, ...]]
+
+    def drives(self, split: str) -> dict[KittiRawDrive, list[int]]:
+        """Return the drives of a split and the numbers of their labelled frames, both in the order of the index.
+
+        Raises
+        ------
+        ArgumentError
+            When there is no such split.
+        DataError
+            When a drive is missing, or has no such frame.
+        """
+        if split not in self.splits:
+            raise ArgumentError("split", f"one of {', '.join(self.splits)}", repr(split))
+        drives: dict[tuple[str, str], list[int]] = {}
+        for date, drive, frame in self.splits[split]:
+            drives.setdefault((date, drive), []).append(frame)
+        opened = {KittiRawDrive(self.root, *name): frames for name, frames in drives.items()}
+        for drive, frames in opened.items():
+            if max(frames) >= len(drive):
+                raise DataError(drive.folder, f"frame {max(frames)}, which {INDEX_FILE} lists", f"{len(drive)} frames")
+        return opened
+
+
+def load_index(dataset_dir: str | Path) -> DatasetIndex:
+    """Read dataset.json of a data set.
+
+    Parameters
+    ----------
+    dataset_dir : path-like
+        Such as data/minikitti.
+
+    Returns
+    -------
+    DatasetIndex
+
+    Raises
+    ------
+    DataError
+        When the file is missing or isn't such an index.
+    """
+    root = Path(dataset_dir)
+    path = root / INDEX_FILE
+    try:
+        content = json.loads(read_text(path))
+    except json.JSONDecodeError as error:
+        raise DataError(path, "JSON", error) from error
+    name, label_set, splits = (_entry(path, content, key) for key in ("name", "label_set", "splits"))
+    if not isinstance(label_set, str) or label_set not in LABEL_SETS:
+        raise DataError(path, f"label_set: one of {', '.join(LABEL_SETS)}", repr(label_set))
+    if not isinstance(splits, dict) or not all(isinstance(frames, list) and frames for frames in splits.values()):
+        raise DataError(path, "splits: lists of labelled frames by name, none empty", repr(splits)[:200])
+    frames = {split: tuple(_frame(path, entry) for entry in entries) for split, entries in splits.items()}
+    _refuse_leaks(path, frames)
+    return DatasetIndex(root, name, LABEL_SETS[label_set], frames)
+
+
+def _entry(path: Path, content: Any, key: str) -> Any:
+    """Return the value of a key."""
+    if not isinstance(content, dict) or key not in content:
+        raise DataError(path, f"an object with the key {key!r}", repr(content)[:200])
+    return content[key]
+
+
+def _frame(path: Path, entry: Any) -> LabelledFrame:
+    """Check one entry of a split."""
+    date, drive, frame = (_entry(path, entry, key) for key in LabelledFrame._fields)
+    sound_names = all(isinstance(name, str) and re.fullmatch(r"\w+", name) for name in (date, drive))
+    if not sound_names or type(frame) is not int or frame < 0:
+        raise DataError(path, 'a frame like {"date": "2026_01_01", "drive": "0001", "frame": 9}', entry)
+    return LabelledFrame(date, drive, frame)
+
+
+def _refuse_leaks(path: Path, splits: dict[str, tuple[LabelledFrame, ...]]) -> None:
+    """Refuse a frame that comes twice and a drive in two splits: a network would be tested on what it learned."""
+    split_of: dict[tuple[str, str], str] = {}
+    for split, frames in splits.items():
+        if len(set(frames)) != len(frames):
+            raise DataError(path, f"each frame of {split} once", "a frame that comes twice")
+        for frame in frames:
+            if split_of.setdefault(frame[:2], split) != split:
+                raise DataError(path, "each drive in one split", f"{frame.date} {frame.drive} in two")

@@ -1,0 +1,212 @@
+"""One drive in KITTI's raw layout, real or simulated, frame by frame (section 4; Geiger et al., IJRR 2013)."""
+
+import operator
+import re
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.camera import Camera, invert_rigid
+from semgrid_edu.datasets.calibration import read_camera, read_rigid
+from semgrid_edu.datasets.kitti_labels import read_labels
+from semgrid_edu.datasets.oxts import mercator_pose, mercator_scale, read_packet
+from semgrid_edu.datasets.reading import read_bytes, read_png
+from semgrid_edu.datasets.timestamps import read_timestamps
+from semgrid_edu.errors import DataError
+from semgrid_edu.frame import Frame, FrameLabels
+
+LIDAR_RANGE = 250.0
+"""Metres. The HDL-64E of KITTI sees 120; what lies beyond twice that is no measurement."""
+
+SAME_INSTANT = np.timedelta64(500, "ms")
+"""How far apart the sensors' times of one frame may be; at 10 Hz they should lie within 0.1 s."""
+
+_FRAME_FILE = re.compile(r"(\d{10})\.(bin|png|txt)")
+
+
+class KittiRawDrive(Sequence[Frame]):
+    """The frames of a drive, read when asked for.
+
+    `drive[k]` is frame k as KITTI numbers it, `drive[-1]` the last, `drive[2:5]` a list of three. Nothing but the
+    names of the files is read before; every frame that comes out has passed all checks.
+
+    Parameters
+    ----------
+    root : path-like
+        The folder that holds the dates.
+    date : str
+        Such as "2011_09_26".
+    drive : str
+        Such as "0013".
+
+    Raises
+    ------
+    DataError
+        When there is no such drive (the error says which there are); from `drive[k]`, when a file that the frame
+        needs is missing or damaged.
+
+    Examples
+    --------
+    >>> drive = KittiRawDrive("kitti_raw", "2011_09_26", "0013")    # doctest: +SKIP
+    >>> frame = drive[3]                                            # doctest: +SKIP
+    >>> frame.points.shape, frame.image.shape                       # doctest: +SKIP
+    ((113944, 4), (375, 1242, 3))
+    """
+
+    def __init__(self, root: str | Path, date: str, drive: str) -> None:
+        self.date_folder = _existing(Path(root), date, "dates", "*_*_*")
+        self.folder = _existing(self.date_folder, f"{date}_drive_{drive}_sync", "drives", "*_sync")
+        self._sensors = ["velodyne_points", "oxts"]
+        if (self.folder / "image_02").exists():
+            self._sensors.append("image_02")
+        self._length = 1 + max((_last_frame(self.folder / sensor / "data") for sensor in self._sensors), default=-1)
+        if self._length == 0:
+            raise DataError(self.folder, "frames in velodyne_points/data", "none")
+
+    def __len__(self) -> int:
+        """Return the number of frames, scans that were never recorded included."""
+        return self._length
+
+    @overload
+    def __getitem__(self, index: int) -> Frame: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Frame]: ...
+    def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
+        """Read a frame, or a list of frames."""
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        k = operator.index(index)
+        if not -len(self) <= k < len(self):
+            raise IndexError(f"frame {k} of a drive of {len(self)} frames")
+        k %= len(self)
+        return Frame(
+            image=self._image(k),
+            points=self._points(k),
+            camera=self.camera,
+            T_world_from_lidar=self._pose(k),
+            time=self._time(k),
+            labels=self._labels(k),
+        )
+
+    @cached_property
+    def camera(self) -> Camera:
+        """The calibration of image_02, the same for all frames."""
+        return read_camera(self.date_folder)
+
+    def problems(self) -> list[str]:
+        """Read every file of the drive and say all that is wrong with it.
+
+        Returns
+        -------
+        list of str
+            One line a problem, which names the file; empty when the drive is sound.
+        """
+        readers: list[Callable[[], object]] = [lambda: self.camera, lambda: self._T_lidar_from_imu]
+        readers += [lambda path=path: read_timestamps(path, len(self)) for path in self._timestamp_files()]
+        for k in range(len(self)):
+            for read in (self._points, self._pose, self._time, self._image, self._labels):
+                readers.append(lambda read=read, k=k: read(k))
+        found = [error for error in map(_error_of, readers) if error] + self._short_scans()
+        return list(dict.fromkeys(found))
+
+    def _file(self, sensor: str, k: int, suffix: str) -> Path:
+        return self.folder / sensor / "data" / f"{k:010d}{suffix}"
+
+    def _timestamp_files(self) -> list[Path]:
+        """Return timestamps.txt of every sensor, and the LIDAR's times of start and end where they are given."""
+        optional = [self.folder / "velodyne_points" / f"timestamps_{event}.txt" for event in ("start", "end")]
+        return [self.folder / sensor / "timestamps.txt" for sensor in self._sensors] + [
+            path for path in optional if path.exists()
+        ]
+
+    @cached_property
+    def _times(self) -> dict[str, NDArray[np.datetime64]]:
+        """When each sensor took each frame, (frames,) datetime64[ns] by sensor."""
+        return {sensor: read_timestamps(self.folder / sensor / "timestamps.txt", len(self)) for sensor in self._sensors}
+
+    def _time(self, k: int) -> float:
+        """Return the seconds since the first scan, once the sensors agree that they mean the same instant."""
+        lidar = self._times["velodyne_points"]
+        for sensor, times in self._times.items():
+            path = self.folder / sensor / "timestamps.txt"
+            if np.isnat(times[k]):
+                raise DataError(path, f"a time in line {k + 1}", "an empty line")
+            if abs(times[k] - lidar[k]) > SAME_INSTANT:
+                raise DataError(path, f"a time within {SAME_INSTANT} of the LIDAR's {lidar[k]}", f"{times[k]}")
+        first = lidar[~np.isnat(lidar)][0]
+        return float((lidar[k] - first) / np.timedelta64(1, "s"))
+
+    def _points(self, k: int) -> NDArray[np.float32]:
+        """Read a scan, (N, 4)."""
+        path = self._file("velodyne_points", k, ".bin")
+        content = read_bytes(path)
+        if len(content) % 16:
+            raise DataError(path, "points of 4 x 4 bytes", f"{len(content)} bytes, {len(content) % 16} too many")
+        points = np.frombuffer(content, dtype="<f4").reshape(-1, 4).astype(np.float32)
+        strange = ~(np.abs(points[:, :3]) <= LIDAR_RANGE).all(axis=1) | ~((points[:, 3] >= 0) & (points[:, 3] <= 1))
+        if strange.any():
+            first = strange.argmax()
+            expected = f"finite coordinates within {LIDAR_RANGE:g} m and reflectances from 0 to 1"
+            raise DataError(path, expected, f"{points[first].tolist()} at point {first}")
+        return points
+
+    def _short_scans(self) -> list[str]:
+        """Name the scans that have less than half the bytes of the drive's median scan: cut short, most likely."""
+        paths = [self._file("velodyne_points", k, ".bin") for k in range(len(self))]
+        sizes = {path: path.stat().st_size for path in paths if path.exists()}
+        median = np.median(list(sizes.values())) if sizes else 0
+        expected = f"a scan about as large as the drive's others, {median:g} bytes"
+        return [str(DataError(path, expected, f"{size}")) for path, size in sizes.items() if 0 < size < median / 2]
+
+    def _image(self, k: int) -> NDArray[np.uint8] | None:
+        """Read the image, (h, w, 3); None when the drive has no folder of this camera."""
+        if "image_02" not in self._sensors:
+            return None
+        return read_png(self._file("image_02", k, ".png"), "RGB", self.camera.size)
+
+    @cached_property
+    def _T_lidar_from_imu(self) -> NDArray[np.float64]:
+        return read_rigid(self.date_folder / "calib_imu_to_velo.txt")
+
+    @cached_property
+    def _first_packet(self) -> NDArray[np.float64]:
+        return read_packet(self._file("oxts", 0, ".txt"))
+
+    def _pose(self, k: int) -> NDArray[np.float64]:
+        """Return T_world_from_lidar; the world is the frame of the IMU at the drive's first packet."""
+        scale = mercator_scale(self._first_packet)
+        T_mercator_from_world = mercator_pose(self._first_packet, scale)
+        T_mercator_from_imu = mercator_pose(read_packet(self._file("oxts", k, ".txt")), scale)
+        return invert_rigid(T_mercator_from_world) @ T_mercator_from_imu @ invert_rigid(self._T_lidar_from_imu)
+
+    def _labels(self, k: int) -> FrameLabels | None:
+        return read_labels(self.folder / "labels", f"{k:010d}.png", self.camera.size)
+
+
+def _existing(parent: Path, name: str, what: str, pattern: str) -> Path:
+    """Return parent/name, or say what there is instead."""
+    if not parent.is_dir():
+        raise DataError(parent, f"a folder of {what}", "no folder")
+    if not (parent / name).is_dir():
+        there = sorted(path.name for path in parent.glob(pattern) if path.is_dir())
+        raise DataError(parent / name, "a folder", f"only the {what} {', '.join(there)}" if there else f"no {what}")
+    return parent / name
+
+
+def _last_frame(folder: Path) -> int:
+    """Return the highest frame number among the files of a folder, -1 without any."""
+    names = (path.name for path in folder.iterdir()) if folder.is_dir() else ()
+    return max((int(match[1]) for match in map(_FRAME_FILE.fullmatch, names) if match), default=-1)
+
+
+def _error_of(read: Callable[[], object]) -> str:
+    """Return what a reader complains of, or nothing."""
+    try:
+        read()
+    except DataError as error:
+        return str(error)
+    return ""

@@ -1,0 +1,69 @@
+"""Poses from GPS and inertial packets (OXTS), by the Mercator projection of the KITTI development kit."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from semgrid_edu.camera import rigid_transform
+from semgrid_edu.datasets.reading import parse_numbers, read_text
+from semgrid_edu.errors import DataError
+
+EARTH_RADIUS = 6378137.0
+"""Metres, at the equator (WGS 84), as the KITTI development kit takes it."""
+
+PACKET_FIELDS = 30
+"""Numbers in a packet; dataformat.txt of a drive names them."""
+
+
+def read_packet(path: Path) -> NDArray[np.float64]:
+    """Read a packet: latitude, longitude (degrees), altitude (m), roll, pitch, yaw (rad), and 24 numbers more.
+
+    Returns
+    -------
+    (30,) float64
+
+    Raises
+    ------
+    DataError
+        When the file is missing or damaged, or the position or the attitude is none.
+    """
+    packet = parse_numbers(path, read_text(path), "an oxts packet")
+    if packet.size != PACKET_FIELDS:
+        raise DataError(path, f"{PACKET_FIELDS} numbers", f"{packet.size}")
+    latitude, longitude = packet[:2]
+    if not (abs(latitude) < 90 and abs(longitude) <= 180):
+        raise DataError(path, "latitude and longitude in degrees", (latitude, longitude))
+    if np.abs(packet[3:6]).max() > 2 * np.pi:
+        raise DataError(path, "roll, pitch and yaw in radians", packet[3:6].tolist())
+    return packet
+
+
+def mercator_scale(packet: NDArray) -> float:
+    """Return the cosine of the packet's latitude: it makes Mercator's metres true metres near there."""
+    return float(np.cos(np.radians(packet[0])))
+
+
+def mercator_pose(packet: NDArray, scale: float) -> NDArray[np.float64]:
+    """Return where the IMU of a packet is: east, north and up of where Mercator's axes cross.
+
+    x = s r lon,  y = s r log tan(pi / 4 + lat / 2),  z = altitude;  R = Rz(yaw) Ry(pitch) Rx(roll).
+
+    Parameters
+    ----------
+    packet : (30,) float
+    scale : float
+        s, the same for all packets of a drive: `mercator_scale` of the first.
+
+    Returns
+    -------
+    (4, 4) float64
+        T_mercator_from_imu, metres.
+    """
+    latitude, longitude = np.radians(packet[:2])
+    x = scale * EARTH_RADIUS * longitude
+    y = scale * EARTH_RADIUS * np.log(np.tan(np.pi / 4 + latitude / 2))
+    roll, pitch, yaw = packet[3:6]
+    rotation = Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix()
+    return rigid_transform(rotation, np.array([x, y, packet[2]]))

@@ -1,0 +1,108 @@
+"""Files read whole and checked: bytes, text and PNG images, with errors that name the file."""
+
+import io
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from semgrid_edu.errors import DataError
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return a file's bytes.
+
+    Raises
+    ------
+    DataError
+        When the file is missing, can't be opened or is empty.
+    """
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise DataError(path, "a file", "nothing there") from None
+    except OSError as error:
+        raise DataError(path, "a readable file", error.strerror) from error
+    if not content:
+        raise DataError(path, "a file with content", "0 bytes")
+    return content
+
+
+def read_text(path: Path) -> str:
+    """Return a file's text.
+
+    Raises
+    ------
+    DataError
+        As `read_bytes`, and when the bytes aren't ASCII, as everything that KITTI writes is.
+    """
+    try:
+        return read_bytes(path).decode("ascii")
+    except UnicodeDecodeError as error:
+        raise DataError(path, "ASCII text", f"byte {error.object[error.start]:#x} at {error.start}") from error
+
+
+def parse_numbers(path: Path, text: str, what: str) -> NDArray[np.float64]:
+    """Return the numbers in a piece of text.
+
+    Parameters
+    ----------
+    path : Path
+        Where the text comes from, for the error.
+    text : str
+        Numbers with spaces between.
+    what : str
+        What they are, for the error.
+
+    Returns
+    -------
+    (N,) float64
+
+    Raises
+    ------
+    DataError
+        When a word isn't a finite number.
+    """
+    try:
+        numbers = np.array([float(word) for word in text.split()])
+    except ValueError as error:
+        raise DataError(path, f"numbers for {what}", error) from error
+    if not np.isfinite(numbers).all():
+        raise DataError(path, f"finite numbers for {what}", text.strip())
+    return numbers
+
+
+def read_png(path: Path, mode: str, size: tuple[int, int]) -> NDArray:
+    """Return the pixels of a PNG.
+
+    Every chunk's checksum is verified: a decoder alone may return half a picture without a word.
+
+    Parameters
+    ----------
+    path : Path
+    mode : str
+        Pillow's name of the pixel format: "RGB", "L" (8 bits) or "I;16".
+    size : (int, int)
+        Height and width, pixels.
+
+    Returns
+    -------
+    (h, w, 3) or (h, w) uint8, or uint16 for "I;16"
+
+    Raises
+    ------
+    DataError
+        When the file isn't a sound PNG of this format and size.
+    """
+    content = read_bytes(path)
+    try:
+        Image.open(io.BytesIO(content), formats=["PNG"]).verify()
+        image = Image.open(io.BytesIO(content), formats=["PNG"])
+        image.load()
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        raise DataError(path, "a sound PNG image", f"{str(error).partition(' <')[0]!r}") from error
+    if image.mode != mode or (image.height, image.width) != size:
+        found = f"{image.mode} of {image.height} x {image.width} pixels"
+        raise DataError(path, f"{mode} of {size[0]} x {size[1]} pixels", found)
+    return np.asarray(image)
