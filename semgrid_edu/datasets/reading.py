@@ -9,6 +9,9 @@ from PIL import Image
 
 from semgrid_edu.errors import DataError
 
+PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
+"""The chunk that ends every PNG; decoders are content without it."""
+
 
 def read_bytes(path: Path) -> bytes:
     """Return a file's bytes.
@@ -102,6 +105,8 @@ def read_png(path: Path, mode: str, size: tuple[int, int]) -> NDArray:
         image.load()
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise DataError(path, "a sound PNG image", f"{str(error).partition(' <')[0]!r}") from error
+    if PNG_END not in content:
+        raise DataError(path, "a sound PNG image", "one without its end")
     if image.mode != mode or (image.height, image.width) != size:
         found = f"{image.mode} of {image.height} x {image.width} pixels"
         raise DataError(path, f"{mode} of {size[0]} x {size[1]} pixels", found)

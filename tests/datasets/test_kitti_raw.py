@@ -1,0 +1,345 @@
+"""A hand-made drive: what it holds comes out, and whatever is broken is named."""
+
+import shutil
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from PIL import Image
+from tiny_drive import (
+    BASELINE,
+    CAMERA_FROM_LIDAR,
+    DATE,
+    LIDAR_FROM_IMU,
+    SIZE,
+    STEP,
+    K,
+    write_packet,
+    write_tiny_drive,
+)
+
+from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.errors import DataError
+
+slow_disk = settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+@pytest.fixture
+def root(tmp_path):
+    write_tiny_drive(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def folder(root):
+    return root / DATE / f"{DATE}_drive_0001_sync"
+
+
+def read_all(root):
+    return KittiRawDrive(root, DATE, "0001")[:]
+
+
+def frames_equal(a, b):
+    same = [np.array_equal(x, y) for x, y in (
+        (a.image, b.image), (a.points, b.points), (a.camera.K, b.camera.K),
+        (a.camera.T_camera_from_lidar, b.camera.T_camera_from_lidar),
+        (a.T_world_from_lidar, b.T_world_from_lidar), (a.time, b.time),
+    )]  # fmt: skip
+    if a.labels is None or b.labels is None:
+        return all(same) and a.labels is b.labels
+    kinds = ("image", "birdseye", "visible")
+    same += [np.array_equal(getattr(a.labels, kind), getattr(b.labels, kind)) for kind in kinds]
+    return all(same) and np.array_equal(a.labels.depth, b.labels.depth, equal_nan=True)
+
+
+class TestSoundDrive:
+    def test_has_no_problems(self, root):
+        assert KittiRawDrive(root, DATE, "0001").problems() == []
+
+    def test_calibration_is_what_was_written(self, root):
+        camera = KittiRawDrive(root, DATE, "0001").camera
+        np.testing.assert_array_equal(camera.K, K)
+        expected = CAMERA_FROM_LIDAR.copy()
+        expected[0, 3] += BASELINE
+        np.testing.assert_allclose(camera.T_camera_from_lidar, expected, atol=1e-12)
+        assert camera.size == SIZE
+
+    def test_car_drives_straight_ahead(self, root):
+        # Yaw is the direction of travel, so in the world, which turned with the first packet, it moves along x.
+        T_imu_from_lidar = np.linalg.inv(LIDAR_FROM_IMU)
+        for k, frame in enumerate(read_all(root)):
+            expected = T_imu_from_lidar.copy()
+            expected[0, 3] += k * STEP
+            np.testing.assert_allclose(frame.T_world_from_lidar, expected, atol=1e-6)
+
+    def test_time_passes_midnight(self, root):
+        np.testing.assert_allclose([frame.time for frame in read_all(root)], [0.0, 0.1, 0.2], atol=1e-9)
+
+    def test_indexes_like_a_list(self, root):
+        drive = KittiRawDrive(root, DATE, "0001")
+        assert len(drive) == 3
+        assert frames_equal(drive[-1], drive[2])
+        assert [frame.time for frame in drive[::-1]] == [frame.time for frame in reversed(list(drive))]
+        for k in (3, -4):
+            with pytest.raises(IndexError):
+                drive[k]
+
+    def test_labels_are_what_was_written(self, root, folder):
+        frames = read_all(root)
+        assert frames[0].labels is None
+        labels = frames[2].labels
+        depth = np.asarray(Image.open(folder / "labels" / "depth" / "0000000002.png")) / 256
+        np.testing.assert_array_equal(labels.depth, np.where(depth > 0, depth, np.nan).astype(np.float32))
+        assert labels.label_set.names[labels.birdseye[410, 150]] == "building"
+        assert labels.visible.sum() == 310 * 200
+
+    def test_camera_folder_may_be_absent(self, root, folder):
+        shutil.rmtree(folder / "image_02")
+        drive = KittiRawDrive(root, DATE, "0001")
+        assert all(frame.image is None for frame in drive)
+        assert drive.problems() == []
+
+
+@pytest.mark.parametrize(
+    ("args", "there"),
+    [(("2026_01_02", "0001"), DATE), ((DATE, "0002"), f"{DATE}_drive_0001_sync")],
+)
+def test_missing_drive_says_which_there_are(root, args, there):
+    with pytest.raises(DataError, match=there):
+        KittiRawDrive(root, *args)
+
+
+def test_missing_root_is_named(tmp_path):
+    with pytest.raises(DataError, match="nowhere"):
+        KittiRawDrive(tmp_path / "nowhere", DATE, "0001")
+
+
+def replace(old, new):
+    def damage(path):
+        text = path.read_text()
+        assert old in text
+        path.write_text(text.replace(old, new, 1))
+
+    return damage
+
+
+def put(*values):
+    def damage(path):
+        points = np.fromfile(path, "<f4")
+        points[: len(values)] = values
+        points.tofile(path)
+
+    return damage
+
+
+def cut(n_bytes):
+    return lambda path: path.write_bytes(path.read_bytes()[:-n_bytes])
+
+
+def empty(path):
+    path.write_bytes(b"")
+
+
+def save_image(array):
+    return lambda path: Image.fromarray(array).save(path)
+
+
+def drop_last_line(path):
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))
+
+
+def duplicate_last_line(path):
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join([*lines[:-1], lines[-2]]))
+
+
+SCAN, IMAGE, PACKET = (
+    "drive/velodyne_points/data/0000000001.bin",
+    "drive/image_02/data/0000000001.png",
+    "drive/oxts/data/0000000001.txt",
+)
+STAMPS = "drive/velodyne_points/timestamps.txt"
+CAM, VELO, IMU = (f"calib_{name}.txt" for name in ("cam_to_cam", "velo_to_cam", "imu_to_velo"))
+LABELS = "drive/labels"
+
+DAMAGES = {
+    **{f"{path} missing": (path, lambda path: path.unlink()) for path in (
+        SCAN, IMAGE, PACKET, STAMPS, CAM, VELO, IMU, f"{LABELS}/label_set.txt", f"{LABELS}/depth/0000000002.png")},
+    **{f"{path} empty": (path, empty) for path in (SCAN, IMAGE, PACKET, STAMPS, CAM, VELO, IMU)},
+    "odd byte count": (SCAN, cut(3)),
+    "NaN coordinate": (SCAN, put(np.nan)),
+    "infinite coordinate": (SCAN, put(1, 2, np.inf)),
+    "coordinate no LIDAR can see": (SCAN, put(1, 1e9)),
+    "reflectance above one": (SCAN, put(1, 2, 3, 255)),
+    "truncated image": (IMAGE, cut(20)),
+    "image without its last byte": (IMAGE, cut(1)),
+    "image of another size": (IMAGE, save_image(np.zeros((6, 40, 3), np.uint8))),
+    "grey image": (IMAGE, save_image(np.zeros(SIZE, np.uint8))),
+    "text for an image": (IMAGE, lambda path: path.write_text("not a picture")),
+    "too few fields": (PACKET, replace(" 0.0", "")),
+    "word for a field": (PACKET, replace("0.0", "zero")),
+    "NaN field": (PACKET, replace("0.0", "nan")),
+    "latitude past the pole": (PACKET, replace("49.0", "149.0")),
+    "binary packet": (PACKET, lambda path: path.write_bytes(b"\xff\x00" * 40)),
+    "a time too few": (STAMPS, drop_last_line),
+    "a time twice": (STAMPS, duplicate_last_line),
+    "a date that isn't": (STAMPS, replace("2026-01-01", "2026-13-01")),
+    "a time cut short": (STAMPS, cut(4)),
+    "times of another day": (STAMPS, lambda path: path.write_text(path.read_text().replace("2026", "2027"))),
+    "words for times": (STAMPS, lambda path: path.write_text("a\nb\nc\n")),
+    "image times missing": ("drive/image_02/timestamps.txt", drop_last_line),
+    "key missing": (CAM, replace("P_rect_02", "P_rect_03")),
+    "word in calibration": (CAM, replace("2.000000e+01", "twenty")),
+    "number missing": (VELO, replace("0.000000e+00", "")),
+    "line without key": (VELO, replace("T:", "T")),
+    "no rotation": (IMU, replace("1.000000e+00", "2.000000e+00")),
+    "mirror": (IMU, replace("1.000000e+00", "-1.000000e+00")),
+    "last number cut": (IMU, cut(2)),
+    "focal length zero": (CAM, replace("P_rect_02: 2.000000e+01", "P_rect_02: 0.000000e+00")),
+    "image size of nothing": (CAM, replace("S_rect_02: 40", "S_rect_02: 0")),
+    "unknown label set": (f"{LABELS}/label_set.txt", replace("KITTI-14", "KITTI-15")),
+    "class that isn't": (f"{LABELS}/image/0000000002.png", save_image(np.full(SIZE, 14, np.uint8))),
+    "grey mask": (f"{LABELS}/visible/0000000002.png", save_image(np.full((710, 310), 7, np.uint8))),
+    "labels on another grid": (f"{LABELS}/birdseye/0000000002.png", save_image(np.zeros((355, 155), np.uint8))),
+    "depth in 8 bits": (f"{LABELS}/depth/0000000002.png", save_image(np.zeros(SIZE, np.uint8))),
+}  # fmt: skip
+
+
+def path_of(root, name):
+    return root / DATE / name.replace("drive/", f"{DATE}_drive_0001_sync/")
+
+
+@pytest.mark.parametrize(("name", "damage"), DAMAGES.values(), ids=DAMAGES)
+def test_damage_is_named(root, name, damage):
+    path = path_of(root, name)
+    damage(path)
+    with pytest.raises(DataError, match=r"expected .+, found .+") as caught:
+        read_all(root)
+    # Times that don't match are found by comparing two files; either may be the wrong one.
+    assert path.name in str(caught.value)
+    assert any(path.name in problem for problem in KittiRawDrive(root, DATE, "0001").problems())
+
+
+def test_problems_lists_all_at_once(root):
+    for name, damage in ((SCAN, cut(3)), (IMAGE, empty), (PACKET, empty), (STAMPS, drop_last_line), (IMU, empty)):
+        damage(path_of(root, name))
+    problems = KittiRawDrive(root, DATE, "0001").problems()
+    assert len(problems) == 5
+    for name in (SCAN, IMAGE, PACKET, STAMPS, IMU):
+        assert sum(str(path_of(root, name)) in problem for problem in problems) == 1
+
+
+def test_scan_that_was_never_recorded_spoils_only_its_frame(root):
+    path_of(root, SCAN).unlink()
+    stamps = path_of(root, STAMPS)
+    first, _, last = stamps.read_text().splitlines()
+    stamps.write_text(f"{first}\n\n{last}\n")
+    drive = KittiRawDrive(root, DATE, "0001")
+    assert len(drive) == 3
+    assert drive[2].time == pytest.approx(0.2)
+    with pytest.raises(DataError, match=r"0000000001\.bin"):
+        drive[1]
+    assert len(drive.problems()) == 2
+
+
+def test_scan_cut_between_points_is_suspected(root):
+    path = path_of(root, SCAN)
+    path.write_bytes(path.read_bytes()[: 16 * 300])
+    (problem,) = KittiRawDrive(root, DATE, "0001").problems()
+    assert path.name in problem
+
+
+FILES = (SCAN, IMAGE, PACKET, STAMPS, CAM, VELO, IMU, *(
+    f"{LABELS}/{kind}/0000000002.png" for kind in ("image", "depth", "birdseye", "visible")))  # fmt: skip
+
+
+@slow_disk
+@given(name=st.sampled_from(FILES), share=st.floats(0, 1, exclude_max=True))
+def test_truncated_file_is_named_or_changes_nothing(tmp_path_factory, name, share):
+    root = tmp_path_factory.mktemp("drive")
+    write_tiny_drive(root)
+    sound = read_all(root)
+    path = path_of(root, name)
+    content = path.read_bytes()
+    length = int(share * len(content))
+    if name == SCAN:
+        length |= 1  # a cut between two points can't be seen in the file; problems() suspects it
+    path.write_bytes(content[:length])
+    try:
+        frames = read_all(root)
+    except DataError as error:
+        complaint = str(error)
+    else:
+        complaint = path.name if all(map(frames_equal, frames, sound)) else "a wrong frame came out"
+    assert path.name in complaint
+
+
+@slow_disk
+@given(name=st.sampled_from([name for name in FILES if name.endswith("png")]), data=st.data())
+def test_flipped_bit_in_an_image_is_named(tmp_path_factory, name, data):
+    root = tmp_path_factory.mktemp("drive")
+    write_tiny_drive(root)
+    path = path_of(root, name)
+    content = bytearray(path.read_bytes())
+    content[data.draw(st.integers(0, len(content) - 1))] ^= 1 << data.draw(st.integers(0, 7))
+    path.write_bytes(content)
+    with pytest.raises(DataError, match=path.name):
+        read_all(root)
+
+
+@slow_disk
+@given(name=st.sampled_from((PACKET, STAMPS, CAM, VELO, IMU)), junk=st.binary(min_size=1, max_size=40))
+def test_junk_in_a_text_file_is_named(tmp_path_factory, name, junk):
+    root = tmp_path_factory.mktemp("drive")
+    write_tiny_drive(root)
+    path = path_of(root, name)
+    path.write_bytes(junk)
+    with pytest.raises(DataError, match=path.name):
+        read_all(root)
+
+
+reflectances = arrays(np.float32, (7, 1), elements=st.floats(0, 1, width=32))
+coordinates = arrays(np.float32, (7, 3), elements=st.floats(-200, 200, width=32))
+
+
+@slow_disk
+@given(xyz=coordinates, reflectance=reflectances)
+def test_points_round_trip(root, xyz, reflectance):
+    points = np.concatenate([xyz, reflectance], axis=1)
+    path_of(root, SCAN).write_bytes(points.astype("<f4").tobytes())
+    np.testing.assert_array_equal(KittiRawDrive(root, DATE, "0001")[1].points, points)
+
+
+angle = st.floats(-3, 3)
+
+
+@slow_disk
+@given(
+    position=arrays(np.float64, 3, elements=st.floats(-3000, 3000)),
+    roll=st.floats(-0.3, 0.3), pitch=st.floats(-0.3, 0.3), yaw=angle, first_yaw=angle,
+)  # fmt: skip
+def test_pose_round_trips_through_mercator(root, position, roll, pitch, yaw, first_yaw):
+    write_packet(path_of(root, PACKET.replace("1.txt", "0.txt")), np.zeros(3), (0.0, 0.0, first_yaw))
+    write_packet(path_of(root, PACKET), position, (roll, pitch, yaw))
+    T_world_from_lidar = KittiRawDrive(root, DATE, "0001")[1].T_world_from_lidar
+    # Undo the world's turn by hand, and look where the IMU's axes point, one rotation after the other.
+    c, s = np.cos(first_yaw), np.sin(first_yaw)
+    T_east_from_imu = np.eye(4)
+    T_east_from_imu[:2, :2] = [[c, -s], [s, c]]
+    T_east_from_imu = T_east_from_imu @ T_world_from_lidar @ LIDAR_FROM_IMU
+    np.testing.assert_allclose(T_east_from_imu[:3, 3], position, atol=1e-6)
+    forward = [np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), -np.sin(pitch)]
+    np.testing.assert_allclose(T_east_from_imu[:3, 0], forward, atol=1e-9)
+    assert T_east_from_imu[2, 1] == pytest.approx(np.sin(roll) * np.cos(pitch), abs=1e-9)
+
+
+@slow_disk
+@given(nanoseconds=st.lists(st.integers(1, 100_000_000), min_size=2, max_size=2))
+def test_times_are_exact_to_the_nanosecond(root, nanoseconds):
+    start = np.datetime64("2026-01-01T23:59:59.950000001", "ns")
+    times = start + np.cumsum([0, *nanoseconds]).astype("timedelta64[ns]")
+    path_of(root, STAMPS).write_text("".join(f"{str(time).replace('T', ' ')}\n" for time in times))
+    found = [frame.time for frame in KittiRawDrive(root, DATE, "0001")]
+    np.testing.assert_allclose(found, np.cumsum([0, *nanoseconds]) * 1e-9, rtol=0, atol=5e-10)
