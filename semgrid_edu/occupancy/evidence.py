@@ -1,0 +1,211 @@
+"""What one LIDAR scan says of each cell: P(z | occupied) and P(z | free) (paper, section 3.2, step 2)."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.motion import PlanarMotion
+from semgrid_edu.occupancy.polar import count_returns, fill_gaps, passed_cells, polar_profile, reach
+
+
+@dataclass(frozen=True)
+class SensorModel:
+    """How a LIDAR scan speaks of cells.
+
+    Parameters
+    ----------
+    obstacle_min, obstacle_max : float
+        Returns between these heights above the ground (m) are obstacles: above a kerb, below what a car
+        drives under. Lower ones come from the ground, higher ones say nothing.
+    azimuth_step : float
+        Width of a beam, degrees: every beam of KITTI's scanner (a column of returns each 0.18 degrees) holds one
+        column or two.
+    column_spacing : float
+        The widest gap between columns of returns that still is no hole, degrees. Our simulated scanner's is 0.6.
+    p_hit_occupied, p_hit_free : float
+        Probability of an obstacle return from a cell that is occupied, or free (a grazing ray, a mixed pixel).
+    max_returns : int
+        Returns beyond this number in one cell add nothing: they aren't independent.
+    p_pass_occupied, p_pass_free : float
+        Probability that a beam passes a cell that is occupied (foliage is porous, objects fill a cell in
+        part), or free.
+    """
+
+    obstacle_min: float = 0.3
+    obstacle_max: float = 2.5
+    azimuth_step: float = 0.3
+    column_spacing: float = 0.6
+    p_hit_occupied: float = 0.8
+    p_hit_free: float = 0.2
+    max_returns: int = 3
+    p_pass_occupied: float = 0.3
+    p_pass_free: float = 0.7
+
+    @property
+    def beams(self) -> int:
+        """Number of beams in a turn."""
+        return round(360 / self.azimuth_step)
+
+    @property
+    def gap(self) -> int:
+        """The most empty beams that neighbouring columns leave between them."""
+        return math.ceil(self.column_spacing / self.azimuth_step - 1e-9)
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """The likelihood of a scan in each cell; the two are equal where it says nothing.
+
+    Parameters
+    ----------
+    occupied, free : (H, W) float32
+        P(z | occupied) and P(z | free).
+    """
+
+    occupied: NDArray[np.float32]
+    free: NDArray[np.float32]
+
+
+def scan_evidence(points: NDArray, spec: GridSpec, sensor: SensorModel, pose: PlanarMotion | None = None) -> Evidence:
+    """Turn a scan into evidence by way of a polar grid: no loop over rays.
+
+    A beam is a narrow sector of azimuth. Along it nothing stands before its first obstacle or, when it has
+    none, before its farthest ground return: so the whole polar grid is one range a beam, in which each
+    cell is looked up. A cell with obstacle returns is occupied; one that its beam passes from end to end, or
+    that holds a ground return, is free; of the others, behind obstacles or out of range, the scan says nothing.
+
+    Assumed: what a beam passes over between two rings isn't there; returns are independent, up to `max_returns`.
+
+    Parameters
+    ----------
+    points : (N, 3+) float
+        Returns: x forward, y left, z above the ground (m), in the grid frame of the vehicle.
+    spec : GridSpec
+        The cells.
+    sensor : SensorModel
+        How the scanner errs.
+    pose : PlanarMotion, optional
+        Where the vehicle is in the frame of `spec`; at its origin when not given.
+
+    Returns
+    -------
+    Evidence
+        That of `scan_evidence_literal`, except within a cell of where what is seen begins or ends.
+
+    Raises
+    ------
+    ArgumentError
+        When `points` isn't a table of finite coordinates.
+    """
+    points, pose = check_points(points), pose or PlanarMotion()
+    heights = (sensor.obstacle_min, sensor.obstacle_max)
+    grid = (spec.shape, spec.x_max, spec.y_max, spec.cell, pose.dx, pose.dy, pose.dyaw)
+    free_to = fill_gaps(reach(*polar_profile(points, *heights, sensor.beams)), sensor.gap)
+    obstacles, ground = count_returns(points, *heights, *grid)
+    return likelihoods(obstacles, passed_cells(free_to, *grid) | (ground > 0), sensor)
+
+
+def scan_evidence_literal(
+    points: NDArray, spec: GridSpec, sensor: SensorModel, pose: PlanarMotion | None = None
+) -> Evidence:
+    """Turn a scan into evidence by walking every ray cell by cell: the literal twin of `scan_evidence`.
+
+    Parameters, result and errors are those of `scan_evidence`; one ray walks along the middle of each beam.
+    """
+    points, pose = check_points(points).astype(np.float64), pose or PlanarMotion()
+    obstacles, free = np.zeros(spec.shape, np.int64), np.zeros(spec.shape, bool)
+    first_obstacle, last_ground = np.full(sensor.beams, np.inf), np.zeros(sensor.beams)
+    for x, y, z in points[:, :3]:
+        rows, cols, inside = spec.cells(pose.to_previous(np.array([[x, y]])))
+        beam = int((np.arctan2(y, x) + np.pi) / (2 * np.pi) * sensor.beams) % sensor.beams
+        if sensor.obstacle_min <= z <= sensor.obstacle_max:
+            obstacles[rows, cols] += inside
+            first_obstacle[beam] = min(first_obstacle[beam], np.hypot(x, y))
+        elif z < sensor.obstacle_min:
+            free[rows, cols] |= inside
+            last_ground[beam] = max(last_ground[beam], np.hypot(x, y))
+    free_to = fill_gaps(reach(first_obstacle, last_ground), sensor.gap)
+    for beam in np.flatnonzero(free_to):
+        azimuth = (beam + 0.5) / sensor.beams * 2 * np.pi - np.pi + pose.dyaw
+        rows, cols, leaves_at = walk_ray(spec, (pose.dx, pose.dy), azimuth, free_to[beam])
+        free[rows, cols] |= leaves_at <= free_to[beam]
+    return likelihoods(obstacles, free, sensor)
+
+
+def walk_ray(
+    spec: GridSpec, start: tuple[float, float], azimuth: float, length: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """List the cells along a ray: it changes cell wherever it crosses a line of the grid.
+
+    Parameters
+    ----------
+    spec : GridSpec
+        The cells.
+    start : (float, float)
+        x, y where the ray begins, metres; it may lie outside the grid.
+    azimuth : float
+        Direction, radians from the x axis to the left.
+    length : float
+        How far to walk, metres; the cell where the ray ends is the last.
+
+    Returns
+    -------
+    rows, cols : (K,) int64
+        The cells, nearest first.
+    leaves_at : (K,) float64
+        Distance from the start at which the ray leaves each, metres; beyond `length` for the last.
+    """
+    direction = np.array([np.cos(azimuth), np.sin(azimuth)])
+    height, width = spec.shape
+    lines = (spec.x_max - np.arange(height + 1) * spec.cell, spec.y_max - np.arange(width + 1) * spec.cell)
+    crossings = [(line - at) / along for line, at, along in zip(lines, start, direction, strict=True) if along]
+    distance = np.unique(np.concatenate([[0.0], *crossings]))
+    distance = distance[distance >= 0]
+    entered = distance[:-1][distance[:-1] < length]
+    leaves_at = distance[1 : len(entered) + 1]
+    rows, cols, inside = spec.cells(start + (entered + leaves_at)[:, None] / 2 * direction)
+    return rows[inside], cols[inside], leaves_at[inside]
+
+
+def likelihoods(obstacles: NDArray, free: NDArray, sensor: SensorModel) -> Evidence:
+    """Turn what fell into each cell into P(z | occupied) and P(z | free).
+
+    Parameters
+    ----------
+    obstacles : (H, W) int
+        Number of obstacle returns, n: P(z | .) = p_hit^min(n, max_returns).
+    free : (H, W) bool
+        Whether the cell was seen to be free; obstacle returns overrule it, for an object fills a cell in part.
+    sensor : SensorModel
+        How the scanner errs.
+
+    Returns
+    -------
+    Evidence
+        Both are 1 where neither holds.
+
+    Examples
+    --------
+    >>> likelihoods(np.array([[2, 0, 0]]), np.array([[True, True, False]]), SensorModel()).free.round(2)
+    array([[0.04, 0.7 , 1.  ]], dtype=float32)
+    """
+    hits = np.minimum(obstacles, sensor.max_returns)
+    passed = free & (hits == 0)
+    occupied = np.float32(sensor.p_hit_occupied) ** hits * np.where(passed, np.float32(sensor.p_pass_occupied), 1)
+    empty = np.float32(sensor.p_hit_free) ** hits * np.where(passed, np.float32(sensor.p_pass_free), 1)
+    return Evidence(occupied.astype(np.float32), empty.astype(np.float32))
+
+
+def check_points(points: NDArray) -> NDArray:
+    """Return the points as an array, or refuse what isn't a table of finite coordinates."""
+    points = np.asarray(points)
+    if points.ndim != 2 or points.shape[1] < 3:
+        raise ArgumentError("points", "shape (N, 3+): x, y, z in metres", f"shape {points.shape}")
+    if not np.isfinite(points[:, :3]).all():
+        bad = int((~np.isfinite(points[:, :3]).all(axis=1)).sum())
+        raise ArgumentError("points", "finite coordinates", f"{bad} of {len(points)} points with NaN or infinity")
+    return points

@@ -1,0 +1,81 @@
+"""Planar motion of the vehicle: what the filter needs to know of ego-motion (paper, section 3.2)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.camera import invert_rigid
+from semgrid_edu.errors import ArgumentError
+
+
+@dataclass(frozen=True)
+class PlanarMotion:
+    """The pose of the vehicle now, in the grid frame of the previous instant.
+
+    Parameters
+    ----------
+    dx, dy : float
+        Metres forward and to the left.
+    dyaw : float
+        Radians to the left.
+
+    Raises
+    ------
+    ArgumentError
+        When one of them isn't finite.
+
+    Examples
+    --------
+    >>> PlanarMotion(1.0, 0.0, np.pi / 2).to_previous(np.array([[2.0, 0.0]])).round(6)
+    array([[1., 2.]])
+    """
+
+    dx: float = 0.0
+    dy: float = 0.0
+    dyaw: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse a motion to nowhere."""
+        if not np.isfinite([self.dx, self.dy, self.dyaw]).all():
+            raise ArgumentError("motion", "finite metres and radians", self)
+
+    @classmethod
+    def from_poses(cls, T_world_from_before: NDArray, T_world_from_now: NDArray) -> "PlanarMotion":
+        """Return the motion between two poses, seen from above.
+
+        Parameters
+        ----------
+        T_world_from_before, T_world_from_now : (4, 4) float
+            Rigid transforms.
+
+        Raises
+        ------
+        ArgumentError
+            When one isn't a finite 4x4 matrix.
+        """
+        for name, T in (("T_world_from_before", T_world_from_before), ("T_world_from_now", T_world_from_now)):
+            if np.shape(T) != (4, 4) or not np.isfinite(T).all():
+                raise ArgumentError(name, "a finite 4x4 transform", T)
+        T_before_from_now = invert_rigid(T_world_from_before) @ T_world_from_now
+        dyaw = np.arctan2(T_before_from_now[1, 0], T_before_from_now[0, 0])
+        return cls(float(T_before_from_now[0, 3]), float(T_before_from_now[1, 3]), float(dyaw))
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """(2, 2): turns vectors in the axes of now into those of the previous instant."""
+        cos, sin = np.cos(self.dyaw), np.sin(self.dyaw)
+        return np.array([[cos, -sin], [sin, cos]])
+
+    def to_previous(self, xy: NDArray) -> NDArray:
+        """Give points of now, (..., 2) metres, their coordinates in the previous frame."""
+        return xy @ self.rotation.T + (self.dx, self.dy)
+
+    def to_now(self, xy: NDArray) -> NDArray:
+        """Give points of the previous frame, (..., 2) metres, their coordinates now."""
+        return (xy - (self.dx, self.dy)) @ self.rotation
+
+    def then(self, motion: "PlanarMotion") -> "PlanarMotion":
+        """Return this motion followed by another."""
+        dx, dy = self.to_previous(np.array([motion.dx, motion.dy]))
+        return PlanarMotion(float(dx), float(dy), self.dyaw + motion.dyaw)

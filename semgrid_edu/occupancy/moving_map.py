@@ -1,0 +1,86 @@
+"""A map that scrolls under the vehicle by whole cells, so that memory stays sharp (paper, section 3.2, step 1)."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.motion import PlanarMotion
+
+
+def map_around(spec: GridSpec, max_yaw: float) -> GridSpec:
+    """Return the map that covers a grid turned by up to `max_yaw` (radians) and shifted by up to a cell."""
+    farthest = np.hypot(max(abs(spec.x_min), abs(spec.x_max)), max(abs(spec.y_min), abs(spec.y_max)))
+    margin = (np.ceil(farthest * np.sin(max_yaw) / spec.cell) + 1) * spec.cell
+    return GridSpec(spec.x_min - margin, spec.x_max + margin, spec.y_min - margin, spec.y_max + margin, spec.cell)
+
+
+def scroll(pose: PlanarMotion, cell: float, max_yaw: float) -> tuple[PlanarMotion, PlanarMotion]:
+    """Decide how the map follows the vehicle.
+
+    It shifts by whole cells, which is exact, and the rest of the vehicle's pose stays in the pose: nothing
+    is interpolated. Only when the vehicle has turned by more than `max_yaw` does the map turn with it,
+    and each cell is looked up once.
+
+    Parameters
+    ----------
+    pose : PlanarMotion
+        Of the vehicle in the map's frame.
+    cell : float
+        Metres.
+    max_yaw : float
+        Radians.
+
+    Returns
+    -------
+    shift : PlanarMotion
+        The map's new frame in its old one.
+    pose : PlanarMotion
+        The vehicle in the new frame: what remains.
+
+    Examples
+    --------
+    >>> scroll(PlanarMotion(1.25, 0.0, 0.01), cell=0.5, max_yaw=0.03)
+    (PlanarMotion(dx=1.0, dy=0.0, dyaw=0.0), PlanarMotion(dx=0.25, dy=0.0, dyaw=0.01))
+    """
+    if abs(pose.dyaw) > max_yaw:
+        return pose, PlanarMotion()
+    dx, dy = round(pose.dx / cell) * cell, round(pose.dy / cell) * cell
+    return PlanarMotion(dx, dy), PlanarMotion(pose.dx - dx, pose.dy - dy, pose.dyaw)
+
+
+def look_up(values: NDArray, outside: NDArray, source: GridSpec, target: GridSpec, pose: PlanarMotion) -> NDArray:
+    """Give each cell of one grid the values of the cell of another that its centre lies in.
+
+    Parameters
+    ----------
+    values : (K, H, W) float32
+        Over the cells of `source`.
+    outside : (K,) float32
+        What a cell gets whose centre lies outside `source`.
+    source, target : GridSpec
+        The grids, (H, W) and (H', W') cells.
+    pose : PlanarMotion
+        The frame of `target` in that of `source`.
+
+    Returns
+    -------
+    (K, H', W') float32
+    """
+    corners = (source.x_max, source.y_max, source.cell, target.x_max, target.y_max, target.cell)
+    return _look_up(values, outside, *corners, target.shape, pose.dx, pose.dy, pose.dyaw)
+
+
+@njit(cache=True)
+def _look_up(values, outside, source_x, source_y, source_cell, x_max, y_max, cell, shape, dx, dy, dyaw):
+    found = np.empty((len(values), *shape), np.float32)
+    cos, sin = np.cos(dyaw), np.sin(dyaw)
+    for r in range(shape[0]):
+        for c in range(shape[1]):
+            x, y = x_max - (r + 0.5) * cell, y_max - (c + 0.5) * cell
+            row = np.floor((source_x - (cos * x - sin * y + dx)) / source_cell)
+            col = np.floor((source_y - (sin * x + cos * y + dy)) / source_cell)
+            inside = 0 <= row < values.shape[1] and 0 <= col < values.shape[2]
+            for k in range(len(values)):
+                found[k, r, c] = values[k, int(row), int(col)] if inside else outside[k]
+    return found

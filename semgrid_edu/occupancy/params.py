@@ -1,0 +1,105 @@
+"""The parameters of the occupancy filter and its transition matrix (paper, section 3.2, step 1)."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.occupancy.evidence import SensorModel
+
+Rates = tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class CmcdotParams:
+    """What the filter assumes of the world.
+
+    The world changes in continuous time, so the transition matrix of any time step follows from rates (1/s),
+    and no time means no change.
+
+    Parameters
+    ----------
+    particles : int
+        How many samples the dynamic mass has.
+    rates : 4 x 4 floats
+        How often a cell turns from the state of the row into that of the column, 1/s; the diagonal is
+        ignored. What nobody sees is forgotten in a few seconds: free space sooner than what stands.
+    stop_rate, stop_speed : float
+        What moves slower than about `stop_speed` (m/s) stands: a particle of speed v turns STATIC at the rate
+        stop_rate exp(-v^2 / (2 stop_speed^2)), 1/s. A pedestrian's 1.4 m/s is far above the default.
+    max_speed : float
+        The velocity prior of what starts to move: speed uniform up to this, m/s (25 m/s = 90 km/h).
+    acceleration : float
+        Standard deviation of a particle's acceleration, m/s^2: traffic brakes and turns with about 2.
+    birth_share : float
+        Part of the particles that is spent on newborn mass, so that new things are found soon.
+    p_seen_unknown : float
+        Probability that the scan says anything about an UNKNOWN (unobserved) cell, relative to the
+        best other explanation: small, so that a cell once seen isn't unknown any more.
+    sensor : SensorModel
+        How the scanner errs.
+
+    Raises
+    ------
+    ArgumentError
+        When a parameter can't be one.
+    """
+
+    particles: int = 100_000
+    rates: Rates = (
+        # to FREE, STATIC, DYNAMIC, UNKNOWN
+        (0.0, 0.1, 0.05, 0.3),
+        (0.02, 0.0, 0.01, 0.1),
+        (0.1, 0.1, 0.0, 0.1),
+        (0.05, 0.05, 0.005, 0.0),
+    )
+    stop_rate: float = 5.0
+    stop_speed: float = 0.4
+    max_speed: float = 25.0
+    acceleration: float = 2.0
+    birth_share: float = 0.2
+    p_seen_unknown: float = 1e-3
+    sensor: SensorModel = field(default_factory=SensorModel)
+
+    def __post_init__(self) -> None:
+        """Refuse parameters that describe no filter."""
+        if self.particles < 1:
+            raise ArgumentError("particles", "at least one", self.particles)
+        rates = np.asarray(self.rates, dtype=float)
+        if rates.shape != (4, 4) or not np.isfinite(rates).all() or (rates < 0).any():
+            raise ArgumentError("rates", "4 x 4 finite rates, none negative", self.rates)
+        for name in ("stop_rate", "stop_speed", "max_speed", "acceleration", "p_seen_unknown"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
+                raise ArgumentError(name, "a finite number, not negative", getattr(self, name))
+        if not 0 < self.birth_share < 1:
+            raise ArgumentError("birth_share", "a share between 0 and 1", self.birth_share)
+
+
+def transition_matrix(params: CmcdotParams, dt: float) -> NDArray[np.float64]:
+    """Return the transition matrix of a time step, M = exp(Q dt).
+
+    Parameters
+    ----------
+    params : CmcdotParams
+        Its rates are the off-diagonal of Q, whose rows sum to zero.
+    dt : float
+        Seconds, not negative.
+
+    Returns
+    -------
+    (4, 4) float64
+        M[i, j] is the probability that a cell in state i is in state j after `dt`; rows sum to 1.
+
+    Raises
+    ------
+    ArgumentError
+        When `dt` is negative or not finite.
+    """
+    if not (np.isfinite(dt) and dt >= 0):
+        raise ArgumentError("dt", "seconds, not negative", dt)
+    Q = np.array(params.rates, dtype=np.float64)
+    np.fill_diagonal(Q, 0)
+    np.fill_diagonal(Q, -Q.sum(axis=1))
+    return expm(Q * dt)

@@ -1,0 +1,183 @@
+"""What many particles do at once: fly, add up in cells, be drawn anew (paper, section 3.2, steps 1 and 4)."""
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.state import Particles
+
+OUTSIDE = -1
+"""The cell of a particle that has left the map."""
+
+
+def cells_of(position: NDArray, spec: GridSpec) -> NDArray[np.int32]:
+    """Return the cell that each particle is in, as an index into the flattened grid.
+
+    Parameters
+    ----------
+    position : (N, 2) float
+        Metres, in the frame of `spec`.
+    spec : GridSpec
+        The cells.
+
+    Returns
+    -------
+    (N,) int32
+        row * W + column; `OUTSIDE` for a particle that has left.
+    """
+    return _cells_of(position, spec.shape, spec.x_max, spec.y_max, spec.cell)
+
+
+@njit(cache=True)
+def _cells_of(position, shape, x_max, y_max, cell):
+    cells = np.empty(len(position), np.int32)
+    for i in range(len(position)):
+        row, col = np.floor((x_max - position[i, 0]) / cell), np.floor((y_max - position[i, 1]) / cell)
+        inside = 0 <= row < shape[0] and 0 <= col < shape[1]
+        cells[i] = int(row) * shape[1] + int(col) if inside else OUTSIDE
+    return cells
+
+
+def weight_in_cells(weight: NDArray, cells: NDArray, shape: tuple[int, ...]) -> NDArray:
+    """Add the weights up in each cell.
+
+    Parameters
+    ----------
+    weight : (N,) float
+        What each particle carries.
+    cells : (N,) int
+        Where it is, from `cells_of`.
+    shape : (int, int)
+        H, W.
+
+    Returns
+    -------
+    (H, W) float32
+        Summed in the order of the particles, in double precision.
+    """
+    return _sum_in_cells(weight, cells, math.prod(shape)).reshape(shape).astype(np.float32)
+
+
+@njit(cache=True)
+def _sum_in_cells(values, cells, n_cells):
+    total = np.zeros(n_cells)
+    for i in range(len(cells)):
+        if cells[i] != OUTSIDE:
+            total[cells[i]] += values[i]
+    return total
+
+
+def scale_in_cells(weight: NDArray, cells: NDArray, factor: NDArray) -> NDArray[np.float32]:
+    """Multiply each weight by the factor, (H, W), of its cell; what is outside gets zero."""
+    return _scale_in_cells(weight, cells, factor.ravel())
+
+
+@njit(cache=True)
+def _scale_in_cells(weight, cells, factor):
+    scaled = np.zeros(len(weight), np.float32)
+    for i in range(len(weight)):
+        if cells[i] != OUTSIDE:
+            scaled[i] = weight[i] * factor[cells[i]]
+    return scaled
+
+
+def fly(particles: Particles, acceleration: float, dt: float, rng: np.random.Generator) -> Particles:
+    """Let particles fly for a while: constant velocity plus noise.
+
+    Parameters
+    ----------
+    particles : Particles
+    acceleration : float
+        Standard deviation of the acceleration along each axis, m/s^2, constant during the flight.
+    dt : float
+        Seconds.
+    rng : numpy.random.Generator
+        Where the accelerations come from.
+
+    Returns
+    -------
+    Particles
+        v' = v + a dt, x' = x + v dt + a dt^2 / 2.
+    """
+    change = rng.standard_normal((len(particles), 2), np.float32) * np.float32(acceleration * dt)
+    middle = particles.velocity + change / 2
+    return Particles(particles.position + middle * np.float32(dt), particles.velocity + change, particles.weight)
+
+
+def mean_velocity(particles: Particles, cells: NDArray, shape: tuple[int, int]) -> NDArray[np.float32]:
+    """Return the mean velocity of the particles in each cell, weighed: (2, H, W) m/s, NaN without any."""
+    weight = _sum_in_cells(particles.weight, cells, shape[0] * shape[1])
+    moment = np.stack(
+        [_sum_in_cells(particles.weight * particles.velocity[:, k], cells, len(weight)) for k in range(2)]
+    )
+    mean = np.divide(moment, weight, out=np.full(moment.shape, np.nan), where=weight > 0)
+    return mean.reshape(2, *shape).astype(np.float32)
+
+
+@njit(cache=True)
+def systematic_resample(weight, count, offset):
+    """Draw `count` indices in proportion to the weights, by systematic resampling.
+
+    The weights are laid end to end and cut at `count` points, equally spaced, that one random offset
+    places: index i is drawn floor or ceil of count w_i / sum(w) times. For count = N this is
+    `filterpy.monte_carlo.systematic_resample`, which takes its offset from numpy's global generator;
+    here it is an argument, so that a seed decides it.
+
+    Parameters
+    ----------
+    weight : (N,) float
+        Not negative, not all zero; they need not sum to 1.
+    count : int
+        How many to draw, M.
+    offset : float
+        In [0, 1).
+
+    Returns
+    -------
+    (M,) int64
+        Ascending.
+
+    Examples
+    --------
+    >>> systematic_resample(np.array([0.1, 0.6, 0.3]), 4, 0.5)
+    array([1, 1, 2, 2])
+    """
+    total = 0.0
+    for w in weight:
+        total += w
+    chosen = np.empty(count, np.int64)
+    last, below = 0, float(weight[0])
+    for m in range(count):
+        at = (m + offset) / count * total
+        while below <= at and last < len(weight) - 1:
+            last += 1
+            below += weight[last]
+        chosen[m] = last
+    return chosen
+
+
+def draw_velocities(count: int, max_speed: float, rng: np.random.Generator) -> NDArray[np.float32]:
+    """Draw velocities of things of which nothing is known but that they move.
+
+    Heading and speed are uniform, so walking pace is drawn as often as any other band of speeds of its width:
+    uniform in the plane, one particle in two hundred would be as slow as a pedestrian.
+
+    Parameters
+    ----------
+    count : int
+        M.
+    max_speed : float
+        m/s.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    (M, 2) float32
+        m/s.
+    """
+    speed = max_speed * rng.random(count, np.float32)
+    heading = np.float32(2 * np.pi) * rng.random(count, np.float32)
+    return np.stack([speed * np.cos(heading), speed * np.sin(heading)], axis=1)

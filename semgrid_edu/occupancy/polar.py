@@ -1,0 +1,145 @@
+"""A scan in polar coordinates: how far each beam sees, and which cells it passes (paper, section 3.2, step 2)."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+
+@njit(cache=True)
+def polar_profile(points, low, high, beams):
+    """Find what the returns of each beam say.
+
+    Parameters
+    ----------
+    points : (N, 3+) float
+        Returns in the grid frame of the vehicle, metres.
+    low, high : float
+        The heights between which a return is an obstacle; a lower one is ground, a higher one nothing.
+    beams : int
+        B, the number of beams in a turn; beam 0 begins straight behind the vehicle, and they go counter-clockwise.
+
+    Returns
+    -------
+    first_obstacle : (B,) float32
+        Range of the nearest obstacle return, metres; infinite without one.
+    last_ground : (B,) float32
+        Range of the farthest ground return, metres; zero without one.
+    """
+    first_obstacle = np.full(beams, np.inf, np.float32)
+    last_ground = np.zeros(beams, np.float32)
+    for i in range(len(points)):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        if z <= high:
+            distance = np.sqrt(x * x + y * y)
+            beam = beam_of(x, y, beams)
+            if z >= low:
+                first_obstacle[beam] = min(first_obstacle[beam], distance)
+            else:
+                last_ground[beam] = max(last_ground[beam], distance)
+    return first_obstacle, last_ground
+
+
+@njit(cache=True, inline="always")
+def beam_of(x, y, beams):
+    """Return the beam, 0..beams-1, that looks towards x, y."""
+    return min(int((np.arctan2(y, x) + np.pi) * (beams / (2 * np.pi))), beams - 1)
+
+
+def reach(first_obstacle: NDArray, last_ground: NDArray) -> NDArray[np.float32]:
+    """Return how far each beam sees, (B,) metres: to its first obstacle, else to its last ground return."""
+    return np.where(np.isfinite(first_obstacle), first_obstacle, last_ground)
+
+
+@njit(cache=True)
+def fill_gaps(reach, gap):
+    """Give beams between two columns of returns the shorter reach of the two.
+
+    A scanner with columns wider apart than a beam leaves beams empty: they are no holes in what it
+    sees, nor do they see farther than their neighbours. Wider gaps (nothing came back) stay blind.
+
+    Parameters
+    ----------
+    reach : (B,) float
+        How far each beam sees, metres; zero where nothing came back.
+    gap : int
+        The most empty beams that two neighbouring columns can leave between them.
+
+    Returns
+    -------
+    (B,) float
+        The same, with the gaps filled.
+
+    Examples
+    --------
+    >>> fill_gaps(np.array([5.0, 0.0, 0.0, 3.0, 0.0, 0.0, 0.0]), gap=2)
+    array([5., 3., 3., 3., 0., 0., 0.])
+    """
+    beams = len(reach)
+    seen = np.flatnonzero(reach)
+    filled = reach.copy()
+    for k in range(len(seen)):
+        left, right = seen[k - 1], seen[k]
+        empty = (right - left - 1) % beams
+        if empty <= gap:
+            for step in range(1, empty + 1):
+                filled[(left + step) % beams] = min(reach[left], reach[right])
+    return filled
+
+
+@njit(cache=True)
+def count_returns(points, low, high, shape, x_max, y_max, cell, dx, dy, dyaw):
+    """Count the returns in each cell.
+
+    Parameters
+    ----------
+    points : (N, 3+) float
+        Returns in the grid frame of the vehicle, metres.
+    low, high : float
+        The heights between which a return is an obstacle.
+    shape, x_max, y_max, cell : (int, int), float, float, float
+        The grid.
+    dx, dy, dyaw : float
+        Pose of the vehicle in the frame of the grid, metres and radians.
+
+    Returns
+    -------
+    obstacles, ground : (H, W) int32
+        Number of obstacle and of ground returns.
+    """
+    obstacles, ground = np.zeros(shape, np.int32), np.zeros(shape, np.int32)
+    cos, sin = np.cos(dyaw), np.sin(dyaw)
+    for i in range(len(points)):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        row = np.floor((x_max - (cos * x - sin * y + dx)) / cell)
+        col = np.floor((y_max - (sin * x + cos * y + dy)) / cell)
+        if z <= high and 0 <= row < shape[0] and 0 <= col < shape[1]:
+            counted = obstacles if z >= low else ground
+            counted[int(row), int(col)] += 1
+    return obstacles, ground
+
+
+@njit(cache=True)
+def passed_cells(reach, shape, x_max, y_max, cell, dx, dy, dyaw):
+    """Find the cells that their beam passes from end to end: look up each centre's azimuth and range.
+
+    Parameters
+    ----------
+    reach : (B,) float32
+        How far each beam sees, metres.
+    shape, x_max, y_max, cell, dx, dy, dyaw
+        The grid and the vehicle's pose in it, as for `count_returns`.
+
+    Returns
+    -------
+    (H, W) bool
+    """
+    passed = np.zeros(shape, np.bool_)
+    cos, sin = np.cos(dyaw), np.sin(dyaw)
+    for row in range(shape[0]):
+        for col in range(shape[1]):
+            from_x = x_max - (row + 0.5) * cell - dx
+            from_y = y_max - (col + 0.5) * cell - dy
+            x, y = cos * from_x + sin * from_y, cos * from_y - sin * from_x
+            distance = np.sqrt(x * x + y * y)
+            passed[row, col] = distance + cell / 2 <= reach[beam_of(x, y, len(reach))]
+    return passed
