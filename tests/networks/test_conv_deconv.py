@@ -1,0 +1,63 @@
+import pytest
+import torch
+from torch import nn
+
+from semgrid_edu.networks.conv_deconv import ConvDeconv, initialise
+
+
+def _convolutions(module):
+    return [m for m in module.modules() if isinstance(m, nn.Conv2d | nn.Conv3d)]
+
+
+def test_unpooling_puts_maxima_back_where_they_were():
+    net = ConvDeconv(1, 1, widths=(1,), depths=(1,)).eval()
+    for conv in _convolutions(net):
+        nn.init.dirac_(conv.weight)  # the convolution that changes nothing
+        nn.init.zeros_(conv.bias)
+    x = torch.tensor([[1.0, 2, 8, 0], [3, 4, 5, 6], [9, 0, 1, 1], [0, 0, 1, 7]])
+    expected = torch.tensor([[0.0, 0, 8, 0], [0, 4, 0, 0], [9, 0, 0, 0], [0, 0, 0, 7]])
+    torch.testing.assert_close(net(x[None, None])[0, 0], expected, rtol=1e-4, atol=0)
+
+
+@pytest.mark.parametrize("size", [(16, 16), (17, 23), (35, 62), (9, 30)])
+@pytest.mark.parametrize("skips", [False, True])
+def test_every_size_comes_back(size, skips):
+    net = ConvDeconv(2, 5, widths=(3, 4, 6), depths=(1, 2, 1), skips=skips).eval()
+    assert net(torch.randn(2, 2, *size, generator=torch.Generator().manual_seed(0))).shape == (2, 5, *size)
+
+
+@pytest.mark.parametrize("skips", [False, True])
+def test_as_many_layers_up_as_down(skips):
+    net = ConvDeconv(3, 14, widths=(8, 16, 32), depths=(1, 2, 3), skips=skips)
+    assert len(_convolutions(net.encoder)) == len(_convolutions(net.decoder)) == 6
+
+
+def test_skips_carry_what_pooling_forgets():
+    """Two inputs with the same maxima: without skips the network can't tell them apart, with skips it can."""
+    x = torch.tensor([[[[5.0, 1], [2, 3]]]])
+    y = torch.tensor([[[[5.0, 2], [1, 3]]]])
+    for skips in (False, True):
+        net = ConvDeconv(1, 1, widths=(1,), depths=(1,), skips=skips).eval()
+        for conv in _convolutions(net):
+            nn.init.zeros_(conv.bias)
+            nn.init.zeros_(conv.weight)
+            conv.weight.data[:, :, 1, 1] = 1
+        assert torch.equal(net(x), net(y)) is not skips
+
+
+def test_weights_depend_on_the_seed_alone():
+    def weights(seed):
+        net = ConvDeconv(3, 4, widths=(5, 6), depths=(1, 2))
+        initialise(net, seed)
+        return nn.utils.parameters_to_vector(net.parameters())
+
+    assert torch.equal(weights(1), weights(1))
+    assert not torch.equal(weights(1), weights(2))
+
+
+def test_initial_signals_keep_their_size():
+    # He et al.: each layer's weights have variance 2 / fan-in.
+    net = ConvDeconv(64, 64, widths=(64,), depths=(3,))
+    initialise(net, 0)
+    for conv in _convolutions(net):
+        assert conv.weight.var().item() == pytest.approx(2 / (64 * 9), rel=0.05)

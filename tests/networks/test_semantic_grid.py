@@ -1,0 +1,124 @@
+import numpy as np
+import pytest
+import torch
+import torch.nn.functional as F
+from torch import nn
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.networks import Architecture, FusionNet, SemanticGridNet, build_net, build_segmenter
+from semgrid_edu.planes import PlaneSampler
+
+N_CLASSES = 5
+
+
+@pytest.fixture
+def small_net():
+    """A whole network on an image of 16 x 24 pixels and a grid of 10 x 9 cells, float64, evaluation mode."""
+    rng = np.random.default_rng(0)
+    pixels, visible = rng.uniform(0, 1, (4, 10, 9, 2)) * (23, 15), rng.random((4, 10, 9)) < 0.8
+    sampler = PlaneSampler(pixels, visible, (16, 24))
+    return SemanticGridNet(build_segmenter("segnet", N_CLASSES), sampler, N_CLASSES).double().eval()
+
+
+@pytest.fixture
+def batch():
+    """An image, an occupancy grid and its truth, two of each."""
+    rng = torch.Generator().manual_seed(1)
+    image = torch.rand(2, 3, 16, 24, generator=rng, dtype=torch.float64)
+    occupancy = torch.rand(2, 4, 10, 9, generator=rng, dtype=torch.float64)
+    truth = torch.randint(N_CLASSES, (2, 10, 9), generator=rng)
+    return image, occupancy / occupancy.sum(1, keepdim=True), truth
+
+
+def test_vgg16_has_its_published_parameters():
+    segmenter = build_segmenter("segnet", 14, preset="paper")
+    convs = [m for m in segmenter.conv_deconv.encoder.modules() if isinstance(m, nn.Conv2d)]
+    assert len(convs) == 13
+    assert sum(p.numel() for conv in convs for p in conv.parameters()) == 14_714_688
+
+
+def test_scores_are_no_probabilities():
+    image = torch.rand(1, 3, 33, 47, generator=torch.Generator().manual_seed(0))
+    scores = build_segmenter("segnet", 14).eval()(image)
+    assert scores.shape == (1, 14, 33, 47)
+    assert (scores < 0).any()
+
+
+def test_the_image_is_normalised_inside():
+    segmenter = build_segmenter("segnet", 3).eval()
+    grey = segmenter.mean.expand(1, 3, 16, 16)
+    torch.testing.assert_close(segmenter(grey), segmenter.conv_deconv(torch.zeros(1, 3, 16, 16)))
+
+
+def test_the_reduction_is_a_1x1_convolution_of_all_planes():
+    fusion = FusionNet(n_scores=3, n_planes=4, n_classes=5, n_reduced=6)
+    conv = fusion.reduce[0]
+    planes = torch.randn(2, 3, 4, 7, 8, generator=torch.Generator().manual_seed(0))
+    as_1x1 = F.conv2d(planes.flatten(1, 2), conv.weight.flatten(1)[..., None, None], conv.bias)
+    torch.testing.assert_close(conv(planes).squeeze(2), as_1x1, rtol=1e-4, atol=1e-5)
+
+
+def test_stages_follow_each_other(small_net, batch):
+    image, occupancy, _ = batch
+    stages = small_net.stages(image, occupancy)
+    assert stages.scores.shape == (2, N_CLASSES, 16, 24)
+    assert stages.planes.shape == (2, N_CLASSES, 4, 10, 9)
+    assert stages.logits.shape == (2, N_CLASSES, 10, 9)
+    torch.testing.assert_close(stages.scores, small_net.segmenter(image))
+    torch.testing.assert_close(stages.planes, small_net.sampler(stages.scores))
+    torch.testing.assert_close(stages.logits, small_net(image, occupancy))
+
+
+def test_frames_of_a_batch_do_not_touch(small_net, batch):
+    image, occupancy, _ = batch
+    alone = torch.cat([small_net(image[k : k + 1], occupancy[k : k + 1]) for k in range(2)])
+    torch.testing.assert_close(small_net(image, occupancy), alone)
+
+
+def test_both_inputs_matter(small_net, batch):
+    image, occupancy, _ = batch
+    logits = small_net(image, occupancy)
+    assert not torch.allclose(logits, small_net(image.flip(-1), occupancy))
+    assert not torch.allclose(logits, small_net(image, occupancy.flip(1)))
+
+
+def test_the_loss_on_the_grid_teaches_the_first_convolution_of_the_image(small_net, batch):
+    """The gradient through fusion, planes and image network equals finite differences."""
+    image, occupancy, truth = batch
+    weight = small_net.segmenter.conv_deconv.encoder[0][0][0].weight
+
+    def loss():
+        return F.cross_entropy(small_net(image, occupancy), truth)
+
+    loss().backward()
+    assert weight.grad.abs().min() > 0
+    step = 1e-6
+    for index in [(0, 0, 0, 0), (3, 1, 2, 1), (15, 2, 1, 2)]:
+        with torch.no_grad():
+            weight[index] += step
+            above = loss().item()
+            weight[index] -= 2 * step
+            below = loss().item()
+            weight[index] += step
+        assert weight.grad[index].item() == pytest.approx((above - below) / (2 * step), rel=1e-4, abs=1e-8)
+
+
+def test_unknown_names_are_refused_with_those_there_are(camera):
+    with pytest.raises(ArgumentError, match="name: expected one of segnet, found 'vit'"):
+        build_segmenter("vit", 14)
+    with pytest.raises(ArgumentError, match="preset: expected one of compact, paper, found 'huge'"):
+        build_segmenter("segnet", 14, preset="huge")
+    with pytest.raises(ArgumentError, match="n_classes"):
+        build_segmenter("segnet", 0)
+    with pytest.raises(ArgumentError, match="label_set: expected one of KITTI-14, SYNTHIA-10"):
+        build_net(Architecture(label_set="COCO"), camera)
+
+
+def test_inputs_of_another_size_or_type_are_refused(small_net, batch):
+    image, occupancy, _ = batch
+    with pytest.raises(ArgumentError, match=r"image: expected shape \(B, 3, 16, 24\), found \(2, 3, 16, 23\)"):
+        small_net(image[..., :-1], occupancy)
+    with pytest.raises(ArgumentError, match=r"occupancy: expected shape \(B, 4, 10, 9\), found \(2, 3, 10, 9\)"):
+        small_net(image, occupancy[:, :3])
+    with pytest.raises(ArgumentError, match=r"image: expected floats in 0..1, found torch.uint8"):
+        small_net((255 * image).to(torch.uint8), occupancy)

@@ -1,0 +1,125 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from safetensors.torch import load_file, save_file
+
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.networks import Architecture, SemanticGridNet, build_net, load_net, save_net
+
+SMALL = Architecture(image_size=(24, 80), grid=GridSpec(0, 30, -6, 6, 1.0), heights=(0.0, 0.5, 1.0))
+
+
+@pytest.fixture
+def net(camera):
+    return build_net(SMALL, camera, seed=3).eval()
+
+
+@pytest.fixture
+def saved(net, tmp_path):
+    path = tmp_path / "net.safetensors"
+    save_net(net, path)
+    return path
+
+
+def _inputs(architecture):
+    rng = torch.Generator().manual_seed(0)
+    image = torch.rand(1, 3, *architecture.image_size, generator=rng)
+    return image, torch.rand(1, 4, *architecture.grid.shape, generator=rng)
+
+
+def _rewrite(path, change_tensors=lambda t: t, header=None):
+    save_file(change_tensors(load_file(path)), path, metadata=header)
+
+
+def test_weights_come_back_bit_for_bit(net, saved, camera):
+    loaded = load_net(saved, camera)
+    assert loaded.architecture == SMALL
+    assert not loaded.training
+    for name, tensor in net.state_dict().items():
+        assert torch.equal(tensor, loaded.state_dict()[name])
+    assert torch.equal(loaded(*_inputs(SMALL)), net(*_inputs(SMALL)))
+
+
+def test_the_same_weights_give_the_same_bytes(net, saved, tmp_path):
+    save_net(net, tmp_path / "again.safetensors")
+    assert (tmp_path / "again.safetensors").read_bytes() == saved.read_bytes()
+
+
+def test_the_planes_follow_the_camera(net, saved, camera):
+    shifted = replace(
+        camera, T_camera_from_lidar=camera.T_camera_from_lidar + np.array([[0, 0, 0, 0.5]] + [[0] * 4] * 3)
+    )
+    loaded = load_net(saved, shifted)
+    assert not torch.equal(loaded(*_inputs(SMALL)), net(*_inputs(SMALL)))
+
+
+def test_the_compact_network_fits_its_budget(camera, tmp_path):
+    save_net(build_net(Architecture(), camera), tmp_path / "compact.safetensors")
+    assert (tmp_path / "compact.safetensors").stat().st_size <= 3e6
+
+
+def test_a_network_made_by_hand_is_not_saved(net, tmp_path):
+    by_hand = SemanticGridNet(net.segmenter, net.sampler, net.n_classes)
+    with pytest.raises(ArgumentError, match="net: expected a network of build_net"):
+        save_net(by_hand, tmp_path / "net.safetensors")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_missing_file_is_named(tmp_path, camera):
+    with pytest.raises(DataError, match=r"nowhere.safetensors: expected a file of weights"):
+        load_net(tmp_path / "nowhere.safetensors", camera)
+
+
+@pytest.mark.parametrize("damage", [lambda b: b"", lambda b: b[: len(b) // 2], lambda b: b"\x80\x04pickle" + b])
+def test_a_damaged_file_is_named(saved, camera, damage):
+    saved.write_bytes(damage(saved.read_bytes()))
+    with pytest.raises(DataError, match=r"net.safetensors: expected a safetensors file"):
+        load_net(saved, camera)
+
+
+def test_weights_of_another_architecture_are_refused(saved, camera):
+    wide = json.dumps({**_header(SMALL), "heights": [0.0, 0.5]})
+    _rewrite(saved, header={"architecture": wide})
+    with pytest.raises(DataError, match=r"\(16, 14, 2, 1, 1\) for fusion.reduce.0.weight, found \(16, 14, 3, 1, 1\)"):
+        load_net(saved, camera)
+
+
+def _header(architecture):
+    return {
+        "segmenter": architecture.segmenter,
+        "preset": architecture.preset,
+        "label_set": architecture.label_set,
+        "image_size": list(architecture.image_size),
+        "grid": vars(architecture.grid),
+        "heights": list(architecture.heights),
+    }
+
+
+def test_a_missing_or_extra_tensor_is_refused(saved, camera):
+    header = {"architecture": json.dumps(_header(SMALL))}
+    _rewrite(saved, lambda t: {**t, "more": torch.zeros(2)}, header)
+    with pytest.raises(DataError, match=r"expected nothing for more, found \(2,\)"):
+        load_net(saved, camera)
+    _rewrite(saved, lambda t: {k: v for k, v in t.items() if k not in ("more", "fusion.reduce.0.bias")}, header)
+    with pytest.raises(DataError, match=r"expected \(16,\) for fusion.reduce.0.bias, found nothing"):
+        load_net(saved, camera)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        None,
+        {"architecture": "no json"},
+        {"architecture": json.dumps({**_header(SMALL), "segmenter": "vit"})},
+        {"architecture": json.dumps({**_header(SMALL), "more": 1})},
+        {"architecture": "[]"},
+    ],
+)
+def test_a_header_of_another_program_is_refused(saved, camera, header):
+    _rewrite(saved, header=header)
+    with pytest.raises(DataError, match="the architecture of a network in the header"):
+        load_net(saved, camera)
