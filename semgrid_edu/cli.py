@@ -35,6 +35,42 @@ def verify(
     typer.echo("every sample is as it was made")
 
 
+@course.command()
+def notebooks(
+    names: Annotated[list[str] | None, typer.Argument(help="Such as 00_tour; all by default.")] = None,
+) -> None:
+    """Execute lectures and write the students' exercises, from their sources."""
+    from semgrid_edu.course.exercises import build_exercise, exercise_sources
+    from semgrid_edu.course.notebooks import build_lecture, lecture_sources, named
+
+    for source in named(exercise_sources(), names):
+        typer.echo(f"exercise {source.stem}: {build_exercise(source)}")
+    for source in named(lecture_sources(), names):
+        typer.echo(f"lecture {source.stem}: {build_lecture(source)}")
+
+
+@course.command()
+def check() -> None:
+    """Check that every notebook is in step with its source, has run, and is fit to be shown."""
+    from semgrid_edu.course.checks import course_problems
+
+    problems = course_problems()
+    for problem in problems:
+        typer.echo(problem, err=True)
+    if problems:
+        raise typer.Exit(1)
+    typer.echo("every notebook is in step with its source")
+
+
+@course.command()
+def build(folder: Annotated[Path, typer.Argument(help="Missing, empty, or a course built before.")]) -> None:
+    """Lay out a complete nbgrader course for an instructor."""
+    from semgrid_edu.course.exercises import build_course
+
+    assignments = build_course(folder)
+    typer.echo(f"{folder}: {len(assignments)} assignments, {', '.join(assignments)}; read {folder / 'README.md'}")
+
+
 def run() -> None:
     """Run the command line; a mistake in the input ends in one line, not in a traceback."""
     try:

@@ -1,0 +1,27 @@
+"""Hidden tests of the exercises: on the instructor's machine only, never in what students get.
+
+A hidden test cell calls one function of a module here and asserts that it returns an empty string. nbgrader's
+feedback pages print a failed cell and its traceback in full; a returned sentence keeps the inputs and the right
+answers out of them.
+"""
+
+import functools
+from collections.abc import Callable
+
+
+def hidden(check: Callable[[Callable], None]) -> Callable[[Callable], str]:
+    """Turn a check that raises into one that returns a short complaint, or "" when all is well."""
+
+    @functools.wraps(check)
+    def complaint(answer: Callable) -> str:
+        try:
+            check(answer)
+        except AssertionError as error:
+            return f"{answer.__name__}, on inputs you haven't seen: {error}"
+        except KeyboardInterrupt:
+            return f"{answer.__name__}, on inputs you haven't seen: it does not come to an end"
+        except Exception as error:
+            return f"{answer.__name__}, on inputs you haven't seen: it raises {type(error).__name__}: {error}"
+        return ""
+
+    return complaint

@@ -1,0 +1,148 @@
+"""What must hold of every committed notebook: in step with its source, run, quiet, small, free of this machine."""
+
+import re
+from pathlib import Path
+
+import nbformat
+from nbformat import NotebookNode
+
+from semgrid_edu.course.exercises import exercise_sources, student_version
+from semgrid_edu.course.notebooks import NOTEBOOKS, lecture_sources, read_percent
+
+MAX_LINES = 25
+"""Lines of a code cell that a student can still take in."""
+
+MAX_BYTES = 1_500_000
+"""Size of a lecture; all together stay under 8 MB."""
+
+PARTS = {
+    "a thesis": r"\*\*In one sentence\.\*\*",
+    "what the student will be able to do": r"\*\*You will be able to\*\*",
+    "prerequisites": r"\*\*Prerequisites\.\*\*",
+    "minutes": r"\*\*Time\.\*\* \d+ minutes",
+    "the paper's sections and equations": r"\*\*Paper\.\*\*",
+    "a prediction": r"\*\*Predict before you run\.\*\*(?s:.*?)<details><summary>Answer</summary>",
+    "a failure": r"^## Where this breaks",
+    "a summary": r"^## In five lines",
+    "further reading": r"^## Further reading",
+    "the link to its exercise": r"\]\(exercises/\d\d_\w+\.ipynb\)",
+    "something to play with": r"\binteract\(",
+}
+"""The parts of a lecture, and how each is recognised in its source."""
+
+MACHINE = re.compile(r"(?<![\w.:/<])(?:/(?:home|root|tmp|work|usr|opt|mnt|srv|private|Users)/|[A-Z]:\\\\)\S*")
+ADDRESS = re.compile(r"\bat 0x[0-9a-f]{6,}\b")
+LINK = re.compile(r"\]\((?!https?:|#|mailto:)([^)#\s]+)[^)]*\)")
+
+
+def lecture_problems(source: Path) -> list[str]:
+    """List all that is wrong with a lecture.
+
+    Parameters
+    ----------
+    source : Path
+        `notebooks/src/NN_name.py`; the executed notebook is looked for two folders up.
+
+    Returns
+    -------
+    list of str
+        One sentence each, naming the notebook; empty when all is well.
+    """
+    path = source.parents[1] / f"{source.stem}.ipynb"
+    wanted = read_percent(source)
+    problems = _missing_parts(wanted)
+    if not path.is_file():
+        return [f"{path.name}: {problem}" for problem in [*problems, "not built; run `semgrid-edu course notebooks`"]]
+    notebook = nbformat.read(path, as_version=4)
+    if _inputs(notebook) != _inputs(wanted):
+        problems.append(f"differs from src/{source.name}; run `semgrid-edu course notebooks {source.stem}`")
+    if path.stat().st_size > MAX_BYTES:
+        problems.append(f"{path.stat().st_size / 1e6:.1f} MB, more than {MAX_BYTES / 1e6} MB")
+    for number, cell in enumerate((c for c in notebook.cells if c.cell_type == "code"), start=1):
+        problems += [f"code cell {number} {problem}" for problem in _run_problems(cell, number)]
+    problems += text_problems(notebook, path.parent)
+    return [f"{path.name}: {problem}" for problem in problems]
+
+
+def exercise_problems(source: Path) -> list[str]:
+    """List all that is wrong with the student version of an exercise.
+
+    Parameters
+    ----------
+    source : Path
+        `notebooks/src/exercises/NN_name.py`.
+
+    Returns
+    -------
+    list of str
+        One sentence each, naming the notebook; empty when all is well.
+    """
+    path = source.parents[2] / "exercises" / f"{source.stem}.ipynb"
+    if not path.is_file():
+        return [f"exercises/{path.name}: not built; run `semgrid-edu course notebooks`"]
+    notebook = nbformat.read(path, as_version=4)
+    problems = text_problems(notebook, path.parent)
+    if notebook != student_version(source):
+        problems.append(f"differs from src/exercises/{source.name}; run `semgrid-edu course notebooks {source.stem}`")
+    return [f"exercises/{path.name}: {problem}" for problem in problems]
+
+
+def course_problems(folder: Path = NOTEBOOKS) -> list[str]:
+    """List all that is wrong with the lectures and the students' exercises in a folder of notebooks."""
+    lectures = [problem for source in lecture_sources(folder) for problem in lecture_problems(source)]
+    return lectures + [problem for source in exercise_sources(folder) for problem in exercise_problems(source)]
+
+
+def text_problems(notebook: NotebookNode, folder: Path) -> list[str]:
+    """List long cells, paths of a machine and links that lead nowhere.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+    folder : Path
+        Where the notebook lies; its links are relative to it.
+    """
+    problems = []
+    for cell in notebook.cells:
+        first = cell.source.strip().split("\n")[0][:60]
+        lines = len(cell.source.splitlines())
+        if cell.cell_type == "code" and lines > MAX_LINES:
+            problems.append(f"cell '{first}' has {lines} lines, more than {MAX_LINES}")
+        for found in MACHINE.findall(cell.source + _printed(cell)):
+            problems.append(f"cell '{first}' names a path of one machine: {found}")
+        if cell.cell_type == "markdown":
+            dead = [target for target in LINK.findall(cell.source) if not (folder / target).exists()]
+            problems += [f"cell '{first}' links to {target}, which does not exist" for target in dead]
+    return problems
+
+
+def _missing_parts(notebook: NotebookNode) -> list[str]:
+    """List the parts of a lecture that its source lacks."""
+    text = "\n\n".join(cell.source for cell in notebook.cells)
+    return [f"lacks {part}" for part, pattern in PARTS.items() if not re.search(pattern, text, re.MULTILINE)]
+
+
+def _run_problems(cell: NotebookNode, number: int) -> list[str]:
+    """List what shows that a code cell did not run, in its turn and without complaint."""
+    problems = []
+    if cell.execution_count != number:
+        problems.append(f"has execution count {cell.execution_count}; execute the whole notebook in order")
+    for output in cell.outputs:
+        if output.output_type == "error":
+            problems.append(f"ends in an error: {output.ename}: {output.evalue}")
+        if output.output_type == "stream" and output.name == "stderr":
+            problems.append(f"writes to stderr: {output.text.strip()[:80]}")
+    if ADDRESS.search(_printed(cell)):
+        problems.append("prints the address of an object; end a plot cell with plt.show()")
+    return problems
+
+
+def _printed(cell: NotebookNode) -> str:
+    """Return all text that a cell shows below itself."""
+    outputs = cell.get("outputs", [])
+    return "".join(output.get("text", "") + output.get("data", {}).get("text/plain", "") for output in outputs)
+
+
+def _inputs(notebook: NotebookNode) -> list[tuple]:
+    """Return what the source of a notebook decides: kind, id, text and metadata of every cell."""
+    return [(cell.cell_type, cell.id, cell.source, dict(cell.metadata)) for cell in notebook.cells]

@@ -1,0 +1,138 @@
+"""Exercises from one source: the students' notebook, and a complete nbgrader course for an instructor."""
+
+import logging
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+
+from nbformat import NotebookNode
+from nbgrader.apps import NbGraderAPI
+from nbgrader.preprocessors import (
+    CheckCellMetadata,
+    ClearHiddenTests,
+    ClearOutput,
+    ClearSolutions,
+    ComputeChecksums,
+    LockCells,
+)
+from traitlets.config import PyFileConfigLoader
+
+from semgrid_edu.course.notebooks import NOTEBOOKS, read_percent, write_notebook
+from semgrid_edu.errors import DataError
+from semgrid_edu.files import write_json, write_text
+
+RELEASE_STEPS = (LockCells, ClearSolutions, ClearOutput, ClearHiddenTests, ComputeChecksums, CheckCellMetadata)
+"""What nbgrader's generate_assignment does to a notebook, without its gradebook."""
+
+MARKER = "semgrid_course.json"
+"""The file that says that a folder is a course that we laid out."""
+
+
+def exercise_sources(folder: Path = NOTEBOOKS) -> list[Path]:
+    """Return the percent sources of all exercises, in the order of the course."""
+    return sorted((folder / "src" / "exercises").glob("[0-9][0-9]_*.py"))
+
+
+def student_version(source: Path) -> NotebookNode:
+    """Take solutions and hidden tests out of an exercise.
+
+    Parameters
+    ----------
+    source : Path
+        `notebooks/src/exercises/NN_name.py`, with nbgrader's markers and metadata.
+
+    Returns
+    -------
+    NotebookNode
+        What `nbgrader generate_assignment` would release.
+    """
+    notebook, resources = read_percent(source), {}
+    for step in RELEASE_STEPS:
+        notebook, resources = step().preprocess(notebook, resources)
+    return notebook
+
+
+def build_exercise(source: Path) -> Path:
+    """Write the student version of an exercise to `notebooks/exercises/NN_name.ipynb`, and return that path."""
+    target = source.parents[2] / "exercises" / f"{source.stem}.ipynb"
+    write_notebook(student_version(source), target)
+    return target
+
+
+def build_course(directory: str | Path, folder: Path = NOTEBOOKS) -> list[str]:
+    """Lay out a complete nbgrader course: sources, settings, the instructor's module, gradebook and released versions.
+
+    Run again, it brings sources and settings up to date and leaves submissions and grades alone.
+
+    Parameters
+    ----------
+    directory : path-like
+        Missing, empty, or a course laid out before.
+    folder : Path
+        The folder of notebooks.
+
+    Returns
+    -------
+    list of str
+        The assignments.
+
+    Raises
+    ------
+    DataError
+        When the folder holds something else, or nbgrader can't release an exercise.
+    """
+    directory = Path(directory).resolve()
+    if directory.exists() and any(directory.iterdir()) and not (directory / MARKER).is_file():
+        raise DataError(directory, f"an empty folder, or a course with its {MARKER}", "a folder with other files")
+    sources = exercise_sources(folder)
+    names = [source.stem for source in sources]
+    write_json(directory / MARKER, {"written by": f"semgrid_edu {version('semgrid_edu')}", "assignments": names})
+    for name in ("nbgrader_config.py", "README.md"):
+        write_text(directory / name, (folder / "instructor" / name).read_text(encoding="utf-8"))
+    module = "semgrid_instructor"
+    shutil.copytree(
+        folder / "instructor" / module,
+        directory / "instructor" / module,
+        ignore=shutil.ignore_patterns("__pycache__"),
+        dirs_exist_ok=True,
+    )
+    for source in sources:
+        write_notebook(read_percent(source), directory / "source" / source.stem / f"{source.stem}.ipynb")
+    with course_api(directory) as api:
+        for name in names:
+            _released(api.generate_assignment(name), directory / "source" / name)
+    return names
+
+
+@contextmanager
+def course_api(directory: Path) -> Iterator[NbGraderAPI]:
+    """Open a course with the settings in its own folder.
+
+    Parameters
+    ----------
+    directory : Path
+        A folder that `build_course` laid out.
+
+    Yields
+    ------
+    NbGraderAPI
+        The settings put the instructor's module on the kernels' path; that is taken back when the block ends.
+    """
+    before = dict(os.environ)
+    try:
+        config = PyFileConfigLoader("nbgrader_config.py", path=str(directory)).load_config()
+        api = NbGraderAPI(config=config)
+        api.log.setLevel(logging.ERROR)
+        yield api
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
+
+
+def _released(result: dict, source: Path) -> None:
+    """Raise when nbgrader did not do what it was asked."""
+    if not result["success"]:
+        raise DataError(source, "an exercise that nbgrader can release", result.get("log") or result["error"])

@@ -1,0 +1,147 @@
+"""Grading by nbgrader itself: notebooks in, scores and messages by test cell out."""
+
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import nbformat
+from nbconvert.filters import strip_ansi
+from nbformat import NotebookNode
+from nbgrader.api import Gradebook
+from nbgrader.utils import is_grade, is_solution
+
+from semgrid_edu.course.exercises import course_api, student_version
+from semgrid_edu.course.notebooks import read_percent, write_notebook
+from semgrid_edu.errors import ArgumentError, DataError
+
+
+@dataclass(frozen=True)
+class CellScore:
+    """What nbgrader made of one test cell.
+
+    Parameters
+    ----------
+    points : float
+        What the cell is worth.
+    score : float or None
+        What the answer earned; None where a person has yet to read it.
+    message : str
+        The error that the student sees; "" without one.
+    """
+
+    points: float
+    score: float | None
+    message: str
+
+
+def tasks(source: Path) -> dict[str, tuple[str, ...]]:
+    """Return the test cells of each task.
+
+    Parameters
+    ----------
+    source : Path
+        The percent source of an exercise.
+
+    Returns
+    -------
+    dict of str to tuple of str
+        For each answer cell, by its grade_id, the test cells between it and the next answer. A written answer is
+        its own test.
+    """
+    found: dict[str, tuple[str, ...]] = {}
+    for cell in read_percent(source).cells:
+        name = cell.metadata.get("nbgrader", {}).get("grade_id")
+        if is_solution(cell):
+            found[name] = (name,) if is_grade(cell) else ()
+        elif is_grade(cell):
+            task = list(found)[-1]
+            found[task] += (name,)
+    return found
+
+
+def reference_answers(source: Path) -> dict[str, str]:
+    """Return the solution of each task of an exercise, by the grade_id of its answer cell."""
+    return {c.metadata.nbgrader.grade_id: c.source for c in read_percent(source).cells if is_solution(c)}
+
+
+def submission(source: Path, answers: Mapping[str, str]) -> NotebookNode:
+    """Fill in the student version of an exercise as a student would.
+
+    Parameters
+    ----------
+    source : Path
+        The percent source of the exercise.
+    answers : mapping of str to str
+        The new text of answer cells, by grade_id. Those not named stay as they were handed out.
+
+    Raises
+    ------
+    ArgumentError
+        When an answer belongs to no cell.
+    """
+    notebook = copy.deepcopy(student_version(source))
+    cells = {c.metadata.nbgrader.grade_id: c for c in notebook.cells if is_solution(c)}
+    for name, text in answers.items():
+        if name not in cells:
+            raise ArgumentError("answers", f"tasks among {', '.join(cells)}", name)
+        cells[name].source = text
+    return notebook
+
+
+def autograde(
+    course: Path, assignment: str, submissions: Mapping[str, NotebookNode], timeout: int = 30
+) -> dict[str, dict[str, CellScore]]:
+    """Hand in notebooks and let nbgrader grade them.
+
+    Parameters
+    ----------
+    course : Path
+        A folder that `build_course` laid out.
+    assignment : str
+        The exercise, such as "00_tour".
+    submissions : mapping of str to NotebookNode
+        One notebook a student.
+    timeout : int
+        Seconds that a cell may take.
+
+    Returns
+    -------
+    dict of str to dict of str to CellScore
+        For each student, for each test cell.
+
+    Raises
+    ------
+    DataError
+        When nbgrader could not grade a submission to its end: then the gradebook's 0 is no score.
+    """
+    for student, notebook in submissions.items():
+        write_notebook(notebook, _place(course, "submitted", student, assignment))
+    with course_api(course) as api:
+        api.config.Execute.timeout = timeout
+        for student in submissions:
+            result = api.autograde(assignment, student)
+            if not result["success"]:
+                place = _place(course, "submitted", student, assignment)
+                raise DataError(place, "a notebook that can be graded", result.get("log") or result["error"])
+    return {student: _scores(course, assignment, student) for student in submissions}
+
+
+def _scores(course: Path, assignment: str, student: str) -> dict[str, CellScore]:
+    """Read a student's scores from the gradebook and the messages from the graded notebook."""
+    graded = nbformat.read(_place(course, "autograded", student, assignment), as_version=4)
+    messages = {c.metadata.nbgrader.grade_id: _message(c) for c in graded.cells if is_grade(c)}
+    with Gradebook(f"sqlite:///{course / 'gradebook.db'}") as gradebook:
+        grades = gradebook.find_submission_notebook(assignment, assignment, student).grades
+        return {g.name: CellScore(g.max_score, g.auto_score, messages[g.name]) for g in grades}
+
+
+def _message(cell: NotebookNode) -> str:
+    """Return the errors below a cell, as the student reads them."""
+    errors = [output for output in cell.get("outputs", []) if output.output_type == "error"]
+    return "\n".join(f"{error.ename}: {error.evalue or strip_ansi(error.traceback[-1])}" for error in errors)
+
+
+def _place(course: Path, step: str, student: str, assignment: str) -> Path:
+    """Return the path of a student's notebook in one of nbgrader's folders."""
+    return course / step / student / assignment / f"{assignment}.ipynb"

@@ -1,0 +1,113 @@
+"""What every exercise must do when nbgrader grades it; one subclass an exercise, with its catalogue of answers."""
+
+import re
+from dataclasses import dataclass
+
+import pytest
+
+from semgrid_edu.course.exercises import build_course
+from semgrid_edu.course.grading import autograde, reference_answers, submission, tasks
+from semgrid_edu.course.notebooks import NOTEBOOKS
+
+TIMEOUT = 6
+"""Seconds for a cell: enough for any answer, and all that an endless loop costs the run."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One answer to one task, and what it must lose."""
+
+    title: str
+    task: str
+    code: str
+    loses: float = 0
+    says: str = ""
+
+
+def mistake(title: str, *, task: str, loses: float, says: str, code: str) -> Entry:
+    """Catalogue a real mistake: the points it must lose, and words that must be in its message."""
+    return Entry(title, task, code, loses, says)
+
+
+def right(title: str, *, task: str, code: str) -> Entry:
+    """Catalogue another right way, which must earn full marks."""
+    return Entry(title, task, code)
+
+
+def pack(entries) -> list[dict[str, Entry]]:
+    """Share entries out to students: each answers every task with at most one entry, so that few runs try them all."""
+    students: list[dict[str, Entry]] = []
+    for entry in entries:
+        free = next((student for student in students if entry.task not in student), None)
+        if free is None:
+            students.append(free := {})
+        free[entry.task] = entry
+    return students
+
+
+# nbgrader 0.9.6 builds a submission outside its database session and lets sqlalchemy complain about it
+@pytest.mark.filterwarnings("ignore:Object of type <Submitted:sqlalchemy.exc.SAWarning")
+class GraderChecks:
+    """The reference earns all, the stub nothing, and each entry loses what it should; tasks don't touch each other."""
+
+    exercise: str
+    entries: tuple[Entry, ...]
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def source(cls):
+        return NOTEBOOKS / "src" / "exercises" / f"{cls.exercise}.py"
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def graded(cls, source, tmp_path_factory):
+        """Every student's score of every task: (score, points, message), by student and task."""
+        course = tmp_path_factory.mktemp("course")
+        build_course(course)
+        reference = reference_answers(source)
+        students = {"reference": reference, "stub": {}}
+        for number, answers in enumerate(pack(cls.entries)):
+            students[f"student-{number}"] = reference | {task: entry.code for task, entry in answers.items()}
+        notebooks = {student: submission(source, answers) for student, answers in students.items()}
+        scores = autograde(course, cls.exercise, notebooks, timeout=TIMEOUT)
+        return {student: cls.by_task(source, cells) for student, cells in scores.items()}
+
+    @staticmethod
+    def by_task(source, cells):
+        """Add up test cells; a written answer waits for a person and is left out once it has been given."""
+        return {
+            task: (
+                sum(cells[name].score for name in names),
+                sum(cells[name].points for name in names),
+                "\n".join(cells[name].message for name in names),
+            )
+            for task, names in tasks(source).items()
+            if all(cells[name].score is not None for name in names)
+        }
+
+    def test_reference_earns_full_marks(self, graded):
+        for task, (score, points, message) in graded["reference"].items():
+            assert score == points, f"{task}: {message}"
+
+    def test_untouched_stub_earns_nothing(self, graded, source):
+        assert {task: score for task, (score, _, _) in graded["stub"].items()} == dict.fromkeys(tasks(source), 0)
+
+    def test_entry(self, graded, entry):
+        student = next(n for n, answers in enumerate(pack(self.entries)) if answers.get(entry.task) is entry)
+        score, points, message = graded[f"student-{student}"][entry.task]
+        assert points - score == entry.loses, message or "no test noticed"
+        assert re.sub(r"\s+", " ", entry.says) in re.sub(r"\s+", " ", message)
+
+    def test_other_tasks_keep_their_points(self, graded):
+        for number, answers in enumerate(pack(self.entries)):
+            for task, (score, points, message) in graded[f"student-{number}"].items():
+                assert task in answers or score == points, f"student-{number}, {task}: {message}"
+
+    def test_catalogue_is_complete(self, source):
+        """Two other right ways and a mistake for every graded task of code, and a loop that never ends."""
+        coded = [task for task, names in tasks(source).items() if names != (task,)]
+        for task in coded:
+            ways = [entry for entry in self.entries if entry.task == task]
+            assert sum(not entry.loses for entry in ways) >= 2, f"{task}: two other right ways"
+            assert any(entry.loses for entry in ways), f"{task}: a mistake"
+        assert any("before timeout" in entry.says for entry in self.entries), "an endless loop"
