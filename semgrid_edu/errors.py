@@ -21,7 +21,11 @@ class ArgumentError(ValueError):
     """
 
     def __init__(self, name: str, expected: object, found: object) -> None:
-        super().__init__(f"{name}: expected {expected}, found {found}")
+        super().__init__(name, expected, found)
+
+    def __str__(self) -> str:
+        """Say all three."""
+        return "{}: expected {}, found {}".format(*self.args)
 
 
 class DataError(ValueError):
@@ -36,5 +40,9 @@ class DataError(ValueError):
     """
 
     def __init__(self, path: str | Path, expected: object, found: object) -> None:
-        super().__init__(f"{path}: expected {expected}, found {found}")
+        super().__init__(path, expected, found)
         self.path = Path(path)
+
+    def __str__(self) -> str:
+        """Say all three."""
+        return "{}: expected {}, found {}".format(*self.args)

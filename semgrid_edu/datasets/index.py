@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from semgrid_edu.datasets.kitti_raw import KittiRawDrive
 from semgrid_edu.datasets.reading import read_text
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import LABEL_SETS, LabelSet
@@ -41,26 +40,20 @@ class DatasetIndex:
     label_set: LabelSet
     splits: dict[str, tuple[LabelledFrame, ...]]
 
-    def drives(self, split: str) -> dict[KittiRawDrive, list[int]]:
-        """Return the drives of a split and the numbers of their labelled frames, both in the order of the index.
+    def frames_by_drive(self, split: str) -> dict[tuple[str, str], list[int]]:
+        """Return the numbers of the labelled frames by (date, drive), in the order of the index.
 
         Raises
         ------
         ArgumentError
             When there is no such split.
-        DataError
-            When a drive is missing, or has no such frame.
         """
         if split not in self.splits:
             raise ArgumentError("split", f"one of {', '.join(self.splits)}", repr(split))
-        drives: dict[tuple[str, str], list[int]] = {}
+        frames: dict[tuple[str, str], list[int]] = {}
         for date, drive, frame in self.splits[split]:
-            drives.setdefault((date, drive), []).append(frame)
-        opened = {KittiRawDrive(self.root, *name): frames for name, frames in drives.items()}
-        for drive, frames in opened.items():
-            if max(frames) >= len(drive):
-                raise DataError(drive.folder, f"frame {max(frames)}, which {INDEX_FILE} lists", f"{len(drive)} frames")
-        return opened
+            frames.setdefault((date, drive), []).append(frame)
+        return frames
 
 
 def load_index(dataset_dir: str | Path) -> DatasetIndex:

@@ -42,6 +42,8 @@ class KittiRawDrive(Sequence[Frame]):
         Such as "2011_09_26".
     drive : str
         Such as "0013".
+    images : bool
+        False leaves the images unread, as if the drive had none: quicker where only the LIDAR matters.
 
     Raises
     ------
@@ -57,11 +59,11 @@ class KittiRawDrive(Sequence[Frame]):
     ((113944, 4), (375, 1242, 3))
     """
 
-    def __init__(self, root: str | Path, date: str, drive: str) -> None:
+    def __init__(self, root: str | Path, date: str, drive: str, *, images: bool = True) -> None:
         self.date_folder = _existing(Path(root), date, "dates", "*_*_*")
         self.folder = _existing(self.date_folder, f"{date}_drive_{drive}_sync", "drives", "*_sync")
         self._sensors = ["velodyne_points", "oxts"]
-        if (self.folder / "image_02").exists():
+        if images and (self.folder / "image_02").exists():
             self._sensors.append("image_02")
         self._length = 1 + max((_last_frame(self.folder / sensor / "data") for sensor in self._sensors), default=-1)
         if self._length == 0:

@@ -1,0 +1,44 @@
+"""Which LIDAR return a pixel sees, and in which cell it lies: how image labels reach the grid (section 4)."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.camera import project, transform_points
+from semgrid_edu.frame import Frame
+from semgrid_edu.grid import GridSpec
+
+
+def seen_returns(
+    frame: Frame, spec: GridSpec, image_size: tuple[int, int]
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Find the returns that the camera sees: of several at one pixel, the closest.
+
+    The LIDAR stands above the camera and looks over things that hide what is behind from the camera; the
+    closest return hides most of those again. Pixels are compared at the camera's own resolution.
+
+    Parameters
+    ----------
+    frame : Frame
+    spec : GridSpec
+        The grid, (H, W) cells.
+    image_size : (int, int)
+        Height and width of the resized image whose labels are to be carried, pixels.
+
+    Returns
+    -------
+    pixels : (N,) int32
+        For each return that is seen and lies in the grid, its pixel in the resized image, row * width + column.
+    cells : (N,) int32
+        Its cell, row * W + column.
+    """
+    in_camera = transform_points(frame.camera.T_camera_from_lidar, frame.points[:, :3])
+    uv, visible = project(in_camera, frame.camera)
+    seen = np.flatnonzero(visible)
+    seen = seen[np.argsort(in_camera[seen, 2], kind="stable")]
+    u, v = np.rint(uv[seen]).astype(np.int64).T
+    _, closest = np.unique(v * frame.camera.size[1] + u, return_index=True)
+    rows, cols, inside = spec.cells(frame.points_grid[seen[closest]])
+    u, v = u[closest][inside], v[closest][inside]
+    scale_v, scale_u = image_size[0] / frame.camera.size[0], image_size[1] / frame.camera.size[1]
+    row, col = ((v + 0.5) * scale_v).astype(np.int32), ((u + 0.5) * scale_u).astype(np.int32)
+    return row * image_size[1] + col, (rows * spec.shape[1] + cols)[inside].astype(np.int32)

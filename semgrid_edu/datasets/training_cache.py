@@ -1,0 +1,155 @@
+"""Arrays of a split's labelled frames, made by worker processes, kept beside the data and mapped from disk."""
+
+import hashlib
+import json
+import multiprocessing
+import shutil
+import tempfile
+from concurrent.futures import ProcessPoolExecutor
+from itertools import islice
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm.auto import tqdm
+
+import semgrid_edu
+from semgrid_edu.datasets.index import INDEX_FILE, DatasetIndex
+from semgrid_edu.datasets.kitti_raw import KittiRawDrive
+from semgrid_edu.datasets.reading import read_text
+from semgrid_edu.datasets.resizing import resize_image, resize_labels
+from semgrid_edu.datasets.returns import seen_returns
+from semgrid_edu.datasets.truth import grid_truth
+from semgrid_edu.errors import DataError
+from semgrid_edu.files import sha256, write_json
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import CmcdotParams, track_drive
+
+WORKERS = 2
+"""Processes that make the arrays, a drive at a time."""
+
+RAGGED = ("return_pixels", "return_cells")
+"""Arrays of which each frame has its own length: they lie end to end, and `return_ends` says where each ends."""
+
+
+class Recipe(NamedTuple):
+    """What the arrays are made by: the grid, the image size (height, width) and the occupancy filter."""
+
+    spec: GridSpec
+    image_size: tuple[int, int]
+    params: CmcdotParams
+
+
+def cached_arrays(index: DatasetIndex, split: str, recipe: Recipe) -> dict[str, NDArray]:
+    """Return the arrays of a split's labelled frames; make them on first use.
+
+    They lie in `cache/` of the data set, in a folder named by a hash of all that decides them: the recipe,
+    dataset.json and the code that makes them. When one of these changes, they are made anew.
+
+    Returns
+    -------
+    dict of str to (frames, ...) arrays mapped from disk, read-only
+        image (3, h, w) uint8, labels (h, w) uint8, occupancy (4, H, W) float32 and truth (H, W) uint8 of each
+        frame; return_pixels and return_cells (`seen_returns`), those of frame k from return_ends[k] to [k + 1].
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such split.
+    DataError
+        When the data set, or what was kept, is damaged.
+    """
+    folder = index.root / "cache" / _key(index, recipe) / split
+    if not folder.exists():
+        _write_arrays(_pack(_process(index, split, recipe)), recipe, folder)
+    return _map_arrays(folder)
+
+
+def _key(index: DatasetIndex, recipe: Recipe) -> str:
+    """Hash what decides the arrays; code that changed makes them stale as surely as data."""
+    package = Path(semgrid_edu.__file__).parent
+    code = [package / name for name in ("camera.py", "frame.py", "grid.py", "labels.py")]
+    code += sorted((package / "datasets").glob("*.py")) + sorted((package / "occupancy").glob("*.py"))
+    parts = [repr(recipe), sha256(index.root / INDEX_FILE), *map(sha256, code)]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
+
+
+def _process(index: DatasetIndex, split: str, recipe: Recipe) -> list[dict[str, NDArray]]:
+    """Make the arrays of every labelled frame of a split."""
+    jobs = [(index.root, *name, labelled, recipe) for name, labelled in index.frames_by_drive(split).items()]
+    # A forked process would inherit the threads' locks of torch and numba, and hang.
+    with ProcessPoolExecutor(WORKERS, mp_context=multiprocessing.get_context("spawn")) as pool:
+        drives = pool.map(_process_drive, *zip(*jobs, strict=True))
+        progress = tqdm(drives, desc=f"{index.name}, {split}", total=len(jobs), unit="drive")
+        return [frame for drive in progress for frame in drive]
+
+
+def _write_arrays(arrays: dict[str, NDArray], recipe: Recipe, folder: Path) -> None:
+    """Write the arrays and their manifest to a folder that appears whole or not at all."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}-"))
+    try:
+        for name, array in arrays.items():
+            np.save(unfinished / f"{name}.npy", array, allow_pickle=False)
+        shapes = {name: [str(array.dtype), *array.shape] for name, array in arrays.items()}
+        write_json(unfinished / "manifest.json", {"recipe": repr(recipe), "arrays": shapes})
+        unfinished.chmod(0o755)
+        unfinished.replace(folder)
+    except OSError:
+        if not folder.exists():  # else another process was quicker
+            raise
+    finally:
+        shutil.rmtree(unfinished, ignore_errors=True)
+
+
+def _process_drive(root: Path, date: str, drive: str, labelled: list[int], recipe: Recipe) -> list[dict[str, NDArray]]:
+    """Run the filter over a drive and make the arrays of its labelled frames, in the order of `labelled`."""
+    scans = islice(KittiRawDrive(root, date, drive, images=False), max(labelled) + 1)
+    beliefs = enumerate(track_drive(scans, recipe.spec, recipe.params, seed=0))
+    occupancy = {k: belief.probability for k, belief in beliefs if k in labelled}
+    frames = KittiRawDrive(root, date, drive)
+    if max(labelled) >= len(frames):
+        raise DataError(frames.folder, f"the frame {max(labelled)} that {INDEX_FILE} lists", f"{len(frames)} frames")
+    return [_process_frame(frames, k, occupancy[k], recipe) for k in labelled]
+
+
+def _process_frame(drive: KittiRawDrive, k: int, occupancy: NDArray, recipe: Recipe) -> dict[str, NDArray]:
+    """Make the arrays of one frame."""
+    frame = drive[k]
+    if frame.labels is None or frame.image is None:
+        missing = "image" if frame.image is None else "labels"
+        raise DataError(drive.folder, f"image and labels of the frame {k} that {INDEX_FILE} lists", f"no {missing}")
+    pixels, cells = seen_returns(frame, recipe.spec, recipe.image_size)
+    return {
+        "image": resize_image(frame.image, recipe.image_size).transpose(2, 0, 1),
+        "labels": resize_labels(frame.labels.image, recipe.image_size),
+        "occupancy": occupancy.astype(np.float32),
+        "truth": grid_truth(frame.labels, occupancy, recipe.spec),
+        "return_pixels": pixels,
+        "return_cells": cells,
+    }
+
+
+def _pack(frames: list[dict[str, NDArray]]) -> dict[str, NDArray]:
+    """Stack the arrays of all frames, or put them end to end."""
+    joins = {name: np.concatenate if name in RAGGED else np.stack for name in frames[0]}
+    arrays = {name: join([frame[name] for frame in frames]) for name, join in joins.items()}
+    arrays["return_ends"] = np.cumsum([0, *(len(frame["return_cells"]) for frame in frames)])
+    return arrays
+
+
+def _map_arrays(folder: Path) -> dict[str, NDArray]:
+    """Map the arrays that the manifest lists, once they are what it says."""
+    manifest = json.loads(read_text(folder / "manifest.json"))
+    arrays = {}
+    for name, (dtype, *shape) in manifest["arrays"].items():
+        path = folder / f"{name}.npy"
+        try:
+            arrays[name] = np.load(path, mmap_mode="r", allow_pickle=False)
+        except (OSError, ValueError, EOFError) as error:
+            raise DataError(path, "an array (delete the folder to make it anew)", error) from error
+        found = [str(arrays[name].dtype), *arrays[name].shape]
+        if found != [dtype, *shape]:
+            raise DataError(path, f"{[dtype, *shape]} (delete the folder to make it anew)", found)
+    return arrays

@@ -1,0 +1,124 @@
+"""The training set: image, occupancy and truth of each labelled frame of a split (section 4.1)."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.utils.data import Dataset
+
+from semgrid_edu.camera import Camera
+from semgrid_edu.datasets.calibration import read_camera
+from semgrid_edu.datasets.index import DatasetIndex, load_index
+from semgrid_edu.datasets.training_cache import Recipe, cached_arrays
+from semgrid_edu.errors import DataError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import CmcdotParams
+
+IMAGE_SIZE = (96, 320)
+"""Height and width of the images that compact networks see: KITTI's aspect at a quarter of its resolution."""
+
+
+class Sample(NamedTuple):
+    """One labelled frame, as a network takes it.
+
+    Parameters
+    ----------
+    image : (3, h, w) uint8
+        RGB.
+    labels : (h, w) uint8
+        The class of each pixel; 255 where unlabelled.
+    occupancy : (4, H, W) float32
+        Probability of free, static, dynamic and unknown.
+    truth : (H, W) uint8
+        The class of each cell.
+    """
+
+    image: Tensor
+    labels: Tensor
+    occupancy: Tensor
+    truth: Tensor
+
+
+class TrainingSet(Dataset[Sample]):
+    """The labelled frames of a split.
+
+    The first use runs the occupancy filter over every drive up to its labelled frames and keeps the result in
+    `cache/` of the data set, in a folder named by a hash of everything that decides it: the recipe, dataset.json
+    and the code. Later uses map it from disk.
+
+    Parameters
+    ----------
+    dataset_dir : path-like
+        A data set with dataset.json, such as data/minikitti.
+    split : str
+        Such as "train".
+    spec : GridSpec, optional
+        The grid; the compact one by default.
+    image_size : (int, int)
+        Height and width of the images.
+    params : CmcdotParams, optional
+        The occupancy filter.
+
+    Attributes
+    ----------
+    camera : Camera
+        The calibration of the resized images, the same for all frames.
+    label_set : LabelSet
+    spec : GridSpec
+    arrays : dict of str to (frames, ...) arrays mapped from disk
+        All frames at once, by the names of `Sample`, and more: see `cached_arrays`.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such split.
+    DataError
+        When the data set is damaged, or its drives have different cameras.
+
+    Examples
+    --------
+    >>> training = TrainingSet("data/minikitti", "train")                  # doctest: +SKIP
+    >>> torch.utils.data.DataLoader(training, batch_size=6, shuffle=True)  # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        dataset_dir: str | Path,
+        split: str,
+        spec: GridSpec | None = None,
+        image_size: tuple[int, int] = IMAGE_SIZE,
+        params: CmcdotParams | None = None,
+    ) -> None:
+        index = load_index(dataset_dir)
+        recipe = Recipe(spec or GridSpec.compact(), tuple(image_size), params or CmcdotParams())
+        self.spec, self.label_set = recipe.spec, index.label_set
+        self.camera = _shared_camera(index, split).resized(recipe.image_size)
+        self.arrays = cached_arrays(index, split, recipe)
+
+    def __len__(self) -> int:
+        """Return the number of labelled frames."""
+        return len(self.arrays["truth"])
+
+    def __getitem__(self, k: int) -> Sample:
+        """Return frame k, by drive in the order of the index."""
+        return Sample(*(torch.from_numpy(np.array(self.arrays[name][k])) for name in Sample._fields))
+
+    def returns(self, k: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Return the pixel and the cell of each LIDAR return that the camera sees in frame k: see `seen_returns`."""
+        first, last = self.arrays["return_ends"][[k, k + 1]]
+        return self.arrays["return_pixels"][first:last], self.arrays["return_cells"][first:last]
+
+
+def _shared_camera(index: DatasetIndex, split: str) -> Camera:
+    """Return the camera of a split's drives, refusing two that differ: one sampler serves them all."""
+    first, *others = sorted({date for date, _ in index.frames_by_drive(split)})
+    camera = read_camera(index.root / first)
+    for date in others:
+        other = read_camera(index.root / date)
+        same = np.array_equal(camera.K, other.K) and camera.size == other.size
+        if not (same and np.array_equal(camera.T_camera_from_lidar, other.T_camera_from_lidar)):
+            raise DataError(index.root / date, f"the calibration of {first}, as one network serves both", "another")
+    return camera

@@ -1,0 +1,60 @@
+"""dataset.json: what it lists comes out, and whatever is wrong with it is said."""
+
+import json
+
+import pytest
+from tiny_drive import DATE
+
+from semgrid_edu.datasets import LabelledFrame, load_index
+from semgrid_edu.errors import ArgumentError, DataError
+
+FRAME = {"date": DATE, "drive": "0001", "frame": 9}
+SOUND = {"name": "tiny", "label_set": "KITTI-14", "splits": {"train": [FRAME], "test": [{**FRAME, "drive": "0002"}]}}
+
+
+def write(folder, content):
+    (folder / "dataset.json").write_text(content if isinstance(content, str) else json.dumps(content))
+    return folder
+
+
+def test_lists_frames(tmp_path):
+    index = load_index(write(tmp_path, SOUND))
+    assert (index.root, index.name, index.label_set.name) == (tmp_path, "tiny", "KITTI-14")
+    assert index.splits == {"train": (LabelledFrame(DATE, "0001", 9),), "test": (LabelledFrame(DATE, "0002", 9),)}
+
+
+def test_groups_frames_by_drive(tmp_path):
+    frames = [{**FRAME, "drive": "0002"}, FRAME, {**FRAME, "frame": 19}]
+    index = load_index(write(tmp_path, {**SOUND, "splits": {"train": frames}}))
+    assert index.frames_by_drive("train") == {(DATE, "0002"): [9], (DATE, "0001"): [9, 19]}
+    with pytest.raises(ArgumentError, match="train"):
+        index.frames_by_drive("test")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "",
+        "{",
+        "[]",
+        {"name": "tiny"},
+        {**SOUND, "label_set": "KITTI-15"},
+        {**SOUND, "label_set": ["KITTI-14"]},
+        {**SOUND, "splits": [FRAME]},
+        {**SOUND, "splits": {"train": []}},
+        {**SOUND, "splits": {"train": [{"date": DATE, "drive": "0001"}]}},
+        {**SOUND, "splits": {"train": [{**FRAME, "frame": "9"}]}},
+        {**SOUND, "splits": {"train": [{**FRAME, "frame": -1}]}},
+        {**SOUND, "splits": {"train": [{**FRAME, "date": "../other"}]}},
+        {**SOUND, "splits": {"train": [FRAME, FRAME]}},
+        {**SOUND, "splits": {"train": [FRAME], "test": [{**FRAME, "frame": 8}]}},
+    ],
+)
+def test_says_what_is_wrong(tmp_path, content):
+    with pytest.raises(DataError, match=r"dataset\.json: expected"):
+        load_index(write(tmp_path, content))
+
+
+def test_missing_index_is_named(tmp_path):
+    with pytest.raises(DataError, match=r"dataset\.json"):
+        load_index(tmp_path)

@@ -1,0 +1,44 @@
+"""Smaller images and labels: averages and majorities of the pixels that they cover."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from semgrid_edu.camera import Camera, project
+from semgrid_edu.datasets.resizing import resize_image, resize_labels
+
+labels = arrays(np.uint8, (12, 8), elements=st.sampled_from([0, 3, 13, 255]))
+
+
+@given(arrays(np.uint8, (12, 8, 3)))
+def test_pixel_is_the_mean_of_its_block(image):
+    blocks = image.reshape(4, 3, 4, 2, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(resize_image(image, (4, 4)), blocks, atol=1)
+
+
+@settings(deadline=None)
+@given(labels)
+def test_label_is_the_most_frequent_of_its_block(labels):
+    blocks = labels.reshape(4, 3, 4, 2).swapaxes(1, 2).reshape(16, 6)
+    expected = [max(sorted(set(block)), key=list(block).count) for block in blocks.tolist()]
+    np.testing.assert_array_equal(resize_labels(labels, (4, 4)).ravel(), expected)
+
+
+@given(labels)
+def test_labels_invent_no_class_at_any_size(labels):
+    resized = resize_labels(labels, (5, 3))
+    assert resized.shape == (5, 3)
+    assert np.isin(resized, labels).all()
+
+
+def test_a_point_keeps_its_spot_in_the_smaller_image():
+    # A white spot of one coarse pixel: its centre, in the small image, is where the resized camera sees it.
+    camera = Camera(np.array([[50.0, 0, 19.5], [0, 50.0, 11.5], [0, 0, 1]]), np.eye(4), (24, 40))
+    image = np.zeros((24, 40, 3), np.uint8)
+    image[8:12, 20:24] = 255
+    point = np.array([[(21.5 - 19.5) / 50, (9.5 - 11.5) / 50, 1.0]])
+    np.testing.assert_allclose(project(point, camera)[0], [[21.5, 9.5]])
+    small = resize_image(image, (6, 10))
+    ((v, u),) = np.argwhere(small[..., 0])
+    np.testing.assert_allclose(project(point, camera.resized((6, 10)))[0], [[u, v]])

@@ -1,0 +1,147 @@
+"""The cached training set of a hand-made data set: what it holds, and when it is made anew."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+import torch
+from tiny_drive import DATE, SIZE, write_tiny_dataset
+
+from semgrid_edu.datasets import KittiRawDrive, grid_truth, training_cache
+from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import CmcdotParams, track_drive
+
+SMALL = (6, 20)
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """A data set whose training split is in the cache."""
+    root = write_tiny_dataset(tmp_path_factory.mktemp("tiny"))
+    TrainingSet(root, "train", image_size=SMALL)
+    return root
+
+
+@pytest.fixture
+def no_work(monkeypatch):
+    """Whatever would make arrays anew fails instead."""
+
+    def refuse(*_):
+        raise AssertionError("made anew")
+
+    monkeypatch.setattr(training_cache, "_process", refuse)
+
+
+@pytest.fixture
+def in_this_process(monkeypatch):
+    """Make arrays without worker processes, which take seconds to start."""
+
+    def process(index, split, recipe):
+        by_drive = index.frames_by_drive(split).items()
+        drives = [training_cache._process_drive(index.root, *name, frames, recipe) for name, frames in by_drive]
+        return [frame for drive in drives for frame in drive]
+
+    monkeypatch.setattr(training_cache, "_process", process)
+
+
+@pytest.mark.usefixtures("no_work")
+class TestBuilt:
+    def test_holds_what_the_readers_and_the_filter_give(self, built):
+        training, spec = TrainingSet(built, "train", image_size=SMALL), GridSpec.compact()
+        assert len(training) == 2
+        for sample, name in zip(training, ("0001", "0002"), strict=True):
+            drive = KittiRawDrive(built, DATE, name)
+            *_, belief = track_drive(drive, spec, seed=0)
+            np.testing.assert_array_equal(sample.occupancy, belief.probability)
+            np.testing.assert_array_equal(sample.truth, grid_truth(drive[2].labels, belief.probability, spec))
+            blocks = drive[2].image.reshape(6, 2, 20, 2, 3).mean(axis=(1, 3)).transpose(2, 0, 1)
+            np.testing.assert_allclose(sample.image.numpy(), blocks, atol=1)
+
+    def test_returns_lie_where_the_wall_stands(self, built):
+        # The wall of the hand-made drive stands 30 m ahead of the LIDAR: row (71 - 30) / 0.5 of the grid.
+        pixels, cells = TrainingSet(built, "train", image_size=SMALL).returns(1)
+        rows = cells // GridSpec.compact().shape[1]
+        assert len(pixels) == len(cells) > 50
+        assert np.bincount(rows).argmax() == 82
+        assert pixels.max() < SMALL[0] * SMALL[1]
+
+    def test_camera_is_that_of_the_resized_images(self, built):
+        camera = TrainingSet(built, "train", image_size=SMALL).camera
+        assert camera.size == SMALL
+        np.testing.assert_array_equal(camera.K, KittiRawDrive(built, DATE, "0001").camera.resized(SMALL).K)
+
+    def test_loads_in_batches(self, built):
+        training = TrainingSet(built, "train", image_size=SMALL)
+        (batch,) = torch.utils.data.DataLoader(training, batch_size=2)
+        assert batch.image.shape == (2, 3, *SMALL)
+        assert batch.labels.shape == (2, *SMALL)
+        assert batch.occupancy.shape == (2, 4, 142, 62)
+        assert batch.truth.shape == (2, 142, 62)
+        assert [t.dtype for t in batch] == [torch.uint8, torch.uint8, torch.float32, torch.uint8]
+
+    @pytest.mark.parametrize(
+        "change",
+        [{"image_size": SIZE}, {"spec": GridSpec(0, 71, -15.5, 15.5, 1.0)}, {"params": CmcdotParams(particles=999)}],
+    )
+    def test_another_recipe_is_not_in_the_cache(self, built, change):
+        with pytest.raises(AssertionError, match="made anew"):
+            TrainingSet(built, "train", **{"image_size": SMALL, **change})
+
+    def test_another_index_is_not_in_the_cache(self, built, tmp_path):
+        root = shutil.copytree(built, tmp_path / "copy")
+        index = json.loads((root / "dataset.json").read_text())
+        (root / "dataset.json").write_text(json.dumps({**index, "seed": 1}))
+        with pytest.raises(AssertionError, match="made anew"):
+            TrainingSet(root, "train", image_size=SMALL)
+
+    def test_damaged_array_is_named(self, built, tmp_path):
+        root = shutil.copytree(built, tmp_path / "copy")
+        (path,) = root.glob("cache/*/train/occupancy.npy")
+        path.write_bytes(path.read_bytes()[:-5])
+        with pytest.raises(DataError, match=r"occupancy\.npy"):
+            TrainingSet(root, "train", image_size=SMALL)
+
+    def test_unknown_split_is_named(self, built):
+        with pytest.raises(ArgumentError, match="split"):
+            TrainingSet(built, "validation")
+
+
+def test_error_in_a_worker_names_the_file_and_leaves_nothing(tmp_path):
+    root = write_tiny_dataset(tmp_path)
+    scan = root / DATE / f"{DATE}_drive_0002_sync" / "velodyne_points" / "data" / "0000000001.bin"
+    scan.write_bytes(b"short")
+    with pytest.raises(DataError, match=str(scan)):
+        TrainingSet(root, "train", image_size=SMALL)
+    assert not list(root.glob("cache/*/train"))
+
+
+@pytest.mark.usefixtures("in_this_process")
+class TestRefusals:
+    def test_frame_without_labels(self, tmp_path):
+        root = write_tiny_dataset(tmp_path)
+        shutil.rmtree(root / DATE / f"{DATE}_drive_0003_sync" / "labels")
+        with pytest.raises(DataError, match="0003_sync"):
+            TrainingSet(root, "test", image_size=SMALL)
+
+    def test_frame_beyond_the_drive(self, tmp_path):
+        root = write_tiny_dataset(tmp_path)
+        text = (root / "dataset.json").read_text().replace('"frame": 2', '"frame": 3')
+        (root / "dataset.json").write_text(text)
+        with pytest.raises(DataError, match="frame 3"):
+            TrainingSet(root, "test", image_size=SMALL)
+
+    def test_drives_of_two_cameras(self, tmp_path):
+        root = write_tiny_dataset(tmp_path)
+        other = shutil.copytree(root / DATE, root / "2026_01_02")
+        for drive in other.glob("*_sync"):
+            drive.rename(other / drive.name.replace(DATE, "2026_01_02"))
+        calibration = other / "calib_cam_to_cam.txt"
+        calibration.write_text(calibration.read_text().replace("2.000000e+01", "3.000000e+01"))
+        frames = [{"date": date, "drive": "0001", "frame": 2} for date in (DATE, "2026_01_02")]
+        index = {"name": "two", "label_set": "KITTI-14", "splits": {"train": frames}}
+        (root / "dataset.json").write_text(json.dumps(index))
+        with pytest.raises(DataError, match="2026_01_02"):
+            TrainingSet(root, "train", image_size=SMALL)

@@ -1,0 +1,57 @@
+"""Truth on the grid: the class where the camera sees, the kind of unknown elsewhere."""
+
+import numpy as np
+import pytest
+
+from semgrid_edu.datasets import grid_truth
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.frame import LABEL_GRID, FrameLabels
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import IGNORE, KITTI_14, SYNTHIA_10
+
+SPEC = GridSpec.compact()
+
+
+def make_labels(birdseye, visible, label_set=KITTI_14):
+    image = np.zeros((2, 2), np.uint8)
+    return FrameLabels(label_set, image, image.astype(np.float32), birdseye, visible)
+
+
+def belief_of(states):
+    return np.eye(4)[states].transpose(2, 0, 1) * 0.4 + 0.15
+
+
+@pytest.fixture
+def states():
+    return np.random.default_rng(0).integers(0, 4, SPEC.shape)
+
+
+def test_seen_cells_take_their_class_and_others_their_state(states):
+    birdseye = np.full(LABEL_GRID.shape, KITTI_14.index("road"), np.uint8)
+    birdseye[:, 150:] = IGNORE
+    visible = np.zeros(LABEL_GRID.shape, bool)
+    visible[350:] = True
+    truth = grid_truth(make_labels(birdseye, visible), belief_of(states), SPEC)
+    seen = np.zeros(SPEC.shape, bool)
+    seen[70:, :30] = True
+    assert (truth[seen] == KITTI_14.index("road")).all()
+    names = np.array(["unknown-free", "unknown-static", "unknown-dynamic", "unknown-unobserved"])
+    np.testing.assert_array_equal(np.array(KITTI_14.names)[truth[~seen]], names[states[~seen]])
+
+
+def test_one_seen_fine_cell_of_a_pole_names_its_cell(states):
+    birdseye = np.full(LABEL_GRID.shape, KITTI_14.index("sidewalk"), np.uint8)
+    birdseye[503, 202] = KITTI_14.index("signage")
+    visible = np.ones(LABEL_GRID.shape, bool)
+    truth = grid_truth(make_labels(birdseye, visible), belief_of(states), SPEC)
+    expected = np.full(SPEC.shape, KITTI_14.index("sidewalk"))
+    expected[100, 40] = KITTI_14.index("signage")
+    np.testing.assert_array_equal(truth, expected)
+
+
+def test_refuses_other_shapes_and_label_sets(states):
+    labels = make_labels(np.zeros(LABEL_GRID.shape, np.uint8), np.ones(LABEL_GRID.shape, bool))
+    with pytest.raises(ArgumentError, match="belief_probability"):
+        grid_truth(labels, belief_of(states)[:, 1:], SPEC)
+    with pytest.raises(ArgumentError, match="SYNTHIA-10"):
+        grid_truth(make_labels(labels.birdseye, labels.visible, SYNTHIA_10), belief_of(states), SPEC)
