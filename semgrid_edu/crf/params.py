@@ -1,0 +1,127 @@
+"""Parameters and input of the CRF that refines the semantic grid (paper, section 3.5)."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from semgrid_edu.errors import ArgumentError
+
+N_STATES = 4
+"""FREE, STATIC, DYNAMIC, UNKNOWN: the values o_i of a cell."""
+
+
+@dataclass(frozen=True)
+class CrfParams:
+    """What eq. (4) leaves open. The paper gives no values.
+
+    Parameters
+    ----------
+    w_bilateral, w_spatial : float
+        w1 and w2, the weights of the two kernels. 4 and 3: the appearance kernel of Kraehenbuehl and Koltun's published
+        code is a few times as strong as its smoothness kernel; on a grid the two lie closer together, since occupancy is
+        a weaker cue than colour.
+    sigma_alpha : float
+        Reach of the bilateral kernel, in cells. 8 cells are 1.6 m in the paper's grid, half a car's length, and 4 m in
+        the compact one: give half as much there to keep the reach in metres.
+    sigma_beta : float
+        Reach of the bilateral kernel in state probability. Two certain, different states lie sqrt(2) apart, seven times
+        0.2, and don't talk to each other; a cell that is 90 % free still hears one that is certainly free.
+    sigma_gamma : float
+        Reach of the spatial kernel, in cells. Kraehenbuehl and Koltun's published 3: removes specks.
+    normalization : {"symmetric", "none"}
+        "symmetric" replaces each kernel K (its diagonal, 1, included) by D^-1/2 K D^-1/2 with D its row sums, as
+        Kraehenbuehl's code does by default: every cell hears about as much, so the weights don't depend on the
+        sigmas or on how common a cell's state is. "none" is eq. (4) as printed: hundreds of neighbours speak at full
+        weight, which over-smooths.
+
+    Raises
+    ------
+    ArgumentError
+        When a weight is negative, a sigma isn't positive, or the normalisation is unknown.
+    """
+
+    w_bilateral: float = 4.0
+    w_spatial: float = 3.0
+    sigma_alpha: float = 8.0
+    sigma_beta: float = 0.2
+    sigma_gamma: float = 3.0
+    normalization: Literal["symmetric", "none"] = "symmetric"
+
+    def __post_init__(self) -> None:
+        """Refuse what eq. (4) has no meaning for."""
+        for name in ("w_bilateral", "w_spatial"):
+            weight = getattr(self, name)
+            if not (np.isfinite(weight) and weight >= 0):
+                raise ArgumentError(name, "a weight of at least 0", weight)
+        for name in ("sigma_alpha", "sigma_beta", "sigma_gamma"):
+            sigma = getattr(self, name)
+            if not (np.isfinite(sigma) and sigma > 0):
+                raise ArgumentError(name, "a positive width", sigma)
+        if self.normalization not in ("symmetric", "none"):
+            raise ArgumentError("normalization", '"symmetric" or "none"', repr(self.normalization))
+
+
+def unary_from_probability(probability: ArrayLike) -> NDArray[np.float64]:
+    """Turn the network's distribution into the unary term of eq. (3): phi_u(x_i) = -log p_i(x_i).
+
+    Parameters
+    ----------
+    probability : (C, ...) float
+        The distribution over classes (the soft-max of the network's scores) of each cell.
+
+    Returns
+    -------
+    (C, ...) float64
+        The unary term; infinite for a class of probability 0, which the CRF then never chooses.
+
+    Raises
+    ------
+    ArgumentError
+        When the columns aren't distributions.
+
+    Examples
+    --------
+    >>> unary_from_probability([0.5, 0.5]).round(3)
+    array([0.693, 0.693])
+    """
+    probability = np.asarray(probability, dtype=np.float64)
+    if probability.ndim == 0 or not (probability >= 0).all() or not np.allclose(probability.sum(axis=0), 1, atol=1e-3):
+        raise ArgumentError("probability", "distributions along axis 0", f"an array of shape {probability.shape}")
+    with np.errstate(divide="ignore"):
+        return -np.log(probability)
+
+
+def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return unary (C, H, W) and values (4, H, W) as float64, or refuse them.
+
+    Raises
+    ------
+    ArgumentError
+        When shapes don't fit, a unary is NaN or -inf, a cell has no possible class, or states don't sum to one.
+    """
+    unary, values = np.asarray(unary, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    if unary.ndim != 3 or 0 in unary.shape:
+        raise ArgumentError("unary", "shape (C, H, W), nothing empty", f"shape {unary.shape}")
+    if values.shape != (N_STATES, *unary.shape[1:]):
+        raise ArgumentError("values", f"shape {(N_STATES, *unary.shape[1:])}", f"shape {values.shape}")
+    if np.isnan(unary).any() or np.isneginf(unary).any():
+        raise ArgumentError("unary", "numbers, or inf for an impossible class", "NaN or -inf")
+    if np.isinf(unary).all(axis=0).any():
+        raise ArgumentError("unary", "a possible class in each cell", "a cell where every class is inf")
+    if not np.allclose(values.sum(axis=0), 1, atol=1e-3):
+        raise ArgumentError("values", "four states that sum to 1 in each cell", "a cell where they don't")
+    return unary, values
+
+
+def check_iterations(iterations: int) -> None:
+    """Refuse a number of iterations that can't be counted.
+
+    Raises
+    ------
+    ArgumentError
+        When it isn't a whole number of at least 0.
+    """
+    if not isinstance(iterations, int | np.integer) or iterations < 0:
+        raise ArgumentError("iterations", "a whole number of at least 0", iterations)
