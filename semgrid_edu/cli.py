@@ -71,6 +71,21 @@ def build(folder: Annotated[Path, typer.Argument(help="Missing, empty, or a cour
     typer.echo(f"{folder}: {len(assignments)} assignments, {', '.join(assignments)}; read {folder / 'README.md'}")
 
 
+@app.command()
+def evaluate(
+    data: Annotated[Path, typer.Option(help="A data set with train and test frames, such as data/minikitti.")],
+    weights: Annotated[Path, typer.Option(help="A network trained on its train frames.")],
+    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("evaluation.json"),
+) -> None:
+    """Score a trained network and two simple baselines on the test frames."""
+    from semgrid_edu.experiments.evaluate import evaluate, table
+    from semgrid_edu.files import write_json
+
+    result = evaluate(data, weights)
+    write_json(out, result)
+    typer.echo(f"{table(result['scores'])}\n\nwritten to {out}")
+
+
 def run() -> None:
     """Run the command line; a mistake in the input ends in one line, not in a traceback."""
     try:

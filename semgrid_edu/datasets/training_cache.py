@@ -26,6 +26,9 @@ from semgrid_edu.files import sha256, write_json
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams, track_drive
 
+SEED = 0
+"""Of the occupancy filter's particles, in each drive."""
+
 WORKERS = 2
 """Processes that make the arrays, a drive at a time."""
 
@@ -106,7 +109,7 @@ def _write_arrays(arrays: dict[str, NDArray], recipe: Recipe, folder: Path) -> N
 def _process_drive(root: Path, date: str, drive: str, labelled: list[int], recipe: Recipe) -> list[dict[str, NDArray]]:
     """Run the filter over a drive and make the arrays of its labelled frames, in the order of `labelled`."""
     scans = islice(KittiRawDrive(root, date, drive, images=False), max(labelled) + 1)
-    beliefs = enumerate(track_drive(scans, recipe.spec, recipe.params, seed=0))
+    beliefs = enumerate(track_drive(scans, recipe.spec, recipe.params, SEED))
     occupancy = {k: belief.probability for k, belief in beliefs if k in labelled}
     frames = KittiRawDrive(root, date, drive)
     if max(labelled) >= len(frames):
