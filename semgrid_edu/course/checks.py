@@ -110,9 +110,9 @@ def text_problems(notebook: NotebookNode, folder: Path) -> list[str]:
             problems.append(f"cell '{first}' has {lines} lines, more than {MAX_LINES}")
         for found in MACHINE.findall(cell.source + _printed(cell)):
             problems.append(f"cell '{first}' names a path of one machine: {found}")
-        if cell.cell_type == "markdown":
-            dead = [target for target in LINK.findall(cell.source) if not (folder / target).exists()]
-            problems += [f"cell '{first}' links to {target}, which does not exist" for target in dead]
+        for target in LINK.findall(_shown(cell)):
+            if not (folder / target).exists():
+                problems.append(f"cell '{first}' links to {target}, which does not exist")
     return problems
 
 
@@ -141,6 +141,12 @@ def _printed(cell: NotebookNode) -> str:
     """Return all text that a cell shows below itself."""
     outputs = cell.get("outputs", [])
     return "".join(output.get("text", "") + output.get("data", {}).get("text/plain", "") for output in outputs)
+
+
+def _shown(cell: NotebookNode) -> str:
+    """Return what a cell shows as formatted text: its own, or what it displays."""
+    displayed = [output.get("data", {}).get("text/markdown", "") for output in cell.get("outputs", [])]
+    return cell.source if cell.cell_type == "markdown" else "\n".join(displayed)
 
 
 def _inputs(notebook: NotebookNode) -> list[tuple]:

@@ -1,0 +1,159 @@
+"""The equation register: where each equation and procedure of the paper stands in code, lectures and exercises."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from pydoc import locate
+
+from semgrid_edu.errors import ArgumentError
+
+
+@dataclass(frozen=True)
+class Equation:
+    """One equation or numbered procedure of the paper.
+
+    Parameters
+    ----------
+    id : str
+        "eq-N" for the paper's equation (N); a short name for a procedure.
+    section : str
+        Of the paper.
+    title : str
+        What it says, in a few words.
+    literal : str
+        Dotted name of the code that reads like it.
+    fast : str or None
+        Dotted name of what the pipeline calls; None where the literal code is fast enough.
+    lecture : str or None
+        "NN_name#tag": the notebook and the tag of the cell that derives it; None while that is to come.
+    exercise : str or None
+        "NN_name#task": the exercise and the grade_id of its answer cell; None while that is to come.
+    """
+
+    id: str
+    section: str
+    title: str
+    literal: str
+    fast: str | None = None
+    lecture: str | None = None
+    exercise: str | None = None
+
+    @property
+    def functions(self) -> list[str]:
+        """The dotted names of its code, literal first."""
+        return [name for name in (self.literal, self.fast) if name]
+
+
+EQUATIONS = (
+    Equation(
+        "sensor-model",
+        "3.2",
+        "What a scan says of each cell, P(z | state)",
+        literal="semgrid_edu.occupancy.scan_evidence_literal",
+        fast="semgrid_edu.occupancy.scan_evidence",
+    ),
+    Equation("cmcdot-1", "3.2", "CMCDOT, step 1: move with the vehicle", literal="semgrid_edu.occupancy.move"),
+    Equation("cmcdot-2", "3.2", "CMCDOT, step 2: predict", literal="semgrid_edu.occupancy.predict"),
+    Equation(
+        "cmcdot-3",
+        "3.2",
+        "CMCDOT, step 3: update by Bayes' rule",
+        literal="semgrid_edu.occupancy.update",
+        lecture="00_tour#bayes",
+        exercise="00_tour#bayes-update",
+    ),
+    Equation("cmcdot-4", "3.2", "CMCDOT, step 4: resample the particles", literal="semgrid_edu.occupancy.resample"),
+    Equation(
+        "eq-1",
+        "3.3",
+        "From a point of a plane to its pixel",
+        literal="semgrid_edu.camera.project",
+        fast="semgrid_edu.planes.plane_pixels",
+        lecture="00_tour#eq-1",
+        exercise="00_tour#pixel-of",
+    ),
+    Equation(
+        "eq-2",
+        "3.3",
+        "A plane takes its value from the scores there",
+        literal="semgrid_edu.planes.sample_planes_naive",
+        fast="semgrid_edu.planes.PlaneSampler",
+    ),
+    Equation(
+        "fusion",
+        "3.4",
+        "Reduction of the planes, fusion with the occupancy grid",
+        literal="semgrid_edu.networks.FusionNet",
+    ),
+    Equation("eq-3", "3.5", "Energy of a labelling", literal="semgrid_edu.crf.energy"),
+    Equation("eq-4", "3.5", "What two cells with different labels cost", literal="semgrid_edu.crf.energy"),
+    Equation(
+        "mean-field",
+        "3.5",
+        "Mean-field inference",
+        literal="semgrid_edu.crf.mean_field_naive",
+        fast="semgrid_edu.crf.mean_field",
+    ),
+    Equation(
+        "ground-truth", "4", "Labels of the image, carried to the grid", literal="semgrid_edu.datasets.truth.grid_truth"
+    ),
+    Equation(
+        "median-frequency", "4.1", "Median frequency balancing", literal="semgrid_edu.training.median_frequency_weights"
+    ),
+    Equation(
+        "pixel-accuracy",
+        "4.2",
+        "Pixel accuracy",
+        literal="semgrid_edu.metrics.pixel_accuracy",
+        lecture="00_tour#accuracies",
+        exercise="00_tour#accuracies",
+    ),
+    Equation(
+        "class-accuracy",
+        "4.2",
+        "Class accuracy",
+        literal="semgrid_edu.metrics.class_accuracy",
+        lecture="00_tour#accuracies",
+        exercise="00_tour#accuracies",
+    ),
+    Equation("fmiou", "4.2", "FmIoU", literal="semgrid_edu.metrics.frequency_weighted_iou"),
+)
+"""In the order of the paper."""
+
+
+def find_code(name: str) -> object:
+    """Return the function or class that a dotted name stands for.
+
+    Raises
+    ------
+    ArgumentError
+        When there is none.
+    """
+    found = locate(name)
+    if found is None:
+        raise ArgumentError("name", "the dotted name of something that can be imported", name)
+    return found
+
+
+def equation_table() -> str:
+    """Return the register as a Markdown table, with links that work from the folder of notebooks."""
+    rows = ["| | paper | what | literal code | fast code | lecture | exercise |", "|---|---|---|---|---|---|---|"]
+    for entry in EQUATIONS:
+        number = f"({entry.id[3:]})" if entry.id.startswith("eq-") else ""
+        code = [_code_link(entry.literal), _code_link(entry.fast) if entry.fast else "the same"]
+        places = [_notebook_link(entry.lecture), _notebook_link(entry.exercise, Path("exercises"))]
+        rows.append("| " + " | ".join([number, entry.section, entry.title, *code, *places]) + " |")
+    return "\n".join(rows)
+
+
+def _code_link(name: str) -> str:
+    """Link a dotted name to the module that defines it."""
+    module = find_code(name).__module__
+    return f"[`{name.rpartition('.')[2]}`](../{module.replace('.', '/')}.py)"
+
+
+def _notebook_link(place: str | None, folder: Path = Path()) -> str:
+    """Link "notebook#part" to its notebook."""
+    if place is None:
+        return "to come"
+    name, _, part = place.partition("#")
+    return f"[{name[:2]}]({(folder / name).as_posix()}.ipynb), `{part}`"

@@ -1,0 +1,60 @@
+"""Everything that the register names exists, and its code says which equation or section it is."""
+
+import inspect
+import re
+import sys
+
+import pytest
+
+from semgrid_edu.course.equations import EQUATIONS, equation_table, find_code
+from semgrid_edu.course.grading import tasks
+from semgrid_edu.course.notebooks import NOTEBOOKS, read_percent
+from semgrid_edu.errors import ArgumentError
+
+FUNCTIONS = [pytest.param(entry, name, id=f"{entry.id}-{name}") for entry in EQUATIONS for name in entry.functions]
+
+
+@pytest.mark.parametrize(("entry", "name"), FUNCTIONS)
+def test_code_names_its_equation(entry, name):
+    code = find_code(name)
+    docstring = inspect.getdoc(code) or ""
+    if entry.id.startswith("eq-"):
+        number = entry.id.removeprefix("eq-")
+        assert re.search(rf"(?i)\beq(uation)?s?\b[^.\n]*\({number}\)", docstring), (
+            f"{name} doesn't name equation ({number})"
+        )
+    else:
+        first_line = sys.modules[code.__module__].__doc__.splitlines()[0]
+        assert re.search(rf"(?i)\bsec(tion)?s?\b.*\b{re.escape(entry.section)}\b", docstring + first_line)
+
+
+@pytest.mark.parametrize("entry", [e for e in EQUATIONS if e.lecture], ids=lambda e: e.id)
+def test_lecture_has_the_tagged_cell(entry):
+    name, _, tag = entry.lecture.partition("#")
+    cells = read_percent(NOTEBOOKS / "src" / f"{name}.py").cells
+    assert any(tag in cell.metadata.get("tags", []) for cell in cells)
+
+
+@pytest.mark.parametrize("entry", [e for e in EQUATIONS if e.exercise], ids=lambda e: e.id)
+def test_exercise_has_the_task(entry):
+    name, _, task = entry.exercise.partition("#")
+    assert task in tasks(NOTEBOOKS / "src" / "exercises" / f"{name}.py")
+
+
+def test_every_numbered_equation_is_registered_once():
+    ids = [entry.id for entry in EQUATIONS]
+    assert len(set(ids)) == len(ids)
+    assert {"eq-1", "eq-2", "eq-3", "eq-4"} <= set(ids)
+    assert {f"cmcdot-{step}" for step in range(1, 5)} <= set(ids)
+
+
+def test_table_has_a_row_for_each_and_says_what_is_to_come():
+    rows = equation_table().splitlines()[2:]
+    assert len(rows) == len(EQUATIONS)
+    for entry, row in zip(EQUATIONS, rows, strict=True):
+        assert ("to come" in row) == (entry.lecture is None or entry.exercise is None)
+
+
+def test_unknown_name_is_refused():
+    with pytest.raises(ArgumentError, match=r"semgrid_edu\.camera\.unproject"):
+        find_code("semgrid_edu.camera.unproject")

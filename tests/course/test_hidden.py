@@ -1,0 +1,40 @@
+"""The instructor's decorator: whatever a student's function does, one sentence comes back."""
+
+import sys
+
+import pytest
+
+from semgrid_edu.course.notebooks import NOTEBOOKS
+
+
+@pytest.fixture
+def hidden(monkeypatch):
+    monkeypatch.syspath_prepend(str(NOTEBOOKS / "instructor"))
+    import semgrid_instructor
+
+    yield semgrid_instructor.hidden
+    del sys.modules["semgrid_instructor"]
+
+
+def answer():
+    """Stand for a student's function."""
+
+
+@pytest.mark.parametrize(
+    ("error", "sentence"),
+    [
+        (AssertionError("values are wrong"), "values are wrong"),
+        (IndexError("7"), "it raises IndexError: 7"),
+        (KeyboardInterrupt(), "it does not come to an end"),
+    ],
+)
+def test_error_becomes_a_sentence(hidden, error, sentence):
+    @hidden
+    def check(function):
+        raise error
+
+    assert check(answer) == f"answer, on inputs you haven't seen: {sentence}"
+
+
+def test_nothing_to_complain_about(hidden):
+    assert hidden(lambda function: None)(answer) == ""
