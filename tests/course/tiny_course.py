@@ -37,7 +37,7 @@ from semgrid_instructor import hidden
 
 @hidden
 def check_twice(twice):
-    secret_input, secret_result = 21, 42
+    secret_input, secret_result = 98765, 197530
     assert twice(secret_input) == secret_result, "wrong"
 '''
 
