@@ -35,7 +35,28 @@ def read_camera(folder: Path) -> Camera:
     DataError
         When a file is missing or damaged.
     """
-    path = folder / "calib_cam_to_cam.txt"
+    K, T_camera_from_camera0, size = read_rectification(folder / "calib_cam_to_cam.txt")
+    T_camera0_from_lidar = read_rigid(folder / "calib_velo_to_cam.txt")
+    return Camera(K, T_camera_from_camera0 @ T_camera0_from_lidar, size)
+
+
+def read_rectification(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[int, int]]:
+    """Read what calib_cam_to_cam.txt says of the rectified camera 2.
+
+    Returns
+    -------
+    K : (3, 3) float64
+        Intrinsic matrix, pixels.
+    T_camera_from_camera0 : (4, 4) float64
+        From the unrectified camera 0.
+    size : (int, int)
+        Height and width, pixels.
+
+    Raises
+    ------
+    DataError
+        When the file is missing or damaged.
+    """
     calibration = read_calibration(path)
     P = _entry(path, calibration, "P_rect_02", (3, 4))
     if not (P[0, 0] > 0 and P[1, 1] > 0 and P[1, 0] == 0 and np.array_equal(P[2, :3], [0, 0, 1])):
@@ -45,9 +66,7 @@ def read_camera(folder: Path) -> Camera:
         raise DataError(path, "S_rect_02: width and height in pixels", [width, height])
     T_rectified_from_camera0 = rigid_transform(_rotation(path, calibration, "R_rect_00"), np.zeros(3))
     T_camera_from_rectified = rigid_transform(np.eye(3), np.array([P[0, 3] / P[0, 0], 0, 0]))
-    T_camera0_from_lidar = read_rigid(folder / "calib_velo_to_cam.txt")
-    T_camera_from_lidar = T_camera_from_rectified @ T_rectified_from_camera0 @ T_camera0_from_lidar
-    return Camera(P[:, :3], T_camera_from_lidar, (int(height), int(width)))
+    return P[:, :3], T_camera_from_rectified @ T_rectified_from_camera0, (int(height), int(width))
 
 
 def read_rigid(path: Path) -> NDArray[np.float64]:

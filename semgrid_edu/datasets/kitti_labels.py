@@ -10,7 +10,8 @@ from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID, FrameLabels
 from semgrid_edu.labels import IGNORE, LABEL_SETS, LabelSet
 
-LABEL_FOLDERS = ("image", "depth", "birdseye", "visible")
+KINDS = ("image", "depth", "birdseye", "visible")
+"""What there is to a labelled frame, a folder each."""
 
 DEPTH_UNIT = 1 / 256
 """Metres of one step in a depth PNG (KITTI's convention); 0 means none."""
@@ -38,18 +39,41 @@ def read_labels(folder: Path, name: str, image_size: tuple[int, int]) -> FrameLa
     DataError
         When only some of the files are there, or one is damaged.
     """
-    paths = {kind: folder / kind / name for kind in LABEL_FOLDERS}
-    if not any(path.exists() for path in paths.values()):
+    if not is_labelled(folder, name):
         return None
-    label_set = read_label_set(folder / "label_set.txt")
-    depth = read_png(paths["depth"], "I;16", image_size).astype(np.float32) * np.float32(DEPTH_UNIT)
-    return FrameLabels(
-        label_set=label_set,
-        image=_read_classes(paths["image"], image_size, label_set),
-        depth=np.where(depth > 0, depth, np.float32(np.nan)),
-        birdseye=_read_classes(paths["birdseye"], LABEL_GRID.shape, label_set),
-        visible=_read_mask(paths["visible"]),
-    )
+    arrays = {kind: read_label(folder, kind, name, image_size) for kind in KINDS}
+    return FrameLabels(label_set=read_label_set(folder / "label_set.txt"), **arrays)
+
+
+def is_labelled(folder: Path, name: str) -> bool:
+    """Say whether any of a frame's four label files is there."""
+    return any((folder / kind / name).exists() for kind in KINDS)
+
+
+def read_label(folder: Path, kind: str, name: str, image_size: tuple[int, int] | None) -> NDArray:
+    """Read one file of a labelled frame: the field of `FrameLabels` that `kind` names.
+
+    Parameters
+    ----------
+    folder, name
+        As for `read_labels`.
+    kind : str
+        One of `KINDS`.
+    image_size : (int, int) or None
+        Height and width of the camera's images; None where nobody knows.
+
+    Raises
+    ------
+    DataError
+        When the file is missing or damaged.
+    """
+    path = folder / kind / name
+    if kind == "depth":
+        return _metres(read_png(path, "I;16", image_size))
+    if kind == "visible":
+        return _mask(path, read_png(path, "L", LABEL_GRID.shape))
+    classes = read_png(path, "L", image_size if kind == "image" else LABEL_GRID.shape)
+    return _classes(path, classes, read_label_set(folder / "label_set.txt"))
 
 
 def read_label_set(path: Path) -> LabelSet:
@@ -66,18 +90,22 @@ def read_label_set(path: Path) -> LabelSet:
     return LABEL_SETS[name]
 
 
-def _read_classes(path: Path, size: tuple[int, int], label_set: LabelSet) -> NDArray[np.uint8]:
-    """Read a map of classes, refusing numbers that name none."""
-    classes = read_png(path, "L", size)
+def _metres(steps: NDArray[np.uint16]) -> NDArray[np.float32]:
+    """Turn a depth image into metres, NaN where there is none."""
+    return np.where(steps > 0, steps.astype(np.float32) * np.float32(DEPTH_UNIT), np.float32(np.nan))
+
+
+def _classes(path: Path, classes: NDArray[np.uint8], label_set: LabelSet) -> NDArray[np.uint8]:
+    """Return a map of classes, refusing numbers that name none."""
     strange = classes[(classes >= len(label_set)) & (classes != IGNORE)]
     if strange.size:
         raise DataError(path, f"classes 0 to {len(label_set) - 1} or {IGNORE}", f"{strange[0]}")
     return classes
 
 
-def _read_mask(path: Path) -> NDArray[np.bool_]:
-    """Read a bird's-eye mask of 0 and 255."""
-    mask = read_png(path, "L", LABEL_GRID.shape)
-    if not np.isin(mask, (0, 255)).all():
-        raise DataError(path, "a mask of 0 and 255", f"the values {np.unique(mask)[:5].tolist()} and so on")
+def _mask(path: Path, mask: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Turn 0 and 255 into false and true, refusing anything else."""
+    strange = mask[(mask != 0) & (mask != 255)]
+    if strange.size:
+        raise DataError(path, "a mask of 0 and 255", f"{strange[0]}")
     return mask == 255

@@ -2,8 +2,8 @@
 
 import operator
 import re
-from collections.abc import Callable, Sequence
-from functools import cached_property
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property, partial
 from pathlib import Path
 from typing import overload
 
@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, invert_rigid
-from semgrid_edu.datasets.calibration import read_camera, read_rigid
-from semgrid_edu.datasets.kitti_labels import read_labels
+from semgrid_edu.datasets.calibration import read_camera, read_rectification, read_rigid
+from semgrid_edu.datasets.kitti_labels import KINDS, is_labelled, read_label, read_labels
 from semgrid_edu.datasets.oxts import mercator_pose, mercator_scale, read_packet
 from semgrid_edu.datasets.reading import read_bytes, read_png
 from semgrid_edu.datasets.timestamps import read_timestamps
@@ -107,13 +107,26 @@ class KittiRawDrive(Sequence[Frame]):
         list of str
             One line a problem, which names the file; empty when the drive is sound.
         """
-        readers: list[Callable[[], object]] = [lambda: self.camera, lambda: self._T_lidar_from_imu]
-        readers += [lambda path=path: read_timestamps(path, len(self)) for path in self._timestamp_files()]
+        found = [*map(_error_of, self._readers()), *self._short_scans()]
+        return [error for error in dict.fromkeys(found) if error]
+
+    def _readers(self) -> Iterator[Callable[[], object]]:
+        """Yield a reader for each file, so that no damaged file hides another."""
+        yield partial(read_rectification, self.date_folder / "calib_cam_to_cam.txt")
+        yield partial(read_rigid, self.date_folder / "calib_velo_to_cam.txt")
+        yield partial(read_rigid, self.date_folder / "calib_imu_to_velo.txt")
+        for path in self._timestamp_files():
+            yield partial(read_timestamps, path, len(self))
+        size = None if _error_of(lambda: self.camera) else self.camera.size
         for k in range(len(self)):
-            for read in (self._points, self._pose, self._time, self._image, self._labels):
-                readers.append(lambda read=read, k=k: read(k))
-        found = [error for error in map(_error_of, readers) if error] + self._short_scans()
-        return list(dict.fromkeys(found))
+            yield partial(self._points, k)
+            yield partial(read_packet, self._file("oxts", k, ".txt"))
+            yield partial(self._time, k)
+            if "image_02" in self._sensors:
+                yield partial(read_png, self._file("image_02", k, ".png"), "RGB", size)
+            labels, name = self.folder / "labels", f"{k:010d}.png"
+            for kind in KINDS if is_labelled(labels, name) else ():
+                yield partial(read_label, labels, kind, name, size)
 
     def _file(self, sensor: str, k: int, suffix: str) -> Path:
         return self.folder / sensor / "data" / f"{k:010d}{suffix}"

@@ -76,7 +76,7 @@ def parse_numbers(path: Path, text: str, what: str) -> NDArray[np.float64]:
     return numbers
 
 
-def read_png(path: Path, mode: str, size: tuple[int, int]) -> NDArray:
+def read_png(path: Path, mode: str, size: tuple[int, int] | None) -> NDArray:
     """Return the pixels of a PNG.
 
     Every chunk's checksum is verified: a decoder alone may return half a picture without a word.
@@ -86,8 +86,8 @@ def read_png(path: Path, mode: str, size: tuple[int, int]) -> NDArray:
     path : Path
     mode : str
         Pillow's name of the pixel format: "RGB", "L" (8 bits) or "I;16".
-    size : (int, int)
-        Height and width, pixels.
+    size : (int, int) or None
+        Height and width that the image must have, pixels; None where nobody knows.
 
     Returns
     -------
@@ -107,7 +107,8 @@ def read_png(path: Path, mode: str, size: tuple[int, int]) -> NDArray:
         raise DataError(path, "a sound PNG image", f"{str(error).partition(' <')[0]!r}") from error
     if PNG_END not in content:
         raise DataError(path, "a sound PNG image", "one without its end")
-    if image.mode != mode or (image.height, image.width) != size:
-        found = f"{image.mode} of {image.height} x {image.width} pixels"
-        raise DataError(path, f"{mode} of {size[0]} x {size[1]} pixels", found)
+    found = (image.height, image.width)
+    if image.mode != mode or found != (size or found):
+        expected = f"{mode} of {size[0]} x {size[1]} pixels" if size else mode
+        raise DataError(path, expected, f"{image.mode} of {image.height} x {image.width} pixels")
     return np.asarray(image)
