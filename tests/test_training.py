@@ -1,0 +1,288 @@
+import csv
+import json
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import torch
+import torch.nn.functional as F
+from safetensors.torch import load_file, save_file
+from sklearn.metrics import accuracy_score
+
+from semgrid_edu import checkpoint, training
+from semgrid_edu.camera import Camera
+from semgrid_edu.datasets.training_set import Sample
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import KITTI_14
+from semgrid_edu.metrics import pixel_accuracy
+from semgrid_edu.networks import Architecture, build_net
+from semgrid_edu.planes import plane_pixels
+from semgrid_edu.training import (
+    TrainingParams,
+    class_frequencies,
+    draw_batch,
+    evaluate,
+    median_frequency_weights,
+    train,
+)
+
+SMALL = Architecture(image_size=(24, 80), grid=GridSpec(2, 26, -6, 6, 1.0), heights=(0.0, 0.5, 1.0))
+QUICK = TrainingParams(image_iterations=3, grid_iterations=4, batch_size=2)
+
+
+@pytest.fixture(scope="module")
+def camera():
+    K = np.array([[721.5, 0, 609.6], [0, 721.5, 172.9], [0, 0, 1]])
+    T_camera_from_lidar = np.array([[0, -1, 0, 0.06], [0, 0, -1, -0.08], [1, 0, 0, -0.27], [0, 0, 0, 1]])
+    return Camera(K, T_camera_from_lidar, (375, 1242))
+
+
+def _street(camera, seed):
+    """A flat street in blocks of three colours, one a class, as the camera sees it and as it is."""
+    rng = np.random.default_rng(seed)
+    spec, size = SMALL.grid, SMALL.image_size
+    blocks = rng.integers(0, 3, (4, 2)).astype(np.uint8)
+    truth = np.kron(blocks, np.ones((6, 6), dtype=np.uint8))
+    fine = GridSpec(spec.x_min, spec.x_max, spec.y_min, spec.y_max, 0.05)
+    pixels, visible = plane_pixels(fine, [0.0], camera.resized(size))
+    labels = np.full(size, KITTI_14.index("sky"), dtype=np.uint8)
+    rows, cols, _ = spec.cells(fine.centers()[visible[0]])
+    u, v = np.rint(pixels[visible]).astype(int).T
+    labels[v, u] = truth[rows, cols]
+    seen = plane_pixels(spec, [0.0], camera.resized(size))[1][0]
+    truth[~seen] = KITTI_14.index("unknown-unobserved")
+    occupancy = np.where(seen, 1.0, 0.0)
+    planes = np.stack([occupancy, 0 * occupancy, 0 * occupancy, 1 - occupancy]).astype(np.float32)
+    image = KITTI_14.colours(labels).transpose(2, 0, 1)
+    return Sample(*map(torch.from_numpy, (image.copy(), labels, planes, truth)))
+
+
+@pytest.fixture(scope="module")
+def streets(camera):
+    return [_street(camera, seed) for seed in range(4)]
+
+
+# Median frequency balancing
+
+
+def test_frequencies_and_weights_by_hand():
+    # Class 0: 15 of 24 cells; class 1: 3 of the 16 in whose maps it occurs; class 2: 6 of 8; class 3: none.
+    maps = np.array([[[0, 0, 0, 0], [0, 0, 0, 1]], [[0, 0, 0, 0], [0, 0, 1, 1]], [[0, 0, 2, 2], [2, 2, 2, 2]]])
+    f = np.array([15 / 24, 3 / 16, 6 / 8, 0])
+    np.testing.assert_allclose(class_frequencies(maps, 4), f)
+    np.testing.assert_allclose(median_frequency_weights(maps, 4), [1, 15 / 24 * 16 / 3, 15 / 24 * 8 / 6, 0])
+    np.testing.assert_allclose(median_frequency_weights(maps, 4, limit=2)[1], 2)
+
+
+def test_unlabelled_cells_count_nowhere():
+    maps = [np.array([0, 1, 1, 255, 255]), np.array([255, 0])]
+    np.testing.assert_allclose(class_frequencies(maps, 2), [2 / 4, 2 / 3])
+
+
+def test_balanced_classes_weigh_the_same():
+    np.testing.assert_allclose(median_frequency_weights([np.arange(6) % 3], 3), 1)
+
+
+@pytest.mark.parametrize("wrong", [3, 254, -1])
+def test_wrong_labels_are_named(wrong):
+    with pytest.raises(ArgumentError, match=r"maps: expected classes 0..2 or 255, found .* in map 1"):
+        class_frequencies([np.array([0, 1]), np.array([0, wrong])], 3)
+
+
+def test_no_labels_at_all_are_refused():
+    with pytest.raises(ArgumentError, match="at least one labelled cell"):
+        median_frequency_weights([np.full(4, 255)], 3)
+
+
+# Batches
+
+
+def test_each_pass_takes_every_frame_once(streets):
+    params = TrainingParams(batch_size=2, jitter=0.0)
+    for epoch in range(3):
+        batches = [draw_batch(streets, params, 2 * epoch + k, seed=0).frames.truth for k in range(2)]
+        drawn = sorted(truth.numpy().tobytes() for truth in torch.cat(batches))
+        assert drawn == sorted(sample.truth.numpy().tobytes() for sample in streets)
+
+
+def test_a_batch_is_a_function_of_seed_and_step(streets):
+    def image(iteration, seed):
+        return draw_batch(streets, TrainingParams(batch_size=2), iteration, seed).frames.image
+
+    assert torch.equal(image(5, 1), image(5, 1))
+    assert not torch.equal(image(5, 1), image(6, 1))
+    assert not torch.equal(image(5, 1), image(5, 2))
+    assert image(5, 1).min() >= 0
+    assert image(5, 1).max() <= 1
+
+
+def test_a_mirror_changes_what_the_network_sees_and_not_where_it_lies(camera, streets):
+    """Networks that answer each place by itself can't tell a mirror from the street."""
+    frames = draw_batch(streets, TrainingParams(batch_size=2, jitter=0.0), 0, seed=0).frames
+    seen = []
+    by_place = SimpleNamespace(
+        segmenter=lambda image: seen.append(image) or image * 2,
+        sampler=build_net(SMALL, camera).sampler,
+        fusion=lambda planes, occupancy: planes.sum(dim=2) + occupancy[:, :1],
+    )
+    plain, mirrored = (training.grid_logits(by_place, training.Batch(frames, m)) for m in (False, True))
+    torch.testing.assert_close(plain, mirrored)
+    assert torch.equal(seen[0], seen[1].flip(-1))
+    assert not torch.equal(seen[0], seen[1])
+
+
+# The loop
+
+
+def test_the_learning_rate_falls_to_zero_in_each_stage():
+    params = TrainingParams(image_iterations=10, grid_iterations=20, learning_rate=0.1)
+    steps = [params.stage(k) for k in range(params.iterations)]
+    assert [stage for stage, _ in steps] == ["image"] * 10 + ["grid"] * 20
+    assert steps[0][1] == steps[10][1] == pytest.approx(0.1)
+    assert steps[20][1] == pytest.approx(0.05)
+    for (stage, rate), (next_stage, next_rate) in pairwise(steps):
+        assert next_rate < rate or next_stage != stage
+
+
+def test_four_streets_are_learnt_by_heart(camera, streets, tmp_path):
+    params = TrainingParams(image_iterations=30, grid_iterations=60, batch_size=4, learning_rate=0.1, jitter=0.0)
+    net = build_net(SMALL, camera)
+    train(net, streets, tmp_path, params)
+    assert pixel_accuracy(evaluate(net, streets)) >= 0.99
+
+
+def test_evaluation_counts_what_the_network_says(camera, streets):
+    net = build_net(SMALL, camera).eval()
+    image, occupancy = (torch.stack(x) for x in zip(*((s.image, s.occupancy) for s in streets), strict=True))
+    predicted = net(image / 255, occupancy).argmax(1)
+    truth = torch.stack([s.truth for s in streets])
+    expected = accuracy_score(truth.ravel(), predicted.ravel())
+    assert pixel_accuracy(evaluate(net, streets)) == pytest.approx(expected)
+
+
+def test_the_first_losses_are_those_of_the_definition(camera, streets, tmp_path):
+    """Weighted cross-entropy over labelled pixels, written out."""
+    net = build_net(SMALL, camera)
+    batch = draw_batch(streets, QUICK, 0, seed=0)
+    net.train()
+    log_p = F.log_softmax(training.image_scores(net, batch), dim=1)
+    alpha = median_frequency_weights([s.labels.numpy() for s in streets], 14, QUICK.weight_limit)
+    labels = batch.frames.labels
+    weight = torch.from_numpy(alpha)[labels.long()]
+    chosen = log_p.gather(1, labels.long()[:, None])[:, 0]
+    expected = -(weight * chosen).sum() / weight.sum()
+    train(build_net(SMALL, camera), streets, tmp_path, QUICK)
+    first = next(csv.DictReader((tmp_path / "log.csv").read_text().splitlines()))
+    assert float(first["loss"]) == pytest.approx(expected.item(), rel=1e-4)
+
+
+class _KilledError(Exception):
+    pass
+
+
+class _KilledIn:
+    """Streets that can be read so many times before the power fails."""
+
+    def __init__(self, streets, reads):
+        self.streets, self.reads = streets, reads
+
+    def __len__(self):
+        return len(self.streets)
+
+    def __getitem__(self, k):
+        if k >= len(self.streets):
+            raise IndexError(k)
+        self.reads -= 1
+        if self.reads < 0:
+            raise _KilledError
+        return self.streets[k]
+
+
+@pytest.mark.parametrize("steps_before_the_kill", [2, 5])
+def test_a_resumed_run_ends_with_the_same_bytes(camera, streets, tmp_path, monkeypatch, steps_before_the_kill):
+    monkeypatch.setattr(training, "CHECKPOINT_EVERY", 2)
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    train(build_net(SMALL, camera, seed=1), streets, whole, QUICK, seed=1)
+    reads = 1 + 2 * len(streets) + QUICK.batch_size * steps_before_the_kill  # the checks, the weights, the steps
+    with pytest.raises(_KilledError):
+        train(build_net(SMALL, camera, seed=1), _KilledIn(streets, reads), broken, QUICK, seed=1)
+    assert (broken / "checkpoint.safetensors").exists()
+    train(build_net(SMALL, camera, seed=9), streets, broken, QUICK, seed=1, resume=True)
+    names = {"image_stage.safetensors", "log.csv", "weights.safetensors"}
+    assert {path.name for path in whole.iterdir()} == {path.name for path in broken.iterdir()} == names
+    for name in names:
+        assert (whole / name).read_bytes() == (broken / name).read_bytes(), name
+
+
+def test_another_seed_gives_other_weights(camera, streets, tmp_path):
+    for seed in (1, 2):
+        train(build_net(SMALL, camera), streets, tmp_path / str(seed), QUICK, seed=seed)
+    first, second = ((tmp_path / str(seed) / "weights.safetensors").read_bytes() for seed in (1, 2))
+    assert first != second
+
+
+# What can go wrong
+
+
+def test_a_loss_that_is_not_finite_stops_the_run(camera, streets, tmp_path):
+    wild = TrainingParams(image_iterations=50, grid_iterations=1, batch_size=2, learning_rate=1e30)
+    with pytest.raises(ArgumentError, match="learning_rate: expected a rate that keeps the loss finite"):
+        train(build_net(SMALL, camera), streets, tmp_path, wild)
+    assert not (tmp_path / "weights.safetensors").exists()
+
+
+def test_frames_that_do_not_fit_are_refused(camera, streets, tmp_path):
+    net = build_net(SMALL, camera)
+    cut = [sample._replace(image=sample.image[..., 1:]) for sample in streets]
+    with pytest.raises(ArgumentError, match=r"image of shape \(3, 24, 80\), found \(3, 24, 79\)"):
+        train(net, cut, tmp_path, QUICK)
+    with pytest.raises(ArgumentError, match="at least one batch of 2 frames, found 1 frames"):
+        train(net, streets[:1], tmp_path, QUICK)
+    wrong = [sample._replace(truth=torch.full_like(sample.truth, 77)) for sample in streets]
+    with pytest.raises(ArgumentError, match=r"classes 0..13 or 255, found 77..77"):
+        train(net, wrong, tmp_path, QUICK)
+
+
+def _checkpoint(camera, path, run="a run"):
+    net = build_net(SMALL, camera)
+    checkpoint.save_checkpoint(path, run, net, torch.optim.SGD(net.parameters(), lr=0.1, momentum=0.9), 2)
+
+
+def test_only_its_own_run_is_resumed(camera, streets, tmp_path):
+    _checkpoint(camera, tmp_path / "checkpoint.safetensors", run=json.dumps({"seed": 5}))
+    with pytest.raises(ArgumentError, match=r"resume: expected the run of .*checkpoint.safetensors, \{\"seed\": 5\}"):
+        train(build_net(SMALL, camera), streets, tmp_path, QUICK, resume=True)
+
+
+def test_a_missing_or_damaged_checkpoint_is_named(camera, streets, tmp_path):
+    path = tmp_path / "checkpoint.safetensors"
+    with pytest.raises(DataError, match=r"checkpoint.safetensors: expected a checkpoint to resume from"):
+        train(build_net(SMALL, camera), streets, tmp_path, QUICK, resume=True)
+    _checkpoint(camera, path)
+    whole = path.read_bytes()
+    for content in (whole[:100], whole[: len(whole) // 2], b""):
+        path.write_bytes(content)
+        with pytest.raises(DataError, match=r"checkpoint.safetensors: expected a checkpoint of a training"):
+            train(build_net(SMALL, camera), streets, tmp_path, QUICK, resume=True)
+    path.write_bytes(whole)
+    save_file(load_file(path), path)
+    with pytest.raises(DataError, match="expected a checkpoint of a training"):
+        train(build_net(SMALL, camera), streets, tmp_path, QUICK, resume=True)
+
+
+def test_a_full_disk_keeps_the_checkpoint_before(camera, tmp_path, monkeypatch):
+    path = tmp_path / "checkpoint.safetensors"
+    _checkpoint(camera, path)
+    before = path.read_bytes()
+
+    def fail(tensors, file, metadata):
+        file.write_bytes(b"half a")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(checkpoint, "save_file", fail)
+    with pytest.raises(OSError, match="No space left"):
+        _checkpoint(camera, path, run="later")
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
