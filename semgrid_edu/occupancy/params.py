@@ -25,19 +25,21 @@ class CmcdotParams:
         How many samples the dynamic mass has.
     rates : 4 x 4 floats
         How often a cell turns from the state of the row into that of the column, 1/s; the diagonal is
-        ignored. What nobody sees is forgotten in a few seconds: free space sooner than what stands.
+        ignored. What nobody sees is forgotten: moving things in 2 s, free space in 3 s, what stands in 10 s. In
+        a free cell something appears once in 15 s, mostly by the sensor's errors: real motion arrives
+        with particles. UNKNOWN stays so until somebody looks (`first_sight`).
     stop_rate, stop_speed : float
         What moves slower than about `stop_speed` (m/s) stands: a particle of speed v turns STATIC at the rate
         stop_rate exp(-v^2 / (2 stop_speed^2)), 1/s. A pedestrian's 1.4 m/s is far above the default.
     max_speed : float
         The velocity prior of what starts to move: speed uniform up to this, m/s (25 m/s = 90 km/h).
     acceleration : float
-        Standard deviation of a particle's acceleration, m/s^2: traffic brakes and turns with about 2.
+        Standard deviation of a particle's acceleration, m/s^2: traffic brakes and turns with 2 to 3.
     birth_share : float
         Part of the particles that is spent on newborn mass, so that new things are found soon.
-    p_seen_unknown : float
-        Probability that the scan says anything about an UNKNOWN (unobserved) cell, relative to the
-        best other explanation: small, so that a cell once seen isn't unknown any more.
+    first_sight : (float, float, float)
+        What UNKNOWN cells turn out to be when they are first seen: FREE, STATIC, DYNAMIC; sums to 1.
+        Of the obstacles on a street, by area, few move.
     sensor : SensorModel
         How the scanner errs.
 
@@ -47,20 +49,20 @@ class CmcdotParams:
         When a parameter can't be one.
     """
 
-    particles: int = 100_000
+    particles: int = 200_000
     rates: Rates = (
         # to FREE, STATIC, DYNAMIC, UNKNOWN
-        (0.0, 0.1, 0.05, 0.3),
+        (0.0, 0.05, 0.02, 0.3),
         (0.02, 0.0, 0.01, 0.1),
-        (0.1, 0.1, 0.0, 0.1),
-        (0.05, 0.05, 0.005, 0.0),
+        (0.1, 0.1, 0.0, 0.5),
+        (0.0, 0.0, 0.0, 0.0),
     )
     stop_rate: float = 5.0
     stop_speed: float = 0.4
     max_speed: float = 25.0
-    acceleration: float = 2.0
+    acceleration: float = 3.0
     birth_share: float = 0.2
-    p_seen_unknown: float = 1e-3
+    first_sight: tuple[float, float, float] = (0.85, 0.14, 0.01)
     sensor: SensorModel = field(default_factory=SensorModel)
 
     def __post_init__(self) -> None:
@@ -70,9 +72,11 @@ class CmcdotParams:
         rates = np.asarray(self.rates, dtype=float)
         if rates.shape != (4, 4) or not np.isfinite(rates).all() or (rates < 0).any():
             raise ArgumentError("rates", "4 x 4 finite rates, none negative", self.rates)
-        for name in ("stop_rate", "stop_speed", "max_speed", "acceleration", "p_seen_unknown"):
+        for name in ("stop_rate", "stop_speed", "max_speed", "acceleration"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
                 raise ArgumentError(name, "a finite number, not negative", getattr(self, name))
+        if len(self.first_sight) != 3 or min(self.first_sight) < 0 or not np.isclose(sum(self.first_sight), 1):
+            raise ArgumentError("first_sight", "three probabilities that sum to 1", self.first_sight)
         if not 0 < self.birth_share < 1:
             raise ArgumentError("birth_share", "a share between 0 and 1", self.birth_share)
 

@@ -64,7 +64,7 @@ def predict(
     """Step 2: what becomes of the belief while `dt` seconds pass and nobody looks.
 
     First each cell mixes by the transition matrix, and particles near zero speed become STATIC. Then
-    dynamic mass flies. What it leaves behind is UNKNOWN. Where it arrives with probability a, two opinions
+    dynamic mass flies. What it leaves behind is FREE: nothing stood where something moved. Where it arrives with probability a, two opinions
     meet: "something arrives" (a) and the cell's own. They can't both be right where the cell is STATIC, so of
     the joint distribution that combination is struck out:
 
@@ -104,7 +104,7 @@ def predict(
     n_cells = going.size
     bucket = np.where((after != before) & (after >= 0), after + n_cells, after)
     stays, arrives = weight_in_cells(particles.weight, bucket, (2, *spec.shape))
-    own[UNKNOWN] += going - stays
+    own[FREE] += going - stays
     own[DYNAMIC] = newborn + stays
 
     claim = np.minimum(arrives, CERTAIN)
@@ -120,8 +120,8 @@ def predict(
 def update(state: FilterState, spec: GridSpec, evidence: Evidence, params: CmcdotParams) -> FilterState:
     """Step 3: Bayes' rule in each cell, P(state | z) = P(z | state) P(state) / P(z).
 
-    STATIC and DYNAMIC share P(z | occupied): one scan can't tell them apart. An UNKNOWN cell, which
-    nobody observes, gives rise to anything at all with only a small probability.
+    STATIC and DYNAMIC share P(z | occupied): one scan can't tell them apart. UNKNOWN means unobserved, so
+    a cell of which the scan says anything isn't that any more: `reveal` goes first.
 
     Parameters
     ----------
@@ -133,30 +133,47 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, params: Cmcdo
         Of the scan; any numbers >= 0, for each cell is scaled by its best explanation first. Where nothing
         that was held possible explains the scan, nothing is known any more: UNKNOWN.
     params : CmcdotParams
-        For `p_seen_unknown`.
+        For `first_sight`.
 
     Returns
     -------
     FilterState
         Given the scan.
     """
-    likelihood = state_likelihoods(evidence, params.p_seen_unknown)
-    joint = state.probability * likelihood
-    total = joint.sum(axis=0)
-    possible = total > 0
-    posterior = np.where(possible, joint / np.where(possible, total, 1), NOTHING_KNOWN[:, None, None])
-    factor = _ratio(posterior[DYNAMIC], state.probability[DYNAMIC])
-    particles = state.particles
-    weight = scale_in_cells(particles.weight, cells_of(particles.position, spec), factor)
-    return FilterState(posterior, Particles(particles.position, particles.velocity, weight), state.newborn * factor)
-
-
-def state_likelihoods(evidence: Evidence, p_seen_unknown: float) -> NDArray[np.float32]:
-    """Return P(z | state) for the four states, (4, H, W), scaled so that the best in each cell is 1."""
+    prior = reveal(state, evidence.occupied != evidence.free, params)
     best = np.maximum(evidence.occupied, evidence.free)
-    occupied, free = (_ratio(likelihood, best) for likelihood in (evidence.occupied, evidence.free))
-    unknown = np.where(evidence.occupied == evidence.free, free, np.float32(p_seen_unknown))
-    return np.stack([free, occupied, occupied, unknown])
+    occupied, free = _ratio(evidence.occupied, best), _ratio(evidence.free, best)
+    joint = prior.probability * np.stack([free, occupied, occupied, free])
+    total = joint.sum(axis=0)
+    explained = total > 0
+    posterior = np.where(explained, joint / np.where(explained, total, 1), NOTHING_KNOWN[:, None, None])
+    factor = _ratio(posterior[DYNAMIC], prior.probability[DYNAMIC])
+    particles = prior.particles
+    weight = scale_in_cells(particles.weight, cells_of(particles.position, spec), factor)
+    return FilterState(posterior, Particles(particles.position, particles.velocity, weight), prior.newborn * factor)
+
+
+def reveal(state: FilterState, seen: NDArray, params: CmcdotParams) -> FilterState:
+    """Share the UNKNOWN mass of cells that are seen among the other states, as they are found at first sight.
+
+    Parameters
+    ----------
+    state : FilterState
+        Predicted.
+    seen : (H, W) bool
+        Of which cells the scan says anything.
+    params : CmcdotParams
+        For `first_sight`; its dynamic part is newborn.
+
+    Returns
+    -------
+    FilterState
+        UNKNOWN only where nobody looks.
+    """
+    revealed = np.where(seen, state.probability[UNKNOWN], 0)
+    shares = np.array([*params.first_sight, -1], dtype=revealed.dtype)
+    probability = state.probability + shares[:, None, None] * revealed
+    return FilterState(probability, state.particles, state.newborn + shares[DYNAMIC] * revealed)
 
 
 def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.random.Generator) -> FilterState:
