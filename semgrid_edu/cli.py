@@ -20,6 +20,26 @@ def main() -> None:
     """Probabilistic bird's-eye semantic perception, taught notebook by notebook."""
 
 
+@app.command()
+def demo(
+    kitti: Annotated[Path | None, typer.Option(help="A folder of KITTI raw drives, which holds the dates.")] = None,
+    date: Annotated[str | None, typer.Option(help="Such as 2011_09_26.")] = None,
+    drive: Annotated[str | None, typer.Option(help="Such as 0013.")] = None,
+    out: Annotated[Path, typer.Option(help="Where to write the page.")] = Path("out/demo"),
+) -> None:
+    """Run every stage over a drive, the shipped one by default, and write a page that shows it."""
+    from semgrid_edu.datasets import KittiRawDrive
+    from semgrid_edu.datasets.samples import sample_drive, sample_weights
+    from semgrid_edu.demo import write_demo
+
+    named = (kitti, date, drive)
+    if None in named and any(named):
+        raise ArgumentError("--kitti, --date, --drive", "all three or none", named)
+    chosen = KittiRawDrive(kitti, date, drive) if kitti and date and drive else sample_drive()
+    page = write_demo(chosen, sample_weights(), out)
+    typer.echo(f"open {page.resolve().as_uri()}\nin one picture: {page.parent / 'overview.png'}")
+
+
 @data.command()
 def verify(
     folder: Annotated[Path | None, typer.Argument(help="A folder of samples; the shipped ones by default.")] = None,
@@ -69,6 +89,22 @@ def build(folder: Annotated[Path, typer.Argument(help="Missing, empty, or a cour
 
     assignments = build_course(folder)
     typer.echo(f"{folder}: {len(assignments)} assignments, {', '.join(assignments)}; read {folder / 'README.md'}")
+
+
+@app.command()
+def train(
+    data: Annotated[Path, typer.Option(help="A data set with train frames, such as data/minikitti.")],
+    out: Annotated[Path, typer.Option(help="A folder for the weights, the log and their provenance.")],
+    seed: Annotated[int, typer.Option(help="Of the initial weights and of the order of the frames.")] = 0,
+    iterations: Annotated[int, typer.Option(min=1, help="Steps of each of the two stages.")] = 2000,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue a training that was interrupted.")] = False,
+) -> None:
+    """Train the compact network: its image network first, then all of it on the grid."""
+    from semgrid_edu.experiments.compact import train_compact
+    from semgrid_edu.training import TrainingParams
+
+    params = TrainingParams(image_iterations=iterations, grid_iterations=iterations)
+    train_compact(data, out, params, seed, resume)
 
 
 @app.command()

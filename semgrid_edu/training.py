@@ -287,7 +287,7 @@ def grid_logits(net: SemanticGridNet, batch: Batch) -> Tensor:
     return batch.flip(net.fusion(batch.flip(planes), batch.flip(batch.frames.occupancy)))
 
 
-def evaluate(net: SemanticGridNet, dataset: Sequence[Sample]) -> NDArray[np.int64]:
+def grid_confusion(net: SemanticGridNet, dataset: Sequence[Sample]) -> NDArray[np.int64]:
     """Return the confusion matrix of the network's most probable classes over all frames, (C, C), row: truth."""
     confusion = np.zeros((net.n_classes, net.n_classes), dtype=np.int64)
     for sample in dataset:

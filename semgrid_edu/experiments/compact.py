@@ -1,0 +1,35 @@
+"""Train the compact network on a data set, with its provenance (paper, section 4.1)."""
+
+from dataclasses import asdict
+from pathlib import Path
+
+from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.networks import Architecture, build_net
+from semgrid_edu.provenance import write_provenance
+from semgrid_edu.training import TrainingParams, train
+
+
+def train_compact(
+    dataset_dir: str | Path, folder: str | Path, params: TrainingParams, seed: int = 0, resume: bool = False
+) -> None:
+    """Train on the split "train" of a data set.
+
+    Parameters
+    ----------
+    dataset_dir : path-like
+        Such as data/minikitti.
+    folder : path-like
+        Takes what `train` writes, and `provenance.json`.
+    params : TrainingParams
+    seed : int
+        Of the initial weights, and of the order and looks of the frames.
+    resume : bool
+        Whether to continue a run that was interrupted.
+    """
+    dataset = TrainingSet(dataset_dir, "train")
+    train(build_net(Architecture(), dataset.camera, seed), dataset, folder, params, seed, resume)
+    command = (
+        f"semgrid-edu train --data {Path(dataset_dir).name} --out {Path(folder).name} "
+        f"--seed {seed} --iterations {params.grid_iterations}"
+    )
+    write_provenance(folder, command, seed, ("torch", "numpy", "safetensors"), params=asdict(params))
