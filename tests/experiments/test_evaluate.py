@@ -5,9 +5,13 @@ import json
 import numpy as np
 import pytest
 import torch
+from tiny_drive import write_tiny_dataset
 
-from semgrid_edu.experiments.evaluate import confusion_matrices, scores, table
+from semgrid_edu.datasets import KittiRawDrive, training_cache
+from semgrid_edu.experiments.evaluate import confusion_matrices, evaluate, scores, table
+from semgrid_edu.files import sha256
 from semgrid_edu.labels import KITTI_14
+from semgrid_edu.networks import Architecture, build_net, save_net
 from semgrid_edu.networks.semantic_grid import Stages
 
 ROAD, CAR, FREE, STATIC = (KITTI_14.index(name) for name in ("road", "car", "unknown-free", "unknown-static"))
@@ -68,3 +72,21 @@ def test_table_shows_every_method_and_number(found):
     assert len(lines) == 2 + len(found)
     assert [float(word) for word in lines[-1].split("labels")[1].split()] == [100.0] * 6
     assert json.loads(json.dumps(found)) == found
+
+
+def test_evaluates_a_network_from_disk(tmp_path, monkeypatch):
+    def process(index, split, recipe):  # without worker processes, which take seconds to start
+        ((name, labelled), *_) = index.frames_by_drive(split).items()
+        return training_cache._process_drive(index.root, *name, labelled, recipe)
+
+    monkeypatch.setattr(training_cache, "_process", process)
+    root = write_tiny_dataset(tmp_path / "tiny")
+    camera = KittiRawDrive(root, "2026_01_01", "0001").camera
+    save_net(build_net(Architecture(), camera), tmp_path / "net.safetensors")
+    result = evaluate(root, tmp_path / "net.safetensors")
+    assert result == json.loads(json.dumps(result))
+    assert result["frames"] == {"train": 1, "test": 1}
+    assert result["weights"]["sha256"] == sha256(tmp_path / "net.safetensors")
+    assert result["command"] == "semgrid-edu evaluate --data tiny --weights net.safetensors"
+    for method, confusion in result["confusion"].items():
+        assert np.sum(confusion) == 142 * 62, method  # every cell has a class
