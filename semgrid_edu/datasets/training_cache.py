@@ -47,8 +47,9 @@ class Recipe(NamedTuple):
 def cached_arrays(index: DatasetIndex, split: str, recipe: Recipe) -> dict[str, NDArray]:
     """Return the arrays of a split's labelled frames; make them on first use.
 
-    They lie in `cache/` of the data set, in a folder named by a hash of all that decides them: the recipe,
-    dataset.json and the code that makes them. When one of these changes, they are made anew.
+    They lie in `cache/` of the data set, in a folder named by a hash of all that decides them: the recipe, the
+    code that makes them, dataset.json, and the drives' files by name and size (hashing a gigabyte at every start
+    would take longer than reading what is kept). When one of these changes, they are made anew.
 
     Returns
     -------
@@ -63,18 +64,23 @@ def cached_arrays(index: DatasetIndex, split: str, recipe: Recipe) -> dict[str, 
     DataError
         When the data set, or what was kept, is damaged.
     """
-    folder = index.root / "cache" / _key(index, recipe) / split
+    folder = index.root / "cache" / _key(index, split, recipe) / split
     if not folder.exists():
         _write_arrays(_pack(_process(index, split, recipe)), recipe, folder)
     return _map_arrays(folder)
 
 
-def _key(index: DatasetIndex, recipe: Recipe) -> str:
-    """Hash what decides the arrays; code that changed makes them stale as surely as data."""
+def _key(index: DatasetIndex, split: str, recipe: Recipe) -> str:
+    """Hash what decides the arrays: the recipe, the code, and names and sizes of all files of the split's drives."""
     package = Path(semgrid_edu.__file__).parent
     code = [package / name for name in ("camera.py", "frame.py", "grid.py", "labels.py")]
     code += sorted((package / "datasets").glob("*.py")) + sorted((package / "occupancy").glob("*.py"))
-    parts = [repr(recipe), sha256(index.root / INDEX_FILE), *map(sha256, code)]
+    drives = index.frames_by_drive(split)
+    calibration = [path for date in {date for date, _ in drives} for path in (index.root / date).glob("*.txt")]
+    parts = [repr(recipe), *map(sha256, [index.root / INDEX_FILE, *code, *sorted(calibration)])]
+    for date, drive in drives:
+        files = (index.root / date / f"{date}_drive_{drive}_sync").rglob("*.*")
+        parts += sorted(f"{file.relative_to(index.root)} {file.stat().st_size}" for file in files)
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 

@@ -46,8 +46,7 @@ class TrainingSet(Dataset[Sample]):
     """The labelled frames of a split.
 
     The first use runs the occupancy filter over every drive up to its labelled frames and keeps the result in
-    `cache/` of the data set, in a folder named by a hash of everything that decides it: the recipe, dataset.json
-    and the code. Later uses map it from disk.
+    `cache/` of the data set, see `cached_arrays`. Later uses map it from disk, until data, recipe or code change.
 
     Parameters
     ----------
