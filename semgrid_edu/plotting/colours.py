@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.occupancy import State
 
-STATE_NAMES = ("free", "static", "dynamic", "unknown")
+STATE_NAMES = tuple(state.name.lower() for state in State)
 """The occupancy states in their order."""
 
 STATE_COLOURS = ((243, 243, 240), (38, 42, 52), (252, 114, 0), (160, 163, 168))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LabelSet
+from semgrid_edu.occupancy import State
 from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, occupancy_colours
 from semgrid_edu.plotting.legends import class_legend, colour_legend
 
@@ -89,7 +90,7 @@ def velocity_arrows(
     speed : (K, 2) float64
         Their mean velocity, metres a second.
     """
-    moving = np.isfinite(velocity).all(axis=0) & (probability[STATE_NAMES.index("dynamic")] > 0.5)
+    moving = np.isfinite(velocity).all(axis=0) & (probability[State.DYNAMIC] > 0.5)
     xy = spec.centers()[moving]
     _, square = np.unique(np.floor(xy / ARROW_SPACING), axis=0, return_inverse=True)
     count = np.maximum(np.bincount(square), 1)

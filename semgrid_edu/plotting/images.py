@@ -122,7 +122,8 @@ def draw_image(image: NDArray, ax: Axes | None = None, **style: object) -> Axes:
     if ax is None:
         _, ax = plt.subplots(figsize=(10, 3.2), layout="constrained")
     ax.imshow(image, **style)
-    ax.set_axis_off()
+    ax.set(xticks=[], yticks=[])
+    ax.spines[:].set_visible(False)
     return ax
 
 
