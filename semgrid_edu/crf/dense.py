@@ -25,7 +25,7 @@ def pair_weights(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
     Returns
     -------
     (H W, H W) float64
-        What two cells of different labels cost, cells counted row by row. Zero on the diagonal: no cell is its own pair.
+        What two cells of different labels cost, cells counted row by row. Zero on the diagonal: a cell is no pair.
 
     Raises
     ------
@@ -33,6 +33,8 @@ def pair_weights(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
         When `values` has another shape or the grid more than `MAX_CELLS` cells.
     """
     values = np.asarray(values, dtype=np.float64)
+    if values.ndim != 3:
+        raise ArgumentError("values", "shape (4, H, W)", f"shape {values.shape}")
     _, height, width = values.shape
     if height * width > MAX_CELLS:
         raise ArgumentError("values", f"at most {MAX_CELLS} cells; mean_field takes more", height * width)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
 
-_PLUS, _MINUS = 0, 1
+_FORTH, _BACK = 0, 1
 
 
 @dataclass(frozen=True)
@@ -63,13 +63,16 @@ class PermutohedralLattice:
         Raises
         ------
         ArgumentError
-            When `features` isn't a table of finite numbers.
+            When `features` isn't a table of finite numbers, or they are too large for the lattice's integers.
         """
         features = np.asarray(features, dtype=np.float64)
         if features.ndim != 2 or 0 in features.shape or not np.isfinite(features).all():
             raise ArgumentError("features", "finite numbers of shape (N, d)", f"shape {features.shape}")
         dimensions = features.shape[1]
-        origins, ranks, weights = _enclosing_simplices(features @ _elevation(dimensions).T)
+        elevated = features @ _elevation(dimensions).T
+        if np.abs(elevated).max() > 2**30:
+            raise ArgumentError("features", "fewer standard deviations, or a larger sigma", np.abs(features).max())
+        origins, ranks, weights = _enclosing_simplices(elevated)
         corners, keys, slots = _number_vertices(origins, ranks)
         neighbours = _find_neighbours(keys, slots)
         diagonal = _self_responses(corners, ranks, weights, neighbours)
@@ -202,7 +205,7 @@ def _lookup(key, keys, slots):
 
 @njit(cache=True)
 def _number_vertices(origins, ranks):
-    """Number the distinct corners of all simplices: (N, d + 1) numbers, the (M, d + 1) keys, the hash table."""
+    """Give a number to each distinct corner: return (N, d + 1) numbers, (M, d + 1) keys and the hash table."""
     n_points, size = origins.shape
     corners = np.empty((n_points, size), np.int32)
     keys = np.empty((n_points * size, size), np.int32)
@@ -229,32 +232,33 @@ def _number_vertices(origins, ranks):
 def _find_neighbours(keys, slots):
     """Return the (d + 1, 2, M) vertices one step forth and back along each direction; M where there is none."""
     n_vertices, size = keys.shape
-    neighbours = np.empty((size, 2, n_vertices), np.int32)
+    neighbours = np.full((size, 2, n_vertices), n_vertices, np.int32)
     for v in prange(n_vertices):
-        key = np.empty(size, np.int32)
+        key = keys[v] + 1
         for direction in range(size):
-            for side, step in ((_PLUS, 1), (_MINUS, -1)):
-                for j in range(size):
-                    key[j] = keys[v, j] + step
-                key[direction] -= step * size
-                found = slots[_lookup(key, keys, slots)]
-                neighbours[direction, side, v] = found if found >= 0 else n_vertices
+            key[direction] -= size
+            found = slots[_lookup(key, keys, slots)]
+            key[direction] += size
+            if found >= 0:
+                neighbours[direction, _FORTH, v] = found
+                neighbours[direction, _BACK, found] = v
     return neighbours
 
 
 @njit(cache=True)
-def _walk(vertex, offsets, neighbours):
-    """Return the weight of the blur's path from a vertex by -1, 0 or 1 step along each direction, in its order."""
+def _walk(vertex, a, b, shift, ranks, neighbours):
+    """Return the weight of one of the blur's paths from a simplex's corner a, the given vertex, to its corner b."""
+    size = len(ranks)
     weight = 1.0
-    for direction in range(len(offsets)):
-        step = offsets[direction]
+    for direction in range(size):
+        step = shift + int(ranks[direction] >= size - b) - int(ranks[direction] >= size - a)
         if step == 0:
             weight *= 0.5
-            continue
-        weight *= 0.25
-        vertex = neighbours[direction, _PLUS if step > 0 else _MINUS, vertex]
-        if vertex == neighbours.shape[2]:
-            return 0.0
+        else:
+            weight *= 0.25
+            vertex = neighbours[direction, _FORTH if step > 0 else _BACK, vertex]
+            if vertex == neighbours.shape[2]:
+                return 0.0
     return weight
 
 
@@ -262,19 +266,17 @@ def _walk(vertex, offsets, neighbours):
 def _self_responses(corners, ranks, weights, neighbours):
     """Return the (N,) diagonal of the filter, without its peak factor: paths between corners of the same simplex.
 
-    From corner a to b > a leads one step along each coordinate whose rank is d - a down to d - b + 1; and since one step along
-    all d + 1 directions leads nowhere, so does that path with every offset raised or lowered by one.
+    From corner a to b > a leads one step along each coordinate whose rank is d - a down to d - b + 1. Since one step
+    along all d + 1 directions leads nowhere, so does that path with every step raised or lowered by one.
     """
     n_points, size = corners.shape
     diagonal = np.zeros(n_points, np.float32)
     for i in prange(n_points):
-        offsets = np.empty(size, np.int64)
         for a in range(size):
             for b in range(size):
                 for shift in range(-1 if a <= b else 0, 2 if a >= b else 1):
-                    for j in range(size):
-                        offsets[j] = shift + int(ranks[i, j] >= size - b) - int(ranks[i, j] >= size - a)
-                    diagonal[i] += weights[i, a] * weights[i, b] * _walk(corners[i, a], offsets, neighbours)
+                    path = _walk(corners[i, a], a, b, shift, ranks[i], neighbours)
+                    diagonal[i] += weights[i, a] * weights[i, b] * path
     return diagonal
 
 

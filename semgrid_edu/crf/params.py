@@ -19,9 +19,8 @@ class CrfParams:
     Parameters
     ----------
     w_bilateral, w_spatial : float
-        w1 and w2, the weights of the two kernels. 4 and 3: the appearance kernel of Kraehenbuehl and Koltun's published
-        code is a few times as strong as its smoothness kernel; on a grid the two lie closer together, since occupancy is
-        a weaker cue than colour.
+        w1 and w2, the weights of the two kernels. 4 and 3: Kraehenbuehl and Koltun's published code takes 10 and 3
+        for images; ours trusts occupancy less than colour, because many classes share a state.
     sigma_alpha : float
         Reach of the bilateral kernel, in cells. 8 cells are 1.6 m in the paper's grid, half a car's length, and 4 m in
         the compact one: give half as much there to keep the reach in metres.

@@ -18,7 +18,7 @@ class SeparableGaussian:
     columns : (W, W) float32
         The kernel between columns.
     reach : int
-        Cells farther apart than this add less than single precision resolves.
+        Cells farther apart, 5 sigma, are left out: less than a millionth of the weight.
     """
 
     rows: NDArray[np.float32]
@@ -48,7 +48,7 @@ class SeparableGaussian:
             Ready to filter.
         """
         rows, columns = (_gaussian(size, sigma, normalization) for size in shape)
-        return cls((weight * rows).astype(np.float32), columns.astype(np.float32), int(np.ceil(6 * sigma)))
+        return cls((weight * rows).astype(np.float32), columns.astype(np.float32), int(np.ceil(5 * sigma)))
 
     @property
     def diagonal(self) -> NDArray[np.float32]:

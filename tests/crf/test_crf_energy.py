@@ -1,0 +1,162 @@
+"""The energy and the written-out mean field against cases worked out by hand and by enumeration."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.special import logsumexp, softmax
+
+from semgrid_edu.crf import CrfParams, energy, mean_field_naive, pair_weights, unary_from_probability
+from semgrid_edu.errors import ArgumentError
+
+AS_PRINTED = CrfParams(w_bilateral=2, w_spatial=3, sigma_alpha=2, sigma_beta=0.5, sigma_gamma=1, normalization="none")
+
+
+def small_crf(seed: int, shape: tuple[int, int] = (2, 2), n_classes: int = 2):
+    rng = np.random.default_rng(seed)
+    values = rng.dirichlet(np.ones(4), shape).transpose(2, 0, 1)
+    return rng.normal(size=(n_classes, *shape)), values
+
+
+def free_energy(Q, unary, values, params):
+    """E[E(x)] - entropy of a distribution over independent cells."""
+    q, weights = Q.reshape(len(Q), -1), pair_weights(values, params)
+    disagree = 1 - q.T @ q
+    return (q * (unary.reshape(q.shape) + np.log(q))).sum() + np.triu(weights * disagree, 1).sum()
+
+
+def test_energy_of_two_by_two_by_hand():
+    unary = np.arange(8.0).reshape(2, 2, 2)
+    values = np.zeros((4, 2, 2))
+    values[0, :, 0] = values[1, :, 1] = 1  # left column free, right column static: squared distance 2
+    side = 2 * np.exp(-1 / 8) + 3 * np.exp(-1 / 2)  # same state
+    across = 2 * np.exp(-1 / 8 - 2 / 0.5) + 3 * np.exp(-1 / 2)  # next to each other, other state
+    slant = 2 * np.exp(-2 / 8 - 2 / 0.5) + 3 * np.exp(-1)
+    cases = {
+        ((0, 0), (0, 0)): 0 + 1 + 2 + 3,
+        ((0, 1), (0, 1)): 0 + 5 + 2 + 7 + 2 * across + 2 * slant,
+        ((0, 0), (1, 1)): 0 + 1 + 6 + 7 + 2 * side + 2 * slant,
+        ((1, 0), (0, 0)): 4 + 1 + 2 + 3 + side + across + slant,
+    }
+    for labels, expected in cases.items():
+        assert energy(np.array(labels), unary, values, AS_PRINTED) == pytest.approx(expected, abs=1e-12)
+
+
+def test_symmetric_normalisation_by_hand():
+    # Two cells, k = exp(-1/2) between them: D = 1 + k, so the pair weighs w k / (1 + k).
+    values = np.full((4, 1, 2), 0.25)
+    params = CrfParams(w_bilateral=0, w_spatial=3, sigma_gamma=1)
+    k = np.exp(-0.5)
+    np.testing.assert_allclose(pair_weights(values, params), 3 * k / (1 + k) * np.array([[0, 1], [1, 0]]))
+
+
+@pytest.mark.parametrize("normalization", ["symmetric", "none"])
+def test_labels_of_every_cell_cost_the_same_in_any_order(normalization):
+    unary, values = small_crf(0, (2, 3), 3)
+    params = CrfParams(normalization=normalization)
+    labels, order = np.array([[0, 1, 2], [2, 1, 0]]), np.array([2, 0, 1])
+    renamed = np.empty_like(order)
+    renamed[order] = np.arange(3)
+    assert energy(labels, unary, values, params) == pytest.approx(energy(renamed[labels], unary[order], values, params))
+
+
+def test_two_cells_reach_the_fixed_point_found_by_bisection():
+    # Two cells with the same unary (0, a) and pair weight w: Q(0) = q solves log(q / (1 - q)) = a + w (2 q - 1).
+    a, values = 0.4, np.full((4, 1, 2), 0.25)
+    params = CrfParams(w_bilateral=0, w_spatial=1, sigma_gamma=1, normalization="none")
+    w, low, high = np.exp(-0.5), 0.5, 1 - 1e-12
+    for _ in range(100):
+        q = (low + high) / 2
+        low, high = (q, high) if np.log(q / (1 - q)) < a + w * (2 * q - 1) else (low, q)
+    Q = mean_field_naive(np.array([[[0.0, 0.0]], [[a, a]]]), values, params, iterations=200)
+    np.testing.assert_allclose(Q[0, 0], q, atol=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_free_energy_bounds_the_partition_function_and_ends_at_a_minimum(seed):
+    unary, values = small_crf(seed, (1, 3), 3)
+    params = CrfParams(w_bilateral=0.5, w_spatial=0.5)
+    energies = [energy(np.array(x).reshape(1, 3), unary, values, params) for x in product(range(3), repeat=3)]
+    Q = mean_field_naive(unary, values, params, iterations=300)
+    final = free_energy(Q, unary, values, params)
+    start = free_energy(softmax(-unary, axis=0), unary, values, params)
+    assert -logsumexp(-np.array(energies)) <= final <= start
+    rng = np.random.default_rng(seed)
+    for _ in range(50):
+        near = softmax(np.log(Q) + 1e-3 * rng.normal(size=Q.shape), axis=0)
+        assert free_energy(near, unary, values, params) >= final - 1e-12
+
+
+def test_weak_pairs_give_the_exact_marginals():
+    # For small weights the error of mean field is of second order: a tenth of the weight, a hundredth of the error.
+    unary, values = small_crf(3, (1, 3), 2)
+    errors = []
+    for weight in (1e-1, 1e-2):
+        params = CrfParams(w_bilateral=weight, w_spatial=weight, normalization="none")
+        marginals = np.zeros_like(unary)
+        for x in product(range(2), repeat=3):
+            labels = np.array(x).reshape(1, 3)
+            np.add.at(marginals, (labels, [[0, 0, 0]], [[0, 1, 2]]), np.exp(-energy(labels, unary, values, params)))
+        marginals /= marginals.sum(axis=0)
+        errors.append(np.abs(mean_field_naive(unary, values, params, 50) - marginals).max())
+    assert errors[0] < 0.02
+    assert errors[1] < errors[0] / 50
+
+
+def test_one_update_written_as_eq_4_with_loops():
+    unary, values = small_crf(1, (2, 3), 3)
+    cells = [(r, c) for r in range(2) for c in range(3)]
+    Q, expected = softmax(-unary, axis=0), np.zeros_like(unary)
+    for i in cells:
+        for label in range(3):
+            cost = unary[(label, *i)]
+            for j in cells:
+                if j == i:
+                    continue
+                place = (i[0] - j[0]) ** 2 + (i[1] - j[1]) ** 2
+                state = ((values[(slice(None), *i)] - values[(slice(None), *j)]) ** 2).sum()
+                k = 2 * np.exp(-place / (2 * 2**2) - state / (2 * 0.5**2)) + 3 * np.exp(-place / 2)
+                cost += k * sum(Q[(other, *j)] for other in range(3) if other != label)
+            expected[(label, *i)] = np.exp(-cost)
+    expected /= expected.sum(axis=0)
+    np.testing.assert_allclose(mean_field_naive(unary, values, AS_PRINTED, iterations=1), expected, atol=1e-12)
+
+
+def test_unary_from_probability_is_minus_log():
+    np.testing.assert_allclose(unary_from_probability([[0.5], [0.5], [0.0]]), [[np.log(2)], [np.log(2)], [np.inf]])
+    for wrong in ([0.5, 0.6], [1.5, -0.5], [np.nan, 1.0]):
+        with pytest.raises(ArgumentError, match="probability"):
+            unary_from_probability(wrong)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("w_bilateral", -1), ("w_spatial", np.nan), ("sigma_alpha", 0), ("sigma_beta", -0.2), ("sigma_gamma", np.inf)],
+)
+def test_params_refuse_what_has_no_meaning(name, value):
+    with pytest.raises(ArgumentError, match=name):
+        CrfParams(**{name: value})
+
+
+def test_params_refuse_an_unknown_normalisation():
+    with pytest.raises(ArgumentError, match=r"normalization.*'before'"):
+        CrfParams(normalization="before")
+
+
+def test_energy_refuses_labels_that_are_no_classes():
+    unary, values = small_crf(0)
+    for labels in (
+        np.full((2, 2), 2),
+        np.full((2, 2), 255),
+        np.full((2, 2), -1),
+        np.zeros((2, 3), int),
+        np.zeros((2, 2)),
+    ):
+        with pytest.raises(ArgumentError, match="labels"):
+            energy(labels, unary, values, CrfParams())
+
+
+def test_written_out_pairs_refuse_a_large_grid():
+    values = np.full((4, 101, 100), 0.25)
+    with pytest.raises(ArgumentError, match=r"at most 10000 cells.*found 10100"):
+        mean_field_naive(np.zeros((2, 101, 100)), values, CrfParams())

@@ -1,0 +1,189 @@
+"""Fast mean field against the written-out one, and what must hold for both."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.ndimage import gaussian_filter
+from scipy.special import softmax
+
+from semgrid_edu.crf import CrfParams, mean_field, mean_field_naive, pair_weights, unary_from_probability
+from semgrid_edu.crf.mean_field import iterate
+from semgrid_edu.errors import ArgumentError
+
+TWINS = pytest.mark.parametrize("infer", [mean_field_naive, mean_field])
+
+
+def patches(shape, count, rng):
+    return np.argmax([gaussian_filter(rng.normal(size=shape), 4) for _ in range(count)], axis=0)
+
+
+def noisy_street(seed, shape=(40, 30), n_classes=14, structured=True):
+    """Classes in patches under noisy scores; states in patches, or without any structure."""
+    rng = np.random.default_rng(seed)
+    truth = patches(shape, n_classes, rng)
+    scores = 2 * np.eye(n_classes)[truth] + 1.5 * rng.normal(size=(*shape, n_classes))
+    values = softmax(5 * np.eye(4)[patches(shape, 4, rng)] + 0.5 * rng.normal(size=(*shape, 4)), axis=-1)
+    if not structured:
+        values = rng.dirichlet(np.full(4, 0.5), shape)
+    unary = unary_from_probability(softmax(scores, axis=-1).transpose(2, 0, 1))
+    return unary, values.transpose(2, 0, 1), truth
+
+
+class DenseKernel:
+    """All pairs as one matrix, in single precision; a cell says nothing to itself."""
+
+    def __init__(self, values, params):
+        self.matrix = pair_weights(values, params).astype(np.float32)
+        self.diagonal = np.diag(self.matrix)
+
+    def __call__(self, values):
+        return self.matrix @ values
+
+
+@pytest.mark.parametrize("structured", [True, False])
+@pytest.mark.parametrize("seed", range(3))
+def test_fast_mean_field_is_the_naive_one_up_to_the_lattice(seed, structured):
+    # Over such values the lattice's normalised kernel differs from the Gaussian by 10 to 20 % (Frobenius), so a message
+    # of at most w1 = 4 by up to 0.8, and a probability by up to a quarter of that. Few cells come near it: summed over
+    # many neighbours the error is some 3 %. A cell at a tie can move more, since its neighbours move with it.
+    unary, values, _ = noisy_street(seed, structured=structured)
+    exact, fast = (infer(unary, values, CrfParams()) for infer in (mean_field_naive, mean_field))
+    error = np.abs(fast - exact)
+    assert error.mean() < 0.005
+    assert np.quantile(error.max(axis=0), 0.99) < 0.2
+    assert (fast.argmax(axis=0) == exact.argmax(axis=0)).mean() > 0.97
+    assert fast.dtype == np.float32
+    assert exact.dtype == np.float64
+
+
+@pytest.mark.parametrize("normalization", ["symmetric", "none"])
+def test_without_the_lattice_the_twins_agree(normalization):
+    unary, values, _ = noisy_street(0)
+    params = CrfParams(
+        w_bilateral=0, w_spatial=2 if normalization == "symmetric" else 0.05, normalization=normalization
+    )
+    np.testing.assert_allclose(mean_field(unary, values, params), mean_field_naive(unary, values, params), atol=1e-5)
+
+
+def test_fast_update_over_the_dense_kernel_is_the_naive_one():
+    unary, values, _ = noisy_street(1, (20, 15), 16)
+    phi = (unary - unary.min(axis=0)).reshape(16, -1).T.astype(np.float32)
+    Q = iterate(phi, [DenseKernel(values, CrfParams())], 10).T.reshape(unary.shape)
+    np.testing.assert_allclose(Q, mean_field_naive(unary, values, CrfParams()), atol=1e-5)
+
+
+@TWINS
+def test_lonely_cells_keep_their_own_distribution(infer):
+    # Four certain, different states and no spatial kernel: nobody is near anybody, and a cell doesn't talk to itself.
+    unary = np.random.default_rng(0).normal(size=(3, 2, 2))
+    values = np.eye(4).reshape(4, 2, 2)
+    params = CrfParams(w_bilateral=50, w_spatial=0, sigma_beta=0.05)
+    np.testing.assert_allclose(infer(unary, values, params), softmax(-unary, axis=0), atol=1e-5)
+
+
+@TWINS
+@pytest.mark.parametrize(("params", "iterations"), [(CrfParams(w_bilateral=0, w_spatial=0), 10), (CrfParams(), 0)])
+def test_without_pairs_or_updates_it_is_a_softmax(infer, params, iterations):
+    unary, values, _ = noisy_street(0, (6, 5))
+    np.testing.assert_allclose(infer(unary, values, params, iterations), softmax(-unary, axis=0), atol=1e-6)
+
+
+@TWINS
+def test_renamed_classes_give_renamed_results(infer):
+    unary, values, _ = noisy_street(0, (12, 10))
+    order = np.random.default_rng(0).permutation(len(unary))
+    np.testing.assert_allclose(
+        infer(unary[order], values, CrfParams()), infer(unary, values, CrfParams())[order], atol=1e-4
+    )
+
+
+@TWINS
+def test_a_speck_is_smoothed_away_and_an_edge_of_occupancy_stays(infer):
+    values = np.zeros((4, 12, 12))
+    values[0, :, :6] = values[1, :, 6:] = 1
+    probability = np.full((2, 12, 12), 0.3)
+    probability[0, :, :6] = probability[1, :, 6:] = 0.7
+    probability[:, 5, 2] = 0.3, 0.7  # a free cell that the network gives to the class of the static ones
+    labels = infer(unary_from_probability(probability), values, CrfParams()).argmax(axis=0)
+    np.testing.assert_array_equal(labels, np.broadcast_to(np.arange(12) >= 6, (12, 12)))
+
+
+@TWINS
+def test_the_crf_repairs_a_noisy_grid(infer):
+    unary, values, truth = noisy_street(2)
+    refined = infer(unary, values, CrfParams())
+    assert (refined.argmax(axis=0) == truth).mean() > (unary.argmin(axis=0) == truth).mean() + 0.1
+
+
+@TWINS
+def test_an_impossible_class_stays_impossible(infer):
+    unary, values, _ = noisy_street(0, (10, 8))
+    unary[3] = np.inf
+    unary[4, 2:5] = 1e300
+    Q = infer(unary, values, CrfParams())
+    assert (Q[3] == 0).all()
+    assert (Q[4, 2:5] == 0).all()
+    np.testing.assert_allclose(Q.sum(axis=0), 1, atol=1e-5)
+
+
+@TWINS
+@settings(max_examples=25, deadline=None)
+@given(data=st.data())
+def test_every_cell_holds_a_distribution(infer, data):
+    height, width, n_classes = (data.draw(st.integers(1, high)) for high in (5, 6, 20))
+    rng = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))
+    unary = rng.choice([0.0, 1.0, -3.0, 50.0, 1e5, -1e5, 1e38, np.inf], size=(n_classes, height, width))
+    unary[0] = np.where(np.isinf(unary).all(axis=0), 0, unary[0])
+    values = rng.dirichlet(np.full(4, 0.2), (height, width)).transpose(2, 0, 1)
+    params = CrfParams(
+        w_bilateral=data.draw(st.floats(0, 1e3)),
+        sigma_alpha=data.draw(st.floats(0.1, 50)),
+        sigma_beta=data.draw(st.floats(0.01, 5)),
+        normalization=data.draw(st.sampled_from(["symmetric", "none"])),
+    )
+    Q = infer(unary, values, params, data.draw(st.integers(0, 4)))
+    assert Q.shape == unary.shape
+    assert (Q >= 0).all()
+    np.testing.assert_allclose(Q.sum(axis=0), 1, atol=1e-5)
+
+
+def test_fast_mean_field_gives_the_same_bits_again():
+    unary, values, _ = noisy_street(0)
+    np.testing.assert_array_equal(mean_field(unary, values, CrfParams()), mean_field(unary, values, CrfParams()))
+
+
+def test_inputs_are_left_alone():
+    unary, values, _ = noisy_street(0, (6, 5))
+    unary, values = unary.astype(np.float32), values.astype(np.float32)
+    before = unary.copy(), values.copy()
+    mean_field(unary, values, CrfParams())
+    np.testing.assert_array_equal(unary, before[0])
+    np.testing.assert_array_equal(values, before[1])
+
+
+@TWINS
+@pytest.mark.parametrize(
+    ("name", "unary", "values"),
+    [
+        ("unary", np.zeros((4, 4)), np.full((4, 4, 4), 0.25)),
+        ("unary", np.zeros((0, 4, 4)), np.full((4, 4, 4), 0.25)),
+        ("unary", np.full((2, 4, 4), np.nan), np.full((4, 4, 4), 0.25)),
+        ("unary", np.full((2, 4, 4), -np.inf), np.full((4, 4, 4), 0.25)),
+        ("unary", np.full((2, 4, 4), np.inf), np.full((4, 4, 4), 0.25)),
+        ("values", np.zeros((2, 4, 4)), np.full((4, 4, 5), 0.25)),
+        ("values", np.zeros((2, 4, 4)), np.full((5, 4, 4), 0.2)),
+        ("values", np.zeros((2, 4, 4)), np.full((4, 4, 4), 0.3)),
+        ("values", np.zeros((2, 4, 4)), np.full((4, 4, 4), np.nan)),
+    ],
+)
+def test_bad_input_is_named(infer, name, unary, values):
+    with pytest.raises(ArgumentError, match=f"^{name}: expected"):
+        infer(unary, values, CrfParams())
+
+
+@TWINS
+@pytest.mark.parametrize("iterations", [-1, 2.5])
+def test_iterations_are_counted(infer, iterations):
+    with pytest.raises(ArgumentError, match="iterations"):
+        infer(np.zeros((2, 3, 3)), np.full((4, 3, 3), 0.25), CrfParams(), iterations)
