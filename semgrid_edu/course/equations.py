@@ -1,8 +1,8 @@
 """The equation register: where each equation and procedure of the paper stands in code, lectures and exercises."""
 
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
-from pydoc import locate
 
 from semgrid_edu.errors import ArgumentError
 
@@ -85,7 +85,7 @@ EQUATIONS = (
         literal="semgrid_edu.networks.FusionNet",
     ),
     Equation("eq-3", "3.5", "Energy of a labelling", literal="semgrid_edu.crf.energy"),
-    Equation("eq-4", "3.5", "What two cells with different labels cost", literal="semgrid_edu.crf.energy"),
+    Equation("eq-4", "3.5", "What two cells with different labels cost", literal="semgrid_edu.crf.pair_weights"),
     Equation(
         "mean-field",
         "3.5",
@@ -128,10 +128,11 @@ def find_code(name: str) -> object:
     ArgumentError
         When there is none.
     """
-    found = locate(name)
-    if found is None:
-        raise ArgumentError("name", "the dotted name of something that can be imported", name)
-    return found
+    module, _, attribute = name.rpartition(".")
+    try:
+        return getattr(import_module(module), attribute)
+    except (ImportError, AttributeError):
+        raise ArgumentError("name", "the dotted name of something that can be imported", name) from None
 
 
 def equation_table() -> str:

@@ -117,7 +117,7 @@ def execute(notebook: NotebookNode, folder: Path, timeout: int = 300) -> Noteboo
         When a cell raises; it names the cell.
     """
     place = {"metadata": {"path": folder}}
-    client = NotebookClient(notebook, timeout=timeout, record_timing=False, store_widget_state=False, resources=place)
+    client = NotebookClient(notebook, timeout=timeout, record_timing=False, resources=place)
     client.execute()
     for cell in notebook.cells:
         if cell.cell_type == "code":

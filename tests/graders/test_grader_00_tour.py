@@ -242,7 +242,7 @@ def pixel_of(point, K, T_camera_from_grid):
             "divided by the distance",
             task="pixel-of",
             loses=2,
-            says="Z is its depth along the camera's axis",
+            says="Z is the depth along the camera's axis",
             code="""
 def pixel_of(point, K, T_camera_from_grid):
     P = (T_camera_from_grid @ np.append(point, 1))[:3]
@@ -353,7 +353,7 @@ def accuracies(confusion):
             "absent class counted as 0",
             task="accuracies",
             loses=3,
-            says="leave it out of the mean",
+            says="leave it out of the mean instead of counting a 0",
             code="""
 def accuracies(confusion):
     share = confusion.diagonal() / np.maximum(confusion.sum(axis=1), 1)

@@ -48,9 +48,9 @@ assert got is not None, "cell_of returned nothing: did you forget `return`?"
 got = tuple(got)
 slips = {
     (1, 2): "row and column are swapped: rows count along x (forward), columns along y (left)",
-    (9, 1): "you count rows from the vehicle: row 0 is the farthest ahead, so measure down from x_max",
-    (2, 6): "you count columns from the right: y points left and column 0 is the leftmost, so measure from y_max",
-    (3, 2): "you round to the nearest border: a point belongs to the cell whose border it has last crossed (floor)",
+    (9, 1): "you count rows from the vehicle: row 0 is the farthest ahead, measure from x_max",
+    (2, 6): "y points left and column 0 is the leftmost: measure columns from y_max",
+    (3, 2): "you round to the nearest border: a point belongs to the cell it lies in (floor)",
     (1, 0): "you count metres: how many cells of 0.5 m fit into 1.4 m?",
 }
 assert got not in slips, f"got {got}: {slips[got]}"
@@ -91,12 +91,12 @@ likelihood[:, 1, 2] = [0.1, 0.9, 0.9, 0.5]  # ... but in cell (1, 2), where the 
 before = belief.copy()
 got = bayes_update(belief, likelihood)
 assert got is not None, "bayes_update returned nothing: did you forget `return`?"
-assert np.array_equal(belief, before), "bayes_update changed its argument `belief`: work on a new array (no *=, no /=)"
+assert np.array_equal(belief, before), "bayes_update changed its argument `belief`: make a new array (no *=, no /=)"
 assert got.shape == (4, 2, 3), f"expected the shape of the belief, (4, 2, 3), got {got.shape}"
 total = got.sum(axis=0)
 row, col = np.unravel_index(np.abs(total - 1).argmax(), total.shape)
 wrong = f"the four states of cell ({row}, {col}) sum to {total[row, col]:.2f}"
-assert np.allclose(total, 1), f"{wrong}: did you normalise over the state axis, each cell for itself?"
+assert np.allclose(total, 1), f"{wrong}: did you normalise over the state axis?"
 assert not np.allclose(got[:, 0, 1], 0.25), "cell (0, 1) forgot what it believed: multiply the old belief in"
 quiet = np.round(got[:, 0, 1], 2)
 assert np.allclose(quiet, before[:, 0, 1], atol=0.01), f"the scan is silent in cell (0, 1), yet 0.7, ... became {quiet}"
@@ -140,11 +140,8 @@ got = pixel_of(np.array([10.0, -2.0, 0.5]), K, ahead)
 assert np.size(got) == 2, f"return two numbers, u and v; got {got}"
 slips = {
     (700, 300): "did you divide by Z?",
-    (68.3, 29.3): "you divide by the distance to the point: Z is its depth along the camera's axis only",
-    (
-        64.3,
-        -265.7,
-    ): "you use the inverse transform: T_camera_from_grid, read from right to left, already takes grid to camera",
+    (68.3, 29.3): "you divide by the distance: Z is the depth along the camera's axis only",
+    (64.3, -265.7): "you use the inverse transform: T_camera_from_grid takes grid to camera as it is",
     (70, 15): "the camera's place got lost: the fourth coordinate of a point is 1, not 0",
     (30, 70): "that is (v, u): u counts to the right and comes first",
     (20, 10): "the principal point is missing: the third column of K shifts the pixel",
@@ -202,7 +199,7 @@ assert np.size(got) == 2, f"return pixel accuracy and class accuracy, got {got}"
 pixel, per_class = got
 assert not np.isclose(pixel, 7 / 12), "the two are swapped: pixel accuracy comes first"
 assert np.isclose(pixel, 8 / 13), f"8 of 13 cells are right, so the pixel accuracy is 0.615, got {pixel:.3f}"
-assert not np.isnan(per_class), "class 2 has no true cell: 0 / 0 is not a share, leave the class out of the mean"
+assert not np.isnan(per_class), "class 2 has no true cell: 0 / 0 is not a share, leave it out"
 slips = {
     7 / 18: "class 2 has no true cell: leave it out of the mean instead of counting a 0",
     5 / 12: "you divide by the columns (what was predicted): a true class is a row",
