@@ -41,6 +41,20 @@ def demo(
 
 
 @data.command()
+def make(
+    name: Annotated[str, typer.Argument(help="minikitti, minichroma, minisynthia, sample, or all for the first three.")],
+    folder: Annotated[Path, typer.Argument(help="Where the data set's own folder goes.")],
+    seed: Annotated[int, typer.Option(help="The same seed gives the same bytes.")] = 0,
+    workers: Annotated[int, typer.Option(help="Processes that share the work.")] = 2,
+) -> None:
+    """Simulate a data set in KITTI's raw layout; when interrupted, the same command resumes."""
+    from semgrid_edu.simulation.datasets import DATA_SETS, make
+
+    for one in DATA_SETS if name == "all" else [name]:
+        typer.echo(f"{one} is in {make(one, folder, seed, workers)}")
+
+
+@data.command()
 def verify(
     folder: Annotated[Path | None, typer.Argument(help="A folder of samples; the shipped ones by default.")] = None,
 ) -> None:

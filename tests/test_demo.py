@@ -1,0 +1,306 @@
+"""The demo's page: whole, self-contained, and true to the pipeline's results."""
+
+import base64
+import io
+import json
+import re
+from html.parser import HTMLParser
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from PIL import Image
+from tiny_drive import DATE, write_tiny_drive
+from typer.testing import CliRunner
+
+from semgrid_edu.camera import Camera
+from semgrid_edu.cli import app
+from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.datasets.truth import grid_truth
+from semgrid_edu.demo import write_demo
+from semgrid_edu.demo.grids import arrows_path, grid_svg
+from semgrid_edu.demo.page import FrameView, Summary, page_html
+from semgrid_edu.demo.rasters import classes_uri, points_layer, raster_uri, scores_layer
+from semgrid_edu.demo.record import Record
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.frame import Frame
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import KITTI_14
+from semgrid_edu.networks import Architecture, build_net, save_net
+from semgrid_edu.pipeline import STAGES, run_pipeline
+
+VOID_TAGS = {"meta", "img", "input", "link", "br"}
+
+
+class Page(HTMLParser):
+    """Every element with its attributes; complains when tags don't match."""
+
+    def __init__(self, html):
+        super().__init__()
+        self.elements, self.text, self._open = [], {}, []
+        self.feed(html)
+        self.close()
+        assert self._open == []
+
+    def handle_starttag(self, tag, attributes):
+        self.elements.append((tag, dict(attributes)))
+        if tag not in VOID_TAGS:
+            self._open.append((tag, dict(attributes).get("id", tag)))
+
+    def handle_startendtag(self, tag, attributes):
+        self.elements.append((tag, dict(attributes)))
+
+    def handle_endtag(self, tag):
+        assert self._open.pop()[0] == tag
+
+    def handle_data(self, data):
+        if self._open:
+            key = self._open[-1][1]
+            self.text[key] = self.text.get(key, "") + data
+
+    def all(self, tag):
+        return [attributes for name, attributes in self.elements if name == tag]
+
+
+def decode(uri):
+    kind, content = re.fullmatch(r"data:image/(png|webp);base64,(.+)", uri).groups()
+    image = Image.open(io.BytesIO(base64.b64decode(content, validate=True)))
+    assert image.format == kind.upper()
+    return image
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    root = tmp_path_factory.mktemp("drive")
+    write_tiny_drive(root, labelled=(1, 2))
+    return KittiRawDrive(root, DATE, "0001")
+
+
+@pytest.fixture(scope="module")
+def weights(drive, tmp_path_factory):
+    path = tmp_path_factory.mktemp("weights") / "net.safetensors"
+    save_net(build_net(Architecture(), drive.camera, seed=3), path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def out(drive, weights, tmp_path_factory):
+    out = tmp_path_factory.mktemp("out") / "new"
+    assert write_demo(drive, weights, out) == out / "index.html"
+    return out
+
+
+@pytest.fixture(scope="module")
+def html(out):
+    return (out / "index.html").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def page(html):
+    return Page(html)
+
+
+@pytest.fixture(scope="module")
+def frames(page):
+    return json.loads(page.text["frames"])
+
+
+@pytest.fixture(scope="module")
+def results(drive, weights):
+    from semgrid_edu.networks import load_net
+
+    return list(run_pipeline(drive, load_net(weights, drive.camera)))
+
+
+@pytest.fixture(scope="module")
+def blank(weights, tmp_path_factory):
+    root = tmp_path_factory.mktemp("blank")
+    write_tiny_drive(root, n_frames=2, labelled=())
+    return write_demo(KittiRawDrive(root, DATE, "0001"), weights, root / "out").read_text(encoding="utf-8")
+
+
+class TestPage:
+    def test_refers_to_nothing_outside_itself(self, html, page):
+        assert not re.search(r"(https?:)?//[a-z]", re.sub(r"base64,[\w+/=]+", "", html), re.IGNORECASE)
+        sources = [a[k] for _, a in page.elements for k in ("src", "href", "data", "action") if a.get(k)]
+        assert all(source.startswith("data:image/") for source in sources)
+        assert "@import" not in html
+        assert "url(" not in html.replace("url(#tip)", "")
+
+    def test_holds_every_frame_and_the_slider_reaches_each(self, page, frames, drive):
+        (slider,) = page.all("input")
+        assert (slider["min"], slider["max"], len(frames)) == ("0", str(len(drive) - 1), len(drive))
+
+    def test_every_picture_decodes_to_its_size(self, frames, drive):
+        grid = GridSpec.compact().shape[::-1]
+        sizes = {"photo": drive.camera.size[::-1], "points": drive.camera.size[::-1], "scores": (320, 96)}
+        for frame in frames:
+            for name, uri in frame["images"].items():
+                assert decode(uri).size == sizes.get(name, grid)
+
+    def test_truth_is_shown_where_there_is_one(self, frames):
+        assert ["truth" in frame["images"] for frame in frames] == [False, True, True]
+
+    def test_every_picture_has_words_beside_and_behind_it(self, page, frames):
+        for frame in frames:
+            shown = set(frame["images"]) - {"photo"}
+            assert set(frame["texts"]) == shown
+            assert all(len(text) > 20 for text in frame["texts"].values())
+        captions = page.text["figcaption"]
+        assert len(page.all("figure")) == len(page.all("figcaption")) == 6
+        assert len(captions) > 200
+
+    def test_grids_hold_the_classes_of_the_pipeline(self, frames, results):
+        for frame, result in zip(frames, results, strict=True):
+            for name, grid in (("grid", result.grid), ("refined", result.refined)):
+                np.testing.assert_array_equal(np.array(decode(frame["images"][name])), grid.argmax(axis=0))
+
+    def test_first_frame_shows_without_the_script(self, page, frames):
+        shown = {a["data-image"]: a.get("src") or a.get("href") for _, a in page.elements if "data-image" in a}
+        first = frames[0]["images"]
+        assert {name: uri for name, uri in shown.items() if uri} == first
+
+    def test_script_finds_the_elements_that_it_changes(self, html, page):
+        script = html[html.rindex("<script>") :]
+        ids = {a["id"] for _, a in page.elements if "id" in a}
+        assert set(re.findall(r'getElementById\("(\w+)"\)', script)) <= ids
+        assert sum(a.get("class") == "arrows" for _, a in page.elements) == 1
+
+    def test_overview_is_a_picture(self, out):
+        with Image.open(out / "overview.png") as image:
+            assert min(image.size) > 500
+
+    def test_nothing_else_is_written(self, out):
+        assert {path.name for path in out.iterdir()} == {"index.html", "overview.png"}
+
+
+class TestMetrics:
+    def test_equal_those_counted_by_hand(self, results, html):
+        truths, guesses = [], {"network": [], "network + CRF": []}
+        for result in results[1:]:
+            truths.append(grid_truth(result.frame.labels, result.belief.probability, GridSpec.compact()).ravel())
+            guesses["network"].append(result.grid.argmax(axis=0).ravel())
+            guesses["network + CRF"].append(result.refined.argmax(axis=0).ravel())
+        truth = np.concatenate(truths)
+        for name, parts in guesses.items():
+            guess = np.concatenate(parts)
+            for cells, kept in (("all cells", truth >= 0), ("semantic cells", truth < 10)):
+                row = self.row(html, f"{cells}, {name}")
+                classes = np.unique(truth[kept])
+                hits = (truth == guess) & kept
+                recall = [hits[truth == c].sum() / (truth == c).sum() for c in classes]
+                union = [(kept & ((truth == c) | (guess == c))).sum() for c in classes]
+                share = [(truth == c).sum() / kept.sum() for c in classes]
+                iou = sum(s * hits[truth == c].sum() / u for s, c, u in zip(share, classes, union, strict=True))
+                expected = [100 * hits.sum() / kept.sum(), 100 * np.mean(recall), 100 * iou]
+                np.testing.assert_allclose(row, expected, atol=0.051)
+
+    @staticmethod
+    def row(html, name):
+        cells = re.search(rf"<tr><th>{re.escape(name)}</th>(.*?)</tr>", html)[1]
+        return [float(value) for value in re.findall(r"<td>([\d.]+)</td>", cells)]
+
+    def test_times_are_medians_of_the_stages(self):
+        record = Record(GridSpec.compact(), KITTI_14)
+        record._seconds = [[5.0] * 5, [0.01] * 5, [0.03, 0.01, 0.01, 0.01, 0.01]]
+        assert record.milliseconds() == pytest.approx(dict(zip(STAGES, [30, 10, 10, 10, 10], strict=True)))
+
+
+class TestWithoutTruth:
+    def test_says_what_to_expect_of_the_semantics(self, blank, html):
+        assert "Expect poor semantics" in blank
+        assert "Expect poor semantics" not in html
+
+    def test_shows_neither_truth_nor_metrics(self, blank):
+        page = Page(blank)
+        assert len(page.all("figure")) == 5
+        assert len(page.all("table")) == 1
+        assert "FmIoU" not in blank
+
+
+class TestPanels:
+    SPEC = GridSpec(x_min=0, x_max=20, y_min=-5, y_max=5, cell=1)
+    CAMERA = Camera(
+        np.array([[10.0, 0, 9.5], [0, 10, 4.5], [0, 0, 1]]),
+        np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]]),
+        size=(10, 20),
+    )
+
+    def test_an_arrow_runs_from_its_cell_to_half_a_second_later_left_is_left(self):
+        probability, velocity = np.zeros((4, 20, 10)), np.full((2, 20, 10), np.nan)
+        probability[2, 9, 2] = 1
+        velocity[:, 9, 2] = 4.0, 2.0
+        path = arrows_path(self.SPEC, probability, velocity)
+        assert path.startswith("M-2.50 -10.50L-3.50 -12.50M")
+
+    def test_lines_of_sight_follow_eq_1(self):
+        svg = grid_svg("grid", self.SPEC, self.CAMERA, "data:image/png;base64,", "")
+        left, right = re.findall(
+            r"M-?0\.00 -?0\.00L(-?[\d.]+) (-?[\d.]+)", re.search(r'class="sight" d="([^"]+)"', svg)[1]
+        )
+        assert float(left[0]) / float(left[1]) == pytest.approx(1, abs=1e-3)
+        assert float(right[0]) / float(right[1]) == pytest.approx(-1, abs=1e-3)
+
+    def test_returns_are_drawn_at_their_pixel_and_near_ones_cover_far_ones(self):
+        points = np.array([[20, 0.1, 0.1, 0], [5, 0, 0, 0], [20, -0.2, 0, 0], [-5, 0, 0, 0]], np.float32)
+        layer = points_layer(Frame(None, points, self.CAMERA, np.eye(4), 0.0), radius=1)
+        from semgrid_edu.plotting import depth_colours
+
+        assert layer.shape == (10, 20, 4)
+        near = layer[..., 3].astype(bool) & (layer[..., :3] == depth_colours(np.array(5.0))).all(axis=-1)
+        assert near.sum() == 9
+        assert {tuple(p) for p in np.argwhere(near)} == {(v, u) for v in (3, 4, 5) for u in (9, 10, 11)}
+
+    def test_the_surer_the_more_opaque(self):
+        scores = np.zeros((14, 1, 3), np.float32)
+        scores[3, 0, 1:] = 2.0, 2000.0
+        layer = scores_layer(scores, KITTI_14)
+        assert (np.diff(layer[0, :, 3].astype(int)) > 0).all()
+        np.testing.assert_array_equal(layer[0, 1:, :3], [KITTI_14.rgb[3]] * 2)
+
+    def test_class_pictures_have_the_colours_of_the_label_set(self):
+        labels = np.array([[0, 13, 255]], np.uint8)
+        painted = np.array(decode(classes_uri(labels, KITTI_14)).convert("RGB"))
+        np.testing.assert_array_equal(painted, KITTI_14.colours(labels))
+
+    def test_names_are_escaped_and_frames_cannot_end_the_script(self):
+        uri = raster_uri(np.zeros((2, 2, 3), np.uint8))
+        names = ("photo", "points", "scores", "occupancy", "grid", "refined")
+        texts = dict.fromkeys(names[1:], '</script><b a="')
+        view = FrameView("</script>", dict.fromkeys(names, uri), texts, "")
+        summary = Summary(
+            "<i>&", self.SPEC, self.CAMERA, (96, 320), [("<u>", (1, 2, 3))], {}, 0, dict.fromkeys(STAGES, 1)
+        )
+        html = page_html(summary, [view])
+        page = Page(html)
+        assert "<i>&" not in html
+        assert "<u>" not in html
+        assert json.loads(page.text["frames"])[0]["texts"] == texts
+
+
+class TestMistakes:
+    def test_an_unknown_drive_is_named(self, drive):
+        root = drive.folder.parents[1]
+        result = CliRunner().invoke(app, ["demo", "--kitti", str(root), "--date", DATE, "--drive", "0042"])
+        assert isinstance(result.exception, DataError)
+        assert "drive_0042" in str(result.exception)
+
+    def test_half_a_name_is_refused(self):
+        result = CliRunner().invoke(app, ["demo", "--date", DATE])
+        assert isinstance(result.exception, ArgumentError)
+
+    def test_a_failed_run_leaves_no_page(self, weights, tmp_path):
+        folder = write_tiny_drive(tmp_path)
+        (folder / "velodyne_points" / "data" / "0000000000.bin").write_bytes(b"\0" * 7)
+        with pytest.raises(DataError, match=r"0000000000\.bin"):
+            write_demo(KittiRawDrive(tmp_path, DATE, "0001"), weights, tmp_path / "out")
+        assert not (tmp_path / "out").exists()
+
+
+def test_a_long_drive_is_shown_evenly_spaced_and_counted_whole(results):
+    record = Record(GridSpec.compact(), KITTI_14, every=2)
+    for result in results:
+        record.add(result)
+    assert [view.clock for view in record.views] == ["frame 0, 0.0 s", "frame 2, 0.2 s"]
+    assert record.labelled == 2
+    assert SimpleNamespace(**record.metrics()).FmIoU.keys() == record.metrics()["pixel accuracy"].keys()
