@@ -6,7 +6,7 @@ sliced back at the points. A corner is the vector of its d + 1 integer coordinat
 remainder modulo d + 1; direction j adds one to all coordinates but takes d from coordinate j.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit, prange
@@ -28,22 +28,24 @@ class PermutohedralLattice:
     ----------
     corners : (N, d + 1) int32
         The lattice vertices around each point.
-    splat, slice_ : (N, d + 1) float32
-        What a point gives to, and takes from, each of its corners.
+    slices : (N, d + 1) float32
+        What a point takes from each of its corners.
     neighbours : (d + 1, 2, M) int32
         The vertex one step forth and back along each direction; M where there is none.
-    starts, members : (M + 1,), (N (d + 1),) int32
-        The corners sorted by vertex: vertex v is corner `members[starts[v]:starts[v + 1]]`, counted through `corners`.
+    starts : (M + 1,) int32
+        Where each vertex's share of the next two begins.
+    points, splats : (N (d + 1),) int32, float32
+        The points around each vertex, vertex after vertex, and what they give to it.
     diagonal : (N,) float32
         How much of its own value each point gets back: k(f_i, f_i) as this lattice has it.
     """
 
     corners: NDArray[np.int32]
-    splat: NDArray[np.float32]
-    slice_: NDArray[np.float32]
+    slices: NDArray[np.float32]
     neighbours: NDArray[np.int32]
     starts: NDArray[np.int32]
-    members: NDArray[np.int32]
+    points: NDArray[np.int32]
+    splats: NDArray[np.float32]
     diagonal: NDArray[np.float32]
 
     @classmethod
@@ -75,11 +77,17 @@ class PermutohedralLattice:
         origins, ranks, weights = _enclosing_simplices(elevated)
         corners, keys, slots = _number_vertices(origins, ranks)
         neighbours = _find_neighbours(keys, slots)
-        diagonal = _self_responses(corners, ranks, weights, neighbours)
         starts, members = _sort_by_vertex(corners.ravel(), len(keys))
         peak = _peak(dimensions)
-        splat = weights.astype(np.float32)
-        return cls(corners, splat, splat * np.float32(peak), neighbours, starts, members, np.float32(peak) * diagonal)
+        return cls(
+            corners=corners,
+            slices=(peak * weights).astype(np.float32),
+            neighbours=neighbours,
+            starts=starts,
+            points=members // np.int32(dimensions + 1),
+            splats=weights.ravel()[members].astype(np.float32),
+            diagonal=np.float32(peak) * _self_responses(corners, ranks, weights, neighbours),
+        )
 
     def scaled(self, scale: NDArray) -> "PermutohedralLattice":
         """Fold a factor of each point into the kernel: diag(scale) K diag(scale).
@@ -94,15 +102,12 @@ class PermutohedralLattice:
         PermutohedralLattice
             The same lattice with other weights.
         """
-        column = scale.astype(np.float32)[:, None]
-        return PermutohedralLattice(
-            self.corners,
-            self.splat * column,
-            self.slice_ * column,
-            self.neighbours,
-            self.starts,
-            self.members,
-            self.diagonal * column[:, 0] ** 2,
+        scale = scale.astype(np.float32)
+        return replace(
+            self,
+            slices=self.slices * scale[:, None],
+            splats=self.splats * scale[self.points],
+            diagonal=self.diagonal * scale**2,
         )
 
     def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -118,10 +123,10 @@ class PermutohedralLattice:
         (N, K) float32
             sum_j k(f_i, f_j) values_j, the point itself included.
         """
-        blurred = _splat(values, self.splat.ravel(), self.starts, self.members, self.corners.shape[1])
+        blurred = _splat(values, self.starts, self.points, self.splats)
         for forth, back in self.neighbours:
             blurred = _blur(blurred, forth, back)
-        return _slice(blurred, self.corners, self.slice_)
+        return _slice(blurred, self.corners, self.slices)
 
 
 def _elevation(d: int) -> NDArray[np.float64]:
@@ -296,15 +301,14 @@ def _sort_by_vertex(vertices, n_vertices):
 
 
 @njit(cache=True, parallel=True, fastmath=True)
-def _splat(values, weights, starts, members, corners_per_point):
+def _splat(values, starts, points, weights):
     """Gather, at each vertex, what its points give: (M + 1, K), the last row zero for neighbours that aren't there."""
     n_vertices = len(starts) - 1
     out = np.zeros((n_vertices + 1, values.shape[1]), np.float32)
     for v in prange(n_vertices):
-        for corner in members[starts[v] : starts[v + 1]]:
-            point = corner // corners_per_point
+        for i in range(starts[v], starts[v + 1]):
             for k in range(values.shape[1]):
-                out[v, k] += weights[corner] * values[point, k]
+                out[v, k] += weights[i] * values[points[i], k]
     return out
 
 

@@ -1,4 +1,4 @@
-"""The spatial kernel of eq. (4), exact and cheap: on a grid a Gaussian of place is one of rows times one of columns."""
+"""The spatial kernel of eq. (4), exact and cheap: on a grid, one convolution along rows and one along columns."""
 
 from dataclasses import dataclass
 
@@ -9,27 +9,25 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class SeparableGaussian:
-    """Sums over all cells of a grid, weighed by exp(-|c_i - c_j|^2 / (2 sigma^2)), as two banded matrix products.
+    """Sums over all cells of a grid, weighed by exp(-|c_i - c_j|^2 / (2 sigma^2)): a convolution along each axis.
 
     Parameters
     ----------
-    rows : (H, H) float32
-        The kernel between rows.
-    columns : (W, W) float32
-        The kernel between columns.
-    reach : int
-        Cells farther apart, 5 sigma, are left out: less than a millionth of the weight.
+    taps : (R + 1,) float32
+        The Gaussian at distances 0 to R cells. R is 5 sigma; beyond lies less than a millionth of the weight.
+    row_scale, column_scale : (H,), (W,) float32
+        Normalisation and weight: k_ij is the Gaussian times both scales of cell i and both of cell j.
     """
 
-    rows: NDArray[np.float32]
-    columns: NDArray[np.float32]
-    reach: int
+    taps: NDArray[np.float32]
+    row_scale: NDArray[np.float32]
+    column_scale: NDArray[np.float32]
 
     @classmethod
     def build(cls, shape: tuple[int, int], sigma: float, weight: float, normalization: str) -> "SeparableGaussian":
-        """Compute the two matrices, with weight and normalisation folded in.
+        """Compute the taps, and the scales that fold weight and normalisation in.
 
-        The row sums of the whole kernel are products of the row sums of the two, so each is normalised by itself.
+        The row sums of the whole kernel are products of those of the two axes, so each is normalised by itself.
 
         Parameters
         ----------
@@ -47,13 +45,18 @@ class SeparableGaussian:
         SeparableGaussian
             Ready to filter.
         """
-        rows, columns = (_gaussian(size, sigma, normalization) for size in shape)
-        return cls((weight * rows).astype(np.float32), columns.astype(np.float32), int(np.ceil(5 * sigma)))
+        reach = int(min(np.ceil(5 * sigma), max(shape) - 1))
+        taps = np.exp(-0.5 * (np.arange(reach + 1) / sigma) ** 2)
+        row_scale, column_scale = np.ones(shape[0]), np.ones(shape[1])
+        if normalization == "symmetric":
+            row_scale, column_scale = (1 / np.sqrt(_row_sums(size, sigma)) for size in shape)
+        row_scale = row_scale * np.sqrt(weight)
+        return cls(taps.astype(np.float32), row_scale.astype(np.float32), column_scale.astype(np.float32))
 
     @property
     def diagonal(self) -> NDArray[np.float32]:
         """What each cell gets back of its own value, (H W,)."""
-        return np.outer(np.diag(self.rows), np.diag(self.columns)).ravel()
+        return np.outer(self.row_scale**2, self.column_scale**2).ravel()
 
     def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """Filter values on the grid.
@@ -68,34 +71,38 @@ class SeparableGaussian:
         (H W, K) float32
             sum_j k_ij values_j, the cell itself included.
         """
-        grid = values.reshape(len(self.rows), len(self.columns), -1)
-        return _filter(self.rows, self.columns, self.reach, grid).reshape(values.shape)
+        grid = values.reshape(len(self.row_scale), -1)
+        scale = np.repeat(self.column_scale, values.shape[1])
+        return _convolve(grid, values.shape[1], self.taps, self.row_scale, scale).reshape(values.shape)
 
 
-def _gaussian(size: int, sigma: float, normalization: str) -> NDArray[np.float64]:
-    """Return the (size, size) kernel of one axis, normalised."""
+def _row_sums(size: int, sigma: float) -> NDArray[np.float64]:
+    """Return the row sums of the Gaussian between all cells of one axis."""
     place = np.arange(size) / sigma
-    kernel = np.exp(-0.5 * np.subtract.outer(place, place) ** 2)
-    if normalization == "symmetric":
-        root = np.sqrt(kernel.sum(axis=1))
-        kernel /= np.outer(root, root)
-    return kernel
+    return np.exp(-0.5 * np.subtract.outer(place, place) ** 2).sum(axis=1)
 
 
-# A loop, though BLAS has matrix products: its threads and numba's would fight for the same cores.
+# Loops, though BLAS has matrix products: its threads and numba's would fight for the same cores.
 @njit(cache=True, parallel=True, fastmath=True)
-def _filter(rows, columns, reach, values):
-    """Multiply (H, W, K) values by both matrices, row by row of the result."""
-    height, width, lanes = values.shape
-    out = np.zeros_like(values)
+def _convolve(values, lanes, taps, row_scale, column_scale):
+    """Convolve (H, W K) values, K lanes a cell, along both axes; the scale of columns is W K long too."""
+    height, length = values.shape
+    reach = len(taps) - 1
+    out = np.empty_like(values)
     for r in prange(height):
-        line = np.zeros((width, lanes), np.float32)
+        padded = np.zeros(length + 2 * reach * lanes, np.float32)  # zeros beyond the ends of the row
+        row = padded[reach * lanes : reach * lanes + length]
         for s in range(max(r - reach, 0), min(r + reach + 1, height)):
-            for c in range(width):
-                for k in range(lanes):
-                    line[c, k] += rows[r, s] * values[s, c, k]
-        for c in range(width):
-            for s in range(max(c - reach, 0), min(c + reach + 1, width)):
-                for k in range(lanes):
-                    out[r, c, k] += columns[c, s] * line[s, k]
+            weight = taps[abs(r - s)] * row_scale[s]
+            for n in range(length):
+                row[n] += weight * values[s, n]
+        for n in range(length):
+            row[n] *= row_scale[r] * column_scale[n]
+            out[r, n] = taps[0] * row[n]
+        for t in range(1, reach + 1):
+            left, right = padded[(reach - t) * lanes :], padded[(reach + t) * lanes :]
+            for n in range(length):
+                out[r, n] += taps[t] * (left[n] + right[n])
+        for n in range(length):
+            out[r, n] *= column_scale[n]
     return out
