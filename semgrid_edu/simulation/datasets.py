@@ -1,0 +1,195 @@
+"""The three data sets of section 4 in simulated form, and a sample drive: made in parallel, resumed when interrupted."""
+
+import json
+import platform
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from functools import partial
+from importlib.metadata import version
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+from tqdm.auto import tqdm
+
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.files import write_json
+from semgrid_edu.labels import LABEL_SETS
+from semgrid_edu.simulation.drive import SimulatedDrive
+from semgrid_edu.simulation.rig import Rig
+from semgrid_edu.simulation.sample import SAMPLE_WISHES
+from semgrid_edu.simulation.writer import (
+    DATE,
+    depth_as_points,
+    drive_folder,
+    lidar_points,
+    write_calibration,
+    write_drive,
+)
+
+FORMAT = 1
+"""Goes up when the simulator changes what a seed gives, so that old and new drives don't mix in one folder."""
+
+
+@dataclass(frozen=True)
+class Route:
+    """One drive of a data set.
+
+    Parameters
+    ----------
+    split : str
+    n_frames : int
+    all_labelled : bool
+        Whether all frames have labels; else the last one alone.
+    """
+
+    split: str
+    n_frames: int
+    all_labelled: bool
+
+    @property
+    def labelled(self) -> range:
+        """The frames that have labels."""
+        return range(0 if self.all_labelled else self.n_frames - 1, self.n_frames)
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What a data set consists of; drives are numbered from 0001 in this order.
+
+    Parameters
+    ----------
+    name : str
+    label_set : str
+    routes : tuple of Route
+    dense : bool
+        Whether points come from the depth image, thinned, instead of the LIDAR.
+    """
+
+    name: str
+    label_set: str
+    routes: tuple[Route, ...]
+    dense: bool = False
+
+
+RECIPES = {
+    recipe.name: recipe
+    for recipe in (
+        Recipe("minikitti", "KITTI-14", (Route("train", 10, False),) * 142 + (Route("test", 10, False),) * 110),
+        Recipe(
+            "minichroma",
+            "KITTI-14",
+            tuple(Route("train", n, True) for n in (49, 49, 48)) + (Route("test", 65, True),) * 2,
+        ),
+        Recipe("minisynthia", "SYNTHIA-10", (Route("train", 60, True), Route("test", 60, True)), dense=True),
+        Recipe("sample", "KITTI-14", (Route("drive", 20, True),)),
+    )
+}
+"""Frames and splits as in the paper: KITTI 142 + 110 labelled frames, INRIA-Chroma 146 + 130 in 3 + 2 routes."""
+
+DATA_SETS = ("minikitti", "minichroma", "minisynthia")
+"""What `semgrid-edu data make all` makes."""
+
+
+def make(name: str, folder: Path, seed: int = 0, workers: int = 2) -> Path:
+    """Make a data set, or finish one that was interrupted.
+
+    The same name and seed give the same bytes, whatever the number of workers and of interruptions.
+
+    Parameters
+    ----------
+    name : str
+        One of `RECIPES`.
+    folder : path-like
+        Where the data set's own folder, `folder`/`name`, goes.
+    seed : int
+        Not negative.
+    workers : int
+        Processes that share the work.
+
+    Returns
+    -------
+    Path
+        The data set's folder.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such data set.
+    DataError
+        When the folder holds something else, or the same with another seed or an older version.
+    """
+    if name not in RECIPES:
+        raise ArgumentError("name", f"one of {', '.join(RECIPES)}", repr(name))
+    if seed < 0:
+        raise ArgumentError("seed", "a whole number from 0 up", seed)
+    recipe, root = RECIPES[name], Path(folder) / name
+    _claim(root, {"name": name, "seed": seed, "format": FORMAT})
+    write_calibration(root, Rig())
+    drives = [f"{k + 1:04d}" for k in range(len(recipe.routes))]
+    missing = [k for k, drive in enumerate(drives) if not drive_folder(root, drive).exists()]
+    with tqdm(total=len(drives), initial=len(drives) - len(missing), desc=name, unit="drive") as bar:
+        for _ in _run(partial(_make_drive, name, root, seed), missing, workers):
+            bar.update()
+    write_json(root / "dataset.json", _index(recipe, drives, seed))
+    return root
+
+
+def _claim(root: Path, marker: dict) -> None:
+    """Make the folder ours, or refuse it when it is somebody else's."""
+    path = root / "simulation.json"
+    if path.exists():
+        found = json.loads(path.read_text())
+        if found != marker:
+            raise DataError(path, f"data made with {marker}", f"{found}: choose another folder or remove this one")
+    elif root.exists() and any(root.iterdir()):
+        raise DataError(root, "an empty folder, or one that an earlier run began", "other files")
+    else:
+        write_json(path, marker)
+
+
+def _run(work: partial, items: list[int], workers: int) -> Iterator[int]:
+    """Do the work in processes (in this one when one is enough), and tell of each item done."""
+    if workers == 1 or len(items) < 2:
+        for item in items:
+            work(item)
+            yield item
+        return
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        try:
+            for future in as_completed([pool.submit(work, item) for item in items]):
+                future.result()
+                yield 1
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+def _make_drive(name: str, root: Path, seed: int, index: int) -> None:
+    """Simulate and write one drive; its random numbers depend on data set, seed and index alone."""
+    recipe = RECIPES[name]
+    route = recipe.routes[index]
+    entropy = [seed, FORMAT, list(RECIPES).index(name)]
+    own_seed = np.random.SeedSequence(entropy, spawn_key=(index,))
+    wishes = SAMPLE_WISHES if name == "sample" else {"speed": 9.0 + index % 3} if route.all_labelled else {}
+    simulated = SimulatedDrive(own_seed, route.n_frames, **wishes)
+    points = depth_as_points if recipe.dense else lidar_points
+    write_drive(root, f"{index + 1:04d}", simulated, route.labelled, LABEL_SETS[recipe.label_set], points)
+
+
+def _index(recipe: Recipe, drives: list[str], seed: int) -> dict:
+    """Return what dataset.json holds."""
+    splits: dict[str, list] = {}
+    for drive, route in zip(drives, recipe.routes, strict=True):
+        frames = [{"date": DATE, "drive": drive, "frame": k} for k in route.labelled]
+        splits.setdefault(route.split, []).extend(frames)
+    packages = ("semgrid_edu", "numpy", "numba", "embreex", "trimesh", "pillow")
+    return {
+        "name": recipe.name,
+        "label_set": recipe.label_set,
+        "seed": seed,
+        "command": f"semgrid-edu data make {recipe.name} DIR --seed {seed}",
+        "versions": {"python": platform.python_version()} | {p: version(p) for p in packages},
+        "splits": splits,
+    }

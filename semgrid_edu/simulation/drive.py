@@ -1,0 +1,189 @@
+"""One simulated drive: a world, the recording car's way through it, and every frame that its sensors take."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, transform_points
+from semgrid_edu.frame import LABEL_GRID
+from semgrid_edu.simulation.footprints import table
+from semgrid_edu.simulation.motion import Ego, Pace, Path
+from semgrid_edu.simulation.oxts import Geodesy
+from semgrid_edu.simulation.plan import Plan, draw_plan
+from semgrid_edu.simulation.raycast import Instant, Scene
+from semgrid_edu.simulation.rig import Rig
+from semgrid_edu.simulation.scenery import build_scenery
+from semgrid_edu.simulation.sensors import Picture, scan, take_picture
+from semgrid_edu.simulation.traffic import Actor, Traffic, fill_street
+from semgrid_edu.simulation.truth import birdseye_kinds, visible_cells, world_cells
+
+PERIOD = 0.1
+"""Seconds between frames: KITTI's LIDAR turns ten times a second."""
+_VIEW = 110.0
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """The bird's-eye truth of a frame: `kinds` (710, 310) uint8, members of `Kind`, and `visible` (710, 310) bool."""
+
+    kinds: NDArray[np.uint8]
+    visible: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedFrame:
+    """One instant of a simulated drive.
+
+    Parameters
+    ----------
+    time : float
+        Seconds since the drive began.
+    T_world_from_lidar : (4, 4) float64
+    picture : Picture
+    points : (N, 4) float32
+        As in `Frame`.
+    truth : Truth or None
+        None where nobody asked for it.
+    objects : list of dict
+        Cars, pedestrians and bicycles in the bird's-eye grid, in the grid frame.
+    """
+
+    time: float
+    T_world_from_lidar: NDArray[np.float64]
+    picture: Picture
+    points: NDArray[np.float32]
+    truth: Truth | None
+    objects: list[dict]
+
+
+class SimulatedDrive:
+    """A drive through a world of its own, the same for the same seed.
+
+    Parameters
+    ----------
+    seed : int or numpy.random.SeedSequence
+    n_frames : int
+        Frames, ten a second.
+    rig : Rig
+    **wishes
+        For `draw_plan`; `speed` (m/s) sets the mean speed of the recording car, `ego_lane` its lane (0: beside the centre
+        line), `cast` a function of `Traffic` that replaces the usual `fill_street`.
+    """
+
+    def __init__(self, seed, n_frames: int, rig: Rig | None = None, **wishes) -> None:
+        self.rng = np.random.default_rng(seed)
+        self.n_frames, self.rig = n_frames, rig or Rig()
+        duration = (n_frames - 1) * PERIOD
+        wishes = dict(wishes)
+        cast, speed, lane = wishes.pop("cast", fill_street), wishes.pop("speed", None), wishes.pop("ego_lane", None)
+        pace = _draw_pace(self.rng, speed)
+        self.plan = draw_plan(self.rng, pace.distance(duration), **wishes)
+        self.ego = _draw_ego(self.rng, self.plan, pace, lane)
+        self.geodesy = Geodesy(
+            49.0 + float(self.rng.uniform(0, 0.05)),
+            8.4 + float(self.rng.uniform(0, 0.05)),
+            114.0,
+            float(self.rng.uniform(-3.1, 3.1)),
+        )
+        builder = build_scenery(self.plan, self.rng)
+        traffic = Traffic(builder, self.plan, self.ego.path, duration)
+        cast(traffic)
+        self.moving: list[Actor] = traffic.moving
+        self.parked: list[Actor] = traffic.parked
+        self.static = Scene.of(builder.shapes, builder.instances)
+        self.footprints = table(builder.footprints)
+        self.sensor_seed = self.rng.bit_generator.seed_seq.spawn(1)[0]
+
+    def pose(self, t: float) -> NDArray[np.float64]:
+        """Return T_world_from_lidar (4, 4) at t seconds."""
+        return self.ego.T_world_from_lidar(t)
+
+    def T_world_from_imu(self, t: float) -> NDArray[np.float64]:
+        """Return the IMU's pose (4, 4) at t seconds."""
+        return self.pose(t) @ self.rig.T_lidar_from_imu
+
+    def instant(self, t: float) -> Instant:
+        """Return the world at t seconds, ready for rays."""
+        road, eye = self.plan.road, self.pose(t)[:2, 3]
+        near = [a for a in self.moving if np.hypot(*(a.path.pose(road, t)[0][:2] - eye)) < _VIEW]
+        if not near:
+            return Instant(self.static, None, np.empty((0, 4)))
+        shapes = [a.shape(road, t) for a in near]
+        boxes = np.array([[shape.vertices.min(axis=0), shape.vertices.max(axis=0)] for shape in shapes], np.float64)
+        radii = np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) / 2
+        spheres = np.column_stack([boxes.mean(axis=1), radii])
+        return Instant(self.static, Scene.of(shapes, [a.instance for a in near]), spheres)
+
+    def objects(self, t: float) -> list[dict]:
+        """Return cars, pedestrians and bicycles that stand in the bird's-eye grid at t seconds."""
+        T_lidar_from_world = np.linalg.inv(self.pose(t))
+        road, found = self.plan.road, []
+        for actor in self.parked + self.moving:
+            position, yaw = actor.path.pose(road, t)
+            centre = transform_points(T_lidar_from_world, position + [0, 0, actor.size[2] / 2]) + [
+                0,
+                0,
+                KITTI_LIDAR_HEIGHT,
+            ]
+            if not LABEL_GRID.cells(centre[None])[2][0]:
+                continue
+            velocity = T_lidar_from_world[:3, :2] @ actor.path.velocity(road, t)
+            heading = T_lidar_from_world[:3, :2] @ [np.cos(yaw), np.sin(yaw)]
+            found.append(
+                {
+                    "id": actor.instance,
+                    "class": actor.kind.name.lower(),
+                    "centre": [round(float(x), 3) for x in centre],
+                    "size": [round(float(x), 3) for x in actor.size],
+                    "yaw": round(float(np.arctan2(heading[1], heading[0])), 4),
+                    "velocity": [round(float(x), 3) for x in velocity[:2]],
+                    "moving": bool(np.hypot(*velocity[:2]) > 0.05),
+                }
+            )
+        return found
+
+    def truth(self, t: float, picture: Picture) -> Truth:
+        """Return the bird's-eye truth at t seconds, of which `picture` was taken."""
+        road, pose = self.plan.road, self.pose(t)
+        cells = world_cells(pose, self.rig)
+        moving = table([a.footprint(road, t) for a in self.moving])
+        footprints = np.concatenate([self.footprints, moving])
+        kinds, which = birdseye_kinds(cells, footprints, road)
+        return Truth(kinds, visible_cells(cells, kinds, which, footprints, road, picture, pose, self.rig.camera))
+
+    def frame(self, index: int, labelled: bool) -> SimulatedFrame:
+        """Take one frame; every frame has its own noise, whichever frames were taken before."""
+        rng = np.random.default_rng(
+            np.random.SeedSequence(self.sensor_seed.entropy, spawn_key=(*self.sensor_seed.spawn_key, index))
+        )
+        t, road = index * PERIOD, self.plan.road
+        instant, pose = self.instant(t), self.pose(t)
+        picture = take_picture(instant, pose, self.rig, road, self.plan.light, rng)
+        points = scan(instant, pose, self.rig.lidar, road, rng)
+        truth = self.truth(t, picture) if labelled else None
+        return SimulatedFrame(t, pose, picture, points, truth, self.objects(t))
+
+    def frames(self, labelled: set[int]) -> Iterator[SimulatedFrame]:
+        """Take all frames, with bird's-eye truth for those in `labelled`."""
+        return (self.frame(k, k in labelled) for k in range(self.n_frames))
+
+
+def _draw_pace(rng: np.random.Generator, speed: float | None) -> Pace:
+    """Draw how fast the recording car drives: 5 to 14 m/s, now and then 0."""
+    drawn = 0.0 if rng.random() < 0.1 else float(rng.uniform(5, 14))
+    mean = drawn if speed is None else speed
+    swing, phase = float(rng.uniform(0.0, 0.12)) * mean, float(rng.uniform(0, 6.28))
+    return Pace(mean, swing, 0.8, phase)
+
+
+def _draw_ego(rng: np.random.Generator, plan: Plan, pace: Pace, lane: int | None) -> Ego:
+    """Draw the recording car's lane (0: beside the centre line), the outer one more often, and how it sways."""
+    road = plan.road
+    drawn = road.lanes_right - 1 if rng.random() < 0.65 else 0
+    lane = drawn if lane is None else lane
+    d = -(lane + 0.5) * road.lane + float(rng.normal(0, 0.1))
+    sway, phase = float(rng.uniform(0.02, 0.1)), float(rng.uniform(0, 6.28))
+    roll, pitch = (float(x) for x in np.radians(rng.uniform(0.05, 0.2, 2)))
+    return Ego(road, Path(0.0, d, 1.0, 0.0, pace), sway, roll, pitch, phase)

@@ -1,0 +1,111 @@
+"""What stands where, seen from above: convex outlines, and their stamp on the bird's-eye grid."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+ROUND, ROUNDED, SQUARE = 2.0, 6.0, 200.0
+"""Exponents of outlines: an ellipse, a car's plan, a rectangle."""
+
+
+class Footprint(NamedTuple):
+    """The superellipse |x/a|^p + |y/b|^p <= 1 that something covers below 2.5 m.
+
+    Parameters
+    ----------
+    x, y : float
+        Its centre in the world, metres.
+    half_length, half_width : float
+        a and b, metres.
+    yaw : float
+        Direction of its length in the world, rad.
+    exponent : float
+        p: `ROUND`, `ROUNDED` or `SQUARE`.
+    kind : int
+        A `Kind`.
+    instance : int
+        Number of the object; 0 for what has none.
+    top : float
+        How high it stands, metres, at most 2.5.
+    """
+
+    x: float
+    y: float
+    half_length: float
+    half_width: float
+    yaw: float
+    exponent: float
+    kind: int
+    instance: int
+    top: float
+
+
+@njit(cache=True)
+def _inside(f, x, y):
+    """Whether the point (x, y) lies in the footprint f (a row of numbers)."""
+    c, s = np.cos(f[4]), np.sin(f[4])
+    u = abs(c * (x - f[0]) + s * (y - f[1])) / f[2]
+    v = abs(c * (y - f[1]) - s * (x - f[0])) / f[3]
+    if u > 1.0 or v > 1.0:
+        return False
+    return u ** f[5] + v ** f[5] <= 1.0
+
+
+@njit(cache=True)
+def stamp(footprints: NDArray, xy: NDArray, cell: float, which: NDArray) -> None:
+    """Write into `which` (H, W) int32 the index of the footprint that covers each cell centre `xy` (H, W, 2).
+
+    Cells that nothing covers keep their value; of several footprints the last one wins. `xy` is a rigidly moved
+    regular grid with sides of `cell` metres: rows go against its first axis, columns against its second one.
+    """
+    height, width = which.shape
+    ex = (xy[0, 0] - xy[1, 0]) / cell
+    ey = (xy[0, 0] - xy[0, 1]) / cell
+    origin = xy[0, 0]
+    for k in range(len(footprints)):
+        f = footprints[k]
+        dx, dy = f[0] - origin[0], f[1] - origin[1]
+        row = -(dx * ex[0] + dy * ex[1]) / cell
+        col = -(dx * ey[0] + dy * ey[1]) / cell
+        reach = np.hypot(f[2], f[3]) / cell + 1.0
+        for r in range(max(int(row - reach), 0), min(int(row + reach) + 2, height)):
+            for c in range(max(int(col - reach), 0), min(int(col + reach) + 2, width)):
+                if _inside(f, xy[r, c, 0], xy[r, c, 1]):
+                    which[r, c] = k
+
+
+def table(footprints: list[Footprint]) -> NDArray[np.float64]:
+    """Return footprints as rows of numbers, for `stamp`."""
+    return np.array(footprints, dtype=np.float64).reshape(-1, len(Footprint._fields))
+
+
+def outline(f: Footprint, margin: float = 0.0) -> NDArray[np.float64]:
+    """Return points on the outline of a footprint and its centre, widened by `margin` metres; (25, 2)."""
+    angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    c, s = np.cos(angle), np.sin(angle)
+    radius = (np.abs(c) ** f.exponent + np.abs(s) ** f.exponent) ** (-1 / f.exponent)
+    local = np.stack([(f.half_length + margin) * radius * c, (f.half_width + margin) * radius * s], axis=1)
+    turn = np.array([[np.cos(f.yaw), np.sin(f.yaw)], [-np.sin(f.yaw), np.cos(f.yaw)]])
+    return np.concatenate([local, [[0, 0]]]) @ turn + [f.x, f.y]
+
+
+def collides(f: Footprint, others: NDArray, margin: float = 0.0) -> bool:
+    """Return whether a footprint, widened by `margin` metres, meets one of a `table` of others."""
+    if len(others) == 0:
+        return False
+    reach = np.hypot(others[:, 2], others[:, 3]) + np.hypot(f.half_length, f.half_width) + margin
+    near = others[np.hypot(others[:, 0] - f.x, others[:, 1] - f.y) < reach]
+    mine = table([f._replace(half_length=f.half_length + margin, half_width=f.half_width + margin)])[0]
+    points = outline(f, margin)
+    return any(_any_inside(other, points) or _any_inside(mine, outline(Footprint(*other))) for other in near)
+
+
+@njit(cache=True)
+def _any_inside(f, points):
+    """Whether any of the points lies in the footprint."""
+    for i in range(len(points)):
+        if _inside(f, points[i, 0], points[i, 1]):
+            return True
+    return False

@@ -1,0 +1,118 @@
+"""Weather and light of a drive, and the textures that make surfaces look like what they are."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+TILE = 512
+"""Side of the repeating noise texture, texels."""
+
+
+@dataclass(frozen=True)
+class Light:
+    """Sun, sky and camera exposure.
+
+    Parameters
+    ----------
+    sun : (float, float, float)
+        Unit vector to the sun.
+    sun_colour, sky_colour, horizon_colour : (float, float, float)
+        Linear radiance of the sun's light on a surface that faces it, of the zenith and of the horizon.
+    softness : float
+        Spread of the sun's direction, rad: 0.01 for a clear sky, 0.5 under clouds.
+    clouds : float
+        Share of the sky that clouds cover.
+    haze : float
+        Extinction, 1/m: contrast falls to 37 % over 1/haze.
+    exposure : float
+        Gain of the camera.
+    balance : (float, float, float)
+        White balance error of the camera.
+    phase : float
+        Shifts the clouds, so that every drive has others.
+    """
+
+    sun: tuple[float, float, float]
+    sun_colour: tuple[float, float, float]
+    sky_colour: tuple[float, float, float]
+    horizon_colour: tuple[float, float, float]
+    softness: float
+    clouds: float
+    haze: float
+    exposure: float
+    balance: tuple[float, float, float]
+    phase: float
+
+    @classmethod
+    def random(cls, rng: np.random.Generator) -> "Light":
+        """Draw a day: clear, hazy, low sun or overcast."""
+        overcast = rng.random() < 0.3
+        elevation, azimuth = np.radians(rng.uniform(18, 62)), rng.uniform(0, 2 * np.pi)
+        low = float(np.clip((np.radians(35) - elevation) / np.radians(20), 0, 1))
+        sun = (np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation))
+        warm = np.array([1.0, 0.95 - 0.12 * low, 0.86 - 0.3 * low])
+        if overcast:
+            strength, sky, horizon = 0.25, np.array([0.62, 0.66, 0.72]), np.array([0.78, 0.80, 0.83])
+        else:
+            strength, sky = rng.uniform(1.3, 1.8), np.array([0.16, 0.30, 0.62]) * rng.uniform(0.8, 1.2)
+            horizon = np.array([0.66, 0.75, 0.86]) * (1 - 0.25 * low) + np.array([0.22, 0.10, 0.0]) * low
+        return cls(
+            sun=tuple(map(float, sun)),
+            sun_colour=tuple(map(float, strength * warm)),
+            sky_colour=tuple(map(float, sky)),
+            horizon_colour=tuple(map(float, horizon)),
+            softness=0.45 if overcast else 0.012,
+            clouds=float(rng.uniform(0.75, 1.0) if overcast else rng.uniform(0.0, 0.6)),
+            haze=float(rng.uniform(0.0008, 0.004)),
+            exposure=float(rng.uniform(0.85, 1.2) * (1.5 if overcast else 1.15)),
+            balance=tuple(map(float, 1 + rng.normal(0, 0.025, 3))),
+            phase=float(rng.uniform(0, 100)),
+        )
+
+
+@cache
+def noise_tile() -> NDArray[np.float32]:
+    """Return a repeating texture of fractal noise, (TILE, TILE) float32 in 0..1, uniformly distributed."""
+    rng = np.random.default_rng(81)
+    frequency = np.fft.fftfreq(TILE)
+    radius = np.hypot(frequency[:, None], frequency[None, :])
+    amplitude = 1 / np.maximum(radius, 2 / TILE) ** 1.1
+    amplitude[0, 0] = 0
+    spectrum = np.fft.fft2(rng.normal(0, 1, (TILE, TILE))) * amplitude
+    rank = np.real(np.fft.ifft2(spectrum)).ravel().argsort().argsort()
+    return (rank.reshape(TILE, TILE) / TILE**2).astype(np.float32)
+
+
+@njit(cache=True, fastmath=True, inline="always")
+def texture(tile, u, v):
+    """Return the noise at (u, v), in texels, bilinear and repeating."""
+    i, j = np.floor(u), np.floor(v)
+    a, b = np.float32(u - i), np.float32(v - j)
+    i0, j0 = int(i) & 511, int(j) & 511
+    i1, j1 = (i0 + 1) & 511, (j0 + 1) & 511
+    top = tile[i0, j0] * (1 - b) + tile[i0, j1] * b
+    bottom = tile[i1, j0] * (1 - b) + tile[i1, j1] * b
+    return top * (1 - a) + bottom * a
+
+
+@njit(cache=True, fastmath=True)
+def sky(tile, x, y, z, sun, sun_colour, zenith, horizon, clouds, phase, out):
+    """Write into `out` the radiance that comes from direction (x, y, z): gradient, glow of the sun, clouds."""
+    up = max(z, 0.0)
+    mix = (1.0 - up) ** 5
+    glow = max(x * sun[0] + y * sun[1] + z * sun[2], 0.0)
+    halo = 0.25 * glow**8 + 0.6 * glow**200
+    cover = 0.0
+    if clouds > 0.0 and z > 0.0:
+        scale = 22.0 / (up + 0.12)
+        u, v = x * scale + 37.0 * phase, y * scale + 11.0 * phase
+        n = 0.65 * texture(tile, u, v) + 0.35 * texture(tile, 3.1 * u, 3.1 * v)
+        cover = min(max((n - 1.0 + clouds) / 0.35, 0.0), 1.0) * min(up * 12.0, 1.0)
+    bright = (0.55 + 0.5 * sun_colour[1]) if sun_colour[1] > 0.5 else 0.85
+    shade = bright * (0.8 + 0.25 * texture(tile, 40.0 * x + 9.0, 40.0 * y + phase))
+    for c in range(3):
+        clear = mix * horizon[c] + (1.0 - mix) * zenith[c] + halo * sun_colour[c]
+        out[c] = (1.0 - 0.85 * cover) * clear + 0.85 * cover * shade

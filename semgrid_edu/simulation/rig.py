@@ -1,0 +1,123 @@
+"""The recording car: calibration in KITTI's conventions, camera and LIDAR models (Geiger et al., 2013, figure 1)."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, Camera, invert_rigid, lidar_from_grid, rigid_transform
+
+HDL64E_ELEVATIONS = tuple(np.concatenate([np.linspace(2.0, -8.33, 32), np.linspace(-8.83, -24.9, 32)]).tolist())
+"""Elevations of the Velodyne HDL-64E's 64 lasers, degrees: two blocks, the upper one finer (its manual)."""
+
+_CAMERA_AXES = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+_KITTI_K = np.array([[721.5377, 0.0, 609.5593], [0.0, 721.5377, 172.8540], [0.0, 0.0, 1.0]])
+_KITTI_SIZE = (375, 1242)
+
+
+@dataclass(frozen=True)
+class Lidar:
+    """A spinning LIDAR.
+
+    Parameters
+    ----------
+    elevations : tuple of float
+        One a laser, degrees: the HDL-64E's.
+    azimuth_min, azimuth_max, azimuth_step : float
+        Directions of a scan, degrees, left positive. The default covers the half-plane ahead at 0.9 degrees so that
+        data sets stay small; the HDL-64E at 10 Hz has -180, 180 and 0.18.
+    range_max : float
+        Metres; 80 m for the HDL-64E on dark surfaces, 120 m on bright ones.
+    range_sigma : float
+        Standard deviation of a range, metres: the manual's 2 cm.
+    drop : float
+        Share of returns lost whatever the surface.
+    """
+
+    elevations: tuple[float, ...] = HDL64E_ELEVATIONS
+    azimuth_min: float = -90.0
+    azimuth_max: float = 90.0
+    azimuth_step: float = 0.9
+    range_max: float = 100.0
+    range_sigma: float = 0.02
+    drop: float = 0.03
+
+    @cached_property
+    def directions(self) -> NDArray[np.float32]:
+        """(N, 3) float32: unit vectors in the LIDAR frame, laser by laser from the top, each from left to right."""
+        azimuth = np.radians(np.arange(self.azimuth_max, self.azimuth_min, -self.azimuth_step))
+        elevation = np.radians(self.elevations)[:, None]
+        x, y = np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth)
+        return np.stack([x, y, np.sin(elevation) + 0 * azimuth], axis=-1).reshape(-1, 3).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Rig:
+    """What stands where on the recording car.
+
+    Parameters
+    ----------
+    image_size : (int, int)
+        Height and width of camera 2's image: half of KITTI's, (188, 621).
+    lidar : Lidar
+    camera_noise : float
+        Standard deviation of pixel noise at mid grey, 8-bit counts.
+    bits : int
+        Bits a colour channel that the camera resolves; 6 keep the PNG files small.
+    """
+
+    image_size: tuple[int, int] = (188, 621)
+    lidar: Lidar = Lidar()
+    camera_noise: float = 0.8
+    bits: int = 6
+
+    @cached_property
+    def R_rect(self) -> NDArray[np.float64]:
+        """(3, 3): from camera 0 to its rectified frame."""
+        return Rotation.from_euler("xyz", [0.25, -0.42, 0.56], degrees=True).as_matrix()
+
+    @cached_property
+    def T_camera0_from_lidar(self) -> NDArray[np.float64]:
+        """(4, 4): camera 0 stands 0.27 m ahead of the LIDAR and 0.08 m lower."""
+        tilt = Rotation.from_euler("xyz", [-0.25, 0.35, -0.5], degrees=True).as_matrix()
+        return rigid_transform(tilt @ _CAMERA_AXES, np.array([-0.004, -0.076, -0.272]))
+
+    @cached_property
+    def T_lidar_from_imu(self) -> NDArray[np.float64]:
+        """(4, 4): the IMU stands 0.81 m behind the LIDAR, 0.32 m to its right and 0.8 m lower."""
+        turn = Rotation.from_euler("xyz", [0.85, 0.12, 0.045], degrees=True).as_matrix()
+        return rigid_transform(turn, np.array([-0.81, 0.32, -0.80]))
+
+    def P_rect(self, index: int) -> NDArray[np.float64]:
+        """Return (3, 4): the projection of camera 0..3, whose baselines are KITTI's."""
+        K = Camera(_KITTI_K, np.eye(4), _KITTI_SIZE).resized(self.image_size).K
+        baseline = (0.0, -0.5372, 0.0622, -0.4706)[index]
+        return np.column_stack([K, [K[0, 0] * baseline, 0.0, 0.0]])
+
+    @cached_property
+    def camera(self) -> Camera:
+        """Camera 2, rectified."""
+        P = self.P_rect(2)
+        shift = rigid_transform(np.eye(3), np.array([P[0, 3] / P[0, 0], 0.0, 0.0]))
+        T = shift @ rigid_transform(self.R_rect, np.zeros(3)) @ self.T_camera0_from_lidar
+        return Camera(P[:, :3], T, self.image_size)
+
+    @cached_property
+    def T_lidar_from_camera(self) -> NDArray[np.float64]:
+        """(4, 4): the inverse of the camera's pose."""
+        return invert_rigid(self.camera.T_camera_from_lidar)
+
+    @cached_property
+    def T_grid_from_lidar(self) -> NDArray[np.float64]:
+        """(4, 4): up by the LIDAR's height."""
+        return invert_rigid(lidar_from_grid(KITTI_LIDAR_HEIGHT))
+
+    def pixel_directions(self, du: NDArray | float = 0.0, dv: NDArray | float = 0.0) -> NDArray[np.float32]:
+        """Return (h w, 3) float32: the unit vector of every pixel in the LIDAR frame, shifted by (du, dv) pixels."""
+        height, width = self.image_size
+        v, u = np.mgrid[:height, :width]
+        pixels = np.stack([u + du, v + dv, np.ones_like(u)], axis=-1).reshape(-1, 3)
+        rays = pixels @ np.linalg.inv(self.camera.K).T @ self.T_lidar_from_camera[:3, :3].T
+        return (rays / np.linalg.norm(rays, axis=1, keepdims=True)).astype(np.float32)

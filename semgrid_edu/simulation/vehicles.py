@@ -1,0 +1,283 @@
+"""Cars lofted from cross-sections, and bicycles of tubes; both stand on z = 0 and look along x."""
+
+from functools import cache
+
+import numpy as np
+
+from semgrid_edu.simulation.materials import Kind, Material
+from semgrid_edu.simulation.shapes import Shape, ball, box, merge, quads, shape, tube
+
+# A body is a row of cross-sections from rear to front: x / length, z of the sill, of the shoulder line and of
+# the top (m), then half-widths of body and top over the half-width of the car. "glass" marks the spans, by the
+# index of their rear section, whose upper sides are windows; "screen" those whose top is a window.
+_BODIES = {
+    "hatchback": (
+        (4.0, 1.74),
+        [
+            (-0.500, 0.36, 0.72, 0.78, 0.86, 0.78),
+            (-0.480, 0.22, 0.92, 0.96, 0.96, 0.84),
+            (-0.400, 0.20, 0.95, 1.38, 1.00, 0.70),
+            (-0.170, 0.20, 0.94, 1.46, 1.00, 0.72),
+            (-0.150, 0.20, 0.94, 1.46, 1.00, 0.72),
+            (0.060, 0.20, 0.92, 1.42, 1.00, 0.71),
+            (0.230, 0.20, 0.90, 0.95, 0.99, 0.82),
+            (0.430, 0.20, 0.76, 0.80, 0.95, 0.76),
+            (0.500, 0.30, 0.58, 0.64, 0.80, 0.66),
+        ],
+        (2, 4, 5),
+        (1, 5),
+    ),
+    "sedan": (
+        (4.6, 1.80),
+        [
+            (-0.500, 0.36, 0.74, 0.80, 0.84, 0.76),
+            (-0.480, 0.24, 0.92, 0.98, 0.94, 0.82),
+            (-0.340, 0.20, 0.96, 1.02, 0.99, 0.84),
+            (-0.210, 0.20, 0.95, 1.40, 1.00, 0.68),
+            (-0.070, 0.20, 0.94, 1.44, 1.00, 0.70),
+            (-0.050, 0.20, 0.94, 1.44, 1.00, 0.70),
+            (0.100, 0.20, 0.92, 1.40, 1.00, 0.69),
+            (0.240, 0.20, 0.90, 0.96, 0.99, 0.82),
+            (0.440, 0.20, 0.76, 0.80, 0.94, 0.76),
+            (0.500, 0.30, 0.58, 0.64, 0.80, 0.66),
+        ],
+        (2, 3, 5, 6),
+        (2, 6),
+    ),
+    "estate": (
+        (4.7, 1.80),
+        [
+            (-0.500, 0.36, 0.74, 0.80, 0.88, 0.80),
+            (-0.485, 0.22, 0.94, 0.98, 0.97, 0.86),
+            (-0.430, 0.20, 0.96, 1.42, 1.00, 0.74),
+            (-0.210, 0.20, 0.95, 1.47, 1.00, 0.74),
+            (-0.195, 0.20, 0.95, 1.47, 1.00, 0.74),
+            (0.090, 0.20, 0.92, 1.42, 1.00, 0.71),
+            (0.240, 0.20, 0.90, 0.96, 0.99, 0.82),
+            (0.440, 0.20, 0.76, 0.80, 0.94, 0.76),
+            (0.500, 0.30, 0.58, 0.64, 0.80, 0.66),
+        ],
+        (2, 4, 5),
+        (1, 5),
+    ),
+    "suv": (
+        (4.5, 1.88),
+        [
+            (-0.500, 0.42, 0.86, 0.92, 0.88, 0.80),
+            (-0.480, 0.30, 1.08, 1.12, 0.97, 0.88),
+            (-0.430, 0.28, 1.10, 1.62, 1.00, 0.76),
+            (-0.190, 0.28, 1.09, 1.70, 1.00, 0.78),
+            (-0.170, 0.28, 1.09, 1.70, 1.00, 0.78),
+            (0.080, 0.28, 1.07, 1.64, 1.00, 0.76),
+            (0.220, 0.28, 1.05, 1.10, 1.00, 0.86),
+            (0.440, 0.28, 0.94, 0.98, 0.96, 0.82),
+            (0.500, 0.38, 0.72, 0.80, 0.84, 0.74),
+        ],
+        (2, 4, 5),
+        (1, 5),
+    ),
+    "van": (
+        (5.3, 1.98),
+        [
+            (-0.500, 0.36, 1.05, 1.85, 0.95, 0.86),
+            (-0.490, 0.28, 1.08, 2.25, 0.99, 0.90),
+            (-0.100, 0.28, 1.10, 2.34, 1.00, 0.92),
+            (0.170, 0.28, 1.10, 2.32, 1.00, 0.90),
+            (0.300, 0.28, 1.10, 2.10, 1.00, 0.84),
+            (0.410, 0.28, 1.08, 1.14, 0.98, 0.84),
+            (0.480, 0.28, 0.90, 0.96, 0.94, 0.80),
+            (0.500, 0.36, 0.70, 0.80, 0.88, 0.76),
+        ],
+        (3, 4),
+        (4,),
+    ),
+}
+BODIES = tuple(_BODIES)
+"""The car bodies that `car` knows."""
+PAINTS = (
+    (0.62, 0.63, 0.63),
+    (0.85, 0.85, 0.84),
+    (0.30, 0.31, 0.33),
+    (0.02, 0.02, 0.025),
+    (0.03, 0.06, 0.19),
+    (0.35, 0.02, 0.02),
+    (0.10, 0.11, 0.13),
+    (0.05, 0.16, 0.10),
+    (0.42, 0.38, 0.28),
+    (0.08, 0.20, 0.42),
+    (0.55, 0.22, 0.03),
+)
+"""Linear colours of car paint, the usual ones first."""
+_GLASS, _DARK = (0.025, 0.03, 0.035), (0.02, 0.02, 0.022)
+
+
+def car_size(body: str) -> tuple[float, float, float]:
+    """Return length, width and height of a car body, metres."""
+    (length, width), sections, _, _ = _BODIES[body]
+    return length, width, max(section[3] for section in sections)
+
+
+def _loft(body: str) -> list[Shape]:
+    """Span the skin between the cross-sections of a body."""
+    (length, width), sections, glass, screen = _BODIES[body]
+    rings = []
+    for x, sill, shoulder, top, half, half_top in sections:
+        w, t = half * width / 2, half_top * width / 2
+        middle = 0.45 * sill + 0.55 * shoulder
+        left = [(0.93 * w, sill), (w, middle), (0.97 * w, shoulder), (t, top)]
+        rings.append([(x * length, y, z) for y, z in left] + [(x * length, -y, z) for y, z in reversed(left)])
+    parts: dict[Material, list] = {Material.PAINT: [], Material.GLASS: [], Material.RUBBER: []}
+    for i, (a, b) in enumerate(zip(rings[:-1], rings[1:], strict=True)):
+        for j in range(8):
+            window = (j in (2, 4) and i in glass) or (j == 3 and i in screen)
+            material = Material.GLASS if window else Material.RUBBER if j == 7 else Material.PAINT
+            k = (j + 1) % 8
+            parts[material] += [(a[j], a[k], b[k]), (a[j], b[k], b[j])]
+    for ring, order in ((rings[0], 1), (rings[-1], -1)):
+        for j in range(3):
+            loop = [ring[j], ring[j + 1], ring[6 - j], ring[7 - j]][::-order]
+            parts[Material.PAINT] += [(loop[0], loop[1], loop[2]), (loop[0], loop[2], loop[3])]
+    colour = {Material.PAINT: PAINTS[0], Material.GLASS: _GLASS, Material.RUBBER: _DARK}
+    return [
+        shape(np.reshape(triangles, (-1, 3)), np.arange(3 * len(triangles)).reshape(-1, 3), colour[m], m, Kind.CAR)
+        for m, triangles in parts.items()
+    ]
+
+
+def _wheels(length: float, width: float, radius: float) -> list[Shape]:
+    """Put four wheels with hubs, and the dark arches around them."""
+    parts = []
+    for x in (-0.295 * length, 0.315 * length):
+        for side in (-1, 1):
+            outer = side * (width / 2 + 0.005)
+            inner = side * (width / 2 - 0.24)
+            arch = side * (width / 2 - 0.012)
+            parts += [
+                tube(
+                    (x, inner, radius + 0.03),
+                    (x, arch, radius + 0.03),
+                    (1.2 * radius,) * 2,
+                    _DARK,
+                    Material.RUBBER,
+                    Kind.CAR,
+                    14,
+                ),
+                tube(
+                    (x, inner, radius), (x, outer, radius), (radius,) * 2, (0.025,) * 3, Material.RUBBER, Kind.CAR, 14
+                ),
+                tube(
+                    (x, inner, radius),
+                    (x, outer + side * 0.012, radius),
+                    (0.6 * radius,) * 2,
+                    (0.42, 0.43, 0.44),
+                    Material.METAL,
+                    Kind.CAR,
+                    10,
+                ),
+                tube(
+                    (x, inner, radius),
+                    (x, outer + side * 0.016, radius),
+                    (0.22 * radius,) * 2,
+                    (0.1,) * 3,
+                    Material.METAL,
+                    Kind.CAR,
+                    6,
+                ),
+            ]
+    return parts
+
+
+@cache
+def car(body: str) -> Shape:
+    """Make a car; its paint is recoloured with `Shape.recoloured(Material.PAINT, colour)`.
+
+    Parameters
+    ----------
+    body : str
+        One of `BODIES`.
+    """
+    length, width, _ = car_size(body)
+    (_, _), sections, _, _ = _BODIES[body]
+    rear, nose = sections[1], sections[-1]
+    lamp_z, head_z = 0.86 * rear[2], 1.02 * nose[2]
+    half = width / 2
+    parts = _loft(body) + _wheels(length, width, 0.31 if body not in ("suv", "van") else 0.35)
+    for side in (-1, 1):
+        y = side * half
+        parts += [
+            box(
+                (-0.489 * length, 0.78 * y, lamp_z),
+                (0.05 * length, 0.2 * half, 0.17),
+                (0.35, 0.01, 0.01),
+                Material.LAMP,
+                Kind.CAR,
+            ),
+            box(
+                (0.482 * length, 0.62 * y, head_z),
+                (0.05 * length, 0.30 * half, 0.12),
+                (0.62, 0.64, 0.64),
+                Material.LAMP,
+                Kind.CAR,
+            ),
+            box((0.19 * length, 1.06 * y, sections[-4][2] + 0.1), (0.16, 0.18, 0.13), _DARK, Material.MATTE, Kind.CAR),
+            box(
+                (-0.02 * length, 0.995 * y, sections[4][2] - 0.1),
+                (0.16, 0.02, 0.03),
+                (0.2, 0.2, 0.2),
+                Material.METAL,
+                Kind.CAR,
+            ),
+        ]
+    parts += [
+        box((-0.497 * length, 0, 0.66), (0.03, 0.52, 0.12), (0.9, 0.9, 0.88), Material.RETRO, Kind.CAR),
+        box((0.497 * length, 0, 0.42), (0.03, 0.52, 0.11), (0.9, 0.9, 0.88), Material.RETRO, Kind.CAR),
+        box((0.488 * length, 0, 0.52), (0.04 * length, 0.8 * half, 0.12), (0.03,) * 3, Material.MATTE, Kind.CAR),
+        box((-0.492 * length, 0, 0.36), (0.03, 1.5 * half, 0.12), (0.04,) * 3, Material.MATTE, Kind.CAR),
+        box((0.485 * length, 0, 0.30), (0.06, 1.45 * half, 0.10), (0.04,) * 3, Material.MATTE, Kind.CAR),
+    ]
+    return merge(parts)
+
+
+def _wheel(x: float) -> list[Shape]:
+    """Make a bicycle wheel: a ring of tubes, a hub and spokes."""
+    angle = np.linspace(0, 2 * np.pi, 17)
+    rim = np.stack([x + 0.33 * np.cos(angle), 0 * angle, 0.35 + 0.33 * np.sin(angle)], axis=1)
+    tyre = [
+        tube(a, b, (0.025, 0.025), (0.02,) * 3, Material.RUBBER, Kind.BICYCLE, 4)
+        for a, b in zip(rim[:-1], rim[1:], strict=True)
+    ]
+    spokes = [
+        tube(rim[i], rim[i + 8], (0.006, 0.006), (0.4,) * 3, Material.METAL, Kind.BICYCLE, 3) for i in range(0, 8, 2)
+    ]
+    return [*tyre, *spokes]
+
+
+@cache
+def bicycle() -> Shape:
+    """Make a bicycle, 1.75 m long; its frame is `Material.PAINT`."""
+    paint = {"colour": PAINTS[5], "material": Material.PAINT, "kind": Kind.BICYCLE, "sides": 5}
+    metal = {"colour": (0.25,) * 3, "material": Material.METAL, "kind": Kind.BICYCLE, "sides": 5}
+    crank, saddle, head, rear, front = (
+        (-0.08, 0, 0.32),
+        (-0.22, 0, 0.9),
+        (0.38, 0, 0.85),
+        (-0.53, 0, 0.35),
+        (0.53, 0, 0.35),
+    )
+    thick, thin = (0.024, 0.024), (0.015, 0.015)
+    return merge(
+        [
+            *_wheel(-0.53),
+            *_wheel(0.53),
+            tube(crank, saddle, thick, **paint),
+            tube(crank, head, thick, **paint),
+            tube((-0.2, 0, 0.83), head, thick, **paint),
+            tube(crank, rear, thin, **paint),
+            tube((-0.2, 0, 0.83), rear, thin, **paint),
+            tube((0.36, 0, 0.98), front, thick, **paint),
+            tube((0.4, -0.28, 1.02), (0.4, 0.28, 1.02), (0.018, 0.018), **metal),
+            ball((-0.24, 0, 0.93), (0.13, 0.08, 0.04), (0.02,) * 3, Material.RUBBER, Kind.BICYCLE),
+            tube((-0.08, -0.12, 0.32), (-0.08, 0.12, 0.32), (0.07, 0.07), **metal),
+            quads([-0.55, 0.0, 0.7], [0.1, 0, 0], [0, 0.03, 0.04], (0.5, 0.02, 0.02), Material.RETRO, Kind.BICYCLE),
+        ]
+    )

@@ -1,0 +1,176 @@
+"""Writes a simulated drive in KITTI's raw layout, whole or not at all."""
+
+import io
+import shutil
+from collections.abc import Callable, Collection
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from semgrid_edu.files import write_json, write_text
+from semgrid_edu.labels import KITTI_14, LabelSet
+from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive, SimulatedFrame
+from semgrid_edu.simulation.materials import class_of_kind
+from semgrid_edu.simulation.oxts import DATAFORMAT, packet
+from semgrid_edu.simulation.rig import Rig
+
+DATE = "2026_01_01"
+"""The day of all simulated drives."""
+
+
+def drive_folder(root: Path, drive: str, date: str = DATE) -> Path:
+    """Return where KITTI's layout keeps a drive."""
+    return Path(root) / date / f"{date}_drive_{drive}_sync"
+
+
+def _row(name: str, numbers: NDArray | tuple) -> str:
+    return f"{name}: " + " ".join(f"{x:.12e}" for x in np.ravel(numbers)) + "\n"
+
+
+def write_calibration(root: Path, rig: Rig, date: str = DATE) -> None:
+    """Write KITTI's three calibration files. The cameras are ideal: no distortion, rotated alike.
+
+    Parameters
+    ----------
+    root : path-like
+        The folder that holds the day's folder.
+    rig : Rig
+    date : str
+    """
+    day, time = Path(root) / date, "calib_time: 01-Jan-2026 09:00:00\n"
+    height, width = rig.image_size
+    text = time + _row("corner_dist", (0.0995,))
+    for index in range(4):
+        P = rig.P_rect(index)
+        baseline = rig.R_rect.T @ np.array([P[0, 3] / P[0, 0], 0.0, 0.0])
+        rows = {"S": (width, height), "K": P[:, :3], "D": np.zeros(5), "R": np.eye(3), "T": baseline}
+        rows |= {"S_rect": (width, height), "R_rect": rig.R_rect, "P_rect": P}
+        text += "".join(_row(f"{name}_{index:02d}", numbers) for name, numbers in rows.items())
+    write_text(day / "calib_cam_to_cam.txt", text)
+    for name, T, extra in (
+        ("calib_velo_to_cam.txt", rig.T_camera0_from_lidar, _row("delta_f", (0, 0)) + _row("delta_c", (0, 0))),
+        ("calib_imu_to_velo.txt", rig.T_lidar_from_imu, ""),
+    ):
+        write_text(day / name, time + _row("R", T[:3, :3]) + _row("T", T[:3, 3]) + extra)
+
+
+def _stamp(start: datetime, seconds: float) -> str:
+    """Return a time of day with nanoseconds, as KITTI writes it."""
+    return f"{start + timedelta(seconds=seconds):%Y-%m-%d %H:%M:%S.%f}000\n"
+
+
+def _write_times(folder: Path, n_frames: int, start: datetime) -> None:
+    """Write timestamps. Camera, LIDAR and IMU read at one instant, the middle of the LIDAR's turn."""
+    offsets = {"image_02/timestamps": 0.0, "oxts/timestamps": 0.0, "velodyne_points/timestamps": 0.0}
+    offsets |= {"velodyne_points/timestamps_start": -PERIOD / 2, "velodyne_points/timestamps_end": PERIOD / 2}
+    for name, offset in offsets.items():
+        lines = [_stamp(start, k * PERIOD + offset) for k in range(n_frames)]
+        (folder / f"{name}.txt").write_text("".join(lines))
+
+
+def _save_png(path: Path, pixels: NDArray) -> None:
+    """Write a PNG at the level of compression where size hardly gains on time."""
+    buffer = io.BytesIO()
+    Image.fromarray(pixels).save(buffer, format="png", compress_level=4)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(buffer.getvalue())
+
+
+def depth_to_png(depth: NDArray) -> NDArray[np.uint16]:
+    """Return metres as KITTI's depth maps hold them: times 256, 0 for none, nothing beyond 255 m."""
+    scaled = np.round(np.nan_to_num(depth, nan=0.0) * 256)
+    return np.where(scaled < 65536, scaled, 0).astype(np.uint16)
+
+
+def _write_labels(folder: Path, name: str, frame: SimulatedFrame, label_set: LabelSet) -> None:
+    """Write what is true of one frame."""
+    table = class_of_kind(label_set)
+    _save_png(folder / "image" / f"{name}.png", table[frame.picture.kind])
+    _save_png(folder / "depth" / f"{name}.png", depth_to_png(frame.picture.depth))
+    _save_png(folder / "birdseye" / f"{name}.png", table[frame.truth.kinds])
+    _save_png(folder / "visible" / f"{name}.png", frame.truth.visible.astype(np.uint8) * 255)
+
+
+def depth_as_points(frame: SimulatedFrame, rig: Rig) -> NDArray[np.float32]:
+    """Return the depth image thinned to a LIDAR's sparsity and carried back to 3-D (section 4: SYNTHIA).
+
+    Every third row and second column within 80 m; reflectance 0, for a depth image has none.
+
+    Returns
+    -------
+    (N, 4) float32
+        LIDAR frame, metres.
+    """
+    v, u = np.mgrid[: rig.image_size[0] : 3, : rig.image_size[1] : 2]
+    depth = frame.picture.depth[v, u]
+    near = depth < 80.0
+    rays = np.stack([u[near], v[near], np.ones(near.sum())], axis=-1) @ np.linalg.inv(rig.camera.K).T
+    T = rig.T_lidar_from_camera
+    points = (rays * depth[near, None]) @ T[:3, :3].T + T[:3, 3]
+    return np.column_stack([points, np.zeros(len(points))]).astype(np.float32)
+
+
+def lidar_points(frame: SimulatedFrame, rig: Rig) -> NDArray[np.float32]:
+    """Return the LIDAR's points, (N, 4) float32."""
+    return frame.points
+
+
+def write_drive(
+    root: Path,
+    drive: str,
+    simulated: SimulatedDrive,
+    labelled: Collection[int],
+    label_set: LabelSet = KITTI_14,
+    points: Callable[[SimulatedFrame, Rig], NDArray[np.float32]] = lidar_points,
+    on_frame: Callable[[], object] = lambda: None,
+) -> Path:
+    """Write a drive: images, points, oxts, timestamps, and labels of some frames.
+
+    It grows in a hidden folder and gets its name when it is whole, so a killed process leaves no half drive.
+
+    Parameters
+    ----------
+    root : path-like
+        The folder that holds the day's folder; `write_calibration` belongs to it.
+    drive : str
+        Four digits.
+    simulated : SimulatedDrive
+    labelled : collection of int
+        Frames that get labels.
+    label_set : LabelSet
+        What the label numbers mean.
+    points : callable
+        What to write as LIDAR points: `lidar_points` or `depth_as_points`.
+    on_frame : callable
+        Called after every frame.
+
+    Returns
+    -------
+    Path
+        The drive's folder.
+    """
+    folder = drive_folder(root, drive)
+    partial = folder.with_name(f".{folder.name}.partial")
+    shutil.rmtree(partial, ignore_errors=True)
+    for name in ("image_02/data", "velodyne_points/data", "oxts/data", "labels"):
+        (partial / name).mkdir(parents=True)
+    objects = {}
+    for k, frame in enumerate(simulated.frames(set(labelled))):
+        name = f"{k:010d}"
+        _save_png(partial / "image_02" / "data" / f"{name}.png", frame.picture.image)
+        (partial / "velodyne_points" / "data" / f"{name}.bin").write_bytes(points(frame, simulated.rig).tobytes())
+        oxts = packet(simulated.T_world_from_imu, frame.time, simulated.geodesy)
+        (partial / "oxts" / "data" / f"{name}.txt").write_text(oxts)
+        objects[name] = frame.objects
+        if k in labelled:
+            _write_labels(partial / "labels", name, frame, label_set)
+        on_frame()
+    _write_times(partial, simulated.n_frames, datetime(2026, 1, 1, 10, 0, 0, 125000))
+    (partial / "oxts" / "dataformat.txt").write_text(DATAFORMAT)
+    (partial / "labels" / "label_set.txt").write_text(f"{label_set.name}\n")
+    write_json(partial / "labels" / "objects.json", objects)
+    partial.rename(folder)
+    return folder
