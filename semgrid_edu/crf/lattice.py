@@ -71,7 +71,8 @@ class PermutohedralLattice:
         if features.ndim != 2 or 0 in features.shape or not np.isfinite(features).all():
             raise ArgumentError("features", "finite numbers of shape (N, d)", f"shape {features.shape}")
         dimensions = features.shape[1]
-        elevated = features @ _elevation(dimensions).T
+        # einsum, not @: the threads of BLAS would fight with numba's for the same cores.
+        elevated = np.einsum("nd,jd->nj", features, _elevation(dimensions))
         if np.abs(elevated).max() > 2**30:
             raise ArgumentError("features", "fewer standard deviations, or a larger sigma", np.abs(features).max())
         origins, ranks, weights = _enclosing_simplices(elevated)

@@ -45,7 +45,7 @@ def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice
         Over H W points in five dimensions: two of place, three of state.
     """
     place = np.indices(values.shape[1:]) / params.sigma_alpha
-    state = np.tensordot(_ZERO_SUM_STATES, values, axes=1) / params.sigma_beta
+    state = np.einsum("ks,shw->khw", _ZERO_SUM_STATES, values) / params.sigma_beta
     lattice = PermutohedralLattice.build(np.concatenate([place, state]).reshape(5, -1).T)
     degree = np.ones(values[0].size)
     if params.normalization == "symmetric":
