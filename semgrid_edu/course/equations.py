@@ -47,7 +47,7 @@ EQUATIONS = (
     Equation(
         "sensor-model",
         "3.2",
-        "What a scan says of each cell, P(z | state)",
+        "What a scan says of each cell",
         literal="semgrid_edu.occupancy.scan_evidence_literal",
         fast="semgrid_edu.occupancy.scan_evidence",
     ),
