@@ -28,6 +28,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import Architecture, build_net, save_net
 from semgrid_edu.pipeline import STAGES, run_pipeline
+from semgrid_edu.plotting import depth_colours
 
 VOID_TAGS = {"meta", "img", "input", "link", "br"}
 
@@ -241,15 +242,15 @@ class TestPanels:
         assert float(left[0]) / float(left[1]) == pytest.approx(1, abs=1e-3)
         assert float(right[0]) / float(right[1]) == pytest.approx(-1, abs=1e-3)
 
-    def test_returns_are_drawn_at_their_pixel_and_near_ones_cover_far_ones(self):
+    @pytest.mark.parametrize(("scale", "side"), [(1, 1), (41, 2), (62, 3)])
+    def test_returns_cover_their_pixel_and_near_ones_cover_far_ones(self, scale, side):
+        camera = self.CAMERA.resized((10 * scale, 20 * scale))
         points = np.array([[20, 0.1, 0.1, 0], [5, 0, 0, 0], [20, -0.2, 0, 0], [-5, 0, 0, 0]], np.float32)
-        layer = points_layer(Frame(None, points, self.CAMERA, np.eye(4), 0.0), radius=1)
-        from semgrid_edu.plotting import depth_colours
-
-        assert layer.shape == (10, 20, 4)
-        near = layer[..., 3].astype(bool) & (layer[..., :3] == depth_colours(np.array(5.0))).all(axis=-1)
-        assert near.sum() == 9
-        assert {tuple(p) for p in np.argwhere(near)} == {(v, u) for v in (3, 4, 5) for u in (9, 10, 11)}
+        layer = points_layer(Frame(None, points, camera, np.eye(4), 0.0))
+        assert layer.shape == (10 * scale, 20 * scale, 4)
+        near = np.argwhere((layer == [*depth_colours(np.array(5.0)), 255]).all(axis=-1))
+        assert len(near) == side**2
+        assert np.abs(near.mean(axis=0) - camera.K[[1, 0], 2]).max() <= 0.5
 
     def test_the_surer_the_more_opaque(self):
         scores = np.zeros((14, 1, 3), np.float32)

@@ -26,7 +26,7 @@ def grid_svg(name: str, spec: GridSpec, camera: Camera, raster: str, text: str) 
     spec : GridSpec
     camera : Camera
     raster : str
-        Data URI.
+        Data URI; empty when there is nothing to show.
     text : str
         What a reader hears who doesn't see the picture.
 
@@ -38,12 +38,13 @@ def grid_svg(name: str, spec: GridSpec, camera: Camera, raster: str, text: str) 
     width, height = spec.y_max - spec.y_min, spec.x_max - spec.x_min
     left, top = -spec.y_max, -spec.x_max
     box = f'x="{left:g}" y="{top:g}" width="{width:g}" height="{height:g}"'
+    href = f'href="{raster}"' if raster else ""
     arrows = '<path class="arrows" d=""/>' if name == "occupancy" else ""
     return (
         f'<svg viewBox="{left - 6.5:g} {top - 1:g} {width + 7.5:g} {height + 7:g}" role="img" '
         f'data-text="{name}" aria-label="{text}">{_axes(spec)}'
         f'<svg {box} viewBox="{left:g} {top:g} {width:g} {height:g}">'
-        f'<image data-image="{name}" href="{raster}" {box} preserveAspectRatio="none"/>'
+        f'<image data-image="{name}" {href} {box} preserveAspectRatio="none"/>'
         f'<path class="sight" d="{_sight(camera, spec)}"/>{arrows}</svg>'
         f'<rect class="frame" {box}/><path class="vehicle" d="M0-1.6.9.7-.9.7z"/></svg>'
     )

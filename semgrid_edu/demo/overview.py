@@ -44,8 +44,8 @@ def draw_overview(result: Result, spec: GridSpec, label_set: LabelSet) -> Figure
     maps = {"semantic grid g": result.grid.argmax(axis=0), "g refined by the CRF": result.refined.argmax(axis=0)}
     if result.frame.labels is not None:
         maps["truth"] = grid_truth(result.frame.labels, result.belief.probability, spec)
-    figure = plt.figure(figsize=(13, 9), layout="constrained")
-    photos, grids, legend = figure.subfigures(3, 1, height_ratios=(2.4, 6.0, 0.6))
+    figure = plt.figure(figsize=(13, 8.3), layout="constrained")
+    photos, grids, legend = figure.subfigures(3, 1, height_ratios=(2.3, 5.4, 0.6))
     left, right = photos.subplots(1, 2)
     plotting.points_on_image(result.frame, left, size=1.2, colour_bar=False).set_title("LIDAR points l on the image i")
     _draw_scores(right, result, label_set)

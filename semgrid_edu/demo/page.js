@@ -11,7 +11,8 @@ function show(k) {
   for (const element of document.querySelectorAll("[data-image]")) {
     const image = frame.images[element.dataset.image];
     if (element.tagName === "IMG") element.src = image;
-    else element.setAttribute("href", image ?? "");
+    else if (image) element.setAttribute("href", image);
+    else element.removeAttribute("href");
   }
   for (const element of document.querySelectorAll("[data-text]")) {
     const name = element.tagName === "IMG" ? "alt" : "aria-label";

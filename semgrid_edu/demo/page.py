@@ -174,7 +174,8 @@ def _lead(summary: Summary, n_frames: int) -> str:
 def _panel(panel: Panel, summary: Summary, first: FrameView) -> str:
     raster, text = first.images.get(panel.name, ""), escape(first.texts.get(panel.name, ""))
     svg = grid_svg(panel.name, summary.spec, summary.camera, raster, text)
-    missing = '<p class="note" data-missing="truth">Nobody labelled this frame.</p>' if panel.name == "truth" else ""
+    hidden = " hidden" if panel.name in first.images else ""
+    missing = f'<p class="note" data-missing="{panel.name}"{hidden}>Nobody labelled this frame.</p>'
     symbol = f" <i>{panel.symbol}</i>" if panel.symbol else ""
     return f"<figure>{svg}{missing}<figcaption><b>{panel.title}</b>{symbol} — {panel.see}</figcaption></figure>"
 

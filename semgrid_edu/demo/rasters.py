@@ -15,6 +15,9 @@ from semgrid_edu.plotting.images import visible_points
 PHOTO_QUALITY = 72
 """WebP's, 0..100: the least at which leaves and lattice fences keep their texture."""
 
+DOTS_ACROSS = 414
+"""So many LIDAR dots side by side would fill the image's width: three pixels a dot on KITTI's images."""
+
 LEAST_OPACITY, MOST_OPACITY = 0.15, 0.8
 """How strongly the least and the most certain class covers its pixel."""
 
@@ -36,29 +39,28 @@ def classes_uri(labels: NDArray[np.uint8], label_set: LabelSet) -> str:
     return _uri(image, "png", optimize=True)
 
 
-def points_layer(frame: Frame, radius: int = 1) -> NDArray[np.uint8]:
+def points_layer(frame: Frame) -> NDArray[np.uint8]:
     """Draw the LIDAR returns that the camera sees on a transparent picture of the image's size.
 
     Parameters
     ----------
     frame : Frame
         With a camera.
-    radius : int
-        A return covers a square of 2 radius + 1 pixels.
 
     Returns
     -------
     (h, w, 4) uint8
-        RGBA; near returns lie over far ones.
+        RGBA; a return is a square around its pixel, and near ones lie over far ones.
     """
     height, width = frame.camera.size
+    side = max(1, round(width / DOTS_ACROSS))
     pixels, depth = visible_points(frame)
-    dv, du = np.indices((2 * radius + 1,) * 2).reshape(2, 1, -1)
-    u, v = np.rint(pixels).astype(int).T[..., None]
-    layer = np.zeros((height + 2 * radius, width + 2 * radius, 4), np.uint8)
+    u, v = np.rint(pixels - (side - 1) / 2).astype(int).T[..., None] + side
+    dv, du = np.indices((side, side)).reshape(2, 1, -1)
+    layer = np.zeros((height + 2 * side, width + 2 * side, 4), np.uint8)
     layer[v + dv, u + du, :3] = depth_colours(depth)[:, None]
     layer[v + dv, u + du, 3] = 255
-    return layer[radius : radius + height, radius : radius + width]
+    return layer[side:-side, side:-side]
 
 
 def scores_layer(scores: NDArray, label_set: LabelSet) -> NDArray[np.uint8]:

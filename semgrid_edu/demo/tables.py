@@ -28,9 +28,9 @@ def metrics_table(metrics: dict[str, dict[str, float]], labelled: int) -> str:
     head = "".join(f"<th>{escape(column)}</th>" for column in metrics)
     rows = "".join(_metrics_row(row, metrics) for row in next(iter(metrics.values())))
     return (
-        f"<table><caption><b>How often it is right</b>Per cent, over the {labelled} frames whose truth is known. "
+        f"<div><table><caption><b>How often it is right</b>Per cent, over the {labelled} frames whose truth is known. "
         "Semantic cells: those whose truth is none of the unknown classes.</caption>"
-        f"<thead><tr><th></th>{head}</tr></thead><tbody>{rows}</tbody></table>"
+        f"<thead><tr><th></th>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
     )
 
 
@@ -50,13 +50,13 @@ def times_table(milliseconds: dict[str, float]) -> str:
     rows = "".join(_time_row(*STAGE_WORDS[stage], value) for stage, value in milliseconds.items())
     total = _time_row("", "all stages", sum(milliseconds.values()), "total")
     return (
-        "<table><caption><b>How long it takes</b>Median of a frame, here, without a GPU. The LIDAR gives a scan every "
-        f"{LIDAR_PERIOD} ms: that would be a full bar.</caption>"
-        f"<thead><tr><th></th><th></th><th>ms</th><th></th></tr></thead><tbody>{rows}{total}</tbody></table>"
+        "<div><table><caption><b>How long it takes</b>Median of a frame, here, without a GPU. The LIDAR gives a scan "
+        f"every {LIDAR_PERIOD} ms: that would be a full bar.</caption>"
+        f"<thead><tr><th></th><th></th><th>ms</th><th></th></tr></thead><tbody>{rows}{total}</tbody></table></div>"
     )
 
 
 def _time_row(symbols: str, words: str, value: float, kind: str = "stage") -> str:
     width = min(100.0, 100 * value / LIDAR_PERIOD)
     bar = f'<td class="share"><span style="width:{width:.1f}%"></span></td>'
-    return f'<tr class="{kind}"><th>{symbols}</th><th>{words}</th><td>{value:.1f}</td>{bar}</tr>'
+    return f'<tr class="{kind}"><th><i>{symbols}</i></th><th>{words}</th><td>{value:.1f}</td>{bar}</tr>'
