@@ -1,10 +1,10 @@
-"""The three data sets of section 4 in simulated form, and a sample drive: made in parallel, resumed when interrupted."""
+"""The data sets of section 4 in simulated form, and a sample drive: made in parallel, resumed when interrupted."""
 
 import json
 import platform
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from importlib.metadata import version
 from multiprocessing import get_context
@@ -42,11 +42,14 @@ class Route:
     n_frames : int
     all_labelled : bool
         Whether all frames have labels; else the last one alone.
+    wishes : dict
+        For `SimulatedDrive`.
     """
 
     split: str
     n_frames: int
     all_labelled: bool
+    wishes: dict = field(default_factory=dict)
 
     @property
     def labelled(self) -> range:
@@ -73,6 +76,11 @@ class Recipe:
     dense: bool = False
 
 
+def _long(split: str, n_frames: int, speed: float, layout: str) -> Route:
+    """Return a route with labels on every frame, fast enough to see much."""
+    return Route(split, n_frames, True, {"speed": speed, "layout": layout})
+
+
 RECIPES = {
     recipe.name: recipe
     for recipe in (
@@ -80,10 +88,21 @@ RECIPES = {
         Recipe(
             "minichroma",
             "KITTI-14",
-            tuple(Route("train", n, True) for n in (49, 49, 48)) + (Route("test", 65, True),) * 2,
+            (
+                _long("train", 49, 11.0, "junction"),
+                _long("train", 49, 9.0, "bend"),
+                _long("train", 48, 12.0, "straight"),
+                _long("test", 65, 10.0, "junction"),
+                _long("test", 65, 9.0, "bend"),
+            ),
         ),
-        Recipe("minisynthia", "SYNTHIA-10", (Route("train", 60, True), Route("test", 60, True)), dense=True),
-        Recipe("sample", "KITTI-14", (Route("drive", 20, True),)),
+        Recipe(
+            "minisynthia",
+            "SYNTHIA-10",
+            (_long("train", 60, 10.0, "junction"), _long("test", 60, 10.0, "junction")),
+            dense=True,
+        ),
+        Recipe("sample", "KITTI-14", (Route("drive", 20, True, SAMPLE_WISHES),)),
     )
 }
 """Frames and splits as in the paper: KITTI 142 + 110 labelled frames, INRIA-Chroma 146 + 130 in 3 + 2 routes."""
@@ -122,15 +141,22 @@ def make(name: str, folder: Path, seed: int = 0, workers: int = 2) -> Path:
     """
     if name not in RECIPES:
         raise ArgumentError("name", f"one of {', '.join(RECIPES)}", repr(name))
+    return make_recipe(RECIPES[name], folder, seed, workers)
+
+
+def make_recipe(recipe: Recipe, folder: Path, seed: int, workers: int) -> Path:
+    """Make a data set of your own; see `make`."""
     if seed < 0:
         raise ArgumentError("seed", "a whole number from 0 up", seed)
-    recipe, root = RECIPES[name], Path(folder) / name
-    _claim(root, {"name": name, "seed": seed, "format": FORMAT})
+    if workers < 1:
+        raise ArgumentError("workers", "at least one process", workers)
+    root = Path(folder) / recipe.name
+    _claim(root, {"name": recipe.name, "seed": seed, "format": FORMAT})
     write_calibration(root, Rig())
     drives = [f"{k + 1:04d}" for k in range(len(recipe.routes))]
     missing = [k for k, drive in enumerate(drives) if not drive_folder(root, drive).exists()]
-    with tqdm(total=len(drives), initial=len(drives) - len(missing), desc=name, unit="drive") as bar:
-        for _ in _run(partial(_make_drive, name, root, seed), missing, workers):
+    with tqdm(total=len(drives), initial=len(drives) - len(missing), desc=recipe.name, unit="drive") as bar:
+        for _ in _run(partial(_make_drive, recipe, root, seed), missing, workers):
             bar.update()
     write_json(root / "dataset.json", _index(recipe, drives, seed))
     return root
@@ -166,14 +192,11 @@ def _run(work: partial, items: list[int], workers: int) -> Iterator[int]:
             raise
 
 
-def _make_drive(name: str, root: Path, seed: int, index: int) -> None:
+def _make_drive(recipe: Recipe, root: Path, seed: int, index: int) -> None:
     """Simulate and write one drive; its random numbers depend on data set, seed and index alone."""
-    recipe = RECIPES[name]
     route = recipe.routes[index]
-    entropy = [seed, FORMAT, list(RECIPES).index(name)]
-    own_seed = np.random.SeedSequence(entropy, spawn_key=(index,))
-    wishes = SAMPLE_WISHES if name == "sample" else {"speed": 9.0 + index % 3} if route.all_labelled else {}
-    simulated = SimulatedDrive(own_seed, route.n_frames, **wishes)
+    own_seed = np.random.SeedSequence([seed, FORMAT, *recipe.name.encode()], spawn_key=(index,))
+    simulated = SimulatedDrive(own_seed, route.n_frames, **route.wishes)
     points = depth_as_points if recipe.dense else lidar_points
     write_drive(root, f"{index + 1:04d}", simulated, route.labelled, LABEL_SETS[recipe.label_set], points)
 

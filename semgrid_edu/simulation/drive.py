@@ -6,17 +6,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, transform_points
+from semgrid_edu.camera import transform_points
 from semgrid_edu.frame import LABEL_GRID
 from semgrid_edu.simulation.footprints import table
+from semgrid_edu.simulation.lidar import scan
 from semgrid_edu.simulation.motion import Ego, Pace, Path
 from semgrid_edu.simulation.oxts import Geodesy
+from semgrid_edu.simulation.picture import Picture, take_picture
 from semgrid_edu.simulation.plan import Plan, draw_plan
 from semgrid_edu.simulation.raycast import Instant, Scene
 from semgrid_edu.simulation.rig import Rig
+from semgrid_edu.simulation.road_users import fill_street
 from semgrid_edu.simulation.scenery import build_scenery
-from semgrid_edu.simulation.sensors import Picture, scan, take_picture
-from semgrid_edu.simulation.traffic import Actor, Traffic, fill_street
+from semgrid_edu.simulation.traffic import Actor, Traffic
 from semgrid_edu.simulation.truth import birdseye_kinds, visible_cells, world_cells
 
 PERIOD = 0.1
@@ -68,8 +70,8 @@ class SimulatedDrive:
         Frames, ten a second.
     rig : Rig
     **wishes
-        For `draw_plan`; `speed` (m/s) sets the mean speed of the recording car, `ego_lane` its lane (0: beside the centre
-        line), `cast` a function of `Traffic` that replaces the usual `fill_street`.
+        For `draw_plan`; `speed` (m/s) sets the mean speed of the recording car, `ego_lane` its lane (0: beside the
+        centre line), `cast` a function of `Traffic` that replaces the usual `fill_street`.
     """
 
     def __init__(self, seed, n_frames: int, rig: Rig | None = None, **wishes) -> None:
@@ -118,19 +120,16 @@ class SimulatedDrive:
 
     def objects(self, t: float) -> list[dict]:
         """Return cars, pedestrians and bicycles that stand in the bird's-eye grid at t seconds."""
-        T_lidar_from_world = np.linalg.inv(self.pose(t))
+        T_grid_from_world = self.rig.T_grid_from_lidar @ np.linalg.inv(self.pose(t))
         road, found = self.plan.road, []
         for actor in self.parked + self.moving:
             position, yaw = actor.path.pose(road, t)
-            centre = transform_points(T_lidar_from_world, position + [0, 0, actor.size[2] / 2]) + [
-                0,
-                0,
-                KITTI_LIDAR_HEIGHT,
-            ]
+            middle = np.add(position, (0, 0, actor.size[2] / 2))
+            centre = transform_points(T_grid_from_world, middle)
             if not LABEL_GRID.cells(centre[None])[2][0]:
                 continue
-            velocity = T_lidar_from_world[:3, :2] @ actor.path.velocity(road, t)
-            heading = T_lidar_from_world[:3, :2] @ [np.cos(yaw), np.sin(yaw)]
+            velocity = T_grid_from_world[:3, :2] @ actor.path.velocity(road, t)
+            heading = T_grid_from_world[:3, :2] @ [np.cos(yaw), np.sin(yaw)]
             found.append(
                 {
                     "id": actor.instance,

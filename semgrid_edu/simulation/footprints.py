@@ -105,7 +105,7 @@ def collides(f: Footprint, others: NDArray, margin: float = 0.0) -> bool:
 @njit(cache=True)
 def _any_inside(f, points):
     """Whether any of the points lies in the footprint."""
-    for i in range(len(points)):
+    for i in range(len(points)):  # noqa: SIM110 (numba compiles no generator)
         if _inside(f, points[i, 0], points[i, 1]):
             return True
     return False

@@ -89,8 +89,8 @@ _FACES = {
 def sign(name: str) -> Shape:
     """Make a traffic sign on its pole; its face looks along -x, towards who drives along x."""
     pole = tube((0, 0, -0.5), (0, 0, 2.75), (0.035, 0.035), (0.42, 0.43, 0.44), Material.METAL, Kind.POLE)
-    plates = [_plate(c + [0, 2.4], colour, -0.05 - 0.008 * i) for i, (c, colour) in enumerate(_FACES[name])]
-    back = _plate(_FACES[name][0][0][::-1] + [0, 2.4], (0.3, 0.3, 0.3), -0.04, Material.METAL)
+    plates = [_plate(np.add(c, (0, 2.4)), colour, -0.05 - 0.008 * i) for i, (c, colour) in enumerate(_FACES[name])]
+    back = _plate(np.add(_FACES[name][0][0][::-1], (0, 2.4)), (0.3, 0.3, 0.3), -0.04, Material.METAL)
     return merge([pole, back, *plates])
 
 

@@ -1,8 +1,8 @@
 """Road geometry: along-road coordinates, and what the ground is and how high it lies at any (x, y).
 
-A road runs straight, bends along an arc, and runs straight again. `s` is the way along its centre line, `d` the distance
-to the left of it, both in metres. One side road may cross it. All of the ground follows from e, the distance outside
-the asphalt's edge.
+A road runs straight, bends along an arc, and runs straight again. `s` is the way along its centre line, `d` the
+distance to the left of it, both in metres. One side road may cross it. All of the ground follows from e, the distance
+outside the asphalt's edge.
 """
 
 from typing import NamedTuple

@@ -66,7 +66,7 @@ class Light:
             horizon_colour=tuple(map(float, horizon)),
             softness=0.45 if overcast else 0.012,
             clouds=float(rng.uniform(0.75, 1.0) if overcast else rng.uniform(0.0, 0.6)),
-            haze=float(rng.uniform(0.0008, 0.004)),
+            haze=float(10 ** rng.uniform(-3.5, -2.5)),
             exposure=float(rng.uniform(0.85, 1.2) * (1.5 if overcast else 1.15)),
             balance=tuple(map(float, 1 + rng.normal(0, 0.025, 3))),
             phase=float(rng.uniform(0, 100)),

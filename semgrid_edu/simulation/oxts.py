@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 
 EARTH_RADIUS = 6378137.0
 """Metres, as in KITTI's development kit."""
+GRAVITY = 9.81
+"""m/s^2: an accelerometer at rest reads it upwards."""
 _STEP = 1e-3
 _FLAGS = (0.05, 0.02, 4, 9, 4, 4, 6)
 
@@ -66,11 +68,12 @@ def packet(pose: Callable[[float], NDArray], t: float, geodesy: Geodesy) -> str:
     acceleration = turn @ (after[:3, 3] - 2 * now[:3, 3] + before[:3, 3]) / _STEP**2
     rates = Rotation.from_matrix(before[:3, :3].T @ after[:3, :3]).as_rotvec() / (2 * _STEP)
     level = Rotation.from_euler("z", yaw).as_matrix()
+    felt = np.add(acceleration, (0, 0, GRAVITY))
     numbers = [latitude, longitude, geodesy.altitude + offset[2], roll, pitch, yaw, velocity[1], velocity[0]]
     numbers += [
         *(level.T @ velocity),
-        *(R.T @ (acceleration + [0, 0, 9.81])),
-        *(level.T @ (acceleration + [0, 0, 9.81])),
+        *(R.T @ felt),
+        *(level.T @ felt),
     ]
     numbers += [*rates, *(level.T @ R @ rates)]
     return " ".join([f"{x:.16g}" for x in numbers] + [str(x) for x in _FLAGS]) + "\n"

@@ -1,6 +1,7 @@
 """People of capsules: walking ones whose legs and arms swing with the distance walked, and riders.
 
-Bodies are built once a phase of the stride, with the number of a garment in place of each colour; dressing them is a look-up.
+Bodies are built once a phase of the stride, with the number of a garment in place of each colour; dressing them is a
+look-up.
 """
 
 from dataclasses import dataclass, replace
@@ -9,9 +10,10 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from semgrid_edu.simulation.bicycles import bicycle
+from semgrid_edu.simulation.cars import PAINTS
 from semgrid_edu.simulation.materials import Kind, Material
 from semgrid_edu.simulation.shapes import Shape, ball, merge, tube
-from semgrid_edu.simulation.vehicles import PAINTS, bicycle
 
 _PHASES = 16
 _TOP, _TROUSERS, _SKIN_SLOT, _HAIR_SLOT, _SHOES = 0, 1, 2, 3, 4
@@ -75,14 +77,14 @@ def _blob(centre: ArrayLike, radii: tuple, slot: int, kind: Kind, detail: int = 
 
 def _trunk(hip: NDArray, shoulder: NDArray, kind: Kind) -> list[Shape]:
     """Make hips, chest, neck, head and hair along the spine."""
-    face = shoulder + [0.03, 0, 0.17]
+    face = np.add(shoulder, (0.03, 0, 0.17))
     return [
         tube(hip, shoulder, (0.145, 0.17), (_TOP,) * 3, Material.CLOTH, kind, 9),
         _blob(hip, (0.13, 0.165, 0.13), _TROUSERS, kind),
         _blob(hip + 0.92 * (shoulder - hip), (0.12, 0.21, 0.11), _TOP, kind),
         tube(shoulder - [0, 0, 0.03], face, (0.055, 0.055), (_SKIN_SLOT,) * 3, Material.CLOTH, kind),
         _blob(face, (0.095, 0.08, 0.12), _SKIN_SLOT, kind),
-        _blob(face + [-0.025, 0, 0.035], (0.098, 0.09, 0.11), _HAIR_SLOT, kind),
+        _blob(np.add(face, (-0.025, 0, 0.035)), (0.098, 0.09, 0.11), _HAIR_SLOT, kind),
     ]
 
 
@@ -97,11 +99,11 @@ def _walking(phase: int) -> Shape:
         step = side * swing
         knee = np.array([0.22 * step + 0.05, 0.09 * side, 0.5])
         foot = np.array([0.36 * step - 0.04 + 0.05 * (step < 0), 0.09 * side, 0.07 + 0.06 * max(-step, 0)])
-        parts += _limb([hip + [0, 0.09 * side, 0], knee, foot], [0.095, 0.07, 0.05], _TROUSERS, kind)
-        parts.append(_blob(foot + [0.06, 0, -0.02], (0.13, 0.05, 0.05), _SHOES, kind, 0))
+        parts += _limb([np.add(hip, (0, 0.09 * side, 0)), knee, foot], [0.095, 0.07, 0.05], _TROUSERS, kind)
+        parts.append(_blob(np.add(foot, (0.06, 0, -0.02)), (0.13, 0.05, 0.05), _SHOES, kind, 0))
         elbow = np.array([-0.12 * step - 0.02, 0.24 * side, 1.17])
         hand = np.array([-0.26 * step + 0.1, 0.25 * side, 0.95])
-        parts += _limb([shoulder + [0, 0.19 * side, -0.03], elbow, hand], [0.06, 0.05, 0.038], _TOP, kind)
+        parts += _limb([np.add(shoulder, (0, 0.19 * side, -0.03)), elbow, hand], [0.06, 0.05, 0.038], _TOP, kind)
         parts.append(_blob(hand, (0.05, 0.04, 0.06), _SKIN_SLOT, kind, 0))
     return merge(parts)
 
@@ -116,10 +118,10 @@ def _riding(phase: int) -> Shape:
         turn = 2 * np.pi * phase / _PHASES + (np.pi if side > 0 else 0)
         foot = np.array([-0.08 + 0.17 * np.cos(turn), 0.11 * side, 0.34 - 0.17 * np.sin(turn)])
         knee = (hip + foot) / 2 + np.array([0.2, 0.02 * side, 0.06])
-        parts += _limb([hip + [0, 0.09 * side, 0], knee, foot], [0.09, 0.065, 0.05], _TROUSERS, kind)
-        parts.append(_blob(foot + [0.05, 0, -0.03], (0.12, 0.045, 0.04), _SHOES, kind, 0))
+        parts += _limb([np.add(hip, (0, 0.09 * side, 0)), knee, foot], [0.09, 0.065, 0.05], _TROUSERS, kind)
+        parts.append(_blob(np.add(foot, (0.05, 0, -0.03)), (0.12, 0.045, 0.04), _SHOES, kind, 0))
         elbow, hand = np.array([0.22, 0.26 * side, 1.2]), np.array([0.4, 0.25 * side, 1.04])
-        parts += _limb([shoulder + [0, 0.18 * side, -0.03], elbow, hand], [0.055, 0.045, 0.035], _TOP, kind)
+        parts += _limb([np.add(shoulder, (0, 0.18 * side, -0.03)), elbow, hand], [0.055, 0.045, 0.035], _TOP, kind)
     return merge(parts)
 
 

@@ -4,11 +4,12 @@ import numpy as np
 
 from semgrid_edu.simulation.light import Light
 from semgrid_edu.simulation.motion import STAND, Pace
-from semgrid_edu.simulation.traffic import Traffic, fill_street
+from semgrid_edu.simulation.road_users import fill_street
+from semgrid_edu.simulation.traffic import Traffic
 
 
 def _cast(traffic: Traffic) -> None:
-    """Put an overtaking car, an oncoming car, a cyclist and pedestrians where the camera sees them, then the usual rest."""
+    """Put an overtaking and an oncoming car, a cyclist and pedestrians where the camera sees them, then the rest."""
     road, ego, end = traffic.road, traffic.ego, traffic.duration
     here = ego.at(end)[0]
     overtaking, oncoming = Pace(ego.pace.mean + 6.0), Pace(9.0)
@@ -61,6 +62,6 @@ SAMPLE_WISHES = {
         exposure=0.8,
         balance=(1.0, 1.0, 1.0),
         phase=3.0,
-    ),  # fmt: skip
+    ),
 }
 """Wishes for the sample's `SimulatedDrive`."""

@@ -6,10 +6,10 @@ from semgrid_edu.simulation import furniture, plants
 from semgrid_edu.simulation.builder import Builder
 from semgrid_edu.simulation.buildings import House, build
 from semgrid_edu.simulation.footprints import ROUND
-from semgrid_edu.simulation.layout import Side
 from semgrid_edu.simulation.materials import Kind, Material
-from semgrid_edu.simulation.terrain import ground_mesh
 from semgrid_edu.simulation.plan import Plan
+from semgrid_edu.simulation.roadside import side_of, stand_lamps, stand_signals, stand_signs
+from semgrid_edu.simulation.terrain import ground_mesh
 
 _TREE_RADIUS = 0.22
 _HEDGE_HALF, _FENCE_HALF = 0.42, 0.08
@@ -27,23 +27,19 @@ def build_scenery(plan: Plan, rng: np.random.Generator) -> Builder:
     ground = ground_mesh(plan.road, plan.extent)
     builder.shapes.append(ground)
     builder.instances.append(0)
-    _signals(builder)
+    stand_signals(builder)
     for sign, style in zip((1, -1), plan.styles, strict=True):
-        _lamps(builder, plan, sign)
+        stand_lamps(builder, plan, sign)
         _street_trees(builder, plan, sign)
         if style == "park":
             _park(builder, plan, sign)
         else:
             _house_row(builder, plan, sign, style)
-        _signs(builder, plan, sign)
+        stand_signs(builder, plan, sign)
     if plan.road.side_half:
         _side_street(builder, plan)
     _horizon(builder, plan)
     return builder
-
-
-def _side_of(builder: Builder, sign: int) -> Side:
-    return builder.road.left if sign > 0 else builder.road.right
 
 
 def _facing(sign: int) -> float:
@@ -116,7 +112,7 @@ def _random_house(style: str, rng: np.random.Generator) -> House:
 
 def _house_row(builder: Builder, plan: Plan, sign: int, style: str) -> None:
     """Line one side with houses; in a suburb with gardens behind fences and hedges."""
-    rng, side = builder.rng, _side_of(builder, sign)
+    rng, side = builder.rng, side_of(builder, sign)
     line = side.strip + side.walk
     setback = rng.uniform(3.5, 8.0) if style == "suburb" else rng.uniform(0.0, 0.4)
     border = str(rng.choice([*furniture.FENCES, "hedge", "none"], p=[0.2, 0.16, 0.16, 0.12, 0.24, 0.12]))
@@ -161,7 +157,7 @@ def _border(builder: Builder, plan: Plan, s0: float, s1: float, sign: int, offse
     gate = builder.rng.uniform(s0, s1)
     for s in np.arange(s0, s1 - 0.5 * step, step):
         gap = abs(s + step / 2 - gate) < 1.3
-        if gap or _junction_gap(builder, s, s + step, sign, offset - _side_of(builder, sign).edge):
+        if gap or _junction_gap(builder, s, s + step, sign, offset - side_of(builder, sign).edge):
             continue
         half, kind = (_HEDGE_HALF, Kind.PLANT) if style == "hedge" else (_FENCE_HALF, Kind.FENCE)
         foot = builder.footprint(s, sign * offset, 0, kind, (step / 2, half), offset=(step / 2, 0.0), top=1.4)
@@ -185,7 +181,7 @@ def _garden(builder: Builder, plan: Plan, s0: float, s1: float, sign: int, offse
 
 def _park(builder: Builder, plan: Plan, sign: int) -> None:
     """Cover one side with trees and bushes on its bank, perhaps a fence along it."""
-    rng, side = builder.rng, _side_of(builder, sign)
+    rng, side = builder.rng, side_of(builder, sign)
     line = side.edge + side.strip + side.walk
     if rng.random() < 0.65:
         style = str(rng.choice(furniture.FENCES, p=[0.2, 0.25, 0.4, 0.15]))
@@ -207,7 +203,7 @@ def _park(builder: Builder, plan: Plan, sign: int) -> None:
 
 def _street_trees(builder: Builder, plan: Plan, sign: int) -> None:
     """Plant a row of like trees in the strip beside the kerb."""
-    rng, side = builder.rng, _side_of(builder, sign)
+    rng, side = builder.rng, side_of(builder, sign)
     if side.strip < 1.2:
         return
     species = str(rng.choice(["broad", "tall", "birch"]))
@@ -217,63 +213,13 @@ def _street_trees(builder: Builder, plan: Plan, sign: int) -> None:
             _tree(builder, plan, s, sign * (side.edge + 0.55 * side.strip), species)
 
 
-def _lamps(builder: Builder, plan: Plan, sign: int) -> None:
-    """Stand street lamps at the kerb."""
-    if builder.rng.random() < 0.25:
-        return
-    side, step = _side_of(builder, sign), builder.rng.uniform(22, 34)
-    shape = furniture.lamp(float(builder.rng.choice([5.5, 7.5])))
-    for s in np.arange(plan.extent.start + builder.rng.uniform(0, step), plan.extent.end, step):
-        builder.try_post(shape, s, sign * (side.edge + 0.6), np.pi if sign > 0 else 0.0, Kind.POLE, 0.11)
-
-
-def _signs(builder: Builder, plan: Plan, sign: int) -> None:
-    """Stand traffic signs at the kerb, facing the traffic on their side."""
-    rng, side = builder.rng, _side_of(builder, sign)
-    yaw = 0.0 if sign < 0 else np.pi
-    for s in np.arange(plan.extent.start, plan.extent.end, 16.0):
-        if rng.random() < 0.45:
-            name = str(
-                rng.choice(["limit", "no-entry", "parking", "warning", "direction"], p=[0.3, 0.2, 0.25, 0.15, 0.1])
-            )
-            builder.try_post(
-                furniture.sign(name),
-                s + rng.uniform(0, 12),
-                sign * (side.edge + 0.75),
-                yaw + rng.normal(0, 0.08),
-                Kind.SIGN,
-                0.08,
-            )
-
-
-def _signals(builder: Builder) -> None:
-    """Stand lights or priority signs at the junction's corners."""
-    road, rng = builder.road, builder.rng
-    if not road.side_half:
-        return
-    lights, green = rng.random() < 0.55, bool(rng.random() < 0.5)
-    back = road.side_half + road.corner + 0.4
-    for sign, yaw in ((-1, 0.0), (1, np.pi)):
-        side = _side_of(builder, sign)
-        shape = furniture.traffic_light(green) if lights else furniture.sign("priority")
-        s = road.junction + sign * back
-        builder.try_post(shape, s, sign * (side.edge + 0.5), yaw, Kind.SIGN, 0.09)
-    for sign, leaves in ((1, road.side_left), (-1, road.side_right)):
-        if leaves:
-            shape = furniture.traffic_light(not green) if lights else furniture.sign("stop")
-            d = sign * (_side_of(builder, sign).edge + road.corner + 0.5)
-            builder.try_post(
-                shape, road.junction + sign * (road.side_half + 0.5), d, -sign * np.pi / 2, Kind.SIGN, 0.09
-            )
-
-
 def _side_street(builder: Builder, plan: Plan) -> None:
     """Line the side road with houses on both of its flanks."""
     road, rng = builder.road, builder.rng
     for sign, leaves, style in zip((1, -1), (road.side_left, road.side_right), plan.styles, strict=True):
         if not leaves:
             continue
-        side = _side_of(builder, sign)
+        side = side_of(builder, sign)
         back = road.side_half + side.strip + side.walk + (rng.uniform(2, 5) if style != "town" else 0.3)
         for flank in (-1, 1):
             d = side.edge + 8

@@ -130,7 +130,7 @@ def _surface(tile, material, p, n, blur, out):
         slant = v / max(np.sqrt(1.0 - n[2] * n[2]), 0.3)
         gain = 1.0 - 0.35 * fade * (1.0 if (slant % 0.32) < 0.07 else 0.0)
         gain *= 1.0 + 0.5 * (texture(tile, 3.0 * u, 3.0 * slant) - 0.5)
-    elif material == _WOOD or material == _BARK:
+    elif material in (_WOOD, _BARK):
         gain = 1.0 + 0.7 * (texture(tile, 50.0 * u + 20.0 * p[0], 5.0 * v) - 0.5) * fade
     elif material == _LEAF:
         gain = 1.0 + 1.1 * (texture(tile, 45.0 * (u + p[0]), 45.0 * v + 20.0 * p[1]) - 0.5) * fade
@@ -162,7 +162,7 @@ def _shade(
 ):
     """Write the radiance (N, 3) and the kind (N,) of every hit."""
     sun, sun_colour, zenith, horizon, clouds, haze, phase = light
-    n, albedo, air = np.empty(3, np.float32), np.empty(3, np.float32), np.empty(3, np.float32)
+    n, albedo, _air = np.empty(3, np.float32), np.empty(3, np.float32), np.empty(3, np.float32)
     for i in range(len(t)):
         ray = rays[i]
         out = radiance[i]
@@ -235,6 +235,7 @@ def shade(
     packed = (*(np.asarray(v, np.float32) for v in vectors), light.clouds, light.haze, light.phase)
     _shade(
         noise_tile(), road, hits.directions, hits.distance, hits.triangle, hits.position,
-        instant.normals, instant.colour, instant.material, instant.kind, sunlit, open_sky, pixel, packed, radiance, kinds,
+        instant.normals, instant.colour, instant.material, instant.kind,
+        sunlit, open_sky, pixel, packed, radiance, kinds,
     )  # fmt: skip
     return radiance, kinds

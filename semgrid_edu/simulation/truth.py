@@ -9,8 +9,8 @@ from semgrid_edu.frame import LABEL_GRID
 from semgrid_edu.simulation.footprints import stamp
 from semgrid_edu.simulation.layout import Road, ground_height, ground_kinds, to_road
 from semgrid_edu.simulation.materials import Kind
+from semgrid_edu.simulation.picture import Picture
 from semgrid_edu.simulation.rig import Rig
-from semgrid_edu.simulation.sensors import Picture
 
 _SEEN_PIXELS = 12
 """Pixels of an object that must show for the camera to see all of its footprint."""
@@ -136,6 +136,7 @@ def visible_cells(
     out = np.zeros(kinds.shape, np.bool_)
     depth = np.nan_to_num(picture.depth, nan=1e9)
     _visible(
-        cells, _LOOKS_LIKE[kinds], which, footprints, road, T, camera.K, _LOOKS_LIKE[picture.kind], depth, seen, _SOLID_DEPTH, out
+        cells, _LOOKS_LIKE[kinds], which, footprints, road, T, camera.K,
+        _LOOKS_LIKE[picture.kind], depth, seen, _SOLID_DEPTH, out,
     )  # fmt: skip
     return out

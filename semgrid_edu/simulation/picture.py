@@ -1,4 +1,4 @@
-"""Camera and LIDAR: what the rig's sensors read of the world at one instant."""
+"""The camera: a picture of the world at one instant, and what each of its pixels shows."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -8,11 +8,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import transform_points
-from semgrid_edu.simulation.layout import Road, ground_kinds
+from semgrid_edu.simulation.layout import Road
 from semgrid_edu.simulation.light import Light
-from semgrid_edu.simulation.materials import REFLECTANCE, Kind, Material
-from semgrid_edu.simulation.raycast import MISS, Hits, Instant, turned
-from semgrid_edu.simulation.rig import Lidar, Rig
+from semgrid_edu.simulation.raycast import Hits, Instant, turned
+from semgrid_edu.simulation.rig import Rig
 from semgrid_edu.simulation.shading import shade
 
 _SKY_STEP = 3
@@ -124,7 +123,7 @@ def _open(
     spread: float,
     rng: np.random.Generator,
 ) -> NDArray[np.float32]:
-    """Return for every pixel 1 where nothing stands between its hit and the light, 0 where something does, -1 unless chosen."""
+    """Return for every pixel 1 where its hit sees the light, 0 where something stands between, -1 unless chosen."""
     luck = rng.random((len(chosen), 3), dtype=np.float32)
     starts, rays = _rays_to(
         np.float32(axis), along_normal, spread, luck, chosen,
@@ -152,7 +151,7 @@ def _sun_and_sky(
 
 @njit(cache=True)
 def _lens(radiance, centre):
-    """Return the picture as a lens spreads it: weight `centre` in the middle, the rest on the next pixels, each axis."""
+    """Return the picture as a lens spreads it: along each axis `centre` stays, the rest goes to the next pixels."""
     height, width, _ = radiance.shape
     side = np.float32((1.0 - centre) / 2)
     middle = np.float32(centre)
@@ -221,52 +220,3 @@ def take_picture(
         depth=np.where(hits.triangle < 0, np.float32(np.nan), ahead).reshape(shape),
         instance=np.where(hits.triangle < 0, 0, instant.instance[hits.triangle]).reshape(shape),
     )
-
-
-def scan(
-    instant: Instant, T_world_from_lidar: NDArray, lidar: Lidar, road: Road, rng: np.random.Generator
-) -> NDArray[np.float32]:
-    """Take one LIDAR scan, all of it at this instant (as if the ego-motion within a turn had been undone).
-
-    A return is lost when too little light comes back: the more, the darker, the farther and the more grazing the
-    surface is. Glass reflects away from the sensor and car paint scatters little.
-
-    Parameters
-    ----------
-    instant : Instant
-    T_world_from_lidar : (4, 4) float
-    lidar : Lidar
-    road : Road
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    (N, 4) float32
-        x, y, z in the LIDAR frame, metres, and reflectance 0..1, as KITTI's binary files hold them.
-    """
-    rays = lidar.directions
-    rotation = T_world_from_lidar[:3, :3].astype(np.float32)
-    hits = instant.cast(T_world_from_lidar[:3, 3], turned(rays, rotation))
-    luck, range_noise = rng.random(len(rays), dtype=np.float32), rng.standard_normal(len(rays), dtype=np.float32)
-    glow = rng.standard_normal(len(rays), dtype=np.float32)
-    near = np.flatnonzero(hits.distance < min(lidar.range_max, MISS))
-    triangle, distance = hits.triangle[near], hits.distance[near]
-    cosine = np.abs((instant.normals[triangle] * hits.directions[near]).sum(axis=1))
-    reflectance = _reflectance(instant, hits, near, road)
-    signal = reflectance * (0.15 + 0.85 * cosine) * (25.0 / np.maximum(distance, 8.0)) ** 2
-    kept = luck[near] > lidar.drop + np.exp(-signal / 0.05)
-    measured = distance + lidar.range_sigma * range_noise[near]
-    intensity = (reflectance * (0.4 + 0.6 * cosine) * (1 + 0.15 * glow[near])).clip(0, 0.99)
-    points = np.column_stack([rays[near] * measured[:, None], np.round(intensity, 2)])
-    return points[kept].astype(np.float32)
-
-
-def _reflectance(instant: Instant, hits: Hits, chosen: NDArray, road: Road) -> NDArray[np.float32]:
-    """Return the reflectance of chosen hits; on the ground lane marks are bright and grass brighter than asphalt."""
-    material = instant.material[hits.triangle[chosen]]
-    reflectance = REFLECTANCE[material]
-    ground = material == Material.GROUND
-    by_kind = np.full(256, 0.2, np.float32)
-    by_kind[[Kind.LANE, Kind.SIDEWALK, Kind.GRASS]] = 0.75, 0.3, 0.45
-    reflectance[ground] = by_kind[ground_kinds(road, hits.position[chosen[ground], :2].astype(np.float64))]
-    return reflectance

@@ -1,11 +1,12 @@
-"""Cars lofted from cross-sections, and bicycles of tubes; both stand on z = 0 and look along x."""
+"""Cars lofted from cross-sections; they stand on z = 0 and look along x."""
 
+import itertools
 from functools import cache
 
 import numpy as np
 
 from semgrid_edu.simulation.materials import Kind, Material
-from semgrid_edu.simulation.shapes import Shape, ball, box, merge, quads, shape, tube
+from semgrid_edu.simulation.shapes import Shape, box, merge, shape, tube
 
 # A body is a row of cross-sections from rear to front: x / length, z of the sill, of the shoulder line and of
 # the top (m), then half-widths of body and top over the half-width of the car. "glass" marks the spans, by the
@@ -127,7 +128,7 @@ def _loft(body: str) -> list[Shape]:
         left = [(0.93 * w, sill), (w, middle), (0.97 * w, shoulder), (t, top)]
         rings.append([(x * length, y, z) for y, z in left] + [(x * length, -y, z) for y, z in reversed(left)])
     parts: dict[Material, list] = {Material.PAINT: [], Material.GLASS: [], Material.RUBBER: []}
-    for i, (a, b) in enumerate(zip(rings[:-1], rings[1:], strict=True)):
+    for i, (a, b) in enumerate(itertools.pairwise(rings)):
         for j in range(8):
             window = (j in (2, 4) and i in glass) or (j == 3 and i in screen)
             material = Material.GLASS if window else Material.RUBBER if j == 7 else Material.PAINT
@@ -187,6 +188,15 @@ def _wheels(length: float, width: float, radius: float) -> list[Shape]:
     return parts
 
 
+def _van_doors(length: float) -> list[Shape]:
+    """Put windows and the seam between the two doors on a van's rear."""
+    x = -0.4985 * length
+    return [
+        box((x, 0, 1.1), (0.03, 0.02, 1.5), _DARK, Material.MATTE, Kind.CAR),
+        *(box((x, y, 1.52), (0.05, 0.62, 0.42), _GLASS, Material.GLASS, Kind.CAR) for y in (-0.42, 0.42)),
+    ]
+
+
 @cache
 def car(body: str) -> Shape:
     """Make a car; its paint is recoloured with `Shape.recoloured(Material.PAINT, colour)`.
@@ -219,7 +229,7 @@ def car(body: str) -> Shape:
                 Material.LAMP,
                 Kind.CAR,
             ),
-            box((0.19 * length, 1.06 * y, sections[-4][2] + 0.1), (0.16, 0.18, 0.13), _DARK, Material.MATTE, Kind.CAR),
+            box((0.17 * length, 1.05 * y, sections[-4][2] + 0.08), (0.09, 0.16, 0.11), _DARK, Material.MATTE, Kind.CAR),
             box(
                 (-0.02 * length, 0.995 * y, sections[4][2] - 0.1),
                 (0.16, 0.02, 0.03),
@@ -228,6 +238,8 @@ def car(body: str) -> Shape:
                 Kind.CAR,
             ),
         ]
+    if body == "van":
+        parts += _van_doors(length)
     parts += [
         box((-0.497 * length, 0, 0.66), (0.03, 0.52, 0.12), (0.9, 0.9, 0.88), Material.RETRO, Kind.CAR),
         box((0.497 * length, 0, 0.42), (0.03, 0.52, 0.11), (0.9, 0.9, 0.88), Material.RETRO, Kind.CAR),
@@ -236,48 +248,3 @@ def car(body: str) -> Shape:
         box((0.485 * length, 0, 0.30), (0.06, 1.45 * half, 0.10), (0.04,) * 3, Material.MATTE, Kind.CAR),
     ]
     return merge(parts)
-
-
-def _wheel(x: float) -> list[Shape]:
-    """Make a bicycle wheel: a ring of tubes, a hub and spokes."""
-    angle = np.linspace(0, 2 * np.pi, 17)
-    rim = np.stack([x + 0.33 * np.cos(angle), 0 * angle, 0.35 + 0.33 * np.sin(angle)], axis=1)
-    tyre = [
-        tube(a, b, (0.025, 0.025), (0.02,) * 3, Material.RUBBER, Kind.BICYCLE, 4)
-        for a, b in zip(rim[:-1], rim[1:], strict=True)
-    ]
-    spokes = [
-        tube(rim[i], rim[i + 8], (0.006, 0.006), (0.4,) * 3, Material.METAL, Kind.BICYCLE, 3) for i in range(0, 8, 2)
-    ]
-    return [*tyre, *spokes]
-
-
-@cache
-def bicycle() -> Shape:
-    """Make a bicycle, 1.75 m long; its frame is `Material.PAINT`."""
-    paint = {"colour": PAINTS[5], "material": Material.PAINT, "kind": Kind.BICYCLE, "sides": 5}
-    metal = {"colour": (0.25,) * 3, "material": Material.METAL, "kind": Kind.BICYCLE, "sides": 5}
-    crank, saddle, head, rear, front = (
-        (-0.08, 0, 0.32),
-        (-0.22, 0, 0.9),
-        (0.38, 0, 0.85),
-        (-0.53, 0, 0.35),
-        (0.53, 0, 0.35),
-    )
-    thick, thin = (0.024, 0.024), (0.015, 0.015)
-    return merge(
-        [
-            *_wheel(-0.53),
-            *_wheel(0.53),
-            tube(crank, saddle, thick, **paint),
-            tube(crank, head, thick, **paint),
-            tube((-0.2, 0, 0.83), head, thick, **paint),
-            tube(crank, rear, thin, **paint),
-            tube((-0.2, 0, 0.83), rear, thin, **paint),
-            tube((0.36, 0, 0.98), front, thick, **paint),
-            tube((0.4, -0.28, 1.02), (0.4, 0.28, 1.02), (0.018, 0.018), **metal),
-            ball((-0.24, 0, 0.93), (0.13, 0.08, 0.04), (0.02,) * 3, Material.RUBBER, Kind.BICYCLE),
-            tube((-0.08, -0.12, 0.32), (-0.08, 0.12, 0.32), (0.07, 0.07), **metal),
-            quads([-0.55, 0.0, 0.7], [0.1, 0, 0], [0, 0.03, 0.04], (0.5, 0.02, 0.02), Material.RETRO, Kind.BICYCLE),
-        ]
-    )
