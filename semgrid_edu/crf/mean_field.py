@@ -68,7 +68,7 @@ def mean_field(unary: ArrayLike, values: ArrayLike, params: CrfParams, iteration
     params : CrfParams
         Weights, widths and normalisation.
     iterations : int
-        Updates; 10, after which Kraehenbuehl and Koltun see no more change.
+        Updates of all cells at once. Ten settle the labels, not every probability: single cells still move later.
 
     Returns
     -------

@@ -23,7 +23,7 @@ class CrfParams:
         for images; ours trusts occupancy less than colour, because many classes share a state.
     sigma_alpha : float
         Reach of the bilateral kernel, in cells. 8 cells are 1.6 m in the paper's grid, half a car's length, and 4 m in
-        the compact one: give half as much there to keep the reach in metres.
+        the compact one: give 3 there to keep the reach in metres.
     sigma_beta : float
         Reach of the bilateral kernel in state probability. Two certain, different states lie sqrt(2) apart, seven times
         0.2, and don't talk to each other; a cell that is 90 % free still hears one that is certainly free.
