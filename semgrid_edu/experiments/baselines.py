@@ -2,10 +2,15 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 
 from semgrid_edu.datasets.truth import unknown_classes
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.labels import IGNORE, KITTI_14
+from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
+from semgrid_edu.occupancy import State
+
+CLOSING_REACH = 1.0
+"""Metres. On minikitti's training split 0.5 to 2 m do about equally well."""
 
 
 def majority_class(truths: NDArray) -> NDArray[np.uint8]:
@@ -64,3 +69,28 @@ def carry_labels(labels: NDArray, pixels: NDArray, cells: NDArray, occupancy: ND
     standing[..., [KITTI_14.index(name) for name in KITTI_14.flat]] = 0
     best = np.where(standing.any(axis=-1), standing.argmax(axis=-1), votes.argmax(axis=-1))
     return np.where(votes.any(axis=-1), best, unknown).astype(np.uint8)
+
+
+def close_gaps(grid: NDArray, cell: float, reach: float = CLOSING_REACH) -> NDArray[np.uint8]:
+    """Label the gaps between the LIDAR's rings: the morphological clean-up that the paper gives such a grid.
+
+    Parameters
+    ----------
+    grid : (H, W) uint8
+        From `carry_labels`.
+    cell : float
+        Side of a cell, metres.
+    reach : float
+        How far a label spreads, metres.
+
+    Returns
+    -------
+    (H, W) uint8
+        Each cell that was observed, but that no label reached, takes the class of the nearest cell that has one.
+    """
+    unlabelled = grid >= KITTI_14.n_semantic
+    if unlabelled.all():
+        return grid
+    distance, nearest = distance_transform_edt(unlabelled, sampling=cell, return_indices=True)
+    observed = grid != UNKNOWN_OF_STATE[State.UNKNOWN]
+    return np.where(observed & (distance <= reach), grid[tuple(nearest)], grid)

@@ -11,7 +11,7 @@ from semgrid_edu.crf import CrfParams, mean_field
 from semgrid_edu.datasets.training_cache import SEED
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.baselines import carry_labels, majority_class
+from semgrid_edu.experiments.baselines import carry_labels, close_gaps, majority_class
 from semgrid_edu.files import sha256
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import (
@@ -107,12 +107,16 @@ def predictions(net: SemanticGridNet, test: TrainingSet, k: int, majority: NDArr
     unary = -stages.logits[0].log_softmax(dim=0).numpy()
     occupancy = sample.occupancy.numpy()
     image_classes = stages.scores[0].argmax(dim=0).numpy()
+    predicted = carry_labels(image_classes, *returns, occupancy)
+    true = carry_labels(sample.labels.numpy(), *returns, occupancy)
     return {
         "network": unary.argmin(axis=0),
         "network + CRF": mean_field(unary, occupancy, CrfParams()).argmax(axis=0),
         "majority class": majority,
-        "geometry, network's image labels": carry_labels(image_classes, *returns, occupancy),
-        "geometry, true image labels": carry_labels(sample.labels.numpy(), *returns, occupancy),
+        "geometry, predicted image labels": predicted,
+        "predicted labels, gaps closed": close_gaps(predicted, test.spec.cell),
+        "geometry, true image labels": true,
+        "true labels, gaps closed": close_gaps(true, test.spec.cell),
     }
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.baselines import carry_labels, majority_class
+from semgrid_edu.experiments.baselines import carry_labels, close_gaps, majority_class
 from semgrid_edu.labels import KITTI_14
 
 ROAD, WALK, CAR, SKY = (KITTI_14.index(name) for name in ("road", "sidewalk", "car", "sky"))
@@ -46,3 +46,13 @@ def test_places_outside_are_refused():
     for name, pixels, cells in (("pixels", [4], [0]), ("cells", [0], [1]), ("cells", [0], [-1])):
         with pytest.raises(ArgumentError, match=name):
             carry_labels(np.zeros((2, 2), np.uint8), np.array(pixels), np.array(cells), occupancy(0))
+
+
+def test_gaps_take_the_nearest_class_where_something_was_observed():
+    row = np.array([[ROAD, FREE, STATIC, FREE, FREE, UNOBSERVED, CAR]], np.uint8)
+    assert close_gaps(row, 0.5, reach=1.0).tolist() == [[ROAD, ROAD, ROAD, FREE, CAR, UNOBSERVED, CAR]]
+
+
+def test_a_grid_without_labels_stays_as_it_is():
+    row = np.array([[FREE, STATIC, DYNAMIC, UNOBSERVED]], np.uint8)
+    np.testing.assert_array_equal(close_gaps(row, 0.5), row)
