@@ -1,6 +1,7 @@
 """The command line, `semgrid-edu`: parses and calls, nothing else."""
 
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -42,7 +43,9 @@ def demo(
 
 @data.command()
 def make(
-    name: Annotated[str, typer.Argument(help="minikitti, minichroma, minisynthia, sample, or all for the first three.")],
+    name: Annotated[
+        str, typer.Argument(help="minikitti, minichroma, minisynthia, sample, or all for the first three.")
+    ],
     folder: Annotated[Path, typer.Argument(help="Where the data set's own folder goes.")],
     seed: Annotated[int, typer.Option(help="The same seed gives the same bytes.")] = 0,
     workers: Annotated[int, typer.Option(help="Processes that share the work.")] = 2,
@@ -67,6 +70,26 @@ def verify(
     if problems:
         raise typer.Exit(1)
     typer.echo("every sample is as it was made")
+
+
+@data.command()
+def excerpt(
+    folder: Annotated[Path, typer.Argument(help="Takes the frames and their provenance.")],
+    data: Annotated[Path, typer.Option(help="A data set with train frames, such as data/minikitti.")],
+    frames: Annotated[int, typer.Option(min=1, help="How many.")] = 6,
+) -> None:
+    """Keep a few labelled frames of a data set, as a network takes them."""
+    from semgrid_edu.datasets.samples import write_excerpt
+
+    write_excerpt(data, frames, folder)
+
+
+@course.callback()
+def needs_tools() -> None:
+    """Build the notebooks and the exercises."""
+    missing = [name for name in ("jupytext", "nbgrader") if find_spec(name) is None]
+    if missing:
+        sys.exit(f"semgrid-edu: {' and '.join(missing)} are needed for this: pip install 'semgrid_edu[course]'")
 
 
 @course.command()

@@ -85,6 +85,8 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS) -> list[str]:
         When the folder holds something else, or nbgrader can't release an exercise.
     """
     directory = Path(directory).resolve()
+    if directory.is_file():
+        raise DataError(directory, "a folder", "a file")
     if directory.exists() and any(directory.iterdir()) and not (directory / MARKER).is_file():
         raise DataError(directory, f"an empty folder, or a course with its {MARKER}", "a folder with other files")
     sources = exercise_sources(folder)

@@ -123,6 +123,8 @@ def test_other_peoples_folder_is_refused(tmp_path, notebooks):
     with pytest.raises(DataError, match=r"an empty folder, or a course"):
         build_course(tmp_path, notebooks)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
+    with pytest.raises(DataError, match=r"thesis\.txt: expected a folder"):
+        build_course(tmp_path / "thesis.txt", notebooks)
 
 
 def test_broken_source_is_refused_by_name(tmp_path):

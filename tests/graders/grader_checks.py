@@ -104,10 +104,16 @@ class GraderChecks:
                 assert task in answers or score == points, f"student-{number}, {task}: {message}"
 
     def test_catalogue_is_complete(self, source):
-        """Two other right ways and a mistake for every graded task of code, and a loop that never ends."""
+        """For each task of code two other right ways, a mistake for its visible and one for its hidden tests."""
         coded = [task for task, names in tasks(source).items() if names != (task,)]
         for task in coded:
             ways = [entry for entry in self.entries if entry.task == task]
             assert sum(not entry.loses for entry in ways) >= 2, f"{task}: two other right ways"
-            assert any(entry.loses for entry in ways), f"{task}: a mistake"
+            hints = [entry.says for entry in ways if entry.loses]
+            assert any("on inputs you haven't seen" not in hint for hint in hints), (
+                f"{task}: one that visible tests find"
+            )
+            assert any("on inputs you haven't seen" in hint for hint in hints), (
+                f"{task}: one that only hidden tests find"
+            )
         assert any("before timeout" in entry.says for entry in self.entries), "an endless loop"

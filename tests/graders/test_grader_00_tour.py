@@ -78,7 +78,7 @@ def cell_of(x, y, x_max, y_max, cell):
             "cells of 0.5 m written in",
             task="cell-of",
             loses=2,
-            says="cells need not be 0.5 m",
+            says="on inputs you haven't seen: wrong row (behind the vehicle x is negative; cells need not be 0.5 m)",
             code="def cell_of(x, y, x_max, y_max, cell):\n    return int((x_max - x) / 0.5), int((y_max - y) / 0.5)",
         ),
         mistake(
@@ -388,6 +388,16 @@ def accuracies(confusion):
     union = confusion.sum(axis=0) + confusion.sum(axis=1) - right
     occurs = confusion.sum(axis=1) > 0
     return right.sum() / confusion.sum(), (right / union)[occurs].mean()""",
+        ),
+        mistake(
+            "three classes written in",
+            task="accuracies",
+            loses=3,
+            says="on inputs you haven't seen: wrong pixel accuracy",
+            code="""
+def accuracies(confusion):
+    share = [confusion[0, 0] / confusion[0].sum(), confusion[1, 1] / confusion[1].sum()]
+    return (confusion[0, 0] + confusion[1, 1] + confusion[2, 2]) / confusion.sum(), np.mean(share)""",
         ),
         mistake(
             "the two swapped",

@@ -1,0 +1,25 @@
+"""The `semgrid-edu course` commands say what they did, and what they could not do."""
+
+import pytest
+from typer.testing import CliRunner
+
+from semgrid_edu import cli
+from semgrid_edu.errors import ArgumentError
+
+
+def test_build_lays_out_a_course_and_points_to_its_guide(tmp_path):
+    result = CliRunner().invoke(cli.app, ["course", "build", str(tmp_path / "course")], catch_exceptions=False)
+    assert result.exit_code == 0
+    assert "00_tour" in result.output
+    assert (tmp_path / "course" / "README.md").is_file()
+
+
+def test_unknown_lecture_is_refused():
+    with pytest.raises(ArgumentError, match="99_nothing"):
+        CliRunner().invoke(cli.app, ["course", "notebooks", "99_nothing"], catch_exceptions=False)
+
+
+def test_missing_tools_are_named(monkeypatch):
+    monkeypatch.setattr(cli, "find_spec", lambda name: None)
+    result = CliRunner().invoke(cli.app, ["course", "check"])
+    assert "jupytext and nbgrader" in str(result.exception)
