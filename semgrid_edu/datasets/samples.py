@@ -2,9 +2,19 @@
 
 from pathlib import Path
 
+import torch
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
+
 from semgrid_edu.datasets.kitti_raw import KittiRawDrive
-from semgrid_edu.errors import DataError
-from semgrid_edu.provenance import FILE_NAME, provenance_problems
+from semgrid_edu.datasets.training_cache import SEED
+from semgrid_edu.datasets.training_set import Sample, TrainingSet
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.files import atomic_path
+from semgrid_edu.provenance import FILE_NAME, provenance_problems, write_provenance
+
+FRAMES = "frames.safetensors"
+"""The file of an excerpt."""
 
 
 def samples_dir() -> Path:
@@ -34,6 +44,55 @@ def sample_drive() -> KittiRawDrive:
 def sample_weights() -> Path:
     """Return the file of the trained compact network, SegNet and fusion."""
     return samples_dir() / "weights" / "segnet_compact.safetensors"
+
+
+def sample_frames() -> list[Sample]:
+    """Return the shipped labelled frames of minikitti's training split, for experiments of a minute."""
+    return read_excerpt(samples_dir() / "frames")
+
+
+def write_excerpt(dataset_dir: str | Path, n_frames: int, folder: str | Path) -> None:
+    """Keep a few labelled frames of a data set's split "train", evenly spread over it.
+
+    Parameters
+    ----------
+    dataset_dir : path-like
+        Such as data/minikitti.
+    n_frames : int
+        How many.
+    folder : path-like
+        Takes `frames.safetensors` and `provenance.json`.
+
+    Raises
+    ------
+    ArgumentError
+        When the split has fewer frames.
+    """
+    training, folder = TrainingSet(dataset_dir, "train"), Path(folder)
+    if not 1 <= n_frames <= len(training):
+        raise ArgumentError("n_frames", f"1 to {len(training)} frames", n_frames)
+    chosen = [training[k * len(training) // n_frames] for k in range(n_frames)]
+    tensors = dict(zip(Sample._fields, map(torch.stack, zip(*chosen, strict=True)), strict=True))
+    with atomic_path(folder / FRAMES) as temporary:
+        save_file(tensors, temporary)
+    command = f"semgrid-edu data excerpt --data {Path(dataset_dir).name} --frames {n_frames} {folder.name}"
+    write_provenance(folder, command, SEED, ("numpy", "torch", "numba"))
+
+
+def read_excerpt(folder: str | Path) -> list[Sample]:
+    """Read the frames that `write_excerpt` kept.
+
+    Raises
+    ------
+    DataError
+        When the file is missing or damaged.
+    """
+    path = Path(folder) / FRAMES
+    try:
+        tensors = load_file(path)
+        return [Sample(*frame) for frame in zip(*(tensors[name] for name in Sample._fields), strict=True)]
+    except (OSError, SafetensorError, KeyError, ValueError) as error:
+        raise DataError(path, f"labelled frames: {', '.join(Sample._fields)}", error) from error
 
 
 def samples_problems(folder: Path | None = None) -> list[str]:

@@ -1,0 +1,51 @@
+"""The shipped samples, and excerpts like them."""
+
+import pytest
+import torch
+from tiny_drive import write_tiny_dataset
+
+from semgrid_edu.datasets.samples import FRAMES, read_excerpt, samples_problems, write_excerpt
+from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.files import write_bytes
+
+
+@pytest.fixture(scope="module")
+def excerpt(tmp_path_factory):
+    """A data set and the excerpt of both frames of its training split."""
+    root = write_tiny_dataset(tmp_path_factory.mktemp("tiny"))
+    write_excerpt(root, 2, root / "samples" / "frames")
+    return root, root / "samples" / "frames"
+
+
+def test_an_excerpt_holds_the_frames_of_the_training_set_bit_for_bit(excerpt):
+    root, folder = excerpt
+    kept, training = read_excerpt(folder), TrainingSet(root, "train")
+    assert len(kept) == len(training) == 2
+    for sample, original in zip(kept, training, strict=True):
+        assert all(map(torch.equal, sample, original))
+
+
+def test_more_frames_than_there_are_is_refused(excerpt):
+    with pytest.raises(ArgumentError, match="n_frames: expected 1 to 2 frames, found 3"):
+        write_excerpt(excerpt[0], 3, excerpt[1])
+
+
+def test_samples_are_checked_one_by_one(excerpt):
+    samples = excerpt[1].parent
+    assert samples_problems(samples) == []
+    write_bytes(samples / "frames" / "stray", b"")
+    assert [problem.rsplit("/", 1)[-1] for problem in samples_problems(samples)] == ["stray: not in provenance.json"]
+
+
+@pytest.mark.parametrize("content", [None, b"", b"no safetensors"])
+def test_a_missing_or_damaged_excerpt_is_named(tmp_path, content):
+    if content is not None:
+        write_bytes(tmp_path / FRAMES, content)
+    with pytest.raises(DataError, match=FRAMES):
+        read_excerpt(tmp_path)
+
+
+def test_no_samples_at_all_is_an_error(tmp_path):
+    with pytest.raises(DataError, match="found none"):
+        samples_problems(tmp_path)
