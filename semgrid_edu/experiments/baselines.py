@@ -9,8 +9,8 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
 from semgrid_edu.occupancy import State
 
-CLOSING_REACH = 1.0
-"""Metres. On minikitti's training split 0.5 to 2 m do about equally well."""
+CLOSING_REACH = 1.5
+"""Metres. Of 0.5 to 3 m it gives the best pixel accuracy on minikitti's training split, with true image labels."""
 
 
 def majority_class(truths: NDArray) -> NDArray[np.uint8]:

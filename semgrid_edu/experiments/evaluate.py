@@ -5,11 +5,12 @@ from pathlib import Path
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import nn
 from tqdm.auto import tqdm
 
 from semgrid_edu.crf import CrfParams, mean_field
 from semgrid_edu.datasets.training_cache import SEED
-from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.datasets.training_set import Sample, TrainingSet
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.baselines import carry_labels, close_gaps, majority_class
 from semgrid_edu.files import sha256
@@ -23,6 +24,7 @@ from semgrid_edu.metrics import (
 )
 from semgrid_edu.networks import SemanticGridNet, load_net
 from semgrid_edu.provenance import versions
+from semgrid_edu.training import IMAGE_STAGE
 
 METRICS = {
     "pixel accuracy": pixel_accuracy,
@@ -42,7 +44,8 @@ def evaluate(dataset_dir: str | Path, weights: str | Path) -> dict[str, object]:
     dataset_dir : path-like
         A data set with the splits "train" and "test", such as data/minikitti.
     weights : path-like
-        A network that learned from the training split.
+        A network that learned from the training split. Where `image_stage.safetensors` lies beside it, its image
+        labels are carried to the grid as well: those that learned from images alone, not yet from grids.
 
     Returns
     -------
@@ -59,7 +62,11 @@ def evaluate(dataset_dir: str | Path, weights: str | Path) -> dict[str, object]:
     """
     training, test = TrainingSet(dataset_dir, "train"), TrainingSet(dataset_dir, "test")
     net = load_net(weights, test.camera)
-    confusions = confusion_matrices(net, test, majority_class(training.arrays["truth"]))
+    segmenters = {"end-to-end": net.segmenter}
+    image_stage = Path(weights).with_name(IMAGE_STAGE)
+    if image_stage.exists():
+        segmenters["image-stage"] = load_net(image_stage, test.camera).segmenter
+    confusions = confusion_matrices(net, segmenters, test, majority_class(training.arrays["truth"]))
     return {
         "scores": scores(confusions, test.label_set),
         "confusion": {method: confusion.tolist() for method, confusion in confusions.items()},
@@ -72,12 +79,16 @@ def evaluate(dataset_dir: str | Path, weights: str | Path) -> dict[str, object]:
     }
 
 
-def confusion_matrices(net: SemanticGridNet, test: TrainingSet, majority: NDArray) -> dict[str, NDArray[np.int64]]:
+def confusion_matrices(
+    net: SemanticGridNet, segmenters: dict[str, nn.Module], test: TrainingSet, majority: NDArray
+) -> dict[str, NDArray[np.int64]]:
     """Count what each method makes of every frame.
 
     Parameters
     ----------
     net : SemanticGridNet
+    segmenters : dict of str to Module
+        Image networks by name, whose labels geometry carries to the grid.
     test : TrainingSet
         The frames.
     majority : (H, W) int
@@ -93,31 +104,31 @@ def confusion_matrices(net: SemanticGridNet, test: TrainingSet, majority: NDArra
         raise ArgumentError("net", f"the {n_classes} classes of {test.label_set.name}", net.n_classes)
     total: dict[str, NDArray[np.int64]] = {}
     for k in tqdm(range(len(test)), desc="evaluate", unit="frame"):
-        truth = test.arrays["truth"][k]
-        for method, grid in predictions(net, test, k, majority).items():
+        truth, sample = test.arrays["truth"][k], test[k]
+        grids = {"majority class": majority, **learned_grids(net, sample)}
+        labels = {name: image_labels(segmenter, sample) for name, segmenter in segmenters.items()}
+        for name, label_image in (labels | {"true": sample.labels.numpy()}).items():
+            carried = carry_labels(label_image, *test.returns(k), sample.occupancy.numpy())
+            grids[f"geometry, {name} labels"] = carried
+            grids[f"geometry, {name} labels, gaps closed"] = close_gaps(carried, test.spec.cell)
+        for method, grid in grids.items():
             total[method] = total.get(method, 0) + confusion_matrix(truth, grid, n_classes)
     return total
 
 
 @torch.inference_mode()
-def predictions(net: SemanticGridNet, test: TrainingSet, k: int, majority: NDArray) -> dict[str, NDArray]:
-    """Return the semantic grid of frame k by each method, (H, W) int."""
-    sample, returns = test[k], test.returns(k)
-    stages = net.stages(sample.image[None] / 255, sample.occupancy[None])
-    unary = -stages.logits[0].log_softmax(dim=0).numpy()
-    occupancy = sample.occupancy.numpy()
-    image_classes = stages.scores[0].argmax(dim=0).numpy()
-    predicted = carry_labels(image_classes, *returns, occupancy)
-    true = carry_labels(sample.labels.numpy(), *returns, occupancy)
-    return {
-        "network": unary.argmin(axis=0),
-        "network + CRF": mean_field(unary, occupancy, CrfParams()).argmax(axis=0),
-        "majority class": majority,
-        "geometry, predicted image labels": predicted,
-        "predicted labels, gaps closed": close_gaps(predicted, test.spec.cell),
-        "geometry, true image labels": true,
-        "true labels, gaps closed": close_gaps(true, test.spec.cell),
-    }
+def learned_grids(net: SemanticGridNet, sample: Sample) -> dict[str, NDArray]:
+    """Return the arg-max of the network's grid and of the refined one, (H, W) int."""
+    logits = net(sample.image[None] / 255, sample.occupancy[None])
+    unary = -logits[0].log_softmax(dim=0).numpy()
+    refined = mean_field(unary, sample.occupancy.numpy(), CrfParams())
+    return {"network": unary.argmin(axis=0), "network + CRF": refined.argmax(axis=0)}
+
+
+@torch.inference_mode()
+def image_labels(segmenter: nn.Module, sample: Sample) -> NDArray[np.int64]:
+    """Return the arg-max of an image network's scores, (h, w)."""
+    return segmenter(sample.image[None] / 255)[0].argmax(dim=0).numpy()
 
 
 def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:

@@ -13,7 +13,6 @@ from semgrid_edu.files import sha256
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import Architecture, build_net, save_net
-from semgrid_edu.networks.semantic_grid import Stages
 
 ROAD, CAR, FREE, STATIC = (KITTI_14.index(name) for name in ("road", "car", "unknown-free", "unknown-static"))
 TRUTH = np.array([[[ROAD, CAR], [FREE, STATIC]]], np.uint8)
@@ -45,28 +44,31 @@ class FourCells:
 class AlwaysRoad:
     n_classes = 14
 
-    def stages(self, image, occupancy):
-        scores = torch.zeros(1, 14, 2, 2)
-        scores[:, ROAD] = 9
-        return Stages(scores, None, scores)
+    def __call__(self, image, occupancy):
+        return self.segmenter(image)
+
+    def segmenter(self, image):
+        return 9 * torch.eye(14)[ROAD].reshape(1, 14, 1, 1).expand(1, 14, 2, 2)
 
 
 @pytest.fixture(scope="module")
 def found():
-    confusions = confusion_matrices(AlwaysRoad(), FourCells(), np.full((2, 2), CAR))
+    confusions = confusion_matrices(
+        AlwaysRoad(), {"all-road": AlwaysRoad().segmenter}, FourCells(), np.full((2, 2), CAR)
+    )
     return scores(confusions, KITTI_14)
 
 
 def test_scores_are_those_counted_by_hand(found):
     accuracy = {method: cells["all"]["pixel accuracy"] for method, cells in found.items()}
     assert accuracy == {
+        "majority class": 0.25,
         "network": 0.25,
         "network + CRF": 0.25,
-        "majority class": 0.25,
-        "geometry, predicted image labels": 0.25,
-        "predicted labels, gaps closed": 0.25,
-        "geometry, true image labels": 1.0,
-        "true labels, gaps closed": 0.5,  # the free and the static cell take the class of their neighbour
+        "geometry, all-road labels": 0.25,
+        "geometry, all-road labels, gaps closed": 0.25,
+        "geometry, true labels": 1.0,
+        "geometry, true labels, gaps closed": 0.5,  # the free and the static cell take the class of their neighbour
     }
     assert found["network"]["semantic"]["class accuracy"] == 0.5
 
@@ -87,7 +89,9 @@ def test_evaluates_a_network_from_disk(tmp_path, monkeypatch):
     root = write_tiny_dataset(tmp_path / "tiny")
     camera = KittiRawDrive(root, "2026_01_01", "0001").camera
     save_net(build_net(Architecture(), camera), tmp_path / "net.safetensors")
+    save_net(build_net(Architecture(), camera, seed=1), tmp_path / "image_stage.safetensors")
     result = evaluate(root, tmp_path / "net.safetensors")
+    assert {"geometry, end-to-end labels", "geometry, image-stage labels"} < result["scores"].keys()
     assert result == json.loads(json.dumps(result))
     assert result["frames"] == {"train": 1, "test": 1}
     assert result["weights"]["sha256"] == sha256(tmp_path / "net.safetensors")
