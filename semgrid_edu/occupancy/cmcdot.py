@@ -8,7 +8,7 @@ from semgrid_edu.occupancy.evidence import scan_evidence
 from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.moving_map import look_up, map_around, scroll
 from semgrid_edu.occupancy.params import CmcdotParams
-from semgrid_edu.occupancy.particles import cells_of, mean_velocity
+from semgrid_edu.occupancy.particles import cells_of, mean_velocity, transform
 from semgrid_edu.occupancy.state import Belief, FilterState, Particles
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN, move, predict, resample, update
 
@@ -20,7 +20,8 @@ class Cmcdot:
     """The filter: give it scan after scan, and it tells free, static, dynamic and unknown cells apart.
 
     Inside, it keeps a map somewhat larger than the grid that stays aligned with the world and scrolls under
-    the vehicle by whole cells (`moving_map`); each belief is looked up from it once.
+    the vehicle by whole cells (`moving_map`). What the map predicts is looked up in the vehicle's cells and
+    updated there with the scan once more, for the belief that is handed out; nothing of that goes back.
 
     Parameters
     ----------
@@ -51,9 +52,7 @@ class Cmcdot:
     @property
     def particles(self) -> Particles:
         """The particles in the grid frame of the vehicle; some lie outside the grid, in the margin of the map."""
-        particles, turn = self._state.particles, self._pose.rotation.astype(np.float32)
-        position = self._pose.to_now(particles.position).astype(np.float32)
-        return Particles(position, particles.velocity @ turn, particles.weight)
+        return transform(self._state.particles, self._pose)
 
     def step(self, points_grid: NDArray, motion: PlanarMotion, dt: float) -> Belief:
         """Take in one scan.
@@ -84,14 +83,19 @@ class Cmcdot:
         predicted = predict(moved, self.map_spec, self.params, dt, self._rng)
         updated = update(predicted, self.map_spec, evidence, self.params)
         self._state, self._pose = resample(updated, self.map_spec, self.params, self._rng), pose
-        return self._belief()
+        return Belief(self._probability(predicted, points_grid), self._velocity())
 
-    def _belief(self) -> Belief:
-        """Look the belief up in the vehicle's frame."""
-        state, pose = self._state, self._pose
-        probability = look_up(state.probability, NOTHING_KNOWN, self.map_spec, self.spec, pose)
-        cells = cells_of(state.particles.position, self.map_spec)
-        over_map = mean_velocity(state.particles, cells, self.map_spec.shape)
-        velocity = look_up(over_map, np.full(2, np.nan, np.float32), self.map_spec, self.spec, pose)
-        velocity = np.einsum("ij,ihw->jhw", pose.rotation.astype(np.float32), velocity)
-        return Belief(probability, velocity)
+    def _probability(self, predicted: FilterState, points_grid: NDArray) -> NDArray[np.float32]:
+        """Look the prediction up in the vehicle's cells and update those, so that returns lie in the cells they hit."""
+        here = look_up(predicted.probability, NOTHING_KNOWN, self.map_spec, self.spec, self._pose)
+        prior = FilterState(here, Particles.none(), np.zeros(self.spec.shape, np.float32))
+        evidence = scan_evidence(points_grid, self.spec, self.params.sensor)
+        return update(prior, self.spec, evidence, self.params).probability
+
+    def _velocity(self) -> NDArray[np.float32]:
+        """Look the mean velocities up in the vehicle's cells, and turn them into its axes."""
+        particles = self._state.particles
+        over_map = mean_velocity(particles, cells_of(particles.position, self.map_spec), self.map_spec.shape)
+        unknown = np.full(2, np.nan, np.float32)
+        velocity = look_up(over_map, unknown, self.map_spec, self.spec, self._pose)
+        return np.einsum("ij,ihw->jhw", self._pose.rotation.astype(np.float32), velocity)

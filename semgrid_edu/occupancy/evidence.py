@@ -33,6 +33,11 @@ class SensorModel:
     p_pass_occupied, p_pass_free : float
         Probability that a beam passes a cell that is occupied (foliage is porous, objects fill a cell in
         part), or free.
+
+    Raises
+    ------
+    ArgumentError
+        When a parameter can't be one.
     """
 
     obstacle_min: float = 0.3
@@ -44,6 +49,16 @@ class SensorModel:
     max_returns: int = 3
     p_pass_occupied: float = 0.3
     p_pass_free: float = 0.7
+
+    def __post_init__(self) -> None:
+        """Refuse a sensor that is impossible, or never errs: certainty can't be corrected."""
+        if not 0 < self.azimuth_step <= 360:
+            raise ArgumentError("azimuth_step", "degrees, above 0 and up to 360", self.azimuth_step)
+        if not self.obstacle_min < self.obstacle_max:
+            raise ArgumentError("obstacle_min", f"less than obstacle_max, {self.obstacle_max}", self.obstacle_min)
+        for name in ("p_hit_occupied", "p_hit_free", "p_pass_occupied", "p_pass_free"):
+            if not 0 < getattr(self, name) < 1:
+                raise ArgumentError(name, "a probability between 0 and 1", getattr(self, name))
 
     @property
     def beams(self) -> int:
@@ -94,7 +109,7 @@ def scan_evidence(points: NDArray, spec: GridSpec, sensor: SensorModel, pose: Pl
     Returns
     -------
     Evidence
-        That of `scan_evidence_literal`, except within a cell of where what is seen begins or ends.
+        That of `scan_evidence_literal`, except for lines of cells where what is seen begins or ends.
 
     Raises
     ------
@@ -119,14 +134,14 @@ def scan_evidence_literal(
     points, pose = check_points(points).astype(np.float64), pose or PlanarMotion()
     obstacles, free = np.zeros(spec.shape, np.int64), np.zeros(spec.shape, bool)
     first_obstacle, last_ground = np.full(sensor.beams, np.inf), np.zeros(sensor.beams)
-    for x, y, z in points[:, :3]:
-        rows, cols, inside = spec.cells(pose.to_previous(np.array([[x, y]])))
+    cells = zip(*spec.cells(pose.to_previous(points[:, :2])), strict=True)
+    for (x, y, z), (row, col, inside) in zip(points[:, :3], cells, strict=True):
         beam = int((np.arctan2(y, x) + np.pi) / (2 * np.pi) * sensor.beams) % sensor.beams
         if sensor.obstacle_min <= z <= sensor.obstacle_max:
-            obstacles[rows, cols] += inside
+            obstacles[row, col] += inside
             first_obstacle[beam] = min(first_obstacle[beam], np.hypot(x, y))
         elif z < sensor.obstacle_min:
-            free[rows, cols] |= inside
+            free[row, col] |= inside
             last_ground[beam] = max(last_ground[beam], np.hypot(x, y))
     free_to = fill_gaps(reach(first_obstacle, last_ground), sensor.gap)
     for beam in np.flatnonzero(free_to):

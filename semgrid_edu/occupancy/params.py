@@ -26,13 +26,14 @@ class CmcdotParams:
     rates : 4 x 4 floats
         How often a cell turns from the state of the row into that of the column, 1/s; the diagonal is
         ignored. What nobody sees is forgotten: moving things in 2 s, free space in 3 s, what stands in 10 s. In
-        a free cell something appears once in 15 s, mostly by the sensor's errors: real motion arrives
-        with particles. UNKNOWN stays so until somebody looks (`first_sight`).
+        a free cell something appears, without having arrived there, once in 30 s, and mostly by the
+        sensor's errors. UNKNOWN stays so until somebody looks (`first_sight`).
     stop_rate, stop_speed : float
         What moves slower than about `stop_speed` (m/s) stands: a particle of speed v turns STATIC at the rate
-        stop_rate exp(-v^2 / (2 stop_speed^2)), 1/s. A pedestrian's 1.4 m/s is far above the default.
+        stop_rate exp(-v^2 / (2 stop_speed^2)), 1/s: by default what doesn't move for 0.2 s stands, and
+        a pedestrian's 1.4 m/s is far above the default speed.
     max_speed : float
-        The velocity prior of what starts to move: speed uniform up to this, m/s (25 m/s = 90 km/h).
+        The velocity prior of what starts to move: any heading, speed up to this, m/s (25 m/s = 90 km/h).
     acceleration : float
         Standard deviation of a particle's acceleration, m/s^2: traffic brakes and turns with 2 to 3.
     birth_share : float
@@ -52,7 +53,7 @@ class CmcdotParams:
     particles: int = 200_000
     rates: Rates = (
         # to FREE, STATIC, DYNAMIC, UNKNOWN
-        (0.0, 0.05, 0.02, 0.3),
+        (0.0, 0.02, 0.01, 0.3),
         (0.02, 0.0, 0.01, 0.1),
         (0.1, 0.1, 0.0, 0.5),
         (0.0, 0.0, 0.0, 0.0),
@@ -72,9 +73,11 @@ class CmcdotParams:
         rates = np.asarray(self.rates, dtype=float)
         if rates.shape != (4, 4) or not np.isfinite(rates).all() or (rates < 0).any():
             raise ArgumentError("rates", "4 x 4 finite rates, none negative", self.rates)
-        for name in ("stop_rate", "stop_speed", "max_speed", "acceleration"):
+        for name in ("stop_rate", "max_speed", "acceleration"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
                 raise ArgumentError(name, "a finite number, not negative", getattr(self, name))
+        if not (np.isfinite(self.stop_speed) and self.stop_speed > 0):
+            raise ArgumentError("stop_speed", "a positive speed in m/s", self.stop_speed)
         if len(self.first_sight) != 3 or min(self.first_sight) < 0 or not np.isclose(sum(self.first_sight), 1):
             raise ArgumentError("first_sight", "three probabilities that sum to 1", self.first_sight)
         if not 0 < self.birth_share < 1:

@@ -7,6 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.state import Particles
 
 OUTSIDE = -1
@@ -102,19 +103,84 @@ def fly(particles: Particles, acceleration: float, dt: float, rng: np.random.Gen
     Particles
         v' = v + a dt, x' = x + v dt + a dt^2 / 2.
     """
-    change = rng.standard_normal((len(particles), 2), np.float32) * np.float32(acceleration * dt)
-    middle = particles.velocity + change / 2
-    return Particles(particles.position + middle * np.float32(dt), particles.velocity + change, particles.weight)
+    noise = rng.standard_normal((len(particles), 2), np.float32)
+    position, velocity = _fly(particles.position, particles.velocity, noise, acceleration, dt)
+    return Particles(position, velocity, particles.weight)
+
+
+@njit(cache=True)
+def _fly(position, velocity, noise, acceleration, dt):
+    flown, faster = np.empty_like(position), np.empty_like(velocity)
+    for i in range(len(position)):
+        for k in range(2):
+            change = noise[i, k] * acceleration * dt
+            flown[i, k] = position[i, k] + (velocity[i, k] + change / 2) * dt
+            faster[i, k] = velocity[i, k] + change
+    return flown, faster
+
+
+def slow_down(particles: Particles, stop_rate: float, stop_speed: float, dt: float) -> Particles:
+    """Keep of each weight what goes on moving: a particle of speed v stops at a rate that falls with v.
+
+    Parameters
+    ----------
+    particles : Particles
+    stop_rate, stop_speed : float
+        Rate of stopping at v = 0, 1/s, and the speed (m/s) above which it falls.
+    dt : float
+        Seconds.
+
+    Returns
+    -------
+    Particles
+        Weights times exp(-stop_rate dt exp(-v^2 / (2 stop_speed^2))).
+    """
+    weight = _slow_down(particles.velocity, particles.weight, stop_rate * dt, stop_speed)
+    return Particles(particles.position, particles.velocity, weight)
+
+
+@njit(cache=True)
+def _slow_down(velocity, weight, stops, stop_speed):
+    kept = np.empty_like(weight)
+    for i in range(len(weight)):
+        speed2 = velocity[i, 0] ** 2 + velocity[i, 1] ** 2
+        kept[i] = weight[i] * np.exp(-stops * np.exp(-speed2 / (2 * stop_speed**2)))
+    return kept
+
+
+def transform(particles: Particles, motion: PlanarMotion) -> Particles:
+    """Express particles in a new frame whose pose in the old one is `motion`."""
+    T = (motion.dx, motion.dy, np.cos(motion.dyaw), np.sin(motion.dyaw))
+    return Particles(*_transform(particles.position, particles.velocity, *T), particles.weight)
+
+
+@njit(cache=True)
+def _transform(position, velocity, dx, dy, cos, sin):
+    moved, turned = np.empty_like(position), np.empty_like(velocity)
+    for i in range(len(position)):
+        x, y = position[i, 0] - dx, position[i, 1] - dy
+        vx, vy = velocity[i]
+        moved[i, 0], moved[i, 1] = cos * x + sin * y, cos * y - sin * x
+        turned[i, 0], turned[i, 1] = cos * vx + sin * vy, cos * vy - sin * vx
+    return moved, turned
 
 
 def mean_velocity(particles: Particles, cells: NDArray, shape: tuple[int, int]) -> NDArray[np.float32]:
     """Return the mean velocity of the particles in each cell, weighed: (2, H, W) m/s, NaN without any."""
-    weight = _sum_in_cells(particles.weight, cells, shape[0] * shape[1])
-    moment = np.stack(
-        [_sum_in_cells(particles.weight * particles.velocity[:, k], cells, len(weight)) for k in range(2)]
-    )
-    mean = np.divide(moment, weight, out=np.full(moment.shape, np.nan), where=weight > 0)
+    moment = _moments(particles.velocity, particles.weight, cells, math.prod(shape))
+    mean = np.divide(moment[:2], moment[2], out=np.full(moment[:2].shape, np.nan), where=moment[2] > 0)
     return mean.reshape(2, *shape).astype(np.float32)
+
+
+@njit(cache=True)
+def _moments(velocity, weight, cells, n_cells):
+    moment = np.zeros((3, n_cells))
+    for i in range(len(cells)):
+        if cells[i] != OUTSIDE:
+            moment[0, cells[i]] += weight[i] * velocity[i, 0]
+            moment[1, cells[i]] += weight[i] * velocity[i, 1]
+            moment[2, cells[i]] += weight[i]
+    return moment
 
 
 @njit(cache=True)
@@ -162,8 +228,8 @@ def systematic_resample(weight, count, offset):
 def draw_velocities(count: int, max_speed: float, rng: np.random.Generator) -> NDArray[np.float32]:
     """Draw velocities of things of which nothing is known but that they move.
 
-    Heading and speed are uniform, so walking pace is drawn as often as any other band of speeds of its width:
-    uniform in the plane, one particle in two hundred would be as slow as a pedestrian.
+    Any heading; the speed is the square of a uniform number, so that slow is more frequent than fast and
+    one in four is no faster than a pedestrian (uniform in the plane, it would be one in two hundred).
 
     Parameters
     ----------
@@ -178,6 +244,6 @@ def draw_velocities(count: int, max_speed: float, rng: np.random.Generator) -> N
     (M, 2) float32
         m/s.
     """
-    speed = max_speed * rng.random(count, np.float32)
+    speed = max_speed * rng.random(count, np.float32) ** 2
     heading = np.float32(2 * np.pi) * rng.random(count, np.float32)
     return np.stack([speed * np.cos(heading), speed * np.sin(heading)], axis=1)

@@ -1,5 +1,7 @@
 """CMCDOT's four steps, each a pure function: move, predict, update, resample (paper, section 3.2)."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +15,9 @@ from semgrid_edu.occupancy.particles import (
     draw_velocities,
     fly,
     scale_in_cells,
+    slow_down,
     systematic_resample,
+    transform,
     weight_in_cells,
 )
 from semgrid_edu.occupancy.state import FilterState, Particles, State
@@ -45,17 +49,16 @@ def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterStat
         In the new frame.
     """
     probability = look_up(state.probability, NOTHING_KNOWN, spec, spec, motion)
-    position = motion.to_now(state.particles.position).astype(np.float32)
-    velocity = state.particles.velocity @ motion.rotation.astype(np.float32)
-    cells = cells_of(position, spec)
-    claimed = weight_in_cells(state.particles.weight, cells, spec.shape)
+    particles = transform(state.particles, motion)
+    cells = cells_of(particles.position, spec)
+    claimed = weight_in_cells(particles.weight, cells, spec.shape)
     dynamic = np.minimum(claimed, 1)
-    weight = scale_in_cells(state.particles.weight, cells, _ratio(dynamic, claimed))
+    weight = scale_in_cells(particles.weight, cells, _ratio(dynamic, claimed))
     others = 1 - probability[DYNAMIC]
     probability *= _ratio(1 - dynamic, others)
     probability[DYNAMIC] = dynamic
     probability[UNKNOWN] += 1 - probability.sum(axis=0)
-    return FilterState(probability, Particles(position, velocity, weight), state.newborn)
+    return FilterState(probability, replace(particles, weight=weight), state.newborn)
 
 
 def predict(
@@ -63,15 +66,15 @@ def predict(
 ) -> FilterState:
     """Step 2: what becomes of the belief while `dt` seconds pass and nobody looks.
 
-    First each cell mixes by the transition matrix, and particles near zero speed become STATIC. Then
-    dynamic mass flies. What it leaves behind is FREE: nothing stood where something moved. Where it arrives with probability a, two opinions
-    meet: "something arrives" (a) and the cell's own. They can't both be right where the cell is STATIC, so of
-    the joint distribution that combination is struck out:
+    First each cell mixes by the transition matrix, and particles near zero speed become STATIC. Then dynamic
+    mass flies. What it leaves behind is FREE: nothing stood where something moved. Where it arrives with
+    probability a, two opinions meet: "something arrives" (a) and the cell's own. They can't both be right where
+    the cell is STATIC, so of the joint distribution that combination is struck out:
 
         P(DYNAMIC) = [a (1 - s) + (1 - a) d] / (1 - a s),   others = (1 - a) others / (1 - a s)
 
-    with s and d the cell's own static and dynamic probability. So what arrives in free space is dynamic, and a
-    standing fence isn't talked out of it by particles that cross it.
+    with s and d the cell's own static and dynamic probability. So what arrives in free space is dynamic, and
+    a standing fence isn't talked out of it by particles that cross it.
 
     Parameters
     ----------
@@ -93,10 +96,11 @@ def predict(
     """
     M = transition_matrix(params, dt).astype(state.probability.dtype)
     before = cells_of(state.particles.position, spec)
-    particles = _slow_down(state.particles, M[DYNAMIC, DYNAMIC], params, dt)
+    particles = slow_down(state.particles, params.stop_rate, params.stop_speed, dt)
+    particles = replace(particles, weight=particles.weight * M[DYNAMIC, DYNAMIC])
     going = weight_in_cells(particles.weight, before, spec.shape)
-    own = np.tensordot(M.T, state.probability, axes=1)
-    newborn = np.tensordot(M[:, DYNAMIC], _without_particles(state), axes=1)
+    own = np.einsum("ij,ihw->jhw", M, state.probability)
+    newborn = np.einsum("i,ihw->hw", M[:, DYNAMIC], _without_particles(state))
     own[STATIC] += np.maximum(own[DYNAMIC] - newborn - going, 0)
 
     particles = fly(particles, params.acceleration, dt, rng)
@@ -114,7 +118,7 @@ def predict(
     weight = scale_in_cells(particles.weight, bucket, np.stack([own_factor, arrival_factor]))
     probability = own * own_factor
     probability[DYNAMIC] += arrives * arrival_factor
-    return FilterState(probability, Particles(particles.position, particles.velocity, weight), newborn * own_factor)
+    return FilterState(probability, replace(particles, weight=weight), newborn * own_factor)
 
 
 def update(state: FilterState, spec: GridSpec, evidence: Evidence, params: CmcdotParams) -> FilterState:
@@ -150,7 +154,7 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, params: Cmcdo
     factor = _ratio(posterior[DYNAMIC], prior.probability[DYNAMIC])
     particles = prior.particles
     weight = scale_in_cells(particles.weight, cells_of(particles.position, spec), factor)
-    return FilterState(posterior, Particles(particles.position, particles.velocity, weight), prior.newborn * factor)
+    return FilterState(posterior, replace(particles, weight=weight), prior.newborn * factor)
 
 
 def reveal(state: FilterState, seen: NDArray, params: CmcdotParams) -> FilterState:
@@ -237,13 +241,6 @@ def _draw_newborn(
     position = (spec.x_max, spec.y_max) - corner * spec.cell
     weight = np.full(count, total / count, np.float32)
     return Particles(position.astype(np.float32), draw_velocities(count, max_speed, rng), weight)
-
-
-def _slow_down(particles: Particles, p_stays: float, params: CmcdotParams, dt: float) -> Particles:
-    """Keep of each weight what the matrix leaves dynamic and what doesn't stop: slow things are standing."""
-    slowness = np.square(particles.velocity).sum(axis=1) / (2 * params.stop_speed**2)
-    goes_on = np.exp(-params.stop_rate * dt * np.exp(-slowness))
-    return Particles(particles.position, particles.velocity, particles.weight * (p_stays * goes_on).astype(np.float32))
 
 
 def _without_particles(state: FilterState) -> NDArray:

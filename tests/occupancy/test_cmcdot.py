@@ -1,0 +1,192 @@
+"""The whole filter on small worlds whose truth is known."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lidar_scenes import Box, cells_in, hit_cells, scan
+
+from semgrid_edu.camera import Camera, rigid_transform
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.frame import Frame
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import Cmcdot, CmcdotParams, PlanarMotion, State, track_drive
+
+SMALL = GridSpec(0, 40, -10, 10, 0.5)
+PARAMS = CmcdotParams(particles=50_000)
+STILL = PlanarMotion()
+WALL, PARKED = Box(5, 60, 7, 7.5, 2.5), Box.around(22, -6, 4, 1.8, 1.5)
+
+
+def street(time: float) -> list[Box]:
+    """A wall, a parked car, a car that comes towards us at 8 m/s and one that drives ahead at 6 m/s."""
+    return [WALL, PARKED, Box.around(36 - 8 * time, 3, 4, 1.8, 1.5), Box.around(12 + 6 * time, -2, 4, 1.8, 1.5)]
+
+
+def drive(speed: float, steps: int, spec: GridSpec = SMALL, seed: int = 0):
+    """Yield time, the vehicle's x, the scan and the belief, for a vehicle that drives along x."""
+    tracker, rng = Cmcdot(spec, PARAMS, seed), np.random.default_rng(seed)
+    for k in range(steps):
+        x = speed * k * 0.1
+        points = scan(street(k * 0.1), x=x, noise=0.02, rng=rng)
+        yield k * 0.1, x, points, tracker.step(points, PlanarMotion(speed * 0.1, 0, 0), 0.1)
+
+
+@pytest.fixture(scope="module", params=[0.0, 4.0], ids=["standing", "driving"])
+def street_at_end(request):
+    return list(drive(request.param, 26))[-1]
+
+
+def dynamic_share(box: Box, at_end) -> tuple[float, np.ndarray]:
+    """Return the share of the box's hit cells that are more DYNAMIC than STATIC, and their mean velocity."""
+    _, x, points, belief = at_end
+    cells = cells_in(box, SMALL, x, margin=0.3) & hit_cells(points, SMALL)
+    dynamic = belief.probability[State.DYNAMIC] > belief.probability[State.STATIC]
+    assert cells.sum() >= 3
+    return dynamic[cells].mean(), np.nanmean(belief.velocity[:, cells & dynamic], axis=1) if dynamic[
+        cells
+    ].any() else None
+
+
+@pytest.mark.parametrize(("which", "speed"), [(2, -8), (3, 6)], ids=["oncoming", "ahead"])
+def test_moving_cars_become_dynamic_with_the_right_velocity(street_at_end, which, speed):
+    share, velocity = dynamic_share(street(street_at_end[0])[which], street_at_end)
+    assert share >= 0.75
+    assert np.abs(velocity - [speed, 0]).max() < 1.5
+
+
+@pytest.mark.parametrize("box", [WALL, PARKED], ids=["wall", "parked"])
+def test_what_stands_stays_static(street_at_end, box):
+    share, _ = dynamic_share(box, street_at_end)
+    assert share <= 0.03
+
+
+def test_road_is_free_and_behind_a_wall_nobody_knows(street_at_end):
+    _, x, _, belief = street_at_end
+    most_likely = belief.probability.argmax(axis=0)
+    road = cells_in(Box(x + 3, x + 8, -2, 2, 0), SMALL, x)
+    behind = cells_in(Box(x + 8, x + 25, 8.5, 10, 0), SMALL, x)
+    assert (most_likely[road] == State.FREE).all()
+    assert (most_likely[behind] == State.UNKNOWN).all()
+
+
+def test_velocity_is_known_where_dynamic_mass_is(street_at_end):
+    belief = street_at_end[3]
+    assert belief.probability.dtype == belief.velocity.dtype == np.float32
+    assert belief.probability.shape == (4, *SMALL.shape)
+    assert np.array_equal(np.isnan(belief.velocity[0]), np.isnan(belief.velocity[1]))
+    known = ~np.isnan(belief.velocity[0])
+    assert known[belief.probability[State.DYNAMIC] > 0.5].mean() > 0.95
+    assert not known[belief.probability[State.DYNAMIC] == 0].any()
+
+
+def test_walking_people_become_dynamic():
+    spec, tracker, rng = (
+        GridSpec(0, 20, -6, 6, 0.2),
+        Cmcdot(GridSpec(0, 20, -6, 6, 0.2), seed=0),
+        np.random.default_rng(0),
+    )
+    for k in range(25):
+        person = Box.around(10, -3 + 1.4 * k * 0.1, 0.5, 0.5, 1.75)
+        points = scan([person], noise=0.02, rng=rng)
+        belief = tracker.step(points, STILL, 0.1)
+    cells = cells_in(person, spec, margin=0.1) & hit_cells(points, spec)
+    assert (belief.probability[State.DYNAMIC] > belief.probability[State.STATIC])[cells].mean() >= 0.6
+    assert abs(np.nanmean(belief.velocity[1, cells]) - 1.4) < 0.7
+
+
+def test_a_mirrored_world_is_believed_mirrored():
+    """Except for cells whose centre lies on the border of two beams; no return lies there."""
+    points = scan(street(0.0), columns=360)
+    beliefs = [Cmcdot(SMALL, PARAMS).step(p, STILL, 0.1).probability for p in (points, points * [1, -1, 1])]
+    assert (np.abs(beliefs[0] - beliefs[1][:, :, ::-1]).max(axis=0) > 0.05).mean() < 0.02
+
+
+def test_the_belief_follows_the_vehicle_through_a_turn():
+    """A post that stands at one place of the world is STATIC there, whatever the vehicle does."""
+    tracker, pose = Cmcdot(SMALL, PARAMS), STILL
+    for _ in range(25):
+        points = scan([Box.around(20, 0, 1.5, 1.5, 2)], x=pose.dx, y=pose.dy, yaw=pose.dyaw)
+        motion = PlanarMotion(0.33, 0.0, 0.013)
+        belief = tracker.step(points, motion if pose is not STILL else STILL, 0.1)
+        seen_from, pose = pose, pose.then(motion)
+    row, col, inside = SMALL.cells(seen_from.to_now(np.array([[19.5, 0.0]])))
+    assert inside.all()
+    assert belief.probability[State.STATIC, row[0], col[0]] > 0.9
+
+
+def test_same_seed_same_bits_other_seed_other_bits():
+    first, again, other = (list(drive(4.0, 4, seed=seed))[-1] for seed in (1, 1, 2))
+    assert np.array_equal(first[3].probability, again[3].probability)
+    assert np.array_equal(first[3].velocity, again[3].velocity, equal_nan=True)
+    assert not np.array_equal(first[3].probability, other[3].probability)
+
+
+def test_a_jump_of_a_hundred_metres_forgets_everything():
+    tracker = Cmcdot(SMALL, PARAMS)
+    for k in range(3):
+        tracker.step(scan(street(k * 0.1)), STILL, 0.1)
+    belief = tracker.step(np.empty((0, 4)), PlanarMotion(100, 0, 0.5), 0.1)
+    assert (belief.probability[State.UNKNOWN] == 1).all()
+    assert np.isnan(belief.velocity).all()
+
+
+def test_without_scans_what_was_seen_is_forgotten():
+    tracker = Cmcdot(SMALL, PARAMS)
+    tracker.step(scan(street(0.0)), STILL, 0.1)
+    for _ in range(3):
+        belief = tracker.step(np.empty((0, 3)), STILL, 20.0)
+    assert (belief.probability.argmax(axis=0) == State.UNKNOWN).all()
+
+
+@settings(deadline=None, max_examples=25)
+@given(
+    st.integers(0, 10_000),
+    st.integers(0, 300),
+    st.sampled_from([1e-3, 1.0, 30.0, 1e6]),
+    st.sampled_from([0.0, 0.1, 5.0]),
+    st.floats(-100, 100),
+    st.floats(-7, 7),
+)
+def test_any_scans_keep_every_cell_a_distribution(seed, count, spread, dt, shift, yaw):
+    rng = np.random.default_rng(seed)
+    tracker = Cmcdot(SMALL, CmcdotParams(particles=2000), seed)
+    for _ in range(3):
+        points = rng.normal(0, 1, (count, 4)) * [spread, spread, 1, 1] + [10, 0, 0.5, 0]
+        belief = tracker.step(points, PlanarMotion(shift, 0, yaw), dt)
+        assert np.abs(belief.probability.sum(axis=0) - 1).max() < 1e-5
+        assert belief.probability.min() >= -1e-6
+
+
+def test_what_is_no_scan_or_time_is_refused_and_changes_nothing():
+    tracker, twin = Cmcdot(SMALL, PARAMS), Cmcdot(SMALL, PARAMS)
+    for points, dt, name in ((np.array([[np.nan, 0, 0]]), 0.1, "points"), (np.zeros((1, 3)), -1.0, "dt")):
+        with pytest.raises(ArgumentError, match=name):
+            tracker.step(points, PlanarMotion(1, 0, 0), dt)
+    points = scan(street(0.0))
+    beliefs = [t.step(points, STILL, 0.1).probability for t in (tracker, twin)]
+    assert np.array_equal(*beliefs)
+
+
+def frames(count: int) -> list[Frame]:
+    """Return the frames of a LIDAR that drives along the world's y axis at 5 m/s."""
+    camera = Camera(np.diag([100.0, 100.0, 1.0]), np.eye(4), size=(10, 20))
+    turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    result = []
+    for k in range(count):
+        points = np.pad(scan(street(0.1 * k), x=0.5 * k), ((0, 0), (0, 1))) - np.float32([0, 0, 1.73, 0])
+        result.append(Frame(None, points, camera, rigid_transform(turn, np.array([3.0, 0.5 * k, 0])), 0.1 * k))
+    return result
+
+
+def test_track_drive_takes_motion_and_time_from_the_frames():
+    tracker = Cmcdot(SMALL, PARAMS, seed=5)
+    for k, belief in enumerate(track_drive(frames(3), SMALL, PARAMS, seed=5)):
+        expected = tracker.step(scan(street(0.1 * k), x=0.5 * k), PlanarMotion(0.5 * min(k, 1), 0, 0), 0.1)
+        assert np.abs(belief.probability - expected.probability).max() < 0.05
+    assert len(list(track_drive([], SMALL))) == 0
+
+
+def test_track_drive_refuses_frames_out_of_order():
+    with pytest.raises(ArgumentError, match="dt"):
+        list(track_drive(frames(3)[::-1], SMALL, PARAMS))
