@@ -67,7 +67,7 @@ plt.rcParams["figure.dpi"] = 80
 # | $u, v$ | pixel: right, down; the centre of the first pixel is (0, 0) | | `pixels` |
 # | $K$ | the camera's intrinsic matrix, pixels | (3, 3) | `camera.K` |
 # | $T$ | rigid transform; read the name from right to left | (4, 4) | `T_camera_from_grid` |
-# | $f(c), \alpha_c$ | frequency and weight of class $c$ | (C,) | `frequencies`, `weights` |
+# | $f(c), \alpha_c$ | frequency and weight of class $c$ | (C,) | `f`, `alpha` |
 # | $E, \phi, \mu, w$ | energy of the CRF, its potentials, label compatibility, weights | | `energy`, `CrfParams` |
 # | $Q$ | mean-field estimate of the refined grid | (C, H, W) | `refined` |
 #
@@ -232,9 +232,10 @@ plotting.image_labels(small, now.scores.argmax(axis=0), KITTI_14)
 plt.show()
 
 # %% [markdown]
-# Nobody ever told this network what a pixel shows. It was trained end to end: the only truth it saw is the map, and
-# the map's mistakes travelled back through fusion, planes and equation (2) into these scores. So don't expect clean
-# outlines here: the scores are whatever helps the map (lectures 07 and 08).
+# Look for what is easy (road, sky, big walls) and what isn't (thin poles, far people, the edge of the sidewalk). The
+# network learnt in two steps: first from labelled images, then end to end, when only the map counted: the map's
+# mistakes travel back through fusion, planes and equation (2) into these scores. So don't expect clean outlines: the
+# scores are whatever helps the map (lectures 07 and 08).
 
 # %% [markdown]
 # ## Stage 3, $s \to p$: from pixels to places
@@ -393,7 +394,8 @@ for stage in ("grid", "refined"):
 # were they called?
 
 # %%
-plotting.confusion(drive_confusion("refined"), KITTI_14.names)
+_, ax = plt.subplots(figsize=(7, 7), layout="constrained")
+plotting.confusion(drive_confusion("refined"), KITTI_14.names, ax=ax)
 plt.show()
 
 # %% [markdown]
