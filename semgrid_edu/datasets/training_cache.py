@@ -29,6 +29,13 @@ from semgrid_edu.occupancy import CmcdotParams, track_drive
 SEED = 0
 """Of the occupancy filter's particles, in each drive."""
 
+CODE = (
+    *("camera", "frame", "grid", "labels"),
+    *(f"datasets/{name}" for name in ("calibration", "kitti_labels", "kitti_raw", "oxts", "reading", "resizing")),
+    *(f"datasets/{name}" for name in ("returns", "timestamps", "training_cache", "truth")),
+)
+"""The modules that decide what comes out, beside all of occupancy/."""
+
 WORKERS = 2
 """Processes that make the arrays, a drive at a time."""
 
@@ -73,8 +80,7 @@ def cached_arrays(index: DatasetIndex, split: str, recipe: Recipe) -> dict[str, 
 def _key(index: DatasetIndex, split: str, recipe: Recipe) -> str:
     """Hash what decides the arrays: the recipe, the code, and names and sizes of all files of the split's drives."""
     package = Path(semgrid_edu.__file__).parent
-    code = [package / name for name in ("camera.py", "frame.py", "grid.py", "labels.py")]
-    code += sorted((package / "datasets").glob("*.py")) + sorted((package / "occupancy").glob("*.py"))
+    code = [package / f"{name}.py" for name in CODE] + sorted((package / "occupancy").glob("*.py"))
     drives = index.frames_by_drive(split)
     calibration = [path for date in {date for date, _ in drives} for path in (index.root / date).glob("*.txt")]
     parts = [repr(recipe), *map(sha256, [index.root / INDEX_FILE, *code, *sorted(calibration)])]
