@@ -177,8 +177,10 @@ def walk_ray(
     direction = np.array([np.cos(azimuth), np.sin(azimuth)])
     height, width = spec.shape
     lines = (spec.x_max - np.arange(height + 1) * spec.cell, spec.y_max - np.arange(width + 1) * spec.cell)
-    crossings = [(line - at) / along for line, at, along in zip(lines, start, direction, strict=True) if along]
-    distance = np.unique(np.concatenate([[0.0], *crossings]))
+    crossings = [
+        (line - at) / along for line, at, along in zip(lines, start, direction, strict=True) if abs(along) > 1e-12
+    ]
+    distance = np.unique(np.concatenate([[0.0], *crossings]).round(9))  # a corner is crossed once
     distance = distance[distance >= 0]
     entered = distance[:-1][distance[:-1] < length]
     leaves_at = distance[1 : len(entered) + 1]

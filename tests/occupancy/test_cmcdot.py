@@ -15,7 +15,7 @@ from semgrid_edu.occupancy import Cmcdot, CmcdotParams, PlanarMotion, State, tra
 SMALL = GridSpec(0, 40, -10, 10, 0.5)
 PARAMS = CmcdotParams(particles=50_000)
 STILL = PlanarMotion()
-WALL, PARKED = Box(5, 60, 7, 7.5, 2.5), Box.around(22, -6, 4, 1.8, 1.5)
+WALL, PARKED = Box(5, 60, 7.2, 7.7, 2.5), Box.around(22, -6, 4, 1.8, 1.5)
 
 
 def street(time: float) -> list[Box]:

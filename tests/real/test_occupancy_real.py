@@ -1,0 +1,99 @@
+"""CMCDOT with its defaults on KITTI's drive 0013: what moves, what stands.
+
+The car on the right overtakes; its boxes were found by hand. A fence stands beyond it. A second car follows it into the
+grid near the end, so cells there count for neither.
+"""
+
+import json
+
+import numpy as np
+import pytest
+
+from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import State, track_drive
+
+pytestmark = pytest.mark.real
+
+SPEC = GridSpec.paper()
+centre_x, centre_y = np.moveaxis(SPEC.centers(), -1, 0)
+FIRST_BOX, ONE_SECOND = 4, 10
+
+
+@pytest.fixture(scope="module")
+def drive(kitti_root):
+    """Return the frames, their beliefs, and the car's box in each frame that has one."""
+    boxes_file = kitti_root / "moving_cars_0013.json"
+    if not boxes_file.exists():
+        pytest.skip("needs moving_cars_0013.json beside the drive")
+    boxes = {int(frame): box for frame, box in json.loads(boxes_file.read_text())["car_1"].items()}
+    drive = KittiRawDrive(kitti_root, "2011_09_26", "0013")
+    frames = [drive[k] for k in range(len(drive))]
+    return frames, list(track_drive(frames, SPEC)), boxes
+
+
+def returned(frame) -> np.ndarray:
+    """Return the cells with two or more returns between 0.3 and 1.6 m above the ground, (H, W) bool."""
+    points = frame.points_grid
+    rows, cols, inside = SPEC.cells(points[(points[:, 2] >= 0.3) & (points[:, 2] <= 1.6)])
+    count = np.zeros(SPEC.shape, int)
+    np.add.at(count, (rows[inside], cols[inside]), 1)
+    return count >= 2
+
+
+def in_box(box, margin=0.0) -> np.ndarray:
+    x_min, x_max, y_min, y_max = box[:4]
+    return (
+        (centre_x > x_min - margin)
+        & (centre_x < x_max + margin)
+        & (centre_y > y_min - margin)
+        & (centre_y < y_max + margin)
+    )
+
+
+def moving(belief) -> np.ndarray:
+    return belief.probability[State.DYNAMIC] > belief.probability[State.STATIC]
+
+
+def test_the_overtaking_car_is_dynamic_from_0_8_s_after_it_comes_into_view(drive):
+    frames, beliefs, boxes = drive
+    for k in range(FIRST_BOX + 8, len(frames)):
+        cells = returned(frames[k]) & in_box(boxes[k])
+        assert moving(beliefs[k])[cells].mean() >= 0.9, k
+
+
+def test_its_speed_over_ground_is_right_from_1_5_s(drive):
+    """The truth is the way of its box's front, in the world, over two frames before and after."""
+    frames, beliefs, boxes = drive
+    fronts = {k: frames[k].T_world_from_lidar @ [box[1], (box[2] + box[3]) / 2, 0, 1] for k, box in boxes.items()}
+    for k in range(FIRST_BOX + 15, len(frames) - 2):
+        way = np.linalg.norm((fronts[k + 2] - fronts[k - 2])[:2])
+        truth = way / (frames[k + 2].time - frames[k - 2].time)
+        velocity = beliefs[k].velocity[:, returned(frames[k]) & in_box(boxes[k])]
+        assert abs(np.linalg.norm(np.nanmean(velocity, axis=1)) - truth) < 1.5, k
+
+
+def test_the_fence_is_static(drive):
+    frames, beliefs, _ = drive
+    static = 0
+    for frame, belief in zip(frames, beliefs, strict=True):
+        fence = returned(frame) & (centre_x > 4) & (centre_x < 25) & (centre_y < -5.2)
+        static += (belief.probability.argmax(axis=0) == State.STATIC)[fence].mean() / len(frames)
+    assert static >= 0.99
+
+
+def test_little_else_is_dynamic(drive):
+    frames, beliefs, boxes = drive
+    for k in range(ONE_SECOND, len(frames)):
+        follower = in_box([-2, 6, -4.9, -2])
+        others = (
+            returned(frames[k]) & (centre_x < 40) & (abs(centre_y) < 12) & ~in_box(boxes[k], margin=0.5) & ~follower
+        )
+        assert moving(beliefs[k])[others].mean() <= 0.03, k
+
+
+def test_the_road_ahead_is_free(drive):
+    _, beliefs, _ = drive
+    road = in_box([4, 20, -1.5, 1.5])
+    for belief in beliefs:
+        assert (belief.probability.argmax(axis=0) == State.FREE)[road].mean() >= 0.95
