@@ -155,9 +155,9 @@ def _wheels(length: float, width: float, radius: float) -> list[Shape]:
             arch = side * (width / 2 - 0.012)
             parts += [
                 tube(
-                    (x, inner, radius + 0.03),
-                    (x, arch, radius + 0.03),
-                    (1.2 * radius,) * 2,
+                    (x, inner, radius + 0.05),
+                    (x, arch, radius + 0.05),
+                    (1.14 * radius,) * 2,
                     _DARK,
                     Material.RUBBER,
                     Kind.CAR,
@@ -216,14 +216,14 @@ def car(body: str) -> Shape:
         y = side * half
         parts += [
             box(
-                (-0.489 * length, 0.78 * y, lamp_z),
-                (0.05 * length, 0.2 * half, 0.17),
+                (-0.484 * length, 0.78 * y, lamp_z),
+                (0.036 * length, 0.2 * half, 0.17),
                 (0.35, 0.01, 0.01),
                 Material.LAMP,
                 Kind.CAR,
             ),
             box(
-                (0.482 * length, 0.62 * y, head_z),
+                (0.474 * length, 0.62 * y, head_z),
                 (0.05 * length, 0.30 * half, 0.12),
                 (0.62, 0.64, 0.64),
                 Material.LAMP,
@@ -241,9 +241,9 @@ def car(body: str) -> Shape:
     if body == "van":
         parts += _van_doors(length)
     parts += [
-        box((-0.497 * length, 0, 0.66), (0.03, 0.52, 0.12), (0.9, 0.9, 0.88), Material.RETRO, Kind.CAR),
-        box((0.497 * length, 0, 0.42), (0.03, 0.52, 0.11), (0.9, 0.9, 0.88), Material.RETRO, Kind.CAR),
-        box((0.488 * length, 0, 0.52), (0.04 * length, 0.8 * half, 0.12), (0.03,) * 3, Material.MATTE, Kind.CAR),
+        box((0.01 - 0.5 * length, 0, 0.66), (0.03, 0.52, 0.12), (0.9, 0.9, 0.88), Material.RETRO, Kind.CAR),
+        box((0.5 * length - 0.01, 0, 0.42), (0.03, 0.52, 0.11), (0.9, 0.9, 0.88), Material.RETRO, Kind.CAR),
+        box((0.481 * length, 0, 0.52), (0.04 * length, 0.8 * half, 0.12), (0.03,) * 3, Material.MATTE, Kind.CAR),
         box((-0.492 * length, 0, 0.36), (0.03, 1.5 * half, 0.12), (0.04,) * 3, Material.MATTE, Kind.CAR),
         box((0.485 * length, 0, 0.30), (0.06, 1.45 * half, 0.10), (0.04,) * 3, Material.MATTE, Kind.CAR),
     ]

@@ -1,0 +1,17 @@
+"""Shared by the simulator's tests: one small drive, simulated once."""
+
+import pytest
+
+from semgrid_edu.simulation.drive import SimulatedDrive
+
+
+@pytest.fixture(scope="session")
+def junction_drive() -> SimulatedDrive:
+    """A drive of ten frames towards a busy junction, houses and gardens beside it."""
+    return SimulatedDrive(5, 10, layout="junction", styles=("suburb", "town"), density=0.9, speed=8.0)
+
+
+@pytest.fixture(scope="session")
+def last_frame(junction_drive):
+    """Its last frame, with bird's-eye truth."""
+    return junction_drive.frame(9, labelled=True)

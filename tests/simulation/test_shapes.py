@@ -1,0 +1,77 @@
+"""Shapes stand where their makers say."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from semgrid_edu.simulation.bicycles import bicycle
+from semgrid_edu.simulation.buildings import House, build
+from semgrid_edu.simulation.cars import BODIES, car, car_size
+from semgrid_edu.simulation.furniture import FENCES, SIGNS, fence, sign
+from semgrid_edu.simulation.materials import Kind, Material
+from semgrid_edu.simulation.people import Person, rider, walker
+from semgrid_edu.simulation.plants import TREES, bush, hedge, tree
+from semgrid_edu.simulation.shapes import ball, box, merge, quads, tube
+
+STYLE = {"colour": (0.5, 0.5, 0.5), "material": Material.MATTE, "kind": Kind.POLE}
+
+
+def test_a_tube_has_the_volume_of_its_prism():
+    shape = tube((1, 2, 3), (4, 6, 3), (0.5, 0.5), sides=64, **STYLE)
+    assert trimesh.Trimesh(shape.vertices, shape.faces).volume == pytest.approx(np.pi * 0.25 * 5, rel=0.01)
+
+
+def test_a_quad_faces_right_cross_up():
+    assert quads([0, 0, 0], [1, 0, 0], [0, 0, 1], **STYLE).normals == pytest.approx(np.array([[0, -1, 0]] * 2))
+
+
+def test_placing_turns_then_moves():
+    turned = box((1, 0, 0), (0.2, 0.2, 0.2), **STYLE).placed((10, 20, 1), np.pi / 2)
+    assert turned.vertices.mean(axis=0) == pytest.approx([10, 21, 1], abs=1e-5)
+
+
+def test_merging_keeps_every_triangle():
+    one, two = box((0, 0, 0), (1, 1, 1), **STYLE), ball((5, 0, 0), (1, 1, 1), **STYLE)
+    both = merge([one, two])
+    assert np.array_equal(both.vertices[both.faces[-len(two.faces) :]], two.vertices[two.faces])
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_a_car_fills_its_box_and_stands_on_the_ground(body):
+    low, high = car(body).vertices.min(axis=0), car(body).vertices.max(axis=0)
+    length, width, height = car_size(body)
+    assert high[0] - low[0] == pytest.approx(length, abs=0.1)
+    assert high[1] - low[1] == pytest.approx(width, abs=0.3)
+    assert high[2] == pytest.approx(height, abs=0.01)
+    assert low[2] == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.mark.parametrize("distance", [0.0, 0.4, 1.0])
+def test_people_stand_on_the_ground_at_their_height(distance):
+    person = Person.random(np.random.default_rng(0))
+    shape = walker(person, distance)
+    assert shape.vertices[:, 2].min() == pytest.approx(0.0, abs=0.05)
+    assert shape.vertices[:, 2].max() == pytest.approx(person.height, abs=0.06)
+    assert set(shape.kind) == {Kind.PEDESTRIAN}
+    assert set(rider(person, distance).kind) == {Kind.BICYCLE}
+
+
+def test_a_stride_repeats():
+    person = Person.random(np.random.default_rng(0))
+    assert np.array_equal(walker(person, 0.3).vertices, walker(person, 0.3 + 1.45).vertices)
+
+
+def test_a_house_covers_its_plan_up_to_its_eaves():
+    house = House(10.0, 8.0, 2, "flat", False, 3)
+    shape = build(house)
+    walls = trimesh.Trimesh(shape.vertices, shape.faces)
+    assert walls.bounds[:, 2] == pytest.approx([-2.5, house.eaves + 1.8], abs=0.01)
+    assert set(shape.kind) == {Kind.BUILDING}
+
+
+def test_everything_else_is_what_it_says():
+    kinds = {Kind.PLANT: [tree(s, 0) for s in TREES] + [bush(0), hedge(0)], Kind.FENCE: [fence(s, 2.5) for s in FENCES]}
+    for kind, shapes in kinds.items():
+        assert all(set(shape.kind) == {kind} for shape in shapes)
+    assert all(set(sign(s).kind) == {Kind.POLE, Kind.SIGN} for s in SIGNS)
+    assert set(bicycle().kind) == {Kind.BICYCLE}

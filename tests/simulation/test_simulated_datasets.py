@@ -1,0 +1,116 @@
+"""Data sets: the same bytes for the same seed, however they came about."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from semgrid_edu.datasets import KittiRawDrive, load_index
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.files import sha256
+from semgrid_edu.labels import KITTI_14
+from semgrid_edu.simulation import datasets
+from semgrid_edu.simulation.datasets import RECIPES, Recipe, Route, make, make_recipe
+from semgrid_edu.simulation.writer import DATE, drive_folder
+
+QUIET = {"density": 0.2, "layout": "straight", "styles": ("park", "park")}
+TINY = Recipe("tiny", "KITTI-14", (Route("train", 2, False, QUIET), Route("test", 1, True, QUIET)))
+DENSE = Recipe("dense", "SYNTHIA-10", (Route("train", 1, True, QUIET),), dense=True)
+
+
+def contents(root: Path) -> dict[str, str]:
+    return {str(p.relative_to(root)): sha256(p) for p in sorted(root.rglob("*")) if p.is_file()}
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    return make_recipe(TINY, tmp_path_factory.mktemp("alone"), seed=3, workers=1)
+
+
+def test_two_workers_write_the_same_bytes_as_one(alone, tmp_path):
+    assert contents(make_recipe(TINY, tmp_path, seed=3, workers=2)) == contents(alone)
+
+
+def test_another_seed_gives_another_world(alone, tmp_path):
+    other = contents(make_recipe(Recipe("tiny", "KITTI-14", TINY.routes[:1]), tmp_path, seed=4, workers=1))
+    image = f"{DATE}/{DATE}_drive_0001_sync/image_02/data/0000000000.png"
+    assert other[image] != contents(alone)[image]
+
+
+def test_killed_in_the_middle_it_resumes_to_the_same_bytes(alone, tmp_path, monkeypatch):
+    """A kill leaves a finished drive, a half one in its hidden folder, and no dataset.json."""
+    whole = datasets.write_drive
+
+    def killed_in_the_second(root, drive, simulated, labelled, *rest):
+        if drive == "0002":
+            partial = drive_folder(root, drive).with_name(f".{DATE}_drive_0002_sync.partial")
+            (partial / "image_02" / "data").mkdir(parents=True)
+            (partial / "image_02" / "data" / "0000000007.png").write_bytes(b"half")
+            raise KeyboardInterrupt
+        return whole(root, drive, simulated, labelled, *rest)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(datasets, "write_drive", killed_in_the_second)
+        with pytest.raises(KeyboardInterrupt):
+            make_recipe(TINY, tmp_path, seed=3, workers=1)
+    assert not (tmp_path / "tiny" / "dataset.json").exists()
+    first = drive_folder(tmp_path / "tiny", "0001") / "oxts" / "data" / "0000000000.txt"
+    written = first.stat().st_mtime_ns
+    resumed = make_recipe(TINY, tmp_path, seed=3, workers=1)
+    assert contents(resumed) == contents(alone)
+    assert first.stat().st_mtime_ns == written
+
+
+def test_the_index_lists_the_labelled_frames(alone):
+    index = load_index(alone)
+    assert (index.name, index.label_set.name if hasattr(index.label_set, "name") else index.label_set) == (
+        "tiny",
+        "KITTI-14",
+    )
+    assert [(f.drive, f.frame) for f in index.splits["train"]] == [("0001", 1)]
+    assert [(f.drive, f.frame) for f in index.splits["test"]] == [("0002", 0)]
+    for frames in index.splits.values():
+        for labelled in frames:
+            assert KittiRawDrive(alone, labelled.date, labelled.drive)[labelled.frame].labels is not None
+
+
+def test_dense_points_lie_on_the_depth_image(tmp_path):
+    root = make_recipe(DENSE, tmp_path, seed=0, workers=1)
+    frame = KittiRawDrive(root, DATE, "0001")[0]
+    assert 3000 < len(frame.points) < 20_000
+    T = frame.camera.T_camera_from_lidar
+    points = frame.points[:, :3] @ T[:3, :3].T + T[:3, 3]
+    pixels = points @ frame.camera.K.T
+    u, v = (pixels[:, :2] / pixels[:, 2:]).round().astype(int).T
+    assert frame.labels.depth[v, u] == pytest.approx(points[:, 2], abs=0.01)
+    assert frame.labels.image.max() <= 9
+
+
+def test_somebody_elses_folder_is_refused(alone, tmp_path):
+    with pytest.raises(DataError, match=r"simulation\.json.*'seed': 5.*'seed': 3"):
+        make_recipe(TINY, alone.parent, seed=5, workers=1)
+    (tmp_path / "tiny").mkdir()
+    (tmp_path / "tiny" / "thesis.txt").write_text("precious")
+    with pytest.raises(DataError, match="other files"):
+        make_recipe(TINY, tmp_path, seed=5, workers=1)
+    assert (tmp_path / "tiny" / "thesis.txt").read_text() == "precious"
+
+
+def test_bad_arguments_are_named(tmp_path):
+    with pytest.raises(ArgumentError, match="name: expected one of minikitti"):
+        make("maxikitti", tmp_path)
+    with pytest.raises(ArgumentError, match="seed"):
+        make("minikitti", tmp_path, seed=-1)
+    with pytest.raises(ArgumentError, match="workers"):
+        make("minikitti", tmp_path, workers=0)
+
+
+def test_the_recipes_have_the_papers_numbers_of_frames():
+    def labelled(name, split):
+        return [len(route.labelled) for route in RECIPES[name].routes if route.split == split]
+
+    assert (sum(labelled("minikitti", "train")), sum(labelled("minikitti", "test"))) == (142, 110)
+    assert all(route.n_frames == 10 and list(route.labelled) == [9] for route in RECIPES["minikitti"].routes)
+    assert (sum(labelled("minichroma", "train")), len(labelled("minichroma", "train"))) == (146, 3)
+    assert (sum(labelled("minichroma", "test")), len(labelled("minichroma", "test"))) == (130, 2)
+    assert json.dumps({name: len(labelled(name, "test")) for name in ("minisynthia",)}) == '{"minisynthia": 1}'
