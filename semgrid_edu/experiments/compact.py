@@ -3,7 +3,9 @@
 from dataclasses import asdict
 from pathlib import Path
 
+from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.files import sha256
 from semgrid_edu.networks import Architecture, build_net
 from semgrid_edu.provenance import write_provenance
 from semgrid_edu.training import TrainingParams, train
@@ -19,7 +21,7 @@ def train_compact(
     dataset_dir : path-like
         Such as data/minikitti.
     folder : path-like
-        Takes what `train` writes, and `provenance.json`.
+        Takes what `train` writes, and `provenance.json`, which also names the data by their index's SHA-256.
     params : TrainingParams
     seed : int
         Of the initial weights, and of the order and looks of the frames.
@@ -32,4 +34,5 @@ def train_compact(
         f"semgrid-edu train --data {Path(dataset_dir).name} --out {Path(folder).name} "
         f"--seed {seed} --iterations {params.grid_iterations}"
     )
-    write_provenance(folder, command, seed, ("torch", "numpy", "safetensors"), params=asdict(params))
+    details = {"params": asdict(params), "dataset": sha256(Path(dataset_dir) / INDEX_FILE)}
+    write_provenance(folder, command, seed, ("torch", "numpy", "safetensors"), **details)

@@ -9,6 +9,7 @@ from semgrid_edu.camera import Camera
 from semgrid_edu.cli import app
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.experiments import compact
+from semgrid_edu.files import sha256, write_text
 from semgrid_edu.networks import Architecture, load_net
 from semgrid_edu.provenance import provenance_problems
 
@@ -43,8 +44,9 @@ class _Noise:
 
 def test_the_command_leaves_weights_log_and_provenance(monkeypatch, tmp_path):
     monkeypatch.setattr(compact, "TrainingSet", _Noise)
-    out = tmp_path / "compact"
-    arguments = ["train", "--data", "data/minikitti", "--out", str(out), "--seed", "3", "--iterations", "1"]
+    data, out = tmp_path / "minikitti", tmp_path / "compact"
+    write_text(data / "dataset.json", "{}")
+    arguments = ["train", "--data", str(data), "--out", str(out), "--seed", "3", "--iterations", "1"]
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0, result.output
     names = {"weights.safetensors", "image_stage.safetensors", "log.csv", "provenance.json"}
@@ -54,6 +56,7 @@ def test_the_command_leaves_weights_log_and_provenance(monkeypatch, tmp_path):
     assert provenance["command"] == "semgrid-edu train --data minikitti --out compact --seed 3 --iterations 1"
     assert provenance["seed"] == 3
     assert provenance["params"]["batch_size"] == 6
+    assert provenance["dataset"] == sha256(data / "dataset.json")
     assert len((out / "log.csv").read_text().splitlines()) == 3
     assert load_net(out / "weights.safetensors", _Noise.camera).n_classes == 14
 
