@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence import scan_evidence
+from semgrid_edu.occupancy.evidence import Evidence, beam_reach, check_points, evidence_in_cells
 from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.moving_map import look_up, map_around, scroll
 from semgrid_edu.occupancy.params import CmcdotParams
@@ -78,18 +78,20 @@ class Cmcdot:
             tracker is then as it was.
         """
         shift, pose = scroll(self._pose.then(motion), self.spec.cell, MAX_YAW)
-        evidence = scan_evidence(points_grid, self.map_spec, self.params.sensor, pose)
+        sensor, points = self.params.sensor, check_points(points_grid)
+        free_to = beam_reach(points, sensor)
+        evidence = evidence_in_cells(points, free_to, self.map_spec, sensor, pose)
         moved = move(self._state, self.map_spec, shift)
         predicted = predict(moved, self.map_spec, self.params, dt, self._rng)
         updated = update(predicted, self.map_spec, evidence, self.params)
         self._state, self._pose = resample(updated, self.map_spec, self.params, self._rng), pose
-        return Belief(self._probability(predicted, points_grid), self._velocity())
+        here = evidence_in_cells(points, free_to, self.spec, sensor, PlanarMotion())
+        return Belief(self._probability(predicted, here), self._velocity())
 
-    def _probability(self, predicted: FilterState, points_grid: NDArray) -> NDArray[np.float32]:
+    def _probability(self, predicted: FilterState, evidence: Evidence) -> NDArray[np.float32]:
         """Look the prediction up in the vehicle's cells and update those, so that returns lie in the cells they hit."""
         here = look_up(predicted.probability, NOTHING_KNOWN, self.map_spec, self.spec, self._pose)
         prior = FilterState(here, Particles.none(), np.zeros(self.spec.shape, np.float32))
-        evidence = scan_evidence(points_grid, self.spec, self.params.sensor)
         return update(prior, self.spec, evidence, self.params).probability
 
     def _velocity(self) -> NDArray[np.float32]:

@@ -116,11 +116,36 @@ def scan_evidence(points: NDArray, spec: GridSpec, sensor: SensorModel, pose: Pl
     ArgumentError
         When `points` isn't a table of finite coordinates.
     """
-    points, pose = check_points(points), pose or PlanarMotion()
-    heights = (sensor.obstacle_min, sensor.obstacle_max)
+    points = check_points(points)
+    return evidence_in_cells(points, beam_reach(points, sensor), spec, sensor, pose or PlanarMotion())
+
+
+def beam_reach(points: NDArray, sensor: SensorModel) -> NDArray[np.float32]:
+    """Return how far each beam of a scan sees, (B,) metres: the scan in polar coordinates."""
+    profile = polar_profile(points, sensor.obstacle_min, sensor.obstacle_max, sensor.beams)
+    return fill_gaps(reach(*profile), sensor.gap)
+
+
+def evidence_in_cells(
+    points: NDArray, free_to: NDArray, spec: GridSpec, sensor: SensorModel, pose: PlanarMotion
+) -> Evidence:
+    """Look each cell up in the polar scan: the second half of `scan_evidence`, for any grid and pose.
+
+    Parameters
+    ----------
+    points : (N, 3+) float
+        Returns in the grid frame of the vehicle.
+    free_to : (B,) float
+        How far each beam sees, metres, from `beam_reach`.
+    spec, sensor, pose
+        As for `scan_evidence`.
+
+    Returns
+    -------
+    Evidence
+    """
     grid = (spec.shape, spec.x_max, spec.y_max, spec.cell, pose.dx, pose.dy, pose.dyaw)
-    free_to = fill_gaps(reach(*polar_profile(points, *heights, sensor.beams)), sensor.gap)
-    obstacles, ground = count_returns(points, *heights, *grid)
+    obstacles, ground = count_returns(points, sensor.obstacle_min, sensor.obstacle_max, *grid)
     return likelihoods(obstacles, passed_cells(free_to, *grid) | (ground > 0), sensor)
 
 

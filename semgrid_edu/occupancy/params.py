@@ -34,8 +34,8 @@ class CmcdotParams:
         a pedestrian's 1.4 m/s is far above the default speed.
     max_speed : float
         The velocity prior of what starts to move: any heading, speed up to this, m/s (25 m/s = 90 km/h).
-    acceleration : float
-        Standard deviation of a particle's acceleration, m/s^2: traffic brakes and turns with 2 to 3.
+    max_acceleration : float
+        Largest acceleration of a particle along each axis, m/s^2: half of what tyres can do.
     birth_share : float
         Part of the particles that is spent on newborn mass, so that new things are found soon.
     first_sight : (float, float, float)
@@ -61,7 +61,7 @@ class CmcdotParams:
     stop_rate: float = 5.0
     stop_speed: float = 0.4
     max_speed: float = 25.0
-    acceleration: float = 3.0
+    max_acceleration: float = 5.0
     birth_share: float = 0.2
     first_sight: tuple[float, float, float] = (0.85, 0.14, 0.01)
     sensor: SensorModel = field(default_factory=SensorModel)
@@ -73,7 +73,7 @@ class CmcdotParams:
         rates = np.asarray(self.rates, dtype=float)
         if rates.shape != (4, 4) or not np.isfinite(rates).all() or (rates < 0).any():
             raise ArgumentError("rates", "4 x 4 finite rates, none negative", self.rates)
-        for name in ("stop_rate", "max_speed", "acceleration"):
+        for name in ("stop_rate", "max_speed", "max_acceleration"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
                 raise ArgumentError(name, "a finite number, not negative", getattr(self, name))
         if not (np.isfinite(self.stop_speed) and self.stop_speed > 0):

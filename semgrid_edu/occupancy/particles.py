@@ -12,6 +12,8 @@ from semgrid_edu.occupancy.state import Particles
 
 OUTSIDE = -1
 """The cell of a particle that has left the map."""
+SLOW = np.float32(16)
+"""exp(-16) is nothing in single precision beside 1: exponentials beyond needn't be computed."""
 
 
 def cells_of(position: NDArray, spec: GridSpec) -> NDArray[np.int32]:
@@ -85,14 +87,14 @@ def _scale_in_cells(weight, cells, factor):
     return scaled
 
 
-def fly(particles: Particles, acceleration: float, dt: float, rng: np.random.Generator) -> Particles:
+def fly(particles: Particles, max_acceleration: float, dt: float, rng: np.random.Generator) -> Particles:
     """Let particles fly for a while: constant velocity plus noise.
 
     Parameters
     ----------
     particles : Particles
-    acceleration : float
-        Standard deviation of the acceleration along each axis, m/s^2, constant during the flight.
+    max_acceleration : float
+        Largest acceleration along each axis, m/s^2: uniform up to it, constant during the flight.
     dt : float
         Seconds.
     rng : numpy.random.Generator
@@ -103,18 +105,20 @@ def fly(particles: Particles, acceleration: float, dt: float, rng: np.random.Gen
     Particles
         v' = v + a dt, x' = x + v dt + a dt^2 / 2.
     """
-    noise = rng.standard_normal((len(particles), 2), np.float32)
-    position, velocity = _fly(particles.position, particles.velocity, noise, acceleration, dt)
+    noise = rng.random((len(particles), 2), np.float32)
+    change = np.float32(max_acceleration * dt)
+    position, velocity = _fly(particles.position, particles.velocity, noise, change, np.float32(dt))
     return Particles(position, velocity, particles.weight)
 
 
 @njit(cache=True)
-def _fly(position, velocity, noise, acceleration, dt):
+def _fly(position, velocity, noise, max_change, dt):
     flown, faster = np.empty_like(position), np.empty_like(velocity)
+    half, two = np.float32(0.5), np.float32(2)
     for i in range(len(position)):
         for k in range(2):
-            change = noise[i, k] * acceleration * dt
-            flown[i, k] = position[i, k] + (velocity[i, k] + change / 2) * dt
+            change = (two * noise[i, k] - np.float32(1)) * max_change
+            flown[i, k] = position[i, k] + (velocity[i, k] + half * change) * dt
             faster[i, k] = velocity[i, k] + change
     return flown, faster
 
@@ -135,16 +139,20 @@ def slow_down(particles: Particles, stop_rate: float, stop_speed: float, dt: flo
     Particles
         Weights times exp(-stop_rate dt exp(-v^2 / (2 stop_speed^2))).
     """
-    weight = _slow_down(particles.velocity, particles.weight, stop_rate * dt, stop_speed)
+    stops, scale = np.float32(stop_rate * dt), np.float32(0.5 / stop_speed**2)
+    weight = _slow_down(particles.velocity, particles.weight, stops, scale)
     return Particles(particles.position, particles.velocity, weight)
 
 
 @njit(cache=True)
-def _slow_down(velocity, weight, stops, stop_speed):
+def _slow_down(velocity, weight, stops, scale):
     kept = np.empty_like(weight)
     for i in range(len(weight)):
-        speed2 = velocity[i, 0] ** 2 + velocity[i, 1] ** 2
-        kept[i] = weight[i] * np.exp(-stops * np.exp(-speed2 / (2 * stop_speed**2)))
+        speed2 = velocity[i, 0] * velocity[i, 0] + velocity[i, 1] * velocity[i, 1]
+        slowness = speed2 * scale
+        kept[i] = weight[i]
+        if slowness < SLOW:
+            kept[i] *= np.exp(-stops * np.exp(-slowness))
     return kept
 
 

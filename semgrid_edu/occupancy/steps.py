@@ -103,7 +103,7 @@ def predict(
     newborn = np.einsum("i,ihw->hw", M[:, DYNAMIC], _without_particles(state))
     own[STATIC] += np.maximum(own[DYNAMIC] - newborn - going, 0)
 
-    particles = fly(particles, params.acceleration, dt, rng)
+    particles = fly(particles, params.max_acceleration, dt, rng)
     after = cells_of(particles.position, spec)
     n_cells = going.size
     bucket = np.where((after != before) & (after >= 0), after + n_cells, after)
@@ -226,7 +226,7 @@ def _draw_again(particles: Particles, count: int, rng: np.random.Generator) -> P
         return Particles.none()
     chosen = systematic_resample(particles.weight, count, rng.random())
     weight = np.full(count, total / count, np.float32)
-    return Particles(particles.position[chosen], particles.velocity[chosen], weight)
+    return Particles(particles.position.take(chosen, axis=0), particles.velocity.take(chosen, axis=0), weight)
 
 
 def _draw_newborn(

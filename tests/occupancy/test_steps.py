@@ -59,7 +59,7 @@ def assert_sound(state: FilterState, spec: GridSpec) -> None:
 def test_one_cell_that_nothing_leaves_is_filterpys_discrete_bayes(belief, dt, scans):
     """Particles at rest in one cell, that don't stop by themselves: then only the matrix and Bayes' rule are left."""
     spec = GridSpec(0, 1, 0, 1, 1)
-    params = replace(PARAMS, stop_rate=0.0, acceleration=0.0)
+    params = replace(PARAMS, stop_rate=0.0, max_acceleration=0.0)
     state, rng = state_of(belief[:, None, None], spec, speed=0.0), np.random.default_rng(0)
     expected = belief.copy()
     for occupied, free in scans:
@@ -116,7 +116,7 @@ def test_a_half_turn_turns_the_belief_and_its_velocities():
 
 def test_no_time_no_change():
     state = random_state(2)
-    predicted = predict(state, GRID, replace(PARAMS, acceleration=0.0), 0.0, np.random.default_rng(0))
+    predicted = predict(state, GRID, replace(PARAMS, max_acceleration=0.0), 0.0, np.random.default_rng(0))
     assert np.allclose(predicted.probability, state.probability, atol=1e-6)
     assert not predicted.newborn.any()
 
@@ -127,7 +127,7 @@ def one_mover(ahead: list[float]) -> FilterState:
     probability[:, 0, 0], probability[State.DYNAMIC, 1, 0] = ahead, 1
     mover = Particles(np.array([[0.5, 0.5]], np.float32), np.array([[10, 0]], np.float32), np.ones(1, np.float32))
     still = ((0.0,) * 4,) * 4
-    params = replace(PARAMS, rates=still, stop_rate=0.0, acceleration=0.0)
+    params = replace(PARAMS, rates=still, stop_rate=0.0, max_acceleration=0.0)
     return predict(FilterState(probability, mover, np.zeros((2, 1))), spec, params, 0.1, np.random.default_rng(0))
 
 
