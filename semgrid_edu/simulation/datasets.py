@@ -155,6 +155,7 @@ def make_recipe(recipe: Recipe, folder: Path, seed: int, workers: int) -> Path:
     write_calibration(root, Rig())
     drives = [f"{k + 1:04d}" for k in range(len(recipe.routes))]
     missing = [k for k, drive in enumerate(drives) if not drive_folder(root, drive).exists()]
+    missing.sort(key=lambda k: -recipe.routes[k].n_frames)
     with tqdm(total=len(drives), initial=len(drives) - len(missing), desc=recipe.name, unit="drive") as bar:
         for _ in _run(partial(_make_drive, recipe, root, seed), missing, workers):
             bar.update()

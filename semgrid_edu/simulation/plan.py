@@ -4,10 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from semgrid_edu.simulation.furniture import FENCES
 from semgrid_edu.simulation.layout import Road, Side
 from semgrid_edu.simulation.light import Light
 from semgrid_edu.simulation.terrain import Extent
 
+BORDERS = (*FENCES, "hedge", "none")
+"""What may run along the gardens of a suburb."""
 STYLES = ("town", "suburb", "park")
 """What lines a side of the road: facades at the sidewalk; houses in gardens; grass banks and trees."""
 
@@ -22,6 +25,8 @@ class Plan:
     extent : Extent
     styles : (str, str)
         Left and right side, members of `STYLES`.
+    borders : (str, str)
+        What runs along the gardens of a suburb, left and right: a fence of `furniture.FENCES`, "hedge" or "none".
     parking : (bool, bool)
         Whether there are parking bays left and right.
     light : Light
@@ -34,6 +39,7 @@ class Plan:
     road: Road
     extent: Extent
     styles: tuple[str, str]
+    borders: tuple[str, str]
     parking: tuple[bool, bool]
     light: Light
     density: float
@@ -60,11 +66,12 @@ def draw_plan(rng: np.random.Generator, length: float, **wishes) -> Plan:
     length : float
         Metres that the ego vehicle drives.
     **wishes
-        Fields of `Plan` or of `Road` to set instead of drawing them, `styles`, `parking` and `lanes` among them.
+        Fields of `Plan` or of `Road` to set instead of drawing them, `layout` and `lanes` among them.
     """
     layout = wishes.get("layout") or rng.choice(["straight", "bend", "junction"], p=[0.3, 0.3, 0.4])
     lanes = wishes.get("lanes") or [(1, 1), (1, 1), (1, 2), (2, 2)][rng.integers(4)]
-    styles = wishes.get("styles") or tuple(rng.choice(STYLES, 2, p=[0.35, 0.4, 0.25]))
+    styles = wishes.get("styles") or tuple(map(str, rng.choice(STYLES, 2, p=[0.35, 0.4, 0.25])))
+    borders = wishes.get("borders") or tuple(map(str, rng.choice(BORDERS, 2, p=[0.2, 0.16, 0.16, 0.12, 0.24, 0.12])))
     parking = wishes.get("parking") or tuple(bool(p) for p in rng.random(2) < 0.5)
     lane = rng.uniform(3.1, 3.6)
     bend = (
@@ -88,4 +95,4 @@ def draw_plan(rng: np.random.Generator, length: float, **wishes) -> Plan:
     foliage = [(1.0, 1.0, 1.0), (1.35, 1.25, 0.9), (2.2, 1.05, 0.7)][season]
     light = wishes.get("light") or Light.random(rng)
     density = wishes.get("density", float(rng.uniform(0.15, 1.0)))
-    return Plan(road, Extent(-45.0, length + 210.0), styles, parking, light, density, foliage)
+    return Plan(road, Extent(-45.0, length + 210.0), styles, borders, parking, light, density, foliage)

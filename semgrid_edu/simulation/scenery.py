@@ -115,7 +115,7 @@ def _house_row(builder: Builder, plan: Plan, sign: int, style: str) -> None:
     rng, side = builder.rng, side_of(builder, sign)
     line = side.strip + side.walk
     setback = rng.uniform(3.5, 8.0) if style == "suburb" else rng.uniform(0.0, 0.4)
-    border = str(rng.choice([*furniture.FENCES, "hedge", "none"], p=[0.2, 0.16, 0.16, 0.12, 0.24, 0.12]))
+    border = plan.borders[0 if sign > 0 else 1]
     s = plan.extent.start + rng.uniform(0, 8)
     while s < plan.extent.end - 20:
         house = _random_house(style, rng)

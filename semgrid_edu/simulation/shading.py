@@ -192,7 +192,7 @@ def _shade(
             )
             out[c] = albedo[c] * (direct * sun_colour[c] + ambient)
         if m == _GLASS:
-            _mirror(tile, ray, n, sun, sun_colour, zenith, horizon, clouds, phase, 300.0, 0.16, out)
+            _mirror(tile, ray, n, sun, sun_colour, zenith, horizon, clouds, phase, 300.0, 0.09, out)
         elif m == _PAINT:
             _mirror(tile, ray, n, sun, sun_colour, zenith, horizon, clouds, phase, 60.0, 0.055, out)
         elif m == _METAL:

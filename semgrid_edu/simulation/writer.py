@@ -1,6 +1,7 @@
 """Writes a simulated drive in KITTI's raw layout, whole or not at all."""
 
 import io
+import json
 import shutil
 from collections.abc import Callable, Collection
 from datetime import datetime, timedelta
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from semgrid_edu.files import write_json, write_text
+from semgrid_edu.files import write_text
 from semgrid_edu.labels import KITTI_14, LabelSet
 from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive, SimulatedFrame
 from semgrid_edu.simulation.materials import class_of_kind
@@ -97,14 +98,14 @@ def _write_labels(folder: Path, name: str, frame: SimulatedFrame, label_set: Lab
 def depth_as_points(frame: SimulatedFrame, rig: Rig) -> NDArray[np.float32]:
     """Return the depth image thinned to a LIDAR's sparsity and carried back to 3-D (section 4: SYNTHIA).
 
-    Every third row and second column within 80 m; reflectance 0, for a depth image has none.
+    Every fourth row and second column within 80 m; reflectance 0, for a depth image has none.
 
     Returns
     -------
     (N, 4) float32
         LIDAR frame, metres.
     """
-    v, u = np.mgrid[: rig.image_size[0] : 3, : rig.image_size[1] : 2]
+    v, u = np.mgrid[: rig.image_size[0] : 4, : rig.image_size[1] : 2]
     depth = frame.picture.depth[v, u]
     near = depth < 80.0
     rays = np.stack([u[near], v[near], np.ones(near.sum())], axis=-1) @ np.linalg.inv(rig.camera.K).T
@@ -125,7 +126,6 @@ def write_drive(
     labelled: Collection[int],
     label_set: LabelSet = KITTI_14,
     points: Callable[[SimulatedFrame, Rig], NDArray[np.float32]] = lidar_points,
-    on_frame: Callable[[], object] = lambda: None,
 ) -> Path:
     """Write a drive: images, points, oxts, timestamps, and labels of some frames.
 
@@ -144,8 +144,6 @@ def write_drive(
         What the label numbers mean.
     points : callable
         What to write as LIDAR points: `lidar_points` or `depth_as_points`.
-    on_frame : callable
-        Called after every frame.
 
     Returns
     -------
@@ -167,10 +165,9 @@ def write_drive(
         objects[name] = frame.objects
         if k in labelled:
             _write_labels(partial / "labels", name, frame, label_set)
-        on_frame()
     _write_times(partial, simulated.n_frames, datetime(2026, 1, 1, 10, 0, 0, 125000))
     (partial / "oxts" / "dataformat.txt").write_text(DATAFORMAT)
     (partial / "labels" / "label_set.txt").write_text(f"{label_set.name}\n")
-    write_json(partial / "labels" / "objects.json", objects)
+    (partial / "labels" / "objects.json").write_text(json.dumps(objects, separators=(",", ":")) + "\n")
     partial.rename(folder)
     return folder
