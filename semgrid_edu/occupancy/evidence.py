@@ -45,8 +45,8 @@ class SensorModel:
     azimuth_step: float = 0.3
     column_spacing: float = 0.6
     p_hit_occupied: float = 0.8
-    p_hit_free: float = 0.2
-    max_returns: int = 3
+    p_hit_free: float = 0.05
+    max_returns: int = 2
     p_pass_occupied: float = 0.3
     p_pass_free: float = 0.7
 
@@ -232,8 +232,8 @@ def likelihoods(obstacles: NDArray, free: NDArray, sensor: SensorModel) -> Evide
 
     Examples
     --------
-    >>> likelihoods(np.array([[2, 0, 0]]), np.array([[True, True, False]]), SensorModel()).free.round(2)
-    array([[0.04, 0.7 , 1.  ]], dtype=float32)
+    >>> likelihoods(np.array([[1, 0, 0]]), np.array([[True, True, False]]), SensorModel()).free.round(2)
+    array([[0.05, 0.7 , 1.  ]], dtype=float32)
     """
     hits = np.minimum(obstacles, sensor.max_returns)
     passed = free & (hits == 0)

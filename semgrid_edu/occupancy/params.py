@@ -62,7 +62,7 @@ class CmcdotParams:
     stop_speed: float = 0.4
     max_speed: float = 25.0
     max_acceleration: float = 5.0
-    birth_share: float = 0.2
+    birth_share: float = 0.3
     first_sight: tuple[float, float, float] = (0.85, 0.14, 0.01)
     sensor: SensorModel = field(default_factory=SensorModel)
 

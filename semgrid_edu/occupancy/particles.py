@@ -217,7 +217,7 @@ def systematic_resample(weight, count, offset):
     Examples
     --------
     >>> systematic_resample(np.array([0.1, 0.6, 0.3]), 4, 0.5)
-    array([1, 1, 2, 2])
+    array([1, 1, 1, 2])
     """
     total = 0.0
     for w in weight:

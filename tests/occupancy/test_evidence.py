@@ -23,7 +23,7 @@ def test_five_cells_on_a_ray_by_hand(evidence_of):
     """Two obstacle returns at 3.5 m, one of the ground at 1.5 m: free, free, free, occupied, unseen."""
     points = np.array([[1.5, 0, 0.0], [3.5, 0, 1.0], [3.5, 0, 1.2]])
     evidence = evidence_of(points, RAY, SENSOR)
-    farthest_first = [(1, 1), (0.8**2, 0.2**2), (0.3, 0.7), (0.3, 0.7), (0.3, 0.7)]
+    farthest_first = [(1, 1), (0.8**2, 0.05**2), (0.3, 0.7), (0.3, 0.7), (0.3, 0.7)]
     assert np.allclose(evidence.occupied[:, 0], [occupied for occupied, _ in farthest_first])
     assert np.allclose(evidence.free[:, 0], [free for _, free in farthest_first])
 
