@@ -1,13 +1,15 @@
 """The data sets of section 4 in simulated form, and a sample drive: made in parallel, resumed when interrupted."""
 
 import json
+import os
 import platform
+import threading
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from functools import partial
 from importlib.metadata import version
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from pathlib import Path
 
 import numpy as np
@@ -183,7 +185,7 @@ def _run(work: partial, items: list[int], workers: int) -> Iterator[int]:
             work(item)
             yield item
         return
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_end_with_parent) as pool:
         try:
             for future in as_completed([pool.submit(work, item) for item in items]):
                 future.result()
@@ -191,6 +193,16 @@ def _run(work: partial, items: list[int], workers: int) -> Iterator[int]:
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
+
+
+def _end_with_parent() -> None:
+    """End this worker when the process that started it is killed: an orphan would write beside the one that resumes."""
+
+    def watch() -> None:
+        parent_process().join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _make_drive(recipe: Recipe, root: Path, seed: int, index: int) -> None:

@@ -5,7 +5,8 @@ import numpy as np
 from semgrid_edu.simulation import furniture, plants
 from semgrid_edu.simulation.builder import Builder
 from semgrid_edu.simulation.buildings import House, build
-from semgrid_edu.simulation.footprints import ROUND
+from semgrid_edu.simulation.footprints import ROUND, outline
+from semgrid_edu.simulation.layout import to_road
 from semgrid_edu.simulation.materials import Kind, Material
 from semgrid_edu.simulation.plan import Plan
 from semgrid_edu.simulation.roadside import side_of, stand_lamps, stand_signals, stand_signs
@@ -88,15 +89,15 @@ def _bush(builder: Builder, plan: Plan, s: float, d: float) -> None:
         builder.add(shape, s, d, builder.rng.uniform(0, 6.28), scale, [foot])
 
 
-def _house(builder: Builder, house: House, s: float, d: float, yaw: float) -> bool:
-    """Put a house with the middle of its front at (s, d)."""
-    foot = builder.footprint(
-        s, d, yaw, Kind.BUILDING, (house.width / 2, house.depth / 2), offset=(0.0, house.depth / 2)
-    )
-    if not builder.free(foot, 0.05):
-        return False
-    builder.add(build(house), s, d, yaw, 1.0, [foot])
-    return True
+def _house(builder: Builder, house: House, s: float, d: float, yaw: float, across_road: bool = False) -> None:
+    """Put a house with the middle of its front at (s, d), where nothing stands; on a road only when it may."""
+    half = (house.width / 2, house.depth / 2)
+    foot = builder.footprint(s, d, yaw, Kind.BUILDING, half, offset=(0.0, house.depth / 2))
+    corners = [to_road(builder.road, x, y) for x, y in outline(foot)]
+    if not across_road and min(builder.edge_distance(*corner) for corner in corners) < 0.1:
+        return
+    if builder.free(foot, 0.05):
+        builder.add(build(house), s, d, yaw, 1.0, [foot])
 
 
 def _random_house(style: str, rng: np.random.Generator) -> House:
@@ -241,6 +242,5 @@ def _horizon(builder: Builder, plan: Plan) -> None:
     for d in np.arange(-70, 70, 3.5):
         _tree(builder, plan, extent.end - 8 + rng.uniform(-12, 10), d + rng.uniform(-1, 1))
     for d in np.arange(-60, 60, 17):
-        _house(
-            builder, _random_house("town", rng), extent.end - 2 + rng.uniform(0, 8), d + rng.uniform(-4, 4), -np.pi / 2
-        )
+        s = extent.end - 2 + rng.uniform(0, 8)
+        _house(builder, _random_house("town", rng), s, d + rng.uniform(-4, 4), -np.pi / 2, across_road=True)

@@ -1,6 +1,11 @@
 """Data sets: the same bytes for the same seed, however they came about."""
 
 import json
+import os
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -59,6 +64,34 @@ def test_killed_in_the_middle_it_resumes_to_the_same_bytes(alone, tmp_path, monk
     resumed = make_recipe(TINY, tmp_path, seed=3, workers=1)
     assert contents(resumed) == contents(alone)
     assert first.stat().st_mtime_ns == written
+
+
+def test_workers_end_when_their_parent_is_killed(tmp_path):
+    code = "from semgrid_edu.simulation.datasets import make\nif __name__ == '__main__':\n    make('minikitti', {!r})"
+    script = tmp_path / "run.py"
+    script.write_text(code.format(str(tmp_path)))
+    process = subprocess.Popen([sys.executable, script], stderr=subprocess.DEVNULL, start_new_session=True)
+    day = tmp_path / "minikitti" / DATE
+    while not list(day.glob(".*.partial/image_02/data/*.png")):
+        assert process.poll() is None
+        time.sleep(0.05)
+    process.kill()
+    process.wait()
+    for _ in range(200):
+        if not group_alive(process.pid):
+            return
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGKILL)
+    pytest.fail("workers went on for ten seconds without their parent")
+
+
+def group_alive(group: int) -> bool:
+    """Whether any process of a process group still runs."""
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
 
 
 def test_the_index_lists_the_labelled_frames(alone):
