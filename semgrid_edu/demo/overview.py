@@ -73,4 +73,5 @@ def _draw_legend(figure: Figure, classes: NDArray, label_set: LabelSet) -> None:
     patches = [
         Patch(facecolor=np.divide(rgb, 255), edgecolor="0.5", linewidth=0.5, label=name) for name, rgb in entries
     ]
-    figure.legend(handles=patches, ncols=9, loc="center", frameon=False, columnspacing=1.3, handlelength=1.4)
+    columns = -(-len(patches) // 2)
+    figure.legend(handles=patches, ncols=columns, loc="center", frameon=False, columnspacing=1.3, handlelength=1.4)

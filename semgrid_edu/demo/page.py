@@ -45,8 +45,8 @@ GRID_PANELS = (
         "refined",
         "Refined grid",
         "g after the CRF",
-        "Cells that lie close and have like occupancy agree on a class, so specks and holes go. A thin pole may go "
-        "with them: compare.",
+        "Cells that lie close and have like occupancy agree on a class, so specks and holes go. What is thin or rare "
+        "may go with them: compare.",
     ),
     Panel(
         "truth",
