@@ -147,6 +147,8 @@ class TestPage:
             shown = set(frame["images"]) - {"photo"}
             assert set(frame["texts"]) == shown
             assert all(len(text) > 20 for text in frame["texts"].values())
+            dots = (np.array(decode(frame["images"]["points"]))[..., 3] > 0).sum()
+            assert dots <= int(re.search(r"(\d+) LIDAR", frame["texts"]["points"])[1]) < 700
         captions = page.text["figcaption"]
         assert len(page.all("figure")) == len(page.all("figcaption")) == 6
         assert len(captions) > 200

@@ -19,6 +19,7 @@ from semgrid_edu.metrics import (
 from semgrid_edu.occupancy import State
 from semgrid_edu.pipeline import STAGES, Result
 from semgrid_edu.plotting import occupancy_colours
+from semgrid_edu.plotting.images import visible_points
 
 METRICS = {"pixel accuracy": pixel_accuracy, "class accuracy": class_accuracy, "FmIoU": frequency_weighted_iou}
 """Section 4.2, by the names of the page's columns."""
@@ -117,7 +118,7 @@ def _texts(result: Result, maps: dict[str, NDArray], label_set: LabelSet) -> dic
     states = np.bincount(result.belief.probability.argmax(axis=0).ravel(), minlength=4) / maps["grid"].size
     occupancy = ", ".join(f"{share:.1%} {state.name.lower()}" for state, share in zip(State, states, strict=True))
     texts = {
-        "points": f"Camera image with the returns of {len(result.frame.points)} laser pulses that it sees.",
+        "points": f"Camera image with the {len(visible_points(result.frame)[1])} LIDAR returns that it sees.",
         "scores": f"Camera image painted with classes: {_shares(result.scores.argmax(axis=0), label_set)}.",
         "occupancy": f"Occupancy grid seen from above: {occupancy}.",
     }
