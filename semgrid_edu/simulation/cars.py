@@ -223,7 +223,7 @@ def car(body: str) -> Shape:
                 Kind.CAR,
             ),
             box(
-                (0.474 * length, 0.62 * y, head_z),
+                (0.4785 * length, 0.62 * y, head_z),
                 (0.05 * length, 0.30 * half, 0.12),
                 (0.62, 0.64, 0.64),
                 Material.LAMP,

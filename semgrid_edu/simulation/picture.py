@@ -15,6 +15,7 @@ from semgrid_edu.simulation.rig import Rig
 from semgrid_edu.simulation.shading import shade
 
 _SKY_STEP = 3
+_SUBPIXELS = ((-0.33, 0.33), (0.33, -0.33))
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,16 +41,9 @@ class Picture:
 
 
 @cache
-def _rays(rig: Rig) -> NDArray[np.float32]:
-    """Return the ray through the middle of every pixel."""
-    return rig.pixel_directions()
-
-
-@cache
-def _second_rays(rig: Rig) -> NDArray[np.float32]:
-    """Return a second ray for every pixel, to one side and to the other in turn, so that edges don't move."""
-    v, u = np.mgrid[: rig.image_size[0], : rig.image_size[1]]
-    return rig.pixel_directions(np.where((u + v) % 2, 0.38, -0.38), np.where(v % 2, 0.38, -0.38))
+def _rays(rig: Rig, du: float = 0.0, dv: float = 0.0) -> NDArray[np.float32]:
+    """Return a ray for every pixel, through its middle or beside it."""
+    return rig.pixel_directions(du, dv)
 
 
 @cache
@@ -209,9 +203,10 @@ def take_picture(
 
     triangles, distance = hits.triangle.reshape(shape), hits.distance.reshape(shape)
     edges = np.flatnonzero(_discontinuities(triangles, distance, instant.kind, instant.material))
-    second = instant.cast(eye, turned(_second_rays(rig)[edges], rotation))
-    radiance[edges] += shade(second, instant, road, light, sunlit[edges], open_sky[edges], pixel)[0]
-    radiance[edges] /= 2
+    for du, dv in _SUBPIXELS:
+        beside = instant.cast(eye, turned(_rays(rig, du, dv)[edges], rotation))
+        radiance[edges] += shade(beside, instant, road, light, sunlit[edges], open_sky[edges], pixel)[0]
+    radiance[edges] /= 1 + len(_SUBPIXELS)
 
     ahead = _cosines(rig) * hits.distance
     return Picture(

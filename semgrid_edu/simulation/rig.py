@@ -114,7 +114,7 @@ class Rig:
         """(4, 4): up by the LIDAR's height."""
         return invert_rigid(lidar_from_grid(KITTI_LIDAR_HEIGHT))
 
-    def pixel_directions(self, du: NDArray | float = 0.0, dv: NDArray | float = 0.0) -> NDArray[np.float32]:
+    def pixel_directions(self, du: float = 0.0, dv: float = 0.0) -> NDArray[np.float32]:
         """Return (h w, 3) float32: the unit vector of every pixel in the LIDAR frame, shifted by (du, dv) pixels."""
         height, width = self.image_size
         v, u = np.mgrid[:height, :width]
