@@ -101,7 +101,7 @@ def run_pipeline(
             with _clock(seconds, "fusion"):
                 log_g = net.fusion(p, o)[0].log_softmax(dim=0).numpy()
         with _clock(seconds, "crf"):
-            refined = mean_field(-log_g, belief.probability, crf or CrfParams())
+            refined = mean_field(-log_g, belief.probability, crf or CrfParams.for_cells(net.architecture.grid.cell))
         yield Result(frame, belief, s[0].numpy(), np.exp(log_g), refined, seconds)
 
 

@@ -59,7 +59,7 @@ def test_the_semantic_grid_is_that_of_the_whole_network(net, results):
 
 def test_refinement_is_the_crf_on_the_semantic_grid(results):
     for result in results:
-        refined = mean_field(-np.log(result.grid), result.belief.probability, CrfParams())
+        refined = mean_field(-np.log(result.grid), result.belief.probability, CrfParams.for_cells(0.5))
         np.testing.assert_allclose(result.refined, refined, atol=1e-4)
 
 

@@ -12,6 +12,10 @@ N_STATES = 4
 """FREE, STATIC, DYNAMIC, UNKNOWN: the values o_i of a cell."""
 
 
+PAPER_CELL = 0.2
+"""Metres: the side of a cell in the paper (section 4.1)."""
+
+
 @dataclass(frozen=True)
 class CrfParams:
     """What eq. (4) leaves open. The paper gives no values.
@@ -22,13 +26,12 @@ class CrfParams:
         w1 and w2, the weights of the two kernels. 4 and 3: Kraehenbuehl and Koltun's published code takes 10 and 3
         for images; ours trusts occupancy less than colour, because many classes share a state.
     sigma_alpha : float
-        Reach of the bilateral kernel, in cells. 8 cells are 1.6 m in the paper's grid, half a car's length, and 4 m in
-        the compact one: give 3 there to keep the reach in metres.
+        Reach of the bilateral kernel, in cells: 8 are 1.6 m in the paper's grid, the width of a car.
     sigma_beta : float
         Reach of the bilateral kernel in state probability. Two certain, different states lie sqrt(2) apart, seven times
         0.2, and don't talk to each other; a cell that is 90 % free still hears one that is certainly free.
     sigma_gamma : float
-        Reach of the spatial kernel, in cells. Kraehenbuehl and Koltun's published 3: removes specks.
+        Reach of the spatial kernel, in cells: 3, as in Kraehenbuehl and Koltun's published code, removes specks.
     normalization : {"symmetric", "none"}
         "symmetric" replaces each kernel K (its diagonal, 1, included) by D^-1/2 K D^-1/2 with D its row sums, as
         Kraehenbuehl's code does by default: every cell hears about as much, so the weights don't depend on the
@@ -47,6 +50,23 @@ class CrfParams:
     sigma_beta: float = 0.2
     sigma_gamma: float = 3.0
     normalization: Literal["symmetric", "none"] = "symmetric"
+
+    @classmethod
+    def for_cells(cls, cell: float) -> "CrfParams":
+        """Return the defaults for cells of another size: what reaches 1.6 m and 0.6 m shall do so in any grid.
+
+        Parameters
+        ----------
+        cell : float
+            Side of a cell, metres; the defaults are for the paper's 0.2.
+
+        Examples
+        --------
+        >>> CrfParams.for_cells(0.5).sigma_alpha
+        3.2
+        """
+        scale = PAPER_CELL / cell
+        return cls(sigma_alpha=cls.sigma_alpha * scale, sigma_gamma=cls.sigma_gamma * scale)
 
     def __post_init__(self) -> None:
         """Refuse what eq. (4) has no meaning for."""

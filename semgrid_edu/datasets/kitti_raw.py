@@ -162,10 +162,10 @@ class KittiRawDrive(Sequence[Frame]):
         if len(content) % 16:
             raise DataError(path, "points of 4 x 4 bytes", f"{len(content)} bytes, {len(content) % 16} too many")
         points = np.frombuffer(content, dtype="<f4").reshape(-1, 4).astype(np.float32)
-        strange = ~(np.abs(points[:, :3]) <= LIDAR_RANGE).all(axis=1) | ~((points[:, 3] >= 0) & (points[:, 3] <= 1))
+        strange = ~(np.abs(points[:, :3]) <= LIDAR_RANGE).all(axis=1) | ~np.isfinite(points[:, 3])
         if strange.any():
             first = strange.argmax()
-            expected = f"finite coordinates within {LIDAR_RANGE:g} m and reflectances from 0 to 1"
+            expected = f"finite coordinates within {LIDAR_RANGE:g} m and a finite reflectance"
             raise DataError(path, expected, f"{points[first].tolist()} at point {first}")
         return points
 

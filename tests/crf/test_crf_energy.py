@@ -160,3 +160,10 @@ def test_written_out_pairs_refuse_a_large_grid():
     values = np.full((4, 101, 100), 0.25)
     with pytest.raises(ArgumentError, match=r"at most 10000 cells.*found 10100"):
         mean_field_naive(np.zeros((2, 101, 100)), values, CrfParams())
+
+
+@pytest.mark.parametrize("cell", [0.1, 0.2, 0.5])
+def test_the_reach_in_metres_is_the_same_in_every_grid(cell):
+    params = CrfParams.for_cells(cell)
+    assert params.sigma_alpha * cell == pytest.approx(CrfParams().sigma_alpha * 0.2)
+    assert params.sigma_gamma * cell == pytest.approx(CrfParams().sigma_gamma * 0.2)

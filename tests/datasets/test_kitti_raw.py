@@ -172,7 +172,7 @@ DAMAGES = {
     "NaN coordinate": (SCAN, put(np.nan)),
     "infinite coordinate": (SCAN, put(1, 2, np.inf)),
     "coordinate no LIDAR can see": (SCAN, put(1, 1e9)),
-    "reflectance above one": (SCAN, put(1, 2, 3, 255)),
+    "reflectance that is infinite": (SCAN, put(1, 2, 3, np.inf)),
     "truncated image": (IMAGE, cut(20)),
     "image without its last byte": (IMAGE, cut(1)),
     "image of another size": (IMAGE, save_image(np.zeros((6, 40, 3), np.uint8))),
