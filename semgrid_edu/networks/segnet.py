@@ -21,7 +21,8 @@ class SegNet(nn.Module):
         C.
     preset : str
         "paper" has VGG16's thirteen convolutions down and thirteen up; "compact" is the same, narrow and
-        shallow enough for two cores.
+        shallow enough for two cores. Both have two convolutions at full resolution: after unpooling three
+        pixels in four are empty, and a single one leaves them speckled.
     seed : int
         Of the initial weights.
 
@@ -32,7 +33,7 @@ class SegNet(nn.Module):
     """
 
     PRESETS: ClassVar = {
-        "compact": {"widths": (16, 32, 64, 96), "depths": (1, 1, 2, 2)},
+        "compact": {"widths": (16, 32, 64, 96), "depths": (2, 1, 2, 2)},
         "paper": {"widths": (64, 128, 256, 512, 512), "depths": (2, 2, 3, 3, 3)},
     }
 
