@@ -121,7 +121,7 @@ def learned_grids(net: SemanticGridNet, sample: Sample) -> dict[str, NDArray]:
     """Return the arg-max of the network's grid and of the refined one, (H, W) int."""
     logits = net(sample.image[None] / 255, sample.occupancy[None])
     unary = -logits[0].log_softmax(dim=0).numpy()
-    refined = mean_field(unary, sample.occupancy.numpy(), CrfParams.for_cells(test.spec.cell))
+    refined = mean_field(unary, sample.occupancy.numpy(), CrfParams.for_cells(net.architecture.grid.cell))
     return {"network": unary.argmin(axis=0), "network + CRF": refined.argmax(axis=0)}
 
 
