@@ -125,9 +125,10 @@ class TrainingParams:
     momentum : float
         The paper's 0.9.
     weight_limit : float
-        Largest weight of a class, see `median_frequency_weights`.
+        Largest weight of a class, see `median_frequency_weights`. Without it a cell of signage counts three hundred
+        times one of unknown-unobserved in minikitti, and the loss is made of a handful of cells.
     jitter : float
-        How far brightness and contrast of the images vary, as a share: some twenty streets teach little about light.
+        How far brightness and contrast of the images vary, as a share: 142 frames teach little about light.
     """
 
     image_iterations: int = 2000
