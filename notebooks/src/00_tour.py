@@ -30,6 +30,7 @@ import numpy as np
 import torch
 from IPython.display import Markdown
 from ipywidgets import IntSlider, interact
+from scipy import ndimage
 
 from semgrid_edu import plotting
 from semgrid_edu.camera import Camera, project
@@ -434,20 +435,27 @@ plt.show()
 #
 # Three failures, each of them real, none of them repaired for this page.
 #
-# **What has just been seen stands still.** Follow the car that drives ahead of you. In each frame, take the cells of
-# the grid that hold it and that the filter holds occupied: how much of them does it call DYNAMIC?
+# **What has just been seen stands still.** Take, in the last frame, the car ahead that moves most certainly the way
+# we do, and follow it back in time through the truth. In each frame, take the cells that it fills and that the filter
+# holds occupied: how much of them does it call DYNAMIC?
 
 # %%
-x, y = spec.centers().transpose(2, 0, 1)
-lane = (x > 13) & (x < 30) & (y > 1) & (y < 5)  # that car, and no other, in every frame
+x = spec.centers()[..., 0]
+truth_maps = [result.frame.labels.birdseye_on(spec) for result in results]
+car_ahead = (truth_maps[-1] == car) & (x > 13) & (now.belief.velocity[0] > 0)
+surest = np.where(car_ahead, now.belief.probability[State.DYNAMIC], 0).argmax()
+place = spec.centers().reshape(-1, 2)[surest]
 dynamic = []
-for result in results:
-    probability = result.belief.probability
-    on_car = lane & (result.frame.labels.birdseye_on(spec) == car)
-    occupied = on_car & (probability[State.STATIC] + probability[State.DYNAMIC] > 0.5)
-    dynamic.append(probability[State.DYNAMIC][occupied].mean() if occupied.any() else np.nan)
+for result, truth in zip(results[::-1], truth_maps[::-1], strict=True):
+    cars, n_cars = ndimage.label(truth == car)
+    centers = np.array([spec.centers()[cars == n].mean(axis=0) for n in range(1, n_cars + 1)])
+    nearest = np.linalg.norm(centers - place, axis=1).argmin()
+    place = centers[nearest]
+    belief = result.belief.probability[:, cars == nearest + 1]
+    occupied = belief[State.STATIC] + belief[State.DYNAMIC] > 0.5
+    dynamic.append(belief[State.DYNAMIC, occupied].mean() if occupied.any() else np.nan)
 fig, ax = plt.subplots(figsize=(6, 2.6), layout="constrained")
-ax.plot([result.frame.time for result in results], dynamic, "o-", color="0.3")
+ax.plot([result.frame.time for result in results], dynamic[::-1], "o-", color="0.3")
 ax.set(xlabel="time since the first scan [s]", ylabel="P(DYNAMIC) on the car", ylim=(0, 1))
 plt.show()
 
