@@ -197,6 +197,21 @@ def _van_doors(length: float) -> list[Shape]:
     ]
 
 
+def _trim(body: str, side: int) -> list[Shape]:
+    """Put lamps, a mirror and a door handle on one side of a body, 1 for the left."""
+    length, width, _ = car_size(body)
+    sections = _BODIES[body][1]
+    y, half = side * width / 2, width / 2
+    tail, head = 0.86 * sections[1][2], 1.02 * sections[-1][2]
+    red, white, steel = (0.35, 0.01, 0.01), (0.62, 0.64, 0.64), (0.2, 0.2, 0.2)
+    return [
+        box((-0.484 * length, 0.78 * y, tail), (0.036 * length, 0.2 * half, 0.17), red, Material.LAMP, Kind.CAR),
+        box((0.4785 * length, 0.62 * y, head), (0.05 * length, 0.30 * half, 0.12), white, Material.LAMP, Kind.CAR),
+        box((0.17 * length, 1.05 * y, sections[-4][2] + 0.08), (0.09, 0.16, 0.11), _DARK, Material.MATTE, Kind.CAR),
+        box((-0.02 * length, 0.995 * y, sections[4][2] - 0.1), (0.16, 0.02, 0.03), steel, Material.METAL, Kind.CAR),
+    ]
+
+
 @cache
 def car(body: str) -> Shape:
     """Make a car; its paint is recoloured with `Shape.recoloured(Material.PAINT, colour)`.
@@ -207,37 +222,9 @@ def car(body: str) -> Shape:
         One of `BODIES`.
     """
     length, width, _ = car_size(body)
-    (_, _), sections, _, _ = _BODIES[body]
-    rear, nose = sections[1], sections[-1]
-    lamp_z, head_z = 0.86 * rear[2], 1.02 * nose[2]
     half = width / 2
     parts = _loft(body) + _wheels(length, width, 0.31 if body not in ("suv", "van") else 0.35)
-    for side in (-1, 1):
-        y = side * half
-        parts += [
-            box(
-                (-0.484 * length, 0.78 * y, lamp_z),
-                (0.036 * length, 0.2 * half, 0.17),
-                (0.35, 0.01, 0.01),
-                Material.LAMP,
-                Kind.CAR,
-            ),
-            box(
-                (0.4785 * length, 0.62 * y, head_z),
-                (0.05 * length, 0.30 * half, 0.12),
-                (0.62, 0.64, 0.64),
-                Material.LAMP,
-                Kind.CAR,
-            ),
-            box((0.17 * length, 1.05 * y, sections[-4][2] + 0.08), (0.09, 0.16, 0.11), _DARK, Material.MATTE, Kind.CAR),
-            box(
-                (-0.02 * length, 0.995 * y, sections[4][2] - 0.1),
-                (0.16, 0.02, 0.03),
-                (0.2, 0.2, 0.2),
-                Material.METAL,
-                Kind.CAR,
-            ),
-        ]
+    parts += _trim(body, -1) + _trim(body, 1)
     if body == "van":
         parts += _van_doors(length)
     parts += [

@@ -6,7 +6,7 @@ import platform
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
 from multiprocessing import get_context, parent_process
@@ -19,6 +19,7 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.files import write_json
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.simulation.drive import SimulatedDrive
+from semgrid_edu.simulation.plan import ANY, Wishes
 from semgrid_edu.simulation.rig import Rig
 from semgrid_edu.simulation.sample import SAMPLE_WISHES
 from semgrid_edu.simulation.writer import (
@@ -44,14 +45,13 @@ class Route:
     n_frames : int
     all_labelled : bool
         Whether all frames have labels; else the last one alone.
-    wishes : dict
-        For `SimulatedDrive`.
+    wishes : Wishes
     """
 
     split: str
     n_frames: int
     all_labelled: bool
-    wishes: dict = field(default_factory=dict)
+    wishes: Wishes = ANY
 
     @property
     def labelled(self) -> range:
@@ -80,7 +80,7 @@ class Recipe:
 
 def _long(split: str, n_frames: int, speed: float, layout: str) -> Route:
     """Return a route with labels on every frame, fast enough to see much."""
-    return Route(split, n_frames, True, {"speed": speed, "layout": layout})
+    return Route(split, n_frames, True, Wishes(layout=layout, speed=speed))
 
 
 RECIPES = {
@@ -209,7 +209,7 @@ def _make_drive(recipe: Recipe, root: Path, seed: int, index: int) -> None:
     """Simulate and write one drive; its random numbers depend on data set, seed and index alone."""
     route = recipe.routes[index]
     own_seed = np.random.SeedSequence([seed, FORMAT, *recipe.name.encode()], spawn_key=(index,))
-    simulated = SimulatedDrive(own_seed, route.n_frames, **route.wishes)
+    simulated = SimulatedDrive(own_seed, route.n_frames, route.wishes)
     points = depth_as_points if recipe.dense else lidar_points
     write_drive(root, f"{index + 1:04d}", simulated, route.labelled, LABEL_SETS[recipe.label_set], points)
 

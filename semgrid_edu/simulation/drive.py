@@ -13,7 +13,7 @@ from semgrid_edu.simulation.lidar import scan
 from semgrid_edu.simulation.motion import Ego, Pace, Path
 from semgrid_edu.simulation.oxts import Geodesy
 from semgrid_edu.simulation.picture import Picture, take_picture
-from semgrid_edu.simulation.plan import Plan, draw_plan
+from semgrid_edu.simulation.plan import ANY, Plan, Wishes, draw_plan
 from semgrid_edu.simulation.raycast import Instant, Scene
 from semgrid_edu.simulation.rig import Rig
 from semgrid_edu.simulation.road_users import fill_street
@@ -68,21 +68,20 @@ class SimulatedDrive:
     seed : int or numpy.random.SeedSequence
     n_frames : int
         Frames, ten a second.
+    wishes : Wishes
     rig : Rig
-    **wishes
-        For `draw_plan`; `speed` (m/s) sets the mean speed of the recording car, `ego_lane` its lane (0: beside the
-        centre line), `cast` a function of `Traffic` that replaces the usual `fill_street`.
     """
 
-    def __init__(self, seed, n_frames: int, rig: Rig | None = None, **wishes) -> None:
+    def __init__(
+        self, seed: int | np.random.SeedSequence, n_frames: int, wishes: Wishes = ANY, rig: Rig | None = None
+    ) -> None:
+        self.wishes = wishes
         self.rng = np.random.default_rng(seed)
         self.n_frames, self.rig = n_frames, rig or Rig()
         duration = (n_frames - 1) * PERIOD
-        wishes = dict(wishes)
-        cast, speed, lane = wishes.pop("cast", fill_street), wishes.pop("speed", None), wishes.pop("ego_lane", None)
-        pace = _draw_pace(self.rng, speed)
-        self.plan = draw_plan(self.rng, pace.distance(duration), **wishes)
-        self.ego = _draw_ego(self.rng, self.plan, pace, lane)
+        pace = _draw_pace(self.rng, wishes.speed)
+        self.plan = draw_plan(self.rng, pace.distance(duration), wishes)
+        self.ego = _draw_ego(self.rng, self.plan, pace, wishes.ego_lane)
         self.geodesy = Geodesy(
             49.0 + float(self.rng.uniform(0, 0.05)),
             8.4 + float(self.rng.uniform(0, 0.05)),
@@ -91,7 +90,7 @@ class SimulatedDrive:
         )
         builder = build_scenery(self.plan, self.rng)
         traffic = Traffic(builder, self.plan, self.ego.path, duration)
-        cast(traffic)
+        (wishes.cast or fill_street)(traffic)
         self.moving: list[Actor] = traffic.moving
         self.parked: list[Actor] = traffic.parked
         self.static = Scene.of(builder.shapes, builder.instances)

@@ -1,4 +1,4 @@
-"""What stands beside a street: fences, walls, signs, lamps, traffic lights and parked bicycles' racks."""
+"""What stands beside a street: fences, garden walls, traffic signs, lamps and traffic lights."""
 
 from functools import cache
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from semgrid_edu.simulation.light import Light
 from semgrid_edu.simulation.motion import STAND, Pace
+from semgrid_edu.simulation.plan import Wishes
 from semgrid_edu.simulation.road_users import fill_street
 from semgrid_edu.simulation.traffic import Traffic
 
@@ -41,28 +42,29 @@ def _cast(traffic: Traffic) -> None:
 
 
 _SUN = np.array([0.45, 0.62, 0.64]) / np.linalg.norm([0.45, 0.62, 0.64])
+_LIGHT = Light(
+    sun=tuple(_SUN.tolist()),
+    sun_colour=(1.55, 1.46, 1.27),
+    sky_colour=(0.17, 0.31, 0.62),
+    horizon_colour=(0.66, 0.75, 0.86),
+    softness=0.012,
+    clouds=0.4,
+    haze=0.0012,
+    exposure=1.1,
+    balance=(1.0, 1.0, 1.0),
+    phase=3.0,
+)
 
-SAMPLE_WISHES = {
-    "layout": "bend",
-    "lanes": (1, 2),
-    "styles": ("suburb", "suburb"),
-    "borders": ("hedge", "planks"),
-    "parking": (True, False),
-    "density": 0.45,
-    "speed": 8.0,
-    "ego_lane": 1,
-    "cast": _cast,
-    "light": Light(
-        sun=tuple(_SUN.tolist()),
-        sun_colour=(1.55, 1.46, 1.27),
-        sky_colour=(0.17, 0.31, 0.62),
-        horizon_colour=(0.66, 0.75, 0.86),
-        softness=0.012,
-        clouds=0.4,
-        haze=0.0012,
-        exposure=1.1,
-        balance=(1.0, 1.0, 1.0),
-        phase=3.0,
-    ),
-}
-"""Wishes for the sample's `SimulatedDrive`."""
+SAMPLE_WISHES = Wishes(
+    layout="bend",
+    lanes=(1, 2),
+    styles=("suburb", "suburb"),
+    borders=("hedge", "planks"),
+    parking=(True, False),
+    density=0.45,
+    speed=8.0,
+    ego_lane=1,
+    cast=_cast,
+    light=_LIGHT,
+)
+"""What the sample drive shows."""

@@ -3,12 +3,15 @@
 import pytest
 
 from semgrid_edu.simulation.drive import SimulatedDrive
+from semgrid_edu.simulation.plan import Wishes
+
+BUSY = Wishes(layout="junction", styles=("suburb", "town"), density=0.9, speed=8.0)
 
 
 @pytest.fixture(scope="session")
 def junction_drive() -> SimulatedDrive:
     """A drive of ten frames towards a busy junction, houses and gardens beside it."""
-    return SimulatedDrive(5, 10, layout="junction", styles=("suburb", "town"), density=0.9, speed=8.0)
+    return SimulatedDrive(5, 10, BUSY)
 
 
 @pytest.fixture(scope="session")

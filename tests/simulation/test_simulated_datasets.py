@@ -16,9 +16,10 @@ from semgrid_edu.files import sha256
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.simulation import datasets
 from semgrid_edu.simulation.datasets import RECIPES, Recipe, Route, make, make_recipe
+from semgrid_edu.simulation.plan import Wishes
 from semgrid_edu.simulation.writer import DATE, drive_folder
 
-QUIET = {"density": 0.2, "layout": "straight", "styles": ("park", "park")}
+QUIET = Wishes(density=0.2, layout="straight", styles=("park", "park"))
 TINY = Recipe("tiny", "KITTI-14", (Route("train", 2, False, QUIET), Route("test", 1, True, QUIET)))
 DENSE = Recipe("dense", "SYNTHIA-10", (Route("train", 1, True, QUIET),), dense=True)
 

@@ -12,6 +12,7 @@ from semgrid_edu.simulation.drive import SimulatedDrive
 from semgrid_edu.simulation.footprints import ROUND, SQUARE, Footprint, collides, outline, stamp, table
 from semgrid_edu.simulation.layout import outside_asphalt, to_road
 from semgrid_edu.simulation.materials import Kind, class_of_kind
+from semgrid_edu.simulation.plan import Wishes
 from semgrid_edu.simulation.shapes import merge
 
 
@@ -72,7 +73,7 @@ def test_cars_keep_to_the_asphalt_and_houses_off_it(junction_drive):
 def test_people_walk_at_1_4_metres_a_second():
     speeds = [
         np.hypot(*actor.path.velocity(drive.plan.road, 0.5))
-        for drive in (SimulatedDrive(seed, 10, density=1.0, styles=("town", "town")) for seed in range(3))
+        for drive in (SimulatedDrive(seed, 10, Wishes(density=1.0, styles=("town", "town"))) for seed in range(3))
         for actor in drive.moving
         if actor.kind == Kind.PEDESTRIAN and actor.path.pace.mean > 0
     ]
@@ -153,8 +154,8 @@ def test_every_kind_has_its_class_in_both_label_sets():
     assert kitti[255] == synthia[255] == 255
 
 
-def test_the_same_seed_gives_the_same_frame(last_frame):
-    again = SimulatedDrive(5, 10, layout="junction", styles=("suburb", "town"), density=0.9, speed=8.0).frame(9, True)
+def test_the_same_seed_gives_the_same_frame(junction_drive, last_frame):
+    again = SimulatedDrive(5, 10, junction_drive.wishes).frame(9, True)
     assert np.array_equal(again.picture.image, last_frame.picture.image)
     assert np.array_equal(again.points, last_frame.points)
     assert np.array_equal(again.truth.visible, last_frame.truth.visible)

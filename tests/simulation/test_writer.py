@@ -10,12 +10,13 @@ from PIL import Image
 from semgrid_edu.camera import invert_rigid
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.simulation.drive import SimulatedDrive
+from semgrid_edu.simulation.plan import Wishes
 from semgrid_edu.simulation.writer import DATE, depth_to_png, write_calibration, write_drive
 
 
 @pytest.fixture(scope="module")
 def simulated():
-    return SimulatedDrive(11, 4, layout="bend", speed=12.0)
+    return SimulatedDrive(11, 4, Wishes(layout="bend", speed=12.0))
 
 
 @pytest.fixture(scope="module")
