@@ -1,7 +1,8 @@
 # `make demo` and `make test` need Python 3.11 or later and nothing else: they make .venv when it is missing or out of date.
 PYTHON ?= python3
 BIN := .venv/bin
-# One thread a test process: two processes share two cores.
+# Idle OpenMP threads sleep instead of spinning: two test processes share two cores.
+export OMP_WAIT_POLICY := PASSIVE
 PYTEST := OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest
 
 .PHONY: demo test test-real notebooks lint bench clean
@@ -10,7 +11,7 @@ demo: .venv/made
 	$(BIN)/semgrid-edu demo --out out/demo
 
 test: lint
-	$(PYTEST) -n 2 --dist loadfile tests
+	$(PYTEST) -n 2 --dist loadfile --doctest-modules semgrid_edu tests
 	$(BIN)/python -m pytest --nbval --nbval-current-env --nbval-cell-timeout=300 -n 2 --dist loadscope -p no:cacheprovider notebooks/*.ipynb
 
 test-real: .venv/made
