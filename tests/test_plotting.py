@@ -176,3 +176,13 @@ def test_values_carry_a_colour_bar_with_their_name():
 def test_wrong_input_is_named(draw):
     with pytest.raises(ArgumentError, match="expected"):
         draw()
+
+
+def test_label_maps_share_one_legend_of_all_their_classes():
+    spec = GridSpec(0, 2, -1, 1, 1)
+    maps = {"left": np.array([[0, 0], [0, 3]]), "right": np.array([[1, 255], [1, 1]])}
+    figure = plotting.label_maps(spec, maps, KITTI_14)
+    assert [ax.get_title() for ax in figure.axes] == ["left", "right"]
+    assert [ax.get_legend() is None for ax in figure.axes] == [True, False]
+    assert [text.get_text() for text in figure.axes[1].get_legend().get_texts()] == ["road", "sidewalk", "car"]
+    plt.close(figure)

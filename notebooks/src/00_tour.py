@@ -284,12 +284,9 @@ for Z in (10, 20, 40, 80):
 with torch.inference_mode():
     planes = net.sampler(torch.from_numpy(now.scores)[None])[0]  # (C, D, H, W)
 heights = plane_heights()
-fig, axes = plt.subplots(1, 3, figsize=(11, 5.5), layout="constrained")
-for ax, d in zip(axes, (0, 5, 10), strict=True):
-    seen = planes[:, d].abs().sum(dim=0) > 0
-    labels = np.where(seen, planes[:, d].argmax(dim=0), 255)
-    plotting.grid_labels(spec, labels, KITTI_14, ax=ax, legend=d == 10)
-    ax.set_title(f"plane at {heights[d]:.1f} m")
+seen = planes.abs().sum(dim=0) > 0
+labels = np.where(seen, planes.argmax(dim=0), 255)
+plotting.label_maps(spec, {f"plane at {heights[d]:.1f} m": labels[d] for d in (0, 5, 10)}, KITTI_14)
 plt.show()
 
 # %% [markdown]
@@ -300,22 +297,16 @@ plt.show()
 # ## Stage 4, $(p, o) \to g$: one map
 #
 # A 1x1 convolution reduces 20 x 14 planes to 16, the four of the occupancy grid join them, and a small network with
-# pooling and skips gives each cell a probability for every class. Left: where. Middle: the map that says what. Right:
-# the truth.
+# pooling and skips gives each cell a probability for every class. The picture shows the most probable one.
 
 # %%
 truths = [grid_truth(r.frame.labels, r.belief.probability, spec) for r in results]
-fig, axes = plt.subplots(1, 3, figsize=(11, 5.5), layout="constrained")
-plotting.occupancy(spec, now.belief.probability, ax=axes[0], legend=False)
-plotting.grid_labels(spec, now.grid.argmax(axis=0), KITTI_14, ax=axes[1], legend=False)
-plotting.grid_labels(spec, truths[-1], KITTI_14, ax=axes[2])
-for ax, title in zip(axes, ("occupancy $o$", "semantic grid $g$", "truth"), strict=True):
-    ax.set_title(title)
+plotting.label_maps(spec, {"semantic grid $g$": now.grid.argmax(axis=0), "truth": truths[-1]}, KITTI_14)
 plt.show()
 
 # %% [markdown]
-# Road and sidewalk are both FREE on the left and told apart in the middle: that the LIDAR can't do. Walls are thin
-# and in their place: that the camera can't do. In the truth, a cell that the camera doesn't see is *unknown-free*,
+# Road and sidewalk, both FREE in the occupancy grid, are told apart: that the LIDAR can't do. Walls stand where the
+# LIDAR met them: that the camera can't do. In the truth, a cell that the camera doesn't see is *unknown-free*,
 # *-static*, *-dynamic* or *-unobserved*, by its occupancy state.
 
 # %% [markdown]
@@ -331,13 +322,9 @@ plt.show()
 # filled too. The paper finds pixel accuracy slightly up and class accuracy down.</details>
 
 # %%
-changed = now.refined.argmax(axis=0) != now.grid.argmax(axis=0)
-fig, axes = plt.subplots(1, 3, figsize=(11, 5.5), layout="constrained")
-plotting.grid_labels(spec, now.grid.argmax(axis=0), KITTI_14, ax=axes[0], legend=False)
-plotting.grid_labels(spec, now.refined.argmax(axis=0), KITTI_14, ax=axes[1], legend=False)
-plotting.grid_labels(spec, np.where(changed, now.refined.argmax(axis=0), 255), KITTI_14, ax=axes[2])
-for ax, title in zip(axes, ("before", "after", "what changed, with its new class"), strict=True):
-    ax.set_title(title)
+before, after = now.grid.argmax(axis=0), now.refined.argmax(axis=0)
+changed = np.where(after != before, after, 255)
+plotting.label_maps(spec, {"before": before, "after": after, "what changed, and to what": changed}, KITTI_14)
 plt.show()
 
 # %% [markdown]

@@ -6,7 +6,7 @@ decreases to the right. Arrays are never flipped: row 0 is the farthest ahead, c
 
 from semgrid_edu.plotting.charts import confusion
 from semgrid_edu.plotting.colours import DEPTH_RANGE, STATE_COLOURS, STATE_NAMES, depth_colours, occupancy_colours
-from semgrid_edu.plotting.grids import grid_labels, grid_values, occupancy, velocity, velocity_arrows
+from semgrid_edu.plotting.grids import grid_labels, grid_values, label_maps, occupancy, velocity, velocity_arrows
 from semgrid_edu.plotting.images import image_labels, image_values, points_on_image
 from semgrid_edu.plotting.legends import class_legend
 
@@ -21,6 +21,7 @@ __all__ = [
     "grid_values",
     "image_labels",
     "image_values",
+    "label_maps",
     "occupancy",
     "occupancy_colours",
     "points_on_image",

@@ -1,8 +1,11 @@
 """Bird's-eye grids as maps in metres, forward up: occupancy, velocities, classes, values (section 3.2, 3.4)."""
 
+from collections.abc import Mapping
+
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
@@ -126,6 +129,32 @@ def grid_labels(
     """
     ax = draw_map(spec, label_set.colours(labels), ax)
     return class_legend(ax, label_set, labels) if legend else ax
+
+
+def label_maps(spec: GridSpec, maps: Mapping[str, NDArray], label_set: LabelSet) -> Figure:
+    """Draw maps of classes side by side, with one legend for all of them.
+
+    Parameters
+    ----------
+    spec : GridSpec
+    maps : mapping of str to (H, W) int
+        Titles and classes, from left to right; 255, unlabelled, is white.
+    label_set : LabelSet
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    ArgumentError
+        When a map doesn't fit `spec`.
+    """
+    figure, axes = plt.subplots(1, len(maps), figsize=(2 + 3 * len(maps), 5.5), layout="constrained", squeeze=False)
+    for ax, (title, labels) in zip(axes[0], maps.items(), strict=True):
+        grid_labels(spec, labels, label_set, ax=ax, legend=False).set_title(title)
+    class_legend(axes[0, -1], label_set, np.stack(list(maps.values())))
+    return figure
 
 
 def grid_values(spec: GridSpec, values: NDArray, name: str, ax: Axes | None = None, **style: object) -> Axes:
