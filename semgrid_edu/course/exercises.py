@@ -2,7 +2,6 @@
 
 import logging
 import os
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.metadata import version
@@ -85,22 +84,11 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS) -> list[str]:
         When the folder holds something else, or nbgrader can't release an exercise.
     """
     directory = Path(directory).resolve()
-    if directory.is_file():
-        raise DataError(directory, "a folder", "a file")
-    if directory.exists() and any(directory.iterdir()) and not (directory / MARKER).is_file():
-        raise DataError(directory, f"an empty folder, or a course with its {MARKER}", "a folder with other files")
+    _refuse_what_is_not_ours(directory)
     sources = exercise_sources(folder)
     names = [source.stem for source in sources]
     write_json(directory / MARKER, {"written by": f"semgrid_edu {version('semgrid_edu')}", "assignments": names})
-    for name in ("nbgrader_config.py", "README.md"):
-        write_text(directory / name, (folder / "instructor" / name).read_text(encoding="utf-8"))
-    module = "semgrid_instructor"
-    shutil.copytree(
-        folder / "instructor" / module,
-        directory / "instructor" / module,
-        ignore=shutil.ignore_patterns("__pycache__"),
-        dirs_exist_ok=True,
-    )
+    _copy_instructors_part(folder / "instructor", directory)
     for source in sources:
         write_notebook(read_percent(source), directory / "source" / source.stem / f"{source.stem}.ipynb")
     with course_api(directory) as api:
@@ -132,6 +120,23 @@ def course_api(directory: Path) -> Iterator[NbGraderAPI]:
     finally:
         os.environ.clear()
         os.environ.update(before)
+
+
+def _refuse_what_is_not_ours(directory: Path) -> None:
+    """Raise when a folder holds anything but a course that we laid out."""
+    if directory.is_file():
+        raise DataError(directory, "a folder", "a file")
+    if directory.exists() and any(directory.iterdir()) and not (directory / MARKER).is_file():
+        raise DataError(directory, f"an empty folder, or a course with its {MARKER}", "a folder with other files")
+
+
+def _copy_instructors_part(source: Path, directory: Path) -> None:
+    """Copy settings, guide and hidden tests."""
+    for name in ("nbgrader_config.py", "README.md"):
+        write_text(directory / name, (source / name).read_text(encoding="utf-8"))
+    module = Path("semgrid_instructor")
+    for path in sorted((source / module).glob("*.py")):
+        write_text(directory / "instructor" / module / path.name, path.read_text(encoding="utf-8"))
 
 
 def _released(result: dict, source: Path) -> None:
