@@ -25,7 +25,7 @@ class SensorModel:
         Width of a beam, degrees: every beam of KITTI's scanner (a column of returns each 0.18 degrees) holds one
         column or two.
     column_spacing : float
-        The widest gap between columns of returns that still is no hole, degrees. Our simulated scanner's is 0.6.
+        The widest gap between columns of returns that still is no hole, degrees. Our simulated scanner's is 0.9.
     p_hit_occupied, p_hit_free : float
         Probability of an obstacle return from a cell that is occupied, or free (a grazing ray, a mixed pixel).
     max_returns : int
@@ -43,7 +43,7 @@ class SensorModel:
     obstacle_min: float = 0.3
     obstacle_max: float = 2.5
     azimuth_step: float = 0.3
-    column_spacing: float = 0.6
+    column_spacing: float = 0.9
     p_hit_occupied: float = 0.8
     p_hit_free: float = 0.05
     max_returns: int = 2

@@ -78,8 +78,8 @@ def test_a_ray_walks_through_neighbouring_cells(x, y, azimuth, length):
 
 
 def test_columns_wider_apart_than_beams_leave_no_holes():
-    """The simulated scanner's columns are 0.6 degrees apart; beams are half as wide."""
-    azimuth = np.radians(np.arange(-45, 45, 0.6))
+    """The simulated scanner's columns are 0.9 degrees apart, beams a third of that."""
+    azimuth = np.radians(np.arange(-45, 45, 0.9))
     ground = np.stack([30 * np.cos(azimuth), 30 * np.sin(azimuth), 0 * azimuth], axis=1)
     spec = GridSpec(0, 20, -5, 5, 0.5)
     x, y = np.moveaxis(spec.centers(), -1, 0)
