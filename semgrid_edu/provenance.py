@@ -28,7 +28,7 @@ def write_provenance(folder: str | Path, command: str, seed: int, packages: tupl
     Parameters
     ----------
     folder : path-like
-        The folder; all files below it are recorded with their SHA-256.
+        The folder; all files below it are recorded with their SHA-256, but for `cache/`, which is made of them.
     command : str
         The command that made them.
     seed : int
@@ -81,5 +81,6 @@ def provenance_problems(folder: str | Path) -> list[str]:
 
 
 def _checksums(folder: Path) -> dict[str, str]:
-    files = sorted(path for path in folder.rglob("*") if path.is_file() and path != folder / FILE_NAME)
-    return {path.relative_to(folder).as_posix(): sha256(path) for path in files}
+    files = {path.relative_to(folder): path for path in sorted(folder.rglob("*")) if path.is_file()}
+    left_out = (FILE_NAME, "cache")
+    return {name.as_posix(): sha256(path) for name, path in files.items() if name.parts[0] not in left_out}

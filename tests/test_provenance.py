@@ -44,6 +44,11 @@ def test_untouched_files_have_no_problems(recorded):
     assert set(record["versions"]) == {"python", "semgrid_edu", "numpy"}
 
 
+def test_what_is_cached_beside_the_files_is_no_part_of_them(recorded):
+    write_text(recorded / "cache" / "arrays.npy", "made of the others")
+    assert provenance_problems(recorded) == []
+
+
 def test_changed_missing_and_added_files_are_each_named(recorded):
     write_text(recorded / "2.txt", "tow")
     (recorded / "a" / "1.txt").unlink()

@@ -38,7 +38,7 @@ def samples_dir() -> Path:
 
 def sample_drive() -> KittiRawDrive:
     """Return the shipped drive: 20 labelled frames of a simulated street."""
-    return KittiRawDrive(samples_dir() / "drive", "2026_01_01", "0001")
+    return KittiRawDrive(samples_dir() / "sample", "2026_01_01", "0001")
 
 
 def sample_weights() -> Path:

@@ -2,13 +2,11 @@
 
 import json
 import os
-import platform
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from functools import partial
-from importlib.metadata import version
 from multiprocessing import get_context, parent_process
 from pathlib import Path
 
@@ -18,6 +16,7 @@ from tqdm.auto import tqdm
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.files import write_json
 from semgrid_edu.labels import LABEL_SETS
+from semgrid_edu.provenance import versions, write_provenance
 from semgrid_edu.simulation.drive import SimulatedDrive
 from semgrid_edu.simulation.plan import ANY, Wishes
 from semgrid_edu.simulation.rig import Rig
@@ -112,6 +111,9 @@ RECIPES = {
 DATA_SETS = ("minikitti", "minichroma", "minisynthia")
 """What `semgrid-edu data make all` makes."""
 
+PACKAGES = ("numpy", "numba", "embreex", "trimesh", "pillow")
+"""The packages whose versions can change what a seed gives."""
+
 
 def make(name: str, folder: Path, seed: int = 0, workers: int = 2) -> Path:
     """Make a data set, or finish one that was interrupted.
@@ -161,7 +163,9 @@ def make_recipe(recipe: Recipe, folder: Path, seed: int, workers: int) -> Path:
     with tqdm(total=len(drives), initial=len(drives) - len(missing), desc=recipe.name, unit="drive") as bar:
         for _ in _run(partial(_make_drive, recipe, root, seed), missing, workers):
             bar.update()
-    write_json(root / "dataset.json", _index(recipe, drives, seed))
+    index = _index(recipe, drives, seed)
+    write_json(root / "dataset.json", index)
+    write_provenance(root, index["command"], seed, PACKAGES)
     return root
 
 
@@ -220,12 +224,11 @@ def _index(recipe: Recipe, drives: list[str], seed: int) -> dict:
     for drive, route in zip(drives, recipe.routes, strict=True):
         frames = [{"date": DATE, "drive": drive, "frame": k} for k in route.labelled]
         splits.setdefault(route.split, []).extend(frames)
-    packages = ("semgrid_edu", "numpy", "numba", "embreex", "trimesh", "pillow")
     return {
         "name": recipe.name,
         "label_set": recipe.label_set,
         "seed": seed,
         "command": f"semgrid-edu data make {recipe.name} DIR --seed {seed}",
-        "versions": {"python": platform.python_version()} | {p: version(p) for p in packages},
+        "versions": versions(*PACKAGES),
         "splits": splits,
     }
