@@ -92,6 +92,17 @@ def needs_tools() -> None:
         sys.exit(f"semgrid-edu: {' and '.join(missing)} are needed for this: pip install 'semgrid_edu[course]'")
 
 
+@data.command()
+def ship(
+    run: Annotated[Path, typer.Argument(help="A folder that `semgrid-edu train` wrote.")],
+    folder: Annotated[Path, typer.Argument(help="Takes the weights, the log and their provenance.")],
+) -> None:
+    """Keep a trained network as a sample."""
+    from semgrid_edu.datasets.samples import write_weights
+
+    write_weights(run, folder)
+
+
 @course.command()
 def notebooks(
     names: Annotated[list[str] | None, typer.Argument(help="Such as 00_tour; all by default.")] = None,

@@ -1,5 +1,6 @@
 """The shipped samples: a short simulated drive, a few labelled frames and trained compact weights."""
 
+import json
 from pathlib import Path
 
 import torch
@@ -10,11 +11,14 @@ from semgrid_edu.datasets.kitti_raw import KittiRawDrive
 from semgrid_edu.datasets.training_cache import SEED
 from semgrid_edu.datasets.training_set import Sample, TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.files import atomic_path
+from semgrid_edu.files import atomic_path, write_bytes
 from semgrid_edu.provenance import FILE_NAME, provenance_problems, write_provenance
 
 FRAMES = "frames.safetensors"
 """The file of an excerpt."""
+
+WEIGHTS = "segnet_compact.safetensors"
+"""The file of the trained network."""
 
 
 def samples_dir() -> Path:
@@ -43,7 +47,31 @@ def sample_drive() -> KittiRawDrive:
 
 def sample_weights() -> Path:
     """Return the file of the trained compact network, SegNet and fusion."""
-    return samples_dir() / "weights" / "segnet_compact.safetensors"
+    return samples_dir() / "weights" / WEIGHTS
+
+
+def write_weights(run: str | Path, folder: str | Path) -> None:
+    """Keep what a training has learnt, with its log and what its provenance says, and leave the rest behind.
+
+    Parameters
+    ----------
+    run : path-like
+        The folder that `semgrid-edu train` wrote.
+    folder : path-like
+        Takes `segnet_compact.safetensors`, `log.csv` and `provenance.json`.
+
+    Raises
+    ------
+    DataError
+        When the run has no provenance, or its files aren't those that it names.
+    """
+    run, folder = Path(run), Path(folder)
+    if problems := provenance_problems(run):
+        raise DataError(run, "a training as it ended", problems[0])
+    for name, kept in (("weights.safetensors", WEIGHTS), ("log.csv", "log.csv")):
+        write_bytes(folder / kept, (run / name).read_bytes())
+    record = json.loads((run / FILE_NAME).read_text())
+    write_provenance(folder, record["command"], record["seed"], ("torch", "numpy", "safetensors"), training=record)
 
 
 def sample_frames() -> list[Sample]:

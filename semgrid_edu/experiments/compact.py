@@ -1,6 +1,7 @@
 """Train the compact network on a data set, with its provenance (paper, section 4.1)."""
 
 from dataclasses import asdict
+from datetime import UTC, datetime
 from pathlib import Path
 
 from semgrid_edu.datasets.index import INDEX_FILE
@@ -28,11 +29,13 @@ def train_compact(
     resume : bool
         Whether to continue a run that was interrupted.
     """
-    dataset = TrainingSet(dataset_dir, "train")
+    dataset, began = TrainingSet(dataset_dir, "train"), datetime.now(UTC)
     train(build_net(Architecture(), dataset.camera, seed), dataset, folder, params, seed, resume)
     command = (
         f"semgrid-edu train --data {Path(dataset_dir).name} --out {Path(folder).name} "
         f"--seed {seed} --iterations {params.grid_iterations}"
     )
-    details = {"params": asdict(params), "dataset": sha256(Path(dataset_dir) / INDEX_FILE)}
+    minutes = round((datetime.now(UTC) - began).total_seconds() / 60, 1)
+    details = {"date": f"{began:%Y-%m-%d}", "minutes": minutes, "resumed": resume, "params": asdict(params)}
+    details["dataset"] = sha256(Path(dataset_dir) / INDEX_FILE)
     write_provenance(folder, command, seed, ("torch", "numpy", "safetensors"), **details)

@@ -1,5 +1,6 @@
 """The trained network against what learns next to nothing, on frames that none has seen (sections 4.2 and 4.3)."""
 
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +76,7 @@ def evaluate(dataset_dir: str | Path, weights: str | Path) -> dict[str, object]:
         "weights": {"file": Path(weights).name, "sha256": sha256(weights)},
         "command": f"semgrid-edu evaluate --data {Path(dataset_dir).name} --weights {Path(weights).name}",
         "seed": SEED,
+        "date": f"{datetime.now(UTC):%Y-%m-%d}",
         "versions": versions("numpy", "torch", "numba"),
     }
 

@@ -1,13 +1,23 @@
 """The shipped samples, and excerpts like them."""
 
+import json
+
 import pytest
 import torch
 from tiny_drive import write_tiny_dataset
 
-from semgrid_edu.datasets.samples import FRAMES, read_excerpt, samples_problems, write_excerpt
+from semgrid_edu.datasets.samples import (
+    FRAMES,
+    WEIGHTS,
+    read_excerpt,
+    samples_problems,
+    write_excerpt,
+    write_weights,
+)
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.files import write_bytes
+from semgrid_edu.provenance import provenance_problems, write_provenance
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +46,27 @@ def test_samples_are_checked_one_by_one(excerpt):
     assert samples_problems(samples) == []
     write_bytes(samples / "frames" / "stray", b"")
     assert [problem.rsplit("/", 1)[-1] for problem in samples_problems(samples)] == ["stray: not in provenance.json"]
+
+
+def test_a_kept_training_is_what_it_ended_with(tmp_path):
+    run, kept = tmp_path / "run", tmp_path / "weights"
+    for name in ("weights.safetensors", "image_stage.safetensors", "log.csv"):
+        write_bytes(run / name, name.encode())
+    write_provenance(run, "semgrid-edu train", 3, ("torch",), minutes=9)
+    write_weights(run, kept)
+    assert provenance_problems(kept) == []
+    assert sorted(path.name for path in kept.iterdir()) == ["log.csv", "provenance.json", WEIGHTS]
+    assert (kept / WEIGHTS).read_bytes() == b"weights.safetensors"
+    record = json.loads((kept / "provenance.json").read_text())
+    assert (record["command"], record["seed"], record["training"]["minutes"]) == ("semgrid-edu train", 3, 9)
+
+
+def test_a_training_that_was_touched_since_is_not_kept(tmp_path):
+    write_bytes(tmp_path / "run" / "weights.safetensors", b"learnt")
+    write_provenance(tmp_path / "run", "semgrid-edu train", 0, ("torch",))
+    write_bytes(tmp_path / "run" / "weights.safetensors", b"edited")
+    with pytest.raises(DataError, match=r"weights\.safetensors: changed"):
+        write_weights(tmp_path / "run", tmp_path / "kept")
 
 
 @pytest.mark.parametrize("content", [None, b"", b"no safetensors"])
