@@ -64,12 +64,7 @@ def verify(
     """Check the samples against the checksums in their provenance files."""
     from semgrid_edu.datasets.samples import samples_problems
 
-    problems = samples_problems(folder)
-    for problem in problems:
-        typer.echo(problem, err=True)
-    if problems:
-        raise typer.Exit(1)
-    typer.echo("every sample is as it was made")
+    _report(samples_problems(folder), "every sample is as it was made")
 
 
 @data.command()
@@ -122,12 +117,7 @@ def check() -> None:
     """Check that every notebook is in step with its source, has run, and is fit to be shown."""
     from semgrid_edu.course.checks import course_problems
 
-    problems = course_problems()
-    for problem in problems:
-        typer.echo(problem, err=True)
-    if problems:
-        raise typer.Exit(1)
-    typer.echo("every notebook is in step with its source")
+    _report(course_problems(), "every notebook is in step with its source")
 
 
 @course.command()
@@ -168,6 +158,14 @@ def evaluate(
     result = evaluate(data, weights)
     write_json(out, result)
     typer.echo(f"{table(result['scores'])}\n\nwritten to {out}")
+
+
+def _report(problems: list[str], sound: str) -> None:
+    """Say what is wrong, each problem on its line, and exit with 1; or that nothing is."""
+    if problems:
+        typer.echo("\n".join(problems), err=True)
+        raise typer.Exit(1)
+    typer.echo(sound)
 
 
 def run() -> None:
