@@ -447,9 +447,9 @@ ax.set(xlabel="time since the first scan [s]", ylabel="P(DYNAMIC) on the car", y
 plt.show()
 
 # %% [markdown]
-# The first scans show that *something* is there, and nothing says that it moves: STATIC is the better bet. Only when
-# it arrives where free space was seen before does the filter change its mind. A planner that trusts the map in that
-# first half second takes a moving car for a parked one.
+# The first scans show that *something* is there, and nothing says that it moves: STATIC is the better bet. Only when it
+# arrives where free space was seen before does the filter change its mind, and here that takes more than a second. A
+# planner that trusts the map until then takes a moving car for a parked one.
 #
 # **Far away everything is worse.** A cell of half a metre, 60 m ahead, is less than a pixel high in the network's
 # image, and the LIDAR's rings are metres apart there.
