@@ -5,9 +5,10 @@
 """
 
 from semgrid_edu.occupancy.cmcdot import Cmcdot
-from semgrid_edu.occupancy.evidence import Evidence, SensorModel, scan_evidence, scan_evidence_literal
+from semgrid_edu.occupancy.evidence import Evidence, scan_evidence, scan_evidence_literal
 from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.params import CmcdotParams, transition_matrix
+from semgrid_edu.occupancy.sensor import SensorModel
 from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import move, predict, resample, update
 from semgrid_edu.occupancy.tracking import track_drive

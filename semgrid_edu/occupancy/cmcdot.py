@@ -4,11 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence import Evidence, beam_reach, check_points, evidence_in_cells
+from semgrid_edu.occupancy.evidence import Evidence, beam_reach, evidence_in_cells
 from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.moving_map import look_up, map_around, scroll
 from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.particles import cells_of, mean_velocity, transform
+from semgrid_edu.occupancy.sensor import check_points, without_own_returns
 from semgrid_edu.occupancy.state import Belief, FilterState, Particles
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN, move, predict, resample, update
 
@@ -78,7 +79,8 @@ class Cmcdot:
             tracker is then as it was.
         """
         shift, pose = scroll(self._pose.then(motion), self.spec.cell, MAX_YAW)
-        sensor, points = self.params.sensor, check_points(points_grid)
+        sensor = self.params.sensor
+        points = without_own_returns(check_points(points_grid), sensor)
         free_to = beam_reach(points, sensor)
         evidence = evidence_in_cells(points, free_to, self.map_spec, sensor, pose)
         moved = move(self._state, self.map_spec, shift)

@@ -1,74 +1,14 @@
 """What one LIDAR scan says of each cell: P(z | occupied) and P(z | free) (paper, section 3.2, step 2)."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.polar import count_returns, fill_gaps, passed_cells, polar_profile, reach
-
-
-@dataclass(frozen=True)
-class SensorModel:
-    """How a LIDAR scan speaks of cells.
-
-    Parameters
-    ----------
-    obstacle_min, obstacle_max : float
-        Returns between these heights above the ground (m) are obstacles: above a kerb, below what a car
-        drives under. Lower ones come from the ground, higher ones say nothing.
-    azimuth_step : float
-        Width of a beam, degrees: every beam of KITTI's scanner (a column of returns each 0.18 degrees) holds one
-        column or two.
-    column_spacing : float
-        The widest gap between columns of returns that still is no hole, degrees. Our simulated scanner's is 0.9.
-    p_hit_occupied, p_hit_free : float
-        Probability of an obstacle return from a cell that is occupied, or free (a grazing ray, a mixed pixel).
-    max_returns : int
-        Returns beyond this number in one cell add nothing: they aren't independent.
-    p_pass_occupied, p_pass_free : float
-        Probability that a beam passes a cell that is occupied (foliage is porous, objects fill a cell in
-        part), or free.
-
-    Raises
-    ------
-    ArgumentError
-        When a parameter can't be one.
-    """
-
-    obstacle_min: float = 0.3
-    obstacle_max: float = 2.5
-    azimuth_step: float = 0.3
-    column_spacing: float = 0.9
-    p_hit_occupied: float = 0.8
-    p_hit_free: float = 0.05
-    max_returns: int = 2
-    p_pass_occupied: float = 0.3
-    p_pass_free: float = 0.7
-
-    def __post_init__(self) -> None:
-        """Refuse a sensor that is impossible, or never errs: certainty can't be corrected."""
-        if not 0 < self.azimuth_step <= 360:
-            raise ArgumentError("azimuth_step", "degrees, above 0 and up to 360", self.azimuth_step)
-        if not self.obstacle_min < self.obstacle_max:
-            raise ArgumentError("obstacle_min", f"less than obstacle_max, {self.obstacle_max}", self.obstacle_min)
-        for name in ("p_hit_occupied", "p_hit_free", "p_pass_occupied", "p_pass_free"):
-            if not 0 < getattr(self, name) < 1:
-                raise ArgumentError(name, "a probability between 0 and 1", getattr(self, name))
-
-    @property
-    def beams(self) -> int:
-        """Number of beams in a turn."""
-        return round(360 / self.azimuth_step)
-
-    @property
-    def gap(self) -> int:
-        """The most empty beams that neighbouring columns leave between them."""
-        return math.ceil(self.column_spacing / self.azimuth_step - 1e-9)
+from semgrid_edu.occupancy.sensor import SensorModel, check_points, without_own_returns
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +56,7 @@ def scan_evidence(points: NDArray, spec: GridSpec, sensor: SensorModel, pose: Pl
     ArgumentError
         When `points` isn't a table of finite coordinates.
     """
-    points = check_points(points)
+    points = without_own_returns(check_points(points), sensor)
     return evidence_in_cells(points, beam_reach(points, sensor), spec, sensor, pose or PlanarMotion())
 
 
@@ -156,7 +96,7 @@ def scan_evidence_literal(
 
     Parameters, result and errors are those of `scan_evidence`; one ray walks along the middle of each beam.
     """
-    points, pose = check_points(points).astype(np.float64), pose or PlanarMotion()
+    points, pose = without_own_returns(check_points(points), sensor).astype(np.float64), pose or PlanarMotion()
     obstacles, free = np.zeros(spec.shape, np.int64), np.zeros(spec.shape, bool)
     first_obstacle, last_ground = np.full(sensor.beams, np.inf), np.zeros(sensor.beams)
     cells = zip(*spec.cells(pose.to_previous(points[:, :2])), strict=True)
@@ -240,14 +180,3 @@ def likelihoods(obstacles: NDArray, free: NDArray, sensor: SensorModel) -> Evide
     occupied = np.float32(sensor.p_hit_occupied) ** hits * np.where(passed, np.float32(sensor.p_pass_occupied), 1)
     empty = np.float32(sensor.p_hit_free) ** hits * np.where(passed, np.float32(sensor.p_pass_free), 1)
     return Evidence(occupied.astype(np.float32), empty.astype(np.float32))
-
-
-def check_points(points: NDArray) -> NDArray:
-    """Return the points as an array, or refuse what isn't a table of finite coordinates."""
-    points = np.asarray(points)
-    if points.ndim != 2 or points.shape[1] < 3:
-        raise ArgumentError("points", "shape (N, 3+): x, y, z in metres", f"shape {points.shape}")
-    if not np.isfinite(points[:, :3]).all():
-        bad = int((~np.isfinite(points[:, :3]).all(axis=1)).sum())
-        raise ArgumentError("points", "finite coordinates", f"{bad} of {len(points)} points with NaN or infinity")
-    return points

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.occupancy.evidence import SensorModel
+from semgrid_edu.occupancy.sensor import SensorModel
 
 Rates = tuple[tuple[float, ...], ...]
 

@@ -89,6 +89,19 @@ def test_columns_wider_apart_than_beams_leave_no_holes():
     assert (evidence.free == evidence.occupied)[~ahead & (np.abs(np.arctan2(y, x)) > np.radians(46))].all()
 
 
+@TWINS
+def test_the_vehicles_own_bonnet_is_no_obstacle(evidence_of):
+    """KITTI's LIDAR sees its own bonnet; the same return beside the vehicle is an obstacle."""
+    spec = GridSpec(0, 4, -2, 2, 0.5)
+    ground = np.array([[3.75, 0.25, 0.0], [3.75, 1.75, 0.0]])
+    bonnet, beside = np.array([[2.5, 0.2, 0.8]]), np.array([[2.5, 1.2, 0.8]])
+    for returns, obstacles in ((bonnet, 0), (beside, 1)):
+        evidence = evidence_of(np.concatenate([ground, returns]), spec, SENSOR)
+        assert (evidence.occupied > evidence.free).sum() == obstacles
+    with_bonnet = evidence_of(np.concatenate([ground, bonnet]), spec, SENSOR)
+    np.testing.assert_array_equal(with_bonnet.free, evidence_of(ground, spec, SENSOR).free)
+
+
 def test_wide_gaps_stay_blind_and_narrow_ones_see_no_farther_than_their_neighbours():
     reach = np.array([0.0, 7.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0, 9.0])
     assert fill_gaps(reach, 2).tolist() == [7.0, 7.0, 4.0, 4.0, 4.0, 0.0, 0.0, 0.0, 9.0]

@@ -1,0 +1,91 @@
+"""The LIDAR as the filter knows it: how it errs, and which of its returns count (paper, section 3.2)."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import ArgumentError
+
+
+@dataclass(frozen=True)
+class SensorModel:
+    """How a LIDAR scan speaks of cells.
+
+    Parameters
+    ----------
+    obstacle_min, obstacle_max : float
+        Returns between these heights above the ground (m) are obstacles: above a kerb, below what a car
+        drives under. Lower ones come from the ground, higher ones say nothing.
+    azimuth_step : float
+        Width of a beam, degrees: every beam of KITTI's scanner (a column of returns each 0.18 degrees) holds one
+        column or two.
+    column_spacing : float
+        The widest gap between columns of returns that still is no hole, degrees. Our simulated scanner's is 0.9.
+    p_hit_occupied, p_hit_free : float
+        Probability of an obstacle return from a cell that is occupied, or free (a grazing ray, a mixed pixel).
+    max_returns : int
+        Returns beyond this number in one cell add nothing: they aren't independent.
+    p_pass_occupied, p_pass_free : float
+        Probability that a beam passes a cell that is occupied (foliage is porous, objects fill a cell in
+        part), or free.
+    vehicle : (float, float, float, float)
+        Outline of the vehicle itself, x_min, x_max, y_min, y_max in the grid frame, metres: an obstacle in it is the
+        vehicle's own bonnet or roof. That of KITTI's estate car, whose LIDAR sees the end of its bonnet 2.5 m ahead.
+
+    Raises
+    ------
+    ArgumentError
+        When a parameter can't be one.
+    """
+
+    obstacle_min: float = 0.3
+    obstacle_max: float = 2.5
+    azimuth_step: float = 0.3
+    column_spacing: float = 0.9
+    p_hit_occupied: float = 0.8
+    p_hit_free: float = 0.05
+    max_returns: int = 2
+    p_pass_occupied: float = 0.3
+    p_pass_free: float = 0.7
+    vehicle: tuple[float, float, float, float] = (-2.1, 2.7, -0.95, 0.95)
+
+    def __post_init__(self) -> None:
+        """Refuse a sensor that is impossible, or never errs: certainty can't be corrected."""
+        if not 0 < self.azimuth_step <= 360:
+            raise ArgumentError("azimuth_step", "degrees, above 0 and up to 360", self.azimuth_step)
+        if not self.obstacle_min < self.obstacle_max:
+            raise ArgumentError("obstacle_min", f"less than obstacle_max, {self.obstacle_max}", self.obstacle_min)
+        for name in ("p_hit_occupied", "p_hit_free", "p_pass_occupied", "p_pass_free"):
+            if not 0 < getattr(self, name) < 1:
+                raise ArgumentError(name, "a probability between 0 and 1", getattr(self, name))
+
+    @property
+    def beams(self) -> int:
+        """Number of beams in a turn."""
+        return round(360 / self.azimuth_step)
+
+    @property
+    def gap(self) -> int:
+        """The most empty beams that neighbouring columns leave between them."""
+        return math.ceil(self.column_spacing / self.azimuth_step - 1e-9)
+
+
+def check_points(points: NDArray) -> NDArray:
+    """Return the points as an array, or refuse what isn't a table of finite coordinates."""
+    points = np.asarray(points)
+    if points.ndim != 2 or points.shape[1] < 3:
+        raise ArgumentError("points", "shape (N, 3+): x, y, z in metres", f"shape {points.shape}")
+    if not np.isfinite(points[:, :3]).all():
+        bad = int((~np.isfinite(points[:, :3]).all(axis=1)).sum())
+        raise ArgumentError("points", "finite coordinates", f"{bad} of {len(points)} points with NaN or infinity")
+    return points
+
+
+def without_own_returns(points: NDArray, sensor: SensorModel) -> NDArray:
+    """Return the points without those that the vehicle itself sends back: they would move with it for ever."""
+    x, y, z = points[:, 0], points[:, 1], points[:, 2]
+    x_min, x_max, y_min, y_max = sensor.vehicle
+    own = (x > x_min) & (x < x_max) & (y > y_min) & (y < y_max) & (z >= sensor.obstacle_min)
+    return points[~own]
