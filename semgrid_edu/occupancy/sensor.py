@@ -32,7 +32,7 @@ class SensorModel:
         part), or free.
     vehicle : (float, float, float, float)
         Outline of the vehicle itself, x_min, x_max, y_min, y_max in the grid frame, metres: an obstacle in it is the
-        vehicle's own bonnet or roof. That of KITTI's estate car, whose LIDAR sees the end of its bonnet 2.5 m ahead.
+        vehicle's own bonnet or mirror. That of KITTI's estate car, whose LIDAR sees the end of its bonnet 2.5 m ahead.
 
     Raises
     ------
@@ -49,7 +49,7 @@ class SensorModel:
     max_returns: int = 2
     p_pass_occupied: float = 0.3
     p_pass_free: float = 0.7
-    vehicle: tuple[float, float, float, float] = (-2.1, 2.7, -0.95, 0.95)
+    vehicle: tuple[float, float, float, float] = (-2.1, 2.7, -1.1, 1.1)
 
     def __post_init__(self) -> None:
         """Refuse a sensor that is impossible, or never errs: certainty can't be corrected."""
