@@ -151,3 +151,7 @@ def _matrix(confusion: ArrayLike) -> NDArray:
 
 def _ratio(part: float, whole: float) -> float:
     return float(part / whole) if whole else float("nan")
+
+
+METRICS = {"pixel accuracy": pixel_accuracy, "class accuracy": class_accuracy, "FmIoU": frequency_weighted_iou}
+"""The three metrics of section 4.2, by the names that tables give them."""

@@ -9,20 +9,11 @@ from semgrid_edu.demo.page import FrameView
 from semgrid_edu.demo.rasters import classes_uri, photo_uri, points_layer, raster_uri, scores_layer
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LabelSet
-from semgrid_edu.metrics import (
-    class_accuracy,
-    confusion_matrix,
-    frequency_weighted_iou,
-    pixel_accuracy,
-    semantic_cells,
-)
+from semgrid_edu.metrics import METRICS, confusion_matrix, semantic_cells
 from semgrid_edu.occupancy import State
 from semgrid_edu.pipeline import STAGES, Result
 from semgrid_edu.plotting import occupancy_colours
 from semgrid_edu.plotting.images import visible_points
-
-METRICS = {"pixel accuracy": pixel_accuracy, "class accuracy": class_accuracy, "FmIoU": frequency_weighted_iou}
-"""Section 4.2, by the names of the page's columns."""
 
 ESTIMATES = {"network": "grid", "network + CRF": "refined"}
 """Which of a result's grids stands in which row of the page's table."""

@@ -16,22 +16,10 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.baselines import carry_labels, close_gaps, majority_class
 from semgrid_edu.files import sha256
 from semgrid_edu.labels import LabelSet
-from semgrid_edu.metrics import (
-    class_accuracy,
-    confusion_matrix,
-    frequency_weighted_iou,
-    pixel_accuracy,
-    semantic_cells,
-)
+from semgrid_edu.metrics import METRICS, confusion_matrix, semantic_cells
 from semgrid_edu.networks import SemanticGridNet, load_net
 from semgrid_edu.provenance import versions
 from semgrid_edu.training import IMAGE_STAGE
-
-METRICS = {
-    "pixel accuracy": pixel_accuracy,
-    "class accuracy": class_accuracy,
-    "FmIoU": frequency_weighted_iou,
-}
 
 Scores = dict[str, dict[str, dict[str, float]]]
 """By method, by cells ("all" or "semantic"), by metric; 0..1."""
