@@ -21,7 +21,7 @@ from semgrid_edu.files import write_text
 from semgrid_edu.labels import IGNORE
 from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.networks import SemanticGridNet, save_net
-from semgrid_edu.networks.fusion import N_STATES
+from semgrid_edu.occupancy import N_STATES
 
 CHECKPOINT, LOG = "checkpoint.safetensors", "log.csv"
 IMAGE_STAGE, WEIGHTS = "image_stage.safetensors", "weights.safetensors"

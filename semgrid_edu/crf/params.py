@@ -7,10 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.errors import ArgumentError
-
-N_STATES = 4
-"""FREE, STATIC, DYNAMIC, UNKNOWN: the values o_i of a cell."""
-
+from semgrid_edu.occupancy import N_STATES
 
 PAPER_CELL = 0.2
 """Metres: the side of a cell in the paper (section 4.1)."""

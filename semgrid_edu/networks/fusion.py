@@ -4,9 +4,7 @@ import torch
 from torch import Tensor, nn
 
 from semgrid_edu.networks.conv_deconv import ConvDeconv, initialise
-
-N_STATES = 4
-"""Planes of the occupancy grid: free, static, dynamic, unknown."""
+from semgrid_edu.occupancy import N_STATES
 
 
 class FusionNet(nn.Module):

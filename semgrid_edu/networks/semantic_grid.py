@@ -5,7 +5,8 @@ from typing import NamedTuple
 from torch import Tensor, nn
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.networks.fusion import N_STATES, FusionNet
+from semgrid_edu.networks.fusion import FusionNet
+from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.planes import PlaneSampler
 
 

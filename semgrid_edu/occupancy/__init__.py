@@ -9,11 +9,12 @@ from semgrid_edu.occupancy.evidence import Evidence, scan_evidence, scan_evidenc
 from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.params import CmcdotParams, transition_matrix
 from semgrid_edu.occupancy.sensor import SensorModel
-from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State
+from semgrid_edu.occupancy.state import N_STATES, Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import move, predict, resample, update
 from semgrid_edu.occupancy.tracking import track_drive
 
 __all__ = [
+    "N_STATES",
     "Belief",
     "Cmcdot",
     "CmcdotParams",

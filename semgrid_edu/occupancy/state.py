@@ -18,6 +18,10 @@ class State(IntEnum):
     UNKNOWN = 3
 
 
+N_STATES = len(State)
+"""Planes of an occupancy grid."""
+
+
 @dataclass(frozen=True, eq=False)
 class Belief:
     """What is believed of the cells in front of the vehicle, in the grid frame of the current instant.
