@@ -15,10 +15,8 @@ from semgrid_edu.datasets.index import DatasetIndex, load_index
 from semgrid_edu.datasets.training_cache import Recipe, cached_arrays
 from semgrid_edu.errors import DataError
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.networks import Architecture
 from semgrid_edu.occupancy import CmcdotParams
-
-IMAGE_SIZE = (96, 320)
-"""Height and width of the images that compact networks see: KITTI's aspect at a quarter of its resolution."""
 
 
 class Sample(NamedTuple):
@@ -57,7 +55,7 @@ class TrainingSet(Dataset[Sample]):
     spec : GridSpec, optional
         The grid; the compact one by default.
     image_size : (int, int)
-        Height and width of the images.
+        Height and width of the images; those that the compact network sees by default.
     params : CmcdotParams, optional
         The occupancy filter.
 
@@ -88,7 +86,7 @@ class TrainingSet(Dataset[Sample]):
         dataset_dir: str | Path,
         split: str,
         spec: GridSpec | None = None,
-        image_size: tuple[int, int] = IMAGE_SIZE,
+        image_size: tuple[int, int] = Architecture.image_size,
         params: CmcdotParams | None = None,
     ) -> None:
         index = load_index(dataset_dir)

@@ -2,8 +2,10 @@
 
 from html import escape
 
-LIDAR_PERIOD = 100
-"""Milliseconds from one scan of KITTI's LIDAR to the next."""
+from semgrid_edu.occupancy.tracking import LIDAR_PERIOD
+
+SCAN_MILLISECONDS = 1000 * LIDAR_PERIOD
+"""From one scan of KITTI's LIDAR to the next."""
 
 STAGE_WORDS = {
     "occupancy": ("l → o", "Bayes filter, CMCDOT"),
@@ -51,12 +53,12 @@ def times_table(milliseconds: dict[str, float]) -> str:
     total = _time_row("", "all stages", sum(milliseconds.values()), "total")
     return (
         "<div><table><caption><b>How long it takes</b>Median of a frame, here, without a GPU. The LIDAR gives a scan "
-        f"every {LIDAR_PERIOD} ms: that would be a full bar.</caption>"
+        f"every {SCAN_MILLISECONDS:g} ms: that would be a full bar.</caption>"
         f"<thead><tr><th></th><th></th><th>ms</th><th></th></tr></thead><tbody>{rows}{total}</tbody></table></div>"
     )
 
 
 def _time_row(symbols: str, words: str, value: float, kind: str = "stage") -> str:
-    width = min(100.0, 100 * value / LIDAR_PERIOD)
+    width = min(100.0, 100 * value / SCAN_MILLISECONDS)
     bar = f'<td class="share"><span style="width:{width:.1f}%"></span></td>'
     return f'<tr class="{kind}"><th><i>{symbols}</i></th><th>{words}</th><td>{value:.1f}</td>{bar}</tr>'
