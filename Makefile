@@ -1,5 +1,5 @@
 # `make demo` and `make test` need Python 3.11 or later and nothing else: they make .venv when it is missing or out of date.
-PYTHON ?= python3
+PYTHON ?= $(shell command -v python3.11 || echo python3)
 BIN := .venv/bin
 # Idle OpenMP threads sleep instead of spinning: two test processes share two cores.
 export OMP_WAIT_POLICY := PASSIVE
