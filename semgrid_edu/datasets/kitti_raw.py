@@ -28,6 +28,17 @@ SAME_INSTANT = np.timedelta64(500, "ms")
 _FRAME_FILE = re.compile(r"(\d{10})\.(bin|png|txt)")
 
 
+def drive_folder(root: str | Path, date: str, drive: str) -> Path:
+    """Return where KITTI's layout keeps a drive.
+
+    Examples
+    --------
+    >>> drive_folder("kitti_raw", "2011_09_26", "0013").name
+    '2011_09_26_drive_0013_sync'
+    """
+    return Path(root) / date / f"{date}_drive_{drive}_sync"
+
+
 class KittiRawDrive(Sequence[Frame]):
     """The frames of a drive, read when asked for.
 
@@ -61,7 +72,7 @@ class KittiRawDrive(Sequence[Frame]):
 
     def __init__(self, root: str | Path, date: str, drive: str, *, images: bool = True) -> None:
         self.date_folder = _existing(Path(root), date, "dates", "*_*_*")
-        self.folder = _existing(self.date_folder, f"{date}_drive_{drive}_sync", "drives", "*_sync")
+        self.folder = _existing(self.date_folder, drive_folder(root, date, drive).name, "drives", "*_sync")
         self._sensors = ["velodyne_points", "oxts"]
         if images and (self.folder / "image_02").exists():
             self._sensors.append("image_02")

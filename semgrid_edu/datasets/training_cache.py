@@ -2,10 +2,8 @@
 
 import hashlib
 import json
-import multiprocessing
 import shutil
 import tempfile
-from concurrent.futures import ProcessPoolExecutor
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -16,7 +14,7 @@ from tqdm.auto import tqdm
 
 import semgrid_edu
 from semgrid_edu.datasets.index import INDEX_FILE, DatasetIndex
-from semgrid_edu.datasets.kitti_raw import KittiRawDrive
+from semgrid_edu.datasets.kitti_raw import KittiRawDrive, drive_folder
 from semgrid_edu.datasets.reading import read_text
 from semgrid_edu.datasets.resizing import resize_image, resize_labels
 from semgrid_edu.datasets.returns import seen_returns
@@ -25,6 +23,7 @@ from semgrid_edu.errors import DataError
 from semgrid_edu.files import sha256, write_json
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams, track_drive
+from semgrid_edu.workers import worker_pool
 
 SEED = 0
 """Of the occupancy filter's particles, in each drive."""
@@ -85,7 +84,7 @@ def _key(index: DatasetIndex, split: str, recipe: Recipe) -> str:
     calibration = [path for date in {date for date, _ in drives} for path in (index.root / date).glob("*.txt")]
     parts = [repr(recipe), *map(sha256, [index.root / INDEX_FILE, *code, *sorted(calibration)])]
     for date, drive in drives:
-        files = (index.root / date / f"{date}_drive_{drive}_sync").rglob("*.*")
+        files = drive_folder(index.root, date, drive).rglob("*.*")
         parts += sorted(f"{file.relative_to(index.root)} {file.stat().st_size}" for file in files)
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
@@ -93,8 +92,7 @@ def _key(index: DatasetIndex, split: str, recipe: Recipe) -> str:
 def _process(index: DatasetIndex, split: str, recipe: Recipe) -> list[dict[str, NDArray]]:
     """Make the arrays of every labelled frame of a split."""
     jobs = [(index.root, *name, labelled, recipe) for name, labelled in index.frames_by_drive(split).items()]
-    # A forked process would inherit the threads' locks of torch and numba, and hang.
-    with ProcessPoolExecutor(WORKERS, mp_context=multiprocessing.get_context("spawn")) as pool:
+    with worker_pool(WORKERS) as pool:
         drives = pool.map(_process_drive, *zip(*jobs, strict=True))
         progress = tqdm(drives, desc=f"{index.name}, {split}", total=len(jobs), unit="drive")
         return [frame for drive in progress for frame in drive]

@@ -1,18 +1,17 @@
 """The data sets of section 4 in simulated form, and a sample drive: made in parallel, resumed when interrupted."""
 
 import json
-import os
-import threading
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context, parent_process
 from pathlib import Path
 
 import numpy as np
 from tqdm.auto import tqdm
 
+from semgrid_edu.datasets.index import INDEX_FILE
+from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.files import write_json
 from semgrid_edu.labels import LABEL_SETS
@@ -24,11 +23,11 @@ from semgrid_edu.simulation.sample import SAMPLE_WISHES
 from semgrid_edu.simulation.writer import (
     DATE,
     depth_as_points,
-    drive_folder,
     lidar_points,
     write_calibration,
     write_drive,
 )
+from semgrid_edu.workers import worker_pool
 
 FORMAT = 1
 """Goes up when the simulator changes what a seed gives, so that old and new drives don't mix in one folder."""
@@ -158,13 +157,13 @@ def make_recipe(recipe: Recipe, folder: Path, seed: int, workers: int) -> Path:
     _claim(root, {"name": recipe.name, "seed": seed, "format": FORMAT})
     write_calibration(root, Rig())
     drives = [f"{k + 1:04d}" for k in range(len(recipe.routes))]
-    missing = [k for k, drive in enumerate(drives) if not drive_folder(root, drive).exists()]
+    missing = [k for k, drive in enumerate(drives) if not drive_folder(root, DATE, drive).exists()]
     missing.sort(key=lambda k: -recipe.routes[k].n_frames)
     with tqdm(total=len(drives), initial=len(drives) - len(missing), desc=recipe.name, unit="drive") as bar:
         for _ in _run(partial(_make_drive, recipe, root, seed), missing, workers):
             bar.update()
     index = _index(recipe, drives, seed)
-    write_json(root / "dataset.json", index)
+    write_json(root / INDEX_FILE, index)
     write_provenance(root, index["command"], seed, PACKAGES)
     return root
 
@@ -189,24 +188,10 @@ def _run(work: partial, items: list[int], workers: int) -> Iterator[int]:
             work(item)
             yield item
         return
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_end_with_parent) as pool:
-        try:
-            for future in as_completed([pool.submit(work, item) for item in items]):
-                future.result()
-                yield 1
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
-
-
-def _end_with_parent() -> None:
-    """End this worker when the process that started it is killed: an orphan would write beside the one that resumes."""
-
-    def watch() -> None:
-        parent_process().join()
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
+    with worker_pool(workers) as pool:
+        for future in as_completed(jobs := {pool.submit(work, item): item for item in items}):
+            future.result()
+            yield jobs[future]
 
 
 def _make_drive(recipe: Recipe, root: Path, seed: int, index: int) -> None:

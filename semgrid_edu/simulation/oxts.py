@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-EARTH_RADIUS = 6378137.0
-"""Metres, as in KITTI's development kit."""
+from semgrid_edu.datasets.oxts import EARTH_RADIUS
+
 GRAVITY = 9.81
 """m/s^2: an accelerometer at rest reads it upwards."""
 _STEP = 1e-3

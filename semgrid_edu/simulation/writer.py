@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from semgrid_edu.datasets.kitti_labels import DEPTH_UNIT
+from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.files import write_text
 from semgrid_edu.labels import KITTI_14, LabelSet
 from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive, SimulatedFrame
@@ -20,11 +22,6 @@ from semgrid_edu.simulation.rig import Rig
 
 DATE = "2026_01_01"
 """The day of all simulated drives."""
-
-
-def drive_folder(root: Path, drive: str, date: str = DATE) -> Path:
-    """Return where KITTI's layout keeps a drive."""
-    return Path(root) / date / f"{date}_drive_{drive}_sync"
 
 
 def _row(name: str, numbers: NDArray | tuple) -> str:
@@ -82,7 +79,7 @@ def _save_png(path: Path, pixels: NDArray) -> None:
 
 def depth_to_png(depth: NDArray) -> NDArray[np.uint16]:
     """Return metres as KITTI's depth maps hold them: times 256, 0 for none, nothing beyond 255 m."""
-    scaled = np.round(np.nan_to_num(depth, nan=0.0) * 256)
+    scaled = np.round(np.nan_to_num(depth, nan=0.0) / DEPTH_UNIT)
     return np.where(scaled < 65536, scaled, 0).astype(np.uint16)
 
 
@@ -150,7 +147,7 @@ def write_drive(
     Path
         The drive's folder.
     """
-    folder = drive_folder(root, drive)
+    folder = drive_folder(root, DATE, drive)
     partial = folder.with_name(f".{folder.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)
     for name in ("image_02/data", "velodyne_points/data", "oxts/data", "labels"):

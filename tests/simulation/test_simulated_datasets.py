@@ -11,13 +11,14 @@ from pathlib import Path
 import pytest
 
 from semgrid_edu.datasets import KittiRawDrive, load_index
+from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.files import sha256
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.simulation import datasets
 from semgrid_edu.simulation.datasets import RECIPES, Recipe, Route, make, make_recipe
 from semgrid_edu.simulation.plan import Wishes
-from semgrid_edu.simulation.writer import DATE, drive_folder
+from semgrid_edu.simulation.writer import DATE
 
 QUIET = Wishes(density=0.2, layout="straight", styles=("park", "park"))
 TINY = Recipe("tiny", "KITTI-14", (Route("train", 2, False, QUIET), Route("test", 1, True, QUIET)))
@@ -49,7 +50,7 @@ def test_killed_in_the_middle_it_resumes_to_the_same_bytes(alone, tmp_path, monk
 
     def killed_in_the_second(root, drive, simulated, labelled, *rest):
         if drive == "0002":
-            partial = drive_folder(root, drive).with_name(f".{DATE}_drive_0002_sync.partial")
+            partial = drive_folder(root, DATE, drive).with_name(f".{DATE}_drive_0002_sync.partial")
             (partial / "image_02" / "data").mkdir(parents=True)
             (partial / "image_02" / "data" / "0000000007.png").write_bytes(b"half")
             raise KeyboardInterrupt
@@ -60,7 +61,7 @@ def test_killed_in_the_middle_it_resumes_to_the_same_bytes(alone, tmp_path, monk
         with pytest.raises(KeyboardInterrupt):
             make_recipe(TINY, tmp_path, seed=3, workers=1)
     assert not (tmp_path / "tiny" / "dataset.json").exists()
-    first = drive_folder(tmp_path / "tiny", "0001") / "oxts" / "data" / "0000000000.txt"
+    first = drive_folder(tmp_path / "tiny", DATE, "0001") / "oxts" / "data" / "0000000000.txt"
     written = first.stat().st_mtime_ns
     resumed = make_recipe(TINY, tmp_path, seed=3, workers=1)
     assert contents(resumed) == contents(alone)
