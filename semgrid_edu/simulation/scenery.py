@@ -127,7 +127,7 @@ def _house_row(builder: Builder, plan: Plan, sign: int, style: str) -> None:
         if style == "suburb":
             if rng.random() < 0.15:
                 border = str(rng.choice([*furniture.FENCES, "hedge"]))
-            _border(builder, plan, s, s + house.width + gap, sign, side.edge + line + 0.35, border)
+            _border(builder, s, s + house.width + gap, sign, side.edge + line + 0.35, border)
             _garden(builder, plan, s, s + house.width + gap, sign, side.edge + line + 1.2, setback)
         elif gap > 2 and rng.random() < 0.6:
             _tree(builder, plan, s + house.width + gap / 2, sign * (side.edge + line + 3.0))
@@ -150,7 +150,7 @@ def _second_row(builder: Builder, plan: Plan, sign: int, offset: float) -> None:
             )
 
 
-def _border(builder: Builder, plan: Plan, s0: float, s1: float, sign: int, offset: float, style: str) -> None:
+def _border(builder: Builder, s0: float, s1: float, sign: int, offset: float, style: str) -> None:
     """Run a fence or a hedge along the road from s0 to s1, in pieces that follow bends; gates stay open."""
     if style == "none":
         return
@@ -186,7 +186,7 @@ def _park(builder: Builder, plan: Plan, sign: int) -> None:
     line = side.edge + side.strip + side.walk
     if rng.random() < 0.65:
         style = str(rng.choice(furniture.FENCES, p=[0.2, 0.25, 0.4, 0.15]))
-        _border(builder, plan, plan.extent.start, plan.extent.start + 150, sign, line + rng.uniform(0.8, 2.5), style)
+        _border(builder, plan.extent.start, plan.extent.start + 150, sign, line + rng.uniform(0.8, 2.5), style)
     for s in np.arange(plan.extent.start, plan.extent.end, 5.5):
         for _ in range(2):
             offset = line + rng.uniform(1.8, 26)
