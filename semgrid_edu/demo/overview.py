@@ -47,7 +47,9 @@ def draw_overview(result: Result, spec: GridSpec, label_set: LabelSet) -> Figure
     figure = plt.figure(figsize=(13, 8.3), layout="constrained")
     photos, grids, legend = figure.subfigures(3, 1, height_ratios=(2.3, 5.4, 0.6))
     left, right = photos.subplots(1, 2)
-    plotting.points_on_image(result.frame, left, size=2.0, colour_bar=False).set_title("LIDAR points l on the image i")
+    near, far = plotting.DEPTH_RANGE
+    points = plotting.points_on_image(result.frame, left, size=2.0, colour_bar=False)
+    points.set_title(f"LIDAR points l on the image i: near ones ({near:g} m) yellow, far ones ({far:g} m) blue")
     _draw_scores(right, result, label_set)
     first, *others = grids.subplots(1, 1 + len(maps), sharey=True)
     plotting.occupancy(spec, result.belief.probability, first, legend=False).set_title("occupancy grid o")

@@ -51,6 +51,8 @@ def occupancy(spec: GridSpec, probability: NDArray, ax: Axes | None = None, lege
 def velocity(spec: GridSpec, probability: NDArray, velocity: NDArray, ax: Axes) -> Axes:
     """Add arrows to an occupancy grid, as `velocity_arrows` chooses them, long as the way in the next half second.
 
+    A second line below the map says so.
+
     Parameters
     ----------
     spec : GridSpec
@@ -68,9 +70,7 @@ def velocity(spec: GridSpec, probability: NDArray, velocity: NDArray, ax: Axes) 
     start, speed = velocity_arrows(spec, probability, velocity)
     (x, y), (vx, vy) = start.T, speed.T * ARROW_SECONDS
     ax.quiver(y, x, vy, vx, angles="xy", scale_units="xy", scale=1.0, color="#6a1b9a", width=0.007, zorder=3)
-    note = f"arrow: way in {ARROW_SECONDS} s (5 m = {5 / ARROW_SECONDS:.0f} m/s)"
-    box = {"facecolor": "white", "alpha": 0.8, "linewidth": 0, "pad": 1.5}
-    ax.text(0.5, 0.01, note, transform=ax.transAxes, ha="center", va="bottom", fontsize="x-small", bbox=box)
+    ax.set_xlabel(f"{ax.get_xlabel()}\narrows: way in {ARROW_SECONDS} s")
     return ax
 
 
@@ -150,7 +150,7 @@ def label_maps(spec: GridSpec, maps: Mapping[str, NDArray], label_set: LabelSet)
     ArgumentError
         When a map doesn't fit `spec`.
     """
-    figure, axes = plt.subplots(1, len(maps), figsize=(2 + 3 * len(maps), 5.5), layout="constrained", squeeze=False)
+    figure, axes = plt.subplots(1, len(maps), figsize=(2 + 3 * len(maps), 5.5), layout="compressed", squeeze=False)
     for ax, (title, labels) in zip(axes[0], maps.items(), strict=True):
         grid_labels(spec, labels, label_set, ax=ax, legend=False).set_title(title)
     class_legend(axes[0, -1], label_set, np.stack(list(maps.values())))
