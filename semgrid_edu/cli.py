@@ -79,14 +79,6 @@ def excerpt(
     write_excerpt(data, frames, folder)
 
 
-@course.callback()
-def needs_tools() -> None:
-    """Build the notebooks and the exercises."""
-    missing = [name for name in ("jupytext", "nbgrader") if find_spec(name) is None]
-    if missing:
-        sys.exit(f"semgrid-edu: {' and '.join(missing)} are needed for this: pip install 'semgrid_edu[course]'")
-
-
 @data.command()
 def ship(
     run: Annotated[Path, typer.Argument(help="A folder that `semgrid-edu train` wrote.")],
@@ -96,6 +88,14 @@ def ship(
     from semgrid_edu.datasets.samples import write_weights
 
     write_weights(run, folder)
+
+
+@course.callback()
+def needs_tools() -> None:
+    """Build the notebooks and the exercises."""
+    missing = [name for name in ("jupytext", "nbgrader") if find_spec(name) is None]
+    if missing:
+        sys.exit(f"semgrid-edu: {' and '.join(missing)} are needed for this: pip install 'semgrid_edu[course]'")
 
 
 @course.command()
