@@ -19,7 +19,6 @@ from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.files import write_text
 from semgrid_edu.labels import IGNORE
-from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.networks import SemanticGridNet, save_net
 from semgrid_edu.occupancy import N_STATES
 
@@ -286,16 +285,6 @@ def grid_logits(net: SemanticGridNet, batch: Batch) -> Tensor:
     """
     planes = net.sampler(image_scores(net, batch))
     return batch.flip(net.fusion(batch.flip(planes), batch.flip(batch.frames.occupancy)))
-
-
-def grid_confusion(net: SemanticGridNet, dataset: Sequence[Sample]) -> NDArray[np.int64]:
-    """Return the confusion matrix of the network's most probable classes over all frames, (C, C), row: truth."""
-    confusion = np.zeros((net.n_classes, net.n_classes), dtype=np.int64)
-    for sample in dataset:
-        with torch.inference_mode():
-            logits = net(sample.image[None] / 255, sample.occupancy[None])
-        confusion += confusion_matrix(sample.truth, logits[0].argmax(0), net.n_classes)
-    return confusion
 
 
 def _check_dataset(net: SemanticGridNet, dataset: Sequence[Sample], params: TrainingParams) -> None:
