@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import NamedTuple, TextIO
+from typing import TextIO
 
 import numpy as np
 import torch
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from tqdm.auto import trange
 
+from semgrid_edu.batches import Batch, draw_batch, grid_logits, image_scores
 from semgrid_edu.checkpoint import load_checkpoint, save_checkpoint
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.errors import ArgumentError
@@ -197,7 +198,8 @@ def train(
     with _open_log(folder / LOG, start) as log:
         for iteration in (progress := trange(start, params.iterations, initial=start, total=params.iterations)):
             stage, optimiser.param_groups[0]["lr"] = params.stage(iteration)
-            loss = _step(net, optimiser, draw_batch(dataset, params, iteration, seed), stage, alpha[stage])
+            batch = draw_batch(dataset, params.batch_size, params.jitter, iteration, seed)
+            loss = _step(net, optimiser, batch, stage, alpha[stage])
             if not math.isfinite(loss):
                 found = f"{params.learning_rate}, with which it is {loss} in iteration {iteration}"
                 raise ArgumentError("learning_rate", "a rate that keeps the loss finite", found)
@@ -213,7 +215,7 @@ def train(
     (folder / CHECKPOINT).unlink(missing_ok=True)
 
 
-def _step(net: SemanticGridNet, optimiser: torch.optim.SGD, batch: "Batch", stage: str, alpha: Tensor) -> float:
+def _step(net: SemanticGridNet, optimiser: torch.optim.SGD, batch: Batch, stage: str, alpha: Tensor) -> float:
     """Change the weights by one step of gradient descent and return the loss before it."""
     optimiser.zero_grad()
     scores = (image_scores if stage == "image" else grid_logits)(net, batch)
@@ -228,63 +230,6 @@ def class_weights(dataset: Sequence[Sample], stage: str, n_classes: int, limit: 
     """Return the loss's weight of each class in a stage, (C,) float32: see `median_frequency_weights`."""
     maps = (getattr(sample, TRUTH[stage]).numpy() for sample in dataset)
     return torch.from_numpy(median_frequency_weights(maps, n_classes, limit)).float()
-
-
-class Batch(NamedTuple):
-    """Frames side by side, and whether the step sees them in a mirror.
-
-    Parameters
-    ----------
-    frames : Sample
-        Each field with a first axis B more; `image` is float32 in 0..1.
-    mirrored : bool
-        Left and right change places inside `image_scores` and `grid_logits`, which change them back.
-    """
-
-    frames: Sample
-    mirrored: bool
-
-    def flip(self, x: Tensor) -> Tensor:
-        """Mirror images or grids, if this batch is to be."""
-        return x.flip(-1) if self.mirrored else x
-
-
-def draw_batch(dataset: Sequence[Sample], params: TrainingParams, iteration: int, seed: int) -> Batch:
-    """Return the frames of a step: each pass over the data takes them in a new order, whole batches only.
-
-    Parameters
-    ----------
-    dataset : sequence of Sample
-    params : TrainingParams
-    iteration : int
-        Number of the step; with the seed, it decides everything.
-    seed : int
-    """
-    epoch, k = divmod(iteration, len(dataset) // params.batch_size)
-    order = np.random.default_rng((seed, 0, epoch)).permutation(len(dataset))
-    chosen = order[k * params.batch_size : (k + 1) * params.batch_size]
-    frames = Sample(*map(torch.stack, zip(*(dataset[i] for i in chosen.tolist()), strict=True)))
-    rng = np.random.default_rng((seed, 1, iteration))
-    contrast, brightness = rng.uniform(-params.jitter, params.jitter, (2, params.batch_size, 1, 1, 1)).astype(
-        np.float32
-    )
-    image = (frames.image / 255 - 0.5) * (1 + torch.from_numpy(contrast)) + 0.5 + torch.from_numpy(brightness)
-    return Batch(frames._replace(image=image.clamp(0, 1)), mirrored=bool(rng.random() < 0.5))
-
-
-def image_scores(net: SemanticGridNet, batch: Batch) -> Tensor:
-    """Return s, (B, C, h, w)."""
-    return batch.flip(net.segmenter(batch.flip(batch.frames.image)))
-
-
-def grid_logits(net: SemanticGridNet, batch: Batch) -> Tensor:
-    """Return g before the soft-max, (B, C, H, W).
-
-    The planes are sampled unmirrored: the camera isn't quite symmetric, so that a mirrored image alone would
-    no longer lie where equation (1) looks.
-    """
-    planes = net.sampler(image_scores(net, batch))
-    return batch.flip(net.fusion(batch.flip(planes), batch.flip(batch.frames.occupancy)))
 
 
 def _check_dataset(net: SemanticGridNet, dataset: Sequence[Sample], params: TrainingParams) -> None:

@@ -11,6 +11,7 @@ from safetensors.torch import load_file, save_file
 from sklearn.metrics import accuracy_score
 
 from semgrid_edu import checkpoint, training
+from semgrid_edu.batches import Batch, draw_batch, grid_logits, image_scores
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.errors import ArgumentError, DataError
@@ -21,7 +22,6 @@ from semgrid_edu.planes import plane_pixels
 from semgrid_edu.training import (
     TrainingParams,
     class_frequencies,
-    draw_batch,
     median_frequency_weights,
     train,
 )
@@ -107,16 +107,15 @@ def test_no_labels_at_all_are_refused():
 
 
 def test_each_pass_takes_every_frame_once(streets):
-    params = TrainingParams(batch_size=2, jitter=0.0)
     for epoch in range(3):
-        batches = [draw_batch(streets, params, 2 * epoch + k, seed=0).frames.truth for k in range(2)]
+        batches = [draw_batch(streets, 2, 0.0, 2 * epoch + k, seed=0).frames.truth for k in range(2)]
         drawn = sorted(truth.numpy().tobytes() for truth in torch.cat(batches))
         assert drawn == sorted(sample.truth.numpy().tobytes() for sample in streets)
 
 
 def test_a_batch_is_a_function_of_seed_and_step(streets):
     def image(iteration, seed):
-        return draw_batch(streets, TrainingParams(batch_size=2), iteration, seed).frames.image
+        return draw_batch(streets, 2, 0.2, iteration, seed).frames.image
 
     assert torch.equal(image(5, 1), image(5, 1))
     assert not torch.equal(image(5, 1), image(6, 1))
@@ -127,14 +126,14 @@ def test_a_batch_is_a_function_of_seed_and_step(streets):
 
 def test_a_mirror_changes_what_the_network_sees_and_not_where_it_lies(camera, streets):
     """Networks that answer each place by itself can't tell a mirror from the street."""
-    frames = draw_batch(streets, TrainingParams(batch_size=2, jitter=0.0), 0, seed=0).frames
+    frames = draw_batch(streets, 2, 0.0, 0, seed=0).frames
     seen = []
     by_place = SimpleNamespace(
         segmenter=lambda image: seen.append(image) or image * 2,
         sampler=build_net(SMALL, camera).sampler,
         fusion=lambda planes, occupancy: planes.sum(dim=2) + occupancy[:, :1],
     )
-    plain, mirrored = (training.grid_logits(by_place, training.Batch(frames, m)) for m in (False, True))
+    plain, mirrored = (grid_logits(by_place, Batch(frames, m)) for m in (False, True))
     torch.testing.assert_close(plain, mirrored)
     assert torch.equal(seen[0], seen[1].flip(-1))
     assert not torch.equal(seen[0], seen[1])
@@ -166,9 +165,9 @@ def test_four_streets_are_learnt_by_heart(camera, streets, tmp_path):
 def test_the_first_losses_are_those_of_the_definition(camera, streets, tmp_path):
     """Weighted cross-entropy over labelled pixels, written out."""
     net = build_net(SMALL, camera)
-    batch = draw_batch(streets, QUICK, 0, seed=0)
+    batch = draw_batch(streets, QUICK.batch_size, QUICK.jitter, 0, seed=0)
     net.train()
-    log_p = F.log_softmax(training.image_scores(net, batch), dim=1)
+    log_p = F.log_softmax(image_scores(net, batch), dim=1)
     alpha = median_frequency_weights([s.labels.numpy() for s in streets], 14, QUICK.weight_limit)
     labels = batch.frames.labels
     weight = torch.from_numpy(alpha)[labels.long()]

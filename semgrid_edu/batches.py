@@ -1,0 +1,69 @@
+"""Batches of labelled frames, jittered and mirrored, and the network on them (paper, section 4.1)."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from semgrid_edu.datasets.training_set import Sample
+from semgrid_edu.networks import SemanticGridNet
+
+
+class Batch(NamedTuple):
+    """Frames side by side, and whether the step sees them in a mirror.
+
+    Parameters
+    ----------
+    frames : Sample
+        Each field with a first axis B more; `image` is float32 in 0..1.
+    mirrored : bool
+        Left and right change places inside `image_scores` and `grid_logits`, which change them back.
+    """
+
+    frames: Sample
+    mirrored: bool
+
+    def flip(self, x: Tensor) -> Tensor:
+        """Mirror images or grids, if this batch is to be."""
+        return x.flip(-1) if self.mirrored else x
+
+
+def draw_batch(dataset: Sequence[Sample], size: int, jitter: float, iteration: int, seed: int) -> Batch:
+    """Return the frames of a step: each pass over the data takes them in a new order, whole batches only.
+
+    Parameters
+    ----------
+    dataset : sequence of Sample
+    size : int
+        Frames a batch, B.
+    jitter : float
+        How far brightness and contrast vary, as a share.
+    iteration : int
+        Number of the step; with the seed, it decides everything.
+    seed : int
+    """
+    epoch, k = divmod(iteration, len(dataset) // size)
+    order = np.random.default_rng((seed, 0, epoch)).permutation(len(dataset))
+    chosen = order[k * size : (k + 1) * size]
+    frames = Sample(*map(torch.stack, zip(*(dataset[i] for i in chosen.tolist()), strict=True)))
+    rng = np.random.default_rng((seed, 1, iteration))
+    contrast, brightness = rng.uniform(-jitter, jitter, (2, size, 1, 1, 1)).astype(np.float32)
+    image = (frames.image / 255 - 0.5) * (1 + torch.from_numpy(contrast)) + 0.5 + torch.from_numpy(brightness)
+    return Batch(frames._replace(image=image.clamp(0, 1)), mirrored=bool(rng.random() < 0.5))
+
+
+def image_scores(net: SemanticGridNet, batch: Batch) -> Tensor:
+    """Return s, (B, C, h, w)."""
+    return batch.flip(net.segmenter(batch.flip(batch.frames.image)))
+
+
+def grid_logits(net: SemanticGridNet, batch: Batch) -> Tensor:
+    """Return g before the soft-max, (B, C, H, W).
+
+    The planes are sampled unmirrored: the camera isn't quite symmetric, so that a mirrored image alone would
+    no longer lie where equation (1) looks.
+    """
+    planes = net.sampler(image_scores(net, batch))
+    return batch.flip(net.fusion(batch.flip(planes), batch.flip(batch.frames.occupancy)))
