@@ -10,6 +10,9 @@ from semgrid_edu.datasets.samples import (
     FRAMES,
     WEIGHTS,
     read_excerpt,
+    sample_drive,
+    sample_frames,
+    sample_weights,
     samples_problems,
     write_excerpt,
     write_weights,
@@ -17,6 +20,7 @@ from semgrid_edu.datasets.samples import (
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.files import write_bytes
+from semgrid_edu.networks import load_net
 from semgrid_edu.provenance import provenance_problems, write_provenance
 
 
@@ -80,3 +84,13 @@ def test_a_missing_or_damaged_excerpt_is_named(tmp_path, content):
 def test_no_samples_at_all_is_an_error(tmp_path):
     with pytest.raises(DataError, match="found none"):
         samples_problems(tmp_path)
+
+
+def test_the_shipped_network_knows_the_shipped_frames():
+    """They come from its training split; a frame's commonest class fills at most six cells in ten."""
+    net, frames = load_net(sample_weights(), sample_drive().camera), sample_frames()
+    assert len(frames) == 6
+    for sample in frames:
+        with torch.inference_mode():
+            predicted = net(sample.image[None] / 255, sample.occupancy[None])[0].argmax(0)
+        assert (predicted == sample.truth).float().mean() > 0.75
