@@ -1,4 +1,4 @@
-"""The bird's-eye grid: where its cells lie, in metres, and which cell a point falls into."""
+"""The bird's-eye grid: where its cells lie, in metres, and which cell a point falls into (section 4.1)."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Poses from GPS and inertial packets (OXTS), by the Mercator projection of the KITTI development kit."""
+"""Poses from GPS and inertial packets (OXTS), by the Mercator projection of the KITTI development kit (section 4)."""
 
 from pathlib import Path
 

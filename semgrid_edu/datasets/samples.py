@@ -1,4 +1,4 @@
-"""The shipped samples: a short simulated drive, a few labelled frames and trained compact weights."""
+"""The shipped samples: a short simulated drive, a few labelled frames and trained compact weights (section 4)."""
 
 import json
 from pathlib import Path

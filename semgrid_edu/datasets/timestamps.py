@@ -1,4 +1,4 @@
-"""KITTI's timestamps.txt: one line a frame, to the nanosecond."""
+"""KITTI's timestamps.txt: one line a frame, to the nanosecond (section 4)."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Arrays of a split's labelled frames, made by worker processes, kept beside the data and mapped from disk."""
+"""Arrays of a split's labelled frames, kept beside the data and mapped from disk (section 4.1)."""
 
 import hashlib
 import json

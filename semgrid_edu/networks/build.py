@@ -1,4 +1,4 @@
-"""Networks by name, and the whole network from a description that a weights file can hold."""
+"""Networks by name, and the whole network from a description that a weights file can hold (sections 3.1, 3.4)."""
 
 from dataclasses import dataclass, field
 

@@ -1,4 +1,4 @@
-"""Weights on disk: safetensors files that say in their header which network they belong to."""
+"""Weights on disk: safetensors files that say in their header which network they belong to (section 4.1)."""
 
 import json
 from dataclasses import asdict
