@@ -12,7 +12,7 @@
 # | 4 | two accuracies that disagree | 3 |
 # | 5 | in your own words | 2 |
 #
-# Write between the lines that say so, and run the test cell below each task. A test that fails tells you how to think, not just that
+# Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
 # you are wrong. Your instructor's tests use other numbers. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
 
 # %% nbgrader={"grade": false, "grade_id": "setup", "locked": true, "schema_version": 3, "solution": false, "task": false}
@@ -45,6 +45,7 @@ def cell_of(x, y, x_max, y_max, cell):
 # A grid 6 m ahead, 2 m to each side, in cells of 0.5 m. By hand: 1.4 m below the top edge, 0.8 m from the left edge.
 got = cell_of(x=4.6, y=1.2, x_max=6, y_max=2, cell=0.5)
 assert got is not None, "cell_of returned nothing: did you forget `return`?"
+assert np.size(got) == 2, f"return two numbers, row and column; got {got}"
 got = tuple(got)
 slips = {
     (1, 2): "row and column are swapped: rows count along x (forward), columns along y (left)",
@@ -161,8 +162,9 @@ assert not complaint, complaint
 # %% nbgrader={"grade": true, "grade_id": "pixel-behind-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 got = pixel_of(np.array([-5.0, 1.0, 0.5]), K, ahead)
 assert np.size(got) == 2, f"return (nan, nan) for a point behind the camera, got {got}"
-assert np.isnan(np.array(got, dtype=float)).all(), (
-    f"a point 5 m behind the camera has no pixel, got {got}: look at the sign of Z"
+u, v = np.array(got, dtype=float)
+assert np.isnan([u, v]).all(), (
+    f"a point 5 m behind the camera has no pixel, got ({u:.0f}, {v:.0f}): look at the sign of Z"
 )
 ### BEGIN HIDDEN TESTS
 from semgrid_instructor import tour
