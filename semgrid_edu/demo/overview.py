@@ -6,7 +6,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from semgrid_edu import plotting
@@ -17,6 +16,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.pipeline import Result
 from semgrid_edu.plotting.images import draw_image
+from semgrid_edu.plotting.legends import colour_patches
 
 REACH = 50.0
 """Metres ahead that the picture shows: beyond, few cells are seen."""
@@ -72,8 +72,6 @@ def _draw_legend(figure: Figure, classes: NDArray, label_set: LabelSet) -> None:
     """Name the states of the occupancy grid, then the classes that occur."""
     entries = [*zip(plotting.STATE_NAMES, plotting.STATE_COLOURS, strict=True)]
     entries += [(label_set.names[c], label_set.rgb[c]) for c in classes if c < len(label_set)]
-    patches = [
-        Patch(facecolor=np.divide(rgb, 255), edgecolor="0.5", linewidth=0.5, label=name) for name, rgb in entries
-    ]
+    patches = colour_patches(*zip(*entries, strict=True))
     columns = -(-len(patches) // 2)
     figure.legend(handles=patches, ncols=columns, loc="center", frameon=False, columnspacing=1.3, handlelength=1.4)

@@ -32,10 +32,14 @@ def class_legend(ax: Axes, label_set: LabelSet, labels: NDArray, **style: object
 
 def colour_legend(ax: Axes, names: Sequence[str], rgb: Iterable[tuple[int, int, int]], **style: object) -> Axes:
     """Name colours, 8-bit RGB, to the right of a picture."""
-    patches = [
+    placing = {"loc": "upper left", "bbox_to_anchor": (1.02, 1.0), "fontsize": "small", "frameon": False}
+    ax.legend(handles=colour_patches(names, rgb), **(placing | style))
+    return ax
+
+
+def colour_patches(names: Sequence[str], rgb: Iterable[tuple[int, int, int]]) -> list[Patch]:
+    """Return the entries of a legend: a patch of each colour, 8-bit RGB, with its name."""
+    return [
         Patch(facecolor=np.divide(colour, 255), edgecolor="0.4", linewidth=0.5, label=name)
         for name, colour in zip(names, rgb, strict=True)
     ]
-    placing = {"loc": "upper left", "bbox_to_anchor": (1.02, 1.0), "fontsize": "small", "frameon": False}
-    ax.legend(handles=patches, **(placing | style))
-    return ax
