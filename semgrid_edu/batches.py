@@ -43,6 +43,10 @@ def draw_batch(dataset: Sequence[Sample], size: int, jitter: float, iteration: i
     iteration : int
         Number of the step; with the seed, it decides everything.
     seed : int
+
+    Returns
+    -------
+    Batch
     """
     epoch, k = divmod(iteration, len(dataset) // size)
     order = np.random.default_rng((seed, 0, epoch)).permutation(len(dataset))
@@ -55,15 +59,36 @@ def draw_batch(dataset: Sequence[Sample], size: int, jitter: float, iteration: i
 
 
 def image_scores(net: SemanticGridNet, batch: Batch) -> Tensor:
-    """Return s, (B, C, h, w)."""
+    """Return the image network's scores of a batch, before any soft-max.
+
+    Parameters
+    ----------
+    net : SemanticGridNet
+    batch : Batch
+
+    Returns
+    -------
+    (B, C, h, w) float32
+        s, unmirrored.
+    """
     return batch.flip(net.segmenter(batch.flip(batch.frames.image)))
 
 
 def grid_logits(net: SemanticGridNet, batch: Batch) -> Tensor:
-    """Return g before the soft-max, (B, C, H, W).
+    """Return the semantic grid of a batch before the soft-max.
 
     The planes are sampled unmirrored: the camera isn't quite symmetric, so that a mirrored image alone would
     no longer lie where equation (1) looks.
+
+    Parameters
+    ----------
+    net : SemanticGridNet
+    batch : Batch
+
+    Returns
+    -------
+    (B, C, H, W) float32
+        log g up to a number a cell, unmirrored.
     """
     planes = net.sampler(image_scores(net, batch))
     return batch.flip(net.fusion(batch.flip(planes), batch.flip(batch.frames.occupancy)))

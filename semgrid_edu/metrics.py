@@ -74,6 +74,11 @@ def semantic_cells(confusion: ArrayLike, label_set: LabelSet) -> NDArray[np.int6
     -------
     (C, C) int64
         The same matrix with the rows of the other classes emptied.
+
+    Raises
+    ------
+    ArgumentError
+        When the matrix isn't one of this label set.
     """
     kept = _matrix(confusion).copy()
     if len(kept) != len(label_set):

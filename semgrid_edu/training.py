@@ -227,7 +227,20 @@ def _step(net: SemanticGridNet, optimiser: torch.optim.SGD, batch: Batch, stage:
 
 
 def class_weights(dataset: Sequence[Sample], stage: str, n_classes: int, limit: float) -> Tensor:
-    """Return the loss's weight of each class in a stage, (C,) float32: see `median_frequency_weights`."""
+    """Return the loss's weight of each class in a stage.
+
+    Parameters
+    ----------
+    dataset : sequence of Sample
+    stage : str
+        "image" or "grid".
+    n_classes, limit
+        As for `median_frequency_weights`.
+
+    Returns
+    -------
+    (C,) float32
+    """
     maps = (getattr(sample, TRUTH[stage]).numpy() for sample in dataset)
     return torch.from_numpy(median_frequency_weights(maps, n_classes, limit)).float()
 

@@ -57,6 +57,12 @@ def cached_arrays(index: DatasetIndex, split: str, recipe: Recipe) -> dict[str, 
     code that makes them, dataset.json, and the drives' files by name and size (hashing a gigabyte at every start
     would take longer than reading what is kept). When one of these changes, they are made anew.
 
+    Parameters
+    ----------
+    index : DatasetIndex
+    split : str
+    recipe : Recipe
+
     Returns
     -------
     dict of str to (frames, ...) arrays mapped from disk, read-only

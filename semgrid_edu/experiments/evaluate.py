@@ -88,6 +88,11 @@ def confusion_matrices(
     -------
     dict of str to (C, C) int64
         By method; row: truth.
+
+    Raises
+    ------
+    ArgumentError
+        When the network has other classes than the test set.
     """
     n_classes = len(test.label_set)
     if net.n_classes != n_classes:

@@ -93,6 +93,11 @@ def build_net(architecture: Architecture, camera: Camera, seed: int = 0) -> Sema
     -------
     SemanticGridNet
         Its `architecture` says how it was built.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such label set, image network or preset.
     """
     if architecture.label_set not in LABEL_SETS:
         raise ArgumentError("label_set", f"one of {', '.join(LABEL_SETS)}", repr(architecture.label_set))

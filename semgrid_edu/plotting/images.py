@@ -128,7 +128,13 @@ def draw_image(image: NDArray, ax: Axes | None = None, **style: object) -> Axes:
 
 
 def need_image(frame: Frame) -> NDArray[np.uint8]:
-    """Return the frame's image, (h, w, 3), or say that there is none."""
+    """Return the frame's image, (h, w, 3).
+
+    Raises
+    ------
+    ArgumentError
+        When the frame has none.
+    """
     if frame.image is None:
         raise ArgumentError("frame", "a frame with a camera image", "a frame without one")
     return frame.image
