@@ -94,7 +94,10 @@ EQUATIONS = (
         fast="semgrid_edu.crf.mean_field",
     ),
     Equation(
-        "ground-truth", "4", "Labels of the image, carried to the grid", literal="semgrid_edu.datasets.truth.grid_truth"
+        "ground-truth",
+        "4",
+        "Labels of the image, carried to the grid",
+        literal="semgrid_edu.experiments.baselines.carry_labels",
     ),
     Equation(
         "median-frequency", "4.1", "Median frequency balancing", literal="semgrid_edu.training.median_frequency_weights"
