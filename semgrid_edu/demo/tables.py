@@ -31,7 +31,9 @@ def metrics_table(metrics: dict[str, dict[str, float]], labelled: int) -> str:
     rows = "".join(_metrics_row(row, metrics) for row in next(iter(metrics.values())))
     return (
         f"<div><table><caption><b>How often it is right</b>Per cent, over the {labelled} frames whose truth is known. "
-        "Semantic cells: those whose truth is none of the unknown classes.</caption>"
+        "Class accuracy: the mean over classes, so rare ones count as much as road. FmIoU: overlap of each class with "
+        "its truth, weighted by how often it occurs. Semantic cells: those whose truth is none of the unknown "
+        "classes.</caption>"
         f"<thead><tr><th></th>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
     )
 
