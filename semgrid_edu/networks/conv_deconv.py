@@ -1,10 +1,14 @@
 """The conv-deconv network: down by max-pooling, up by the indices it kept (paper, sections 3.1 and 3.4, Fig. 5)."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import pairwise
 
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
+
+from semgrid_edu.errors import ArgumentError
 
 
 def conv_bn_relu(n_in: int, n_out: int) -> nn.Sequential:
@@ -50,7 +54,16 @@ class ConvDeconv(nn.Module):
         )
 
     def forward(self, x: Tensor) -> Tensor:
-        """Return the result at the size of the input, (B, n_in, H, W) -> (B, n_out, H, W)."""
+        """Return the result at the size of the input, (B, n_in, H, W) -> (B, n_out, H, W).
+
+        Raises
+        ------
+        ArgumentError
+            When a side is smaller than 2^S: halved S times, nothing would be left of it.
+        """
+        smallest = 2 ** len(self.encoder)
+        if min(x.shape[2:]) < smallest:
+            raise ArgumentError("x", f"maps of {smallest} x {smallest} or larger", tuple(x.shape))
         # Channels last in memory: half the time on a CPU, the same numbers.
         x = x.contiguous(memory_format=torch.channels_last)
         seen = []
@@ -69,6 +82,23 @@ def _layers(channels: list[int], plain_end: bool = False) -> list[nn.Module]:
     """Return the layers that lead from each number of channels to the next."""
     layers = [conv_bn_relu(n_in, n_out) for n_in, n_out in pairwise(channels)]
     return [*layers[:-1], layers[-1][0]] if plain_end else layers
+
+
+@contextmanager
+def fresh_weights(net: nn.Module, seed: int) -> Iterator[None]:
+    """Build layers inside, and their weights depend on the seed alone; the global generator stays as it was.
+
+    PyTorch's layers draw their first weights from that generator as they are made.
+
+    Parameters
+    ----------
+    net : Module
+        Gets the layers.
+    seed : int
+    """
+    with torch.random.fork_rng(devices=[]):
+        yield
+    initialise(net, seed)
 
 
 def initialise(net: nn.Module, seed: int) -> None:

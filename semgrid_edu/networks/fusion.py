@@ -3,7 +3,7 @@
 import torch
 from torch import Tensor, nn
 
-from semgrid_edu.networks.conv_deconv import ConvDeconv, initialise
+from semgrid_edu.networks.conv_deconv import ConvDeconv, fresh_weights
 from semgrid_edu.occupancy import N_STATES
 
 
@@ -34,12 +34,12 @@ class FusionNet(nn.Module):
 
     def __init__(self, n_scores: int, n_planes: int, n_classes: int, n_reduced: int = 16, seed: int = 0) -> None:
         super().__init__()
-        # On (B, C, D, H, W) a D x 1 x 1 kernel is the 1x1 convolution of all D x C planes.
-        self.reduce = nn.Sequential(
-            nn.Conv3d(n_scores, n_reduced, (n_planes, 1, 1)), nn.BatchNorm3d(n_reduced), nn.ReLU(inplace=True)
-        )
-        self.conv_deconv = ConvDeconv(n_reduced + N_STATES, n_classes, self.WIDTHS, self.DEPTHS, skips=True)
-        initialise(self, seed)
+        with fresh_weights(self, seed):
+            # On (B, C, D, H, W) a D x 1 x 1 kernel is the 1x1 convolution of all D x C planes.
+            self.reduce = nn.Sequential(
+                nn.Conv3d(n_scores, n_reduced, (n_planes, 1, 1)), nn.BatchNorm3d(n_reduced), nn.ReLU(inplace=True)
+            )
+            self.conv_deconv = ConvDeconv(n_reduced + N_STATES, n_classes, self.WIDTHS, self.DEPTHS, skips=True)
 
     def forward(self, planes: Tensor, occupancy: Tensor) -> Tensor:
         """Return the logits of the semantic grid; a soft-max over C makes them probabilities.

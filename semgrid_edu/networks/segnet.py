@@ -6,7 +6,7 @@ import torch
 from torch import Tensor, nn
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.networks.conv_deconv import ConvDeconv, initialise
+from semgrid_edu.networks.conv_deconv import ConvDeconv, fresh_weights
 
 IMAGENET_MEAN, IMAGENET_STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 """Of red, green and blue over ImageNet's images, 0..1: what weights learnt there expect."""
@@ -44,8 +44,8 @@ class SegNet(nn.Module):
         self.n_classes = n_classes
         self.register_buffer("mean", torch.tensor(IMAGENET_MEAN).view(3, 1, 1), persistent=False)
         self.register_buffer("std", torch.tensor(IMAGENET_STD).view(3, 1, 1), persistent=False)
-        self.conv_deconv = ConvDeconv(3, n_classes, **self.PRESETS[preset])
-        initialise(self, seed)
+        with fresh_weights(self, seed):
+            self.conv_deconv = ConvDeconv(3, n_classes, **self.PRESETS[preset])
 
     def forward(self, image: Tensor) -> Tensor:
         """Return s, the scores of each class at each pixel, no soft-max.

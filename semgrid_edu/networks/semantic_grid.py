@@ -36,7 +36,7 @@ class SemanticGridNet(nn.Module):
     Parameters
     ----------
     segmenter : Module
-        i -> s; its `n_classes` is the C of the scores.
+        i -> s; its `n_classes`, where it has one, is the C of the scores, which is else that of the grid.
     sampler : PlaneSampler
         s -> p, for one calibration.
     n_classes : int
@@ -50,7 +50,8 @@ class SemanticGridNet(nn.Module):
         self.segmenter = segmenter
         self.sampler = sampler
         self.n_classes = n_classes
-        self.fusion = FusionNet(segmenter.n_classes, sampler.planes_shape[0], n_classes, seed=seed)
+        n_scores = getattr(segmenter, "n_classes", n_classes)
+        self.fusion = FusionNet(n_scores, sampler.planes_shape[0], n_classes, seed=seed)
 
     def stages(self, image: Tensor, occupancy: Tensor) -> Stages:
         """Return the result and what led to it.
@@ -65,10 +66,13 @@ class SemanticGridNet(nn.Module):
         Raises
         ------
         ArgumentError
-            When a size isn't the one that the network was built for, or the image isn't of floats.
+            When a size isn't the one that the network was built for, one of the two isn't of floats, or there
+            aren't as many of one as of the other.
         """
         _check("image", image, (3, *self.sampler.image_size))
         _check("occupancy", occupancy, (N_STATES, *self.sampler.planes_shape[1:]))
+        if len(image) != len(occupancy):
+            raise ArgumentError("occupancy", f"one for each of the {len(image)} images", len(occupancy))
         scores = self.segmenter(image)
         planes = self.sampler(scores)
         return Stages(scores, planes, self.fusion(planes, occupancy))

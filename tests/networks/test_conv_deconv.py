@@ -2,6 +2,7 @@ import pytest
 import torch
 from torch import nn
 
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks.conv_deconv import ConvDeconv, initialise
 
 
@@ -24,6 +25,13 @@ def test_unpooling_puts_maxima_back_where_they_were():
 def test_every_size_comes_back(size, skips):
     net = ConvDeconv(2, 5, widths=(3, 4, 6), depths=(1, 2, 1), skips=skips).eval()
     assert net(torch.randn(2, 2, *size, generator=torch.Generator().manual_seed(0))).shape == (2, 5, *size)
+
+
+def test_a_map_that_cannot_be_halved_often_enough_is_refused():
+    net = ConvDeconv(2, 5, widths=(3, 4, 6), depths=(1, 1, 1)).eval()
+    assert net(torch.zeros(1, 2, 8, 8)).shape == (1, 5, 8, 8)
+    with pytest.raises(ArgumentError, match="x: expected maps of 8 x 8 or larger"):
+        net(torch.zeros(1, 2, 20, 7))
 
 
 @pytest.mark.parametrize("skips", [False, True])

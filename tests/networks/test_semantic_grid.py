@@ -122,3 +122,17 @@ def test_inputs_of_another_size_or_type_are_refused(small_net, batch):
         small_net(image, occupancy[:, :3])
     with pytest.raises(ArgumentError, match=r"image: expected floats in 0..1, found torch.uint8"):
         small_net((255 * image).to(torch.uint8), occupancy)
+    with pytest.raises(ArgumentError, match="occupancy: expected one for each of the 2 images, found 1"):
+        small_net(image, occupancy[:1])
+
+
+def test_any_module_can_be_the_image_network(small_net, batch):
+    image, occupancy, _ = batch
+    net = SemanticGridNet(nn.Conv2d(3, N_CLASSES, 1), small_net.sampler, N_CLASSES).double().eval()
+    assert net(image, occupancy).shape == (2, N_CLASSES, 10, 9)
+
+
+def test_the_global_generator_is_left_alone(small_net):
+    before = torch.get_rng_state()
+    SemanticGridNet(build_segmenter("segnet", N_CLASSES), small_net.sampler, N_CLASSES)
+    assert torch.equal(torch.get_rng_state(), before)
