@@ -10,7 +10,7 @@ from semgrid_edu.occupancy.moving_map import look_up, map_around, scroll
 from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.particles import cells_of, mean_velocity, transform
 from semgrid_edu.occupancy.sensor import check_points, without_own_returns
-from semgrid_edu.occupancy.state import Belief, FilterState, Particles
+from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN, move, predict, resample, update
 
 MAX_YAW = np.radians(2)
@@ -88,7 +88,8 @@ class Cmcdot:
         updated = update(predicted, self.map_spec, evidence, self.params)
         self._state, self._pose = resample(updated, self.map_spec, self.params, self._rng), pose
         here = evidence_in_cells(points, free_to, self.spec, sensor, PlanarMotion())
-        return Belief(self._probability(predicted, here), self._velocity())
+        probability = self._probability(predicted, here)
+        return Belief(probability, self._velocity(probability[State.DYNAMIC] > 0))
 
     def _probability(self, predicted: FilterState, evidence: Evidence) -> NDArray[np.float32]:
         """Look the prediction up in the vehicle's cells and update those, so that returns lie in the cells they hit."""
@@ -96,10 +97,11 @@ class Cmcdot:
         prior = FilterState(here, Particles.none(), np.zeros(self.spec.shape, np.float32))
         return update(prior, self.spec, evidence, self.params).probability
 
-    def _velocity(self) -> NDArray[np.float32]:
-        """Look the mean velocities up in the vehicle's cells, and turn them into its axes."""
+    def _velocity(self, moving: NDArray[np.bool_]) -> NDArray[np.float32]:
+        """Look the mean velocities up in the vehicle's cells that hold dynamic mass, and turn them into its axes."""
         particles = self._state.particles
         over_map = mean_velocity(particles, cells_of(particles.position, self.map_spec), self.map_spec.shape)
         unknown = np.full(2, np.nan, np.float32)
         velocity = look_up(over_map, unknown, self.map_spec, self.spec, self._pose)
-        return np.einsum("ij,ihw->jhw", self._pose.rotation.astype(np.float32), velocity)
+        velocity = np.einsum("ij,ihw->jhw", self._pose.rotation.astype(np.float32), velocity)
+        return np.where(moving, velocity, unknown[:, None, None])

@@ -68,8 +68,8 @@ class CmcdotParams:
 
     def __post_init__(self) -> None:
         """Refuse parameters that describe no filter."""
-        if self.particles < 1:
-            raise ArgumentError("particles", "at least one", self.particles)
+        if not isinstance(self.particles, int | np.integer) or self.particles < 1:
+            raise ArgumentError("particles", "a whole number of at least 1", self.particles)
         rates = np.asarray(self.rates, dtype=float)
         if rates.shape != (4, 4) or not np.isfinite(rates).all() or (rates < 0).any():
             raise ArgumentError("rates", "4 x 4 finite rates, none negative", self.rates)

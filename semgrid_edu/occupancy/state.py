@@ -32,7 +32,7 @@ class Belief:
         P(FREE), P(STATIC), P(DYNAMIC), P(UNKNOWN) of each cell; they sum to 1.
     velocity : (2, H, W) float32
         Mean velocity over ground of what moves in the cell, along the grid's x and y axes, m/s; NaN
-        where no particles are.
+        without dynamic mass, or where it is too small to have got a particle.
     """
 
     probability: NDArray[np.float32]

@@ -222,7 +222,7 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
 def _draw_again(particles: Particles, count: int, rng: np.random.Generator) -> Particles:
     """Draw particles by weight, each then carrying the same share."""
     total = particles.weight.sum(dtype=np.float64)
-    if total == 0:
+    if total == 0 or count == 0:
         return Particles.none()
     chosen = systematic_resample(particles.weight, count, rng.random())
     weight = np.full(count, total / count, np.float32)
@@ -234,7 +234,7 @@ def _draw_newborn(
 ) -> Particles:
     """Draw new particles in cells by newborn mass, each carrying the same share."""
     total = newborn.sum(dtype=np.float64)
-    if total == 0:
+    if total == 0 or count == 0:
         return Particles.none()
     chosen = systematic_resample(newborn.ravel(), count, rng.random())
     corner = np.stack(np.divmod(chosen, spec.shape[1]), axis=1) + rng.random((count, 2), np.float32)

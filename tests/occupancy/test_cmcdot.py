@@ -163,6 +163,20 @@ def test_any_scans_keep_every_cell_a_distribution(seed, count, spread, dt, shift
         assert belief.probability.min() >= -1e-6
 
 
+@pytest.mark.parametrize("particles", [1, 2, 3])
+def test_hardly_any_particles_still_keep_every_cell_a_distribution(particles):
+    tracker, points = Cmcdot(SMALL, CmcdotParams(particles=particles)), scan(street(0))
+    for _ in range(4):
+        belief = tracker.step(points, STILL, 0.1)
+        assert np.abs(belief.probability.sum(axis=0) - 1).max() < 1e-5
+
+
+def test_without_dynamic_mass_there_is_no_velocity_in_the_first_turning_step():
+    belief = Cmcdot(SMALL, PARAMS).step(scan(street(0)), PlanarMotion(1, 0, 0.01), 0.1)
+    assert np.isnan(belief.velocity[:, belief.probability[State.DYNAMIC] == 0]).all()
+    assert np.isfinite(belief.velocity).any()
+
+
 def test_what_is_no_scan_or_time_is_refused_and_changes_nothing():
     tracker, twin = Cmcdot(SMALL, PARAMS), Cmcdot(SMALL, PARAMS)
     for points, dt, name in ((np.array([[np.nan, 0, 0]]), 0.1, "points"), (np.zeros((1, 3)), -1.0, "dt")):

@@ -197,6 +197,7 @@ def test_time_that_runs_backwards_is_refused(dt):
     "bad",
     [
         {"particles": 0},
+        {"particles": 1.5},
         {"rates": ((1, 2), (3, 4))},
         {"stop_speed": 0.0},
         {"max_speed": -1.0},
