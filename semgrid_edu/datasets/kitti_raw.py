@@ -25,6 +25,9 @@ LIDAR_RANGE = 250.0
 SAME_INSTANT = np.timedelta64(500, "ms")
 """How far apart the sensors' times of one frame may be; at 10 Hz they should lie within 0.1 s."""
 
+SHORT_SCAN = 0.6
+"""Of the bytes of a drive's median scan: scans of one drive differ far less, and one that lost its half falls below."""
+
 _FRAME_FILE = re.compile(r"(\d{10})\.(bin|png|txt)")
 
 
@@ -162,7 +165,9 @@ class KittiRawDrive(Sequence[Frame]):
             if np.isnat(times[k]):
                 raise DataError(path, f"a time in line {k + 1}", "an empty line")
             if abs(times[k] - lidar[k]) > SAME_INSTANT:
-                raise DataError(path, f"a time within {SAME_INSTANT} of the LIDAR's {lidar[k]}", f"{times[k]}")
+                lidar_path = self.folder / "velodyne_points" / "timestamps.txt"
+                expected = f"in line {k + 1} a time within {SAME_INSTANT} of {lidar[k]}, which {lidar_path} has there"
+                raise DataError(path, expected, f"{times[k]}")
         first = lidar[~np.isnat(lidar)][0]
         return float((lidar[k] - first) / np.timedelta64(1, "s"))
 
@@ -181,12 +186,14 @@ class KittiRawDrive(Sequence[Frame]):
         return points
 
     def _short_scans(self) -> list[str]:
-        """Name the scans that have less than half the bytes of the drive's median scan: cut short, most likely."""
+        """Name the scans that are much smaller than the drive's median scan: cut short, most likely."""
         paths = [self._file("velodyne_points", k, ".bin") for k in range(len(self))]
         sizes = {path: path.stat().st_size for path in paths if path.exists()}
         median = np.median(list(sizes.values())) if sizes else 0
         expected = f"a scan about as large as the drive's others, {median:g} bytes"
-        return [str(DataError(path, expected, f"{size}")) for path, size in sizes.items() if 0 < size < median / 2]
+        return [
+            str(DataError(path, expected, f"{size}")) for path, size in sizes.items() if 0 < size < SHORT_SCAN * median
+        ]
 
     def _image(self, k: int) -> NDArray[np.uint8] | None:
         """Read the image, (h, w, 3); None when the drive has no folder of this camera."""

@@ -111,4 +111,4 @@ def read_png(path: Path, mode: str, size: tuple[int, int] | None) -> NDArray:
     if image.mode != mode or found != (size or found):
         expected = f"{mode} of {size[0]} x {size[1]} pixels" if size else mode
         raise DataError(path, expected, f"{image.mode} of {image.height} x {image.width} pixels")
-    return np.asarray(image)
+    return np.array(image)

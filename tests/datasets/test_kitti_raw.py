@@ -256,6 +256,27 @@ def test_scan_cut_between_points_is_suspected(root):
     assert path.name in problem
 
 
+def test_half_of_a_scan_is_suspected_though_the_whole_was_longer_than_the_others(root):
+    path = path_of(root, SCAN)
+    path.write_bytes(path.read_bytes()[: 16 * 360])  # of 720 points; the others have 700
+    (problem,) = KittiRawDrive(root, DATE, "0001").problems()
+    assert path.name in problem
+
+
+def test_times_that_differ_name_both_files(root):
+    path = path_of(root, STAMPS)
+    path.write_text(path.read_text().replace("2026", "2027"))
+    with pytest.raises(DataError, match=r"oxts/timestamps\.txt: .+velodyne_points/timestamps\.txt"):
+        read_all(root)
+
+
+def test_arrays_of_a_frame_may_be_written_to(root):
+    frame = read_all(root)[2]
+    labels = frame.labels
+    for array in (frame.image, frame.points, labels.image, labels.depth, labels.birdseye, labels.visible):
+        assert array.flags.writeable
+
+
 FILES = (SCAN, IMAGE, PACKET, STAMPS, CAM, VELO, IMU, *(
     f"{LABELS}/{kind}/0000000002.png" for kind in ("image", "depth", "birdseye", "visible")))  # fmt: skip
 
