@@ -77,7 +77,7 @@ def plane_pixels(spec: GridSpec, heights: ArrayLike, camera: Camera) -> tuple[ND
     return project(transform_points(camera.T_camera_from_grid, points), camera)
 
 
-def sample_planes_naive(scores: ArrayLike, pixels: NDArray, visible: NDArray) -> NDArray[np.float64]:
+def sample_planes_naive(scores: ArrayLike, pixels: ArrayLike, visible: ArrayLike) -> NDArray[np.float64]:
     """Resample the scores on the planes: equation (2), literally, one point at a time.
 
     p[c, i, j] = sum_n sum_m s[c, n, m] k(u_j - m) k(v_j - n), with the bilinear kernel k(t) = max(0, 1 - |t|).
@@ -106,7 +106,7 @@ def sample_planes_naive(scores: ArrayLike, pixels: NDArray, visible: NDArray) ->
     >>> sample_planes_naive(scores, np.full((1, 1, 1, 2), 0.5), np.ones((1, 1, 1), bool))
     array([[[[1.5]]]])
     """
-    s = np.asarray(scores, dtype=np.float64)
+    s, pixels, visible = np.asarray(scores, dtype=np.float64), np.asarray(pixels), np.asarray(visible)
     _check_points(pixels, visible, s.shape[1:])
     n, m = np.arange(s.shape[1]), np.arange(s.shape[2])
     p = np.zeros((s.shape[0], *visible.shape))
@@ -149,7 +149,7 @@ class PlaneSampler(nn.Module):
     tensor([[[[[1.5000]]]]])
     """
 
-    def __init__(self, pixels: NDArray, visible: NDArray, image_size: tuple[int, int]) -> None:
+    def __init__(self, pixels: ArrayLike, visible: ArrayLike, image_size: tuple[int, int]) -> None:
         super().__init__()
         pixels, visible = np.asarray(pixels), np.asarray(visible)
         _check_points(pixels, visible, image_size)

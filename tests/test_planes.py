@@ -68,6 +68,12 @@ def test_equation_2_by_hand():
     np.testing.assert_allclose(sample_planes_naive(scores, pixels, visible).ravel(), list(cases.values()))
 
 
+def test_the_literal_twin_takes_lists_and_tensors_too():
+    scores, points, visible = [[[0.0, 1.0], [2.0, 3.0]]], [[[[0.5, 0.5]]]], [[[True]]]
+    assert sample_planes_naive(scores, points, visible).item() == 1.5
+    assert sample_planes_naive(*map(torch.tensor, (scores, points, visible))).item() == 1.5
+
+
 def test_each_kernel_weight_by_hand():
     scores = np.zeros((1, 3, 3))
     scores[0, 1:, 1:] = [[1, 10], [100, 1000]]

@@ -126,8 +126,8 @@ def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float6
         raise ArgumentError("unary", "numbers, or inf for an impossible class", "NaN or -inf")
     if np.isinf(unary).all(axis=0).any():
         raise ArgumentError("unary", "a possible class in each cell", "a cell where every class is inf")
-    if not np.allclose(values.sum(axis=0), 1, atol=1e-3):
-        raise ArgumentError("values", "four states that sum to 1 in each cell", "a cell where they don't")
+    if not (values >= -1e-3).all() or not np.allclose(values.sum(axis=0), 1, atol=1e-3):
+        raise ArgumentError("values", "four probabilities that sum to 1 in each cell", "a cell where they don't")
     return unary, values
 
 

@@ -175,6 +175,7 @@ def test_inputs_are_left_alone():
         ("values", np.zeros((2, 4, 4)), np.full((5, 4, 4), 0.2)),
         ("values", np.zeros((2, 4, 4)), np.full((4, 4, 4), 0.3)),
         ("values", np.zeros((2, 4, 4)), np.full((4, 4, 4), np.nan)),
+        ("values", np.zeros((2, 4, 4)), np.tile(np.reshape([-1.0, 2, 0, 0], (4, 1, 1)), (1, 4, 4))),
     ],
 )
 def test_bad_input_is_named(infer, name, unary, values):
