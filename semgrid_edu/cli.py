@@ -33,9 +33,10 @@ def demo(
     from semgrid_edu.datasets.samples import sample_drive, sample_weights
     from semgrid_edu.demo import write_demo
 
-    named = (kitti, date, drive)
-    if None in named and any(named):
-        raise ArgumentError("--kitti, --date, --drive", "all three or none", named)
+    named = {"--kitti": kitti, "--date": date, "--drive": drive}
+    given = [option for option, value in named.items() if value is not None]
+    if given and len(given) < len(named):
+        raise ArgumentError(", ".join(named), "all three or none", f"only {' and '.join(given)}")
     chosen = KittiRawDrive(kitti, date, drive) if kitti and date and drive else sample_drive()
     page = write_demo(chosen, sample_weights(), out)
     typer.echo(f"open {page.resolve().as_uri()}\nin one picture: {page.parent / 'overview.png'}")
@@ -169,8 +170,11 @@ def _report(problems: list[str], sound: str) -> None:
 
 
 def run() -> None:
-    """Run the command line; a mistake in the input ends in one line, not in a traceback."""
+    """Run the command line; a mistake in the input, or a disk that refuses, ends in one line, not in a traceback."""
     try:
         app()
     except (ArgumentError, DataError) as error:
         sys.exit(f"semgrid-edu: {error}")
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        sys.exit(f"semgrid-edu: {where}{error.strerror or error}")

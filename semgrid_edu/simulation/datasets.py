@@ -172,7 +172,10 @@ def _claim(root: Path, marker: dict) -> None:
     """Make the folder ours, or refuse it when it is somebody else's."""
     path = root / "simulation.json"
     if path.exists():
-        found = json.loads(path.read_text())
+        try:
+            found = json.loads(path.read_text())
+        except ValueError as error:
+            raise DataError(path, f"data made with {marker}", f"no JSON: {error}") from error
         if found != marker:
             raise DataError(path, f"data made with {marker}", f"{found}: choose another folder or remove this one")
     elif root.exists() and any(root.iterdir()):

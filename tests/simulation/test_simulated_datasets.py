@@ -126,6 +126,9 @@ def test_somebody_elses_folder_is_refused(alone, tmp_path):
     with pytest.raises(DataError, match="other files"):
         make_recipe(TINY, tmp_path, seed=5, workers=1)
     assert (tmp_path / "tiny" / "thesis.txt").read_text() == "precious"
+    (tmp_path / "tiny" / "simulation.json").write_text("{")
+    with pytest.raises(DataError, match=r"simulation\.json: expected data made with .+, found no JSON"):
+        make_recipe(TINY, tmp_path, seed=5, workers=1)
 
 
 def test_bad_arguments_are_named(tmp_path):
