@@ -2,13 +2,11 @@
 
 from pathlib import Path
 
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 from torch import nn
 from torch.optim import SGD
 
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.files import atomic_path
+from semgrid_edu.tensors import read_tensors, write_tensors
 
 
 def save_checkpoint(path: Path, run: str, net: nn.Module, optimiser: SGD, iteration: int) -> None:
@@ -29,8 +27,7 @@ def save_checkpoint(path: Path, run: str, net: nn.Module, optimiser: SGD, iterat
     for name, parameter in net.named_parameters():
         if parameter in optimiser.state:  # not before its first gradient
             tensors[f"momentum.{name}"] = optimiser.state[parameter]["momentum_buffer"]
-    with atomic_path(path) as temporary:
-        save_file(tensors, temporary, metadata={"run": run, "iteration": str(iteration)})
+    write_tensors(path, tensors, {"run": run, "iteration": str(iteration)})
 
 
 def load_checkpoint(path: Path, run: str, net: nn.Module, optimiser: SGD) -> int:
@@ -48,13 +45,10 @@ def load_checkpoint(path: Path, run: str, net: nn.Module, optimiser: SGD) -> int
     ArgumentError
         When it belongs to another run.
     """
-    if not path.is_file():
-        raise DataError(path, "a checkpoint to resume from", "no such file")
+    header, tensors = read_tensors(path)
     try:
-        with safe_open(path, framework="pt") as file:
-            header, tensors = file.metadata(), {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-            found, iteration = header["run"], int(header["iteration"])
-    except (SafetensorError, TypeError, KeyError, ValueError) as error:
+        found, iteration = header["run"], int(header["iteration"])
+    except (KeyError, ValueError) as error:
         raise DataError(path, "a checkpoint of a training", error) from error
     if found != run:
         raise ArgumentError("resume", f"the run of {path}, {found}", run)

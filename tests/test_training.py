@@ -10,7 +10,7 @@ import torch.nn.functional as F
 from safetensors.torch import load_file, save_file
 from sklearn.metrics import accuracy_score
 
-from semgrid_edu import checkpoint, training
+from semgrid_edu import checkpoint, tensors, training
 from semgrid_edu.batches import Batch, draw_batch, grid_logits, image_scores
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.training_set import Sample
@@ -258,13 +258,13 @@ def test_only_its_own_run_is_resumed(camera, streets, tmp_path):
 
 def test_a_missing_or_damaged_checkpoint_is_named(camera, streets, tmp_path):
     path = tmp_path / "checkpoint.safetensors"
-    with pytest.raises(DataError, match=r"checkpoint.safetensors: expected a checkpoint to resume from"):
+    with pytest.raises(DataError, match=r"checkpoint.safetensors: expected a safetensors file, found no such file"):
         train(build_net(SMALL, camera), streets, tmp_path, QUICK, resume=True)
     _checkpoint(camera, path)
     whole = path.read_bytes()
     for content in (whole[:100], whole[: len(whole) // 2], b""):
         path.write_bytes(content)
-        with pytest.raises(DataError, match=r"checkpoint.safetensors: expected a checkpoint of a training"):
+        with pytest.raises(DataError, match=r"checkpoint.safetensors: expected a safetensors file"):
             train(build_net(SMALL, camera), streets, tmp_path, QUICK, resume=True)
     path.write_bytes(whole)
     save_file(load_file(path), path)
@@ -277,11 +277,11 @@ def test_a_full_disk_keeps_the_checkpoint_before(camera, tmp_path, monkeypatch):
     _checkpoint(camera, path)
     before = path.read_bytes()
 
-    def fail(tensors, file, metadata):
+    def fail(_, file, metadata):
         file.write_bytes(b"half a")
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(checkpoint, "save_file", fail)
+    monkeypatch.setattr(tensors, "save_file", fail)
     with pytest.raises(OSError, match="No space left"):
         _checkpoint(camera, path, run="later")
     assert path.read_bytes() == before

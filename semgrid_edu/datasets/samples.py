@@ -4,15 +4,14 @@ import json
 from pathlib import Path
 
 import torch
-from safetensors import SafetensorError
-from safetensors.torch import load_file, save_file
 
 from semgrid_edu.datasets.kitti_raw import KittiRawDrive
 from semgrid_edu.datasets.training_cache import SEED
 from semgrid_edu.datasets.training_set import Sample, TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.files import atomic_path, write_bytes
+from semgrid_edu.files import write_bytes
 from semgrid_edu.provenance import FILE_NAME, provenance_problems, write_provenance
+from semgrid_edu.tensors import read_tensors, write_tensors
 
 FRAMES = "frames.safetensors"
 """The file of an excerpt."""
@@ -101,8 +100,7 @@ def write_excerpt(dataset_dir: str | Path, n_frames: int, folder: str | Path) ->
         raise ArgumentError("n_frames", f"1 to {len(training)} frames", n_frames)
     chosen = [training[k * len(training) // n_frames] for k in range(n_frames)]
     tensors = dict(zip(Sample._fields, map(torch.stack, zip(*chosen, strict=True)), strict=True))
-    with atomic_path(folder / FRAMES) as temporary:
-        save_file(tensors, temporary)
+    write_tensors(folder / FRAMES, tensors)
     command = f"semgrid-edu data excerpt --data {Path(dataset_dir).name} --frames {n_frames} {folder.name}"
     write_provenance(folder, command, SEED, ("numpy", "torch", "numba"))
 
@@ -116,10 +114,10 @@ def read_excerpt(folder: str | Path) -> list[Sample]:
         When the file is missing or damaged.
     """
     path = Path(folder) / FRAMES
+    _, tensors = read_tensors(path)
     try:
-        tensors = load_file(path)
         return [Sample(*frame) for frame in zip(*(tensors[name] for name in Sample._fields), strict=True)]
-    except (OSError, SafetensorError, KeyError, ValueError) as error:
+    except (KeyError, ValueError) as error:
         raise DataError(path, f"labelled frames: {', '.join(Sample._fields)}", error) from error
 
 

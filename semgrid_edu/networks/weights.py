@@ -4,16 +4,14 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 from torch import Tensor
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.files import atomic_path
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks.build import Architecture, build_net
 from semgrid_edu.networks.semantic_grid import SemanticGridNet
+from semgrid_edu.tensors import read_tensors, write_tensors
 
 
 def save_net(net: SemanticGridNet, path: str | Path) -> None:
@@ -34,10 +32,7 @@ def save_net(net: SemanticGridNet, path: str | Path) -> None:
     if not hasattr(net, "architecture"):
         raise ArgumentError("net", "a network of build_net, which records its architecture", "one made by hand")
     tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in net.state_dict().items()}
-    # One entry only: the order of several isn't fixed, and the same weights must give the same bytes.
-    header = {"architecture": json.dumps(asdict(net.architecture))}
-    with atomic_path(path) as temporary:
-        save_file(tensors, temporary, metadata=header)
+    write_tensors(path, tensors, {"architecture": json.dumps(asdict(net.architecture))})
 
 
 def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:
@@ -61,7 +56,7 @@ def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:
         When the file is missing, damaged, of another program, or holds weights of another architecture than
         its header says.
     """
-    header, tensors = _read(path)
+    header, tensors = read_tensors(path)
     try:
         net = build_net(_architecture(json.loads(header["architecture"])), camera)
     except (KeyError, TypeError, json.JSONDecodeError, ArgumentError) as error:
@@ -69,16 +64,6 @@ def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:
     _check_tensors(path, tensors, net.state_dict())
     net.load_state_dict(tensors)
     return net.eval()
-
-
-def _read(path: str | Path) -> tuple[dict[str, str], dict[str, Tensor]]:
-    if not Path(path).is_file():
-        raise DataError(path, "a file of weights", "no such file")
-    try:
-        with safe_open(path, framework="pt") as file:
-            return file.metadata() or {}, {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-    except SafetensorError as error:
-        raise DataError(path, "a safetensors file", error) from error
 
 
 def _architecture(values: dict) -> Architecture:

@@ -70,7 +70,7 @@ def test_a_network_made_by_hand_is_not_saved(net, tmp_path):
 
 
 def test_a_missing_file_is_named(tmp_path, camera):
-    with pytest.raises(DataError, match=r"nowhere.safetensors: expected a file of weights"):
+    with pytest.raises(DataError, match=r"nowhere.safetensors: expected a safetensors file, found no such file"):
         load_net(tmp_path / "nowhere.safetensors", camera)
 
 
