@@ -297,7 +297,14 @@ class TestMistakes:
         (folder / "velodyne_points" / "data" / "0000000000.bin").write_bytes(b"\0" * 7)
         with pytest.raises(DataError, match=r"0000000000\.bin"):
             write_demo(KittiRawDrive(tmp_path, DATE, "0001"), weights, tmp_path / "out")
-        assert not (tmp_path / "out").exists()
+        assert list((tmp_path / "out").iterdir()) == []
+
+    def test_a_folder_that_cannot_be_made_is_known_before_any_frame_is_read(self, weights, tmp_path):
+        folder = write_tiny_drive(tmp_path)
+        (folder / "velodyne_points" / "data" / "0000000000.bin").unlink()
+        (tmp_path / "file").touch()
+        with pytest.raises(NotADirectoryError, match="file"):
+            write_demo(KittiRawDrive(tmp_path, DATE, "0001"), weights, tmp_path / "file" / "out")
 
 
 def test_a_long_drive_is_shown_evenly_spaced_and_counted_whole(results):

@@ -42,6 +42,7 @@ def write_demo(drive: KittiRawDrive, weights: str | Path, out: str | Path) -> Pa
         When a file of the drive, or the weights, can't be read.
     """
     net = load_net(weights, drive.camera)
+    Path(out).mkdir(parents=True, exist_ok=True)  # a folder that can't be made shall be known before the work
     label_set = LABEL_SETS[net.architecture.label_set]
     record = Record(net.architecture.grid, label_set, every=-(-len(drive) // SHOWN))
     for result in tqdm(run_pipeline(drive, net), total=len(drive), desc=drive.folder.name, unit="frame"):
