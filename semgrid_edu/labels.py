@@ -82,7 +82,7 @@ _KITTI_COLOURS = {
     "car": (0, 0, 142),
     "pedestrian": (204, 0, 50),
     "bicycle": (114, 4, 28),
-    "building": (70, 70, 70),
+    "building": (110, 125, 130),
     "signage": (223, 223, 0),
     "fence": (190, 153, 153),
     "sky": (66, 130, 182),
@@ -106,7 +106,7 @@ UNKNOWN_OF_STATE = (10, 11, 12, 13)
 
 _SYNTHIA_COLOURS = {
     "void": (12, 16, 24),
-    "building": (70, 70, 70),
+    "building": (110, 125, 130),
     "road": (126, 59, 122),
     "sidewalk": (255, 64, 252),
     "fence": (190, 153, 153),
