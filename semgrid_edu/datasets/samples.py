@@ -1,6 +1,7 @@
 """The shipped samples: a short simulated drive, a few labelled frames and trained compact weights (section 4)."""
 
 import json
+from datetime import UTC, datetime
 from pathlib import Path
 
 import torch
@@ -70,7 +71,9 @@ def write_weights(run: str | Path, folder: str | Path) -> None:
     for name, kept in (("weights.safetensors", WEIGHTS), ("log.csv", "log.csv")):
         write_bytes(folder / kept, (run / name).read_bytes())
     record = json.loads((run / FILE_NAME).read_text())
-    write_provenance(folder, record["command"], record["seed"], ("torch", "numpy", "safetensors"), training=record)
+    ended = datetime.fromtimestamp((run / "weights.safetensors").stat().st_mtime, UTC)
+    details = {"trained": f"{ended:%Y-%m-%d %H:%M} UTC", "training": record}
+    write_provenance(folder, record["command"], record["seed"], ("torch", "numpy", "safetensors"), **details)
 
 
 def sample_frames() -> list[Sample]:

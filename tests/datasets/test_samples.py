@@ -1,6 +1,7 @@
 """The shipped samples, and excerpts like them."""
 
 import json
+import os
 
 import pytest
 import torch
@@ -57,12 +58,14 @@ def test_a_kept_training_is_what_it_ended_with(tmp_path):
     for name in ("weights.safetensors", "image_stage.safetensors", "log.csv"):
         write_bytes(run / name, name.encode())
     write_provenance(run, "semgrid-edu train", 3, ("torch",), minutes=9)
+    os.utime(run / "weights.safetensors", (86400, 86400))
     write_weights(run, kept)
     assert provenance_problems(kept) == []
     assert sorted(path.name for path in kept.iterdir()) == ["log.csv", "provenance.json", WEIGHTS]
     assert (kept / WEIGHTS).read_bytes() == b"weights.safetensors"
     record = json.loads((kept / "provenance.json").read_text())
     assert (record["command"], record["seed"], record["training"]["minutes"]) == ("semgrid-edu train", 3, 9)
+    assert record["trained"] == "1970-01-02 00:00 UTC"
 
 
 def test_a_training_that_was_touched_since_is_not_kept(tmp_path):
