@@ -109,6 +109,18 @@ class Frame:
     time: float
     labels: FrameLabels | None = None
 
+    def need_image(self) -> NDArray[np.uint8]:
+        """Return the image, (h, w, 3) uint8, for those who can't do without.
+
+        Raises
+        ------
+        ArgumentError
+            When the frame has none.
+        """
+        if self.image is None:
+            raise ArgumentError("frame", "a frame with a camera image", "a frame without one")
+        return self.image
+
     @property
     def points_grid(self) -> NDArray[np.float32]:
         """(N, 4) float32: the returns in the grid frame, so that z is the height above flat ground."""

@@ -13,7 +13,6 @@ from torch import Tensor
 
 from semgrid_edu.crf import CrfParams, mean_field
 from semgrid_edu.datasets.resizing import resize_image
-from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
 from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.occupancy import Belief, CmcdotParams, track_drive
@@ -125,9 +124,7 @@ def network_image(frame: Frame, size: tuple[int, int]) -> Tensor:
     ArgumentError
         When the frame has no image.
     """
-    if frame.image is None:
-        raise ArgumentError("frame", "a frame with a camera image", "a frame without one")
-    return torch.tensor(resize_image(frame.image, size)).permute(2, 0, 1).float() / 255
+    return torch.tensor(resize_image(frame.need_image(), size)).permute(2, 0, 1).float() / 255
 
 
 @contextmanager

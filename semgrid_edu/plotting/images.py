@@ -38,7 +38,7 @@ def points_on_image(frame: Frame, ax: Axes | None = None, size: float = 3.0, col
     ArgumentError
         When the frame has no image.
     """
-    ax = draw_image(need_image(frame), ax)
+    ax = draw_image(frame.need_image(), ax)
     pixels, depth = visible_points(frame)
     ax.scatter(*pixels.T, s=size, c=depth_colours(depth) / 255, linewidths=0)
     if colour_bar:
@@ -125,16 +125,3 @@ def draw_image(image: NDArray, ax: Axes | None = None, **style: object) -> Axes:
     ax.set(xticks=[], yticks=[])
     ax.spines[:].set_visible(False)
     return ax
-
-
-def need_image(frame: Frame) -> NDArray[np.uint8]:
-    """Return the frame's image, (h, w, 3).
-
-    Raises
-    ------
-    ArgumentError
-        When the frame has none.
-    """
-    if frame.image is None:
-        raise ArgumentError("frame", "a frame with a camera image", "a frame without one")
-    return frame.image
