@@ -9,7 +9,20 @@ from semgrid_edu.occupancy.motion import PlanarMotion
 
 
 def map_around(spec: GridSpec, max_yaw: float) -> GridSpec:
-    """Return the map that covers a grid turned by up to `max_yaw` (radians) and shifted by up to a cell."""
+    """Return the map that covers a grid however the vehicle turns and shifts in it before it scrolls.
+
+    Parameters
+    ----------
+    spec : GridSpec
+        The grid around the vehicle.
+    max_yaw : float
+        The farthest that it turns, radians; it shifts by a cell at most.
+
+    Returns
+    -------
+    GridSpec
+        Of the same cells, with a margin on every side.
+    """
     farthest = np.hypot(max(abs(spec.x_min), abs(spec.x_max)), max(abs(spec.y_min), abs(spec.y_max)))
     margin = (np.ceil(farthest * np.sin(max_yaw) / spec.cell) + 1) * spec.cell
     return GridSpec(spec.x_min - margin, spec.x_max + margin, spec.y_min - margin, spec.y_max + margin, spec.cell)

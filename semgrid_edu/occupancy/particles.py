@@ -174,7 +174,21 @@ def _transform(position, velocity, dx, dy, cos, sin):
 
 
 def mean_velocity(particles: Particles, cells: NDArray, shape: tuple[int, int]) -> NDArray[np.float32]:
-    """Return the mean velocity of the particles in each cell, weighed: (2, H, W) m/s, NaN without any."""
+    """Return the mean velocity of the particles in each cell, weighed by what each carries.
+
+    Parameters
+    ----------
+    particles : Particles
+    cells : (N,) int
+        The cell of each, from `cells_of`.
+    shape : (int, int)
+        H, W of the map.
+
+    Returns
+    -------
+    (2, H, W) float32
+        Along the axes of the map, m/s; NaN where no particle is.
+    """
     moment = _moments(particles.velocity, particles.weight, cells, math.prod(shape))
     mean = np.divide(moment[:2], moment[2], out=np.full(moment[:2].shape, np.nan), where=moment[2] > 0)
     return mean.reshape(2, *shape).astype(np.float32)

@@ -57,6 +57,9 @@ class SensorModel:
             raise ArgumentError("azimuth_step", "degrees, above 0 and up to 360", self.azimuth_step)
         if not self.obstacle_min < self.obstacle_max:
             raise ArgumentError("obstacle_min", f"less than obstacle_max, {self.obstacle_max}", self.obstacle_min)
+        x_min, x_max, y_min, y_max = self.vehicle
+        if not (x_min <= x_max and y_min <= y_max):
+            raise ArgumentError("vehicle", "x_min, x_max, y_min, y_max in metres, the smaller first", self.vehicle)
         for name in ("p_hit_occupied", "p_hit_free", "p_pass_occupied", "p_pass_free"):
             if not 0 < getattr(self, name) < 1:
                 raise ArgumentError(name, "a probability between 0 and 1", getattr(self, name))
@@ -73,7 +76,23 @@ class SensorModel:
 
 
 def check_points(points: NDArray) -> NDArray:
-    """Return the points as an array, or refuse what isn't a table of finite coordinates."""
+    """Return the points of a scan as an array, or refuse them.
+
+    Parameters
+    ----------
+    points : (N, 3+) float
+        Returns: x forward, y left, z above the ground (m), in the grid frame of the vehicle; N may be 0.
+
+    Returns
+    -------
+    (N, 3+) float
+        The same numbers.
+
+    Raises
+    ------
+    ArgumentError
+        When it isn't a table of finite coordinates.
+    """
     points = np.asarray(points)
     if points.ndim != 2 or points.shape[1] < 3:
         raise ArgumentError("points", "shape (N, 3+): x, y, z in metres", f"shape {points.shape}")
@@ -84,7 +103,20 @@ def check_points(points: NDArray) -> NDArray:
 
 
 def without_own_returns(points: NDArray, sensor: SensorModel) -> NDArray:
-    """Return the points without those that the vehicle itself sends back: they would move with it for ever."""
+    """Leave out what the vehicle itself sends back: it would move along for ever, and hide what is behind it.
+
+    Parameters
+    ----------
+    points : (N, 3+) float
+        Returns in the grid frame of the vehicle, metres.
+    sensor : SensorModel
+        For the vehicle's outline, and the height from which a return is an obstacle.
+
+    Returns
+    -------
+    (M, 3+) float
+        The others, in their order.
+    """
     x, y, z = points[:, 0], points[:, 1], points[:, 2]
     x_min, x_max, y_min, y_max = sensor.vehicle
     own = (x > x_min) & (x < x_max) & (y > y_min) & (y < y_max) & (z >= sensor.obstacle_min)

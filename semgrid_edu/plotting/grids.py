@@ -187,7 +187,27 @@ def grid_values(spec: GridSpec, values: NDArray, name: str, ax: Axes | None = No
 
 
 def draw_map(spec: GridSpec, raster: NDArray, ax: Axes | None = None, **style: object) -> Axes:
-    """Draw an array over the grid, (H, W) or (H, W, 3), with axes in metres."""
+    """Draw an array over the grid, with axes in metres.
+
+    Parameters
+    ----------
+    spec : GridSpec
+    raster : (H, W) float or (H, W, 3) uint8
+        Numbers, or colours.
+    ax : Axes, optional
+        Where to draw; a new figure when left out.
+    **style
+        Passed on to `Axes.imshow`.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ArgumentError
+        When the array doesn't fit `spec`.
+    """
     if np.shape(raster)[:2] != spec.shape:
         raise ArgumentError("raster", f"the grid's shape {spec.shape}", f"shape {np.shape(raster)}")
     if ax is None:

@@ -114,7 +114,10 @@ def test_what_is_no_scan_is_refused_by_name(evidence_of, points):
         evidence_of(points, RAY, SENSOR)
 
 
-@pytest.mark.parametrize("bad", [{"azimuth_step": 0}, {"p_hit_free": 0}, {"p_pass_free": 1}, {"obstacle_min": 3}])
+@pytest.mark.parametrize(
+    "bad",
+    [{"azimuth_step": 0}, {"p_hit_free": 0}, {"p_pass_free": 1}, {"obstacle_min": 3}, {"vehicle": (3, -2, -1, 1)}],
+)
 def test_an_impossible_sensor_is_refused_by_name(bad):
     with pytest.raises(ArgumentError, match=next(iter(bad))):
         SensorModel(**bad)
