@@ -9,7 +9,7 @@ from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.moving_map import look_up, map_around, scroll
 from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.particles import cells_of, mean_velocity, transform
-from semgrid_edu.occupancy.sensor import check_points, without_own_returns
+from semgrid_edu.occupancy.sensor import prepare_scan
 from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN, move, predict, resample, update
 
@@ -80,7 +80,7 @@ class Cmcdot:
         """
         shift, pose = scroll(self._pose.then(motion), self.spec.cell, MAX_YAW)
         sensor = self.params.sensor
-        points = without_own_returns(check_points(points_grid), sensor)
+        points = prepare_scan(points_grid, sensor)
         free_to = beam_reach(points, sensor)
         evidence = evidence_in_cells(points, free_to, self.map_spec, sensor, pose)
         moved = move(self._state, self.map_spec, shift)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.polar import count_returns, fill_gaps, passed_cells, polar_profile, reach
-from semgrid_edu.occupancy.sensor import SensorModel, check_points, without_own_returns
+from semgrid_edu.occupancy.sensor import SensorModel, prepare_scan
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ def scan_evidence(points: NDArray, spec: GridSpec, sensor: SensorModel, pose: Pl
     ArgumentError
         When `points` isn't a table of finite coordinates.
     """
-    points = without_own_returns(check_points(points), sensor)
+    points = prepare_scan(points, sensor)
     return evidence_in_cells(points, beam_reach(points, sensor), spec, sensor, pose or PlanarMotion())
 
 
@@ -96,7 +96,7 @@ def scan_evidence_literal(
 
     Parameters, result and errors are those of `scan_evidence`; one ray walks along the middle of each beam.
     """
-    points, pose = without_own_returns(check_points(points), sensor).astype(np.float64), pose or PlanarMotion()
+    points, pose = prepare_scan(points, sensor).astype(np.float64), pose or PlanarMotion()
     obstacles, free = np.zeros(spec.shape, np.int64), np.zeros(spec.shape, bool)
     first_obstacle, last_ground = np.full(sensor.beams, np.inf), np.zeros(sensor.beams)
     cells = zip(*spec.cells(pose.to_previous(points[:, :2])), strict=True)

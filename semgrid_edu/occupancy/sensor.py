@@ -75,6 +75,28 @@ class SensorModel:
         return math.ceil(self.column_spacing / self.azimuth_step - 1e-9)
 
 
+def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray:
+    """Make a scan fit for evidence: check it, and leave out what the vehicle itself sends back.
+
+    Parameters
+    ----------
+    points : (N, 3+) float
+        Returns: x forward, y left, z above the ground (m), in the grid frame of the vehicle; N may be 0.
+    sensor : SensorModel
+        For the vehicle's outline.
+
+    Returns
+    -------
+    (M, 3+) float
+
+    Raises
+    ------
+    ArgumentError
+        When `points` isn't a table of finite coordinates.
+    """
+    return without_own_returns(check_points(points), sensor)
+
+
 def check_points(points: NDArray) -> NDArray:
     """Return the points of a scan as an array, or refuse them.
 

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from lidar_scenes import Box, cells_in, hit_cells, scan
 
 from semgrid_edu.camera import Camera, rigid_transform
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.experiments.occupancy import hit_cells
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Cmcdot, CmcdotParams, PlanarMotion, State, track_drive
+from semgrid_edu.simulation.boxes import Box, cells_in, scan_boxes
 
 SMALL = GridSpec(0, 40, -10, 10, 0.5)
 PARAMS = CmcdotParams(particles=50_000)
@@ -28,7 +29,7 @@ def drive(speed: float, steps: int, spec: GridSpec = SMALL, seed: int = 0):
     tracker, rng = Cmcdot(spec, PARAMS, seed), np.random.default_rng(seed)
     for k in range(steps):
         x = speed * k * 0.1
-        points = scan(street(k * 0.1), x=x, noise=0.02, rng=rng)
+        points = scan_boxes(street(k * 0.1), x=x, noise=0.02, rng=rng)
         yield k * 0.1, x, points, tracker.step(points, PlanarMotion(speed * 0.1, 0, 0), 0.1)
 
 
@@ -93,7 +94,7 @@ def test_walking_people_become_dynamic():
     )
     for k in range(25):
         person = Box.around(10, -3 + 1.4 * k * 0.1, 0.5, 0.5, 1.75)
-        points = scan([person], noise=0.02, rng=rng)
+        points = scan_boxes([person], noise=0.02, rng=rng)
         belief = tracker.step(points, STILL, 0.1)
     cells = cells_in(person, spec, margin=0.1) & hit_cells(points, spec)
     assert (belief.probability[State.DYNAMIC] > belief.probability[State.STATIC])[cells].mean() >= 0.6
@@ -102,7 +103,7 @@ def test_walking_people_become_dynamic():
 
 def test_a_mirrored_world_is_believed_mirrored():
     """Except for cells whose centre lies on the border of two beams; no return lies there."""
-    points = scan(street(0.0), columns=360)
+    points = scan_boxes(street(0.0), columns=360)
     beliefs = [Cmcdot(SMALL, PARAMS).step(p, STILL, 0.1).probability for p in (points, points * [1, -1, 1])]
     assert (np.abs(beliefs[0] - beliefs[1][:, :, ::-1]).max(axis=0) > 0.05).mean() < 0.02
 
@@ -111,7 +112,7 @@ def test_the_belief_follows_the_vehicle_through_a_turn():
     """A post that stands at one place of the world is STATIC there, whatever the vehicle does."""
     tracker, pose = Cmcdot(SMALL, PARAMS), STILL
     for _ in range(25):
-        points = scan([Box.around(20, 0, 1.5, 1.5, 2)], x=pose.dx, y=pose.dy, yaw=pose.dyaw)
+        points = scan_boxes([Box.around(20, 0, 1.5, 1.5, 2)], x=pose.dx, y=pose.dy, yaw=pose.dyaw)
         motion = PlanarMotion(0.33, 0.0, 0.013)
         belief = tracker.step(points, motion if pose is not STILL else STILL, 0.1)
         seen_from, pose = pose, pose.then(motion)
@@ -130,7 +131,7 @@ def test_same_seed_same_bits_other_seed_other_bits():
 def test_a_jump_of_a_hundred_metres_forgets_everything():
     tracker = Cmcdot(SMALL, PARAMS)
     for k in range(3):
-        tracker.step(scan(street(k * 0.1)), STILL, 0.1)
+        tracker.step(scan_boxes(street(k * 0.1)), STILL, 0.1)
     belief = tracker.step(np.empty((0, 4)), PlanarMotion(100, 0, 0.5), 0.1)
     assert (belief.probability[State.UNKNOWN] == 1).all()
     assert np.isnan(belief.velocity).all()
@@ -138,7 +139,7 @@ def test_a_jump_of_a_hundred_metres_forgets_everything():
 
 def test_without_scans_what_was_seen_is_forgotten():
     tracker = Cmcdot(SMALL, PARAMS)
-    tracker.step(scan(street(0.0)), STILL, 0.1)
+    tracker.step(scan_boxes(street(0.0)), STILL, 0.1)
     for _ in range(3):
         belief = tracker.step(np.empty((0, 3)), STILL, 20.0)
     assert (belief.probability.argmax(axis=0) == State.UNKNOWN).all()
@@ -165,14 +166,14 @@ def test_any_scans_keep_every_cell_a_distribution(seed, count, spread, dt, shift
 
 @pytest.mark.parametrize("particles", [1, 2, 3])
 def test_hardly_any_particles_still_keep_every_cell_a_distribution(particles):
-    tracker, points = Cmcdot(SMALL, CmcdotParams(particles=particles)), scan(street(0))
+    tracker, points = Cmcdot(SMALL, CmcdotParams(particles=particles)), scan_boxes(street(0))
     for _ in range(4):
         belief = tracker.step(points, STILL, 0.1)
         assert np.abs(belief.probability.sum(axis=0) - 1).max() < 1e-5
 
 
 def test_without_dynamic_mass_there_is_no_velocity_in_the_first_turning_step():
-    belief = Cmcdot(SMALL, PARAMS).step(scan(street(0)), PlanarMotion(1, 0, 0.01), 0.1)
+    belief = Cmcdot(SMALL, PARAMS).step(scan_boxes(street(0)), PlanarMotion(1, 0, 0.01), 0.1)
     assert np.isnan(belief.velocity[:, belief.probability[State.DYNAMIC] == 0]).all()
     assert np.isfinite(belief.velocity).any()
 
@@ -182,7 +183,7 @@ def test_what_is_no_scan_or_time_is_refused_and_changes_nothing():
     for points, dt, name in ((np.array([[np.nan, 0, 0]]), 0.1, "points"), (np.zeros((1, 3)), -1.0, "dt")):
         with pytest.raises(ArgumentError, match=name):
             tracker.step(points, PlanarMotion(1, 0, 0), dt)
-    points = scan(street(0.0))
+    points = scan_boxes(street(0.0))
     beliefs = [t.step(points, STILL, 0.1).probability for t in (tracker, twin)]
     assert np.array_equal(*beliefs)
 
@@ -193,7 +194,7 @@ def frames(count: int) -> list[Frame]:
     turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
     result = []
     for k in range(count):
-        points = np.pad(scan(street(0.1 * k), x=0.5 * k), ((0, 0), (0, 1))) - np.float32([0, 0, 1.73, 0])
+        points = np.pad(scan_boxes(street(0.1 * k), x=0.5 * k), ((0, 0), (0, 1))) - np.float32([0, 0, 1.73, 0])
         result.append(Frame(None, points, camera, rigid_transform(turn, np.array([3.0, 0.5 * k, 0])), 0.1 * k))
     return result
 
@@ -201,7 +202,7 @@ def frames(count: int) -> list[Frame]:
 def test_track_drive_takes_motion_and_time_from_the_frames():
     tracker = Cmcdot(SMALL, PARAMS, seed=5)
     for k, belief in enumerate(track_drive(frames(3), SMALL, PARAMS, seed=5)):
-        expected = tracker.step(scan(street(0.1 * k), x=0.5 * k), PlanarMotion(0.5 * min(k, 1), 0, 0), 0.1)
+        expected = tracker.step(scan_boxes(street(0.1 * k), x=0.5 * k), PlanarMotion(0.5 * min(k, 1), 0, 0), 0.1)
         assert np.abs(belief.probability - expected.probability).max() < 0.05
     assert len(list(track_drive([], SMALL))) == 0
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from lidar_scenes import Box, scan
 from scipy.ndimage import minimum_filter
 
 from semgrid_edu.errors import ArgumentError
@@ -12,6 +11,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import PlanarMotion, SensorModel, scan_evidence, scan_evidence_literal
 from semgrid_edu.occupancy.evidence import walk_ray
 from semgrid_edu.occupancy.polar import fill_gaps
+from semgrid_edu.simulation.boxes import Box, scan_boxes
 
 RAY = GridSpec(x_min=0, x_max=5, y_min=-0.5, y_max=0.5, cell=1)
 SENSOR = SensorModel()
@@ -58,7 +58,7 @@ def test_an_empty_scan_says_nothing(evidence_of):
 def test_the_twins_differ_in_thin_lines_only(corners, dx, dy, dyaw):
     """Obstacles are counted alike; where one ends what is free half a cell before the other, no 3 x 3 cells differ."""
     spec, pose = GridSpec(0, 30, -10, 10, 0.5), PlanarMotion(dx, dy, dyaw)
-    points = scan([Box(x, x + long, y, y + wide, 1.6) for x, y, long, wide in corners], columns=360, rings=24)
+    points = scan_boxes([Box(x, x + long, y, y + wide, 1.6) for x, y, long, wide in corners], columns=360, rings=24)
     fast, literal = (f(points, spec, SENSOR, pose) for f in (scan_evidence, scan_evidence_literal))
     assert np.array_equal(fast.occupied > fast.free, literal.occupied > literal.free)
     differ = (fast.free > fast.occupied) != (literal.free > literal.occupied)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.experiments.occupancy import hit_cells
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import State, track_drive
 
@@ -34,11 +35,7 @@ def drive(kitti_root):
 
 def returned(frame) -> np.ndarray:
     """Return the cells with two or more returns between 0.3 and 1.6 m above the ground, (H, W) bool."""
-    points = frame.points_grid
-    rows, cols, inside = SPEC.cells(points[(points[:, 2] >= 0.3) & (points[:, 2] <= 1.6)])
-    count = np.zeros(SPEC.shape, int)
-    np.add.at(count, (rows[inside], cols[inside]), 1)
-    return count >= 2
+    return hit_cells(frame.points_grid, SPEC)
 
 
 def in_box(box, margin=0.0) -> np.ndarray:
