@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import transform_points
-from semgrid_edu.frame import LABEL_GRID
+from semgrid_edu.frame import LABEL_GRID, Frame
 from semgrid_edu.simulation.footprints import table
 from semgrid_edu.simulation.lidar import scan
 from semgrid_edu.simulation.motion import Ego, Pace, Path
@@ -94,7 +94,7 @@ class SimulatedDrive:
         self.moving: list[Actor] = traffic.moving
         self.parked: list[Actor] = traffic.parked
         self.static = Scene.of(builder.shapes, builder.instances)
-        self.footprints = table(builder.footprints)
+        self.static_footprints = table(builder.footprints)
         self.sensor_seed = self.rng.bit_generator.seed_seq.spawn(1)[0]
 
     def pose(self, t: float) -> NDArray[np.float64]:
@@ -117,9 +117,18 @@ class SimulatedDrive:
         spheres = np.column_stack([boxes.mean(axis=1), radii])
         return Instant(self.static, Scene.of(shapes, [a.instance for a in near]), spheres)
 
+    def T_grid_from_world(self, t: float) -> NDArray[np.float64]:
+        """Return the pose (4, 4) of the world in the grid frame at t seconds."""
+        return self.rig.T_grid_from_lidar @ np.linalg.inv(self.pose(t))
+
+    def velocities(self, t: float) -> dict[int, NDArray[np.float64]]:
+        """Return the velocity over ground of everybody in traffic at t seconds, (2,) m/s in grid axes, by number."""
+        rotation, road = self.T_grid_from_world(t)[:2, :2], self.plan.road
+        return {actor.instance: rotation @ actor.path.velocity(road, t) for actor in self.moving}
+
     def objects(self, t: float) -> list[dict]:
         """Return cars, pedestrians and bicycles that stand in the bird's-eye grid at t seconds."""
-        T_grid_from_world = self.rig.T_grid_from_lidar @ np.linalg.inv(self.pose(t))
+        T_grid_from_world = self.T_grid_from_world(t)
         road, found = self.plan.road, []
         for actor in self.parked + self.moving:
             position, yaw = actor.path.pose(road, t)
@@ -142,26 +151,51 @@ class SimulatedDrive:
             )
         return found
 
+    def footprints(self, t: float) -> NDArray[np.float64]:
+        """Return the footprints of all that stands or moves at t seconds, a `table`."""
+        return np.concatenate([self.static_footprints, table([a.footprint(self.plan.road, t) for a in self.moving])])
+
+    def birdseye(self, t: float) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
+        """Return what the cells of `LABEL_GRID` hold at t seconds, seen by anybody or not.
+
+        Returns
+        -------
+        kinds : (710, 310) uint8
+            Members of `Kind`.
+        instances : (710, 310) int32
+            Number of the car, pedestrian or bicycle there; 0 for all else.
+        """
+        footprints = self.footprints(t)
+        kinds, which = birdseye_kinds(world_cells(self.pose(t), self.rig), footprints, self.plan.road)
+        return kinds, np.where(which >= 0, footprints[which, 7], 0).astype(np.int32)
+
     def truth(self, t: float, picture: Picture) -> Truth:
         """Return the bird's-eye truth at t seconds, of which `picture` was taken."""
         road, pose = self.plan.road, self.pose(t)
-        cells = world_cells(pose, self.rig)
-        moving = table([a.footprint(road, t) for a in self.moving])
-        footprints = np.concatenate([self.footprints, moving])
+        cells, footprints = world_cells(pose, self.rig), self.footprints(t)
         kinds, which = birdseye_kinds(cells, footprints, road)
         return Truth(kinds, visible_cells(cells, kinds, which, footprints, road, picture, pose, self.rig.camera))
 
     def frame(self, index: int, labelled: bool) -> SimulatedFrame:
         """Take one frame; every frame has its own noise, whichever frames were taken before."""
-        rng = np.random.default_rng(
-            np.random.SeedSequence(self.sensor_seed.entropy, spawn_key=(*self.sensor_seed.spawn_key, index))
-        )
+        rng = self._noise(index)
         t, road = index * PERIOD, self.plan.road
         instant, pose = self.instant(t), self.pose(t)
         picture = take_picture(instant, pose, self.rig, road, self.plan.light, rng)
         points = scan(instant, pose, self.rig.lidar, road, rng)
         truth = self.truth(t, picture) if labelled else None
         return SimulatedFrame(t, pose, picture, points, truth, self.objects(t))
+
+    def scan(self, index: int) -> Frame:
+        """Take one frame without image and labels, fast; the noise of its returns is another than `frame`'s."""
+        t = index * PERIOD
+        points = scan(self.instant(t), self.pose(t), self.rig.lidar, self.plan.road, self._noise(index, 1))
+        return Frame(None, points, self.rig.camera, self.pose(t), t)
+
+    def _noise(self, *key: int) -> np.random.Generator:
+        """Return a generator of the drive's own for each key."""
+        seed = np.random.SeedSequence(self.sensor_seed.entropy, spawn_key=(*self.sensor_seed.spawn_key, *key))
+        return np.random.default_rng(seed)
 
     def frames(self, labelled: set[int]) -> Iterator[SimulatedFrame]:
         """Take all frames, with bird's-eye truth for those in `labelled`."""

@@ -50,7 +50,7 @@ def test_collision_of_rectangles():
 @pytest.mark.parametrize("seed", range(6))
 def test_nobody_runs_into_anybody(seed):
     drive = SimulatedDrive(seed, 10)
-    road, still = drive.plan.road, table([Footprint(*f) for f in drive.footprints])
+    road, still = drive.plan.road, table([Footprint(*f) for f in drive.static_footprints])
     for t in (0.0, 0.45, 0.9):
         feet = [a.footprint(road, t) for a in drive.moving]
         for k, foot in enumerate(feet):
@@ -64,7 +64,7 @@ def test_cars_keep_to_the_asphalt_and_houses_off_it(junction_drive):
         if actor.kind == Kind.CAR:
             assert outside_asphalt(road, *actor.path.at(0.0)) < 0
     end_of_the_world = junction_drive.plan.extent.end - 25
-    for f in junction_drive.footprints:
+    for f in junction_drive.static_footprints:
         if f[6] in (Kind.BUILDING, Kind.FENCE, Kind.PLANT, Kind.SIGN, Kind.POLE) and f[0] < end_of_the_world:
             points = outline(Footprint(*f)) if f[6] == Kind.BUILDING else f[None, :2]
             assert min(outside_asphalt(road, *to_road(road, x, y)) for x, y in points) > 0
