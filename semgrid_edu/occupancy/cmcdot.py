@@ -8,7 +8,7 @@ from semgrid_edu.occupancy.evidence import Evidence, beam_reach, evidence_in_cel
 from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.moving_map import look_up, map_around, scroll
 from semgrid_edu.occupancy.params import CmcdotParams
-from semgrid_edu.occupancy.particles import cells_of, mean_velocity, transform
+from semgrid_edu.occupancy.particles import cells_of, transform, turn_moments, velocity_moments
 from semgrid_edu.occupancy.sensor import prepare_scan
 from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN, move, predict, resample, update
@@ -89,7 +89,7 @@ class Cmcdot:
         self._state, self._pose = resample(updated, self.map_spec, self.params, self._rng), pose
         here = evidence_in_cells(points, free_to, self.spec, sensor, PlanarMotion())
         probability = self._probability(predicted, here)
-        return Belief(probability, self._velocity(probability[State.DYNAMIC] > 0))
+        return Belief(probability, *self._velocity(probability[State.DYNAMIC] > 0))
 
     def _probability(self, predicted: FilterState, evidence: Evidence) -> NDArray[np.float32]:
         """Look the prediction up in the vehicle's cells and update those, so that returns lie in the cells they hit."""
@@ -97,11 +97,11 @@ class Cmcdot:
         prior = FilterState(here, Particles.none(), np.zeros(self.spec.shape, np.float32))
         return update(prior, self.spec, evidence, self.params).probability
 
-    def _velocity(self, moving: NDArray[np.bool_]) -> NDArray[np.float32]:
-        """Look the mean velocities up in the vehicle's cells that hold dynamic mass, and turn them into its axes."""
-        particles = self._state.particles
-        over_map = mean_velocity(particles, cells_of(particles.position, self.map_spec), self.map_spec.shape)
-        unknown = np.full(2, np.nan, np.float32)
-        velocity = look_up(over_map, unknown, self.map_spec, self.spec, self._pose)
-        velocity = np.einsum("ij,ihw->jhw", self._pose.rotation.astype(np.float32), velocity)
-        return np.where(moving, velocity, unknown[:, None, None])
+    def _velocity(self, moving: NDArray[np.bool_]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Look velocities up in the vehicle's cells that hold dynamic mass, and turn them into its axes."""
+        particles, shape = self._state.particles, self.map_spec.shape
+        mean, covariance = velocity_moments(particles, cells_of(particles.position, self.map_spec), shape)
+        over_map = np.concatenate([mean, covariance.reshape(4, *shape)])
+        here = look_up(over_map, np.full(6, np.nan, np.float32), self.map_spec, self.spec, self._pose)
+        here[:, ~moving] = np.nan
+        return turn_moments(here[:2], here[2:].reshape(2, 2, *self.spec.shape), self._pose)

@@ -173,8 +173,10 @@ def _transform(position, velocity, dx, dy, cos, sin):
     return moved, turned
 
 
-def mean_velocity(particles: Particles, cells: NDArray, shape: tuple[int, int]) -> NDArray[np.float32]:
-    """Return the mean velocity of the particles in each cell, weighed by what each carries.
+def velocity_moments(
+    particles: Particles, cells: NDArray, shape: tuple[int, int]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return mean and covariance of the velocities in each cell, weighed by what each particle carries.
 
     Parameters
     ----------
@@ -186,23 +188,39 @@ def mean_velocity(particles: Particles, cells: NDArray, shape: tuple[int, int]) 
 
     Returns
     -------
-    (2, H, W) float32
-        Along the axes of the map, m/s; NaN where no particle is.
+    mean : (2, H, W) float32
+        sum(w v) / sum(w), along the axes of the map, m/s; NaN where no particle is.
+    covariance : (2, 2, H, W) float32
+        sum(w (v - mean) (v - mean)^T) / sum(w), m^2/s^2; zero for a single particle, NaN where none is.
     """
-    moment = _moments(particles.velocity, particles.weight, cells, math.prod(shape))
-    mean = np.divide(moment[:2], moment[2], out=np.full(moment[:2].shape, np.nan), where=moment[2] > 0)
-    return mean.reshape(2, *shape).astype(np.float32)
+    mean, spread = _moments(particles.velocity, particles.weight, cells, math.prod(shape))
+    return mean.T.reshape(2, *shape).copy(), spread.T[[[0, 1], [1, 2]]].reshape(2, 2, *shape)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _moments(velocity, weight, cells, n_cells):
-    moment = np.zeros((3, n_cells))
+    total, mean, spread = np.zeros((n_cells, 1)), np.zeros((n_cells, 2)), np.zeros((n_cells, 3))
     for i in range(len(cells)):
         if cells[i] != OUTSIDE:
-            moment[0, cells[i]] += weight[i] * velocity[i, 0]
-            moment[1, cells[i]] += weight[i] * velocity[i, 1]
-            moment[2, cells[i]] += weight[i]
-    return moment
+            w = np.float64(weight[i])
+            total[cells[i], 0] += w
+            mean[cells[i], 0] += w * velocity[i, 0]
+            mean[cells[i], 1] += w * velocity[i, 1]
+    mean /= total
+    for i in range(len(cells)):
+        if cells[i] != OUTSIDE:
+            x, y = velocity[i, 0] - mean[cells[i], 0], velocity[i, 1] - mean[cells[i], 1]
+            spread[cells[i], 0] += weight[i] * x * x
+            spread[cells[i], 1] += weight[i] * x * y
+            spread[cells[i], 2] += weight[i] * y * y
+    return mean.astype(np.float32), (spread / total).astype(np.float32)
+
+
+def turn_moments(mean: NDArray, covariance: NDArray, motion: PlanarMotion) -> tuple[NDArray, NDArray]:
+    """Express mean (2, H, W) and covariance (2, 2, H, W) in the axes of a frame whose pose is `motion`: R^T C R."""
+    R = motion.rotation.astype(mean.dtype)
+    half_turned = np.einsum("ij,ikhw->jkhw", R, covariance)
+    return np.einsum("ij,ihw->jhw", R, mean), np.einsum("jkhw,kl->jlhw", half_turned, R)
 
 
 @njit(cache=True)

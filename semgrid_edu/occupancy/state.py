@@ -33,10 +33,14 @@ class Belief:
     velocity : (2, H, W) float32
         Mean velocity over ground of what moves in the cell, along the grid's x and y axes, m/s; NaN
         without dynamic mass, or where it is too small to have got a particle.
+    velocity_covariance : (2, 2, H, W) float32
+        How much that velocity varies, and is in doubt, m^2/s^2: symmetric, positive semi-definite, in the same
+        axes; NaN where the velocity is.
     """
 
     probability: NDArray[np.float32]
     velocity: NDArray[np.float32]
+    velocity_covariance: NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)

@@ -54,10 +54,11 @@ def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterStat
     claimed = weight_in_cells(particles.weight, cells, spec.shape)
     dynamic = np.minimum(claimed, 1)
     weight = scale_in_cells(particles.weight, cells, _ratio(dynamic, claimed))
-    others = 1 - probability[DYNAMIC]
+    probability[DYNAMIC] = 0
+    others = probability.sum(axis=0)  # not 1 - P(DYNAMIC), which has no digits left where dynamic mass is nearly all
     probability *= _ratio(1 - dynamic, others)
+    probability[UNKNOWN] += np.where(others > 0, 0, 1 - dynamic)
     probability[DYNAMIC] = dynamic
-    probability[UNKNOWN] += 1 - probability.sum(axis=0)
     return FilterState(probability, replace(particles, weight=weight), state.newborn)
 
 

@@ -86,6 +86,18 @@ def test_velocity_is_known_where_dynamic_mass_is(street_at_end):
     assert not known[belief.probability[State.DYNAMIC] == 0].any()
 
 
+def test_the_covariance_of_velocity_is_one_wherever_velocity_is(street_at_end):
+    belief = street_at_end[3]
+    covariance = np.moveaxis(belief.velocity_covariance, (0, 1), (-2, -1))
+    assert covariance.shape == (*SMALL.shape, 2, 2)
+    assert covariance.dtype == np.float32
+    known = ~np.isnan(belief.velocity[0])
+    assert np.array_equal(np.isnan(covariance), np.broadcast_to(~known[..., None, None], covariance.shape))
+    assert np.array_equal(covariance, covariance.swapaxes(-2, -1), equal_nan=True)
+    assert np.linalg.eigvalsh(covariance[known].astype(float)).min() > -1e-4
+    assert covariance[known].max() > 1
+
+
 def test_walking_people_become_dynamic():
     spec, tracker, rng = (
         GridSpec(0, 20, -6, 6, 0.2),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from filterpy import discrete_bayes
 from filterpy.monte_carlo import resampling
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from semgrid_edu.errors import ArgumentError
@@ -83,6 +83,9 @@ def test_one_cell_that_nothing_leaves_is_filterpys_discrete_bayes(belief, dt, sc
     st.floats(-4, 4),
     st.sampled_from([0, 1e-30, 0.3, 1]),
 )
+@example(
+    seed=255, dt=0.0, dx=0.0, dy=0.5, dyaw=-1.5, floor=0
+)  # a cell that moving mass leaves, nearly all that was there
 def test_every_step_conserves_probability(seed, dt, dx, dy, dyaw, floor):
     rng = np.random.default_rng(seed)
     evidence = Evidence(*np.maximum(rng.random((2, *GRID.shape)) ** 9, floor))

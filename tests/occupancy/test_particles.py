@@ -1,0 +1,54 @@
+"""What many particles say together: mean and covariance of their velocities, held to numpy's."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from semgrid_edu.occupancy import Particles, PlanarMotion
+from semgrid_edu.occupancy.particles import OUTSIDE, transform, turn_moments, velocity_moments
+
+SHAPE = (2, 3)
+
+
+def particles_in(cells: list[int], seed: int) -> Particles:
+    rng = np.random.default_rng(seed)
+    velocity, weight = rng.normal(0, 10, (len(cells), 2)), rng.uniform(0.01, 1, len(cells))
+    return Particles(np.zeros((len(cells), 2), np.float32), velocity.astype(np.float32), weight.astype(np.float32))
+
+
+@given(st.lists(st.integers(OUTSIDE, 5), min_size=1, max_size=60), st.integers(0, 1000))
+def test_moments_of_velocity_are_numpys(cells, seed):
+    particles, cells = particles_in(cells, seed), np.array(cells, np.int32)
+    mean, covariance = velocity_moments(particles, cells, SHAPE)
+    assert mean.dtype == covariance.dtype == np.float32
+    for cell in range(6):
+        here, at = cells == cell, np.unravel_index(cell, SHAPE)
+        if here.any():
+            velocity, weight = particles.velocity[here].astype(float), particles.weight[here].astype(float)
+            expected = np.cov(velocity.T, aweights=weight, ddof=0)
+            np.testing.assert_allclose(mean[:, *at], np.average(velocity, axis=0, weights=weight), rtol=1e-5, atol=1e-5)
+            np.testing.assert_allclose(covariance[:, :, *at], expected, rtol=1e-4, atol=1e-4)
+        else:
+            assert np.isnan(mean[:, *at]).all()
+            assert np.isnan(covariance[:, :, *at]).all()
+
+
+def test_moments_by_hand():
+    """Speeds 0 and 4 m/s along x with weights 3 : 1 have mean 1 and variance (3 * 1 + 1 * 9) / 4 = 3."""
+    velocity, weight = np.float32([[0, 2], [4, 2], [7, -3]]), np.float32([0.3, 0.1, 0.2])
+    particles, cells = Particles(np.zeros((3, 2), np.float32), velocity, weight), np.int32([0, 0, 4])
+    mean, covariance = velocity_moments(particles, cells, SHAPE)
+    np.testing.assert_allclose(mean[:, 0, 0], [1, 2], rtol=1e-6)
+    np.testing.assert_allclose(covariance[:, :, 0, 0], [[3, 0], [0, 0]], rtol=1e-6)
+    assert mean[:, 1, 1].tolist() == [7, -3]
+    assert (covariance[:, :, 1, 1] == 0).all()
+
+
+@given(st.integers(0, 1000), st.floats(-7, 7))
+def test_turned_moments_are_the_moments_of_turned_particles(seed, dyaw):
+    cells = np.random.default_rng(seed).integers(0, 6, 40, dtype=np.int32)
+    particles, motion = particles_in(cells, seed), PlanarMotion(dyaw=dyaw)
+    turned = turn_moments(*velocity_moments(particles, cells, SHAPE), motion)
+    expected = velocity_moments(transform(particles, motion), cells, SHAPE)
+    for moments, others in zip(turned, expected, strict=True):
+        np.testing.assert_allclose(moments, others, rtol=1e-3, atol=1e-3)
