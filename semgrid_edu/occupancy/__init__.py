@@ -1,35 +1,70 @@
 """From LIDAR scans to a grid of free, static, dynamic and unknown cells: l -> o (paper, section 3.2).
 
 `evidence` says what one scan tells; `steps` holds the four steps of the filter, each a pure function on a
-`FilterState`; `Cmcdot` runs them, and `track_drive` runs it over a drive.
+`FilterState`; `Cmcdot` runs them, and `track_drive` runs it over a drive. `LogOddsGrid` and `Bof` are what came
+before it: the binary grid, and the exact filter on a lattice of velocities.
 """
 
+from semgrid_edu.occupancy.bof import Bof
+from semgrid_edu.occupancy.bof_steps import (
+    BofParams,
+    BofState,
+    bof_move,
+    bof_predict,
+    bof_predict_literal,
+    bof_update,
+    bof_velocity,
+)
 from semgrid_edu.occupancy.cmcdot import Cmcdot
 from semgrid_edu.occupancy.evidence import Evidence, scan_evidence, scan_evidence_literal
+from semgrid_edu.occupancy.log_odds import (
+    LogOddsGrid,
+    LogOddsParams,
+    log_odds,
+    probability,
+    smear_area,
+    update_log_odds,
+)
 from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.params import CmcdotParams, transition_matrix
 from semgrid_edu.occupancy.sensor import SensorModel
 from semgrid_edu.occupancy.state import N_STATES, Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import move, predict, resample, update
 from semgrid_edu.occupancy.tracking import track_drive
+from semgrid_edu.occupancy.velocity_lattice import VelocityLattice
 
 __all__ = [
     "N_STATES",
     "Belief",
+    "Bof",
+    "BofParams",
+    "BofState",
     "Cmcdot",
     "CmcdotParams",
     "Evidence",
     "FilterState",
+    "LogOddsGrid",
+    "LogOddsParams",
     "Particles",
     "PlanarMotion",
     "SensorModel",
     "State",
+    "VelocityLattice",
+    "bof_move",
+    "bof_predict",
+    "bof_predict_literal",
+    "bof_update",
+    "bof_velocity",
+    "log_odds",
     "move",
     "predict",
+    "probability",
     "resample",
     "scan_evidence",
     "scan_evidence_literal",
+    "smear_area",
     "track_drive",
     "transition_matrix",
     "update",
+    "update_log_odds",
 ]

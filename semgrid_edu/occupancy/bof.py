@@ -1,0 +1,84 @@
+"""The BOF, the Bayesian Occupancy Filter, from which CMCDOT descends (Coue et al., IJRR 2006; paper, section 3.2)."""
+
+from numpy.typing import NDArray
+
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.bof_steps import BofParams, BofState, bof_move, bof_predict, bof_update, bof_velocity
+from semgrid_edu.occupancy.cmcdot import MAX_YAW
+from semgrid_edu.occupancy.evidence import beam_reach, evidence_in_cells
+from semgrid_edu.occupancy.local_belief import local_belief
+from semgrid_edu.occupancy.motion import PlanarMotion
+from semgrid_edu.occupancy.moving_map import map_around, scroll
+from semgrid_edu.occupancy.sensor import prepare_scan
+from semgrid_edu.occupancy.state import Belief
+
+
+class Bof:
+    """The exact filter on a lattice of velocities: what `Cmcdot` tends to as its particles grow in number.
+
+    It has no randomness and no sampling error, and pays for them with time and memory that grow with the
+    number of velocities in every cell, whether anything moves there or not. In the map's frame it scrolls as
+    `Cmcdot` does.
+
+    Parameters
+    ----------
+    spec : GridSpec
+        The grid of its beliefs.
+    params : BofParams, optional
+        What it assumes.
+
+    Raises
+    ------
+    ArgumentError
+        When lattice times grid is too much for memory.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> tracker = Bof(GridSpec.compact())
+    >>> wall = np.array([[20.25, y, 1.0] for y in np.arange(-3, 3, 0.1)])
+    >>> belief = tracker.step(wall, PlanarMotion(), dt=0.1)
+    >>> belief.probability[:, 101, 31].argmax(), belief.probability[:, 120, 31].argmax()
+    (np.int64(1), np.int64(0))
+    """
+
+    def __init__(self, spec: GridSpec, params: BofParams | None = None) -> None:
+        self.spec = spec
+        self.params = params or BofParams()
+        self.map_spec = map_around(spec, MAX_YAW)
+        self._pose = PlanarMotion()
+        self._state = BofState.nothing_known(self.map_spec, self.params.lattice)
+
+    def step(self, points_grid: NDArray, motion: PlanarMotion, dt: float) -> Belief:
+        """Take in one scan.
+
+        Parameters
+        ----------
+        points_grid : (N, 3+) float
+            Returns: x forward, y left, z above the ground (m), in the grid frame of the vehicle now.
+        motion : PlanarMotion
+            Of the vehicle since the last step; at the first step it doesn't matter.
+        dt : float
+            Seconds since the last step; at the first step any time of the sensor's order.
+
+        Returns
+        -------
+        Belief
+            In the grid frame of the vehicle now.
+
+        Raises
+        ------
+        ArgumentError
+            When the points aren't a table of finite coordinates, or the time is negative or not finite. The
+            tracker is then as it was.
+        """
+        shift, pose = scroll(self._pose.then(motion), self.spec.cell, MAX_YAW)
+        sensor = self.params.world.sensor
+        points = prepare_scan(points_grid, sensor)
+        free_to = beam_reach(points, sensor)
+        evidence = evidence_in_cells(points, free_to, self.map_spec, sensor, pose)
+        predicted = bof_predict(bof_move(self._state, self.map_spec, shift), self.map_spec, self.params, dt)
+        self._state, self._pose = bof_update(predicted, self.map_spec, evidence, self.params), pose
+        here = evidence_in_cells(points, free_to, self.spec, sensor, PlanarMotion())
+        velocity = bof_velocity(self._state)
+        return local_belief(predicted.probability, velocity, here, self.map_spec, self.spec, pose, self.params.world)

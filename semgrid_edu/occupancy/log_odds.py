@@ -1,0 +1,181 @@
+"""The log-odds grid, occupied or free and nothing else: Bayes' rule as a sum (Moravec and Elfes, ICRA 1985)."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.cmcdot import MAX_YAW
+from semgrid_edu.occupancy.evidence import Evidence, beam_reach, evidence_in_cells
+from semgrid_edu.occupancy.motion import PlanarMotion
+from semgrid_edu.occupancy.moving_map import look_up, map_around, scroll
+from semgrid_edu.occupancy.sensor import SensorModel, prepare_scan
+
+TINY = np.float32(1e-30)
+"""Stands for a likelihood of 0, whose logarithm is no number; the clamp hides the difference."""
+
+
+@dataclass(frozen=True)
+class LogOddsParams:
+    """What the log-odds grid assumes.
+
+    Parameters
+    ----------
+    prior : float
+        P(occupied) of a cell that nobody has seen: one half says nothing (Moravec and Elfes).
+    lowest, highest : float
+        P(occupied) never leaves these bounds, so that a cell can change its mind: the more often it was
+        seen, the longer that would take otherwise. OctoMap's 0.12 and 0.97 (Hornung et al., Autonomous Robots 2013).
+    sensor : SensorModel
+        How the scanner errs.
+
+    Raises
+    ------
+    ArgumentError
+        When a parameter can't be one.
+    """
+
+    prior: float = 0.5
+    lowest: float = 0.12
+    highest: float = 0.97
+    sensor: SensorModel = field(default_factory=SensorModel)
+
+    def __post_init__(self) -> None:
+        """Refuse certainty, and bounds that leave the prior out."""
+        if not 0 < self.lowest < self.highest < 1:
+            raise ArgumentError("lowest, highest", "0 < lowest < highest < 1", (self.lowest, self.highest))
+        if not self.lowest <= self.prior <= self.highest:
+            raise ArgumentError("prior", f"a probability from {self.lowest} to {self.highest}", self.prior)
+
+
+def log_odds(p: ArrayLike) -> NDArray[np.floating]:
+    """Return l = log(p / (1 - p)) of a probability between 0 and 1.
+
+    Examples
+    --------
+    >>> log_odds(np.array([0.5, 0.97])).round(2)
+    array([0.  , 3.48])
+    """
+    p = np.asarray(p)
+    return np.log(p) - np.log1p(-p)
+
+
+def probability(l: ArrayLike) -> NDArray[np.floating]:  # noqa: E741, the field's symbol
+    """Return p = 1 / (1 + exp(-l)), the inverse of `log_odds`."""
+    return 1 / (1 + np.exp(-np.asarray(l)))
+
+
+def update_log_odds(l: NDArray, evidence: Evidence, params: LogOddsParams) -> NDArray[np.floating]:  # noqa: E741
+    """Take in one scan by Bayes' rule, which is a sum in log-odds.
+
+        l(o | z) = l(o) + log( P(z | occupied) / P(z | free) )
+
+    P(z), the same for both states, has dropped out of the ratio. Nothing is subtracted, for the evidence
+    is a likelihood. With an inverse sensor model, P(o | z), whose log-odds hold the prior already, the prior's
+    log-odds have to be subtracted once a scan, or else it would be counted again with each.
+
+    Parameters
+    ----------
+    l : (H, W) float
+        Log-odds before the scan.
+    evidence : Evidence
+        Of the scan, likelihoods >= 0.
+    params : LogOddsParams
+        For the bounds.
+
+    Returns
+    -------
+    (H, W) float
+        Log-odds given the scan, within the bounds.
+    """
+    ratio = np.log(np.maximum(evidence.occupied, TINY)) - np.log(np.maximum(evidence.free, TINY))
+    return np.clip(l + ratio, *log_odds([params.lowest, params.highest]).astype(l.dtype))
+
+
+def smear_area(p_occupied: NDArray, left: NDArray[np.bool_], spec: GridSpec) -> float:
+    """Measure the smear of something that has moved: the area it has left and is still believed to occupy.
+
+    Parameters
+    ----------
+    p_occupied : (H, W) float
+        P(occupied): of a log-odds grid, or P(STATIC) + P(DYNAMIC) of a `Belief`.
+    left : (H, W) bool
+        The cells in which it was once and isn't any more.
+    spec : GridSpec
+        Their grid.
+
+    Returns
+    -------
+    float
+        Square metres of those cells with P(occupied) > 1/2.
+    """
+    return float(np.count_nonzero((p_occupied > 0.5) & left) * spec.cell**2)
+
+
+class LogOddsGrid:
+    """The binary baseline: each cell is occupied or free, for ever.
+
+    It has no notion of motion, so what moves leaves a smear: cells that it has left stay occupied until as much
+    has been seen to the contrary. In the map's frame it scrolls as `Cmcdot` does.
+
+    Parameters
+    ----------
+    spec : GridSpec
+        The grid of what it returns.
+    params : LogOddsParams, optional
+        What it assumes.
+
+    Examples
+    --------
+    >>> grid = LogOddsGrid(GridSpec.compact())
+    >>> wall = np.array([[20.25, y, 1.0] for y in np.arange(-3, 3, 0.1)])
+    >>> p = grid.step(wall, PlanarMotion(), dt=0.1)
+    >>> p[[101, 120, 80], 31].round(2)  # the wall, before it, behind it
+    array([0.97, 0.3 , 0.5 ], dtype=float32)
+    """
+
+    def __init__(self, spec: GridSpec, params: LogOddsParams | None = None) -> None:
+        self.spec = spec
+        self.params = params or LogOddsParams()
+        self.map_spec = map_around(spec, MAX_YAW)
+        self._prior = np.array([log_odds(self.params.prior)], np.float32)
+        self._pose = PlanarMotion()
+        self._log_odds = np.full(self.map_spec.shape, self._prior, np.float32)
+
+    def step(self, points_grid: NDArray, motion: PlanarMotion, dt: float) -> NDArray[np.float32]:
+        """Take in one scan.
+
+        Parameters
+        ----------
+        points_grid : (N, 3+) float
+            Returns: x forward, y left, z above the ground (m), in the grid frame of the vehicle now.
+        motion : PlanarMotion
+            Of the vehicle since the last step; at the first step it doesn't matter.
+        dt : float
+            Seconds since the last step: all the same to a world that stands still.
+
+        Returns
+        -------
+        (H, W) float32
+            P(occupied) in the grid frame of the vehicle now.
+
+        Raises
+        ------
+        ArgumentError
+            When the points aren't a table of finite coordinates, or the time is negative or not finite. The
+            grid is then as it was.
+        """
+        if not (np.isfinite(dt) and dt >= 0):
+            raise ArgumentError("dt", "seconds, not negative", dt)
+        shift, pose = scroll(self._pose.then(motion), self.spec.cell, MAX_YAW)
+        sensor = self.params.sensor
+        points = prepare_scan(points_grid, sensor)
+        free_to = beam_reach(points, sensor)
+        moved = look_up(self._log_odds[None], self._prior, self.map_spec, self.map_spec, shift)[0]
+        evidence = evidence_in_cells(points, free_to, self.map_spec, sensor, pose)
+        self._log_odds, self._pose = update_log_odds(moved, evidence, self.params), pose
+        before = look_up(moved[None], self._prior, self.map_spec, self.spec, pose)[0]
+        here = evidence_in_cells(points, free_to, self.spec, sensor, PlanarMotion())
+        return probability(update_log_odds(before, here, self.params))

@@ -1,0 +1,70 @@
+"""The finitely many velocities that the BOF tells apart (Coue et al., IJRR 2006; paper, section 3.2)."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import ArgumentError
+
+FINEST = 100
+"""Most spacings up to the top speed: beyond that, at 30,000 velocities, no grid fits into memory."""
+
+
+@dataclass(frozen=True)
+class VelocityLattice:
+    """A square lattice of velocities, cut to a disc.
+
+    Parameters
+    ----------
+    max_speed : float
+        The fastest velocities, m/s; by default 16 m/s, somewhat above what is allowed in a town.
+    spacing : float
+        Between neighbours along an axis, m/s; by default 2 m/s, a cell of the paper's grid in one turn of the LIDAR.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no velocity but zero, or more than a computer can hold.
+
+    Examples
+    --------
+    >>> VelocityLattice(max_speed=1.0, spacing=1.0).velocities.tolist()
+    [[0.0, 0.0], [-1.0, 0.0], [0.0, -1.0], [0.0, 1.0], [1.0, 0.0]]
+    """
+
+    max_speed: float = 16.0
+    spacing: float = 2.0
+
+    def __post_init__(self) -> None:
+        """Refuse a lattice that is no such thing."""
+        if not (np.isfinite(self.spacing) and self.spacing > 0):
+            raise ArgumentError("spacing", "a positive speed in m/s", self.spacing)
+        if not self.spacing <= self.max_speed <= FINEST * self.spacing:
+            expected = f"from 1 to {FINEST} times the spacing of {self.spacing} m/s"
+            raise ArgumentError("max_speed", expected, self.max_speed)
+
+    @cached_property
+    def velocities(self) -> NDArray[np.float64]:
+        """(V, 2): its velocities, m/s, slow before fast; the first is zero."""
+        steps = int(self.max_speed / self.spacing + 1e-9)
+        x, y = (axis.ravel() for axis in np.mgrid[-steps : steps + 1, -steps : steps + 1])
+        order = np.lexsort((y, x, x**2 + y**2))
+        lattice = np.stack([x, y], axis=1)[order] * float(self.spacing)
+        return lattice[np.hypot(*lattice.T) <= self.max_speed * (1 + 1e-9)]
+
+    @cached_property
+    def prior(self) -> NDArray[np.float64]:
+        """(V,): how probable each is of something of which nothing is known but that it moves; sums to 1.
+
+        The density of `particles.draw_velocities`, any heading and a speed that is the square of a uniform
+        number, is proportional to |v|^(-3/2) in the plane of velocities.
+        """
+        speed = np.hypot(*self.velocities.T)
+        density = np.append(0, speed[1:] ** -1.5)
+        return density / density.sum()
+
+    def __len__(self) -> int:
+        """Return the number of velocities, V."""
+        return len(self.velocities)
