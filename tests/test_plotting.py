@@ -12,6 +12,7 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
+from semgrid_edu.occupancy import State
 from semgrid_edu.plotting.images import blend_labels, visible_points
 
 # Machado, Oliveira and Fernandes (2009), deuteranopia of severity 1.0, on linear RGB.
@@ -68,6 +69,34 @@ def test_a_deuteranope_tells_every_two_classes_apart(label_set):
 
 def test_a_deuteranope_tells_the_occupancy_states_apart():
     assert min(deuteranope_distances(plotting.STATE_COLOURS)) > 28
+
+
+def test_a_deuteranope_tells_four_headings_apart_and_from_what_stays():
+    headings = list(plotting.HEADING_COLOURS)
+    stays = [plotting.STATE_COLOURS[s] for s in (State.FREE, State.STATIC, State.UNKNOWN)]
+    assert min(deuteranope_distances(headings)) > 35
+    assert min(min(deuteranope_distances([heading, still])) for heading in headings for still in stays) > 20
+
+
+def test_a_velocity_has_the_hue_of_its_heading_and_fades_to_static_as_it_slows():
+    forward, left, back, right = plotting.HEADING_COLOURS
+    fast = 2 * plotting.WHEEL_SPEED * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]]).T
+    np.testing.assert_array_equal(plotting.velocity_colours(fast), [forward, left, back, right])
+    between = plotting.velocity_colours(np.array([100.0, 100.0]))
+    np.testing.assert_allclose(between, np.add(forward, left) / 2, atol=0.5)
+    quarter = plotting.velocity_colours(np.array([-plotting.WHEEL_SPEED / 4, 0]))
+    np.testing.assert_allclose(quarter, np.add(back, plotting.STATE_COLOURS[State.STATIC]) / 2, atol=0.5)
+    np.testing.assert_array_equal(plotting.velocity_colours(np.zeros(2)), plotting.STATE_COLOURS[State.STATIC])
+    np.testing.assert_array_equal(
+        plotting.velocity_colours(np.array([np.nan, 1])), plotting.STATE_COLOURS[State.DYNAMIC]
+    )
+
+
+def test_hues_go_round_without_a_jump():
+    angle = np.radians(np.arange(361))
+    ring = plotting.velocity_colours(20 * np.stack([np.cos(angle), np.sin(angle)])).astype(float)
+    assert np.abs(np.diff(ring, axis=0)).max() < 4
+    np.testing.assert_array_equal(ring[0], ring[-1])
 
 
 def test_occupancy_mixes_state_colours_by_probability():

@@ -5,15 +5,35 @@ decreases to the right. Arrays are never flipped: row 0 is the farthest ahead, c
 """
 
 from semgrid_edu.plotting.charts import confusion
-from semgrid_edu.plotting.colours import DEPTH_RANGE, STATE_COLOURS, STATE_NAMES, depth_colours, occupancy_colours
+from semgrid_edu.plotting.colours import (
+    DEPTH_RANGE,
+    HEADING_COLOURS,
+    STATE_COLOURS,
+    STATE_NAMES,
+    WHEEL_SPEED,
+    depth_colours,
+    occupancy_colours,
+    velocity_colours,
+)
 from semgrid_edu.plotting.grids import grid_labels, grid_values, label_maps, occupancy, velocity, velocity_arrows
 from semgrid_edu.plotting.images import image_labels, image_values, points_on_image
 from semgrid_edu.plotting.legends import class_legend
+from semgrid_edu.plotting.lines import probability_line, probability_lines, state_history
+from semgrid_edu.plotting.motion import (
+    animate_occupancy,
+    particles,
+    velocity_ellipse,
+    velocity_spread,
+    velocity_wheel,
+)
 
 __all__ = [
     "DEPTH_RANGE",
+    "HEADING_COLOURS",
     "STATE_COLOURS",
     "STATE_NAMES",
+    "WHEEL_SPEED",
+    "animate_occupancy",
     "class_legend",
     "confusion",
     "depth_colours",
@@ -24,7 +44,15 @@ __all__ = [
     "label_maps",
     "occupancy",
     "occupancy_colours",
+    "particles",
     "points_on_image",
+    "probability_line",
+    "probability_lines",
+    "state_history",
     "velocity",
     "velocity_arrows",
+    "velocity_colours",
+    "velocity_ellipse",
+    "velocity_spread",
+    "velocity_wheel",
 ]

@@ -1,4 +1,4 @@
-"""Colours of occupancy states and of depth; those of classes stand in `labels` (paper, section 3.2)."""
+"""Colours of occupancy states, velocities and depth; those of classes stand in `labels` (paper, section 3.2)."""
 
 from functools import cache
 
@@ -14,6 +14,15 @@ STATE_NAMES = tuple(state.name.lower() for state in State)
 
 STATE_COLOURS = ((243, 243, 240), (38, 42, 52), (252, 114, 0), (160, 163, 168))
 """8-bit RGB of each state: free is light, static dark, dynamic a strong warm colour, unknown mid-grey."""
+
+HEADING_COLOURS = ((30, 110, 230), (90, 200, 120), (255, 200, 0), (190, 0, 120))
+"""8-bit RGB of velocity forward, to the left, backward, to the right; headings between them are mixed.
+
+Forward and backward are blue and yellow, which the colour-blind tell apart too; left is lighter than right.
+"""
+
+WHEEL_SPEED = 16.0
+"""m/s (58 km/h): what moves as fast or faster has its heading's full colour."""
 
 DEPTH_RANGE = (4.0, 50.0)
 """Metres: nearer points take the first colour, farther ones the last."""
@@ -45,6 +54,44 @@ def occupancy_colours(probability: NDArray) -> NDArray[np.uint8]:
         raise ArgumentError("probability", "shape (4, H, W)", f"shape {np.shape(probability)}")
     mixed = np.einsum("shw,sk->hwk", probability, np.array(STATE_COLOURS, dtype=np.float64))
     return np.clip(np.rint(mixed), 0, 255).astype(np.uint8)
+
+
+def velocity_colours(velocity: NDArray) -> NDArray[np.uint8]:
+    """Colour velocities by a wheel: the hue is the heading, and the slower, the nearer to STATIC's dark.
+
+    The share of the heading's colour is sqrt(speed / `WHEEL_SPEED`), so that a pedestrian has a colour too.
+
+    Parameters
+    ----------
+    velocity : (2, ...) float
+        Along x, forward, and y, to the left, m/s. Where it is NaN, the colour is that of DYNAMIC.
+
+    Returns
+    -------
+    (..., 3) uint8
+
+    Raises
+    ------
+    ArgumentError
+        When there aren't two components.
+
+    Examples
+    --------
+    >>> velocity_colours(np.array([[20.0, 0.0], [0.0, 0.0]]))
+    array([[ 30, 110, 230],
+           [ 38,  42,  52]], dtype=uint8)
+    """
+    if np.ndim(velocity) < 1 or len(velocity) != 2:
+        raise ArgumentError("velocity", "two components, shape (2, ...)", f"shape {np.shape(velocity)}")
+    vx, vy = np.asarray(velocity, dtype=np.float64)
+    known = np.isfinite(vx) & np.isfinite(vy)
+    vx, vy = np.where(known, vx, 0), np.where(known, vy, 0)
+    headings, static = np.array([*HEADING_COLOURS, HEADING_COLOURS[0]], float), np.array(STATE_COLOURS[State.STATIC])
+    quarter = np.arctan2(vy, vx) % (2 * np.pi) / (np.pi / 2)
+    full = np.stack([np.interp(quarter, range(5), channel) for channel in headings.T], axis=-1)
+    share = np.sqrt(np.minimum(np.hypot(vx, vy) / WHEEL_SPEED, 1))[..., None]
+    mixed = np.where(known[..., None], (1 - share) * static + share * full, STATE_COLOURS[State.DYNAMIC])
+    return np.rint(mixed).astype(np.uint8)
 
 
 @cache

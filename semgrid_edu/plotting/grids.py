@@ -211,7 +211,8 @@ def draw_map(spec: GridSpec, raster: NDArray, ax: Axes | None = None, **style: o
     if np.shape(raster)[:2] != spec.shape:
         raise ArgumentError("raster", f"the grid's shape {spec.shape}", f"shape {np.shape(raster)}")
     if ax is None:
-        _, ax = plt.subplots(figsize=(4.2, 6.4), layout="constrained")
+        height, width = spec.shape
+        _, ax = plt.subplots(figsize=(4.2, np.clip(0.8 + 2.5 * height / width, 2.4, 6.4)), layout="compressed")
     extent = (spec.y_max, spec.y_min, spec.x_min, spec.x_max)
     ax.imshow(raster, extent=extent, origin="upper", interpolation="nearest", **style)
     ax.set(xlabel="y, to the left [m]", ylabel="x, forward [m]")

@@ -1,0 +1,127 @@
+"""Probabilities as bars on a line of cells, and as bands over time (filtering by Bayes' rule, section 3.2)."""
+
+from collections.abc import Mapping, Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES
+from semgrid_edu.plotting.legends import colour_legend
+
+TOP = 1.25
+"""An axis ends this many times the largest number above zero: there is room for the number itself."""
+
+MAX_NUMBERS = 12
+"""A line of more cells than these has no room for the number of each."""
+
+
+def probability_line(
+    values: NDArray,
+    ax: Axes | None = None,
+    title: str = "",
+    names: Sequence[str] | None = None,
+    truth: int | None = None,
+) -> Axes:
+    """Draw one number a cell of a line, a belief or a likelihood, as bars from left to right.
+
+    Parameters
+    ----------
+    values : (N,) float
+        Between 0 and 1.
+    ax : Axes, optional
+        Where to draw; a new figure when left out.
+    title : str
+        What the numbers are.
+    names : sequence of str, optional
+        Of the N cells; their numbers when left out.
+    truth : int, optional
+        The right cell: a triangle marks it.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ArgumentError
+        When the numbers aren't a line of probabilities, or names and cells differ in number.
+    """
+    values = np.asarray(values)
+    if values.ndim != 1 or not ((values >= 0) & (values <= 1)).all():
+        raise ArgumentError("values", "one number between 0 and 1 for each cell, shape (N,)", values)
+    names = [str(cell) for cell in range(len(values))] if names is None else names
+    if len(names) != len(values):
+        raise ArgumentError("names", f"one for each of {len(values)} cells", len(names))
+    if ax is None:
+        _, ax = plt.subplots(figsize=(6, 1.8), layout="constrained")
+    bars = ax.bar(range(len(values)), values, width=0.8, color="0.45")
+    if len(values) <= MAX_NUMBERS:
+        ax.bar_label(bars, [f"{value:.2f}" for value in values], fontsize="small")
+    if truth is not None:
+        ax.plot(truth, 1.02, "v", color="#d55e00", transform=ax.get_xaxis_transform(), clip_on=False)
+    ax.set_xticks(range(len(values)), names)
+    ax.set_title(title, loc="left", fontsize="medium")
+    ax.set(ylim=(0, TOP), ylabel="probability", xlim=(-0.6, len(values) - 0.4))
+    return ax
+
+
+def probability_lines(
+    lines: Mapping[str, NDArray], names: Sequence[str] | None = None, truth: int | None = None
+) -> Figure:
+    """Draw lines of cells below each other to one scale, that of the largest number: prior, likelihood, posterior.
+
+    Parameters
+    ----------
+    lines : mapping of str to (N,) float
+        Titles and numbers, from top to bottom.
+    names, truth
+        As for `probability_line`, for all lines.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    ArgumentError
+        As `probability_line` does.
+    """
+    size = (6, 0.5 + 1.3 * len(lines))
+    figure, axes = plt.subplots(len(lines), 1, figsize=size, sharex=True, layout="constrained", squeeze=False)
+    for ax, (title, values) in zip(axes[:, 0], lines.items(), strict=True):
+        probability_line(values, ax, title, names, truth).set_ylim(0, TOP * max(map(np.max, lines.values())))
+    return figure
+
+
+def state_history(times: NDArray, probability: NDArray, ax: Axes | None = None) -> Axes:
+    """Draw the states of one cell over time as bands, each as high as its probability.
+
+    Parameters
+    ----------
+    times : (T,) float
+        Seconds.
+    probability : (4, T) float
+        FREE, STATIC, DYNAMIC, UNKNOWN; sums to 1 at each time.
+    ax : Axes, optional
+        Where to draw; a new figure when left out.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ArgumentError
+        When the arrays don't fit each other.
+    """
+    if np.ndim(times) != 1 or np.shape(probability) != (4, len(times)):
+        raise ArgumentError("probability", f"shape (4, T) for times of shape {np.shape(times)}", np.shape(probability))
+    if ax is None:
+        _, ax = plt.subplots(figsize=(6, 2.2), layout="constrained")
+    ax.stackplot(times, probability, colors=np.divide(STATE_COLOURS, 255), edgecolor="0.4", linewidth=0.5)
+    ax.set(xlabel="time [s]", ylabel="probability", ylim=(0, 1), xlim=(times[0], times[-1]))
+    return colour_legend(ax, STATE_NAMES, STATE_COLOURS)

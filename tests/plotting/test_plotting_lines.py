@@ -1,0 +1,72 @@
+"""Bars are as high as their probabilities, bands as thick."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from semgrid_edu import plotting
+from semgrid_edu.errors import ArgumentError
+
+
+@pytest.fixture(autouse=True)
+def _close_figures():
+    yield
+    plt.close("all")
+
+
+def heights(ax):
+    return [bar.get_height() for bar in ax.patches]
+
+
+def test_a_bar_is_as_high_as_its_probability_and_says_so():
+    ax = plotting.probability_line(np.array([0.5, 0.125, 0.375]), title="belief", names=["a", "b", "c"])
+    assert heights(ax) == [0.5, 0.125, 0.375]
+    assert [text.get_text() for text in ax.texts] == ["0.50", "0.12", "0.38"]
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["a", "b", "c"]
+    assert ax.get_title(loc="left") == "belief"
+
+
+def test_a_triangle_marks_the_right_cell_and_only_when_it_is_known():
+    (mark,) = plotting.probability_line(np.full(4, 0.25), truth=2).lines
+    assert mark.get_xdata() == [2]
+    assert not plotting.probability_line(np.full(4, 0.25)).lines
+
+
+def test_a_long_line_has_no_numbers_over_its_bars():
+    assert not plotting.probability_line(np.full(40, 0.025)).texts
+
+
+def test_lines_below_each_other_share_their_scale():
+    lines = {"prior": np.full(2, 0.5), "likelihood": np.array([0.9, 0.3]), "posterior": np.array([0.75, 0.25])}
+    figure = plotting.probability_lines(lines, truth=0)
+    assert [ax.get_title(loc="left") for ax in figure.axes] == list(lines)
+    assert len({ax.get_ylim() for ax in figure.axes}) == 1
+    assert figure.axes[0].get_ylim()[1] > 0.9
+    np.testing.assert_array_equal([heights(ax) for ax in figure.axes], list(lines.values()))
+
+
+def test_a_band_is_as_thick_as_its_probability():
+    probability = np.array([[0.5, 0.25], [0.2, 0.5], [0.2, 0.25], [0.1, 0.0]])
+    ax = plotting.state_history(np.array([0.0, 0.1]), probability)
+    for band, thickness, colour in zip(ax.collections, probability, plotting.STATE_COLOURS, strict=True):
+        corners = band.get_paths()[0].vertices
+        for time, thick in zip((0.0, 0.1), thickness, strict=True):
+            assert np.ptp(corners[corners[:, 0] == time, 1]) == pytest.approx(thick)
+        np.testing.assert_allclose(band.get_facecolor()[0, :3], np.divide(colour, 255))
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == list(plotting.STATE_NAMES)
+
+
+@pytest.mark.parametrize(
+    ("draw", "names"),
+    [
+        (lambda: plotting.probability_line(np.zeros((2, 2))), "values"),
+        (lambda: plotting.probability_line(np.array([0.5, 1.5])), "values"),
+        (lambda: plotting.probability_line(np.array([0.5, np.nan])), "values"),
+        (lambda: plotting.probability_line(np.ones(2), names=["a"]), "names"),
+        (lambda: plotting.probability_lines({"a": np.ones(2), "b": -np.ones(2)}), "values"),
+        (lambda: plotting.state_history(np.zeros(3), np.zeros((3, 4))), "probability"),
+    ],
+)
+def test_wrong_input_is_named(draw, names):
+    with pytest.raises(ArgumentError, match=f"^{names}: expected"):
+        draw()
