@@ -18,7 +18,7 @@ from semgrid_edu.plotting.colours import (
 from semgrid_edu.plotting.grids import grid_labels, grid_values, label_maps, occupancy, velocity, velocity_arrows
 from semgrid_edu.plotting.images import image_labels, image_values, points_on_image
 from semgrid_edu.plotting.legends import class_legend
-from semgrid_edu.plotting.lines import probability_line, probability_lines, state_history
+from semgrid_edu.plotting.lines import belief_history, probability_line, probability_lines, state_history
 from semgrid_edu.plotting.motion import (
     animate_occupancy,
     particles,
@@ -34,6 +34,7 @@ __all__ = [
     "STATE_NAMES",
     "WHEEL_SPEED",
     "animate_occupancy",
+    "belief_history",
     "class_legend",
     "confusion",
     "depth_colours",

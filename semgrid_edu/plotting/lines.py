@@ -97,6 +97,40 @@ def probability_lines(
     return figure
 
 
+def belief_history(belief: NDArray, ax: Axes | None = None, truth: NDArray | None = None) -> Axes:
+    """Draw a belief over a line of cells, step by step: one column a step, the darker the more probable.
+
+    Parameters
+    ----------
+    belief : (T, N) float
+        One belief a row; each sums to 1.
+    ax : Axes, optional
+        Where to draw; a new figure when left out.
+    truth : (T,) int, optional
+        The right cell at each step: a circle marks it.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ArgumentError
+        When the belief isn't a table, or truth and belief differ in number of steps.
+    """
+    if np.ndim(belief) != 2:
+        raise ArgumentError("belief", "one row a step, shape (T, N)", f"shape {np.shape(belief)}")
+    if truth is not None and np.shape(truth) != (len(belief),):
+        raise ArgumentError("truth", f"one cell for each of {len(belief)} steps", f"shape {np.shape(truth)}")
+    if ax is None:
+        _, ax = plt.subplots(figsize=(6, 2.6), layout="constrained")
+    ax.imshow(np.transpose(belief), cmap="Blues", vmin=0, vmax=1, origin="lower", aspect="auto")
+    if truth is not None:
+        ax.plot(np.arange(len(belief)), truth, "o", markersize=4, markerfacecolor="none", color="#d55e00")
+    ax.set(xlabel="step", ylabel="cell")
+    return ax
+
+
 def state_history(times: NDArray, probability: NDArray, ax: Axes | None = None) -> Axes:
     """Draw the states of one cell over time as bands, each as high as its probability.
 

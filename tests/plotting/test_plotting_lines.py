@@ -45,6 +45,16 @@ def test_lines_below_each_other_share_their_scale():
     np.testing.assert_array_equal([heights(ax) for ax in figure.axes], list(lines.values()))
 
 
+def test_a_belief_has_a_column_for_each_step_with_cell_0_at_the_bottom_and_a_circle_at_the_truth():
+    belief = np.array([[0.2, 0.7, 0.1], [0.0, 0.2, 0.8]])
+    ax = plotting.belief_history(belief, truth=np.array([1, 2]))
+    np.testing.assert_array_equal(ax.images[0].get_array(), belief.T)
+    bottom, top = ax.get_ylim()
+    assert bottom < top
+    np.testing.assert_array_equal(ax.lines[0].get_xydata(), [[0, 1], [1, 2]])
+    assert not plotting.belief_history(belief).lines
+
+
 def test_a_band_is_as_thick_as_its_probability():
     probability = np.array([[0.5, 0.25], [0.2, 0.5], [0.2, 0.25], [0.1, 0.0]])
     ax = plotting.state_history(np.array([0.0, 0.1]), probability)
@@ -64,6 +74,8 @@ def test_a_band_is_as_thick_as_its_probability():
         (lambda: plotting.probability_line(np.array([0.5, np.nan])), "values"),
         (lambda: plotting.probability_line(np.ones(2), names=["a"]), "names"),
         (lambda: plotting.probability_lines({"a": np.ones(2), "b": -np.ones(2)}), "values"),
+        (lambda: plotting.belief_history(np.ones(3)), "belief"),
+        (lambda: plotting.belief_history(np.ones((2, 3)), truth=np.zeros(3)), "truth"),
         (lambda: plotting.state_history(np.zeros(3), np.zeros((3, 4))), "probability"),
     ],
 )
