@@ -1,0 +1,128 @@
+"""Hidden tests of exercise 02, occupancy grids: scipy, and the package's walk along a ray, are the reference."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import expit, logit
+
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.evidence import walk_ray
+from semgrid_instructor import hidden
+
+CLIPPED = 0.05
+"""A beam that is in a cell for less than this share of its side only clips it: passed or not, both are right."""
+
+
+@hidden
+def check_log_odds(log_odds: Callable) -> None:
+    """Random arrays, and probabilities close to 0 and 1."""
+    p = np.random.default_rng(21).uniform(0.01, 0.99, size=(4, 5))
+    assert np.allclose(log_odds(p.copy()), logit(p), atol=1e-3), "wrong log-odds of an array"
+    tiny = np.array([1e-9, 1e-6, 1 - 1e-6])
+    assert np.allclose(log_odds(tiny.copy()), logit(tiny)), (
+        "wrong near 0 and 1: nothing is to be cut off or added there"
+    )
+
+
+@hidden
+def check_probability(probability: Callable) -> None:
+    """Random arrays, and log-odds whose exponential no computer holds."""
+    L = np.random.default_rng(22).normal(0, 3, size=(4, 5))
+    assert np.allclose(probability(L.copy()), expit(L)), "wrong probabilities of an array"
+    certain = np.array([float(np.squeeze(probability(L))) for L in (-1000.0, 1000.0)])
+    assert not np.isnan(certain).any(), "log-odds of 1000 give no number: e^1000 overflows, so use e^-1000"
+    assert np.allclose(certain, [0, 1]), "log-odds of -1000 and 1000 must be as good as 0 and 1"
+
+
+def _scan(seed: int) -> tuple[NDArray, NDArray, NDArray]:
+    """Return log-odds and the two likelihoods of a scan that says nothing of every third cell, each (5, 7)."""
+    rng = np.random.default_rng(seed)
+    occupied, free = rng.uniform(0.05, 0.95, size=(2, 5, 7))
+    free.flat[::3] = occupied.flat[::3]
+    return rng.normal(0, 1, size=(5, 7)), occupied, free
+
+
+@hidden
+def check_update(update: Callable) -> None:
+    """Random scans of a grid of another shape, with limits far away."""
+    L, occupied, free = _scan(23)
+    got = np.asarray(update(L.copy(), occupied.copy(), free.copy(), -50.0, 50.0))
+    assert got.shape == L.shape, f"shape {got.shape} instead of {L.shape}"
+    assert np.allclose(got.flat[::3], L.flat[::3]), "cells of which the scan says nothing have changed"
+    assert np.allclose(got, L + np.log(occupied) - np.log(free)), "wrong log-odds"
+
+
+@hidden
+def check_clamp(update: Callable) -> None:
+    """Other limits, not symmetric; cells on both sides of them, and some that began outside."""
+    L, occupied, free = _scan(24)
+    L *= 3
+    got = np.asarray(update(L.copy(), occupied.copy(), free.copy(), -1.2, 2.7))
+    assert got.max() <= 2.7 + 1e-9, "some cells are above L_max"
+    assert got.min() >= -1.2 - 1e-9, "some cells are below L_min"
+    assert np.allclose(got, np.clip(L + np.log(occupied / free), -1.2, 2.7)), "cells within the limits are wrong"
+
+
+@hidden
+def check_fuse(fuse: Callable) -> None:
+    """One scan, and many; other priors."""
+    rng = np.random.default_rng(25)
+    for n_scans, prior in ((1, 0.1), (2, 0.7), (9, 0.35)):
+        posteriors = rng.uniform(0.05, 0.95, size=(n_scans, 3, 4))
+        posteriors[:, 0, 0] = prior
+        got = np.asarray(fuse(prior, posteriors.copy()))
+        how_many = "one scan" if n_scans == 1 else f"{n_scans} scans"
+        assert got.shape == (3, 4), f"shape {got.shape} instead of (3, 4)"
+        assert np.isclose(got[0, 0], prior), f"{how_many} said nothing of a cell, and its prior has changed"
+        evidence = logit(posteriors) - logit(prior)
+        assert np.allclose(got, expit(logit(prior) + evidence.sum(axis=0))), f"wrong with {how_many}"
+
+
+@hidden
+def check_smear(smear: Callable) -> None:
+    """Other speeds, periods, limits and sensors; limits that not a single pass is survived from."""
+    rng = np.random.default_rng(26)
+    for survived in range(8):
+        occupied, share = rng.uniform(0.1, 0.4), rng.uniform(0.1, 0.9)
+        free = rng.uniform(occupied + 0.1, 0.95)
+        L_max = (survived + share) * np.log(free / occupied)
+        speed, dt = rng.uniform(1, 30), rng.uniform(0.05, 0.5)
+        passes, metres = smear(speed, dt, L_max, occupied, free)
+        assert passes == survived, "wrong number of passes (a cell may survive none)"
+        assert np.isclose(metres, survived * speed * dt), "the passes are right, the metres are not"
+
+
+def _judge_beam(beam_evidence: Callable, spec: GridSpec, x: float, y: float) -> None:
+    """Compare one beam, cell by cell, with the package's walk along the ray."""
+    length = np.hypot(x, y)
+    got = np.asarray(beam_evidence(x, y, spec, 1.5, -0.4), dtype=float)
+    assert got.shape == spec.shape, f"shape {got.shape} instead of {spec.shape}"
+    rows, cols, leaves_at = walk_ray(spec, (0.0, 0.0), np.arctan2(y, x), length)
+    inside = np.zeros(spec.shape)
+    inside[rows, cols] = np.diff(np.minimum(leaves_at, length), prepend=0.0)
+    passed = inside > CLIPPED * spec.cell
+    (row,), (col,), (in_grid,) = spec.cells(np.array([[x, y]]))
+    if in_grid:
+        assert got[row, col] == 1.5, "the cell of the return isn't hit (cells need not be 1 m, nor the grid symmetric)"
+        passed[row, col] = inside[row, col] = got[row, col] = 0
+    assert (got <= 0).all(), "a cell is hit in which there is no return"
+    assert (got[passed] == -0.4).all(), "a cell that the beam crosses isn't free"
+    assert (got[inside == 0] == 0).all(), "the beam says something of cells that it doesn't cross"
+
+
+@hidden
+def check_beam(beam_evidence: Callable) -> None:
+    """Beams in all directions, in a grid that also reaches behind the vehicle, of small cells."""
+    rng = np.random.default_rng(27)
+    spec = GridSpec(x_min=-10.1, x_max=14.9, y_min=-6.1, y_max=9.9, cell=0.5)
+    for x, y in rng.uniform([-9, -5.5], [14, 9], size=(12, 2)):
+        _judge_beam(beam_evidence, spec, float(x), float(y))
+
+
+@hidden
+def check_beam_outside(beam_evidence: Callable) -> None:
+    """Try returns beyond each border of the grid."""
+    spec = GridSpec(x_min=-10.1, x_max=14.9, y_min=-6.1, y_max=9.9, cell=0.5)
+    for x, y in ((20.3, 1.7), (16.1, -9.3), (-12.4, 3.3), (4.2, 12.9), (3.1, -7.7)):
+        _judge_beam(beam_evidence, spec, x, y)
