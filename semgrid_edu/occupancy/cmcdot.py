@@ -4,14 +4,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence import Evidence, beam_reach, evidence_in_cells
+from semgrid_edu.occupancy.evidence import beam_reach, evidence_in_cells
+from semgrid_edu.occupancy.local_belief import local_belief
 from semgrid_edu.occupancy.motion import PlanarMotion
-from semgrid_edu.occupancy.moving_map import look_up, map_around, scroll
+from semgrid_edu.occupancy.moving_map import map_around, scroll
 from semgrid_edu.occupancy.params import CmcdotParams
-from semgrid_edu.occupancy.particles import cells_of, transform, turn_moments, velocity_moments
+from semgrid_edu.occupancy.particles import cells_of, transform
 from semgrid_edu.occupancy.sensor import prepare_scan
-from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State
-from semgrid_edu.occupancy.steps import NOTHING_KNOWN, move, predict, resample, update
+from semgrid_edu.occupancy.state import Belief, FilterState, Particles
+from semgrid_edu.occupancy.steps import move, predict, resample, update
+from semgrid_edu.occupancy.velocities import velocity_moments
 
 MAX_YAW = np.radians(2)
 """The map turns with the vehicle only when that has turned this far (a compromise: its margin grows with the angle)."""
@@ -88,20 +90,11 @@ class Cmcdot:
         updated = update(predicted, self.map_spec, evidence, self.params)
         self._state, self._pose = resample(updated, self.map_spec, self.params, self._rng), pose
         here = evidence_in_cells(points, free_to, self.spec, sensor, PlanarMotion())
-        probability = self._probability(predicted, here)
-        return Belief(probability, *self._velocity(probability[State.DYNAMIC] > 0))
+        return local_belief(
+            predicted.probability, self._velocities(), here, self.map_spec, self.spec, pose, self.params
+        )
 
-    def _probability(self, predicted: FilterState, evidence: Evidence) -> NDArray[np.float32]:
-        """Look the prediction up in the vehicle's cells and update those, so that returns lie in the cells they hit."""
-        here = look_up(predicted.probability, NOTHING_KNOWN, self.map_spec, self.spec, self._pose)
-        prior = FilterState(here, Particles.none(), np.zeros(self.spec.shape, np.float32))
-        return update(prior, self.spec, evidence, self.params).probability
-
-    def _velocity(self, moving: NDArray[np.bool_]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Look velocities up in the vehicle's cells that hold dynamic mass, and turn them into its axes."""
-        particles, shape = self._state.particles, self.map_spec.shape
-        mean, covariance = velocity_moments(particles, cells_of(particles.position, self.map_spec), shape)
-        over_map = np.concatenate([mean, covariance.reshape(4, *shape)])
-        here = look_up(over_map, np.full(6, np.nan, np.float32), self.map_spec, self.spec, self._pose)
-        here[:, ~moving] = np.nan
-        return turn_moments(here[:2], here[2:].reshape(2, 2, *self.spec.shape), self._pose)
+    def _velocities(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return mean and covariance of the particles' velocities in each cell of the map."""
+        particles = self._state.particles
+        return velocity_moments(particles, cells_of(particles.position, self.map_spec), self.map_spec.shape)

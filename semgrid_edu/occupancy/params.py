@@ -4,7 +4,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.occupancy.sensor import SensorModel
@@ -85,7 +84,11 @@ class CmcdotParams:
 
 
 def transition_matrix(params: CmcdotParams, dt: float) -> NDArray[np.float64]:
-    """Return the transition matrix of a time step, M = exp(Q dt).
+    """Return the transition matrix of a time step, M = exp(Q dt), by uniformisation.
+
+    With L the largest rate at which a state is left, A = (Q + L I) dt has no negative entry, and exp(Q dt) is the sum
+    of A^k / k!, its rows scaled to 1. The sum is taken over a small part of the time step, which is then doubled.
+    `scipy.linalg.expm` gives the same, but takes eight milliseconds where its BLAS has two threads to wake.
 
     Parameters
     ----------
@@ -108,5 +111,15 @@ def transition_matrix(params: CmcdotParams, dt: float) -> NDArray[np.float64]:
         raise ArgumentError("dt", "seconds, not negative", dt)
     Q = np.array(params.rates, dtype=np.float64)
     np.fill_diagonal(Q, 0)
-    np.fill_diagonal(Q, -Q.sum(axis=1))
-    return expm(Q * dt)
+    leaving = Q.sum(axis=1)
+    np.fill_diagonal(Q, leaving.max() - leaving)
+    doublings = max(0, np.frexp(leaving.max())[1] + np.frexp(dt)[1] + 1)
+    A = Q * np.ldexp(dt, -doublings)
+    M = np.eye(4)
+    for k in range(14, 0, -1):
+        M = np.eye(4) + A @ M / k
+    M /= M.sum(axis=1, keepdims=True)
+    for _ in range(doublings):
+        M = M @ M
+        M /= M.sum(axis=1, keepdims=True)
+    return M

@@ -1,4 +1,4 @@
-"""What many particles do at once: fly, add up in cells, be drawn anew (paper, section 3.2, steps 1 and 4)."""
+"""What many particles do at once: turn with the map, slow down, fly, add up in cells (paper, section 3.2, step 1)."""
 
 import math
 
@@ -34,13 +34,13 @@ def cells_of(position: NDArray, spec: GridSpec) -> NDArray[np.int32]:
     return _cells_of(position, spec.shape, spec.x_max, spec.y_max, spec.cell)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _cells_of(position, shape, x_max, y_max, cell):
     cells = np.empty(len(position), np.int32)
     for i in range(len(position)):
         row, col = np.floor((x_max - position[i, 0]) / cell), np.floor((y_max - position[i, 1]) / cell)
-        inside = 0 <= row < shape[0] and 0 <= col < shape[1]
-        cells[i] = int(row) * shape[1] + int(col) if inside else OUTSIDE
+        inside = (row >= 0) & (row < shape[0]) & (col >= 0) & (col < shape[1])  # `and` would branch, and be slower
+        cells[i] = np.int32(row * shape[1] + col if inside else OUTSIDE)
     return cells
 
 
@@ -85,6 +85,33 @@ def _scale_in_cells(weight, cells, factor):
         if cells[i] != OUTSIDE:
             scaled[i] = weight[i] * factor[cells[i]]
     return scaled
+
+
+def by_origin(before: NDArray, after: NDArray, n_cells: int) -> NDArray[np.int32]:
+    """Tell particles that stayed in their cell from those that came in: the latter's cells are counted on by `n_cells`.
+
+    Parameters
+    ----------
+    before, after : (N,) int32
+        Where each was and is, from `cells_of`.
+    n_cells : int
+        H W.
+
+    Returns
+    -------
+    (N,) int32
+        Indices into (2, H, W), flattened: what stayed, what arrived; `OUTSIDE` for a particle that has left.
+    """
+    return _by_origin(before, after, np.int32(n_cells))
+
+
+@njit(cache=True)
+def _by_origin(before, after, n_cells):
+    origin = after.copy()
+    for i in range(len(after)):
+        if after[i] != before[i] and after[i] != OUTSIDE:
+            origin[i] += n_cells
+    return origin
 
 
 def fly(particles: Particles, max_acceleration: float, dt: float, rng: np.random.Generator) -> Particles:
@@ -171,119 +198,3 @@ def _transform(position, velocity, dx, dy, cos, sin):
         moved[i, 0], moved[i, 1] = cos * x + sin * y, cos * y - sin * x
         turned[i, 0], turned[i, 1] = cos * vx + sin * vy, cos * vy - sin * vx
     return moved, turned
-
-
-def velocity_moments(
-    particles: Particles, cells: NDArray, shape: tuple[int, int]
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return mean and covariance of the velocities in each cell, weighed by what each particle carries.
-
-    Parameters
-    ----------
-    particles : Particles
-    cells : (N,) int
-        The cell of each, from `cells_of`.
-    shape : (int, int)
-        H, W of the map.
-
-    Returns
-    -------
-    mean : (2, H, W) float32
-        sum(w v) / sum(w), along the axes of the map, m/s; NaN where no particle is.
-    covariance : (2, 2, H, W) float32
-        sum(w (v - mean) (v - mean)^T) / sum(w), m^2/s^2; zero for a single particle, NaN where none is.
-    """
-    mean, spread = _moments(particles.velocity, particles.weight, cells, math.prod(shape))
-    return mean.T.reshape(2, *shape).copy(), spread.T[[[0, 1], [1, 2]]].reshape(2, 2, *shape)
-
-
-@njit(cache=True, error_model="numpy")
-def _moments(velocity, weight, cells, n_cells):
-    total, mean, spread = np.zeros((n_cells, 1)), np.zeros((n_cells, 2)), np.zeros((n_cells, 3))
-    for i in range(len(cells)):
-        if cells[i] != OUTSIDE:
-            w = np.float64(weight[i])
-            total[cells[i], 0] += w
-            mean[cells[i], 0] += w * velocity[i, 0]
-            mean[cells[i], 1] += w * velocity[i, 1]
-    mean /= total
-    for i in range(len(cells)):
-        if cells[i] != OUTSIDE:
-            x, y = velocity[i, 0] - mean[cells[i], 0], velocity[i, 1] - mean[cells[i], 1]
-            spread[cells[i], 0] += weight[i] * x * x
-            spread[cells[i], 1] += weight[i] * x * y
-            spread[cells[i], 2] += weight[i] * y * y
-    return mean.astype(np.float32), (spread / total).astype(np.float32)
-
-
-def turn_moments(mean: NDArray, covariance: NDArray, motion: PlanarMotion) -> tuple[NDArray, NDArray]:
-    """Express mean (2, H, W) and covariance (2, 2, H, W) in the axes of a frame whose pose is `motion`: R^T C R."""
-    R = motion.rotation.astype(mean.dtype)
-    half_turned = np.einsum("ij,ikhw->jkhw", R, covariance)
-    return np.einsum("ij,ihw->jhw", R, mean), np.einsum("jkhw,kl->jlhw", half_turned, R)
-
-
-@njit(cache=True)
-def systematic_resample(weight, count, offset):
-    """Draw `count` indices in proportion to the weights, by systematic resampling.
-
-    The weights are laid end to end and cut at `count` points, equally spaced, that one random offset
-    places: index i is drawn floor or ceil of count w_i / sum(w) times. For count = N this is
-    `filterpy.monte_carlo.systematic_resample`, which takes its offset from numpy's global generator;
-    here it is an argument, so that a seed decides it.
-
-    Parameters
-    ----------
-    weight : (N,) float
-        Not negative, not all zero; they need not sum to 1.
-    count : int
-        How many to draw, M.
-    offset : float
-        In [0, 1).
-
-    Returns
-    -------
-    (M,) int64
-        Ascending.
-
-    Examples
-    --------
-    >>> systematic_resample(np.array([0.1, 0.6, 0.3]), 4, 0.5)
-    array([1, 1, 1, 2])
-    """
-    total = 0.0
-    for w in weight:
-        total += w
-    chosen = np.empty(count, np.int64)
-    last, below = 0, float(weight[0])
-    for m in range(count):
-        at = (m + offset) / count * total
-        while below <= at and last < len(weight) - 1:
-            last += 1
-            below += weight[last]
-        chosen[m] = last
-    return chosen
-
-
-def draw_velocities(count: int, max_speed: float, rng: np.random.Generator) -> NDArray[np.float32]:
-    """Draw velocities of things of which nothing is known but that they move.
-
-    Any heading; the speed is the square of a uniform number, so that slow is more frequent than fast and
-    one in four is no faster than a pedestrian (uniform in the plane, it would be one in two hundred).
-
-    Parameters
-    ----------
-    count : int
-        M.
-    max_speed : float
-        m/s.
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    (M, 2) float32
-        m/s.
-    """
-    speed = max_speed * rng.random(count, np.float32) ** 2
-    heading = np.float32(2 * np.pi) * rng.random(count, np.float32)
-    return np.stack([speed * np.cos(heading), speed * np.sin(heading)], axis=1)

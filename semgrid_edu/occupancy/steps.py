@@ -6,26 +6,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.cellwise import bayes, make_room, meet, mix, represent
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.moving_map import look_up
 from semgrid_edu.occupancy.params import CmcdotParams, transition_matrix
 from semgrid_edu.occupancy.particles import (
+    by_origin,
     cells_of,
-    draw_velocities,
     fly,
     scale_in_cells,
     slow_down,
-    systematic_resample,
     transform,
     weight_in_cells,
 )
+from semgrid_edu.occupancy.resampling import draw_again, draw_newborn
 from semgrid_edu.occupancy.state import FilterState, Particles, State
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 NOTHING_KNOWN = np.array([0, 0, 0, 1], dtype=np.float32)
-CERTAIN = np.float32(1 - 1e-3)
-"""The most that arriving particles may claim of a cell: who is never quite certain can be contradicted."""
 
 
 def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterState:
@@ -51,14 +50,8 @@ def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterStat
     probability = look_up(state.probability, NOTHING_KNOWN, spec, spec, motion)
     particles = transform(state.particles, motion)
     cells = cells_of(particles.position, spec)
-    claimed = weight_in_cells(particles.weight, cells, spec.shape)
-    dynamic = np.minimum(claimed, 1)
-    weight = scale_in_cells(particles.weight, cells, _ratio(dynamic, claimed))
-    probability[DYNAMIC] = 0
-    others = probability.sum(axis=0)  # not 1 - P(DYNAMIC), which has no digits left where dynamic mass is nearly all
-    probability *= _ratio(1 - dynamic, others)
-    probability[UNKNOWN] += np.where(others > 0, 0, 1 - dynamic)
-    probability[DYNAMIC] = dynamic
+    probability, factor = make_room(probability, weight_in_cells(particles.weight, cells, spec.shape))
+    weight = scale_in_cells(particles.weight, cells, factor)
     return FilterState(probability, replace(particles, weight=weight), state.newborn)
 
 
@@ -95,31 +88,19 @@ def predict(
     FilterState
         At the present instant, before its scan.
     """
-    M = transition_matrix(params, dt).astype(state.probability.dtype)
+    M = transition_matrix(params, dt)
     before = cells_of(state.particles.position, spec)
     particles = slow_down(state.particles, params.stop_rate, params.stop_speed, dt)
-    particles = replace(particles, weight=particles.weight * M[DYNAMIC, DYNAMIC])
+    particles = replace(particles, weight=particles.weight * np.float32(M[DYNAMIC, DYNAMIC]))
     going = weight_in_cells(particles.weight, before, spec.shape)
-    own = np.einsum("ij,ihw->jhw", M, state.probability)
-    newborn = np.einsum("i,ihw->hw", M[:, DYNAMIC], _without_particles(state))
-    own[STATIC] += np.maximum(own[DYNAMIC] - newborn - going, 0)
+    mixed, newborn = mix(state.probability, state.newborn, going, M)
 
     particles = fly(particles, params.max_acceleration, dt, rng)
-    after = cells_of(particles.position, spec)
-    n_cells = going.size
-    bucket = np.where((after != before) & (after >= 0), after + n_cells, after)
-    stays, arrives = weight_in_cells(particles.weight, bucket, (2, *spec.shape))
-    own[FREE] += going - stays
-    own[DYNAMIC] = newborn + stays
-
-    claim = np.minimum(arrives, CERTAIN)
-    consistent = 1 - claim * own[STATIC]
-    own_factor = (1 - claim) / consistent
-    arrival_factor = _ratio(claim, arrives) * (1 - own[STATIC]) / consistent
-    weight = scale_in_cells(particles.weight, bucket, np.stack([own_factor, arrival_factor]))
-    probability = own * own_factor
-    probability[DYNAMIC] += arrives * arrival_factor
-    return FilterState(probability, replace(particles, weight=weight), newborn * own_factor)
+    origin = by_origin(before, cells_of(particles.position, spec), going.size)
+    stays, arrives = weight_in_cells(particles.weight, origin, (2, *spec.shape))
+    probability, newborn, factor = meet(mixed, newborn, going, stays, arrives)
+    weight = scale_in_cells(particles.weight, origin, factor)
+    return FilterState(probability, replace(particles, weight=weight), newborn)
 
 
 def update(state: FilterState, spec: GridSpec, evidence: Evidence, params: CmcdotParams) -> FilterState:
@@ -146,13 +127,7 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, params: Cmcdo
         Given the scan.
     """
     prior = reveal(state, evidence.occupied != evidence.free, params)
-    best = np.maximum(evidence.occupied, evidence.free)
-    occupied, free = _ratio(evidence.occupied, best), _ratio(evidence.free, best)
-    joint = prior.probability * np.stack([free, occupied, occupied, free])
-    total = joint.sum(axis=0)
-    explained = total > 0
-    posterior = np.where(explained, joint / np.where(explained, total, 1), NOTHING_KNOWN[:, None, None])
-    factor = _ratio(posterior[DYNAMIC], prior.probability[DYNAMIC])
+    posterior, factor = bayes(prior.probability, evidence.occupied, evidence.free)
     particles = prior.particles
     weight = scale_in_cells(particles.weight, cells_of(particles.position, spec), factor)
     return FilterState(posterior, replace(particles, weight=weight), prior.newborn * factor)
@@ -205,50 +180,14 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
         The same belief, carried by new particles; no newborn mass.
     """
     births = round(params.birth_share * params.particles)
-    drawn = [_draw_again(state.particles, params.particles - births, rng)]
-    drawn.append(_draw_newborn(state.newborn, spec, births, params.max_speed, rng))
+    drawn = (
+        draw_again(state.particles, params.particles - births, rng),
+        draw_newborn(state.newborn, spec, births, params.max_speed, rng),
+    )
     position, velocity, weight = (
         np.concatenate([getattr(p, name) for p in drawn]) for name in ("position", "velocity", "weight")
     )
     cells = cells_of(position, spec)
-    represented = weight_in_cells(weight, cells, spec.shape)
-    probability = state.probability.copy()
-    lost = np.where(represented > 0, 0, probability[DYNAMIC])
-    probability[DYNAMIC] -= lost
-    probability[UNKNOWN] += lost
-    weight = scale_in_cells(weight, cells, _ratio(probability[DYNAMIC], represented))
-    return FilterState(probability, Particles(position, velocity, weight), np.zeros_like(state.newborn))
-
-
-def _draw_again(particles: Particles, count: int, rng: np.random.Generator) -> Particles:
-    """Draw particles by weight, each then carrying the same share."""
-    total = particles.weight.sum(dtype=np.float64)
-    if total == 0 or count == 0:
-        return Particles.none()
-    chosen = systematic_resample(particles.weight, count, rng.random())
-    weight = np.full(count, total / count, np.float32)
-    return Particles(particles.position.take(chosen, axis=0), particles.velocity.take(chosen, axis=0), weight)
-
-
-def _draw_newborn(
-    newborn: NDArray, spec: GridSpec, count: int, max_speed: float, rng: np.random.Generator
-) -> Particles:
-    """Draw new particles in cells by newborn mass, each carrying the same share."""
-    total = newborn.sum(dtype=np.float64)
-    if total == 0 or count == 0:
-        return Particles.none()
-    chosen = systematic_resample(newborn.ravel(), count, rng.random())
-    corner = np.stack(np.divmod(chosen, spec.shape[1]), axis=1) + rng.random((count, 2), np.float32)
-    position = (spec.x_max, spec.y_max) - corner * spec.cell
-    weight = np.full(count, total / count, np.float32)
-    return Particles(position.astype(np.float32), draw_velocities(count, max_speed, rng), weight)
-
-
-def _without_particles(state: FilterState) -> NDArray:
-    """Return the part of the belief that no particle carries, (4, H, W)."""
-    return np.concatenate([state.probability[:DYNAMIC], state.newborn[None], state.probability[UNKNOWN:]])
-
-
-def _ratio(part: NDArray, whole: NDArray) -> NDArray:
-    """Divide, with 0 where the whole is 0."""
-    return np.divide(part, whole, out=np.zeros_like(whole), where=whole > 0)
+    probability, factor = represent(state.probability, weight_in_cells(weight, cells, spec.shape))
+    particles = Particles(position, velocity, scale_in_cells(weight, cells, factor))
+    return FilterState(probability, particles, np.zeros_like(state.newborn))

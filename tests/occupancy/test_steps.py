@@ -8,6 +8,7 @@ from filterpy import discrete_bayes
 from filterpy.monte_carlo import resampling
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from scipy.linalg import expm
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
@@ -24,7 +25,8 @@ from semgrid_edu.occupancy import (
     transition_matrix,
     update,
 )
-from semgrid_edu.occupancy.particles import cells_of, systematic_resample, weight_in_cells
+from semgrid_edu.occupancy.particles import cells_of, weight_in_cells
+from semgrid_edu.occupancy.resampling import systematic_resample
 
 GRID = GridSpec(0, 6, -2, 2, 1)
 PARAMS = CmcdotParams(particles=2000)
@@ -188,6 +190,24 @@ def test_transition_matrix_composes_over_time():
     assert np.allclose(M @ M, transition_matrix(PARAMS, 0.2))
     assert np.allclose(M.sum(axis=1), 1)
     assert np.array_equal(transition_matrix(PARAMS, 0.0), np.eye(4))
+
+
+@given(
+    st.lists(st.sampled_from([0.0, 1e-3]) | st.floats(0, 20), min_size=16, max_size=16),
+    st.floats(0, 100) | st.sampled_from([1e-9, 0.1]),
+)
+def test_transition_matrix_is_scipys_matrix_exponential(rates, dt):
+    Q = np.array(rates).reshape(4, 4)
+    M = transition_matrix(replace(PARAMS, rates=tuple(map(tuple, Q))), dt)
+    np.fill_diagonal(Q, 0)
+    np.fill_diagonal(Q, -Q.sum(axis=1))
+    np.testing.assert_allclose(M, expm(Q * dt), atol=1e-10)
+
+
+def test_transition_matrix_over_ages_is_where_the_chain_ends():
+    """By default nothing leaves UNKNOWN."""
+    for dt in (1e6, 1e30, 1e308):
+        np.testing.assert_array_equal(transition_matrix(PARAMS, dt), np.outer(np.ones(4), [0, 0, 0, 1]))
 
 
 @pytest.mark.parametrize("dt", [-0.1, np.nan, np.inf])

@@ -1,0 +1,143 @@
+"""Particles drawn anew: where dynamic mass is, and where it has just come into being (paper, section 3.2, step 4)."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.state import Particles
+
+
+@njit(cache=True)
+def systematic_resample(weight, count, offset):
+    """Draw `count` indices in proportion to the weights, by systematic resampling.
+
+    The weights are laid end to end and cut at `count` points, equally spaced, that one random offset
+    places: index i is drawn floor or ceil of count w_i / sum(w) times. For count = N this is
+    `filterpy.monte_carlo.systematic_resample`, which takes its offset from numpy's global generator;
+    here it is an argument, so that a seed decides it.
+
+    Parameters
+    ----------
+    weight : (N,) float
+        Not negative, not all zero; they need not sum to 1.
+    count : int
+        How many to draw, M.
+    offset : float
+        In [0, 1).
+
+    Returns
+    -------
+    (M,) int64
+        Ascending.
+
+    Examples
+    --------
+    >>> systematic_resample(np.array([0.1, 0.6, 0.3]), 4, 0.5)
+    array([1, 1, 1, 2])
+    """
+    total = 0.0
+    for w in weight:
+        total += w
+    chosen = np.empty(count, np.int64)
+    last, below = 0, float(weight[0])
+    for m in range(count):
+        at = (m + offset) / count * total
+        while below <= at and last < len(weight) - 1:
+            last += 1
+            below += weight[last]
+        chosen[m] = last
+    return chosen
+
+
+def draw_again(particles: Particles, count: int, rng: np.random.Generator) -> Particles:
+    """Draw particles by weight, each then carrying the same share.
+
+    Parameters
+    ----------
+    particles : Particles
+    count : int
+        How many to draw.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    Particles
+        With the same sum of weights; none when that is zero.
+    """
+    total = particles.weight.sum(dtype=np.float64)
+    if total == 0 or count == 0:
+        return Particles.none()
+    chosen = systematic_resample(particles.weight, count, rng.random())
+    return Particles(*_take(particles.position, particles.velocity, chosen), np.full(count, total / count, np.float32))
+
+
+@njit(cache=True)
+def _take(position, velocity, chosen):
+    there, then = np.empty((len(chosen), 2), np.float32), np.empty((len(chosen), 2), np.float32)
+    for m in range(len(chosen)):
+        there[m, 0], there[m, 1] = position[chosen[m], 0], position[chosen[m], 1]
+        then[m, 0], then[m, 1] = velocity[chosen[m], 0], velocity[chosen[m], 1]
+    return there, then
+
+
+def draw_newborn(newborn: NDArray, spec: GridSpec, count: int, max_speed: float, rng: np.random.Generator) -> Particles:
+    """Draw new particles in cells by newborn mass, each carrying the same share.
+
+    Parameters
+    ----------
+    newborn : (H, W) float32
+        Dynamic mass that has no particles yet.
+    spec : GridSpec
+        The cells.
+    count : int
+        How many to draw.
+    max_speed : float
+        Of the velocity prior, m/s.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    Particles
+        Anywhere in their cells, with velocities from the prior; none when nothing is newborn.
+    """
+    total = newborn.sum(dtype=np.float64)
+    if total == 0 or count == 0:
+        return Particles.none()
+    chosen = systematic_resample(newborn.ravel(), count, rng.random())
+    position = _anywhere(chosen, rng.random((count, 2), np.float32), spec.shape[1], spec.x_max, spec.y_max, spec.cell)
+    return Particles(position, draw_velocities(count, max_speed, rng), np.full(count, total / count, np.float32))
+
+
+@njit(cache=True)
+def _anywhere(cells, part, width, x_max, y_max, cell):
+    position = np.empty_like(part)
+    for m in range(len(cells)):
+        row, col = divmod(cells[m], width)
+        position[m, 0] = x_max - (row + part[m, 0]) * cell
+        position[m, 1] = y_max - (col + part[m, 1]) * cell
+    return position
+
+
+def draw_velocities(count: int, max_speed: float, rng: np.random.Generator) -> NDArray[np.float32]:
+    """Draw velocities of things of which nothing is known but that they move.
+
+    Any heading; the speed is the square of a uniform number, so that slow is more frequent than fast and
+    one in four is no faster than a pedestrian (uniform in the plane, it would be one in two hundred).
+
+    Parameters
+    ----------
+    count : int
+        M.
+    max_speed : float
+        m/s.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    (M, 2) float32
+        m/s.
+    """
+    speed = max_speed * rng.random(count, np.float32) ** 2
+    heading = np.float32(2 * np.pi) * rng.random(count, np.float32)
+    return np.stack([speed * np.cos(heading), speed * np.sin(heading)], axis=1)
