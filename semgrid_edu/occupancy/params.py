@@ -84,16 +84,16 @@ class CmcdotParams:
 
 
 def transition_matrix(params: CmcdotParams, dt: float) -> NDArray[np.float64]:
-    """Return the transition matrix of a time step, M = exp(Q dt), by uniformisation.
+    """Return the transition matrix of a time step, M = exp(R dt), by uniformisation.
 
-    With L the largest rate at which a state is left, A = (Q + L I) dt has no negative entry, and exp(Q dt) is the sum
+    With r the largest rate at which a state is left, A = (R + r I) dt has no negative entry, and exp(R dt) is the sum
     of A^k / k!, its rows scaled to 1. The sum is taken over a small part of the time step, which is then doubled.
     `scipy.linalg.expm` gives the same, but takes eight milliseconds where its BLAS has two threads to wake.
 
     Parameters
     ----------
     params : CmcdotParams
-        Its rates are the off-diagonal of Q, whose rows sum to zero.
+        Its rates are the off-diagonal of R, whose rows sum to zero.
     dt : float
         Seconds, not negative.
 
@@ -109,12 +109,12 @@ def transition_matrix(params: CmcdotParams, dt: float) -> NDArray[np.float64]:
     """
     if not (np.isfinite(dt) and dt >= 0):
         raise ArgumentError("dt", "seconds, not negative", dt)
-    Q = np.array(params.rates, dtype=np.float64)
-    np.fill_diagonal(Q, 0)
-    leaving = Q.sum(axis=1)
-    np.fill_diagonal(Q, leaving.max() - leaving)
+    R = np.array(params.rates, dtype=np.float64)
+    np.fill_diagonal(R, 0)
+    leaving = R.sum(axis=1)
+    np.fill_diagonal(R, leaving.max() - leaving)
     doublings = max(0, np.frexp(leaving.max())[1] + np.frexp(dt)[1] + 1)
-    A = Q * np.ldexp(dt, -doublings)
+    A = R * np.ldexp(dt, -doublings)
     M = np.eye(4)
     for k in range(14, 0, -1):
         M = np.eye(4) + A @ M / k

@@ -197,11 +197,11 @@ def test_transition_matrix_composes_over_time():
     st.floats(0, 100) | st.sampled_from([1e-9, 0.1]),
 )
 def test_transition_matrix_is_scipys_matrix_exponential(rates, dt):
-    Q = np.array(rates).reshape(4, 4)
-    M = transition_matrix(replace(PARAMS, rates=tuple(map(tuple, Q))), dt)
-    np.fill_diagonal(Q, 0)
-    np.fill_diagonal(Q, -Q.sum(axis=1))
-    np.testing.assert_allclose(M, expm(Q * dt), atol=1e-10)
+    R = np.array(rates).reshape(4, 4)
+    M = transition_matrix(replace(PARAMS, rates=tuple(map(tuple, R))), dt)
+    np.fill_diagonal(R, 0)
+    np.fill_diagonal(R, -R.sum(axis=1))
+    np.testing.assert_allclose(M, expm(R * dt), atol=1e-10)
 
 
 def test_transition_matrix_over_ages_is_where_the_chain_ends():
