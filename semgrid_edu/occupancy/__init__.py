@@ -6,15 +6,9 @@ before it: the binary grid, and the exact filter on a lattice of velocities.
 """
 
 from semgrid_edu.occupancy.bof import Bof
-from semgrid_edu.occupancy.bof_steps import (
-    BofParams,
-    BofState,
-    bof_move,
-    bof_predict,
-    bof_predict_literal,
-    bof_update,
-    bof_velocity,
-)
+from semgrid_edu.occupancy.bof_literal import bof_predict_literal
+from semgrid_edu.occupancy.bof_state import BofParams, BofState
+from semgrid_edu.occupancy.bof_steps import bof_move, bof_predict, bof_update, bof_velocity
 from semgrid_edu.occupancy.cmcdot import Cmcdot
 from semgrid_edu.occupancy.evidence import Evidence, scan_evidence, scan_evidence_literal
 from semgrid_edu.occupancy.log_odds import (

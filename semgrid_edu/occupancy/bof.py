@@ -3,7 +3,8 @@
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.bof_steps import BofParams, BofState, bof_move, bof_predict, bof_update, bof_velocity
+from semgrid_edu.occupancy.bof_state import BofParams, BofState
+from semgrid_edu.occupancy.bof_steps import bof_move, bof_predict, bof_update, bof_velocity
 from semgrid_edu.occupancy.cmcdot import MAX_YAW
 from semgrid_edu.occupancy.evidence import beam_reach, evidence_in_cells
 from semgrid_edu.occupancy.local_belief import local_belief

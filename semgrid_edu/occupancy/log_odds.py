@@ -51,7 +51,7 @@ class LogOddsParams:
 
 
 def log_odds(p: ArrayLike) -> NDArray[np.floating]:
-    """Return l = log(p / (1 - p)) of a probability between 0 and 1.
+    """Return L = log(p / (1 - p)) of a probability between 0 and 1.
 
     Examples
     --------
@@ -62,15 +62,15 @@ def log_odds(p: ArrayLike) -> NDArray[np.floating]:
     return np.log(p) - np.log1p(-p)
 
 
-def probability(l: ArrayLike) -> NDArray[np.floating]:  # noqa: E741, the field's symbol
-    """Return p = 1 / (1 + exp(-l)), the inverse of `log_odds`."""
-    return 1 / (1 + np.exp(-np.asarray(l)))
+def probability(L: ArrayLike) -> NDArray[np.floating]:
+    """Return p = 1 / (1 + exp(-L)), the inverse of `log_odds`."""
+    return 1 / (1 + np.exp(-np.asarray(L)))
 
 
-def update_log_odds(l: NDArray, evidence: Evidence, params: LogOddsParams) -> NDArray[np.floating]:  # noqa: E741
+def update_log_odds(L: NDArray, evidence: Evidence, params: LogOddsParams) -> NDArray[np.floating]:
     """Take in one scan by Bayes' rule, which is a sum in log-odds.
 
-        l(o | z) = l(o) + log( P(z | occupied) / P(z | free) )
+        L(o | z) = L(o) + log( P(z | occupied) / P(z | free) )
 
     P(z), the same for both states, has dropped out of the ratio. Nothing is subtracted, for the evidence
     is a likelihood. With an inverse sensor model, P(o | z), whose log-odds hold the prior already, the prior's
@@ -78,7 +78,7 @@ def update_log_odds(l: NDArray, evidence: Evidence, params: LogOddsParams) -> ND
 
     Parameters
     ----------
-    l : (H, W) float
+    L : (H, W) float
         Log-odds before the scan.
     evidence : Evidence
         Of the scan, likelihoods >= 0.
@@ -91,7 +91,7 @@ def update_log_odds(l: NDArray, evidence: Evidence, params: LogOddsParams) -> ND
         Log-odds given the scan, within the bounds.
     """
     ratio = np.log(np.maximum(evidence.occupied, TINY)) - np.log(np.maximum(evidence.free, TINY))
-    return np.clip(l + ratio, *log_odds([params.lowest, params.highest]).astype(l.dtype))
+    return np.clip(L + ratio, *log_odds([params.lowest, params.highest]).astype(L.dtype))
 
 
 def smear_area(p_occupied: NDArray, left: NDArray[np.bool_], spec: GridSpec) -> float:

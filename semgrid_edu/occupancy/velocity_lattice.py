@@ -65,6 +65,38 @@ class VelocityLattice:
         density = np.append(0, speed[1:] ** -1.5)
         return density / density.sum()
 
+    @cached_property
+    def neighbours(self) -> NDArray[np.int64]:
+        """(V, 4): the velocities one spacing ahead, behind, to the left and right; itself where there is none.
+
+        Zero has no neighbours and is nobody's: what stands doesn't move by accelerating a little.
+        """
+        steps = np.rint(self.velocities / self.spacing).astype(int)
+        index = {tuple(step): k for k, step in enumerate(steps) if k > 0}
+        around = np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])
+        moving = [[index.get(tuple(step + side), k) for side in around] for k, step in enumerate(steps) if k > 0]
+        return np.array([[0, 0, 0, 0], *moving])
+
+    def change_probability(self, max_acceleration: float, dt: float) -> float:
+        """Return the probability that mass changes to one given neighbour within `dt`.
+
+        A particle of CMCDOT changes each component of its velocity by a uniform number up to a dt, of variance (a dt)^2 / 3. A
+        walk to either neighbour, at probability p each, has variance 2 p spacing^2.
+
+        Parameters
+        ----------
+        max_acceleration : float
+            Largest acceleration along each axis, a, m/s^2.
+        dt : float
+            Seconds.
+
+        Returns
+        -------
+        float
+            p = (a dt)^2 / (6 spacing^2), but at most 1/5: then it and its neighbours are equally likely.
+        """
+        return min((max_acceleration * dt / self.spacing) ** 2 / 6, 0.2)
+
     def __len__(self) -> int:
         """Return the number of velocities, V."""
         return len(self.velocities)

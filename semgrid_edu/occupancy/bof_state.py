@@ -1,0 +1,79 @@
+"""What the BOF believes of each cell, and what it assumes: a distribution over velocities (Coue et al., IJRR 2006)."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.params import CmcdotParams
+from semgrid_edu.occupancy.velocity_lattice import VelocityLattice
+
+MOST_BYTES = 2e9
+"""Memory that the occupied mass may take: a step needs twice as much, which a student's computer has."""
+
+
+@dataclass(frozen=True)
+class BofParams:
+    """What the BOF assumes: the model of CMCDOT, with a lattice of velocities in place of particles.
+
+    Parameters
+    ----------
+    lattice : VelocityLattice
+        The velocities it tells apart.
+    world : CmcdotParams
+        Sensor and world. The number of particles and what is spent on births don't matter here, nor does
+        `max_speed`, for the lattice has its own.
+    """
+
+    lattice: VelocityLattice = field(default_factory=VelocityLattice)
+    world: CmcdotParams = field(default_factory=CmcdotParams)
+
+
+@dataclass(frozen=True, eq=False)
+class BofState:
+    """What the BOF carries from step to step: a distribution over free, unknown and V velocities in each cell.
+
+    Each velocity's mass is shifted by whole cells, and the rest of its displacement is kept beside: so no
+    mass is ever spread by interpolation, and slow things move too, a cell every few steps. Nor does
+    the lattice turn with the map; its velocities are expressed in the map's axes.
+
+    Parameters
+    ----------
+    free, unknown : (H, W) float32
+        P(FREE) and P(UNKNOWN).
+    occupied : (V, H, W) float32
+        P(occupied, velocity). The first velocity is zero: its mass is STATIC, that of all others DYNAMIC.
+    velocity : (V, 2) float64
+        The lattice in the axes of the map, m/s.
+    remainder : (V, 2) float64
+        How far, beyond whole cells, each velocity has moved its mass, metres along the axes of the map.
+    """
+
+    free: NDArray[np.float32]
+    unknown: NDArray[np.float32]
+    occupied: NDArray[np.float32]
+    velocity: NDArray[np.float64]
+    remainder: NDArray[np.float64]
+
+    @classmethod
+    def nothing_known(cls, spec: GridSpec, lattice: VelocityLattice) -> "BofState":
+        """Return the state of one who has seen nothing: UNKNOWN everywhere.
+
+        Raises
+        ------
+        ArgumentError
+            When lattice times grid is too much for memory.
+        """
+        shape = (len(lattice), *spec.shape)
+        if (size := 4 * float(np.prod(shape, dtype=float))) > MOST_BYTES:
+            expected = f"velocities x cells that take at most {MOST_BYTES / 1e9:g} GB"
+            raise ArgumentError("lattice", expected, "{} x {} x {}, ".format(*shape) + f"{size / 1e9:.1f} GB")
+        free, unknown = np.zeros(spec.shape, np.float32), np.ones(spec.shape, np.float32)
+        return cls(free, unknown, np.zeros(shape, np.float32), lattice.velocities, np.zeros((len(lattice), 2)))
+
+    @property
+    def probability(self) -> NDArray[np.floating]:
+        """(4, H, W): P(FREE), P(STATIC), P(DYNAMIC), P(UNKNOWN)."""
+        return np.stack([self.free, self.occupied[0], self.occupied[1:].sum(axis=0), self.unknown])
