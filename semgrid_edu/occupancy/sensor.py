@@ -1,12 +1,13 @@
 """The LIDAR as the filter knows it: how it errs, and which of its returns count (paper, section 3.2)."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,8 @@ class SensorModel:
     vehicle : (float, float, float, float)
         Outline of the vehicle itself, x_min, x_max, y_min, y_max in the grid frame, metres: an obstacle in it is the
         vehicle's own bonnet or mirror. That of KITTI's estate car, whose LIDAR sees the end of its bonnet 2.5 m ahead.
+    ground : GroundParams or None
+        How the ground is found from which heights count; None for flat ground at z = 0.
 
     Raises
     ------
@@ -50,6 +53,7 @@ class SensorModel:
     p_pass_occupied: float = 0.3
     p_pass_free: float = 0.7
     vehicle: tuple[float, float, float, float] = (-2.1, 2.7, -1.1, 1.1)
+    ground: GroundParams | None = field(default_factory=GroundParams)
 
     def __post_init__(self) -> None:
         """Refuse a sensor that is impossible, or never errs: certainty can't be corrected."""
@@ -76,25 +80,30 @@ class SensorModel:
 
 
 def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray:
-    """Make a scan fit for evidence: check it, and leave out what the vehicle itself sends back.
+    """Make a scan fit for evidence: check it, leave out what the vehicle itself sends back, and find the ground.
 
     Parameters
     ----------
     points : (N, 3+) float
-        Returns: x forward, y left, z above the ground (m), in the grid frame of the vehicle; N may be 0.
+        Returns: x forward, y left, z above the ground on which the vehicle stands (m), in its grid frame; N may be 0.
     sensor : SensorModel
-        For the vehicle's outline.
+        For the vehicle's outline, and how the ground is found.
 
     Returns
     -------
-    (M, 3+) float
+    (M, 3) float
+        The others, in their order: x, y, and the height above the ground at that place (m).
 
     Raises
     ------
     ArgumentError
         When `points` isn't a table of finite coordinates.
     """
-    return without_own_returns(check_points(points), sensor)
+    points = without_own_returns(check_points(points), sensor)[:, :3]
+    if sensor.ground is None:
+        return points
+    height = height_above_ground(points, sensor.ground)
+    return np.column_stack([points[:, :2], height.astype(np.result_type(points, np.float32))])
 
 
 def check_points(points: NDArray) -> NDArray:

@@ -1,0 +1,254 @@
+"""Where the ground lies under each return: walked outward from the vehicle (after Himmelsbach et al., IV 2010).
+
+What counts as an obstacle is decided by height above the ground, and no street is flat: a car's body pitches, roads
+rise, verges slope. `height_above_ground_literal` says how the ground is found, sector by sector;
+`height_above_ground` is the same, fast.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import ArgumentError
+
+
+@dataclass(frozen=True)
+class GroundParams:
+    """How ground can look to a LIDAR on a road vehicle.
+
+    From the last ground found along a sector, what lies d metres farther out is ground as well when it is no more than
+    min(step + slope d, rise + grade d) higher or lower: steep for a short way, gentle over a long one. Where ground
+    was hidden for more than `gap` metres, d = gap.
+
+    Parameters
+    ----------
+    sectors : int
+        Sectors of azimuth in a turn, each walked by itself: 1 degree, which holds a column of returns of any
+        scanner of this project.
+    bin : float
+        Length of a bin along a sector, metres: shorter than a car's bonnet, so that its front is seen to stand.
+    farthest : float
+        Where the walk ends, metres: KITTI's scanner has no ground returns beyond; ground farther out is level.
+    step : float
+        A height that ground may jump, metres: most of a kerb.
+    slope : float
+        The steepest short slope: 1:3, that of the steepest embankments that a car can cross (AASHTO, Roadside
+        Design Guide).
+    rise : float
+        Heights that differ by more, metres, aren't both ground, however far apart on level ground; nor is what lies
+        in a bin where returns differ by more: something stands there.
+    grade : float
+        What is added to `rise` for each metre: roads in towns rise up to about 5 in 100.
+    gap : float
+        The widest gap between two rings on level ground that counts, metres: that of KITTI's scanner at 50 m.
+    neighbours : int
+        The ground of a sector is the median of its own and so many on each side: cars and houses hide it in some.
+
+    Raises
+    ------
+    ArgumentError
+        When a parameter can't be one.
+    """
+
+    sectors: int = 360
+    bin: float = 0.25
+    farthest: float = 80.0
+    step: float = 0.1
+    slope: float = 1 / 3
+    rise: float = 0.3
+    grade: float = 0.05
+    gap: float = 10.0
+    neighbours: int = 3
+
+    def __post_init__(self) -> None:
+        """Refuse a walk that goes nowhere."""
+        for name in ("sectors", "neighbours"):
+            if not isinstance(getattr(self, name), int | np.integer) or getattr(self, name) < (name == "sectors"):
+                raise ArgumentError(name, "a whole number, at least 1 sector and 0 neighbours", getattr(self, name))
+        if 2 * self.neighbours >= self.sectors:
+            raise ArgumentError("neighbours", f"less than half of the {self.sectors} sectors", self.neighbours)
+        for name in ("step", "slope", "rise", "grade", "gap"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
+                raise ArgumentError(name, "a finite number, not negative", getattr(self, name))
+        if not (np.isfinite(self.farthest) and 0 < self.bin <= self.farthest):
+            raise ArgumentError("bin", f"metres, above 0 and up to farthest, {self.farthest}", self.bin)
+
+    @property
+    def bins(self) -> int:
+        """Number of bins along a sector."""
+        return int(np.ceil(self.farthest / self.bin))
+
+
+def height_above_ground(points: NDArray, params: GroundParams) -> NDArray[np.float32]:
+    """Return how high each return of a scan is above the ground below it.
+
+    Parameters
+    ----------
+    points : (N, 3+) float
+        Returns: x forward, y left, z above the point of the ground on which the vehicle stands (m), in the grid frame
+        of the vehicle.
+    params : GroundParams
+        How ground can look.
+
+    Returns
+    -------
+    (N,) float32
+        Metres; z where no ground is found. That of `height_above_ground_literal`.
+    """
+    lowest, highest, distance, place = _lowest_returns(points, params.sectors, params.bin, params.bins)
+    limits = (params.step, params.slope, params.rise, params.grade, params.gap)
+    profile, seen = _walk_all(lowest, highest, distance, params.bin, *limits)
+    return _heights(points, place, _median_of_neighbours(profile, seen, params.neighbours))
+
+
+def height_above_ground_literal(points: NDArray, params: GroundParams) -> NDArray[np.float64]:
+    """Return how high each return is above the ground: the literal twin of `height_above_ground`.
+
+    1. Walk outward along each sector of azimuth, and note where the ground lies (`walk_sector`).
+    2. The ground of a sector is the median of its own profile and its neighbours', of those that hold returns.
+    3. Subtract it.
+
+    Parameters and result are those of `height_above_ground`.
+    """
+    points = np.asarray(points, dtype=np.float64)
+    sector, bin_ = _polar_cells(points, params)
+    distance = np.hypot(points[:, 0], points[:, 1])
+    own = [walk_sector(distance[sector == s], points[sector == s, 2], params) for s in range(params.sectors)]
+    seen = set(sector)
+    around = range(-params.neighbours, params.neighbours + 1)
+    height = points[:, 2].copy()
+    for s in seen:
+        beside = [own[(s + k) % params.sectors] for k in around if (s + k) % params.sectors in seen]
+        height[sector == s] -= np.median(beside, axis=0)[bin_[sector == s]]
+    return height
+
+
+def walk_sector(distance: NDArray, z: NDArray, params: GroundParams) -> NDArray[np.float64]:
+    """Walk outward along one sector, from the ground on which the vehicle stands: the height of the ground in each bin.
+
+    Of each bin the lowest return is asked whether it can be ground, given the last ground before it. Bins with returns
+    that differ by more than `rise` aren't asked: something stands there. Between ground and ground it runs straight,
+    beyond the last it is level.
+
+    Parameters
+    ----------
+    distance, z : (N,) float
+        The returns of the sector: distance from the vehicle as seen from above, and height, metres.
+    params : GroundParams
+        How ground can look.
+
+    Returns
+    -------
+    (B,) float64
+        Height of the ground in the middle of each bin, metres.
+
+    Examples
+    --------
+    A road that rises by 3 in 100, and a wall 12 m ahead:
+
+    >>> distance = np.array([4.0, 6.0, 9.0, 12.0, 12.0, 12.0])
+    >>> z = np.array([0.12, 0.18, 0.27, 0.5, 1.0, 1.5])
+    >>> walk_sector(distance, z, GroundParams(bin=4, farthest=16)).round(2)
+    array([0.06, 0.18, 0.27, 0.27])
+    """
+    ground_at, ground = [0.0], [0.0]
+    for b in range(params.bins):
+        here = np.flatnonzero(np.floor(distance / params.bin) == b)
+        if len(here) == 0 or np.ptp(z[here]) > params.rise:
+            continue
+        lowest = here[z[here].argmin()]
+        farther = min(distance[lowest] - ground_at[-1], params.gap)
+        allowed = min(params.step + params.slope * farther, params.rise + params.grade * farther)
+        if abs(z[lowest] - ground[-1]) <= allowed:
+            ground_at.append(distance[lowest])
+            ground.append(z[lowest])
+    return np.interp((np.arange(params.bins) + 0.5) * params.bin, ground_at, ground)
+
+
+def _polar_cells(points: NDArray, params: GroundParams) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return sector and bin of each point; what is farther away than the last bin counts to it."""
+    x, y = points[:, 0], points[:, 1]
+    sector = ((np.arctan2(y, x) + np.pi) * (params.sectors / (2 * np.pi))).astype(int)
+    bin_ = np.minimum(np.hypot(x, y) / params.bin, params.bins - 1).astype(int)
+    return np.minimum(sector, params.sectors - 1), bin_
+
+
+@njit(cache=True)
+def _lowest_returns(points, sectors, bin_, bins):
+    """Find the lowest and highest return of each bin of each sector, and in which of these each return lies."""
+    lowest, highest = np.full((sectors, bins), np.inf), np.full((sectors, bins), -np.inf)
+    distance, place = np.zeros((sectors, bins)), np.empty(len(points), np.int32)
+    for i in range(len(points)):
+        x, y, z = np.float64(points[i, 0]), np.float64(points[i, 1]), points[i, 2]
+        away = np.sqrt(x * x + y * y)
+        s = min(int((np.arctan2(y, x) + np.pi) * (sectors / (2 * np.pi))), sectors - 1)
+        b = int(min(away / bin_, bins))
+        place[i] = s * bins + min(b, bins - 1)
+        if b < bins:
+            highest[s, b] = max(highest[s, b], z)
+            if z < lowest[s, b]:
+                lowest[s, b], distance[s, b] = z, away
+    return lowest, highest, distance, place
+
+
+@njit(cache=True, parallel=True)
+def _walk_all(lowest, highest, distance, bin_, step, slope, rise, grade, gap):
+    """Walk all sectors: the height of the ground in each bin, and whether the sector holds returns."""
+    sectors, bins = lowest.shape
+    profile, seen = np.empty((sectors, bins), np.float32), np.zeros(sectors, np.bool_)
+    for s in prange(sectors):
+        ground_at, ground, filled = 0.0, 0.0, 0
+        for b in range(bins):
+            if highest[s, b] < lowest[s, b]:
+                continue
+            seen[s] = True
+            farther = min(distance[s, b] - ground_at, gap)
+            allowed = min(step + slope * farther, rise + grade * farther)
+            if highest[s, b] - lowest[s, b] > rise or abs(lowest[s, b] - ground) > allowed:
+                continue
+            while filled < bins and (filled + 0.5) * bin_ <= distance[s, b]:
+                part = ((filled + 0.5) * bin_ - ground_at) / (distance[s, b] - ground_at)
+                profile[s, filled] = ground + part * (lowest[s, b] - ground)
+                filled += 1
+            ground_at, ground = distance[s, b], lowest[s, b]
+        profile[s, filled:] = ground
+    return profile, seen
+
+
+@njit(cache=True, parallel=True)
+def _median_of_neighbours(profile, seen, neighbours):
+    """Take the median of each sector and its neighbours, of those that hold returns."""
+    sectors, bins = profile.shape
+    ground = np.zeros_like(profile)
+    for s in prange(sectors):
+        beside = np.empty((2 * neighbours + 1, bins), np.float32)
+        n = 0
+        for k in range(s - neighbours, s + neighbours + 1):
+            if seen[k % sectors]:
+                beside[n] = profile[k % sectors]
+                n += 1
+        if n > 0:
+            _sort_each_bin(beside[:n])
+            ground[s] = (beside[(n - 1) // 2] + beside[n // 2]) / 2
+    return ground
+
+
+@njit(cache=True, inline="always")
+def _sort_each_bin(rows):
+    """Sort (n, B) along the first axis: bubble sort of a few rows, all bins at once."""
+    for last in range(len(rows) - 1, 0, -1):
+        for k in range(last):
+            for b in range(rows.shape[1]):
+                low, high = rows[k, b], rows[k + 1, b]
+                rows[k, b], rows[k + 1, b] = min(low, high), max(low, high)
+
+
+@njit(cache=True)
+def _heights(points, place, ground):
+    """Subtract the ground at its place from the height of each return."""
+    height, ground = np.empty(len(points), np.float32), ground.ravel()
+    for i in range(len(points)):
+        height[i] = points[i, 2] - ground[place[i]]
+    return height
