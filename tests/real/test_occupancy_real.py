@@ -74,9 +74,20 @@ def test_the_fence_is_static(drive):
     frames, beliefs, _ = drive
     static = 0
     for frame, belief in zip(frames, beliefs, strict=True):
-        fence = returned(frame) & (centre_x > 4) & (centre_x < 25) & (centre_y < -5.2)
+        above_the_verge = hit_cells(frame.points_grid, SPEC, low=0.8)
+        fence = above_the_verge & (centre_x > 4) & (centre_x < 25) & (centre_y < -5.2)
         static += (belief.probability.argmax(axis=0) == State.STATIC)[fence].mean() / len(frames)
     assert static >= 0.99
+
+
+def test_the_verges_are_not_taken_for_obstacles(drive):
+    """Left of the road grass rises to 0.6 m; in the strip before the fence, to 0.55 m. Two trunks stand on the left."""
+    frames, beliefs, _ = drive
+    for frame, belief in zip(frames, beliefs, strict=True):
+        grass = (centre_x > 5) & (centre_x < 20) & (centre_y > 3) & (centre_y < 9)
+        verge = returned(frame) & ~hit_cells(frame.points_grid, SPEC, least=1, low=0.8) & grass
+        assert verge.sum() > 200
+        assert (belief.probability.argmax(axis=0) == State.FREE)[verge].mean() > 0.97
 
 
 def test_little_else_is_dynamic(drive):
