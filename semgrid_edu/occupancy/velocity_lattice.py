@@ -80,8 +80,8 @@ class VelocityLattice:
     def change_probability(self, max_acceleration: float, dt: float) -> float:
         """Return the probability that mass changes to one given neighbour within `dt`.
 
-        A particle of CMCDOT changes each component of its velocity by a uniform number up to a dt, of variance (a dt)^2 / 3. A
-        walk to either neighbour, at probability p each, has variance 2 p spacing^2.
+        A particle of CMCDOT changes each component of its velocity by a uniform number up to a dt, of variance
+        (a dt)^2 / 3. A step to either neighbour, with probability p each, has variance 2 p spacing^2.
 
         Parameters
         ----------

@@ -1,0 +1,418 @@
+"""The BOF: against its literal twin, CMCDOT's own prediction, filterpy, and answers found by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from filterpy import discrete_bayes
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.experiments.occupancy import hit_cells
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import (
+    Bof,
+    BofParams,
+    BofState,
+    CmcdotParams,
+    Evidence,
+    FilterState,
+    Particles,
+    PlanarMotion,
+    State,
+    VelocityLattice,
+    bof_move,
+    bof_predict,
+    bof_predict_literal,
+    bof_update,
+    bof_velocity,
+    predict,
+    transition_matrix,
+    update,
+)
+from semgrid_edu.occupancy.particles import cells_of, weight_in_cells
+from semgrid_edu.occupancy.resampling import draw_velocities
+from semgrid_edu.simulation.boxes import Box, cells_in, scan_boxes
+
+FREE, STATIC, DYNAMIC, UNKNOWN = State
+GRID = GridSpec(0, 3, -1, 1, 0.5)
+LINE = GridSpec(0, 5, 0, 0.5, 0.5)
+LATTICE = VelocityLattice(max_speed=8.0, spacing=4.0)
+PARAMS = BofParams(LATTICE)
+STILL = CmcdotParams(rates=((0.0,) * 4,) * 4, stop_rate=0.0, max_acceleration=0.0, first_sight=(0.85, 0.15, 0.0))
+ONLY_FLIGHT = BofParams(LATTICE, STILL)
+EXACT = 0.125
+"""Seconds in which 4 m/s are exactly one cell of half a metre."""
+
+
+def random_state(seed: int, spec: GridSpec = GRID, lattice: VelocityLattice = LATTICE) -> BofState:
+    """Return a state in which some cells are crowded and others empty, and any remainder is possible."""
+    rng = np.random.default_rng(seed)
+    mass = np.moveaxis(rng.dirichlet(np.full(len(lattice) + 2, 0.1), spec.shape), -1, 0).astype(np.float32)
+    remainder = rng.uniform(-0.5, 0.5, lattice.velocities.shape) * spec.cell
+    return BofState(mass[0], mass[1], mass[2:], lattice.velocities, remainder)
+
+
+def bin_of(vx: float, vy: float = 0.0) -> int:
+    """Return the index of a velocity of the lattice."""
+    return int(np.flatnonzero((LATTICE.velocities == (vx, vy)).all(axis=1))[0])
+
+
+def movers(cars: dict[int, tuple[float, float]]) -> BofState:
+    """Return free cells on a line with moving mass in some: row -> (velocity along x, probability)."""
+    free, occupied = np.ones(LINE.shape, np.float32), np.zeros((len(LATTICE), *LINE.shape), np.float32)
+    for row, (velocity, mass) in cars.items():
+        free[row], occupied[bin_of(velocity), row] = 1 - mass, mass
+    unknown, remainder = np.zeros(LINE.shape, np.float32), np.zeros((len(LATTICE), 2))
+    return BofState(free, unknown, occupied, LATTICE.velocities, remainder)
+
+
+def predicted(state: BofState, steps: int, params: BofParams = ONLY_FLIGHT, dt: float = EXACT) -> BofState:
+    """Predict several times, with nobody looking."""
+    for _ in range(steps):
+        state = bof_predict(state, LINE, params, dt)
+    return state
+
+
+def assert_sound(state: BofState) -> None:
+    """Each cell is a distribution."""
+    assert np.abs(state.probability.sum(axis=0) - 1).max() < 1e-5
+    assert min(state.free.min(), state.unknown.min(), state.occupied.min()) >= -1e-6
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 1000), st.sampled_from([0.0, 0.03, EXACT, 0.7, 30.0]), st.booleans())
+def test_fast_and_literal_prediction_agree(seed, dt, shifted):
+    state = random_state(seed)
+    params = replace(PARAMS, world=replace(PARAMS.world, stop_speed=3.0)) if shifted else PARAMS
+    fast, literal = (f(state, GRID, params, dt) for f in (bof_predict, bof_predict_literal))
+    for name in ("free", "unknown", "occupied", "remainder"):
+        assert np.allclose(getattr(fast, name), getattr(literal, name), atol=2e-6), name
+    assert literal.occupied.dtype == np.float64
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 1000))
+def test_prediction_is_that_of_cmcdot_when_its_particles_lie_on_the_lattice(seed):
+    """One particle a cell and velocity, anywhere in its cell: in whole cells both do the same, mass by mass."""
+    rng, world = np.random.default_rng(seed), replace(CmcdotParams(), max_acceleration=0.0, stop_speed=3.0)
+    state = replace(random_state(seed), remainder=np.zeros((len(LATTICE), 2)))
+    velocity, row, col = (index.ravel() for index in np.indices(state.occupied[1:].shape))
+    corner = np.stack([row, col], axis=1) + rng.uniform(0.05, 0.95, (len(row), 2))
+    position = ((GRID.x_max, GRID.y_max) - corner * GRID.cell).astype(np.float32)
+    particles = Particles(position, LATTICE.velocities[1:][velocity].astype(np.float32), state.occupied[1:].ravel())
+    twin = FilterState(state.probability, particles, np.zeros(GRID.shape, np.float32))
+
+    twin = predict(twin, GRID, world, EXACT, rng)
+    state = bof_predict(state, GRID, BofParams(LATTICE, world), EXACT)
+    assert np.allclose(state.probability, twin.probability, atol=2e-6)
+    for k in range(1, len(LATTICE)):
+        of_bin = velocity == k - 1
+        cells = cells_of(twin.particles.position[of_bin], GRID)
+        carried = weight_in_cells(twin.particles.weight[of_bin], cells, GRID.shape)
+        assert np.allclose(state.occupied[k], carried + LATTICE.prior[k] * twin.newborn, atol=2e-6)
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 1000), st.sampled_from([(0.8, 0.05), (0.3, 0.7), (1.0, 1.0), (0.0, 1.0)]))
+def test_one_cell_without_motion_is_filterpys_discrete_bayes(seed, scan):
+    spec = GridSpec(0, 1, 0, 1, 1)
+    params = BofParams(LATTICE, replace(CmcdotParams(), stop_rate=0.0, max_acceleration=0.0))
+    nowhere = np.zeros((len(LATTICE), 2))
+    state = replace(random_state(seed, spec), velocity=nowhere, remainder=nowhere)
+    expected = state.probability[:, 0, 0].astype(np.float64)
+
+    state = bof_predict(state, spec, params, 0.4)
+    expected = expected @ transition_matrix(params.world, 0.4)
+    assert np.allclose(state.probability[:, 0, 0], expected, atol=1e-5)
+    if scan[0] != scan[1]:
+        expected = expected + expected[UNKNOWN] * np.array([*params.world.first_sight, -1])
+    state = bof_update(state, spec, Evidence(np.array([[scan[0]]]), np.array([[scan[1]]])), params)
+    expected = discrete_bayes.update(np.array([scan[1], scan[0], scan[0], scan[1]]), expected)
+    assert np.allclose(state.probability[:, 0, 0], expected, atol=1e-5)
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(0, 0.99), min_size=4, max_size=4))
+def test_mass_moves_one_cell_a_step_and_leaves_free_space(mass):
+    """What filterpy's prediction does to a distribution over places: an exact shift."""
+    state = movers({5 + k: (4.0, p) for k, p in enumerate(mass)})
+    expected = np.pad(np.array(mass), (5, 1))
+    for _ in range(3):
+        state = predicted(state, 1)
+        expected = discrete_bayes.predict(expected, offset=-1, kernel=[1.0])
+        assert np.allclose(state.probability[DYNAMIC, :, 0], expected, atol=1e-6)
+        assert np.allclose(state.free[:, 0], 1 - expected, atol=1e-6)
+
+
+def test_slow_mass_moves_too():
+    """1 m/s in steps of 0.1 s on cells of 0.5 m: 5 steps a cell, the first jump when half a cell is exceeded."""
+    lattice = VelocityLattice(1.0, 1.0)
+    occupied = np.zeros((5, *LINE.shape), np.float32)
+    occupied[4, 9] = 0.5
+    zero, half = np.zeros((5, 2)), np.float32(0.5)
+    state = BofState(1 - half * (occupied[4] > 0), np.zeros(LINE.shape, np.float32), occupied, lattice.velocities, zero)
+    rows = []
+    for _ in range(20):
+        state = bof_predict(state, LINE, BofParams(lattice, STILL), 0.1)
+        rows.append(int(state.occupied[4, :, 0].argmax()))
+    assert rows == [9] * 2 + [8] * 5 + [7] * 5 + [6] * 5 + [5] * 3
+    assert np.isclose(state.occupied[4].max(), 0.5)
+
+
+def test_objects_that_pass_between_cells_come_out_unchanged():
+    state = predicted(movers({8: (4.0, 0.6), 3: (-4.0, 0.7)}), 5)
+    assert np.allclose(state.occupied[bin_of(4.0), :, 0], 0.6 * (np.arange(10) == 3))
+    assert np.allclose(state.occupied[bin_of(-4.0), :, 0], 0.7 * (np.arange(10) == 8))
+
+
+def test_objects_that_meet_in_a_cell_share_its_probability():
+    """They claim 0.6 + 0.7 of it and get 0.999 in that proportion."""
+    state = predicted(movers({8: (4.0, 0.6), 4: (-4.0, 0.7)}), 2)
+    assert np.isclose(state.occupied[bin_of(4.0), 6, 0], 0.999 * 0.6 / 1.3)
+    assert np.isclose(state.occupied[bin_of(-4.0), 6, 0], 0.999 * 0.7 / 1.3)
+    assert np.allclose(bof_velocity(state)[0][:, 6, 0], [4 * (0.6 - 0.7) / 1.3, 0], atol=1e-6)
+
+
+def test_nothing_is_lost_but_over_the_border_and_nothing_comes_in():
+    state = predicted(movers(dict.fromkeys(range(10), (8.0, 0.5))), 2)
+    assert np.allclose(state.probability[DYNAMIC, :, 0], 0.5 * (np.arange(10) < 6))
+    assert_sound(predicted(state, 1, dt=1000.0))
+    assert predicted(state, 1, dt=1000.0).occupied[1:].max() == 0
+
+
+def test_a_standing_wall_is_not_talked_out_of_it():
+    """Arrival a = 0.6 against static s = 0.9: by hand, a (1 - s) / (1 - a s)."""
+    state = movers({8: (4.0, 0.6)})
+    state.free[7], state.occupied[0, 7] = 0.1, 0.9
+    state = predicted(state, 1)
+    assert np.isclose(state.probability[DYNAMIC, 7, 0], 0.6 * 0.1 / (1 - 0.6 * 0.9))
+    assert np.isclose(state.probability[STATIC, 7, 0], 0.4 * 0.9 / (1 - 0.6 * 0.9))
+
+
+def test_acceleration_spreads_velocities_with_the_variance_of_particles():
+    """Uniform up to 6 m/s^2 in 0.1 s: (0.6 m/s)^2 / 3 along each axis, away from the rim of the lattice."""
+    lattice = VelocityLattice(8.0, 1.0)
+    state = BofState.nothing_known(LINE, lattice)
+    state.unknown[:] = 0
+    state.occupied[(lattice.velocities == (4.0, 1.0)).all(axis=1)] = 1
+    moved = bof_predict(state, LINE, BofParams(lattice, replace(STILL, max_acceleration=6.0)), 0.1)
+    mean, covariance = bof_velocity(moved)
+    assert np.allclose(mean[:, 5, 0], [4, 1], atol=1e-5)
+    assert np.allclose(covariance[:, :, 5, 0], np.eye(2) * 0.6**2 / 3, atol=1e-4)
+
+
+def test_velocity_moments_of_two_movers_by_hand():
+    """0.1 at (4, 0) and 0.3 at (0, -4): mean (1, -3), E[v v^T] - mean mean^T = [[3, 3], [3, 3]]."""
+    state = movers({})
+    state.occupied[bin_of(4, 0), 2], state.occupied[bin_of(0, -4), 2] = 0.1, 0.3
+    mean, covariance = bof_velocity(state)
+    assert np.allclose(mean[:, 2, 0], [1, -3], atol=1e-5)
+    assert np.allclose(covariance[:, :, 2, 0], 3, atol=1e-5)
+    assert np.isnan(mean[:, :2]).all()
+    assert np.isnan(covariance[:, :, 3:]).all()
+
+
+@settings(deadline=None, max_examples=25)
+@given(
+    st.integers(0, 1000),
+    st.floats(0, 1),
+    st.floats(-3, 3),
+    st.floats(-3, 3),
+    st.floats(-4, 4),
+    st.sampled_from([0, 1e-30, 0.3, 1]),
+)
+def test_every_step_keeps_every_cell_a_distribution(seed, dt, dx, dy, dyaw, floor):
+    evidence = Evidence(*np.maximum(np.random.default_rng(seed).random((2, *GRID.shape)) ** 9, floor))
+    state = random_state(seed)
+    for step in (
+        lambda s: bof_move(s, GRID, PlanarMotion(dx, dy, dyaw)),
+        lambda s: bof_predict(s, GRID, PARAMS, dt),
+        lambda s: bof_update(s, GRID, evidence, PARAMS),
+    ):
+        state = step(state)
+        assert_sound(state)
+
+
+@given(st.integers(0, 1000))
+def test_update_is_that_of_cmcdot_and_leaves_velocities_alone(seed):
+    """A scan knows nothing of velocities: what moves keeps its distribution over them where nothing is born."""
+    state, rng = random_state(seed), np.random.default_rng(seed)
+    evidence = Evidence(*rng.uniform(0.1, 1, (2, *GRID.shape)))
+    given_scan = bof_update(state, GRID, evidence, ONLY_FLIGHT)
+    prior = FilterState(state.probability, Particles.none(), np.zeros(GRID.shape, np.float32))
+    assert np.allclose(given_scan.probability, update(prior, GRID, evidence, STILL).probability, atol=1e-6)
+    before, after = (s.occupied[1:] / np.maximum(s.probability[DYNAMIC], 1e-9) for s in (state, given_scan))
+    worth = np.minimum(state.probability[DYNAMIC], given_scan.probability[DYNAMIC]) > 1e-3
+    assert np.allclose(before[:, worth], after[:, worth], atol=1e-3)
+
+
+@pytest.mark.parametrize("certain", ["free", "occupied"])
+def test_contradiction_leaves_nothing_known(certain):
+    state = movers({})
+    if certain == "occupied":
+        state.free[:], state.occupied[0] = 0, 1
+    impossible = np.full(LINE.shape, float(certain == "free"))
+    state = bof_update(state, LINE, Evidence(impossible, 1 - impossible), PARAMS)
+    assert (state.unknown == 1).all()
+    assert_sound(state)
+
+
+def test_what_is_born_takes_the_prior_velocities():
+    """UNKNOWN cells that turn out occupied: the dynamic share of first sight over the lattice's prior."""
+    state = bof_update(
+        BofState.nothing_known(GRID, LATTICE), GRID, Evidence(np.ones(GRID.shape), np.zeros(GRID.shape)), PARAMS
+    )
+    static, dynamic = PARAMS.world.first_sight[1:]
+    assert np.allclose(state.occupied[1:, 0, 0], LATTICE.prior[1:] * dynamic / (static + dynamic))
+
+
+def test_no_time_no_change():
+    state = random_state(3)
+    after = bof_predict(replace(state, remainder=state.remainder * 0.9), GRID, PARAMS, 0.0)
+    assert np.allclose(after.occupied, state.occupied, atol=1e-6)
+    assert np.allclose(after.free, state.free, atol=1e-6)
+
+
+def test_a_shift_by_whole_cells_is_exact_and_what_enters_is_unknown():
+    state = random_state(4)
+    moved = bof_move(state, GRID, PlanarMotion(1.0, 0.5, 0))
+    assert np.array_equal(moved.occupied[:, 2:, 1:], state.occupied[:, :-2, :-1])
+    assert np.array_equal(moved.free[2:, 1:], state.free[:-2, :-1])
+    assert (moved.unknown[:2] == 1).all()
+    assert (moved.unknown[:, 0] == 1).all()
+    assert np.array_equal(moved.remainder, state.remainder)
+
+
+def test_a_half_turn_turns_mass_velocities_and_remainders():
+    spec = GridSpec(-1.5, 1.5, -1, 1, 0.5)
+    state = random_state(5, spec)
+    turned = bof_move(state, spec, PlanarMotion(dyaw=np.pi))
+    assert np.array_equal(turned.occupied, state.occupied[:, ::-1, ::-1])
+    assert np.allclose(turned.velocity, -state.velocity)
+    assert np.allclose(turned.remainder, -state.remainder)
+
+
+def test_the_lattice_holds_the_points_of_a_disc():
+    """Gauss's circle problem: 1, 5, 13, 29, 49 points up to radius 0, 1, 2, 3, 4; 197 up to 8."""
+    assert [len(VelocityLattice(r * 0.7, 0.7)) for r in (1, 2, 3, 4, 8)] == [5, 13, 29, 49, 197]
+    lattice = VelocityLattice(5.0, 1.0)
+    assert (lattice.velocities[0] == 0).all()
+    assert (np.diff(np.hypot(*lattice.velocities.T)) >= -1e-12).all()
+    assert lattice.prior[0] == 0
+    assert np.isclose(lattice.prior.sum(), 1)
+    sides = lattice.velocities[lattice.neighbours] - lattice.velocities[:, None]
+    inner = (np.hypot(*lattice.velocities.T) <= 4) & (np.hypot(*lattice.velocities.T) > 1)
+    assert np.allclose(sides[inner], [[1, 0], [-1, 0], [0, 1], [0, -1]])
+    assert (lattice.neighbours[1:] != 0).all()
+
+
+def test_the_prior_is_what_particles_are_born_with():
+    """A million draws counted around each point of the lattice, away from zero where a square holds one density."""
+    lattice, drawn = VelocityLattice(10.0, 1.0), draw_velocities(1_000_000, 12.0, np.random.default_rng(0))
+    steps = np.rint(drawn).astype(int)
+    count = np.zeros((25, 25))
+    np.add.at(count, (steps[:, 0] + 12, steps[:, 1] + 12), 1)
+    fast = np.hypot(*lattice.velocities.T) >= 3
+    counted = count[tuple(lattice.velocities[fast].astype(int).T + 12)]
+    expected = lattice.prior[fast]
+    assert np.abs(counted / counted.sum() / (expected / expected.sum()) - 1).max() < 0.1
+
+
+@pytest.mark.parametrize(
+    ("bad", "name"),
+    [((16.0, 0.0), "spacing"), ((1.0, 2.0), "max_speed"), ((np.nan, 1.0), "max_speed"), ((1e9, 1.0), "max_speed")],
+)
+def test_no_lattice_is_refused_by_name(bad, name):
+    with pytest.raises(ArgumentError, match=name):
+        VelocityLattice(*bad)
+
+
+def test_too_much_for_memory_is_refused_with_its_size():
+    """By hand: 4-byte numbers for 7845 velocities (Gauss's circle of radius 50) in 100 x 700 cells are 2.2 GB."""
+    with pytest.raises(ArgumentError, match=r"lattice: .*at most 2 GB, found 7845 x 100 x 700, 2\.2 GB"):
+        BofState.nothing_known(GridSpec(0, 100, 0, 700, 1), VelocityLattice(50.0, 1.0))
+
+
+SMALL = GridSpec(0, 40, -10, 10, 0.25)
+WALL, PARKED = Box(5, 60, 7.2, 7.7, 2.5), Box.around(22, -6, 4, 1.8, 1.5)
+
+
+def street(time: float) -> list[Box]:
+    """Return a wall, a parked car, a car that comes towards us at 8 m/s and one that drives ahead at 6 m/s."""
+    return [WALL, PARKED, Box.around(36 - 8 * time, 3, 4, 1.8, 1.5), Box.around(12 + 6 * time, -2, 4, 1.8, 1.5)]
+
+
+@pytest.fixture(scope="module", params=[0.0, 4.0], ids=["standing", "driving"])
+def street_seen(request):
+    """Yield the vehicle's x, the scan and the belief of each step."""
+    tracker, rng, seen = Bof(SMALL), np.random.default_rng(0), []
+    for k in range(26):
+        x = request.param * k * 0.1
+        points = scan_boxes(street(k * 0.1), x=x, noise=0.02, rng=rng)
+        seen.append((x, points, tracker.step(points, PlanarMotion(request.param * 0.1, 0, 0), 0.1)))
+    return seen
+
+
+def hit_and_dynamic(box: Box, seen) -> tuple[np.ndarray, np.ndarray]:
+    """Return which cells of a box are hit, and which are more DYNAMIC than STATIC."""
+    x, points, belief = seen
+    hit = cells_in(box, SMALL, x, margin=0.3) & hit_cells(points, SMALL)
+    return hit, hit & (belief.probability[DYNAMIC] > belief.probability[STATIC])
+
+
+@pytest.mark.parametrize(("which", "speed"), [(2, -8), (3, 6)], ids=["oncoming", "ahead"])
+def test_moving_cars_become_dynamic_with_the_right_velocity(street_seen, which, speed):
+    pairs = [hit_and_dynamic(street(k * 0.1)[which], street_seen[k]) for k in range(16, 26)]
+    hit, dynamic = np.array(pairs).sum(axis=(0, 2, 3))
+    assert dynamic / hit > 0.7
+    velocity = np.concatenate([street_seen[k][2].velocity[:, pairs[k - 16][1]] for k in range(16, 26)], axis=1)
+    assert np.abs(velocity.mean(axis=1) - [speed, 0]).max() < 1.5
+
+
+@pytest.mark.parametrize("box", [WALL, PARKED], ids=["wall", "parked"])
+def test_what_stands_stays_static(street_seen, box):
+    hit, dynamic = np.array([hit_and_dynamic(box, seen) for seen in street_seen[5:]]).sum(axis=(0, 2, 3))
+    assert dynamic / hit <= 0.05
+
+
+def test_the_belief_is_whole(street_seen):
+    for _, _, belief in street_seen:
+        assert belief.probability.dtype == belief.velocity.dtype == belief.velocity_covariance.dtype == np.float32
+        assert np.abs(belief.probability.sum(axis=0) - 1).max() < 1e-5
+        known = np.isfinite(belief.velocity).all(axis=0)
+        assert np.array_equal(known, np.isfinite(belief.velocity_covariance).all(axis=(0, 1)))
+        assert not known[belief.probability[DYNAMIC] == 0].any()
+        assert np.linalg.eigvalsh(np.moveaxis(belief.velocity_covariance[:, :, known], -1, 0)).min() > -1e-2
+
+
+def test_a_turning_vehicle_sees_a_car_move_straight_on():
+    """The lattice doesn't turn with the map, so the car's velocity stays on it; beliefs are in the vehicle's axes."""
+    tracker, pose, motion = Bof(SMALL), PlanarMotion(), PlanarMotion(0.2, 0.0, 0.02)
+    for k in range(20):
+        car = Box.around(16 + 0.6 * k, 0, 4, 1.8, 1.5)
+        points = scan_boxes([car], x=pose.dx, y=pose.dy, yaw=pose.dyaw)
+        belief = tracker.step(points, motion, 0.1)
+        seen_from, pose = pose, pose.then(motion)
+    moving = (belief.probability[DYNAMIC] > 0.5) & hit_cells(points, SMALL)
+    assert moving.sum() >= 3
+    heading = seen_from.rotation @ belief.velocity[:, moving].mean(axis=1)
+    assert np.abs(heading - [6, 0]).max() < 1
+
+
+def test_a_jump_of_a_hundred_metres_forgets_everything():
+    tracker = Bof(SMALL, PARAMS)
+    tracker.step(scan_boxes(street(0.0)), PlanarMotion(), 0.1)
+    belief = tracker.step(np.empty((0, 4)), PlanarMotion(100, 0, 0.5), 0.1)
+    assert (belief.probability[UNKNOWN] == 1).all()
+    assert np.isnan(belief.velocity).all()
+
+
+def test_what_is_no_scan_or_time_is_refused_and_changes_nothing():
+    tracker, twin = Bof(SMALL, PARAMS), Bof(SMALL, PARAMS)
+    for points, dt, name in ((np.array([[np.nan, 0, 0]]), 0.1, "points"), (np.zeros((1, 3)), -1.0, "dt")):
+        with pytest.raises(ArgumentError, match=name):
+            tracker.step(points, PlanarMotion(1, 0, 0), dt)
+    points = scan_boxes(street(0.0))
+    assert np.array_equal(*[t.step(points, PlanarMotion(), 0.1).probability for t in (tracker, twin)])
