@@ -1,5 +1,7 @@
 """A map that scrolls under the vehicle by whole cells, so that memory stays sharp (paper, section 3.2, step 1)."""
 
+import math
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -58,8 +60,8 @@ def scroll(pose: PlanarMotion, cell: float, max_yaw: float) -> tuple[PlanarMotio
     """
     if abs(pose.dyaw) > max_yaw:
         return pose, PlanarMotion()
-    dx, dy = round(pose.dx / cell) * cell, round(pose.dy / cell) * cell
-    return PlanarMotion(dx, dy), PlanarMotion(pose.dx - dx, pose.dy - dy, pose.dyaw)
+    dx, dy = math.remainder(pose.dx, cell), math.remainder(pose.dy, cell)
+    return PlanarMotion(pose.dx - dx, pose.dy - dy), PlanarMotion(dx, dy, pose.dyaw)
 
 
 def look_up(values: NDArray, outside: NDArray, source: GridSpec, target: GridSpec, pose: PlanarMotion) -> NDArray:
