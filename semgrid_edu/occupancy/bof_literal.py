@@ -1,4 +1,4 @@
-"""The prediction of the BOF, cell by cell and velocity by velocity as it is written down (Coue et al., IJRR 2006)."""
+"""The BOF's prediction cell by cell, velocity by velocity (Coue et al., IJRR 2006; paper, section 3.2)."""
 
 import numpy as np
 from numpy.typing import NDArray

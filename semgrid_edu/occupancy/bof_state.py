@@ -1,4 +1,4 @@
-"""What the BOF believes of each cell, and what it assumes: a distribution over velocities (Coue et al., IJRR 2006)."""
+"""What the BOF believes of each cell, and what it assumes (Coue et al., IJRR 2006; paper, section 3.2)."""
 
 from dataclasses import dataclass, field
 

@@ -1,4 +1,4 @@
-"""The steps of the BOF, occupancy times velocity on a lattice, each a pure function (Coue et al., IJRR 2006)."""
+"""The BOF's steps, occupancy times velocity, each a pure function (Coue et al., IJRR 2006; paper, section 3.2)."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""The log-odds grid, occupied or free and nothing else: Bayes' rule as a sum (Moravec and Elfes, ICRA 1985)."""
+"""The log-odds grid, occupied or free: Bayes' rule as a sum (Moravec and Elfes, ICRA 1985; before section 3.2)."""
 
 from dataclasses import dataclass, field
 
