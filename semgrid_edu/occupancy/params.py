@@ -38,8 +38,10 @@ class CmcdotParams:
     birth_share : float
         Part of the particles that is spent on newborn mass, so that new things are found soon.
     first_sight : (float, float, float)
-        What UNKNOWN cells turn out to be when they are first seen: FREE, STATIC, DYNAMIC; sums to 1.
-        Of the obstacles on a street, by area, few move.
+        What UNKNOWN cells turn out to be when they are first seen: FREE, STATIC, DYNAMIC; sums to 1. Most of a
+        street is free; of the cells that hold an obstacle, one in ten moves. The static share also weighs against
+        what flies in where nobody has looked: who walks away from the sensor enters only such cells, so a large one
+        takes that person for standing; a small one takes the end of a wall that comes into view for moving.
     sensor : SensorModel
         How the scanner errs.
 
@@ -60,9 +62,9 @@ class CmcdotParams:
     stop_rate: float = 5.0
     stop_speed: float = 0.4
     max_speed: float = 25.0
-    max_acceleration: float = 5.0
+    max_acceleration: float = 4.0
     birth_share: float = 0.3
-    first_sight: tuple[float, float, float] = (0.85, 0.14, 0.01)
+    first_sight: tuple[float, float, float] = (0.93, 0.063, 0.007)
     sensor: SensorModel = field(default_factory=SensorModel)
 
     def __post_init__(self) -> None:
