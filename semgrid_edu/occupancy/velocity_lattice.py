@@ -21,7 +21,8 @@ class VelocityLattice:
     max_speed : float
         The fastest velocities, m/s; by default 16 m/s, somewhat above what is allowed in a town.
     spacing : float
-        Between neighbours along an axis, m/s; by default 2 m/s, a cell of the paper's grid in one turn of the LIDAR.
+        Between neighbours along an axis, m/s; by default 1 m/s, so that the slowest of them is slower than a
+        pedestrian, who walks at 1.4 m/s.
 
     Raises
     ------
@@ -35,7 +36,7 @@ class VelocityLattice:
     """
 
     max_speed: float = 16.0
-    spacing: float = 2.0
+    spacing: float = 1.0
 
     def __post_init__(self) -> None:
         """Refuse a lattice that is no such thing."""

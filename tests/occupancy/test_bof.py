@@ -347,7 +347,7 @@ def street(time: float) -> list[Box]:
 @pytest.fixture(scope="module", params=[0.0, 4.0], ids=["standing", "driving"])
 def street_seen(request):
     """Yield the vehicle's x, the scan and the belief of each step."""
-    tracker, rng, seen = Bof(SMALL), np.random.default_rng(0), []
+    tracker, rng, seen = Bof(SMALL, BofParams(VelocityLattice(12.0, 2.0))), np.random.default_rng(0), []
     for k in range(26):
         x = request.param * k * 0.1
         points = scan_boxes(street(k * 0.1), x=x, noise=0.02, rng=rng, columns=600)
@@ -390,7 +390,11 @@ def test_the_belief_is_whole(street_seen):
 
 def test_a_turning_vehicle_sees_a_car_move_straight_on():
     """The lattice doesn't turn with the map, so the car's velocity stays on it; beliefs are in the vehicle's axes."""
-    tracker, pose, motion = Bof(SMALL), PlanarMotion(), PlanarMotion(0.2, 0.0, 0.02)
+    tracker, pose, motion = (
+        Bof(SMALL, BofParams(VelocityLattice(8.0, 2.0))),
+        PlanarMotion(),
+        PlanarMotion(0.2, 0.0, 0.02),
+    )
     for k in range(20):
         car = Box.around(16 + 0.6 * k, 0, 4, 1.8, 1.5)
         points = scan_boxes([car], x=pose.dx, y=pose.dy, yaw=pose.dyaw)
@@ -400,6 +404,19 @@ def test_a_turning_vehicle_sees_a_car_move_straight_on():
     assert moving.sum() >= 3
     heading = seen_from.rotation @ belief.velocity[:, moving].mean(axis=1)
     assert np.abs(heading - [6, 0]).max() < 1
+
+
+def test_walking_people_become_dynamic():
+    spec, shares = GridSpec(0, 20, -6, 6, 0.25), []
+    tracker, rng = Bof(spec, BofParams(VelocityLattice(4.0, 1.0))), np.random.default_rng(0)
+    for k in range(25):
+        person = Box.around(10, -3 + 1.4 * k * 0.1, 0.5, 0.5, 1.75)
+        points = scan_boxes([person], noise=0.02, rng=rng, columns=600)
+        belief = tracker.step(points, PlanarMotion(), 0.1)
+        cells = cells_in(person, spec, margin=0.1) & hit_cells(points, spec)
+        shares.append((belief.probability[DYNAMIC] > belief.probability[STATIC])[cells].mean())
+    assert np.mean(shares[-10:]) >= 0.6
+    assert abs(np.nanmean(belief.velocity[1, cells]) - 1.4) < 0.7
 
 
 def test_a_jump_of_a_hundred_metres_forgets_everything():
