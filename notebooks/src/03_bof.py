@@ -490,7 +490,7 @@ for frame in drive:
     beliefs.append(bof.step(frame.points_grid, motion, frame.time - before.time))
     before = frame
 
-fig, axes = plt.subplots(1, 3, figsize=(10, 5.4), layout="compressed", sharey=True)
+fig, axes = plt.subplots(1, 3, figsize=(9, 4.8), layout="compressed", sharey=True)
 for ax, k in zip(axes, (3, 9, 19), strict=True):
     plotting.velocity_wheel(street, beliefs[k].probability, beliefs[k].velocity, ax=ax, legend=k == 19)
     plotting.velocity(street, beliefs[k].probability, beliefs[k].velocity, ax)
@@ -614,9 +614,9 @@ for ax in axes:
 plt.show()
 
 # %% [markdown]
-# Right: stairs. With a spacing of 4 m/s whatever does 4 to 6 m/s is said to do 4, and there is nothing in between 4 and
-# 8; with 2 m/s the steps are half as high. Left: what is slower than half a spacing just stands, and up to a whole one
-# most of it does. With a spacing of 4 m/s a pedestrian is furniture.
+# Left: what is slower than half a spacing just stands, and up to a whole one most of it does. With a spacing of 4 m/s a
+# pedestrian is furniture. Right: the beginnings of a stair. With a spacing of 4 m/s, what does 4 to 6 m/s is said to do
+# 4 to 5, and from there the line climbs steeply to the next velocity of the lattice. With 2 m/s it keeps to the truth.
 #
 # ## Where this breaks
 #
@@ -660,16 +660,18 @@ axes[0].plot(t, np.maximum(8 - 4 * t, 0), color="#c04000", label="truth")
 axes[0].plot(t, np.where(braked[:, 0] > 0.5, braked[:, 1], np.nan), "o", color="0.2", label="BOF, if DYNAMIC")
 axes[0].set(xlabel="time [s]", ylabel="speed [m/s]")
 axes[0].legend(frameon=False)
-axes[1].plot(t, braked[:, 0], "o-", color="0.2")
+axes[1].plot(t, approach(lambda t: 8, spacing=2, scans=26)[:, 0], color="0.7", label="at 8 m/s all the time")
+axes[1].plot(t, braked[:, 0], "o-", color="0.2", label="braking")
 axes[1].set(xlabel="time [s]", ylabel="P(DYNAMIC)", ylim=(0, 1.05))
+axes[1].legend(frameon=False, fontsize="small")
 plt.show()
 
 # %% [markdown]
 # Each velocity flies straight on for ever. When the box has slowed down by a bin, the mass of the old one overshoots,
 # and in the new one there is next to nothing: it has to be born again, out of what starts to move by the transition
-# matrix. So the dots lie above the line: BOF is late; and P(DYNAMIC) sags where one velocity hands over to the next.
-# One could let mass leak from bin to bin. Particles with a little noise in their velocity do that for nothing (lecture
-# 04).
+# matrix. So the dots lie above the line, for BOF is late; and half-way through the braking it is far less sure that the
+# box moves than of one that keeps its speed (right). One could let mass leak from bin to bin. Particles with a little
+# noise in their velocity do that for nothing (lecture 04).
 #
 # **Two more**, for which you have all you need. *What nobody has seen before has no antecedent*: a car that comes out
 # from behind another is believed to stand until it has arrived somewhere free. *Behind an obstacle* mass flies on

@@ -142,16 +142,16 @@ def update(joint, if_occupied, if_free):
 
 
 # %% nbgrader={"grade": true, "grade_id": "update-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
-joint = np.zeros((3, 1, 3))
+joint = np.zeros((3, 1, 4))  # the last cell is free
 joint[:, 0, 0] = [0.1, 0.2, 0.1]  # of this cell the scan says nothing
 joint[:, 0, 1] = [0.1, 0.2, 0.1]  # here a beam came back
 joint[:, 0, 2] = [0.3, 0.3, 0.2]  # and this one it passed
-if_occupied, if_free = np.array([[1.0, 0.9, 0.3]]), np.array([[1.0, 0.1, 0.8]])
+if_occupied, if_free = np.array([[1.0, 0.9, 0.3, 0.3]]), np.array([[1.0, 0.1, 0.8, 0.8]])
 before = joint.copy()
 got = update(joint, if_occupied, if_free)
 assert got is not None, "update returned nothing: did you forget `return`?"
 assert np.array_equal(joint, before), "update changed its argument `joint`: make a new array (no *=, no /=)"
-assert np.shape(got) == (3, 1, 3), f"expected the shape of the joint, (3, 1, 3), got {np.shape(got)}"
+assert np.shape(got) == (3, 1, 4), f"expected the shape of the joint, (3, 1, 4), got {np.shape(got)}"
 slips = {
     "the velocities sum to 1, yet the cell may be free: 1 - sum of the joint is a hypothesis as well": [0.25, 0.5, 0.25],
     "Bayes' rule has a second step: divide by P(z), the sum over all hypotheses of the cell": [0.09, 0.18, 0.09],

@@ -1,0 +1,604 @@
+"""The graders of exercise 03, against real mistakes and other right ways."""
+
+from grader_checks import GraderChecks, mistake, right
+
+
+class TestBof(GraderChecks):
+    exercise = "03_bof"
+    entries = (
+        # ---- task 1
+        right(
+            "numpy, both at once",
+            task="antecedent",
+            code="""
+def antecedent(row, col, velocity, dt, cell):
+    return np.array([row, col]) + np.rint(np.array(velocity) * dt / cell).astype(int)""",
+        ),
+        right(
+            "through metres and back",
+            task="antecedent",
+            code="""
+def antecedent(row, col, velocity, dt, cell):
+    x, y = -(row + 0.5) * cell - velocity[0] * dt, -(col + 0.5) * cell - velocity[1] * dt
+    return int(np.floor(-x / cell)), int(np.floor(-y / cell))""",
+        ),
+        mistake(
+            "where it will be",
+            task="antecedent",
+            loses=2,
+            says="you look for where it was",
+            code="""
+def antecedent(row, col, velocity, dt, cell):
+    return row - round(velocity[0] * dt / cell), col - round(velocity[1] * dt / cell)""",
+        ),
+        mistake(
+            "rows count up",
+            task="antecedent",
+            loses=2,
+            says="rows count down the map",
+            code="""
+def antecedent(row, col, velocity, dt, cell):
+    return row - round(velocity[0] * dt / cell), col + round(velocity[1] * dt / cell)""",
+        ),
+        mistake(
+            "y to the right",
+            task="antecedent",
+            loses=2,
+            says="columns count to the right and y to the left",
+            code="""
+def antecedent(row, col, velocity, dt, cell):
+    return row + round(velocity[0] * dt / cell), col - round(velocity[1] * dt / cell)""",
+        ),
+        mistake(
+            "x and y swapped",
+            task="antecedent",
+            loses=2,
+            says="x and y are swapped",
+            code="""
+def antecedent(row, col, velocity, dt, cell):
+    return row + round(velocity[1] * dt / cell), col + round(velocity[0] * dt / cell)""",
+        ),
+        mistake(
+            "time forgotten",
+            task="antecedent",
+            loses=2,
+            says="velocity times dt is the way",
+            code="""
+def antecedent(row, col, velocity, dt, cell):
+    return row + round(velocity[0] / cell), col + round(velocity[1] / cell)""",
+        ),
+        mistake(
+            "metres instead of cells",
+            task="antecedent",
+            loses=2,
+            says="you count metres",
+            code="""
+def antecedent(row, col, velocity, dt, cell):
+    return row + round(velocity[0] * dt), col + round(velocity[1] * dt)""",
+        ),
+        mistake(
+            "floats for indices",
+            task="antecedent",
+            loses=2,
+            says="an index must be an integer",
+            code="""
+def antecedent(row, col, velocity, dt, cell):
+    return row + velocity[0] * dt / cell, col + velocity[1] * dt / cell""",
+        ),
+        mistake(
+            "cut instead of rounded",
+            task="antecedent",
+            loses=2,
+            says="on inputs you haven't seen: one cell off: a way of 2.9999999 cells is one of 3",
+            code="""
+def antecedent(row, col, velocity, dt, cell):
+    return row + int(velocity[0] * dt / cell), col + int(velocity[1] * dt / cell)""",
+        ),
+        mistake(
+            "endless loop",
+            task="antecedent",
+            loses=2,
+            says="No reply from kernel before timeout",
+            code="def antecedent(row, col, velocity, dt, cell):\n    while True:\n        row += 1",
+        ),
+        # ---- task 2
+        right(
+            "slices with a margin",
+            task="shift",
+            code="""
+def shift(mass, down, right):
+    height, width = mass.shape
+    down, right = np.clip(down, -height, height), np.clip(right, -width, width)
+    wide = np.pad(mass, ((height, height), (width, width)))
+    return wide[height - down : 2 * height - down, width - right : 2 * width - right]""",
+        ),
+        right(
+            "roll, then clear what came round",
+            task="shift",
+            code="""
+def shift(mass, down, right):
+    flown = np.roll(mass, (down, right), axis=(0, 1))
+    rows, cols = np.indices(mass.shape)
+    inside = (rows - down >= 0) & (rows - down < mass.shape[0]) & (cols - right >= 0) & (cols - right < mass.shape[1])
+    return flown * inside""",
+        ),
+        mistake(
+            "wraps around",
+            task="shift",
+            loses=2,
+            says="the world isn't round",
+            code="def shift(mass, down, right):\n    return np.roll(mass, (down, right), axis=(0, 1))",
+        ),
+        mistake(
+            "the wrong way",
+            task="shift",
+            loses=2,
+            says="it flew the wrong way",
+            code="""
+def shift(mass, down, right):
+    flown = np.zeros_like(mass)
+    for r in range(mass.shape[0]):
+        for c in range(mass.shape[1]):
+            if 0 <= r + down < mass.shape[0] and 0 <= c + right < mass.shape[1]:
+                flown[r, c] = mass[r + down, c + right]
+    return flown""",
+        ),
+        mistake(
+            "rows upside down",
+            task="shift",
+            loses=2,
+            says="it flew down instead of up",
+            code="""
+def shift(mass, down, right):
+    from scipy import ndimage
+    return ndimage.shift(mass, (-down, right), order=0)""",
+        ),
+        mistake(
+            "columns mirrored",
+            task="shift",
+            loses=2,
+            says="it flew left instead of right",
+            code="""
+def shift(mass, down, right):
+    from scipy import ndimage
+    return ndimage.shift(mass, (down, -right), order=0)""",
+        ),
+        mistake(
+            "axes swapped",
+            task="shift",
+            loses=2,
+            says="`down` is for rows",
+            code="""
+def shift(mass, down, right):
+    from scipy import ndimage
+    return ndimage.shift(mass, (right, down), order=0)""",
+        ),
+        mistake(
+            "border repeated",
+            task="shift",
+            loses=2,
+            says="at the border you repeat the last cell",
+            code="""
+def shift(mass, down, right):
+    rows = np.clip(np.arange(mass.shape[0]) - down, 0, mass.shape[0] - 1)
+    cols = np.clip(np.arange(mass.shape[1]) - right, 0, mass.shape[1] - 1)
+    return mass[np.ix_(rows, cols)]""",
+        ),
+        mistake(
+            "argument changed in place",
+            task="shift",
+            loses=2,
+            says="changed its argument",
+            code="""
+def shift(mass, down, right):
+    mass[:-1] = mass[1:]
+    mass[-1] = 0
+    mass[:, 2:] = mass[:, :-2].copy()
+    mass[:, :2] = 0
+    return mass""",
+        ),
+        mistake(
+            "slices that know one direction",
+            task="shift",
+            loses=2,
+            says="on inputs you haven't seen",
+            code="""
+def shift(mass, down, right):
+    flown = np.zeros_like(mass)
+    flown[:down, right:] = mass[-down:, :-right]
+    return flown""",
+        ),
+        mistake(
+            "negative indices come round",
+            task="shift",
+            loses=2,
+            says="on inputs you haven't seen: it raises IndexError",
+            code="""
+def shift(mass, down, right):
+    flown = np.zeros_like(mass)
+    for r in range(mass.shape[0]):
+        for c in range(mass.shape[1]):
+            if r + down >= 0 and c + right < mass.shape[1]:
+                flown[r + down, c + right] = mass[r, c]
+    return flown""",
+        ),
+        # ---- task 3
+        right(
+            "a loop over cells and hypotheses",
+            task="update",
+            code="""
+def update(joint, if_occupied, if_free):
+    after = np.zeros_like(joint)
+    for r in range(joint.shape[1]):
+        for c in range(joint.shape[2]):
+            hypotheses = [p * if_occupied[r, c] for p in joint[:, r, c]]
+            total = sum(hypotheses) + (1 - sum(joint[:, r, c])) * if_free[r, c]
+            after[:, r, c] = [h / total for h in hypotheses]
+    return after""",
+        ),
+        right(
+            "free as one more hypothesis",
+            task="update",
+            code="""
+def update(joint, if_occupied, if_free):
+    belief = np.concatenate([joint, 1 - joint.sum(axis=0, keepdims=True)])
+    likelihood = np.concatenate([np.repeat(if_occupied[None], len(joint), axis=0), if_free[None]])
+    product = belief * likelihood
+    return (product / product.sum(axis=0))[:-1]""",
+        ),
+        mistake(
+            "free forgotten",
+            task="update",
+            loses=3,
+            says="the velocities sum to 1, yet the cell may be free",
+            code="""
+def update(joint, if_occupied, if_free):
+    product = joint * if_occupied
+    return product / product.sum(axis=0)""",
+        ),
+        mistake(
+            "no normalisation",
+            task="update",
+            loses=3,
+            says="Bayes' rule has a second step",
+            code="def update(joint, if_occupied, if_free):\n    return joint * if_occupied",
+        ),
+        mistake(
+            "likelihoods swapped",
+            task="update",
+            loses=3,
+            says="the two likelihoods are swapped",
+            code="""
+def update(joint, if_occupied, if_free):
+    product = joint * if_free
+    return product / (product.sum(axis=0) + (1 - joint.sum(axis=0)) * if_occupied)""",
+        ),
+        mistake(
+            "free without its prior",
+            task="update",
+            loses=3,
+            says="free lacks its prior",
+            code="""
+def update(joint, if_occupied, if_free):
+    product = joint * if_occupied
+    return product / (product.sum(axis=0) + if_free)""",
+        ),
+        mistake(
+            "each velocity against all else",
+            task="update",
+            loses=3,
+            says="you update each velocity against all else",
+            code="""
+def update(joint, if_occupied, if_free):
+    return joint * if_occupied / (joint * if_occupied + (1 - joint) * if_free)""",
+        ),
+        mistake(
+            "normalised over the whole grid",
+            task="update",
+            loses=3,
+            says="go cell by cell",
+            code="""
+def update(joint, if_occupied, if_free):
+    product = joint * if_occupied
+    return product / (product.sum() + ((1 - joint.sum(axis=0)) * if_free).sum())""",
+        ),
+        mistake(
+            "argument changed in place",
+            task="update",
+            loses=3,
+            says="changed its argument",
+            code="""
+def update(joint, if_occupied, if_free):
+    free = (1 - joint.sum(axis=0)) * if_free
+    joint *= if_occupied
+    return joint / (joint.sum(axis=0) + free)""",
+        ),
+        mistake(
+            "axes swapped",
+            task="update",
+            loses=3,
+            says="expected the shape of the joint",
+            code="""
+def update(joint, if_occupied, if_free):
+    product = joint.T * if_occupied.T[..., None]
+    return product / (product.sum(axis=-1) + ((1 - joint.sum(axis=0)) * if_free).T)[..., None]""",
+        ),
+        mistake(
+            "three velocities written in",
+            task="update",
+            loses=3,
+            says="on inputs you haven't seen",
+            code="""
+def update(joint, if_occupied, if_free):
+    product = joint * if_occupied
+    occupied = joint[0] + joint[1] + joint[2]
+    return product / (product[0] + product[1] + product[2] + (1 - occupied) * if_free)""",
+        ),
+        # ---- task 4
+        right(
+            "a loop over cells, numpy's own average and covariance",
+            task="mean-and-covariance",
+            code="""
+def mean_and_covariance(joint, velocities):
+    shape = joint.shape[1:]
+    mean, covariance = np.full((2, *shape), np.nan), np.full((2, 2, *shape), np.nan)
+    for r, c in np.ndindex(shape):
+        weights = joint[1:, r, c]
+        if weights.sum() > 0:
+            mean[:, r, c] = np.average(velocities[1:], axis=0, weights=weights)
+            covariance[:, :, r, c] = np.cov(velocities[1:].T, aweights=weights, ddof=0)
+    return mean, covariance""",
+        ),
+        right(
+            "moments",
+            task="mean-and-covariance",
+            code="""
+def mean_and_covariance(joint, velocities):
+    m, v = joint[1:], velocities[1:]
+    total = m.sum(axis=0)
+    mean = np.tensordot(v.T, m, axes=1) / total
+    second = np.tensordot(np.einsum("vi,vj->ijv", v, v), m, axes=1) / total
+    return mean, second - mean[:, None] * mean[None]""",
+        ),
+        mistake(
+            "not divided by the probability",
+            task="mean-and-covariance",
+            loses=4,
+            says="given that something moves means divided by P(DYNAMIC)",
+            code="""
+def mean_and_covariance(joint, velocities):
+    m, v = joint[1:], velocities[1:]
+    mean = np.tensordot(v.T, m, axes=1)
+    apart = v[:, :, None, None] - mean / m.sum(axis=0)
+    return np.where(m.sum(axis=0) > 0, mean, np.nan), np.einsum("vhw,vihw,vjhw->ijhw", m, apart, apart)""",
+        ),
+        mistake(
+            "what stands counted in",
+            task="mean-and-covariance",
+            loses=5,
+            says="what stands doesn't move",
+            code="""
+def mean_and_covariance(joint, velocities):
+    share = joint / joint.sum(axis=0)
+    mean = np.einsum("vhw,vi->ihw", share, velocities)
+    apart = velocities[:, :, None, None] - mean
+    return mean, np.einsum("vhw,vihw,vjhw->ijhw", share, apart, apart)""",
+        ),
+        mistake(
+            "x and y swapped",
+            task="mean-and-covariance",
+            loses=4,
+            says="x and y are swapped",
+            code="""
+def mean_and_covariance(joint, velocities):
+    share, v = joint[1:] / joint[1:].sum(axis=0), velocities[1:, ::-1]
+    mean = np.einsum("vhw,vi->ihw", share, v)
+    apart = v[:, :, None, None] - mean
+    return mean, np.einsum("vhw,vihw,vjhw->ijhw", share, apart, apart)""",
+        ),
+        mistake(
+            "every velocity counts the same",
+            task="mean-and-covariance",
+            loses=4,
+            says="every velocity counts the same",
+            code="""
+def mean_and_covariance(joint, velocities):
+    nothing = np.where(joint[1:].sum(axis=0) > 0, 0, np.nan)
+    mean, covariance = velocities[1:].mean(axis=0), np.cov(velocities[1:].T)
+    return mean[:, None, None] + nothing, covariance[..., None, None] + nothing""",
+        ),
+        mistake(
+            "the most probable velocity",
+            task="mean-and-covariance",
+            loses=2,
+            says="that is the most probable velocity",
+            code="""
+def mean_and_covariance(joint, velocities):
+    share, v = joint[1:] / joint[1:].sum(axis=0), velocities[1:]
+    mean = np.einsum("vhw,vi->ihw", share, v)
+    apart = v[:, :, None, None] - mean
+    best = v[joint[1:].argmax(axis=0)].transpose(2, 0, 1) + 0 * mean
+    return best, np.einsum("vhw,vihw,vjhw->ijhw", share, apart, apart)""",
+        ),
+        mistake(
+            "zero instead of NaN",
+            task="mean-and-covariance",
+            loses=1,
+            says="no velocity isn't zero velocity",
+            code="""
+def mean_and_covariance(joint, velocities):
+    share = joint[1:] / np.maximum(joint[1:].sum(axis=0), 1e-12)
+    mean = np.einsum("vhw,vi->ihw", share, velocities[1:])
+    apart = velocities[1:, :, None, None] - mean
+    return mean, np.einsum("vhw,vihw,vjhw->ijhw", share, apart, apart)""",
+        ),
+        mistake(
+            "NaN where there is little",
+            task="mean-and-covariance",
+            loses=5,
+            says="on inputs you haven't seen: NaN where something may move",
+            code="""
+def mean_and_covariance(joint, velocities):
+    total = joint[1:].sum(axis=0)
+    share = joint[1:] / np.where(total > 1e-3, total, np.nan)
+    mean = np.einsum("vhw,vi->ihw", share, velocities[1:])
+    apart = velocities[1:, :, None, None] - mean
+    return mean, np.einsum("vhw,vihw,vjhw->ijhw", share, apart, apart)""",
+        ),
+        mistake(
+            "mean not taken off",
+            task="mean-and-covariance",
+            loses=2,
+            says="take the mean velocity off first",
+            code="""
+def mean_and_covariance(joint, velocities):
+    share, v = joint[1:] / joint[1:].sum(axis=0), velocities[1:]
+    return np.einsum("vhw,vi->ihw", share, v), np.einsum("vhw,vi,vj->ijhw", share, v, v)""",
+        ),
+        mistake(
+            "variances only",
+            task="mean-and-covariance",
+            loses=2,
+            says="the two components vary together",
+            code="""
+def mean_and_covariance(joint, velocities):
+    share = joint[1:] / joint[1:].sum(axis=0)
+    mean = np.einsum("vhw,vi->ihw", share, velocities[1:])
+    variance = np.einsum("vhw,vihw->ihw", share, (velocities[1:, :, None, None] - mean) ** 2)
+    return mean, variance[None] * np.eye(2)[:, :, None, None]""",
+        ),
+        mistake(
+            "standard deviations",
+            task="mean-and-covariance",
+            loses=2,
+            says="these are standard deviations",
+            code="""
+def mean_and_covariance(joint, velocities):
+    share = joint[1:] / joint[1:].sum(axis=0)
+    mean = np.einsum("vhw,vi->ihw", share, velocities[1:])
+    variance = np.einsum("vhw,vihw->ihw", share, (velocities[1:, :, None, None] - mean) ** 2)
+    return mean, np.sqrt(variance)[None] * np.eye(2)[:, :, None, None]""",
+        ),
+        # ---- task 5
+        right(
+            "the eight pairs, counted",
+            task="arrive",
+            code="""
+def arrive(own, arrives):
+    after = np.zeros_like(own)
+    for state in range(4):
+        for comes, p in ((True, arrives), (False, 1 - arrives)):
+            if not (comes and state == 1):
+                after[2 if comes else state] += p * own[state]
+    return after / after.sum(axis=0)""",
+        ),
+        right(
+            "by a loop over cells",
+            task="arrive",
+            code="""
+def arrive(own, arrives):
+    after = np.zeros(own.shape)
+    for r in range(own.shape[1]):
+        for c in range(own.shape[2]):
+            a, s = arrives[r, c], own[1, r, c]
+            after[:, r, c] = (1 - a) * own[:, r, c] / (1 - a * s)
+            after[2, r, c] = 1 - after[0, r, c] - after[1, r, c] - after[3, r, c]
+    return after""",
+        ),
+        mistake(
+            "nothing struck out",
+            task="arrive",
+            loses=3,
+            says="you strike nothing out",
+            code="""
+def arrive(own, arrives):
+    after = (1 - arrives) * own
+    after[2] += arrives
+    return after""",
+        ),
+        mistake(
+            "what stands wins",
+            task="arrive",
+            loses=3,
+            says="neither of the two wins",
+            code="""
+def arrive(own, arrives):
+    free, static, dynamic, unknown = own
+    nothing = 1 - arrives
+    return np.stack([nothing * free, static, arrives * (1 - static) + nothing * dynamic, nothing * unknown])""",
+        ),
+        mistake(
+            "added and scaled",
+            task="arrive",
+            loses=3,
+            says="you add what arrives and scale",
+            code="""
+def arrive(own, arrives):
+    after = own.copy()
+    after[2] += arrives
+    return after / after.sum(axis=0)""",
+        ),
+        mistake(
+            "what moves can't be arrived at either",
+            task="arrive",
+            loses=3,
+            says="only STATIC and arriving exclude each other",
+            code="""
+def arrive(own, arrives):
+    after = (1 - arrives) * own
+    after[2] += arrives * (own[0] + own[3])
+    return after / after.sum(axis=0)""",
+        ),
+        mistake(
+            "what moved already lost",
+            task="arrive",
+            loses=3,
+            says="what moved in the cell already got lost",
+            code="""
+def arrive(own, arrives):
+    after = (1 - arrives) * own
+    after[2] = arrives * (1 - own[1])
+    return after / after.sum(axis=0)""",
+        ),
+        mistake(
+            "not divided by what is left",
+            task="arrive",
+            loses=3,
+            says="divide by what is left after striking out",
+            code="""
+def arrive(own, arrives):
+    after = (1 - arrives) * own
+    after[2] += arrives * (1 - own[1])
+    return after""",
+        ),
+        mistake(
+            "FREE and STATIC mixed up",
+            task="arrive",
+            loses=3,
+            says="by hand: 0.21, 0.12, 0.50, 0.09",
+            code="""
+def arrive(own, arrives):
+    after = (1 - arrives) * own
+    after[2] += arrives * (1 - own[0])
+    return after / after.sum(axis=0)""",
+        ),
+        mistake(
+            "in odds, which are infinite where it is certain",
+            task="arrive",
+            loses=3,
+            says="on inputs you haven't seen: no number where it is certain that something arrives",
+            code="""
+def arrive(own, arrives):
+    odds = arrives / (1 - arrives)
+    after = own.copy()
+    after[2] += odds * (1 - own[1])
+    return after / after.sum(axis=0)""",
+        ),
+        mistake(
+            "a crash",
+            task="arrive",
+            loses=3,
+            says="IndexError",
+            code="def arrive(own, arrives):\n    return own[4]",
+        ),
+    )
