@@ -10,11 +10,13 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
     Bof,
+    BofParams,
     Evidence,
     LogOddsGrid,
     LogOddsParams,
     PlanarMotion,
     State,
+    VelocityLattice,
     log_odds,
     probability,
     smear_area,
@@ -96,7 +98,7 @@ def test_a_moving_car_leaves_a_smear_as_long_as_the_bound_allows():
 
 
 def test_a_filter_that_knows_motion_smears_less():
-    tracker = Bof(SPEC)
+    tracker = Bof(SPEC, BofParams(VelocityLattice(8.0, 1.0)))
     states = [State.STATIC, State.DYNAMIC]
     assert smears(lambda points: tracker.step(points, PlanarMotion(), 0.1).probability[states].sum(axis=0)) < 2
 
