@@ -11,7 +11,7 @@ from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.velocity_lattice import VelocityLattice
 
 MOST_BYTES = 2e9
-"""Memory that the occupied mass may take: a step needs twice as much, which a student's computer has."""
+"""Memory that the occupied mass may take; a step needs three times as much."""
 
 
 @dataclass(frozen=True)

@@ -390,11 +390,8 @@ def test_the_belief_is_whole(street_seen):
 
 def test_a_turning_vehicle_sees_a_car_move_straight_on():
     """The lattice doesn't turn with the map, so the car's velocity stays on it; beliefs are in the vehicle's axes."""
-    tracker, pose, motion = (
-        Bof(SMALL, BofParams(VelocityLattice(8.0, 2.0))),
-        PlanarMotion(),
-        PlanarMotion(0.2, 0.0, 0.02),
-    )
+    tracker = Bof(SMALL, BofParams(VelocityLattice(8.0, 2.0)))
+    pose, motion = PlanarMotion(), PlanarMotion(0.2, 0.0, 0.02)
     for k in range(20):
         car = Box.around(16 + 0.6 * k, 0, 4, 1.8, 1.5)
         points = scan_boxes([car], x=pose.dx, y=pose.dy, yaw=pose.dyaw)
