@@ -191,13 +191,8 @@ def fuse(prior, posteriors):
 
 # %% nbgrader={"grade": true, "grade_id": "fuse-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 # Three scans of two cells, prior 0.2. Cell (0, 0): none says anything. Cell (0, 1): two make it 0.5, the third says nothing.
-posteriors = np.array([[[0.2, 0.5]], [[0.2, 0.5]], [[0.2, 0.2]]])
-got = fuse(0.2, posteriors)
-assert got is not None, "fuse returned nothing: did you forget `return`?"
-assert np.shape(got) == (1, 2), (
-    f"expected one number a cell, shape (1, 2), got {np.shape(got)}: sum over the scans only"
-)
-silent, twice = got[0]
+got = fuse(0.2, np.array([[[0.2, 0.5]], [[0.2, 0.5]], [[0.2, 0.2]]]))
+assert np.shape(got) == (1, 2), f"expected one number a cell, (1, 2), got {np.shape(got)}: sum over the scans only"
 slips = {
     0.0154: "the prior is counted three times, once with each scan: subtract L_0 from each L_k",
     0.0039: "the prior is counted four times: subtract L_0 from each L_k before you add it once",
@@ -207,16 +202,18 @@ slips = {
     0.008: "you multiply probabilities: what P(free | z) says must count too, so work with odds",
     -1.386: "those are log-odds: give the probability back",
 }
+silent, twice = got[0]
 for slip, hint in slips.items():
     assert not np.isclose(silent, slip, atol=6e-4), (
-        f"no scan says anything of cell (0, 0), yet 0.2 became {silent:.4f}: {hint}"
+        f"nothing was seen in cell (0, 0), yet 0.2 became {silent:.4f}: {hint}"
     )
-assert not np.isclose(twice, 0.4), "cell (0, 1) is at 0.4, the mean: two scans that agree are worth more than one"
-assert not np.isclose(twice, 0.5), "cell (0, 1) is at 0.5: two scans that agree are worth more than the best of them"
-assert not np.isclose(twice, 0.2), (
-    "cell (0, 1) is back at the prior: the last scan says nothing, but the two before it did"
-)
-# odds 1/4 at first; a scan that makes 0.2 into 0.5, odds 1, multiplies them by 4; two of them make them 4
+slips = {
+    0.4: "that is the mean, but two scans that agree are worth more than one",
+    0.5: "two scans that agree are worth more than the best of them",
+    0.2: "that is the prior: the last scan says nothing, but the two before it did",
+}
+for slip, hint in slips.items():
+    assert not np.isclose(twice, slip, atol=6e-4), f"cell (0, 1) is at {twice:.1f}: {hint}"
 np.testing.assert_allclose(got, [[0.2, 0.8]], atol=1e-3, err_msg="by hand: odds 1/4 * 4 * 4 = 4, so 0.8")
 ### BEGIN HIDDEN TESTS
 from semgrid_instructor import grids
