@@ -1,64 +1,146 @@
-"""Times of the occupancy stage, as ratios: `python benchmarks/bench_occupancy.py [KITTI_ROOT]`.
+"""Time the occupancy filter, whole, in parts and as it grows: `python benchmarks/bench_occupancy.py [KITTI_ROOT]`.
 
-With a KITTI root, on a real scan of drive 0013; without, on a made-up scan of the same size.
+With a KITTI root, on the real scans of drive 0013, along with the vehicle's own motion; without, on made-up scans
+of the same size. Of each scan the fastest of several passes counts, for a busy machine only slows; then the median.
 """
 
 import sys
+import time
 import timeit
+from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import Cmcdot, CmcdotParams, PlanarMotion, SensorModel, scan_evidence, scan_evidence_literal
+from semgrid_edu.occupancy import (
+    Cmcdot,
+    CmcdotParams,
+    PlanarMotion,
+    SensorModel,
+    cmcdot,
+    scan_evidence,
+    scan_evidence_literal,
+)
 from semgrid_edu.occupancy.tracking import LIDAR_PERIOD
 
-
-def a_scan() -> np.ndarray:
-    """Return a scan in the grid frame, (N, 3+)."""
-    if len(sys.argv) > 1:
-        from semgrid_edu.datasets import KittiRawDrive
-
-        return KittiRawDrive(sys.argv[1], "2011_09_26", "0013")[10].points_grid
-    rng = np.random.default_rng(0)
-    azimuth, distance = rng.uniform(-np.pi, np.pi, 120_000), rng.uniform(4, 60, 120_000)
-    height = np.where(distance > 30 + 10 * np.sin(5 * azimuth), 1.0, 0.0)
-    return np.stack([distance * np.cos(azimuth), distance * np.sin(azimuth), height], axis=1).astype(np.float32)
-
-
-def best(call, repeats: int) -> float:
-    """Return the seconds of the fastest of some calls: the others were disturbed."""
-    call()
-    return min(timeit.repeat(call, number=1, repeat=repeats))
+Drive = list[tuple[NDArray, PlanarMotion]]
+WHOLE = "whole step"
+PARTS = {
+    "prepare_scan": "ground",
+    "beam_reach": "evidence",
+    "evidence_in_cells": "evidence",
+    "move": "move",
+    "predict": "predict",
+    "update": "update",
+    "resample": "resample",
+    "velocity_moments": "belief",
+    "local_belief": "belief",
+}
+"""The functions that a step calls, and what each belongs to; of the belief, the scan's evidence counts as evidence."""
 
 
-def step_time(points: np.ndarray, spec: GridSpec, particles: int) -> float:
-    """Return the seconds of one whole step of a filter that has settled."""
+def real_drive(root: str) -> Drive:
+    """Return the scans of drive 0013 in the grid frame, each with the motion since the last."""
+    drive = KittiRawDrive(root, "2011_09_26", "0013")
+    frames = [drive[k] for k in range(len(drive))]
+    pairs = zip(frames[:1] + frames, frames, strict=False)
+    motions = [PlanarMotion.from_poses(a.T_world_from_lidar, b.T_world_from_lidar) for a, b in pairs]
+    return [(frame.points_grid, motion) for frame, motion in zip(frames, motions, strict=True)]
+
+
+def made_up_drive(scans: int = 20, points: int = 120_000) -> Drive:
+    """Return scans of a wavy wall around a plain."""
+    rng, drive = np.random.default_rng(0), []
+    for _ in range(scans):
+        azimuth, distance = rng.uniform(-np.pi, np.pi, points), rng.uniform(4, 60, points)
+        height = np.where(distance > 30 + 10 * np.sin(5 * azimuth), 1.0, 0.0)
+        scan = np.stack([distance * np.cos(azimuth), distance * np.sin(azimuth), height], axis=1)
+        drive.append((scan.astype(np.float32), PlanarMotion(0.9, 0.01, 0.003)))
+    return drive
+
+
+def step_times(drive: Drive, spec: GridSpec, particles: int, passes: int = 9) -> dict[str, float]:
+    """Return the milliseconds of a whole step and of its parts, medians over the drive after a pass to warm up."""
     tracker = Cmcdot(spec, replace(CmcdotParams(), particles=particles))
-    for _ in range(5):
-        tracker.step(points, PlanarMotion(), LIDAR_PERIOD)
-    return best(lambda: tracker.step(points, PlanarMotion(0.9, 0.01, 0.001), LIDAR_PERIOD), 30)
+    spent, rows = defaultdict(float), []
+    originals = {name: getattr(cmcdot, name) for name in PARTS}
+    for name, part in PARTS.items():
+        setattr(cmcdot, name, stopwatch(originals[name], part, spent))
+    try:
+        for points, motion in drive * passes:
+            spent.clear()
+            stopwatch(tracker.step, WHOLE, spent)(points, motion, LIDAR_PERIOD)
+            rows.append([spent[name] for name in (WHOLE, *dict.fromkeys(PARTS.values()))])
+    finally:
+        for name, original in originals.items():
+            setattr(cmcdot, name, original)
+    fastest = np.reshape(rows, (passes, len(drive), -1))[1:].min(axis=0)
+    return dict(zip((WHOLE, *dict.fromkeys(PARTS.values())), 1e3 * np.median(fastest, axis=0), strict=True))
+
+
+def stopwatch(function: Callable, part: str, spent: dict[str, float]) -> Callable:
+    """Return the function, that then adds the seconds it takes to a part's."""
+
+    def timed(*arguments):
+        start = time.perf_counter()
+        result = function(*arguments)
+        spent[part] += time.perf_counter() - start
+        return result
+
+    return timed
+
+
+def best_of(call: Callable, repeats: int) -> float:
+    """Return the milliseconds of the fastest of some calls, after one that doesn't count."""
+    call()
+    return 1e3 * min(timeit.repeat(call, number=1, repeat=repeats))
+
+
+def print_parts(times: dict[str, float]) -> None:
+    """Print what a step spends on what, and its share of the time between scans."""
+    for name, milliseconds in times.items():
+        print(f"  {name:12} {milliseconds:6.1f} ms  {milliseconds / times[WHOLE]:4.0%} of the step", end="")
+        print(f"  {milliseconds / 1e3 / LIDAR_PERIOD:4.0%} of the LIDAR's period" if name == WHOLE else "")
+
+
+def print_growth(drive: Drive, base: float) -> None:
+    """Print how long a step takes with more and fewer points, cells and particles, beside the same at full size."""
+    rng, paper, usual = np.random.default_rng(0), GridSpec.paper(), CmcdotParams().particles
+    twice = [(np.concatenate([p, p + rng.normal(0, 0.02, p.shape).astype(p.dtype)]), m) for p, m in drive]
+    finer = GridSpec(paper.x_min, paper.x_max, paper.y_min, paper.y_max, paper.cell / 2)
+    coarser = replace(finer, y_min=-15.6, y_max=15.6, x_max=71.2, cell=2 * paper.cell)
+    cases = [
+        ("points x 1/4", [(points[::4], motion) for points, motion in drive], paper, usual),
+        ("points x 1/2", [(points[::2], motion) for points, motion in drive], paper, usual),
+        ("points x 2", twice, paper, usual),
+        ("cells x 1/4", drive, coarser, usual),
+        ("cells x 4", drive, finer, usual),
+        ("particles x 1/4", drive, paper, usual // 4),
+        ("particles x 1/2", drive, paper, usual // 2),
+        ("particles x 2", drive, paper, usual * 2),
+    ]
+    for name, scans, spec, particles in cases:
+        milliseconds = step_times(scans, spec, particles, passes=5)[WHOLE]
+        print(f"  {name:16} {milliseconds:6.1f} ms  time x {milliseconds / base:.2f}")
 
 
 def main() -> None:
-    points, paper, sensor = a_scan(), GridSpec.paper(), SensorModel()
-    literal = best(lambda: scan_evidence_literal(points, paper, sensor), 1)
-    fast = best(lambda: scan_evidence(points, paper, sensor), 20)
-    print(
-        f"evidence of {len(points):,} points: literal {literal:.2f} s, fast {fast * 1e3:.1f} ms, {literal / fast:.0f}x"
-    )
-    print("one whole step, and its share of the LIDAR's period:")
-    compact, few = GridSpec.compact(), points[::4]
-    cases = [
-        ("paper grid, 200,000 particles", points, paper, 200_000),
-        ("paper grid, 50,000 particles", points, paper, 50_000),
-        ("paper grid, 200,000 particles, a quarter of the points", few, paper, 200_000),
-        ("compact grid, 200,000 particles", points, compact, 200_000),
-        ("compact grid, 50,000 particles", points, compact, 50_000),
-    ]
-    for name, scan, spec, particles in cases:
-        seconds = step_time(scan, spec, particles)
-        print(f"  {seconds * 1e3:5.1f} ms  {seconds / LIDAR_PERIOD:4.0%}  {name}")
+    drive = real_drive(sys.argv[1]) if len(sys.argv) > 1 else made_up_drive()
+    points, paper, sensor = drive[len(drive) // 2][0], GridSpec.paper(), SensorModel()
+    size = f"grid {paper.shape}, {CmcdotParams().particles:,} particles"
+    print(f"{len(drive)} scans of about {len(points):,} points; {size}")
+    literal = best_of(lambda: scan_evidence_literal(points, paper, sensor), 1)
+    fast = best_of(lambda: scan_evidence(points, paper, sensor), 20)
+    print(f"evidence, literal / fast: {literal:.0f} ms / {fast:.1f} ms = {literal / fast:.0f}")
+    times = step_times(drive, paper, CmcdotParams().particles)
+    print("one step in its parts:")
+    print_parts(times)
+    print("as one thing grows and the others stay:")
+    print_growth(drive, times[WHOLE])
 
 
 if __name__ == "__main__":

@@ -57,5 +57,6 @@ def _moments(velocity, weight, cells, n_cells):
 def turn_moments(mean: NDArray, covariance: NDArray, motion: PlanarMotion) -> tuple[NDArray, NDArray]:
     """Express mean (2, H, W) and covariance (2, 2, H, W) in the axes of a frame whose pose is `motion`: R^T C R."""
     R = motion.rotation.astype(mean.dtype)
-    half_turned = np.einsum("ij,ikhw->jkhw", R, covariance)
-    return np.einsum("ij,ihw->jhw", R, mean), np.einsum("jkhw,kl->jlhw", half_turned, R)
+    turned = np.einsum("jkhw,kl->jlhw", np.einsum("ij,ikhw->jkhw", R, covariance), R)
+    turned[1, 0] = turned[0, 1]  # rounded differently
+    return np.einsum("ij,ihw->jhw", R, mean), turned
