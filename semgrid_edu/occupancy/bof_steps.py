@@ -108,8 +108,10 @@ def going_on(state: BofState, params: BofParams, dt: float) -> NDArray[np.float3
 def whole_cells(state: BofState, spec: GridSpec, dt: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return by how many whole cells each velocity shifts its mass, (V, 2) along x and y, and the new remainders."""
     displacement = state.remainder + state.velocity * dt
-    cells = np.rint(displacement / spec.cell).astype(np.int64)
-    return cells, displacement - cells * spec.cell
+    remainder = (displacement + spec.cell / 2) % spec.cell - spec.cell / 2
+    cells = np.rint((displacement - remainder) / spec.cell)
+    farthest = max(spec.shape)  # beyond the grid all is lost anyway, however long nobody looked
+    return np.clip(cells, -farthest, farthest).astype(np.int64), remainder
 
 
 def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofParams) -> BofState:

@@ -96,7 +96,7 @@ class VelocityLattice:
         float
             p = (a dt)^2 / (6 spacing^2), but at most 1/5: then it and its neighbours are equally likely.
         """
-        return min((max_acceleration * dt / self.spacing) ** 2 / 6, 0.2)
+        return min(max_acceleration * dt / self.spacing, 1.2**0.5) ** 2 / 6
 
     def __len__(self) -> int:
         """Return the number of velocities, V."""

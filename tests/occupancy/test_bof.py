@@ -424,6 +424,16 @@ def test_a_jump_of_a_hundred_metres_forgets_everything():
     assert np.isnan(belief.velocity).all()
 
 
+def test_after_ages_all_is_forgotten_and_the_filter_goes_on():
+    tracker = Bof(SMALL, PARAMS)
+    tracker.step(scan_boxes(street(0.0)), PlanarMotion(), 0.1)
+    belief = tracker.step(np.empty((0, 3)), PlanarMotion(), 1e30)
+    assert (belief.probability[UNKNOWN] > 0.999).all()
+    belief = tracker.step(scan_boxes(street(0.0)), PlanarMotion(), 0.1)
+    assert np.isfinite(belief.probability).all()
+    assert hit_and_dynamic(WALL, (0.0, scan_boxes(street(0.0)), belief))[1].sum() == 0
+
+
 def test_what_is_no_scan_or_time_is_refused_and_changes_nothing():
     tracker, twin = Bof(SMALL, PARAMS), Bof(SMALL, PARAMS)
     for points, dt, name in ((np.array([[np.nan, 0, 0]]), 0.1, "points"), (np.zeros((1, 3)), -1.0, "dt")):
