@@ -81,12 +81,12 @@ class GroundParams:
         return int(np.ceil(self.farthest / self.bin))
 
 
-def height_above_ground(points: NDArray, params: GroundParams) -> NDArray[np.float32]:
+def height_above_ground(points: NDArray, params: GroundParams) -> NDArray:
     """Return how high each return of a scan is above the ground below it.
 
     Parameters
     ----------
-    points : (N, 3+) float
+    points : (N, 3+) float32 or float64
         Returns: x forward, y left, z above the point of the ground on which the vehicle stands (m), in the grid frame
         of the vehicle.
     params : GroundParams
@@ -94,12 +94,13 @@ def height_above_ground(points: NDArray, params: GroundParams) -> NDArray[np.flo
 
     Returns
     -------
-    (N,) float32
-        Metres; z where no ground is found. That of `height_above_ground_literal`.
+    (N,) float
+        Metres, in the type of `points`; z where no ground is found. That of `height_above_ground_literal`.
     """
-    lowest, highest, distance, place = _lowest_returns(points, params.sectors, params.bin, params.bins)
+    place = _places(points, params.sectors, params.bin, params.bins)
+    lowest = _lowest_returns(points, place, params.sectors * params.bins)
     limits = (params.step, params.slope, params.rise, params.grade, params.gap)
-    profile, seen = _walk_all(lowest, highest, distance, params.bin, *limits)
+    profile, seen = _walk_all(points, *lowest, params.sectors, params.bin, *limits)
     return _heights(points, place, _median_of_neighbours(profile, seen, params.neighbours))
 
 
@@ -153,9 +154,10 @@ def walk_sector(distance: NDArray, z: NDArray, params: GroundParams) -> NDArray[
     >>> walk_sector(distance, z, GroundParams(bin=4, farthest=16)).round(2)
     array([0.06, 0.18, 0.27, 0.27])
     """
+    bin_of = np.minimum(distance // params.bin, params.bins - 1)
     ground_at, ground = [0.0], [0.0]
     for b in range(params.bins):
-        here = np.flatnonzero(np.floor(distance / params.bin) == b)
+        here = np.flatnonzero(bin_of == b)
         if len(here) == 0 or np.ptp(z[here]) > params.rise:
             continue
         lowest = here[z[here].argmin()]
@@ -175,44 +177,51 @@ def _polar_cells(points: NDArray, params: GroundParams) -> tuple[NDArray[np.int6
     return np.minimum(sector, params.sectors - 1), bin_
 
 
+@njit(cache=True, parallel=True)
+def _places(points, sectors, bin_, bins):
+    """Find the place of each return, sector times bins plus bin; what is farther away counts to the last bin."""
+    place = np.empty(len(points), np.int32)
+    for i in prange(len(points)):
+        x, y = np.float64(points[i, 0]), np.float64(points[i, 1])
+        sector = min(int((np.arctan2(y, x) + np.pi) * (sectors / (2 * np.pi))), sectors - 1)
+        place[i] = sector * bins + int(min(np.sqrt(x * x + y * y) / bin_, bins - 1))
+    return place
+
+
 @njit(cache=True)
-def _lowest_returns(points, sectors, bin_, bins):
-    """Find the lowest and highest return of each bin of each sector, and in which of these each return lies."""
-    lowest, highest = np.full((sectors, bins), np.inf), np.full((sectors, bins), -np.inf)
-    distance, place = np.zeros((sectors, bins)), np.empty(len(points), np.int32)
+def _lowest_returns(points, place, n_places):
+    """Find at each place the lowest return, its height, and the greatest height; infinite where there is none."""
+    lowest = np.empty(n_places, np.int32)
+    low, high = np.full(n_places, np.inf, points.dtype), np.full(n_places, -np.inf, points.dtype)
     for i in range(len(points)):
-        x, y, z = np.float64(points[i, 0]), np.float64(points[i, 1]), points[i, 2]
-        away = np.sqrt(x * x + y * y)
-        s = min(int((np.arctan2(y, x) + np.pi) * (sectors / (2 * np.pi))), sectors - 1)
-        b = int(min(away / bin_, bins))
-        place[i] = s * bins + min(b, bins - 1)
-        if b < bins:
-            highest[s, b] = max(highest[s, b], z)
-            if z < lowest[s, b]:
-                lowest[s, b], distance[s, b] = z, away
-    return lowest, highest, distance, place
+        k, z = place[i], points[i, 2]
+        high[k] = max(high[k], z)
+        if z < low[k]:
+            lowest[k], low[k] = i, z
+    return lowest, low, high
 
 
 @njit(cache=True, parallel=True)
-def _walk_all(lowest, highest, distance, bin_, step, slope, rise, grade, gap):
+def _walk_all(points, lowest, low, high, sectors, bin_, step, slope, rise, grade, gap):
     """Walk all sectors: the height of the ground in each bin, and whether the sector holds returns."""
-    sectors, bins = lowest.shape
+    bins = len(low) // sectors
     profile, seen = np.empty((sectors, bins), np.float32), np.zeros(sectors, np.bool_)
     for s in prange(sectors):
         ground_at, ground, filled = 0.0, 0.0, 0
-        for b in range(bins):
-            if highest[s, b] < lowest[s, b]:
+        for k in range(s * bins, (s + 1) * bins):
+            if high[k] < low[k]:
                 continue
             seen[s] = True
-            farther = min(distance[s, b] - ground_at, gap)
-            allowed = min(step + slope * farther, rise + grade * farther)
-            if highest[s, b] - lowest[s, b] > rise or abs(lowest[s, b] - ground) > allowed:
+            x, y, z = np.float64(points[lowest[k], 0]), np.float64(points[lowest[k], 1]), np.float64(low[k])
+            distance = np.sqrt(x * x + y * y)
+            farther = min(distance - ground_at, gap)
+            if high[k] - low[k] > rise or abs(z - ground) > min(step + slope * farther, rise + grade * farther):
                 continue
-            while filled < bins and (filled + 0.5) * bin_ <= distance[s, b]:
-                part = ((filled + 0.5) * bin_ - ground_at) / (distance[s, b] - ground_at)
-                profile[s, filled] = ground + part * (lowest[s, b] - ground)
+            while filled < bins and (filled + 0.5) * bin_ <= distance:
+                part = ((filled + 0.5) * bin_ - ground_at) / (distance - ground_at)
+                profile[s, filled] = ground + part * (z - ground)
                 filled += 1
-            ground_at, ground = distance[s, b], lowest[s, b]
+            ground_at, ground = distance, z
         profile[s, filled:] = ground
     return profile, seen
 
@@ -248,7 +257,7 @@ def _sort_each_bin(rows):
 @njit(cache=True)
 def _heights(points, place, ground):
     """Subtract the ground at its place from the height of each return."""
-    height, ground = np.empty(len(points), np.float32), ground.ravel()
+    height, ground = np.empty(len(points), points.dtype), ground.ravel()
     for i in range(len(points)):
         height[i] = points[i, 2] - ground[place[i]]
     return height

@@ -1,7 +1,7 @@
 """A scan in polar coordinates: how far each beam sees, and which cells it passes (paper, section 3.2, step 2)."""
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 from numpy.typing import NDArray
 
 
@@ -118,9 +118,8 @@ def count_returns(points, low, high, shape, x_max, y_max, cell, dx, dy, dyaw):
     return obstacles, ground
 
 
-@njit(cache=True)
 def passed_cells(reach, shape, x_max, y_max, cell, dx, dy, dyaw):
-    """Find the cells that their beam passes from end to end: look up each centre's azimuth and range.
+    """Find the cells that their beam passes from end to end.
 
     Parameters
     ----------
@@ -133,13 +132,32 @@ def passed_cells(reach, shape, x_max, y_max, cell, dx, dy, dyaw):
     -------
     (H, W) bool
     """
-    passed = np.zeros(shape, np.bool_)
+    return beyond_reach(reach, shape, x_max, y_max, cell, dx, dy, dyaw) <= -cell / 2
+
+
+@njit(cache=True, parallel=True)
+def beyond_reach(reach, shape, x_max, y_max, cell, dx, dy, dyaw):
+    """Return how far each cell's centre lies beyond the reach of its beam: look up its azimuth and range.
+
+    Parameters
+    ----------
+    reach : (B,) float32
+        How far each beam sees, metres.
+    shape, x_max, y_max, cell, dx, dy, dyaw
+        The grid and the vehicle's pose in it, as for `count_returns`.
+
+    Returns
+    -------
+    (H, W) float32
+        Metres; negative for cells that the beam passes.
+    """
+    beyond = np.empty(shape, np.float32)
     cos, sin = np.cos(dyaw), np.sin(dyaw)
-    for row in range(shape[0]):
+    for row in prange(shape[0]):
         for col in range(shape[1]):
             from_x = x_max - (row + 0.5) * cell - dx
             from_y = y_max - (col + 0.5) * cell - dy
             x, y = cos * from_x + sin * from_y, cos * from_y - sin * from_x
             distance = np.sqrt(x * x + y * y)
-            passed[row, col] = distance + cell / 2 <= reach[beam_of(x, y, len(reach))]
-    return passed
+            beyond[row, col] = distance - reach[beam_of(x, y, len(reach))]
+    return beyond

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
@@ -31,6 +32,9 @@ class SensorModel:
     p_pass_occupied, p_pass_free : float
         Probability that a beam passes a cell that is occupied (foliage is porous, objects fill a cell in
         part), or free.
+    under : float
+        A ground return up to so far behind its beam's first obstacle may come from under it, from between a car's
+        wheels, and says nothing: the length of a car, metres.
     vehicle : (float, float, float, float)
         Outline of the vehicle itself, x_min, x_max, y_min, y_max in the grid frame, metres: an obstacle in it is the
         vehicle's own bonnet or mirror. That of KITTI's estate car, whose LIDAR sees the end of its bonnet 2.5 m ahead.
@@ -52,11 +56,14 @@ class SensorModel:
     max_returns: int = 2
     p_pass_occupied: float = 0.3
     p_pass_free: float = 0.7
+    under: float = 5.0
     vehicle: tuple[float, float, float, float] = (-2.1, 2.7, -1.1, 1.1)
     ground: GroundParams | None = field(default_factory=GroundParams)
 
     def __post_init__(self) -> None:
         """Refuse a sensor that is impossible, or never errs: certainty can't be corrected."""
+        if not (math.isfinite(self.under) and self.under >= 0):
+            raise ArgumentError("under", "metres, not negative", self.under)
         if not 0 < self.azimuth_step <= 360:
             raise ArgumentError("azimuth_step", "degrees, above 0 and up to 360", self.azimuth_step)
         if not self.obstacle_min < self.obstacle_max:
@@ -99,11 +106,10 @@ def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray:
     ArgumentError
         When `points` isn't a table of finite coordinates.
     """
-    points = without_own_returns(check_points(points), sensor)[:, :3]
-    if sensor.ground is None:
-        return points
-    height = height_above_ground(points, sensor.ground)
-    return np.column_stack([points[:, :2], height.astype(np.result_type(points, np.float32))])
+    points = without_own_returns(check_points(points), sensor)
+    if sensor.ground is not None:
+        points[:, 2] = height_above_ground(points, sensor.ground)
+    return points
 
 
 def check_points(points: NDArray) -> NDArray:
@@ -116,7 +122,7 @@ def check_points(points: NDArray) -> NDArray:
 
     Returns
     -------
-    (N, 3+) float
+    (N, 3+) float32 or float64
         The same numbers.
 
     Raises
@@ -125,6 +131,7 @@ def check_points(points: NDArray) -> NDArray:
         When it isn't a table of finite coordinates.
     """
     points = np.asarray(points)
+    points = points.astype(np.result_type(points, np.float32), copy=False)
     if points.ndim != 2 or points.shape[1] < 3:
         raise ArgumentError("points", "shape (N, 3+): x, y, z in metres", f"shape {points.shape}")
     if not np.isfinite(points[:, :3]).all():
@@ -145,10 +152,19 @@ def without_own_returns(points: NDArray, sensor: SensorModel) -> NDArray:
 
     Returns
     -------
-    (M, 3+) float
-        The others, in their order.
+    (M, 3) float
+        x, y and z of the others, in their order.
     """
-    x, y, z = points[:, 0], points[:, 1], points[:, 2]
-    x_min, x_max, y_min, y_max = sensor.vehicle
-    own = (x > x_min) & (x < x_max) & (y > y_min) & (y < y_max) & (z >= sensor.obstacle_min)
-    return points[~own]
+    return _outside(points, *sensor.vehicle, sensor.obstacle_min)
+
+
+@njit(cache=True)
+def _outside(points, x_min, x_max, y_min, y_max, low):
+    """Copy the points that don't lie in a box without a lid."""
+    others, n = np.empty((len(points), 3), points.dtype), 0
+    for i in range(len(points)):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        if not (x_min < x < x_max and y_min < y < y_max and z >= low):
+            others[n, 0], others[n, 1], others[n, 2] = x, y, z
+            n += 1
+    return others[:n]
