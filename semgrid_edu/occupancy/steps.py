@@ -23,7 +23,7 @@ from semgrid_edu.occupancy.particles import (
 from semgrid_edu.occupancy.resampling import draw_again, draw_newborn
 from semgrid_edu.occupancy.state import FilterState, Particles, State
 
-FREE, STATIC, DYNAMIC, UNKNOWN = State
+DYNAMIC, UNKNOWN = State.DYNAMIC, State.UNKNOWN
 NOTHING_KNOWN = np.array([0, 0, 0, 1], dtype=np.float32)
 
 
