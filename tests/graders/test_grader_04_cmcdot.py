@@ -687,7 +687,7 @@ def meet(own, arrives):
             "STATIC always wins",
             task="meet",
             loses=3,
-            says="then normalise",
+            says="STATIC isn't always right",
             code="""
 def meet(own, arrives):
     a = np.minimum(arrives, 0.999)

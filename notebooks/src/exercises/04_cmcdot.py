@@ -297,20 +297,13 @@ got = meet(own, np.array([[0.5, 0.0]]))
 assert np.array_equal(own, before), "meet changed its argument `own`: make a new array"
 assert np.shape(got) == (4, 1, 2), f"return the belief, of the shape of own, (4, 1, 2); got {np.shape(got)}"
 fence, quiet = np.round(np.asarray(got, dtype=float), 2)[:, 0].T
-assert not np.isclose(quiet[DYNAMIC], 0), (
-    "the own DYNAMIC of cell (0, 1) got lost: nothing arrives, so it is still there"
-)
+assert not np.isclose(quiet[DYNAMIC], 0), "the own DYNAMIC of cell (0, 1) got lost: nothing arrives, it is still there"
 assert np.allclose(quiet, [0.1, 0.2, 0.3, 0.4]), f"nothing arrives in cell (0, 1), yet it became {quiet}"
 assert np.isclose(fence.sum(), 1, atol=0.02), f"cell (0, 0) sums to {fence.sum():.2f}: divide by what is left"
 slips = {
     (0.25, 0.25, 0.5, 0): "a thing can't arrive where STATIC stands: strike that combination out",
     (0.5, 0, 0.5, 0): "`doesn't arrive and STATIC` is possible: don't strike it out",
-    (
-        0.25,
-        0.5,
-        0.25,
-        0,
-    ): "STATIC isn't always right: strike the combination out of the joint distribution, then normalise",
+    (0.25, 0.5, 0.25, 0): "STATIC isn't always right: strike the combination out, then divide all that is left",
 }
 for slip, hint in slips.items():
     assert not np.allclose(fence, slip, atol=0.011), f"cell (0, 0) is {fence}: {hint}"
