@@ -160,12 +160,14 @@ def test_contradiction_leaves_nothing_known(certain):
 
 
 @settings(deadline=None)
-@given(st.lists(st.integers(0, 40), min_size=1, max_size=50), st.floats(0, 1, exclude_max=True))
+@given(st.lists(st.integers(0, 40), min_size=1, max_size=50), st.integers(0, 2**20 - 1))
 def test_systematic_resampling_is_filterpys_given_its_offset(weights, offset):
     """Filterpy draws its one random number from the global generator; here both are given the same.
 
-    Weights are multiples of 2^-11, so that they add up to 1 exactly, as filterpy's indexing needs.
+    Weights are multiples of 2^-11, so that they add up to 1 exactly, and the offset isn't the last number below 1:
+    otherwise filterpy looks beyond the last weight.
     """
+    offset = offset / 2**20
     weights = np.array([*weights, 2**11 - sum(weights)]) / 2**11
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(resampling, "random", lambda: offset)
