@@ -14,7 +14,7 @@
 #
 # **Prerequisites.** Lecture 00 (the grid, Bayes' rule) and lecture 01 (predict, update). Logarithms.
 #
-# **Time.** 45 minutes, of which the computer needs less than half of one.
+# **Time.** 45 minutes, of which the computer needs less than one.
 #
 # **Paper.** Section 3.2, step 2, the sensor model; it builds on Moravec and Elfes (1985) and Elfes (1989).
 #
@@ -166,9 +166,11 @@ np.testing.assert_allclose(free, package.free[::-1, 0])
 print("P(occupied):", (0.5 * occupied / (0.5 * occupied + 0.5 * free)).round(2))
 
 # %% [markdown]
-# Three rules of the package that five cells don't show. A cell that is passed by one beam and hit by another is hit:
+# Four rules of the package that five cells don't show. A cell that is passed by one beam and hit by another is hit:
 # an object fills a cell in part. Two returns count twice, but not more, however many there are: neighbouring returns
-# share their errors. And a beam that never comes back says *nothing*: it may have met black paint, glass or the sky.
+# share their errors. A ground return frees its cell, unless it lies within 5 m behind an obstacle: then the beam may
+# have come through under a car. And a beam that never comes back says *nothing*: it may have met black paint, glass
+# or the sky.
 #
 # ### A beam across the grid
 #
@@ -839,8 +841,8 @@ plt.show()
 # - **Glass, water, black paint** send nothing back, or what stands in the mirror. A beam without a return says
 #   nothing, so a black car is a hole of unknown; a beam through a window sees the room behind it and calls the pane
 #   free.
-# - **Free isn't safe.** A cell is free as soon as *one* height of it is passed. A beam that looks under a lorry, or
-#   over a kerb, empties it.
+# - **Free isn't safe.** A cell is free as soon as a beam passes it at *one* height. What is lower than the beam
+#   there, or hangs above it, goes unseen: a kerb, a dog, the load of a lorry.
 # - **The vehicle sees itself.** Returns from its own bonnet would be an obstacle that drives along for ever, and hide
 #   what is behind it. The package drops them (`SensorModel.vehicle`), and with them whatever else is that near.
 #
