@@ -8,7 +8,7 @@ rise, verges slope. `height_above_ground_literal` says how the ground is found, 
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
@@ -177,11 +177,11 @@ def _polar_cells(points: NDArray, params: GroundParams) -> tuple[NDArray[np.int6
     return np.minimum(sector, params.sectors - 1), bin_
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True)
 def _places(points, sectors, bin_, bins):
     """Find the place of each return, sector times bins plus bin; what is farther away counts to the last bin."""
     place = np.empty(len(points), np.int32)
-    for i in prange(len(points)):
+    for i in range(len(points)):
         x, y = np.float64(points[i, 0]), np.float64(points[i, 1])
         sector = min(int((np.arctan2(y, x) + np.pi) * (sectors / (2 * np.pi))), sectors - 1)
         place[i] = sector * bins + int(min(np.sqrt(x * x + y * y) / bin_, bins - 1))
@@ -201,12 +201,12 @@ def _lowest_returns(points, place, n_places):
     return lowest, low, high
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True)
 def _walk_all(points, lowest, low, high, sectors, bin_, step, slope, rise, grade, gap):
     """Walk all sectors: the height of the ground in each bin, and whether the sector holds returns."""
     bins = len(low) // sectors
     profile, seen = np.empty((sectors, bins), np.float32), np.zeros(sectors, np.bool_)
-    for s in prange(sectors):
+    for s in range(sectors):
         ground_at, ground, filled = 0.0, 0.0, 0
         for k in range(s * bins, (s + 1) * bins):
             if high[k] < low[k]:
@@ -226,12 +226,12 @@ def _walk_all(points, lowest, low, high, sectors, bin_, step, slope, rise, grade
     return profile, seen
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True)
 def _median_of_neighbours(profile, seen, neighbours):
     """Take the median of each sector and its neighbours, of those that hold returns."""
     sectors, bins = profile.shape
     ground = np.zeros_like(profile)
-    for s in prange(sectors):
+    for s in range(sectors):
         beside = np.empty((2 * neighbours + 1, bins), np.float32)
         n = 0
         for k in range(s - neighbours, s + neighbours + 1):

@@ -1,7 +1,7 @@
 """A scan in polar coordinates: how far each beam sees, and which cells it passes (paper, section 3.2, step 2)."""
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 
@@ -135,7 +135,7 @@ def passed_cells(reach, shape, x_max, y_max, cell, dx, dy, dyaw):
     return beyond_reach(reach, shape, x_max, y_max, cell, dx, dy, dyaw) <= -cell / 2
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True)
 def beyond_reach(reach, shape, x_max, y_max, cell, dx, dy, dyaw):
     """Return how far each cell's centre lies beyond the reach of its beam: look up its azimuth and range.
 
@@ -153,7 +153,7 @@ def beyond_reach(reach, shape, x_max, y_max, cell, dx, dy, dyaw):
     """
     beyond = np.empty(shape, np.float32)
     cos, sin = np.cos(dyaw), np.sin(dyaw)
-    for row in prange(shape[0]):
+    for row in range(shape[0]):
         for col in range(shape[1]):
             from_x = x_max - (row + 0.5) * cell - dx
             from_y = y_max - (col + 0.5) * cell - dy
