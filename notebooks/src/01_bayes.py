@@ -35,6 +35,7 @@ from scipy.special import logsumexp
 from semgrid_edu import plotting
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import KITTI_14
 from semgrid_edu.occupancy import (
     CmcdotParams,
     Evidence,
@@ -80,8 +81,8 @@ plt.rcParams["figure.dpi"] = 80
 
 # %%
 POLES = [2, 3, 7]
-N = 10
-P_POLE = np.where(np.isin(np.arange(N), POLES), 0.8, 0.1)  # P("pole" | cell), for each cell
+N_CELLS = 10
+P_POLE = np.where(np.isin(np.arange(N_CELLS), POLES), 0.8, 0.1)  # P("pole" | cell), for each cell
 
 
 # %% tags=["update"]
@@ -91,7 +92,7 @@ def update(likelihood, prior):
     return np.array(product) / sum(product)
 
 
-nothing_known = np.full(N, 1 / N)
+nothing_known = np.full(N_CELLS, 1 / N_CELLS)
 one_reading = update(P_POLE, nothing_known)
 np.testing.assert_allclose(one_reading, discrete_bayes.update(P_POLE, nothing_known))
 print("cell 3: {:.3f}   cell 5: {:.3f}".format(*one_reading[[3, 5]]))
@@ -172,7 +173,7 @@ plt.show()
 def trip(steps, rng, poles=POLES, moved=MOVED, hit=0.8):
     """Return the places of a random trip, and whether the sensor says "pole" at each."""
     moves = rng.choice(3, size=steps, p=moved)
-    places = (rng.integers(N) + np.cumsum(moves)) % N
+    places = (rng.integers(N_CELLS) + np.cumsum(moves)) % N_CELLS
     says_pole = rng.random(steps) < np.where(np.isin(places, poles), hit, 0.1)
     return places, says_pole
 
@@ -192,7 +193,8 @@ def entropy(belief):
 #
 # <details><summary>Answer</summary>Prediction never lowers it: each new number is a mean of old ones, so peaks get
 # lower and holes fill up. Update lowers it usually, but not always: a reading that contradicts what you believed
-# leaves you with two explanations instead of one. A surprise makes you less sure, and rightly so.</details>
+# leaves you with two explanations instead of one. A surprise makes you less sure, and rightly so. (Where a road ends
+# at a wall, even prediction can lower the entropy: in time, everybody stands at the wall.)</details>
 
 # %%
 places, says_pole = trip(25, np.random.default_rng(2))
@@ -281,7 +283,7 @@ print(f"cell 3: predict, then update {right[3]:.2f};  update, then predict {wron
 # 8, so 8⁴ = 4096 turns them round: four readings.</details>
 
 # %%
-certain, nearly = np.eye(N)[5], np.zeros(N)
+certain, nearly = np.eye(N_CELLS)[5], np.zeros(N_CELLS)
 nearly[[5, 7]] = 0.999, 0.001
 for reading in range(1, 11):
     certain, nearly = update(P_POLE, certain), update(P_POLE, nearly)
@@ -326,7 +328,7 @@ np.testing.assert_allclose(np.exp(log_update(np.log(P_POLE), np.log(moved_on))),
 # Here it is easier with odds: P(OCCUPIED) : P(FREE).
 #
 # <details><summary>Answer</summary>Odds 1, then 3/7 = 0.43, then 9/49 = 0.18; the return multiplies by 0.8/0.05 = 16:
-# 2.94. As probabilities: 0.30, 0.16, 0.75. One return outweighs two passes, and three more.</details>
+# 2.94. As probabilities: 0.30, 0.16, 0.75. One return outweighs three passes.</details>
 
 # %%
 PASS, HIT = np.array([0.7, 0.3]), np.array([0.05, 0.8])  # P(z | FREE), P(z | OCCUPIED)
@@ -360,7 +362,7 @@ def predict_states(belief, M):
 M = np.array([[0.9, 0.1], [0.2, 0.8]])
 print(predict_states(np.array([0.6, 0.4]), M).round(2))
 
-ring = np.array([predict(place, MOVED) for place in np.eye(N)])  # row i: where a vehicle in cell i will be
+ring = np.array([predict(place, MOVED) for place in np.eye(N_CELLS)])  # row i: where a vehicle in cell i will be
 np.testing.assert_allclose(predict_states(one_reading, ring), predict(one_reading, MOVED))
 
 # %% [markdown]
@@ -375,6 +377,10 @@ np.testing.assert_allclose(predict_states(one_reading, ring), predict(one_readin
 # <details><summary>Answer</summary>It forgets twice as fast: in each tenth of a second $M$ is applied twice. The
 # matrix belongs to a time step. What belongs to the world are *rates*: how often, a second, does a free cell become
 # occupied?</details>
+#
+# By hand: what stands in a cell leaves it at the rate of 1 a second. In 0.1 s a tenth of the belief has left, or so:
+# do it in two steps of 0.05 s, and 0.95² = 0.9025 is left; in ten of 0.01 s, 0.99¹⁰ = 0.9044. The finer the cut, the
+# nearer to $e^{-0.1} = 0.9048$, which is exact.
 #
 # Give the rates $R_{ij}$, from state $i$ to $j$, in 1/s. In a very short time $\tau$ the belief changes by $\tau\, b
 # R$ (the diagonal of $R$ is what leaves: rows of $R$ sum to zero). Many short times make a long one:
@@ -400,7 +406,8 @@ def matrix_of(rates, dt, k=100_000):
     return np.linalg.matrix_power(np.eye(len(R)) + R * dt / k, k)
 
 
-params = CmcdotParams(rates=RATES, sensor=SensorModel(p_hit_occupied=0.8, p_hit_free=0.05))
+sensor = SensorModel(p_hit_occupied=0.8, p_hit_free=0.05, p_pass_occupied=0.3, p_pass_free=0.7)
+params = CmcdotParams(rates=RATES, first_sight=(0.85, 0.14, 0.01), sensor=sensor)
 M = transition_matrix(params, dt=0.1)
 np.testing.assert_allclose(matrix_of(RATES, dt=0.1), M, atol=1e-6)
 half = transition_matrix(params, dt=0.05)
@@ -435,7 +442,7 @@ plt.show()
 
 # %%
 SPOTS = {
-    "road": (16.25, 0.25),
+    "road": (18.25, -0.75),
     "front of a house": (33.25, -13.25),
     "a car drives through": (17.25, 2.75),
     "a passing car hides it": (20.25, 5.75),
@@ -446,10 +453,21 @@ start = frames[0].T_world_from_lidar
 occupied, free = np.empty((2, len(frames), len(SPOTS)))
 for k, frame in enumerate(frames):
     pose = PlanarMotion.from_poses(start, frame.T_world_from_lidar)
-    evidence = scan_evidence(frame.points_grid, spec, params.sensor, pose)
+    evidence = scan_evidence(frame.points_grid, spec, sensor, pose)
     occupied[k], free[k] = evidence.occupied[rows, cols], evidence.free[rows, cols]
 
+LABEL = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 1}
+fig, ax = plt.subplots(figsize=(6.5, 5.6), layout="compressed")
+plotting.grid_labels(spec, frames[0].labels.birdseye_on(spec), KITTI_14, ax=ax).set_ylim(5, 40)
+for name, (x, y) in SPOTS.items():
+    ax.plot(y, x, "o", markersize=9, markerfacecolor="none", markeredgecolor="black", markeredgewidth=2)
+    ax.annotate(name, (y, x), (0, 9), textcoords="offset points", ha="center", bbox=LABEL)
+plt.show()
+
 # %% [markdown]
+# The map is the truth of the first frame, the circles are our spots. The car that will drive through one of them is
+# still behind us.
+#
 # `scan_evidence` turns a scan into two likelihoods for each cell, P(z | occupied) and P(z | free), as in the toy case
 # (lecture 02 shows how). Where a scan says nothing of a cell, they are equal. One letter a scan: `#` for a return,
 # `.` for a beam that passes, a blank for nothing.
@@ -512,9 +530,11 @@ plt.show()
 # %% [markdown]
 # Each picture is one cell over two seconds, each band as high as its state is probable. The road becomes free within
 # two scans, the house static. Below on the left the car is there within one scan and mostly dynamic: the right
-# answer, for the reason that you have predicted. When it has left, the cell needs three scans to believe it; remember
-# that for the next lecture. On the right the belief fades to grey while the car hides the cell, and is back when it
-# is seen again.
+# answer, for the reason that you have predicted. It isn't ten to one, though. A little STATIC was left over from
+# before, and more has come in by way of UNKNOWN: what the prediction forgets of the free cell is shared out anew at
+# each scan, and at first sight standing things are more frequent than moving ones. When the car has left, the cell
+# needs three scans to believe it; remember that for the next lecture. On the right the belief fades while the car
+# hides the cell, and is back when it is seen again.
 #
 # A few lines agree with `filterpy` and with the package to six digits. The package does this in thousands of cells at
 # once.
@@ -528,7 +548,7 @@ plt.show()
 
 # %% tags=["nbval-ignore-output"]
 def localise(says_pole, sensor, moved=MOVED):
-    """Return the belief after each reading, (T, N); `sensor` holds the likelihoods of "nothing" and of "pole"."""
+    """Return the belief after each reading; `sensor` holds the likelihoods of "nothing" and of "pole"."""
     belief, history = nothing_known, []
     for says in says_pole:
         belief = update(sensor[int(says)], predict(belief, moved))
@@ -540,7 +560,7 @@ def show(hit, slip, ax=None):
     """Draw a trip of 40 steps with such a sensor and such odometry, and what a filter that knows both believes."""
     moved = np.array([slip / 2, 1 - slip, slip / 2])
     places, says_pole = trip(40, np.random.default_rng(6), moved=moved, hit=hit)
-    p_pole = np.where(np.isin(np.arange(N), POLES), hit, 0.1)
+    p_pole = np.where(np.isin(np.arange(N_CELLS), POLES), hit, 0.1)
     history = localise(says_pole, [1 - p_pole, p_pole], moved)
     right = 100 * np.mean(history.argmax(axis=1) == places)
     ax = plotting.belief_history(history, ax, truth=places)
@@ -618,7 +638,7 @@ assert all(claim > truth + 0.1 for claim, truth in broken)
 # again.
 
 # %%
-road, sensor = history[-1, list(SPOTS).index("road")], params.sensor
+road = history[-1, list(SPOTS).index("road")]
 hits = sensor.p_hit_occupied**2, sensor.p_hit_free**2
 passes = sensor.p_pass_occupied, sensor.p_pass_free
 for scan in (hits, *[passes] * 5):

@@ -53,7 +53,8 @@ def probability_line(
     values = np.asarray(values)
     if values.ndim != 1 or not ((values >= 0) & (values <= 1)).all():
         raise ArgumentError("values", "one number between 0 and 1 for each cell, shape (N,)", values)
-    names = [str(cell) for cell in range(len(values))] if names is None else names
+    named = names is not None
+    names = names if named else [str(cell) for cell in range(len(values))]
     if len(names) != len(values):
         raise ArgumentError("names", f"one for each of {len(values)} cells", len(names))
     if ax is None:
@@ -65,7 +66,7 @@ def probability_line(
         ax.plot(truth, 1.02, "v", color="#d55e00", transform=ax.get_xaxis_transform(), clip_on=False)
     ax.set_xticks(range(len(values)), names)
     ax.set_title(title, loc="left", fontsize="medium")
-    ax.set(ylim=(0, TOP), ylabel="probability", xlim=(-0.6, len(values) - 0.4))
+    ax.set(ylim=(0, TOP), xlim=(-0.6, len(values) - 0.4), xlabel="" if named else "cell", ylabel="probability")
     return ax
 
 
@@ -94,6 +95,7 @@ def probability_lines(
     figure, axes = plt.subplots(len(lines), 1, figsize=size, sharex=True, layout="constrained", squeeze=False)
     for ax, (title, values) in zip(axes[:, 0], lines.items(), strict=True):
         probability_line(values, ax, title, names, truth).set_ylim(0, TOP * max(map(np.max, lines.values())))
+        ax.label_outer()
     return figure
 
 

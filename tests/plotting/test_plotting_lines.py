@@ -41,6 +41,7 @@ def test_lines_below_each_other_share_their_scale():
     figure = plotting.probability_lines(lines, truth=0)
     assert [ax.get_title(loc="left") for ax in figure.axes] == list(lines)
     assert len({ax.get_ylim() for ax in figure.axes}) == 1
+    assert [ax.get_xlabel() for ax in figure.axes] == ["", "", "cell"]
     assert figure.axes[0].get_ylim()[1] > 0.9
     np.testing.assert_array_equal([heights(ax) for ax in figure.axes], list(lines.values()))
 
