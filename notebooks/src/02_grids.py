@@ -755,8 +755,9 @@ for ax in axes[1:]:
 plt.show()
 
 # %% [markdown]
-# The car is seen at its first hit in all three; what differs is the letting go: five passes, nine, eighteen. A porous
-# world makes each pass weak evidence, and free space is learnt slowly too: look at the first second.
+# In the red band the car is there. It is seen at its first hit in all three; what differs is the letting go: five
+# passes, nine, eighteen. A porous world makes each pass weak evidence, and free space is learnt slowly too: look at
+# the first second.
 #
 # ## Where this breaks
 #
