@@ -108,7 +108,7 @@ story["cell 4 is hit"] = look(story["a second later "], *beams(hit=4))
 for when in ("a second later", "cell 3 is hit"):
     print(f"{when:<16}" + "".join(f"cell {cell:<5}" for cell in range(6)))
     for v, row in zip(V, story[when], strict=True):
-        print(f"   P(O, v = {v:+d})  " + "".join(f"{p:<10.3f}" for p in row))
+        print(f"   P(O, v = {v:2d})  " + "".join(f"{p:<10.3f}" for p in row))
 
 # %% [markdown]
 # The package does the same on any grid. Lay the line along x: row 0 is the farthest ahead, so the array runs the other
@@ -159,9 +159,9 @@ plt.show()
 # that started in one column has been sheared apart. The scan of the third panel picks a *column*, and with it a
 # velocity. The next flight tests the claim: only +1 arrives in cell 4, where the next beam comes back.
 #
-# See also what BOF does *not* know. There was one thing; yet after the first scan the cells hold 0.18 + 0.18 + 0.89 =
-# 1.24 things. Each cell is judged by itself: finding the thing in cell 3 says nothing about cell 1. Only looking there
-# does.
+# See also what BOF does *not* know. There was one thing; yet after the first scan the cells hold 0.176 + 0.176 + 0.889
+# = 1.24 things. Each cell is judged by itself: finding the thing in cell 3 says nothing about cell 1. Only looking
+# there does.
 
 # %% [markdown]
 # ## What arrives where something stands
@@ -522,7 +522,7 @@ plt.show()
 # ## On the drive
 #
 # The same on the shipped drive: a street, a vehicle that moves at 8.5 m/s, scans of a whole turn. `Bof` is the two
-# functions, plus a map that scrolls under the vehicle by whole cells (lecture 02). A lattice up to 16 m/s, 2 m/s apart,
+# functions, plus a map that scrolls under the vehicle by whole cells. A lattice up to 16 m/s, 2 m/s apart,
 # has 197 velocities.
 #
 # **Predict before you run.** A red car overtakes on the left. It touches cells that were free a moment ago at its
@@ -586,6 +586,7 @@ print("BOF after 1.9 s:   front half {:4.0f}   rear half {:4.0f}".format(*told[2
 # work.</details>
 
 # %%
+assert (beliefs[-1].probability[DYNAMIC] > 0.1).mean() < 0.05
 cells = np.prod(GridSpec.paper().shape)
 print("fastest  spacing  velocities   memory on the paper's grid")
 for fastest, spacing in ((8, 2), (16, 2), (16, 1), (25, 1), (25, 0.5)):
@@ -603,8 +604,8 @@ for fastest, spacing in ((8, 2), (16, 2), (16, 1)):
     print(f"{len(params.lattice):4d} velocities: {1000 * min(took):4.0f} ms for one prediction on the compact grid")
 
 # %% [markdown]
-# Time grows with V x H x W, nearly all of it spent on flying zeros about: on a street one cell in ten holds anything
-# that may move, and in that cell a handful of velocities count. Lecture 04 puts the memory where the mass is:
+# Time grows with V x H x W, nearly all of it spent on flying zeros about: on the drive above fewer than one cell in
+# twenty holds something that moves with a probability of 0.1 or more. Lecture 04 puts the memory where the mass is:
 # particles, each with a position and a velocity of its own, many where something moves and none elsewhere.
 #
 # ## Play with it
@@ -691,11 +692,11 @@ axes[1].set(xlabel="behind the front of the bus [m]", ylabel="P(DYNAMIC), where 
 plt.show()
 
 # %% [markdown]
-# Left: a yellow head with arrows, and a black body, as if the bus were a wall from which somebody walks away. Right:
-# the cells along its flank. The first metres move for sure; farther back the bus stands. It is the same bus,
-# but BOF knows no buses: cells are independent of each other, so the front can't tell the flank. That is why the rear
-# of the red car came out too slow. And it is why the wall stayed STATIC: if it slid along itself, you would see the
-# same.
+# Left: a yellow head with arrows, and behind it, black, the returns from its flank, as if somebody walked away from a
+# wall. Right: the cells along that flank. The first metres move for sure; farther back the bus stands. It is the same
+# bus, but BOF knows no buses: cells are independent of each other, so the front can't tell the flank. That is why the
+# rear of the red car came out too slow. And it is why the wall stayed STATIC: if it slid along itself, you would see
+# the same.
 #
 # **A lattice brakes in jerks.** A box comes at 8 m/s and slows down by 4 m/s² until it stands.
 
@@ -736,8 +737,8 @@ plt.show()
 #
 # - Coué, Pradalier, Laugier, Fraichard, Bessière, *Bayesian occupancy filtering for multitarget tracking: an automotive
 #   application*, International Journal of Robotics Research 25(1), 2006: the filter.
-# - Chen, Tay, Laugier, Mekhnacha, *Dynamic environment modeling with gridmap: a multiple-object tracking application*,
-#   ICARCV 2006: a variant whose cells each estimate one distribution of velocity.
+# - Nègre, Rummelhard, Laugier, *Hybrid sampling Bayesian occupancy filter*, IEEE Intelligent Vehicles Symposium 2014:
+#   what stands in the grid, what moves in particles; the step from here to lecture 04.
 # - Danescu, Oniga, Nedevschi, *Modeling and tracking the driving environment with a particle-based occupancy grid*,
 #   IEEE Transactions on Intelligent Transportation Systems 12(4), 2011: particles in place of the lattice.
 #
