@@ -9,7 +9,7 @@
 # - do each of the four steps by hand on a line of six cells: move, predict, update, resample;
 # - explain why prediction alone, and no single scan, tells STATIC from DYNAMIC;
 # - choose the number of particles and the speed below which a thing stands, and say what either costs;
-# - name four situations in which the filter is wrong.
+# - name three situations in which the filter is wrong, and say why.
 #
 # **Prerequisites.** Lectures 01 to 03: Bayes' rule on a line, evidence of a scan, occupancy with velocity.
 #
@@ -99,7 +99,9 @@ print(f"CMCDOT: {cells:,} cells x 4, and {CmcdotParams().particles:,} particles 
 #
 # ## Four steps, one loop
 #
-# Here is the filter. Each line is one of the paper's steps, and a function that changes nothing but what it returns.
+# Here is the filter: four numbered lines, each a pure function. (The paper counts prediction, update, estimation of
+# the states and resampling. To move with the vehicle goes without saying there; here it comes first, for it is easily
+# done wrong.)
 
 # %%
 drive, spec, params = sample_drive(), GridSpec.compact(), CmcdotParams()
@@ -168,9 +170,9 @@ plt.show()
 # the nearest old one instead, when we drive 0.4 m a step?
 #
 # <details><summary>Answer</summary>Each step is a coin toss: move by a whole cell or not. After n steps by a fraction
-# f of a cell the post has a standard deviation of the square root of n f (1 - f) cells: the blur grows for ever. The
-# nearest cell to 0.4 is cell 0: the map never moves at all, and after ten steps the post is four metres from where it
-# belongs.</details>
+# f of a cell the post has a standard deviation of the square root of n f (1 - f) cells: the blur grows for ever.
+# Here, 40 steps of half a cell: 3.2 cells. The nearest cell to 0.4 is cell 0: the map never moves at all, and after
+# ten steps the post is four metres from where it belongs.</details>
 #
 # $$ b'(c) = (1 - f)\, b(c + k) + f\, b(c + k + 1), \qquad \text{shift} = k + f \text{ cells},\; 0 \le f < 1 $$
 
@@ -321,10 +323,10 @@ for ax, state in zip(axes, (FREE, STATIC, DYNAMIC), strict=True):
 plt.show()
 
 # %% [markdown]
-# What moves is forgotten first, what stands last. UNKNOWN has no way back: only a look reveals what is there (step 3).
-# And a sliver of every state turns DYNAMIC: it is **born**. By hand, for a cell FREE 0.8, STATIC 0.2, when either turns
-# DYNAMIC at 0.01 a second: in 0.1 s a thousandth, $0.8 \cdot 0.001 + 0.2 \cdot 0.001$. Newborn mass has no velocity
-# yet; step 4 will give it some.
+# What moves is forgotten first, what stands last. UNKNOWN has no way back: only a look reveals what is there (step
+# 3). And a sliver of every state turns DYNAMIC: it is **born**. By hand, for a cell FREE 0.8, STATIC 0.2, when either
+# turns DYNAMIC at 0.01 a second: in 0.1 s a thousandth, $0.8 \cdot 0.001 + 0.2 \cdot 0.001$. Newborn mass has no
+# velocity yet; step 4 will give it some.
 
 # %%
 born_slowly = CmcdotParams(rates=((0, 0, 0.01, 0), (0, 0, 0.01, 0), (0, 0, 0, 0), (0, 0, 0, 0)))
@@ -667,7 +669,7 @@ for offset in rng.random(20):
 urn = rng.multinomial(4, [0.1, 0.6, 0.3], size=2000)[:, 1]
 combed = np.array([comb([0.1, 0.6, 0.3], 4, offset).count(1) for offset in rng.random(2000)])
 print(f"mean copies of particle 1: urn {urn.mean():.1f}, comb {combed.mean():.1f}; expected 2.4")
-print(f"variance:                  urn {urn.var():.1f}, comb {combed.var():.1f}")
+print(f"variance:                  urn {urn.var():.2f}, comb {combed.var():.2f}")
 assert combed.var() <= 0.25 < urn.var()
 fig, ax = plt.subplots(figsize=(5, 2.2), layout="constrained")
 for drawn, name, at, colour in ((urn, "urn (multinomial)", -0.2, "0.7"), (combed, "comb (systematic)", 0.2, "#6a1b9a")):
@@ -772,10 +774,10 @@ plt.show()
 # %% [markdown]
 # Left, the orange band is the car passing over the cell: 4 m at 8 m/s is half a second. It comes with no dark before
 # it. Right, the parked car is dark from first sight, and the sliver of orange it starts with is gone in three scans.
-# Here is the street after 2 s, the particles on the right:
+# Here is the street after 1.8 s, the particles on the right:
 
 # %%
-t, x, points, belief, particles = seen[20]
+t, x, points, belief, particles = seen[18]
 fig, axes = plt.subplots(1, 2, figsize=(9.5, 4.2), layout="compressed")
 plotting.velocity_wheel(spec, belief.probability, belief.velocity, ax=axes[0], legend=False)
 plotting.velocity(spec, belief.probability, belief.velocity, ax=axes[0])
@@ -813,8 +815,10 @@ shares = np.array(
 for name, share in zip(names, shares.mean(axis=0), strict=True):
     print(f"{name:<13} {100 * share:3.0f} % of its cells more DYNAMIC than STATIC, from 1.0 s to 2.4 s")
 velocity = np.nanmedian(on(street(t)[2], x, points, belief)[2], axis=1)
-print(f"oncoming car: {velocity[0]:.0f} m/s forward, {velocity[1]:.0f} m/s to the left; the truth is -8 and 0")
-assert abs(velocity[0] + 8) < 1.5
+print(
+    "oncoming car: {:d} m/s forward, {:d} m/s to the left; the truth is -8 and 0".format(*np.rint(velocity).astype(int))
+)
+assert np.abs(velocity - [-8, 0]).max() < 1.5
 assert max(shares[:, :2].mean(axis=0)) < 0.1
 assert shares[:, 2].mean() > 0.7
 
@@ -822,7 +826,7 @@ assert shares[:, 2].mean() > 0.7
 # ## What a particle is worth
 #
 # Half of a cell's mass flies to the left, half to the right, and four particles carry it. Toss four coins: how many
-# go left? Two on average, and one of the sixteen outcomes has all four on one side.
+# go left? Two on average; but in two of the sixteen outcomes all four go to one side.
 #
 # **Predict before you run.** You pay for sixteen particles instead of four. How much smaller is the error: by four,
 # by two, by sixteen?
@@ -967,7 +971,7 @@ plt.show()
 # %% [markdown]
 # ## Where this breaks
 #
-# Four failures. None is repaired for this page.
+# Three failures, none of them repaired for this page, and one that you might expect.
 #
 # **The middle of a long thing.** A bus, 18 m long, drives ahead on our left at 8 m/s. Its front has just passed us
 # when we switch the filter on.
@@ -1059,8 +1063,8 @@ for name, (times, means) in hidden.items():
     print(f"car behind {name}: hidden for {gone.sum() / 10:.1f} s; P(DYNAMIC) {before:.1f} before, {after:.1f} after")
 
 # %% [markdown]
-# The person is called STATIC for a second and more: first the belief in a standing thing, grown over two seconds,
-# must be worn down. Who brakes for pedestrians only when they are DYNAMIC brakes late.
+# The person is called STATIC for about a second: first the belief in a standing thing, grown over two seconds, must
+# be worn down. Who brakes for pedestrians only when they are DYNAMIC brakes late.
 #
 # **Who is hidden for long.** Behind the narrow van the car's particles fly on unseen, and when the car comes out it
 # is expected. Behind the wide van they fade as the third picture of step 2 says, with a time of 2 s, and the
@@ -1105,7 +1109,7 @@ print(f"after the first second, {100 * np.nanmean(shares):.1f} % of its cells ar
 # 2. Move: scroll by whole cells, keep the remainder. Predict: fade by $M = e^{R \Delta t}$, fly, strike conflicts out.
 # 3. Update: reveal UNKNOWN, then Bayes. The ratio of DYNAMIC to STATIC stays, so prediction alone decides between them.
 # 4. Resample: one comb over the weights, a share for the newborn. The error falls like $N_p^{-1/2}$, towards the BOF.
-# 5. It fails along a long side, and for who has just set out: there STATIC predicts as well. What is hidden it forgets.
+# 5. It fails along a long side and for whoever has just set out: STATIC predicts as well there. What is hidden fades.
 #
 # ## Further reading
 #
