@@ -40,8 +40,9 @@ def scan_evidence(points: NDArray, spec: GridSpec, sensor: SensorModel, pose: Pl
     - *Occlusion.* A beam ends at its first obstacle, however low, though higher rings may look over it. What they hit
       behind it still counts: obstacle returns always, ground returns from `under` metres on; nearer ones may come
       through below it.
-    - *Thin objects.* One return stops the whole beam, 16 cm wide at 30 m: a pole casts a shadow of at least a beam.
-      What stands between two columns of returns and is thinner than their distance isn't seen, and passed for free.
+    - *Thin objects.* One return stops its whole beam, which is 16 cm wide at 30 m; a cell that beams share belongs to
+      the one through its centre. What is thinner than the distance between two columns of returns may stand
+      between them unseen, and is passed for free.
     - *Several rings.* What a beam passes over between two rings isn't there. Where rings differ by an angle a, they
       miss things lower than a times the distance: for KITTI's scanner 0.3 m at 50 m. Below its lowest ring, nearer
       than 4 m, nothing is checked; nor are rays that don't come back.

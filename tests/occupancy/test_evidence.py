@@ -1,17 +1,21 @@
 """Evidence from a scan: by hand on a ray of five cells, and the fast twin against the literal one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import minimum_filter
 
+from semgrid_edu.camera import KITTI_LIDAR_HEIGHT
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import PlanarMotion, SensorModel, scan_evidence, scan_evidence_literal
 from semgrid_edu.occupancy.evidence import walk_ray
 from semgrid_edu.occupancy.polar import fill_gaps
 from semgrid_edu.simulation.boxes import Box, scan_boxes
+from semgrid_edu.simulation.rig import HDL64E_ELEVATIONS
 
 RAY = GridSpec(x_min=0, x_max=5, y_min=-0.5, y_max=0.5, cell=1)
 SENSOR = SensorModel()
@@ -32,6 +36,66 @@ def test_five_cells_on_a_ray_by_hand(evidence_of):
 def test_ground_alone_is_free_up_to_its_farthest_return(evidence_of):
     evidence = evidence_of(np.array([[2.5, 0, 0.1]]), RAY, SENSOR)
     assert (evidence.free[:, 0] > evidence.occupied[:, 0]).tolist() == [False, False, True, True, True]
+
+
+def says(evidence):
+    """Return what the evidence says of each cell of the ray, nearest first: free, occupied or nothing."""
+    ratio = np.sign(evidence.occupied - evidence.free)[::-1, 0]
+    return "".join({-1: "f", 1: "o", 0: "."}[int(r)] for r in ratio)
+
+
+LONG_RAY = GridSpec(x_min=0, x_max=12, y_min=-0.5, y_max=0.5, cell=1)
+
+
+@TWINS
+@pytest.mark.parametrize(
+    ("returns", "expected"),
+    [
+        # occlusion: a low thing hides what is behind it, though rings that look over it may hit something there
+        ([(3.5, 0.4), (9.5, 0.0)], "fffo.....f.."),
+        ([(3.5, 0.4), (6.5, 1.5)], "fffo..o....."),
+        # what a ring hits just behind the first obstacle may lie under it; from a car's length on it can't
+        ([(3.5, 0.6), (5.5, 0.0), (7.5, 0.0), (9.5, 0.0)], "fffo.....f.."),
+        # a crown or a bridge hides nothing below it, and says nothing itself
+        ([(3.5, 3.0), (6.5, 0.0)], "fffffff....."),
+        # a wall seen through the gap under something that hangs
+        ([(3.5, 3.0), (6.5, 1.0)], "ffffffo....."),
+        # one return of a pole in front of a wall stops the beam
+        ([(4.5, 1.0), (8.5, 1.0), (8.5, 1.4)], "ffffo...o..."),
+        # two rings that hit the ground: nothing stands between them
+        ([(4.5, 0.0), (7.5, 0.0)], "ffffffff...."),
+        # a kerb is ground, an obstacle beside a ground return overrules it
+        ([(4.5, 0.1), (7.5, 0.05), (7.6, 1.0)], "fffffffo...."),
+    ],
+)
+def test_what_a_beam_with_several_rings_says_of_its_cells(evidence_of, returns, expected):
+    ahead, heights = np.array(returns).T
+    points = np.stack([ahead, np.zeros_like(ahead), heights], axis=1)
+    assert says(evidence_of(points, LONG_RAY, replace(SENSOR, ground=None))) == expected
+
+
+@TWINS
+def test_one_return_of_a_pole_is_an_obstacle_and_shades_no_more_than_its_beam(evidence_of):
+    azimuth = np.radians(np.arange(-30, 30, 0.2))
+    wall = np.stack([20 * np.cos(azimuth), 20 * np.sin(azimuth), 0 * azimuth + 1], axis=1)
+    spec = GridSpec(0, 20, -4, 4, 0.2)
+    pole = np.array([[8.0, 0.01, 1.0]])
+    alone, with_pole = (evidence_of(scan, spec, SENSOR) for scan in (wall, np.concatenate([wall, pole])))
+    shadow = (alone.free > alone.occupied) & ~(with_pole.free > with_pole.occupied)
+    x, y = np.moveaxis(spec.centers()[shadow], -1, 0)
+    assert (with_pole.occupied > with_pole.free)[60, 19]
+    assert (x > 7.8).all()
+    assert (np.abs(y) < 0.2 + np.radians(SENSOR.azimuth_step) * x).all()
+
+
+def test_no_obstacle_hides_between_the_rings_of_kittis_scanner_within_50_m():
+    """The ray to the farther of two rings on the ground is so high above the nearer one, where the gap begins."""
+    rings = np.radians(HDL64E_ELEVATIONS)
+    on_ground = -KITTI_LIDAR_HEIGHT / np.tan(rings[rings < 0])
+    nearer, farther = on_ground[1:], on_ground[:-1]
+    hidden = KITTI_LIDAR_HEIGHT * (farther - nearer) / farther
+    assert (hidden[farther < 50] < SENSOR.obstacle_min).all()
+    assert (hidden[farther > 70] > SENSOR.obstacle_min).all()
 
 
 @TWINS
@@ -116,7 +180,14 @@ def test_what_is_no_scan_is_refused_by_name(evidence_of, points):
 
 @pytest.mark.parametrize(
     "bad",
-    [{"azimuth_step": 0}, {"p_hit_free": 0}, {"p_pass_free": 1}, {"obstacle_min": 3}, {"vehicle": (3, -2, -1, 1)}],
+    [
+        {"azimuth_step": 0},
+        {"p_hit_free": 0},
+        {"p_pass_free": 1},
+        {"obstacle_min": 3},
+        {"vehicle": (3, -2, -1, 1)},
+        {"under": -1.0},
+    ],
 )
 def test_an_impossible_sensor_is_refused_by_name(bad):
     with pytest.raises(ArgumentError, match=next(iter(bad))):
