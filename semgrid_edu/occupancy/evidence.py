@@ -62,7 +62,8 @@ def scan_evidence(points: NDArray, spec: GridSpec, sensor: SensorModel, pose: Pl
     Returns
     -------
     Evidence
-        That of `scan_evidence_literal`, except for lines of cells where what is seen begins or ends.
+        That of `scan_evidence_literal`, except for cells that several beams share, of which only some get through:
+        thin lines where what is seen begins or ends, and far out, among foliage, whole patches.
 
     Raises
     ------
