@@ -39,9 +39,9 @@ class CmcdotParams:
         Part of the particles that is spent on newborn mass, so that new things are found soon.
     first_sight : (float, float, float)
         What UNKNOWN cells turn out to be when they are first seen: FREE, STATIC, DYNAMIC; sums to 1. Most of a
-        street is free; of the cells that hold an obstacle, one in ten moves. The static share also weighs against
-        what flies in where nobody has looked: who walks away from the sensor enters only such cells, so a large one
-        takes that person for standing; a small one takes the end of a wall that comes into view for moving.
+        street is free, and of the obstacles on it, by area, few move. The static share also weighs against what
+        flies in where nobody has looked. Who walks away from the sensor enters only such cells: with a large
+        share that person seems to stand, with a small one the end of a wall that comes into view seems to move.
     sensor : SensorModel
         How the scanner errs.
 
@@ -64,7 +64,7 @@ class CmcdotParams:
     max_speed: float = 25.0
     max_acceleration: float = 4.0
     birth_share: float = 0.3
-    first_sight: tuple[float, float, float] = (0.93, 0.063, 0.007)
+    first_sight: tuple[float, float, float] = (0.93, 0.067, 0.003)
     sensor: SensorModel = field(default_factory=SensorModel)
 
     def __post_init__(self) -> None:
