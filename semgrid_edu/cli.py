@@ -12,8 +12,10 @@ from semgrid_edu.errors import ArgumentError, DataError
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 data = typer.Typer(no_args_is_help=True, help="Make and check data.")
 course = typer.Typer(no_args_is_help=True, help="Build the notebooks and the exercises.")
+reproduce = typer.Typer(no_args_is_help=True, help="Run the experiments of the lectures.")
 app.add_typer(data, name="data")
 app.add_typer(course, name="course")
+app.add_typer(reproduce, name="reproduce")
 
 
 @app.callback()
@@ -159,6 +161,27 @@ def evaluate(
     result = evaluate(data, weights)
     write_json(out, result)
     typer.echo(f"{table(result['scores'])}\n\nwritten to {out}")
+
+
+@reproduce.callback()
+def experiments() -> None:
+    """Run the experiments of the lectures."""
+
+
+@reproduce.command()
+def occupancy(
+    seed: Annotated[int, typer.Option(min=0, help="Of the simulated drives and of the particles.")] = 0,
+    drives: Annotated[int, typer.Option(min=1, help="How many, of three seconds each.")] = 20,
+    grid: Annotated[str | None, typer.Option(help="paper or compact; both by default.")] = None,
+    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("occupancy.json"),
+) -> None:
+    """Score log-odds grid, BOF and CMCDOT on simulated drives (lecture 04)."""
+    from semgrid_edu.experiments.occupancy import GRIDS, compare, tables
+    from semgrid_edu.files import write_json
+
+    result = compare(seed, drives, (grid,) if grid else tuple(GRIDS))
+    write_json(out, result)
+    typer.echo(f"{tables(result)}\n\nwritten to {out}")
 
 
 def _report(problems: list[str], sound: str) -> None:

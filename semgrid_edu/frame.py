@@ -59,8 +59,8 @@ class FrameLabels:
         ArgumentError
             When `spec` isn't a coarsening of `LABEL_GRID`.
         """
-        blocks = _blocks(self.birdseye, spec)
-        counts = np.stack([(blocks == c).sum(axis=-1) for c in range(len(self.label_set))])
+        fine = blocks(self.birdseye, spec)
+        counts = np.stack([(fine == c).sum(axis=-1) for c in range(len(self.label_set))])
         flat = [self.label_set.index(name) for name in self.label_set.flat]
         standing = counts.copy()
         standing[flat] = 0
@@ -69,11 +69,28 @@ class FrameLabels:
 
     def visible_on(self, spec: GridSpec) -> NDArray[np.bool_]:
         """Pool visibility to a coarser grid, (H, W) bool: a cell is seen when any part of it is."""
-        return _blocks(self.visible, spec).any(axis=-1)
+        return blocks(self.visible, spec).any(axis=-1)
 
 
-def _blocks(fine: NDArray, spec: GridSpec) -> NDArray:
-    """Return the fine cells of each cell of `spec`, (H, W, factor^2)."""
+def blocks(fine: NDArray, spec: GridSpec) -> NDArray:
+    """Return the fine cells that each cell of a coarser grid consists of.
+
+    Parameters
+    ----------
+    fine : (710, 310)
+        Anything over `LABEL_GRID`.
+    spec : GridSpec
+        A coarsening of `LABEL_GRID`.
+
+    Returns
+    -------
+    (H, W, factor^2)
+
+    Raises
+    ------
+    ArgumentError
+        When it isn't one.
+    """
     factor = round(spec.cell / LABEL_GRID.cell)
     height, width = spec.shape
     coarsening = GridSpec(spec.x_min, spec.x_max, spec.y_min, spec.y_max, LABEL_GRID.cell) == LABEL_GRID

@@ -1,0 +1,104 @@
+"""What is true of each cell of a simulated street: the states of section 3.2, known instead of estimated."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.frame import blocks
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import State
+from semgrid_edu.simulation.drive import SimulatedDrive
+from semgrid_edu.simulation.materials import Kind
+
+MOVES = 0.05
+"""m/s: what is faster moves."""
+FLAT = (Kind.ROAD, Kind.LANE, Kind.SIDEWALK, Kind.GRASS)
+"""The kinds of bare ground."""
+
+
+@dataclass(frozen=True, eq=False)
+class CellTruth:
+    """What is true at one instant.
+
+    Parameters
+    ----------
+    state : (H, W) uint8
+        FREE, STATIC or DYNAMIC of `State`: truth is never UNKNOWN.
+    kind : (H, W) uint8
+        What stands in the cell, a `Kind`; the kind of the ground where nothing does.
+    instance : (H, W) int32
+        Number of the car, pedestrian or bicycle in it; 0 for all else.
+    velocity : (2, H, W) float32
+        Over ground, in grid axes, m/s; 0 where nothing moves.
+    """
+
+    state: NDArray[np.uint8]
+    kind: NDArray[np.uint8]
+    instance: NDArray[np.int32]
+    velocity: NDArray[np.float32]
+
+
+def true_cells(drive: SimulatedDrive, time: float, spec: GridSpec) -> CellTruth:
+    """Return the truth of a simulated drive at one instant, on a grid; see `pool_truth`.
+
+    Parameters
+    ----------
+    drive : SimulatedDrive
+    time : float
+        Seconds since it began.
+    spec : GridSpec
+        A coarsening of `LABEL_GRID`.
+
+    Returns
+    -------
+    CellTruth
+    """
+    return pool_truth(*drive.birdseye(time), drive.velocities(time), spec)
+
+
+def pool_truth(kinds: NDArray, instances: NDArray, velocities: dict[int, NDArray], spec: GridSpec) -> CellTruth:
+    """Pool the truth of 0.1 m cells to a coarser grid.
+
+    A cell takes what covers most of it, bare ground left aside: be it one fine cell of a thin pole, a cell
+    in which anything stands isn't free.
+
+    Parameters
+    ----------
+    kinds : (710, 310) uint8
+        Members of `Kind`, over `LABEL_GRID`.
+    instances : (710, 310) int
+        Number of the object in each fine cell, 0 for none.
+    velocities : dict of int to (2,) float
+        Of the objects that may move, by number, m/s.
+    spec : GridSpec
+        A coarsening of `LABEL_GRID`.
+
+    Returns
+    -------
+    CellTruth
+
+    Raises
+    ------
+    ArgumentError
+        When `spec` isn't a coarsening of `LABEL_GRID`.
+    """
+    numbers = np.int64(instances) * 256 + kinds  # what is there, as one number
+    chosen = _most_frequent(blocks(numbers, spec), blocks(np.isin(kinds, FLAT), spec))
+    instance, kind = np.divmod(chosen, 256)
+    speeds = np.zeros((instance.max() + 1, 2), np.float32)
+    for number, velocity in velocities.items():
+        if number < len(speeds):
+            speeds[number] = velocity
+    velocity = np.moveaxis(speeds[instance], -1, 0)
+    standing = np.where(np.hypot(*velocity) > MOVES, State.DYNAMIC, State.STATIC)
+    state = np.where(np.isin(kind, FLAT), State.FREE, standing)
+    return CellTruth(state.astype(np.uint8), kind.astype(np.uint8), instance.astype(np.int32), velocity)
+
+
+def _most_frequent(numbers: NDArray, flat: NDArray) -> NDArray[np.int64]:
+    """Return the most frequent number of each block, (H, W, K); a flat one only where all are. Ties: the larger."""
+    ranked = np.where(flat & ~flat.all(axis=-1, keepdims=True), -1, numbers)
+    count = (ranked[..., :, None] == ranked[..., None, :]).sum(axis=-1)
+    best = np.where(ranked < 0, -1, count * (ranked.max() + 1) + ranked).argmax(axis=-1)
+    return np.take_along_axis(numbers, best[..., None], axis=-1)[..., 0]

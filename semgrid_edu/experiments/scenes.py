@@ -1,0 +1,154 @@
+"""Simulated drives, frame by frame, with all that is true of their cells (section 3.2)."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm.auto import tqdm
+
+from semgrid_edu.experiments.cell_truth import CellTruth, true_cells
+from semgrid_edu.frame import Frame
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import PlanarMotion, SensorModel, State, scan_evidence
+from semgrid_edu.occupancy.cmcdot import MAX_YAW
+from semgrid_edu.occupancy.moving_map import look_up, map_around
+from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive
+
+LEFT_SINCE = 10
+"""Frames, 1 s: what a moving thing has left within them should be free by now."""
+OUT_OF_VIEW = 3
+"""Frames without a hit after which something comes into view anew: shorter gaps are a post in between."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """One frame of a drive and what is true of its cells.
+
+    Parameters
+    ----------
+    frame : Frame
+        With its scan, without image.
+    motion : PlanarMotion
+        Of the vehicle since the last frame.
+    truth : CellTruth
+    hit : (H, W) bool
+        Cells that the scan hits, from `hit_cells`.
+    observed : (H, W) bool
+        Cells of which this scan says something: P(z | occupied) and P(z | free) differ.
+    never_seen : (H, W) bool
+        Cells of which no scan of the drive has said anything: nobody can know them.
+    left : (H, W) bool
+        Free cells, seen at some time, that something covered as it moved within the last second.
+    in_view : dict of int to int
+        For how many frames each car, pedestrian and bicycle that is hit now has been in view, by number.
+    """
+
+    frame: Frame
+    motion: PlanarMotion
+    truth: CellTruth
+    hit: NDArray[np.bool_]
+    observed: NDArray[np.bool_]
+    never_seen: NDArray[np.bool_]
+    left: NDArray[np.bool_]
+    in_view: dict[int, int]
+
+
+def hit_cells(
+    points: NDArray, spec: GridSpec, least: int = 2, low: float = 0.3, high: float = 1.6
+) -> NDArray[np.bool_]:
+    """Return which cells hold enough returns of what stands on the ground to be scored.
+
+    Parameters
+    ----------
+    points : (N, 3+) float
+        Returns in the grid frame, metres.
+    spec : GridSpec
+    least : int
+        Returns that a cell needs.
+    low, high : float
+        The heights above flat ground between which they count, metres.
+
+    Returns
+    -------
+    (H, W) bool
+    """
+    rows, cols, inside = spec.cells(points[(points[:, 2] >= low) & (points[:, 2] <= high)])
+    count = np.zeros(spec.shape, int)
+    np.add.at(count, (rows[inside], cols[inside]), 1)
+    return count >= least
+
+
+def scenes(drive: SimulatedDrive, spec: GridSpec, sensor: SensorModel, name: str = "drive") -> Iterator[Scene]:
+    """Take the scans of a drive, one after the other, with their truth.
+
+    Parameters
+    ----------
+    drive : SimulatedDrive
+    spec : GridSpec
+        A coarsening of `LABEL_GRID`.
+    sensor : SensorModel
+        Decides what a scan says anything of.
+    name : str
+        What the progress bar calls it.
+
+    Yields
+    ------
+    Scene
+    """
+    past = Past(spec, sensor)
+    for k in tqdm(range(drive.n_frames), desc=name, unit="frame", leave=False):
+        yield past.add(drive.scan(k), true_cells(drive, k * PERIOD, spec))
+
+
+class Past:
+    """What a drive has seen so far, and what moved in it.
+
+    Parameters
+    ----------
+    spec : GridSpec
+        Of the scenes that it makes.
+    sensor : SensorModel
+        Decides what a scan says anything of.
+    """
+
+    def __init__(self, spec: GridSpec, sensor: SensorModel) -> None:
+        self.spec, self.sensor = spec, sensor
+        self._around = map_around(spec, MAX_YAW)  # what the trackers remember of the grid's surroundings
+        self._poses: list[NDArray] = []
+        self._observed: list[NDArray] = []
+        self._dynamic: list[NDArray] = []
+        self._first_hit: dict[int, int] = {}
+        self._last_hit: dict[int, int] = {}
+
+    def add(self, frame: Frame, truth: CellTruth) -> Scene:
+        """Make a scene of the next frame, and remember it."""
+        evidence = scan_evidence(frame.points_grid, self._around, self.sensor)
+        pose = frame.T_world_from_lidar
+        motion = PlanarMotion.from_poses(self._poses[-1], pose) if self._poses else PlanarMotion()
+        self._poses.append(pose)
+        self._observed.append(evidence.occupied != evidence.free)
+        observed = self._any_of(self._observed[-1:], self._around)
+        seen = self._any_of(self._observed, self._around)
+        left = self._any_of(self._dynamic[-LEFT_SINCE:], self.spec, skip=1) & seen & (truth.state == State.FREE)
+        self._dynamic.append(truth.state == State.DYNAMIC)
+        hit = hit_cells(frame.points_grid, self.spec)
+        return Scene(frame, motion, truth, hit, observed, ~seen, left, self._in_view(truth.instance[hit]))
+
+    def _any_of(self, masks: list[NDArray], source: GridSpec, skip: int = 0) -> NDArray[np.bool_]:
+        """Return the present cells that lie in any of these of the last frames, the `skip` last left aside."""
+        found, outside = np.zeros(self.spec.shape, bool), np.zeros(1, np.float32)
+        poses = self._poses[len(self._poses) - skip - len(masks) : len(self._poses) - skip]
+        for pose, mask in zip(poses, masks, strict=True):
+            motion = PlanarMotion.from_poses(pose, self._poses[-1])
+            found |= look_up(mask[None].astype(np.float32), outside, source, self.spec, motion)[0] > 0
+        return found
+
+    def _in_view(self, hit_instances: NDArray) -> dict[int, int]:
+        """Return for how many frames each object that is hit now has been in view."""
+        now = len(self._poses) - 1
+        for number in map(int, np.unique(hit_instances[hit_instances > 0])):
+            if number not in self._last_hit or now - self._last_hit[number] > OUT_OF_VIEW + 1:
+                self._first_hit[number] = now
+            self._last_hit[number] = now
+        return {number: now - self._first_hit[number] for number, last in self._last_hit.items() if last == now}
