@@ -11,6 +11,7 @@ from semgrid_edu.occupancy.bof_state import BofParams, BofState
 from semgrid_edu.occupancy.bof_steps import bof_move, bof_predict, bof_update, bof_velocity
 from semgrid_edu.occupancy.cmcdot import Cmcdot
 from semgrid_edu.occupancy.evidence import Evidence, scan_evidence, scan_evidence_literal
+from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
 from semgrid_edu.occupancy.log_odds import (
     LogOddsGrid,
     LogOddsParams,
@@ -37,6 +38,7 @@ __all__ = [
     "CmcdotParams",
     "Evidence",
     "FilterState",
+    "GroundParams",
     "LogOddsGrid",
     "LogOddsParams",
     "Particles",
@@ -49,6 +51,7 @@ __all__ = [
     "bof_predict_literal",
     "bof_update",
     "bof_velocity",
+    "height_above_ground",
     "log_odds",
     "move",
     "predict",
