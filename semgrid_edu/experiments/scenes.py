@@ -122,7 +122,18 @@ class Past:
         self._last_hit: dict[int, int] = {}
 
     def add(self, frame: Frame, truth: CellTruth) -> Scene:
-        """Make a scene of the next frame, and remember it."""
+        """Make a scene of the next frame, and remember it.
+
+        Parameters
+        ----------
+        frame : Frame
+        truth : CellTruth
+            Of that instant.
+
+        Returns
+        -------
+        Scene
+        """
         evidence = scan_evidence(frame.points_grid, self._around, self.sensor)
         pose = frame.T_world_from_lidar
         motion = PlanarMotion.from_poses(self._poses[-1], pose) if self._poses else PlanarMotion()

@@ -95,6 +95,35 @@ def test_velocity_of_objects_is_the_change_of_their_place(junction_drive):
     assert after
 
 
+def test_velocities_are_those_of_the_objects(junction_drive):
+    velocities = junction_drive.velocities(0.4)
+    moving = [o for o in junction_drive.objects(0.4) if o["moving"]]
+    assert len(moving) >= 3
+    for thing in moving:
+        assert velocities[thing["id"]] == pytest.approx(thing["velocity"], abs=1e-3)
+
+
+def test_birdseye_names_what_stands_where_and_who_it_is(junction_drive, last_frame):
+    kinds, instances = junction_drive.birdseye(0.9)
+    assert np.array_equal(kinds, last_frame.truth.kinds)
+    assert set(kinds[instances > 0]) <= {Kind.CAR, Kind.BICYCLE, Kind.PEDESTRIAN}
+    for thing in junction_drive.objects(0.9):
+        row, col, _ = LABEL_GRID.cells(np.array([thing["centre"]]))
+        assert instances[row[0], col[0]] == thing["id"]
+
+
+def test_a_scan_is_a_frame_without_picture_with_noise_of_its_own(junction_drive, last_frame):
+    scan, again = junction_drive.scan(9), junction_drive.scan(9)
+    assert scan.image is None
+    assert np.array_equal(scan.points, again.points)
+    assert np.array_equal(scan.T_world_from_lidar, last_frame.T_world_from_lidar)
+    assert scan.time == last_frame.time
+    ranges = [np.sort(np.linalg.norm(points[:, :3], axis=1)) for points in (scan.points, last_frame.points)]
+    assert len(ranges[0]) == pytest.approx(len(ranges[1]), rel=0.02)
+    assert np.quantile(ranges[0], 0.5) == pytest.approx(np.quantile(ranges[1], 0.5), abs=0.1)
+    assert not np.array_equal(scan.points, last_frame.points)
+
+
 def test_stamps_agree_with_rays_from_below(junction_drive, last_frame):
     instant = junction_drive.instant(0.9)
     solid = np.isin(instant.kind, (Kind.CAR, Kind.BUILDING))
