@@ -1,4 +1,7 @@
-"""What becomes of each cell by itself in the filter's steps: a rule is a loop over cells (paper, section 3.2)."""
+"""What becomes of each cell by itself in the filter's steps: a rule is a loop over cells (paper, section 3.2).
+
+In the loops stand numbers alone, and choices without branches: so the compiler does several cells at a time.
+"""
 
 import numpy as np
 from numba import njit
@@ -10,7 +13,7 @@ CERTAIN = 1 - 1e-3
 """The most that arriving particles may claim of a cell: who is never quite certain can be contradicted."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def make_room(probability, claimed):
     """Let its particles decide how much of a cell is dynamic; the other states share the rest as before.
 
@@ -28,21 +31,21 @@ def make_room(probability, claimed):
     factor : (H, W) float32
         By which the weights change.
     """
-    shared, factor = np.empty_like(probability), np.zeros_like(claimed)
-    for r, c in np.ndindex(claimed.shape):
-        free, static, _, unknown = probability[:, r, c]
-        dynamic, others = min(claimed[r, c], 1), free + static + unknown  # 1 - P(DYNAMIC) may have no digits left
-        share = (1 - dynamic) / others if others > 0 else 0.0
-        shared[FREE, r, c] = share * free
-        shared[STATIC, r, c] = share * static
-        shared[DYNAMIC, r, c] = dynamic
-        shared[UNKNOWN, r, c] = share * unknown if others > 0 else 1 - dynamic
-        if dynamic > 0:
-            factor[r, c] = dynamic / claimed[r, c]
+    shared, factor = np.empty_like(probability), np.empty_like(claimed)
+    for r in range(claimed.shape[0]):
+        for c in range(claimed.shape[1]):
+            dynamic = min(claimed[r, c], np.float32(1))
+            others = probability[FREE, r, c] + probability[STATIC, r, c] + probability[UNKNOWN, r, c]
+            share = (1 - dynamic) / others if others > 0 else 0.0  # others are 1 - P(DYNAMIC), with more digits
+            shared[FREE, r, c] = share * probability[FREE, r, c]
+            shared[STATIC, r, c] = share * probability[STATIC, r, c]
+            shared[DYNAMIC, r, c] = dynamic
+            shared[UNKNOWN, r, c] = share * probability[UNKNOWN, r, c] if others > 0 else 1 - dynamic
+            factor[r, c] = dynamic / claimed[r, c] if claimed[r, c] > 0 else 0.0
     return shared, factor
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def mix(probability, newborn, going, M):
     """Mix the states of each cell by the transition matrix: P(j) = sum_i M[i, j] P(i).
 
@@ -65,20 +68,23 @@ def mix(probability, newborn, going, M):
         Grown by what became DYNAMIC of the other states.
     """
     mixed, born = np.empty_like(probability), np.empty_like(newborn)
-    for r, c in np.ndindex(newborn.shape):
-        free, static, dynamic, unknown = probability[:, r, c]
-        for j in range(4):
-            others = M[FREE, j] * free + M[STATIC, j] * static + M[UNKNOWN, j] * unknown
-            mixed[j, r, c] = others + M[DYNAMIC, j] * dynamic
-            if j == DYNAMIC:
-                born[r, c] = others + M[DYNAMIC, j] * newborn[r, c]
-        stopped = max(mixed[DYNAMIC, r, c] - born[r, c] - going[r, c], 0)
-        mixed[STATIC, r, c] += stopped
-        mixed[DYNAMIC, r, c] = born[r, c] + going[r, c]
+    for j in range(4):
+        from_free, from_static, from_dynamic, from_unknown = M[FREE, j], M[STATIC, j], M[DYNAMIC, j], M[UNKNOWN, j]
+        for r in range(newborn.shape[0]):
+            for c in range(newborn.shape[1]):
+                others = from_free * probability[FREE, r, c] + from_static * probability[STATIC, r, c]
+                dynamic = newborn[r, c] if j == DYNAMIC else probability[DYNAMIC, r, c]  # particles are added below
+                mixed[j, r, c] = others + from_dynamic * dynamic + from_unknown * probability[UNKNOWN, r, c]
+    stays = M[DYNAMIC, DYNAMIC]
+    for r in range(newborn.shape[0]):
+        for c in range(newborn.shape[1]):
+            born[r, c] = mixed[DYNAMIC, r, c]
+            mixed[DYNAMIC, r, c] += going[r, c]
+            mixed[STATIC, r, c] += max(stays * (probability[DYNAMIC, r, c] - newborn[r, c]) - going[r, c], 0.0)
     return mixed, born
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def meet(mixed, newborn, going, stays, arrives):
     """Let the dynamic mass that arrives in a cell meet what the cell holds: what can't both be is struck out.
 
@@ -101,24 +107,24 @@ def meet(mixed, newborn, going, stays, arrives):
     factor : (2, H, W) float32
         By which the weights of particles change that stay, and that arrive.
     """
-    probability, born, factor = np.empty_like(mixed), np.empty_like(newborn), np.zeros((2, *newborn.shape), np.float32)
-    for r, c in np.ndindex(newborn.shape):
-        free, static, _, unknown = mixed[:, r, c]
-        claim = min(arrives[r, c], CERTAIN)
-        consistent = 1 - claim * static
-        own, arrived = (1 - claim) / consistent, claim * (1 - static) / consistent
-        probability[FREE, r, c] = own * (free + going[r, c] - stays[r, c])
-        probability[STATIC, r, c] = own * static
-        probability[DYNAMIC, r, c] = own * (newborn[r, c] + stays[r, c]) + arrived
-        probability[UNKNOWN, r, c] = own * unknown
-        born[r, c] = own * newborn[r, c]
-        factor[0, r, c] = own
-        if arrives[r, c] > 0:
-            factor[1, r, c] = arrived / arrives[r, c]
+    probability, born = np.empty_like(mixed), np.empty_like(newborn)
+    factor = np.empty((2, *newborn.shape), np.float32)
+    for r in range(newborn.shape[0]):
+        for c in range(newborn.shape[1]):
+            static, claim = mixed[STATIC, r, c], min(arrives[r, c], CERTAIN)
+            consistent = 1 - claim * static
+            own, arrived = (1 - claim) / consistent, claim * (1 - static) / consistent
+            probability[FREE, r, c] = own * (mixed[FREE, r, c] + going[r, c] - stays[r, c])
+            probability[STATIC, r, c] = own * static
+            probability[DYNAMIC, r, c] = own * (newborn[r, c] + stays[r, c]) + arrived
+            probability[UNKNOWN, r, c] = own * mixed[UNKNOWN, r, c]
+            born[r, c] = own * newborn[r, c]
+            factor[0, r, c] = own
+            factor[1, r, c] = arrived / arrives[r, c] if arrives[r, c] > 0 else 0.0
     return probability, born, factor
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def bayes(prior, occupied, free):
     """Multiply by the likelihoods and normalise: P(state | z) = P(z | state) P(state) / P(z).
 
@@ -133,27 +139,29 @@ def bayes(prior, occupied, free):
     -------
     posterior : (4, H, W) float32
         Where nothing that was held possible explains the scan, UNKNOWN.
-    factor : (H, W) float32
+    factor : (H, W) float64
         P(DYNAMIC | z) / P(DYNAMIC): by which the weights change.
     """
-    posterior, factor = np.zeros_like(prior), np.zeros_like(prior[0])
-    for r, c in np.ndindex(factor.shape):
-        best = max(occupied[r, c], free[r, c])  # however small both are, the better explanation counts as 1
-        if_occupied, if_free = (occupied[r, c] / best, free[r, c] / best) if best > 0 else (0.0, 0.0)
-        is_free, static, dynamic, unknown = prior[:, r, c]
-        evidence = if_free * (is_free + unknown) + if_occupied * (static + dynamic)
-        if evidence > 0:
-            posterior[FREE, r, c] = if_free * is_free / evidence
-            posterior[STATIC, r, c] = if_occupied * static / evidence
-            posterior[DYNAMIC, r, c] = if_occupied * dynamic / evidence
-            posterior[UNKNOWN, r, c] = if_free * unknown / evidence
-            factor[r, c] = if_occupied / evidence
-        else:
-            posterior[UNKNOWN, r, c] = 1
+    posterior, factor = np.empty_like(prior), np.empty(prior.shape[1:])
+    for r in range(prior.shape[1]):
+        for c in range(prior.shape[2]):
+            best = max(occupied[r, c], free[r, c])  # however small both are, the better explanation counts as 1
+            if_occupied = occupied[r, c] / best if best > 0 else 0.0
+            if_free = free[r, c] / best if best > 0 else 0.0
+            empty = np.float64(prior[FREE, r, c]) + prior[UNKNOWN, r, c]
+            full = np.float64(prior[STATIC, r, c]) + prior[DYNAMIC, r, c]
+            evidence = if_free * empty + if_occupied * full
+            if_free = if_free / evidence if evidence > 0 else 0.0
+            if_occupied = if_occupied / evidence if evidence > 0 else 0.0
+            posterior[FREE, r, c] = if_free * prior[FREE, r, c]
+            posterior[STATIC, r, c] = if_occupied * prior[STATIC, r, c]
+            posterior[DYNAMIC, r, c] = if_occupied * prior[DYNAMIC, r, c]
+            posterior[UNKNOWN, r, c] = if_free * prior[UNKNOWN, r, c] if evidence > 0 else 1.0
+            factor[r, c] = if_occupied
     return posterior, factor
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def represent(probability, carried):
     """Make particles carry each cell's dynamic probability; without particles it turns UNKNOWN.
 
@@ -168,14 +176,14 @@ def represent(probability, carried):
     -------
     probability : (4, H, W) float32
         DYNAMIC only where particles are.
-    factor : (H, W) float32
+    factor : (H, W) float64
         By which the weights change.
     """
-    represented, factor = probability.copy(), np.zeros_like(carried)
-    for r, c in np.ndindex(carried.shape):
-        if carried[r, c] > 0:
-            factor[r, c] = probability[DYNAMIC, r, c] / carried[r, c]
-        else:
-            represented[UNKNOWN, r, c] += probability[DYNAMIC, r, c]
-            represented[DYNAMIC, r, c] = 0
+    represented, factor = probability.copy(), np.empty(carried.shape)
+    for r in range(carried.shape[0]):
+        for c in range(carried.shape[1]):
+            dynamic = np.float64(probability[DYNAMIC, r, c])
+            represented[DYNAMIC, r, c] = dynamic if carried[r, c] > 0 else 0.0
+            represented[UNKNOWN, r, c] += 0.0 if carried[r, c] > 0 else dynamic
+            factor[r, c] = dynamic / carried[r, c] if carried[r, c] > 0 else 0.0
     return represented, factor

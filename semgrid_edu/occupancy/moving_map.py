@@ -83,19 +83,22 @@ def look_up(values: NDArray, outside: NDArray, source: GridSpec, target: GridSpe
     (K, H', W') float32
     """
     corners = (source.x_max, source.y_max, source.cell, target.x_max, target.y_max, target.cell)
-    return _look_up(values, outside, *corners, target.shape, pose.dx, pose.dy, pose.dyaw)
+    return _look_up(np.ascontiguousarray(values), outside, *corners, target.shape, pose.dx, pose.dy, pose.dyaw)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _look_up(values, outside, source_x, source_y, source_cell, x_max, y_max, cell, shape, dx, dy, dyaw):
     found = np.empty((len(values), *shape), np.float32)
-    cos, sin = np.cos(dyaw), np.sin(dyaw)
+    flat, place = values.reshape(len(values), -1), np.empty(shape[1], np.int32)
+    cos, sin, height, width = np.cos(dyaw), np.sin(dyaw), values.shape[1], values.shape[2]
     for r in range(shape[0]):
         for c in range(shape[1]):
             x, y = x_max - (r + 0.5) * cell, y_max - (c + 0.5) * cell
             row = np.floor((source_x - (cos * x - sin * y + dx)) / source_cell)
             col = np.floor((source_y - (sin * x + cos * y + dy)) / source_cell)
-            inside = 0 <= row < values.shape[1] and 0 <= col < values.shape[2]
-            for k in range(len(values)):
-                found[k, r, c] = values[k, int(row), int(col)] if inside else outside[k]
+            inside = (row >= 0) & (row < height) & (col >= 0) & (col < width)
+            place[c] = np.int32(row * width + col if inside else -1)
+        for k in range(len(values)):
+            for c in range(shape[1]):
+                found[k, r, c] = flat[k, place[c]] if place[c] >= 0 else outside[k]
     return found

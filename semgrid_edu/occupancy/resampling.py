@@ -39,11 +39,11 @@ def systematic_resample(weight, count, offset):
     total = 0.0
     for w in weight:
         total += w
+    cuts = (np.arange(count) + offset) / count * total
     chosen = np.empty(count, np.int64)
-    last, below = 0, float(weight[0])
+    last, below = 0, np.float64(weight[0])
     for m in range(count):
-        at = (m + offset) / count * total
-        while below <= at and last < len(weight) - 1:
+        while below <= cuts[m] and last < len(weight) - 1:
             last += 1
             below += weight[last]
         chosen[m] = last

@@ -130,7 +130,7 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, params: Cmcdo
     posterior, factor = bayes(prior.probability, evidence.occupied, evidence.free)
     particles = prior.particles
     weight = scale_in_cells(particles.weight, cells_of(particles.position, spec), factor)
-    return FilterState(posterior, replace(particles, weight=weight), prior.newborn * factor)
+    return FilterState(posterior, replace(particles, weight=weight), (prior.newborn * factor).astype(np.float32))
 
 
 def reveal(state: FilterState, seen: NDArray, params: CmcdotParams) -> FilterState:

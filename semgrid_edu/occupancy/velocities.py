@@ -31,27 +31,36 @@ def velocity_moments(
     covariance : (2, 2, H, W) float32
         sum(w (v - mean) (v - mean)^T) / sum(w), m^2/s^2; zero for a single particle, NaN where none is.
     """
-    mean, spread = _moments(particles.velocity, particles.weight, cells, math.prod(shape))
-    return mean.T.reshape(2, *shape).copy(), spread.T[[[0, 1], [1, 2]]].reshape(2, 2, *shape)
+    mean, covariance = _moments(particles.velocity, particles.weight, cells, math.prod(shape))
+    return mean.reshape(2, *shape), covariance.reshape(2, 2, *shape)
 
 
 @njit(cache=True, error_model="numpy")
 def _moments(velocity, weight, cells, n_cells):
-    total, mean, spread = np.zeros((n_cells, 1)), np.zeros((n_cells, 2)), np.zeros((n_cells, 3))
+    first, second = np.zeros((n_cells, 3)), np.zeros((n_cells, 3))
     for i in range(len(cells)):
-        if cells[i] != OUTSIDE:
+        c = cells[i]
+        if c != OUTSIDE:
             w = np.float64(weight[i])
-            total[cells[i], 0] += w
-            mean[cells[i], 0] += w * velocity[i, 0]
-            mean[cells[i], 1] += w * velocity[i, 1]
-    mean /= total
+            first[c, 0] += w
+            first[c, 1] += w * velocity[i, 0]
+            first[c, 2] += w * velocity[i, 1]
+    for c in range(n_cells):
+        first[c, 1] /= first[c, 0]
+        first[c, 2] /= first[c, 0]
     for i in range(len(cells)):
-        if cells[i] != OUTSIDE:
-            x, y = velocity[i, 0] - mean[cells[i], 0], velocity[i, 1] - mean[cells[i], 1]
-            spread[cells[i], 0] += weight[i] * x * x
-            spread[cells[i], 1] += weight[i] * x * y
-            spread[cells[i], 2] += weight[i] * y * y
-    return mean.astype(np.float32), (spread / total).astype(np.float32)
+        c = cells[i]
+        if c != OUTSIDE:
+            x, y = velocity[i, 0] - first[c, 1], velocity[i, 1] - first[c, 2]
+            second[c, 0] += weight[i] * x * x
+            second[c, 1] += weight[i] * x * y
+            second[c, 2] += weight[i] * y * y
+    mean, covariance = np.empty((2, n_cells), np.float32), np.empty((2, 2, n_cells), np.float32)
+    for c in range(n_cells):
+        mean[0, c], mean[1, c] = first[c, 1], first[c, 2]
+        covariance[0, 0, c], covariance[1, 1, c] = second[c, 0] / first[c, 0], second[c, 2] / first[c, 0]
+        covariance[0, 1, c] = covariance[1, 0, c] = second[c, 1] / first[c, 0]
+    return mean, covariance
 
 
 def turn_moments(mean: NDArray, covariance: NDArray, motion: PlanarMotion) -> tuple[NDArray, NDArray]:

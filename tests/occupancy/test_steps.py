@@ -149,6 +149,16 @@ def test_a_standing_wall_is_not_talked_out_of_it():
     assert predicted.probability[State.STATIC, 0, 0] > 0.9
 
 
+def test_what_was_all_but_impossible_is_certain_when_it_alone_explains_the_scan():
+    probability = np.zeros((4, 1, 1), np.float32)
+    probability[:, 0, 0] = [1, 0, 1e-40, 0]
+    mover = Particles(np.full((1, 2), 0.5, np.float32), np.ones((1, 2), np.float32), probability[State.DYNAMIC, 0])
+    state = FilterState(probability, mover, np.zeros((1, 1), np.float32))
+    updated = update(state, GridSpec(0, 1, 0, 1, 1), Evidence(np.ones((1, 1)), np.zeros((1, 1))), PARAMS)
+    assert updated.probability[State.DYNAMIC, 0, 0] == 1
+    assert_sound(updated, GridSpec(0, 1, 0, 1, 1))
+
+
 @pytest.mark.parametrize("certain", [State.FREE, State.STATIC])
 def test_contradiction_leaves_nothing_known(certain):
     probability = np.zeros((4, 1, 1), np.float32)
@@ -173,6 +183,12 @@ def test_systematic_resampling_is_filterpys_given_its_offset(weights, offset):
         patch.setattr(resampling, "random", lambda: offset)
         expected = resampling.systematic_resample(weights)
     assert np.array_equal(systematic_resample(weights, len(weights), offset), expected)
+
+
+def test_systematic_resampling_adds_up_in_double_precision():
+    weights = np.random.default_rng(0).random(200_000, np.float32)
+    drawn = systematic_resample(weights, 140_000, 0.5)
+    assert np.array_equal(drawn, systematic_resample(weights.astype(np.float64), 140_000, 0.5))
 
 
 @settings(deadline=None)
