@@ -1,0 +1,102 @@
+"""The comparison of occupancy filters on simulated drives, and what CMCDOT's defaults have to do there."""
+
+import json
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+import semgrid_edu
+from semgrid_edu.cli import run
+from semgrid_edu.experiments.cell_scores import Estimate, Scores
+from semgrid_edu.experiments.occupancy import GRIDS, LIDARS, METHODS, compare, table
+from semgrid_edu.experiments.scenes import scenes
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import Cmcdot, SensorModel
+from semgrid_edu.simulation.cars import car_size
+from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive
+from semgrid_edu.simulation.materials import Kind
+from semgrid_edu.simulation.motion import STAND, Pace
+from semgrid_edu.simulation.motion import Path as Way
+from semgrid_edu.simulation.plan import Wishes
+from semgrid_edu.simulation.rig import Rig
+from semgrid_edu.simulation.traffic import Traffic
+
+COMMITTED = Path(semgrid_edu.__file__).parents[1] / "docs" / "results" / "occupancy.json"
+WALKERS = "walking pedestrians, to 25 m"
+
+
+def people_and_parked_cars(traffic: Traffic) -> None:
+    """Let people walk at 1.4 m/s towards us, away from us and across, between parked cars."""
+    road = traffic.road
+    for side, sign in ((road.left, 1), (road.right, -1)):
+        for s in (8.0, 14.0, 20.0, 26.0):
+            way = Way(s, sign * (side.edge - 1.06), 1, 0, STAND)
+            traffic.park(Kind.CAR, car_size("estate"), way, ("estate", (0.3, 0.3, 0.3)))
+        for s, along in ((10.0, 1), (16.0, -1), (21.0, 1), (24.0, -1)):
+            traffic.walk(s, sign * (side.edge + side.strip + side.walk / 2), along, 0, Pace(1.4))
+        traffic.walk(12.0 + 3 * sign, 3.0 * sign, 0, -sign, Pace(1.4))
+
+
+@pytest.fixture(scope="module")
+def hits() -> dict:
+    """What CMCDOT makes of the hit cells of a drive of 2 s at 3 m/s, with its defaults."""
+    styles, borders = ("town", "town"), ("hedge", "hedge")
+    wishes = Wishes("straight", (1, 1), styles, borders, (True, True), speed=3.0, cast=people_and_parked_cars)
+    drive = SimulatedDrive(0, 20, wishes, Rig(lidar=LIDARS["HDL-64E"]))
+    tracker, scores = Cmcdot(GridSpec.paper(), seed=0), Scores(GridSpec.paper())
+    for scene in scenes(drive, GridSpec.paper(), SensorModel()):
+        belief = tracker.step(scene.frame.points_grid, scene.motion, PERIOD)
+        scores.add(scene, Estimate.of_belief(belief))
+    return scores.summary()["hit cells"]
+
+
+def test_people_who_walk_are_dynamic(hits):
+    assert hits[WALKERS]["cells"] > 50
+    assert hits[WALKERS]["dynamic"] >= 0.6
+
+
+def test_parked_cars_and_walls_are_not(hits):
+    for name in ("standing cars", "walls"):
+        assert hits[name]["cells"] > 300
+        assert hits[name]["dynamic"] <= 0.03
+
+
+@pytest.mark.parametrize("lidar", LIDARS)
+@pytest.mark.parametrize("grid", GRIDS)
+def test_the_committed_comparison_says_the_same_of_all_its_drives(lidar, grid):
+    hits = json.loads(COMMITTED.read_text())["scores"][lidar][grid]["CMCDOT"]["hit cells"]
+    assert hits[WALKERS]["dynamic"] >= 0.6
+    for name in ("standing cars", "parked bicycles", "walls", "fences", "foliage", "poles", "signs"):
+        assert hits[name]["dynamic"] <= 0.03
+
+
+def test_the_command_writes_what_compare_returns_and_prints_it_as_a_table(tmp_path, monkeypatch, capsys):
+    out = tmp_path / "occupancy.json"
+    monkeypatch.setattr("semgrid_edu.experiments.occupancy.compare", partial(compare, frames=2))
+    arguments = ["reproduce", "occupancy", "--seed", "1", "--drives", "2", "--grid", "compact", "--out", str(out)]
+    monkeypatch.setattr("sys.argv", ["semgrid-edu", *arguments])
+    with pytest.raises(SystemExit, match="0"):
+        run()
+    written = json.loads(out.read_text())
+    again = compare(seed=1, drives=2, grids=("compact",), frames=2)
+    assert written["scores"] == again["scores"]
+    assert (
+        written["command"] == again["command"] == "semgrid-edu reproduce occupancy --seed 1 --drives 2 --grid compact"
+    )
+    printed = capsys.readouterr().out
+    assert table(written, "HDL-64E", "compact") in printed
+    assert table(written, "coarse", "compact") in printed
+
+
+def test_a_table_has_one_column_a_method():
+    lines = table(json.loads(COMMITTED.read_text())).splitlines()
+    assert [cell.strip() for cell in lines[0].split("|")[2:-1]] == list(METHODS)
+    assert {line.count("|") for line in lines} == {2 + len(METHODS)}
+    assert len({len(line) for line in lines}) == 1
+
+
+def test_an_unknown_grid_is_refused(monkeypatch):
+    monkeypatch.setattr("sys.argv", ["semgrid-edu", "reproduce", "occupancy", "--grid", "huge"])
+    with pytest.raises(SystemExit, match="semgrid-edu: grid: expected paper or compact, found huge"):
+        run()
