@@ -11,7 +11,7 @@ from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.moving_map import look_up
 from semgrid_edu.occupancy.params import transition_matrix
 from semgrid_edu.occupancy.particles import slow_down
-from semgrid_edu.occupancy.state import FilterState, Particles, State
+from semgrid_edu.occupancy.state import FilterState, Particles, State, check_shape
 from semgrid_edu.occupancy.steps import update
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
@@ -33,7 +33,13 @@ def bof_move(state: BofState, spec: GridSpec, motion: PlanarMotion) -> BofState:
     -------
     BofState
         In the new frame.
+
+    Raises
+    ------
+    ArgumentError
+        When the state is over other cells than those of `spec`.
     """
+    check_shape("state", state.free, spec.shape)
     if motion == PlanarMotion():
         return state
     height, width = spec.shape
@@ -72,7 +78,14 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -
     -------
     BofState
         At the present instant, before its scan.
+
+    Raises
+    ------
+    ArgumentError
+        When the state is over other cells than those of `spec`, or of another lattice, or
+        `dt` is negative or not finite.
     """
+    check_shape("state", state.occupied, (len(params.lattice), *spec.shape))
     M = transition_matrix(params.world, dt)
     kept = (M[DYNAMIC, DYNAMIC] * going_on(state, params, dt)).astype(np.float32)
     change = np.float32(params.lattice.change_probability(params.world.max_acceleration, dt))
@@ -129,12 +142,19 @@ def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofP
     evidence : Evidence
         Of the scan.
     params : BofParams
+        The lattice's prior velocities; for `first_sight`.
 
     Returns
     -------
     BofState
         Given the scan.
+
+    Raises
+    ------
+    ArgumentError
+        When state or evidence are over other cells than those of `spec`, or of another lattice.
     """
+    check_shape("state", state.occupied, (len(params.lattice), *spec.shape))
     before = state.probability
     given = update(FilterState(before, Particles.none(), np.zeros_like(before[0])), spec, evidence, params.world)
     factor = _ratio(np.maximum(given.probability[DYNAMIC] - given.newborn, 0), before[DYNAMIC])

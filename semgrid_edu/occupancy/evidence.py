@@ -5,10 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.polar import beyond_reach, count_returns, fill_gaps, polar_profile, reach
 from semgrid_edu.occupancy.sensor import SensorModel, prepare_scan
+from semgrid_edu.occupancy.state import check_shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,11 +20,23 @@ class Evidence:
     Parameters
     ----------
     occupied, free : (H, W) float32
-        P(z | occupied) and P(z | free).
+        P(z | occupied) and P(z | free), not negative.
+
+    Raises
+    ------
+    ArgumentError
+        When they don't fit each other, or hold what is no likelihood.
     """
 
     occupied: NDArray[np.float32]
     free: NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        """Refuse what would make nonsense of Bayes' rule in silence."""
+        check_shape("free", self.free, np.shape(self.occupied))
+        for name in ("occupied", "free"):
+            if not (least := np.min(getattr(self, name), initial=0)) >= 0:  # NaN isn't either
+                raise ArgumentError(name, "likelihoods, not negative", least)
 
 
 def scan_evidence(points: NDArray, spec: GridSpec, sensor: SensorModel, pose: PlanarMotion | None = None) -> Evidence:

@@ -12,6 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.occupancy.points import check_points
 
 
 @dataclass(frozen=True)
@@ -86,17 +87,23 @@ def height_above_ground(points: NDArray, params: GroundParams) -> NDArray:
 
     Parameters
     ----------
-    points : (N, 3+) float32 or float64
+    points : (N, 3+) float
         Returns: x forward, y left, z above the point of the ground on which the vehicle stands (m), in the grid frame
-        of the vehicle.
+        of the vehicle; N may be 0.
     params : GroundParams
         How ground can look.
 
     Returns
     -------
-    (N,) float
+    (N,) float32 or float64
         Metres, in the type of `points`; z where no ground is found. That of `height_above_ground_literal`.
+
+    Raises
+    ------
+    ArgumentError
+        When `points` isn't a table of finite coordinates.
     """
+    points = check_points(points)
     place = _places(points, params.sectors, params.bin, params.bins)
     lowest = _lowest_returns(points, place, params.sectors * params.bins)
     limits = (params.step, params.slope, params.rise, params.grade, params.gap)
@@ -111,9 +118,9 @@ def height_above_ground_literal(points: NDArray, params: GroundParams) -> NDArra
     2. The ground of a sector is the median of its own profile and its neighbours', of those that hold returns.
     3. Subtract it.
 
-    Parameters and result are those of `height_above_ground`.
+    Parameters, result and errors are those of `height_above_ground`.
     """
-    points = np.asarray(points, dtype=np.float64)
+    points = check_points(points).astype(np.float64)
     sector, bin_ = _polar_cells(points, params)
     distance = np.hypot(points[:, 0], points[:, 1])
     own = [walk_sector(distance[sector == s], points[sector == s, 2], params) for s in range(params.sectors)]

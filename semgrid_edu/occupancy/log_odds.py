@@ -51,7 +51,22 @@ class LogOddsParams:
 
 
 def log_odds(p: ArrayLike) -> NDArray[np.floating]:
-    """Return L = log(p / (1 - p)) of a probability between 0 and 1.
+    """Return L = log(p / (1 - p)) of a probability.
+
+    Parameters
+    ----------
+    p : (...) float
+        Between 0 and 1, which themselves have no log-odds.
+
+    Returns
+    -------
+    (...) float
+        Any number; 0 for one half.
+
+    Raises
+    ------
+    ArgumentError
+        When a number isn't between 0 and 1.
 
     Examples
     --------
@@ -59,11 +74,22 @@ def log_odds(p: ArrayLike) -> NDArray[np.floating]:
     array([0.  , 3.48])
     """
     p = np.asarray(p)
+    if not ((p > 0) & (p < 1)).all():
+        raise ArgumentError("p", "probabilities between 0 and 1, but neither", p)
     return np.log(p) - np.log1p(-p)
 
 
 def probability(L: ArrayLike) -> NDArray[np.floating]:
-    """Return p = 1 / (1 + exp(-L)), the inverse of `log_odds`."""
+    """Return p = 1 / (1 + exp(-L)), the inverse of `log_odds`.
+
+    Parameters
+    ----------
+    L : (...) float
+
+    Returns
+    -------
+    (...) float
+    """
     return 1 / (1 + np.exp(-np.asarray(L)))
 
 

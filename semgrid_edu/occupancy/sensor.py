@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
+from semgrid_edu.occupancy.points import check_points
 
 
 @dataclass(frozen=True)
@@ -66,10 +67,13 @@ class SensorModel:
             raise ArgumentError("under", "metres, not negative", self.under)
         if not 0 < self.azimuth_step <= 360:
             raise ArgumentError("azimuth_step", "degrees, above 0 and up to 360", self.azimuth_step)
+        if not 0 <= self.column_spacing <= 360:
+            raise ArgumentError("column_spacing", "degrees, from 0 to 360", self.column_spacing)
+        if not isinstance(self.max_returns, int | np.integer) or self.max_returns < 1:
+            raise ArgumentError("max_returns", "a whole number of at least 1", self.max_returns)
         if not self.obstacle_min < self.obstacle_max:
             raise ArgumentError("obstacle_min", f"less than obstacle_max, {self.obstacle_max}", self.obstacle_min)
-        x_min, x_max, y_min, y_max = self.vehicle
-        if not (x_min <= x_max and y_min <= y_max):
+        if len(self.vehicle) != 4 or not (self.vehicle[0] <= self.vehicle[1] and self.vehicle[2] <= self.vehicle[3]):
             raise ArgumentError("vehicle", "x_min, x_max, y_min, y_max in metres, the smaller first", self.vehicle)
         for name in ("p_hit_occupied", "p_hit_free", "p_pass_occupied", "p_pass_free"):
             if not 0 < getattr(self, name) < 1:
@@ -109,34 +113,6 @@ def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray:
     points = without_own_returns(check_points(points), sensor)
     if sensor.ground is not None:
         points[:, 2] = height_above_ground(points, sensor.ground)
-    return points
-
-
-def check_points(points: NDArray) -> NDArray:
-    """Return the points of a scan as an array, or refuse them.
-
-    Parameters
-    ----------
-    points : (N, 3+) float
-        Returns: x forward, y left, z above the ground (m), in the grid frame of the vehicle; N may be 0.
-
-    Returns
-    -------
-    (N, 3+) float32 or float64
-        The same numbers.
-
-    Raises
-    ------
-    ArgumentError
-        When it isn't a table of finite coordinates.
-    """
-    points = np.asarray(points)
-    points = points.astype(np.result_type(points, np.float32), copy=False)
-    if points.ndim != 2 or points.shape[1] < 3:
-        raise ArgumentError("points", "shape (N, 3+): x, y, z in metres", f"shape {points.shape}")
-    if not np.isfinite(points[:, :3]).all():
-        bad = int((~np.isfinite(points[:, :3]).all(axis=1)).sum())
-        raise ArgumentError("points", "finite coordinates", f"{bad} of {len(points)} points with NaN or infinity")
     return points
 
 

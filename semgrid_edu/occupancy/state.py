@@ -6,6 +6,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 
 
@@ -20,6 +21,12 @@ class State(IntEnum):
 
 N_STATES = len(State)
 """Planes of an occupancy grid."""
+
+
+def check_shape(name: str, values: NDArray, shape: tuple[int, ...]) -> None:
+    """Refuse an array of another shape, by its name."""
+    if np.shape(values) != shape:
+        raise ArgumentError(name, f"shape {shape}", f"shape {np.shape(values)}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,11 +62,21 @@ class Particles:
         Velocity over ground in the axes of the map, m/s.
     weight : (N,) float32
         Probability that each carries; the dynamic probability of a cell is the sum of the weights in it.
+
+    Raises
+    ------
+    ArgumentError
+        When the three don't fit each other.
     """
 
     position: NDArray[np.float32]
     velocity: NDArray[np.float32]
     weight: NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        """Refuse particles of which something is missing: compiled loops would read what isn't there."""
+        for name in ("position", "velocity"):
+            check_shape(name, getattr(self, name), (*np.shape(self.weight), 2))
 
     @classmethod
     def none(cls) -> "Particles":
@@ -86,11 +103,20 @@ class FilterState:
         The dynamic mass whose velocity is known, more or less.
     newborn : (H, W) float32
         Dynamic mass that has just come into being and has no particles yet: they are drawn at resampling.
+
+    Raises
+    ------
+    ArgumentError
+        When the two arrays don't fit each other.
     """
 
     probability: NDArray[np.float32]
     particles: Particles
     newborn: NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        """Refuse planes of different sizes: compiled loops would read what isn't there."""
+        check_shape("probability", self.probability, (N_STATES, *np.shape(self.newborn)))
 
     @classmethod
     def unknown(cls, spec: GridSpec) -> "FilterState":

@@ -21,7 +21,7 @@ from semgrid_edu.occupancy.particles import (
     weight_in_cells,
 )
 from semgrid_edu.occupancy.resampling import draw_again, draw_newborn
-from semgrid_edu.occupancy.state import FilterState, Particles, State
+from semgrid_edu.occupancy.state import FilterState, Particles, State, check_shape
 
 DYNAMIC, UNKNOWN = State.DYNAMIC, State.UNKNOWN
 NOTHING_KNOWN = np.array([0, 0, 0, 1], dtype=np.float32)
@@ -46,7 +46,13 @@ def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterStat
     -------
     FilterState
         In the new frame.
+
+    Raises
+    ------
+    ArgumentError
+        When the state is over other cells than those of `spec`.
     """
+    check_shape("state", state.newborn, spec.shape)
     probability = look_up(state.probability, NOTHING_KNOWN, spec, spec, motion)
     particles = transform(state.particles, motion)
     cells = cells_of(particles.position, spec)
@@ -87,7 +93,13 @@ def predict(
     -------
     FilterState
         At the present instant, before its scan.
+
+    Raises
+    ------
+    ArgumentError
+        When the state is over other cells than those of `spec`, or `dt` is negative or not finite.
     """
+    check_shape("state", state.newborn, spec.shape)
     M = transition_matrix(params, dt)
     before = cells_of(state.particles.position, spec)
     particles = slow_down(state.particles, params.stop_rate, params.stop_speed, dt)
@@ -125,7 +137,14 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, params: Cmcdo
     -------
     FilterState
         Given the scan.
+
+    Raises
+    ------
+    ArgumentError
+        When state or evidence are over other cells than those of `spec`.
     """
+    check_shape("state", state.newborn, spec.shape)
+    check_shape("evidence", evidence.free, spec.shape)
     prior = reveal(state, evidence.occupied != evidence.free, params)
     posterior, factor = bayes(prior.probability, evidence.occupied, evidence.free)
     particles = prior.particles
@@ -178,7 +197,13 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
     -------
     FilterState
         The same belief, carried by new particles; no newborn mass.
+
+    Raises
+    ------
+    ArgumentError
+        When the state is over other cells than those of `spec`.
     """
+    check_shape("state", state.newborn, spec.shape)
     births = round(params.birth_share * params.particles)
     drawn = (
         draw_again(state.particles, params.particles - births, rng),

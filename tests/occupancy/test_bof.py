@@ -441,3 +441,22 @@ def test_what_is_no_scan_or_time_is_refused_and_changes_nothing():
             tracker.step(points, PlanarMotion(1, 0, 0), dt)
     points = scan_boxes(street(0.0))
     assert np.array_equal(*[t.step(points, PlanarMotion(), 0.1).probability for t in (tracker, twin)])
+
+
+OTHER = GridSpec(0, 6, -2, 2, 0.5)
+SCAN = Evidence(*np.ones((2, *OTHER.shape)))
+
+
+@pytest.mark.parametrize(
+    ("step", "name"),
+    [
+        (lambda state: bof_move(state, OTHER, PlanarMotion(1, 0, 0)), "state"),
+        (lambda state: bof_predict(state, OTHER, PARAMS, 0.1), "state"),
+        (lambda state: bof_predict(state, GRID, BofParams(), 0.1), "state"),
+        (lambda state: bof_update(state, OTHER, SCAN, PARAMS), "state"),
+        (lambda state: bof_update(state, GRID, SCAN, PARAMS), "evidence"),
+    ],
+)
+def test_a_belief_or_a_scan_over_other_cells_is_refused(step, name):
+    with pytest.raises(ArgumentError, match=f"^{name}: expected shape"):
+        step(random_state(0))

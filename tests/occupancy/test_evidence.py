@@ -11,7 +11,7 @@ from scipy.ndimage import minimum_filter
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import PlanarMotion, SensorModel, scan_evidence, scan_evidence_literal
+from semgrid_edu.occupancy import Evidence, PlanarMotion, SensorModel, scan_evidence, scan_evidence_literal
 from semgrid_edu.occupancy.evidence import walk_ray
 from semgrid_edu.occupancy.polar import fill_gaps
 from semgrid_edu.simulation.boxes import Box, scan_boxes
@@ -172,7 +172,17 @@ def test_wide_gaps_stay_blind_and_narrow_ones_see_no_farther_than_their_neighbou
 
 
 @TWINS
-@pytest.mark.parametrize("points", [np.array([[1.0, np.nan, 0.0]]), np.array([[1.0, 0, np.inf]]), np.zeros((3, 2)), 5])
+@pytest.mark.parametrize(
+    "points",
+    [
+        np.array([[1.0, np.nan, 0.0]]),
+        np.array([[1.0, 0, np.inf]]),
+        np.zeros((3, 2)),
+        5,
+        np.ones((2, 3), complex),
+        np.array([["4", "0", "1"]]),
+    ],
+)
 def test_what_is_no_scan_is_refused_by_name(evidence_of, points):
     with pytest.raises(ArgumentError, match="points"):
         evidence_of(points, RAY, SENSOR)
@@ -186,9 +196,27 @@ def test_what_is_no_scan_is_refused_by_name(evidence_of, points):
         {"p_pass_free": 1},
         {"obstacle_min": 3},
         {"vehicle": (3, -2, -1, 1)},
+        {"vehicle": (0, 1, 2)},
         {"under": -1.0},
+        {"column_spacing": np.nan},
+        {"column_spacing": -0.1},
+        {"max_returns": 0},
+        {"max_returns": 1.5},
     ],
 )
 def test_an_impossible_sensor_is_refused_by_name(bad):
     with pytest.raises(ArgumentError, match=next(iter(bad))):
         SensorModel(**bad)
+
+
+@pytest.mark.parametrize(
+    ("occupied", "free", "name"),
+    [
+        (np.ones((2, 3)), np.ones((3, 2)), "free"),
+        (np.full((2, 3), -0.1), np.ones((2, 3)), "occupied"),
+        (np.ones((2, 3)), np.full((2, 3), np.nan), "free"),
+    ],
+)
+def test_what_is_no_likelihood_is_refused_by_name(occupied, free, name):
+    with pytest.raises(ArgumentError, match=f"^{name}: expected"):
+        Evidence(occupied, free)

@@ -144,3 +144,9 @@ def test_what_is_no_scan_or_time_is_refused_and_changes_nothing():
 def test_impossible_parameters_are_refused_by_name(bad, name):
     with pytest.raises(ArgumentError, match=name):
         LogOddsParams(**bad)
+
+
+@pytest.mark.parametrize("p", [0.0, 1, -0.2, 1.2, np.nan, [0.5, 1.5]])
+def test_what_is_no_probability_or_certain_has_no_log_odds(p):
+    with pytest.raises(ArgumentError, match=r"^p: expected"):
+        log_odds(p)

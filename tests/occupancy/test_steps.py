@@ -263,3 +263,35 @@ def test_time_that_runs_backwards_is_refused(dt):
 def test_impossible_parameters_are_refused_by_name(bad):
     with pytest.raises(ArgumentError, match=next(iter(bad))):
         CmcdotParams(**bad)
+
+
+OTHER = GridSpec(0, 12, -4, 4, 1)
+
+
+@pytest.mark.parametrize(
+    ("step", "name"),
+    [
+        (lambda state, rng: move(state, OTHER, PlanarMotion(1, 0, 0)), "state"),
+        (lambda state, rng: predict(state, OTHER, PARAMS, 0.1, rng), "state"),
+        (lambda state, rng: resample(state, OTHER, PARAMS, rng), "state"),
+        (lambda state, rng: update(state, OTHER, Evidence(*np.ones((2, *OTHER.shape))), PARAMS), "state"),
+        (lambda state, rng: update(state, GRID, Evidence(*np.ones((2, *OTHER.shape))), PARAMS), "evidence"),
+        (lambda state, rng: update(state, GRID, Evidence(*np.ones((2, 1, 4))), PARAMS), "evidence"),
+    ],
+)
+def test_a_belief_or_a_scan_over_other_cells_is_refused(step, name):
+    """Such as over the vehicle's cells instead of the map's: compiled loops would read past the end of them."""
+    with pytest.raises(ArgumentError, match=f"^{name}: expected shape"):
+        step(random_state(0), np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("field", ["position", "velocity", "weight"])
+def test_particles_of_which_something_is_missing_are_refused(field):
+    particles = random_state(0).particles
+    with pytest.raises(ArgumentError, match="expected shape"):
+        replace(particles, **{field: getattr(particles, field)[:-1]})
+
+
+def test_a_state_whose_planes_differ_in_size_is_refused():
+    with pytest.raises(ArgumentError, match=r"^probability: expected shape"):
+        replace(random_state(0), newborn=np.zeros(OTHER.shape))
