@@ -48,15 +48,17 @@ def probability_line(
     Raises
     ------
     ArgumentError
-        When the numbers aren't a line of probabilities, or names and cells differ in number.
+        When the numbers aren't a line of probabilities, names and cells differ in number, or there is no such cell.
     """
     values = np.asarray(values)
-    if values.ndim != 1 or not ((values >= 0) & (values <= 1)).all():
+    if values.ndim != 1 or not len(values) or not ((values >= 0) & (values <= 1)).all():
         raise ArgumentError("values", "one number between 0 and 1 for each cell, shape (N,)", values)
     named = names is not None
     names = names if named else [str(cell) for cell in range(len(values))]
     if len(names) != len(values):
         raise ArgumentError("names", f"one for each of {len(values)} cells", len(names))
+    if truth is not None and not 0 <= truth < len(values):
+        raise ArgumentError("truth", f"a cell from 0 to {len(values) - 1}", truth)
     if ax is None:
         _, ax = plt.subplots(figsize=(6, 1.8), layout="constrained")
     bars = ax.bar(range(len(values)), values, width=0.8, color="0.45")
@@ -89,12 +91,15 @@ def probability_lines(
     Raises
     ------
     ArgumentError
-        As `probability_line` does.
+        When there is no line, and as `probability_line` does.
     """
+    if not lines:
+        raise ArgumentError("lines", "at least one", "none")
     size = (6, 0.5 + 1.3 * len(lines))
+    top = TOP * (max(np.max(values, initial=0) for values in lines.values()) or 1)
     figure, axes = plt.subplots(len(lines), 1, figsize=size, sharex=True, layout="constrained", squeeze=False)
     for ax, (title, values) in zip(axes[:, 0], lines.items(), strict=True):
-        probability_line(values, ax, title, names, truth).set_ylim(0, TOP * max(map(np.max, lines.values())))
+        probability_line(values, ax, title, names, truth).set_ylim(0, top)
         ax.label_outer()
     return figure
 
@@ -139,7 +144,7 @@ def state_history(times: NDArray, probability: NDArray, ax: Axes | None = None) 
     Parameters
     ----------
     times : (T,) float
-        Seconds.
+        Seconds, ascending, at least two.
     probability : (4, T) float
         FREE, STATIC, DYNAMIC, UNKNOWN; sums to 1 at each time.
     ax : Axes, optional
@@ -152,10 +157,12 @@ def state_history(times: NDArray, probability: NDArray, ax: Axes | None = None) 
     Raises
     ------
     ArgumentError
-        When the arrays don't fit each other.
+        When the times don't ascend, or the probabilities don't fit them.
     """
-    if np.ndim(times) != 1 or np.shape(probability) != (4, len(times)):
-        raise ArgumentError("probability", f"shape (4, T) for times of shape {np.shape(times)}", np.shape(probability))
+    if np.ndim(times) != 1 or len(times) < 2 or not (np.diff(times) > 0).all():
+        raise ArgumentError("times", "two or more, ascending, shape (T,)", times)
+    if np.shape(probability) != (4, len(times)):
+        raise ArgumentError("probability", f"shape {(4, len(times))}", f"shape {np.shape(probability)}")
     if ax is None:
         _, ax = plt.subplots(figsize=(6, 2.2), layout="constrained")
     ax.stackplot(times, probability, colors=np.divide(STATE_COLOURS, 255), edgecolor="0.4", linewidth=0.5)

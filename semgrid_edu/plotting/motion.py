@@ -122,13 +122,15 @@ def velocity_spread(velocity: NDArray, weight: NDArray, ax: Axes | None = None) 
     Raises
     ------
     ArgumentError
-        When the shapes don't match, or the weights can't be any.
+        When the shapes don't match, a velocity isn't finite, or the weights can't be any.
     """
     velocity, weight = np.asarray(velocity, dtype=np.float64), np.asarray(weight, dtype=np.float64)
     if velocity.shape != (*weight.shape, 2) or weight.ndim != 1:
         raise ArgumentError("velocity", f"(N, 2) for weights of shape {weight.shape}", f"shape {velocity.shape}")
-    if not (weight >= 0).all() or not weight.sum() > 0:
-        raise ArgumentError("weight", "numbers >= 0, not all zero", weight)
+    if not (weight >= 0).all() or not 0 < weight.sum() < np.inf:
+        raise ArgumentError("weight", "finite numbers >= 0, not all zero", weight)
+    if not np.isfinite(velocity).all():
+        raise ArgumentError("velocity", "finite numbers", velocity)
     if ax is None:
         _, ax = plt.subplots(figsize=(4, 4), layout="constrained")
     share = weight / weight.sum()
@@ -166,7 +168,8 @@ def velocity_ellipse(mean: NDArray, covariance: NDArray, ax: Axes) -> Axes:
     """
     covariance = np.asarray(covariance, dtype=np.float64)
     variance, axes = np.linalg.eigh(covariance) if covariance.shape == (2, 2) else ([np.nan], None)
-    if np.shape(mean) != (2,) or not np.all(np.array(variance) >= -1e-6 * np.max(variance)):
+    rounding = 1e-5 * (np.sum(np.square(mean)) + np.max(variance))  # E[v v^T] - mean mean^T in single precision
+    if np.shape(mean) != (2,) or not np.all(np.array(variance) >= -rounding):
         raise ArgumentError("covariance", "(2, 2), symmetric, not negative, beside a mean (2,)", covariance)
     long, short = 4 * np.sqrt(np.maximum(variance[::-1], 0))
     angle = np.degrees(np.arctan2(axes[0, 1], axes[1, 1]))

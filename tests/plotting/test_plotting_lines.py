@@ -46,6 +46,10 @@ def test_lines_below_each_other_share_their_scale():
     np.testing.assert_array_equal([heights(ax) for ax in figure.axes], list(lines.values()))
 
 
+def test_lines_of_zeros_have_an_axis_too():
+    assert plotting.probability_lines({"a": np.zeros(2)}).axes[0].get_ylim()[1] > 0
+
+
 def test_a_belief_has_a_column_for_each_step_with_cell_0_at_the_bottom_and_a_circle_at_the_truth():
     belief = np.array([[0.2, 0.7, 0.1], [0.0, 0.2, 0.8]])
     ax = plotting.belief_history(belief, truth=np.array([1, 2]))
@@ -73,11 +77,16 @@ def test_a_band_is_as_thick_as_its_probability():
         (lambda: plotting.probability_line(np.zeros((2, 2))), "values"),
         (lambda: plotting.probability_line(np.array([0.5, 1.5])), "values"),
         (lambda: plotting.probability_line(np.array([0.5, np.nan])), "values"),
+        (lambda: plotting.probability_line(np.array([])), "values"),
         (lambda: plotting.probability_line(np.ones(2), names=["a"]), "names"),
+        (lambda: plotting.probability_line(np.ones(2), truth=2), "truth"),
+        (lambda: plotting.probability_lines({}), "lines"),
         (lambda: plotting.probability_lines({"a": np.ones(2), "b": -np.ones(2)}), "values"),
         (lambda: plotting.belief_history(np.ones(3)), "belief"),
         (lambda: plotting.belief_history(np.ones((2, 3)), truth=np.zeros(3)), "truth"),
-        (lambda: plotting.state_history(np.zeros(3), np.zeros((3, 4))), "probability"),
+        (lambda: plotting.state_history(np.arange(3), np.zeros((3, 4))), "probability"),
+        (lambda: plotting.state_history(np.zeros(3), np.zeros((4, 3))), "times"),
+        (lambda: plotting.state_history(np.zeros(1), np.zeros((4, 1))), "times"),
     ],
 )
 def test_wrong_input_is_named(draw, names):

@@ -11,7 +11,7 @@ from PIL import Image
 from semgrid_edu import plotting
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import Belief, Particles, State
+from semgrid_edu.occupancy import Belief, BofState, Particles, State, VelocityLattice, bof_velocity
 from semgrid_edu.plotting.motion import MAX_POINTS, wheel_colours
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
@@ -131,6 +131,19 @@ def test_an_ellipse_leans_as_its_velocities_do():
     assert ellipse.angle % 180 == pytest.approx(45)
 
 
+def test_the_ellipse_of_a_single_velocity_is_a_point_however_it_was_rounded():
+    lattice = VelocityLattice()
+    spec = GridSpec(0, len(lattice) - 1, 0, 1, 1)
+    state = BofState.nothing_known(spec, lattice)
+    weight = np.random.default_rng(0).uniform(0.1, 1, len(lattice) - 1)
+    state.occupied[np.arange(1, len(lattice)), np.arange(len(lattice) - 1), 0] = weight
+    mean, covariance = bof_velocity(state)
+    _, ax = plt.subplots()
+    for k in range(0, len(lattice) - 1, 10):
+        ellipse = plotting.velocity_ellipse(mean[:, k, 0], covariance[:, :, k, 0], ax).patches[-1]
+        assert max(ellipse.width, ellipse.height) < 0.1
+
+
 def test_an_area_is_a_weight():
     ax = plotting.velocity_spread(np.eye(2), np.array([1.0, 3.0]))
     first, second = ax.collections[0].get_sizes()
@@ -165,6 +178,8 @@ def test_an_animation_of_one_belief_can_be_shown_in_a_notebook():
         (lambda: plotting.velocity_spread(np.zeros((3, 2)), np.ones(2)), "velocity"),
         (lambda: plotting.velocity_spread(np.zeros((2, 2)), np.zeros(2)), "weight"),
         (lambda: plotting.velocity_spread(np.zeros((2, 2)), np.array([1, -1])), "weight"),
+        (lambda: plotting.velocity_spread(np.zeros((2, 2)), np.array([1, np.inf])), "weight"),
+        (lambda: plotting.velocity_spread(np.full((2, 2), np.nan), np.ones(2)), "velocity"),
         (lambda: plotting.velocity_ellipse(np.zeros(2), np.diag([1, -1]), plt.figure().gca()), "covariance"),
         (lambda: plotting.velocity_ellipse(np.zeros(2), np.full((2, 2), np.nan), plt.figure().gca()), "covariance"),
         (lambda: plotting.velocity_ellipse(np.zeros(3), np.eye(2), plt.figure().gca()), "covariance"),
