@@ -156,8 +156,9 @@ def evaluate(
 ) -> None:
     """Score a trained network and two simple baselines on the test frames."""
     from semgrid_edu.experiments.evaluate import evaluate, table
-    from semgrid_edu.files import write_json
+    from semgrid_edu.files import check_writable, write_json
 
+    check_writable(out)
     result = evaluate(data, weights)
     write_json(out, result)
     typer.echo(f"{table(result['scores'])}\n\nwritten to {out}")
@@ -177,8 +178,9 @@ def occupancy(
 ) -> None:
     """Score log-odds grid, BOF and CMCDOT on simulated drives (lecture 04)."""
     from semgrid_edu.experiments.occupancy import GRIDS, compare, tables
-    from semgrid_edu.files import write_json
+    from semgrid_edu.files import check_writable, write_json
 
+    check_writable(out)
     result = compare(seed, drives, (grid,) if grid else tuple(GRIDS))
     write_json(out, result)
     typer.echo(f"{tables(result)}\n\nwritten to {out}")

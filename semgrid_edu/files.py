@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from semgrid_edu.errors import DataError
+
 
 @contextmanager
 def atomic_path(path: str | Path) -> Iterator[Path]:
@@ -46,6 +48,28 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def check_writable(path: str | Path) -> None:
+    """Refuse a file that can't be written before long work is done whose result would be lost.
+
+    Parameters
+    ----------
+    path : path-like
+        The file; its folder is made when missing.
+
+    Raises
+    ------
+    DataError
+        When a folder is in its place.
+    OSError
+        When its folder can't be made or takes no files.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise DataError(path, "a file to write", "a folder")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    tempfile.TemporaryFile(dir=path.parent).close()
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:

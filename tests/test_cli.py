@@ -12,11 +12,15 @@ from semgrid_edu.cli import run
         (["demo", "--out", "FILE"], r"FILE: File exists"),
         (["demo", "--kitti", "FILE"], r"--kitti, --date, --drive: expected all three or none, found only --kitti"),
         (["data", "verify", "FILE"], r"FILE: expected folders of samples"),
+        (["reproduce", "occupancy", "--out", "FOLDER"], r"FOLDER: expected a file to write, found a folder"),
+        (["reproduce", "occupancy", "--out", "FILE/scores.json"], r"FILE: File exists"),
+        (["evaluate", "--data", ".", "--weights", ".", "--out", "FOLDER"], r"FOLDER: expected a file to write"),
     ],
 )
 def test_a_mistake_ends_in_one_line(tmp_path, monkeypatch, arguments, message):
     (tmp_path / "FILE").write_text("a file where a folder should be")
-    arguments = [str(tmp_path / "FILE") if argument == "FILE" else argument for argument in arguments]
+    (tmp_path / "FOLDER").mkdir()
+    arguments = [str(tmp_path / a) if a.startswith(("FILE", "FOLDER")) else a for a in arguments]
     monkeypatch.setattr("sys.argv", ["semgrid-edu", *arguments])
     with pytest.raises(SystemExit, match=f"^semgrid-edu: .*{message}") as caught:
         run()

@@ -87,10 +87,12 @@ def blur_of(
     Raises
     ------
     ArgumentError
-        When there is no such scheme, or the vehicle leaves the map.
+        When there is no such scheme, no step or no drop, or the vehicle leaves the map.
     """
     if scheme not in SCHEMES:
         raise ArgumentError("scheme", " or ".join(SCHEMES), scheme)
+    if not motions or drops < 1:
+        raise ArgumentError("motions, drops", "at least one of each", f"{len(motions)}, {drops}")
     held = _always_held(spec, motions)
     row, col = np.random.default_rng(seed).permutation(np.argwhere(held))[:drops].T
     fields = np.zeros((len(row) + 1, *spec.shape), np.float32)

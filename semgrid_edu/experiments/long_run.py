@@ -1,12 +1,15 @@
 """The filter for hours: whether cells stay distributions, memory stays flat and bits the same (paper, section 3.2)."""
 
 import hashlib
+import math
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Belief, Cmcdot, CmcdotParams, PlanarMotion
 from semgrid_edu.simulation.boxes import Box, scan_boxes
@@ -37,7 +40,7 @@ class Checkpoint:
     velocities : int
         Cells that had a velocity in the last step.
     memory : float
-        Resident memory of the process, MB.
+        Resident memory of the process, MB; NaN where the system doesn't tell.
     digest : str
         SHA-256 of all beliefs since the start.
     """
@@ -71,7 +74,14 @@ def long_run(
     Yields
     ------
     Checkpoint
+
+    Raises
+    ------
+    ArgumentError
+        When there is no step, or none between checkpoints.
     """
+    if min(steps, every) < 1:
+        raise ArgumentError("steps, every", "at least one", f"{steps}, {every}")
     tracker, rng, digest = Cmcdot(spec, params, seed), np.random.default_rng(seed), hashlib.sha256()
     time, before, worst_sum, lowest = 0.0, pose_at(0.0), 0.0, 1.0
     for step in range(1, steps + 1):
@@ -108,9 +118,11 @@ def scene_at(time: float) -> list[Box]:
 
 
 def resident_memory() -> float:
-    """Return the memory that this process holds now, MB; Linux keeps it in /proc."""
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * 4096 / 1e6
+    """Return the memory that this process holds now, MB; NaN where the system doesn't keep it in /proc."""
+    if not (numbers := Path("/proc/self/statm")).exists():
+        return math.nan
+    pages = int(numbers.read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def _add(digest, belief: Belief) -> None:

@@ -45,11 +45,11 @@ def compare(
     seed : int
         Decides the drives and what the particles draw.
     drives : int
-        How many.
+        How many, at least one.
     grids : tuple of str
-        Of "paper" and "compact".
+        Of "paper" and "compact", at least one.
     frames : int
-        Of each drive, ten a second.
+        Of each drive, ten a second, at least one.
 
     Returns
     -------
@@ -60,11 +60,15 @@ def compare(
     Raises
     ------
     ArgumentError
-        When there is no such grid.
+        When there is no such grid, or nothing to do.
     """
     began = datetime.now(UTC)
-    if not set(grids) <= set(GRIDS):
-        raise ArgumentError("grid", " or ".join(GRIDS), ", ".join(grids))
+    if not grids or not set(grids) <= set(GRIDS):
+        raise ArgumentError("grid", " or ".join(GRIDS), ", ".join(grids) or "none")
+    if seed < 0:
+        raise ArgumentError("seed", "a whole number from 0 up", seed)
+    if min(drives, frames) < 1:
+        raise ArgumentError("drives, frames", "at least one", f"{drives}, {frames}")
     scores = {lidar: {grid: _score(seed, drives, frames, lidar, grid) for grid in grids} for lidar in LIDARS}
     return {
         "scores": scores,
@@ -81,13 +85,18 @@ def compare(
 
 
 def methods(spec: GridSpec, seed: int) -> dict[str, Callable[[NDArray, PlanarMotion, float], Estimate]]:
-    """Return the three methods with their defaults, by name: each takes a scan, the motion and the time since the last.
+    """Return the three methods with their defaults, by name.
 
     Parameters
     ----------
     spec : GridSpec
     seed : int
         Of CMCDOT's particles; the others draw nothing.
+
+    Returns
+    -------
+    dict of str to callable
+        Each takes a scan, the motion and the time since the last, as `Cmcdot.step` does.
     """
     log_odds, bof, cmcdot = LogOddsGrid(spec), Bof(spec), Cmcdot(spec, seed=seed)
     return {

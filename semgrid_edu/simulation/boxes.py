@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 
 
@@ -66,12 +67,19 @@ def scan_boxes(
     (N, 3) float32
         Returns in the grid frame of the vehicle, metres.
 
+    Raises
+    ------
+    ArgumentError
+        When there is noise, but nothing to draw it from.
+
     Examples
     --------
     >>> points = scan_boxes([Box.around(10, 0, 2, 2, 1.5)], columns=1, rings=20)
     >>> points[points[:, 2] > 0.3][:, 0].round(2).tolist()
     [9.0, 9.0, 9.0, 9.0, 9.0]
     """
+    if noise and rng is None:
+        raise ArgumentError("rng", "a numpy.random.Generator to draw the noise from", rng)
     azimuth = np.radians((np.arange(columns) + 0.5) / columns * field - field / 2)
     elevation = np.radians(np.linspace(-24.8, 2.0, rings))
     azimuth, elevation = (angle.ravel() for angle in np.meshgrid(azimuth, elevation))

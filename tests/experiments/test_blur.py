@@ -54,3 +54,7 @@ def test_nonsense_is_refused():
         blur_of("cubic", [PlanarMotion()])
     with pytest.raises(ArgumentError, match="motions"):
         blur_of("nearest", [PlanarMotion(50)] * 2)
+    with pytest.raises(ArgumentError, match="motions, drops"):
+        blur_of("nearest", [])
+    with pytest.raises(ArgumentError, match="motions, drops"):
+        blur_of("nearest", [PlanarMotion()], drops=0)

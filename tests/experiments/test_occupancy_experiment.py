@@ -8,6 +8,7 @@ import pytest
 
 import semgrid_edu
 from semgrid_edu.cli import run
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.cell_scores import Estimate, Scores
 from semgrid_edu.experiments.occupancy import GRIDS, LIDARS, METHODS, compare, table
 from semgrid_edu.experiments.scenes import scenes
@@ -100,3 +101,12 @@ def test_an_unknown_grid_is_refused(monkeypatch):
     monkeypatch.setattr("sys.argv", ["semgrid-edu", "reproduce", "occupancy", "--grid", "huge"])
     with pytest.raises(SystemExit, match="semgrid-edu: grid: expected paper or compact, found huge"):
         run()
+
+
+@pytest.mark.parametrize(
+    ("bad", "name"),
+    [({"drives": 0}, "drives"), ({"frames": 0}, "frames"), ({"seed": -1}, "seed"), ({"grids": ()}, "grid")],
+)
+def test_nothing_to_do_is_refused_by_name(bad, name):
+    with pytest.raises(ArgumentError, match=name):
+        compare(**bad)
