@@ -55,8 +55,8 @@ plt.rcParams["figure.dpi"] = 80
 # ## A road with three poles
 #
 # A vehicle drives round a ring road of ten cells: after cell 9 comes cell 0 again. Poles stand beside cells 2, 3 and
-# 7. A sensor looks to the side and says *pole* or *nothing*. It errs: beside a pole it says *pole* with probability
-#    0.8, elsewhere with probability 0.1. The map is known. Where is the vehicle?
+# 7. A sensor looks to the side and says *pole* or *nothing*. It errs: it says *pole* with probability 0.8 beside a
+# pole, and with probability 0.1 elsewhere. The map is known. Where is the vehicle?
 #
 # ```
 # pole           |   |               |
@@ -329,6 +329,9 @@ np.testing.assert_allclose(np.exp(log_update(np.log(P_POLE), np.log(moved_on))),
 #
 # <details><summary>Answer</summary>Odds 1, then 3/7 = 0.43, then 9/49 = 0.18; the return multiplies by 0.8/0.05 = 16:
 # 2.94. As probabilities: 0.30, 0.16, 0.75. One return outweighs three passes.</details>
+#
+# (0.3 and 0.8 sum to more than one. They needn't fit together: of each pair only the ratio counts, so a pair may be
+# scaled as you like.)
 
 # %%
 PASS, HIT = np.array([0.7, 0.3]), np.array([0.05, 0.8])  # P(z | FREE), P(z | OCCUPIED)
@@ -382,10 +385,11 @@ np.testing.assert_allclose(predict_states(one_reading, ring), predict(one_readin
 # do it in two steps of 0.05 s, and 0.95² = 0.9025 is left; in ten of 0.01 s, 0.99¹⁰ = 0.9044. The finer the cut, the
 # nearer to $e^{-0.1} = 0.9048$, which is exact.
 #
-# Give the rates $R_{ij}$, from state $i$ to $j$, in 1/s. In a very short time $\tau$ the belief changes by $\tau\, b
-# R$ (the diagonal of $R$ is what leaves: rows of $R$ sum to zero). Many short times make a long one:
+# Give the rates $R_{ij}$, from state $i$ to $j$, in 1/s. In a very short time $\epsilon$ the belief changes by
+# $\epsilon\, b R$ (the diagonal of $R$ is what leaves: rows of $R$ sum to zero). Many short times make a time step
+# $\Delta t$, in the code `dt`:
 #
-# $$ M(dt) = \lim_{k \to \infty} \left(I + R\,\frac{dt}{k}\right)^{k} = \exp(R\,dt) $$
+# $$ M(\Delta t) = \lim_{k \to \infty} \left(I + R\,\frac{\Delta t}{k}\right)^{k} = \exp(R\,\Delta t) $$
 #
 # The filter of this course has four states: FREE, STATIC and DYNAMIC (the two kinds of occupied), and UNKNOWN, for
 # what nobody has seen, or not for long. For this page:
@@ -459,9 +463,9 @@ for k, frame in enumerate(frames):
 LABEL = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 1}
 fig, ax = plt.subplots(figsize=(6.5, 5.6), layout="compressed")
 plotting.grid_labels(spec, frames[0].labels.birdseye_on(spec), KITTI_14, ax=ax).set_ylim(5, 40)
-for name, (x, y) in SPOTS.items():
+for (name, (x, y)), place in zip(SPOTS.items(), ((24, -4), (-22, 9), (0, -20), (0, 9)), strict=True):
     ax.plot(y, x, "o", markersize=9, markerfacecolor="none", markeredgecolor="black", markeredgewidth=2)
-    ax.annotate(name, (y, x), (0, 9), textcoords="offset points", ha="center", bbox=LABEL)
+    ax.annotate(name, (y, x), place, textcoords="offset points", ha="center", bbox=LABEL)
 plt.show()
 
 # %% [markdown]
@@ -658,7 +662,7 @@ for scan in (hits, *[passes] * 5):
 # 1. A belief sums to one; a likelihood needn't. Posterior = prior times likelihood, divided by the sum.
 # 2. Predict spreads, update sharpens on average; a surprise may blur. Predict first: a reading speaks of now.
 # 3. Evidence of one instant may come in any order, but each piece once. Zeros can't be corrected.
-# 4. States change by a matrix $M = \exp(R\,dt)$: rates belong to the world, the matrix to a time step.
+# 4. States change by a matrix $M = \exp(R\,\Delta t)$: rates belong to the world, the matrix to a time step.
 # 5. A grid cell is filtered like a place on a road. STATIC and DYNAMIC look alike to a scan: only prediction tells
 #    them apart.
 #
@@ -670,7 +674,7 @@ for scan in (hits, *[passes] * 5):
 #   localisation on a map.
 # - Rabiner, *A tutorial on hidden Markov models*, Proceedings of the IEEE 77(2), 1989: the same recursion, called the
 #   forward algorithm.
-# - Norris, *Markov Chains*, Cambridge 1997, chapter 2: rates and $\exp(R\,dt)$.
+# - Norris, *Markov Chains*, Cambridge 1997, chapter 2: rates and $\exp(R\,\Delta t)$.
 #
 # ## Exercise
 #

@@ -90,9 +90,9 @@ frames = [drive[k] for k in range(len(drive))]
 # / 0.5 = 0.68: the beam on a says something of b.</details>
 #
 # An occupancy grid doesn't keep the four joint probabilities. It keeps one number a cell and *assumes* that cells are
-# independent, given the scans:
+# independent, given the scans $z_1 \ldots z_t$. With $O_c$ for "cell $c$ is occupied":
 #
-# $$ P(m \mid z_{1 \ldots t}) = \prod_i P(m_i \mid z_{1 \ldots t}) $$
+# $$ P(O_a, O_b, \ldots \mid z_1 \ldots z_t) = \prod_c P(O_c \mid z_1 \ldots z_t) $$
 
 # %%
 joint = np.array([0.4, 0.1, 0.1, 0.4])  # both, only a, only b, neither
@@ -347,7 +347,8 @@ print(f"walking takes {seconds[scan_evidence_literal] / seconds[scan_evidence]:.
 # short way; 0.3 m and a gentle grade of 5 in 100 over a long one. By hand: from 6 to 7 m the first allows 0.1 + 1/3 =
 # 0.43, the second 0.35; the step of 0.25 is within both, so it is ground. So are the next three, and the last, from
 # 10 to 12 m. At 11 m the returns differ by 1.1 m, more than 0.3: something *stands* there, and it isn't asked. (Where
-# ground was hidden for more than 10 m, $d$ counts as 10 m.)
+# ground was hidden for more than 10 m, $d$ counts as 10 m.) With the grid frame's height $z$ (in a probability, $z$ is
+# what a scan says):
 #
 # $$ |z - z_\text{ground}| \le \min\left(0.1 + \tfrac13 d,\; 0.3 + 0.05\, d\right), \qquad d \le 10\ \text{m} $$
 
@@ -432,20 +433,21 @@ for seed in range(4):
     assert (hit & places[0]).sum() < 0.6 * (flat_hit & places[0]).sum()
 
 # %% [markdown]
-# The flat rule puts a wall where a lawn rises, and hides what is behind it. The walk removes nine tenths of it or
-# more in three parks of four, and keeps the road users but for a cell or two. (The plants that go are none: the
-# returns in those cells come from the grass below the crowns.) On a real KITTI drive, along a fence, a quarter of the
-# cells that the flat rule called occupied were the grass before it. In the last park the walk loses its way: cars and
-# a fence hide where the bank begins, and behind them the grass starts 0.8 m up, more than the walk allows.
+# The flat rule puts a wall where a lawn rises, and hides what is behind it. The walk removes nearly nine tenths of it
+# or more in three parks of four, and keeps the road users but for a cell or two. (The plants that go are none: the
+# returns in those cells come from the grass below the crowns.) On a real KITTI drive, along a fence, more than a
+# quarter of the cells that the flat rule called occupied were the grass before it. In the last park the walk loses
+# its way: cars and a fence hide where the bank begins, and behind them the grass starts 0.8 m up, more than the walk
+# allows.
 
 # %% [markdown]
 # ## Log-odds: multiplication becomes addition
 #
 # One cell, believed occupied with 0.5. Two beams come back from it, each 0.8 likely if occupied, 0.2 if free. Bayes'
 # rule twice, in odds (occupied to free): 1 to 1, then 4 to 1, then 16 to 1. So P = 16/17 = 0.94. No normalising on
-# the way: odds just multiply. Their logarithm just adds:
+# the way: odds just multiply. Their logarithm just adds. With $P$ for P(occupied):
 #
-# $$ L = \log\frac{p}{1 - p}, \qquad p = \frac{1}{1 + e^{-L}}, \qquad
+# $$ L = \log\frac{P}{1 - P}, \qquad P = \frac{1}{1 + e^{-L}}, \qquad
 #    L_t = L_{t-1} + \log \frac{P(z_t \mid \text{occupied})}{P(z_t \mid \text{free})} $$
 #
 # By hand: log 4 = 1.39, so $L$ goes 0, 1.39, 2.77. (The literature writes a small l; in this course that is the
@@ -528,7 +530,7 @@ plt.show()
 #
 # ## On the drive
 #
-# Now every cell, and a vehicle that moves at 8 m/s. Before each scan the map must move under it, or the world smears.
+# Now every cell, and a vehicle that moves at 8.5 m/s. Before each scan the map must move under it, or the world smears.
 # `LogOddsGrid` does that by whole cells, so that nothing blurs (lecture 04 says how).
 #
 # **Predict before you run.** Forget the motion and add up 20 scans in the vehicle's frame. What does a lamp post look
@@ -815,7 +817,8 @@ print(f"of cells that the map calls occupied with {x_claimed[-1]:.2f}, {100 * x_
 # of one edge of one car are one witness. The clamp and `max_returns` keep the boast within limits, no more: without
 # them, two scans of a wall with ten returns a cell, several rings one above the other, would claim $16^{20}$ to 1.
 #
-# **Thin things flicker.** A wire of 3 cm and two posts. The vehicle passes them, and each scan meets them or misses.
+# **Thin things flicker.** A wire of 3 cm and two posts. The vehicle drives towards them, and each scan meets them or
+# misses.
 
 # %%
 lane = GridSpec(x_min=0, x_max=40, y_min=-8, y_max=8, cell=0.5)
@@ -834,9 +837,10 @@ ax.legend(fontsize="small")
 plt.show()
 
 # %% [markdown]
-# A cell that is met in every fifth scan survives four passes, just; one that is met less often is free for most of
-# the time. The same goes for all that is porous. It doesn't matter how many beams of a scan get through, only whether
-# one comes back: near by a bare hedge is solid, and far away, where a cell meets a beam or two, it is gone.
+# From the clamp a cell survives four passes, just: met in every fifth scan it stays occupied; met less often, as the
+# wire is, it is free for most of the time. The same goes for all that is porous. It doesn't matter how many beams of a
+# scan get through, only whether one comes back: near by a bare hedge is solid, and far away, where a cell meets a beam
+# or two, it is gone.
 #
 # More that no tuning of this grid repairs:
 # - **Glass, water, black paint** send nothing back, or what stands in the mirror. A beam without a return says

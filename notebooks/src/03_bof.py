@@ -60,13 +60,13 @@ FREE, STATIC, DYNAMIC, UNKNOWN = State
 # it, for only one velocity leads from where the thing was to where it is.</details>
 #
 # That is the whole idea. A cell $c$ that is occupied with velocity $v$ now was occupied with velocity $v$ in its
-# **antecedent** $c - v\,dt$ before. The prediction asks the antecedent; the update is Bayes' rule in each cell, in
-# which a scan speaks of occupancy and never of velocity:
+# **antecedent** $c - v\,\Delta t$ before. The prediction asks the antecedent; the update is Bayes' rule in each cell,
+# in which a scan speaks of occupancy and never of velocity:
 #
-# $$ P(O_c, v) \leftarrow P(O_{c - v\,dt},\, v), \qquad
+# $$ P(O_c, v) \leftarrow P(O_{c - v\,\Delta t},\, v), \qquad
 #    P(O_c, v \mid z) = \frac{P(z \mid O)\, P(O_c, v)}{P(z \mid O) \sum_{v'} P(O_c, v') + P(z \mid F)\, P(F_c)} $$
 #
-# $O$ is occupied, $F$ free.
+# $O$ is occupied, $F$ free, $z$ what the scan says of the cell, $\Delta t$ the time step.
 
 # %% tags=["bof-update"]
 V = (-1, 0, 1)  # cells a second, which are metres a second here
@@ -155,9 +155,9 @@ axes[0].set_ylabel("velocity [m/s]")
 plt.show()
 
 # %% [markdown]
-# One row of a panel is one velocity; a row flies by itself, each at its own pace. Look at the second panel: the third
-# that started in one column has been sheared apart. The scan of the third panel picks a *column*, and with it a
-# velocity. The next flight tests the claim: only +1 arrives in cell 4, where the next beam comes back.
+# One row of a panel is one velocity; a row flies by itself, each at its own pace. Look at the second panel: what was
+# one column has been sheared apart. The scan of the third panel picks a *column*, and with it a velocity. The next
+# flight tests the claim: only +1 arrives in cell 4, where the next beam comes back.
 #
 # See also what BOF does *not* know. There was one thing; yet after the first scan the cells hold 0.176 + 0.176 + 0.889
 # = 1.24 things. Each cell is judged by itself: finding the thing in cell 3 says nothing about cell 1. Only looking
@@ -166,8 +166,8 @@ plt.show()
 # %% [markdown]
 # ## What arrives where something stands
 #
-# Cell 2 holds a standing thing with probability $s = 0.5$, else it is free. From cell 1 something moving arrives with
-# probability $a = 0.6$. Two opinions, taken as independent: write down the four pairs.
+# Cell 2 holds a standing thing with probability $b_S = 0.5$ (its belief in STATIC), else it is free. From cell 1
+# something moving arrives with probability $a = 0.6$. Two opinions, taken as independent: write down the four pairs.
 #
 # | | stands here, 0.5 | free, 0.5 |
 # |---|---|---|
@@ -176,14 +176,14 @@ plt.show()
 #
 # Two things can't be in one cell, so one pair is impossible. Strike it out and let the rest, 0.7, sum to one again.
 #
-# **Predict before you run.** What does the cell hold now? And when it was a fence, $s = 0.99$, and $a = 0.3$?
+# **Predict before you run.** What does the cell hold now? And when it was a fence, $b_S = 0.99$, and $a = 0.3$?
 #
 # <details><summary>Answer</summary>DYNAMIC 3/7, STATIC 2/7, FREE 2/7. The fence: DYNAMIC 0.3 · 0.01 = 0.003, STATIC 0.7
 # · 0.99 = 0.693, FREE 0.007, divided by 0.703: still STATIC to 98.6 %. Without the rule it would be at 69 %, and after
 # five such seconds at 17 %.</details>
 #
-# $$ P(O_c, v) \leftarrow \frac{(1 - s)\, P(O_{c - v\,dt}, v)}{1 - a\,s} \ \ (v \ne 0), \qquad
-#    P(O_c, 0) \leftarrow \frac{(1 - a)\, s}{1 - a\,s}, \qquad a = \sum_{v \ne 0} P(O_{c - v\,dt}, v) $$
+# $$ P(O_c, v) \leftarrow \frac{(1 - b_S)\, P(O_{c - v\,\Delta t}, v)}{1 - a\,b_S} \ \ (v \ne 0), \qquad
+#    P(O_c, 0) \leftarrow \frac{(1 - a)\, b_S}{1 - a\,b_S}, \qquad a = \sum_{v \ne 0} P(O_{c - v\,\Delta t}, v) $$
 
 
 # %% tags=["bof-predict"]
@@ -217,10 +217,10 @@ for _ in range(20):
 # %%
 a = np.linspace(0, 0.999, 200)
 fig, ax = plt.subplots(figsize=(6, 3), layout="constrained")
-for s, grey in ((0.5, "0.7"), (0.9, "0.4"), (0.99, "0.0")):
-    ax.plot(a, (1 - a) * s / (1 - a * s), color=grey, label=f"s = {s}")
-ax.plot(a, (1 - a) * 0.99, "--", color="#c04000", label="s = 0.99, nothing struck out")
-ax.set(xlabel="probability a that something arrives", ylabel="P(STATIC) afterwards")
+for static, grey in ((0.5, "0.7"), (0.9, "0.4"), (0.99, "0.0")):
+    ax.plot(a, (1 - a) * static / (1 - a * static), color=grey, label=f"$b_S$ = {static}")
+ax.plot(a, (1 - a) * 0.99, "--", color="#c04000", label="$b_S$ = 0.99, nothing struck out")
+ax.set(xlabel="probability $a$ that something arrives", ylabel="P(STATIC) afterwards")
 ax.legend(frameon=False, fontsize="small")
 plt.show()
 
@@ -277,7 +277,7 @@ for cell, (mean, variance) in enumerate(zip(*what_moves(joint), strict=True)):
 # ## One cell, no motion: lecture 01 again
 #
 # One cell that holds FREE 0.6 and STATIC 0.4, and five scans: hit, hit, passed, hit, passed. Nothing moves. The
-# discrete Bayes filter of lecture 01 predicts by the transition matrix, $p \leftarrow p M$, and updates by Bayes' rule.
+# discrete Bayes filter of lecture 01 predicts by the transition matrix, $b \leftarrow b M$, and updates by Bayes' rule.
 # BOF must do exactly that.
 
 # %%
@@ -286,18 +286,18 @@ rates = np.zeros((4, 4))
 rates[FREE, STATIC], rates[STATIC, FREE] = 0.2, 0.5  # a second; nothing ever moves
 params = BofParams(lattice, CmcdotParams(rates=tuple(map(tuple, rates))))
 M = transition_matrix(params.world, dt=0.1)[:2, :2]
-p = np.array([0.6, 0.4])
+b = np.array([0.6, 0.4])
 occupied = np.zeros((len(lattice), 1, 1), np.float32)
 occupied[0] = 0.4
 start = BofState.nothing_known(one_cell, lattice)
 state = BofState(start.free + 0.6, start.unknown * 0, occupied, start.velocity, start.remainder)
 for hit in (True, True, False, True, False):
     if_free, if_occupied = (0.05, 0.8) if hit else (0.7, 0.3)
-    p = discrete_update(np.array([if_free, if_occupied]), p @ M)
+    b = discrete_update(np.array([if_free, if_occupied]), b @ M)
     scan = Evidence(np.full((1, 1), if_occupied, np.float32), np.full((1, 1), if_free, np.float32))
     state = bof_update(bof_predict(state, one_cell, params, dt=0.1), one_cell, scan, params)
-    np.testing.assert_allclose(state.probability[:2, 0, 0], p, atol=1e-5)
-    print(f"{'hit' if hit else 'passed':<8} STATIC {p[1]:.3f}")
+    np.testing.assert_allclose(state.probability[:2, 0, 0], b, atol=1e-5)
+    print(f"{'hit' if hit else 'passed':<8} STATIC {b[1]:.3f}")
 
 # %% [markdown]
 # So all that is new is what cells tell each other. The matrix of the real filter also lets things start to move. They
@@ -305,36 +305,37 @@ for hit in (True, True, False, True, False):
 #
 # ## A little acceleration
 #
-# Things change their speed. Say by up to $a$ = 6 m/s² along each axis, all values alike. In a tenth of a second that is
-# up to 0.6 m/s: a variance of 0.6²/3 = 0.12 (m/s)². But on a lattice with a spacing of $\Delta$ = 2 m/s nothing can get
-# 0.6 m/s faster.
+# Things change their speed. Say by up to $\dot v$ = 6 m/s² along each axis, all values alike. In a tenth of a second
+# that is up to 0.6 m/s: a variance of 0.6²/3 = 0.12 (m/s)². But on a lattice with a spacing of $\Delta v$ = 2 m/s
+# nothing can get 0.6 m/s faster.
 #
 # **Predict before you run.** It can get 2 m/s faster, seldom, or 2 m/s slower, just as seldom. How seldom, for the same
 # variance?
 #
-# <details><summary>Answer</summary>With probability p up and p down the variance is 2 p · 2² = 8 p = 0.12, so p =
+# <details><summary>Answer</summary>With probability q up and q down the variance is 2 q · 2² = 8 q = 0.12, so q =
 # 0.015. Once in a while a jump, in place of a small change at every step; over many steps the two are alike.</details>
 #
-# $$ 2 p \Delta^2 = \frac{(a\,dt)^2}{3} \quad\Rightarrow\quad p = \frac{(a\,dt)^2}{6 \Delta^2} $$
+# $$ 2 q\, (\Delta v)^2 = \frac{(\dot v\,\Delta t)^2}{3} \quad\Rightarrow\quad
+#    q = \frac{(\dot v\,\Delta t)^2}{6\, (\Delta v)^2} $$
 
 
 # %% tags=["bof-acceleration"]
-def accelerate(joint, velocities, spacing, p):
-    """Return P(O, v), (V,), after a share p of each moving bin has gone to each of its neighbours."""
+def accelerate(joint, velocities, spacing, q):
+    """Return P(O, v), (V,), after a share q of each moving bin has gone to each of its neighbours."""
     index = {tuple(v): k for k, v in enumerate(velocities.tolist())}
     changed = joint.copy()
     for k, (vx, vy) in enumerate(velocities.tolist()):
         for side in ((vx + spacing, vy), (vx - spacing, vy), (vx, vy + spacing), (vx, vy - spacing)):
             if (vx, vy) != (0, 0) and side != (0, 0) and side in index:
-                changed[k] -= p * joint[k]
-                changed[index[side]] += p * joint[k]
+                changed[k] -= q * joint[k]
+                changed[index[side]] += q * joint[k]
     return changed
 
 
 coarse = VelocityLattice(max_speed=8, spacing=2)
 joint = np.zeros(len(coarse), np.float32)
 joint[coarse.velocities.tolist().index([4, 0])] = 0.5
-changed = accelerate(joint, coarse.velocities, spacing=2, p=(6 * 0.1) ** 2 / (6 * 2**2))
+changed = accelerate(joint, coarse.velocities, spacing=2, q=(6 * 0.1) ** 2 / (6 * 2**2))
 square = GridSpec(x_min=0, x_max=11, y_min=0, y_max=11, cell=1)
 occupied = np.zeros((len(coarse), 11, 11), np.float32)
 occupied[:, 5, 5] = joint
@@ -426,10 +427,10 @@ for ax, k in zip(axes[1:], (5, 20), strict=True):
 plt.show()
 
 # %% [markdown]
-# Left, two black tails, 12 m and 3 m long. In the middle, after half a second, most of it is still dark: BOF has seen
-# too little to tell. On the right both boxes have a colour and arrows, back and left, the wall is STATIC, and the tails
-# are gone. The hue is the heading, by the wheel. How large is the smear, in square metres of cells that a box has left
-# and that are still believed occupied?
+# Left, each box drags a black tail, 10 m and 2 m long. In the middle, after half a second, most of it is still dark:
+# BOF has seen too little to tell. On the right both boxes have a colour and arrows, back and left, the wall is
+# STATIC, and of the tails a few cells are left. The hue is the heading, by the wheel. How large is the smear, in
+# square metres of cells that a box has left and that are still believed occupied?
 
 
 # %%
@@ -474,10 +475,11 @@ plt.show()
 # would stand. (b) It goes on in k of 20 steps with the binomial probability for 1/5: in the right cell, k = 4, is 22 %.
 # The rest is spread over two metres to and fro, and looks like uncertainty that nobody has.</details>
 #
-# BOF does neither. A whole map flies at one velocity, so the rest of the way is one number for it: keep that beside.
+# BOF does neither. A whole map flies at one velocity, so the rest of the way is one number for it: keep that, the
+# remainder $\rho$, beside, and shift by $n$ whole cells.
 #
-# $$ n = \operatorname{round}\!\left( \frac{\rho + v\,dt}{\text{cell}} \right), \qquad
-#    \rho \leftarrow \rho + v\,dt - n\,\text{cell} $$
+# $$ n = \operatorname{round}\!\left( \frac{\rho + v\,\Delta t}{\text{cell}} \right), \qquad
+#    \rho \leftarrow \rho + v\,\Delta t - n\,\text{cell} $$
 
 # %%
 road = GridSpec(x_min=0, x_max=6, y_min=0, y_max=0.5, cell=0.5)
@@ -571,15 +573,32 @@ print("BOF after 1.9 s:   front half {:4.0f}   rear half {:4.0f}".format(*told[2
 
 # %% [markdown]
 # The heading is right, the front half is nearly right, and the rear half is too slow: as if the car grew longer. Hold
-# that thought.
+# that thought, and count the ghosts of lecture 02 again: road that is empty in truth and called occupied.
+
+# %%
+log_odds, before = LogOddsGrid(street), drive[0]
+for frame in drive:
+    motion = PlanarMotion.from_poses(before.T_world_from_lidar, frame.T_world_from_lidar)
+    p_occupied = log_odds.step(frame.points_grid, motion, frame.time - before.time)
+    before = frame
+empty = drive[19].labels.birdseye_on(street) == KITTI_14.index("road")
+ghosts = [smear_area(p, empty, street) for p in (p_occupied, beliefs[19].probability[[STATIC, DYNAMIC]].sum(axis=0))]
+print("ghosts after 1.9 s [m²]   log-odds {:.0f}   BOF {:.0f}".format(*ghosts))
+assert ghosts[1] < 0.5 * ghosts[0]
+
+# %% [markdown]
+# Fewer by far, but not none. In the picture on the right you see most of what is left: the dark stretch on the left,
+# from 16 to 22 m ahead. The rear of the first oncoming car was believed to stand, and what it left behind lay in its
+# shadow, where no beam takes it back. There the second car arrived: where something was believed to stand, so the rule
+# that keeps fences made it STATIC as well. A filter that is wrong of one thing is soon wrong of the next.
 #
 # ## What it costs
 #
 # Each velocity has its own map. On the paper's grid, 355 x 155 cells, a number of four bytes a cell and velocity:
 #
-# **Predict before you run.** A lattice up to 16 m/s in steps of 2 m/s has 197 velocities. How many has one that
-# tells a pedestrian's 1.4 m/s from standing, in steps of 0.5 m/s, and reaches 25 m/s, as fast as cars are? And how much
-# memory is that?
+# **Predict before you run.** A lattice up to 16 m/s in steps of 2 m/s has 197 velocities; the package's default, in
+# steps of 1 m/s, has 797. How many has one that tells a pedestrian's 1.4 m/s from standing, in steps of 0.5 m/s, and
+# reaches 25 m/s, as fast as cars are? And how much memory is that?
 #
 # <details><summary>Answer</summary>About the area of the disc in steps: π · 50² ≈ 7850. Times 55,025 cells times 4
 # bytes: 1.7 GB, and each step reads and writes all of it, ten times a second. Half the spacing is four times the

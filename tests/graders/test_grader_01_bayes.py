@@ -517,6 +517,26 @@ def follow(belief, likelihoods, M):
         ),
         # ---- task 4
         right(
+            "many short steps, as in the lecture",
+            task="transition",
+            code="""
+def transition(appears, vanishes, dt, k=100_000):
+    R = np.array([[-appears, appears], [vanishes, -vanishes]])
+    return np.linalg.matrix_power(np.eye(2) + R * dt / k, k)"""
+            + HALF_LIFE,
+        ),
+        mistake(
+            "too few short steps",
+            task="transition",
+            loses=2,
+            says="0.449 of every difference is left",
+            code="""
+def transition(appears, vanishes, dt, k=1000):
+    R = np.array([[-appears, appears], [vanishes, -vanishes]])
+    return np.linalg.matrix_power(np.eye(2) + R * dt / k, k)"""
+            + HALF_LIFE,
+        ),
+        right(
             "the exponential of the rates",
             task="transition",
             code=TRANSITION + HALF_LIFE.strip(),

@@ -243,6 +243,15 @@ def update(L, occupied, free, L_min, L_max):
     return np.clip(L, L_min, L_max)""",
         ),
         mistake(
+            "limits in the wrong order",
+            task="update",
+            loses=3,
+            says="clip takes the lower limit first",
+            code="""
+def update(L, occupied, free, L_min, L_max):
+    return np.clip(L + np.log(occupied / free), L_max, L_min)""",
+        ),
+        mistake(
             "clamped before adding",
             task="update",
             loses=1,
@@ -715,6 +724,13 @@ def beam_evidence(x, y, spec, L_hit, L_pass):
                 "    if 0 <= row < spec.shape[0] and 0 <= col < spec.shape[1]:\n        evidence[row, col] = L_hit",
                 "    evidence[row, col] = L_hit",
             ),
+        ),
+        mistake(
+            "int() where floor is meant",
+            task="beam-evidence",
+            loses=1,
+            says="on inputs you haven't seen: a cell is hit in which there is no return",
+            code=beam(hit_row="(spec.x_max - x) / spec.cell", hit_col="(spec.y_max - y) / spec.cell"),
         ),
         mistake(
             "outside, so nothing",

@@ -572,6 +572,18 @@ def arrive(own, arrives):
     return after""",
         ),
         mistake(
+            "what is struck out becomes UNKNOWN",
+            task="arrive",
+            loses=3,
+            says="isn't UNKNOWN, it is impossible",
+            code="""
+def arrive(own, arrives):
+    after = (1 - arrives) * own
+    after[2] += arrives * (1 - own[1])
+    after[3] += arrives * own[1]
+    return after""",
+        ),
+        mistake(
             "FREE and STATIC mixed up",
             task="arrive",
             loses=3,
@@ -592,6 +604,19 @@ def arrive(own, arrives):
     odds = arrives / (1 - arrives)
     after = own.copy()
     after[2] += odds * (1 - own[1])
+    return after / after.sum(axis=0)""",
+        ),
+        right(
+            "pairs, cell by cell",
+            task="arrive",
+            code="""
+def arrive(own, arrives):
+    after = np.zeros_like(own)
+    for r, c in np.ndindex(arrives.shape):
+        for state, comes in np.ndindex(4, 2):
+            if not (state == 1 and comes):
+                chance = arrives[r, c] if comes else 1 - arrives[r, c]
+                after[2 if comes else state, r, c] += chance * own[state, r, c]
     return after / after.sum(axis=0)""",
         ),
         mistake(

@@ -122,7 +122,7 @@ def check_beam(beam_evidence: Callable) -> None:
 
 @hidden
 def check_beam_outside(beam_evidence: Callable) -> None:
-    """Try returns beyond each border of the grid."""
+    """Try returns beyond each border of the grid, far and near: int() cuts -0.6 to 0, a row of the grid."""
     spec = GridSpec(x_min=-10.1, x_max=14.9, y_min=-6.1, y_max=9.9, cell=0.5)
-    for x, y in ((20.3, 1.7), (16.1, -9.3), (-12.4, 3.3), (4.2, 12.9), (3.1, -7.7)):
+    for x, y in ((20.3, 1.7), (16.1, -9.3), (-12.4, 3.3), (4.2, 12.9), (3.1, -7.7), (15.2, 1.7), (4.2, 10.2)):
         _judge_beam(beam_evidence, spec, x, y)

@@ -123,6 +123,7 @@ got = update(L, occupied, free, L_min=-2.0, L_max=3.5)
 assert got is not None, "update returned nothing: did you forget `return`?"
 assert np.array_equal(L, before), "update changed its argument `L`: make a new array (no +=)"
 assert np.shape(got) == (2, 3), f"expected the shape of L, (2, 3), got {np.shape(got)}"
+assert not np.allclose(got, -2.0), "every cell is at L_min: clip takes the lower limit first, then the upper one"
 slips = {  # of cell (1, 2): by hand 0.5 + log(0.9 / 0.05) = 0.5 + 2.890 = 3.390
     -2.0: "the sign is swapped: a hit makes a cell more occupied, so P(z | occupied) stands above",
     1.755: "that is the logarithm to base 10: take the natural one, np.log",
