@@ -73,6 +73,15 @@ class Scores:
     Parameters
     ----------
     spec : GridSpec
+        Of the frames.
+    confusion : (4, 4) int64
+        Cells by true state and by what they are called; UNKNOWN is true of cells never seen.
+    hits : dict of str to [int, int, int]
+        By group of `groups`: hit cells, those called moving, those held occupied.
+    errors : dict of str to list of float
+        Velocity errors of cells by kind of thing, m/s.
+    smear : [int, int]
+        Cells that something moving has left, those still held occupied.
     """
 
     spec: GridSpec
@@ -82,7 +91,15 @@ class Scores:
     smear: list[int] = field(default_factory=lambda: [0, 0])
 
     def add(self, scene: Scene, estimate: Estimate) -> None:
-        """Score one frame."""
+        """Score one frame.
+
+        Parameters
+        ----------
+        scene : Scene
+            What is true.
+        estimate : Estimate
+            What the method says.
+        """
         truth = np.where(scene.never_seen, State.UNKNOWN, scene.truth.state)
         scored = scene.never_seen | scene.observed
         self.confusion += confusion_matrix(truth[scored], estimate.state[scored], N_STATES)

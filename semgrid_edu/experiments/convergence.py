@@ -103,13 +103,33 @@ def convergence(numbers: Sequence[int], seeds: Sequence[int]) -> Convergence:
 
 
 def cars(step: int) -> list[Box]:
-    """Return where two cars are, one that drives ahead at 8 m/s and one that comes towards us at 8 m/s."""
+    """Return where two cars are, one that drives ahead at 8 m/s and one that comes towards us at 8 m/s.
+
+    Parameters
+    ----------
+    step : int
+        Steps of `DT` since the start.
+
+    Returns
+    -------
+    list of Box
+    """
     travelled = 8 * DT * step
     return [Box.around(3 + travelled, -1, 2, 1, 1.5), Box.around(13 - travelled, 1, 2, 1, 1.5)]
 
 
 def evidence_of(boxes: list[Box]) -> Evidence:
-    """Return the evidence of one hit in each cell of the boxes, and of a beam through each other cell."""
+    """Return the evidence of one hit in each cell of the boxes, and of a beam through each other cell.
+
+    Parameters
+    ----------
+    boxes : list of Box
+
+    Returns
+    -------
+    Evidence
+        Over `SPEC`.
+    """
     sensor = PARAMS.world.sensor
     hit = np.any([cells_in(box, SPEC) for box in boxes], axis=0)
     occupied = np.where(hit, sensor.p_hit_occupied, sensor.p_pass_occupied)
@@ -124,7 +144,15 @@ def first_belief() -> NDArray[np.float32]:
 
 
 def run_bof() -> Iterator[tuple[NDArray, NDArray]]:
-    """Yield dynamic probability, (H, W), and mean velocity, (2, H, W), after each step of the BOF."""
+    """Run the BOF past the two cars.
+
+    Yields
+    ------
+    dynamic : (H, W) float32
+        P(DYNAMIC) after each step.
+    velocity : (2, H, W) float32
+        Mean velocity, m/s; NaN where nothing moves.
+    """
     belief, lattice = first_belief().astype(np.float32), PARAMS.lattice
     occupied = belief[State.DYNAMIC] * lattice.prior[:, None, None].astype(np.float32)
     occupied[0] = belief[State.STATIC]
@@ -136,7 +164,15 @@ def run_bof() -> Iterator[tuple[NDArray, NDArray]]:
 
 
 def run_cmcdot(number: int, seed: int) -> Iterator[tuple[NDArray, NDArray]]:
-    """Yield the same after each step of CMCDOT with so many particles."""
+    """Run CMCDOT past the two cars; it yields what `run_bof` does.
+
+    Parameters
+    ----------
+    number : int
+        Of particles.
+    seed : int
+        Decides everything that is drawn.
+    """
     rng, params = np.random.default_rng(seed), replace(PARAMS.world, particles=number)
     state = _first_particles(number, rng)
     for step in range(1, STEPS + 1):

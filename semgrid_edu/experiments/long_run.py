@@ -103,13 +103,35 @@ def long_run(
 
 
 def pose_at(time: float) -> PlanarMotion:
-    """Return where the vehicle is on its circle: it starts at the origin of the world, looks along x and turns left."""
+    """Return where the vehicle is on its circle: it starts at the origin of the world, looks along x and turns left.
+
+    Parameters
+    ----------
+    time : float
+        Seconds.
+
+    Returns
+    -------
+    PlanarMotion
+        Its pose in the world.
+    """
     yaw = SPEED * time / RADIUS
     return PlanarMotion(float(RADIUS * np.sin(yaw)), float(RADIUS - RADIUS * np.cos(yaw)), yaw)
 
 
 def scene_at(time: float) -> list[Box]:
-    """Return what stands, a car ahead on the circle, one that comes towards us outside it, and a pedestrian."""
+    """Return what stands, a car ahead on the circle, one that comes towards us outside it, and a pedestrian.
+
+    Parameters
+    ----------
+    time : float
+        Seconds.
+
+    Returns
+    -------
+    list of Box
+        In the world.
+    """
     angles = 2 * np.pi * np.array([time / LAP + 0.11, 0.3 - time / LAP])
     x, y = np.array([1.0, 1.12]) * RADIUS * np.sin(angles), RADIUS * (1 - np.array([1.0, 1.12]) * np.cos(angles))
     cars = [Box.around(x[k], y[k], 3, 3, 1.5) for k in range(2)]

@@ -118,7 +118,17 @@ def _score(seed: int, drives: int, frames: int, lidar: str, grid: str) -> dict[s
 
 
 def tables(result: dict) -> str:
-    """Return the tables of all LIDARs and grids of a result, each under its title."""
+    """Return the tables of all LIDARs and grids of a result, each under its title.
+
+    Parameters
+    ----------
+    result : dict
+        As for `table`.
+
+    Returns
+    -------
+    str
+    """
     return "\n\n".join(
         f"{lidar} LIDAR, {grid} grid\n\n{table(result, lidar, grid)}"
         for lidar, grids in result["scores"].items()

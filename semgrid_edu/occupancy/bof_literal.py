@@ -46,7 +46,21 @@ def bof_predict_literal(state: BofState, spec: GridSpec, params: BofParams, dt: 
 
 
 def accelerate(state: BofState, params: BofParams, dt: float) -> NDArray[np.float64]:
-    """Return the mass of each velocity, (V, H, W), after some has changed to neighbouring velocities."""
+    """Return the mass of each velocity after some has changed to neighbouring velocities.
+
+    Parameters
+    ----------
+    state : BofState
+        Before.
+    params : BofParams
+        Lattice and acceleration.
+    dt : float
+        Seconds.
+
+    Returns
+    -------
+    (V, H, W) float64
+    """
     change = params.lattice.change_probability(params.world.max_acceleration, dt)
     changed = np.zeros(state.occupied.shape)
     for k, neighbours in enumerate(params.lattice.neighbours):

@@ -61,6 +61,17 @@ class BofState:
     def nothing_known(cls, spec: GridSpec, lattice: VelocityLattice) -> "BofState":
         """Return the state of one who has seen nothing: UNKNOWN everywhere.
 
+        Parameters
+        ----------
+        spec : GridSpec
+            The cells.
+        lattice : VelocityLattice
+            The velocities.
+
+        Returns
+        -------
+        BofState
+
         Raises
         ------
         ArgumentError

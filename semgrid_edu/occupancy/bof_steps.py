@@ -112,14 +112,45 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -
 
 
 def going_on(state: BofState, params: BofParams, dt: float) -> NDArray[np.float32]:
-    """Return what part of each velocity's mass goes on moving, (V,): to `slow_down` each is a particle of weight 1."""
+    """Return what part of each velocity's mass goes on moving: to `slow_down` each is a particle of weight 1.
+
+    Parameters
+    ----------
+    state : BofState
+        For its velocities.
+    params : BofParams
+        For rate and speed of stopping.
+    dt : float
+        Seconds.
+
+    Returns
+    -------
+    (V,) float32
+    """
     velocity = state.velocity.astype(np.float32)
     particles = Particles(np.zeros_like(velocity), velocity, np.ones(len(velocity), np.float32))
     return slow_down(particles, params.world.stop_rate, params.world.stop_speed, dt).weight
 
 
 def whole_cells(state: BofState, spec: GridSpec, dt: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return by how many whole cells each velocity shifts its mass, (V, 2) along x and y, and the new remainders."""
+    """Return by how many whole cells each velocity shifts its mass, and what remains of its displacement.
+
+    Parameters
+    ----------
+    state : BofState
+        For its velocities and remainders.
+    spec : GridSpec
+        The cells.
+    dt : float
+        Seconds.
+
+    Returns
+    -------
+    cells : (V, 2) int64
+        Along x and y.
+    remainder : (V, 2) float64
+        Metres, at most half a cell.
+    """
     displacement = state.remainder + state.velocity * dt
     remainder = (displacement + spec.cell / 2) % spec.cell - spec.cell / 2
     cells = np.rint((displacement - remainder) / spec.cell)

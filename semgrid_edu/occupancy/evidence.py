@@ -89,7 +89,20 @@ def scan_evidence(points: NDArray, spec: GridSpec, sensor: SensorModel, pose: Pl
 
 
 def beam_reach(points: NDArray, sensor: SensorModel) -> NDArray[np.float32]:
-    """Return how far each beam of a scan sees, (B,) metres: the scan in polar coordinates."""
+    """Return how far each beam of a scan sees: the scan in polar coordinates.
+
+    Parameters
+    ----------
+    points : (N, 3+) float
+        Returns from `prepare_scan`, in the grid frame of the vehicle, metres.
+    sensor : SensorModel
+        Its beams, and the heights of obstacles.
+
+    Returns
+    -------
+    (B,) float32
+        Metres; zero for beams in which nothing came back.
+    """
     profile = polar_profile(points, sensor.obstacle_min, sensor.obstacle_max, sensor.beams)
     return fill_gaps(reach(*profile), sensor.gap)
 

@@ -74,7 +74,21 @@ def _sum_in_cells(values, cells, n_cells):
 
 
 def scale_in_cells(weight: NDArray, cells: NDArray, factor: NDArray) -> NDArray[np.float32]:
-    """Multiply each weight by the factor, (H, W), of its cell; what is outside gets zero."""
+    """Multiply each weight by the factor of its cell.
+
+    Parameters
+    ----------
+    weight : (N,) float
+        What each particle carries.
+    cells : (N,) int
+        Where it is, from `cells_of`, or from `by_origin` for factors (2, H, W).
+    factor : (H, W) or (2, H, W) float
+
+    Returns
+    -------
+    (N,) float32
+        Zero for what is outside.
+    """
     return _scale_in_cells(weight, cells, factor.ravel())
 
 
@@ -184,7 +198,20 @@ def _slow_down(velocity, weight, stops, scale):
 
 
 def transform(particles: Particles, motion: PlanarMotion) -> Particles:
-    """Express particles in a new frame whose pose in the old one is `motion`."""
+    """Express particles in a new frame.
+
+    Parameters
+    ----------
+    particles : Particles
+        In the old frame.
+    motion : PlanarMotion
+        The new frame, in the old one.
+
+    Returns
+    -------
+    Particles
+        In the new frame: positions and velocities turned, weights as they were.
+    """
     T = (motion.dx, motion.dy, np.cos(motion.dyaw), np.sin(motion.dyaw))
     return Particles(*_transform(particles.position, particles.velocity, *T), particles.weight)
 

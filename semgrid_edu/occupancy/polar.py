@@ -46,7 +46,18 @@ def beam_of(x, y, beams):
 
 
 def reach(first_obstacle: NDArray, last_ground: NDArray) -> NDArray[np.float32]:
-    """Return how far each beam sees, (B,) metres: to its first obstacle, else to its last ground return."""
+    """Return how far each beam sees: to its first obstacle, else to its last ground return.
+
+    Parameters
+    ----------
+    first_obstacle, last_ground : (B,) float32
+        Ranges from `polar_profile`, metres.
+
+    Returns
+    -------
+    (B,) float32
+        Metres; zero where nothing came back.
+    """
     return np.where(np.isfinite(first_obstacle), first_obstacle, last_ground)
 
 

@@ -64,7 +64,22 @@ def _moments(velocity, weight, cells, n_cells):
 
 
 def turn_moments(mean: NDArray, covariance: NDArray, motion: PlanarMotion) -> tuple[NDArray, NDArray]:
-    """Express mean (2, H, W) and covariance (2, 2, H, W) in the axes of a frame whose pose is `motion`: R^T C R."""
+    """Express moments of velocity in the axes of another frame: R^T mean, R^T C R.
+
+    Parameters
+    ----------
+    mean : (2, H, W) float32
+        m/s.
+    covariance : (2, 2, H, W) float32
+        m^2/s^2.
+    motion : PlanarMotion
+        Pose of the other frame, of which R is the rotation.
+
+    Returns
+    -------
+    mean, covariance
+        In the other axes, of the same shapes; the covariance is symmetric to the last bit.
+    """
     R = motion.rotation.astype(mean.dtype)
     turned = np.einsum("jkhw,kl->jlhw", np.einsum("ij,ikhw->jkhw", R, covariance), R)
     turned[1, 0] = turned[0, 1]  # rounded differently

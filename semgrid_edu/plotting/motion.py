@@ -63,7 +63,14 @@ def velocity_wheel(
 
 
 def wheel_colours(spec: GridSpec, probability: NDArray, velocity: NDArray) -> NDArray[np.uint8]:
-    """Paint an occupancy grid, (H, W, 3), with the colours of `velocity_colours` in place of DYNAMIC's."""
+    """Paint an occupancy grid with the colours of `velocity_colours` in place of DYNAMIC's.
+
+    Parameters and errors are those of `velocity_wheel`.
+
+    Returns
+    -------
+    (H, W, 3) uint8
+    """
     if np.shape(velocity) != (2, *spec.shape):
         raise ArgumentError("velocity", f"shape {(2, *spec.shape)}", f"shape {np.shape(velocity)}")
     painted = occupancy_colours(probability)

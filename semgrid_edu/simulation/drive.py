@@ -122,7 +122,18 @@ class SimulatedDrive:
         return self.rig.T_grid_from_lidar @ np.linalg.inv(self.pose(t))
 
     def velocities(self, t: float) -> dict[int, NDArray[np.float64]]:
-        """Return the velocity over ground of everybody in traffic at t seconds, (2,) m/s in grid axes, by number."""
+        """Return the velocity over ground of everybody in traffic, by number.
+
+        Parameters
+        ----------
+        t : float
+            Seconds since the drive began.
+
+        Returns
+        -------
+        dict of int to (2,) float64
+            m/s in grid axes.
+        """
         rotation, road = self.T_grid_from_world(t)[:2, :2], self.plan.road
         return {actor.instance: rotation @ actor.path.velocity(road, t) for actor in self.moving}
 
@@ -156,7 +167,12 @@ class SimulatedDrive:
         return np.concatenate([self.static_footprints, table([a.footprint(self.plan.road, t) for a in self.moving])])
 
     def birdseye(self, t: float) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
-        """Return what the cells of `LABEL_GRID` hold at t seconds, seen by anybody or not.
+        """Return what the cells of `LABEL_GRID` hold, seen by anybody or not.
+
+        Parameters
+        ----------
+        t : float
+            Seconds since the drive began.
 
         Returns
         -------
@@ -187,7 +203,17 @@ class SimulatedDrive:
         return SimulatedFrame(t, pose, picture, points, truth, self.objects(t))
 
     def scan(self, index: int) -> Frame:
-        """Take one frame without image and labels, fast; the noise of its returns is another than `frame`'s."""
+        """Take one frame without image and labels, fast; the noise of its returns is another than `frame`'s.
+
+        Parameters
+        ----------
+        index : int
+            Number of the frame, `PERIOD` apart.
+
+        Returns
+        -------
+        Frame
+        """
         t = index * PERIOD
         points = scan(self.instant(t), self.pose(t), self.rig.lidar, self.plan.road, self._noise(index, 1))
         return Frame(None, points, self.rig.camera, self.pose(t), t)
