@@ -235,6 +235,7 @@ def test_every_step_keeps_every_cell_a_distribution(seed, dt, dx, dy, dyaw, floo
         assert_sound(state)
 
 
+@settings(deadline=None)
 @given(st.integers(0, 1000))
 def test_update_is_that_of_cmcdot_and_leaves_velocities_alone(seed):
     """A scan knows nothing of velocities: what moves keeps its distribution over them where nothing is born."""
@@ -385,7 +386,7 @@ def test_the_belief_is_whole(street_seen):
         known = np.isfinite(belief.velocity).all(axis=0)
         assert np.array_equal(known, np.isfinite(belief.velocity_covariance).all(axis=(0, 1)))
         assert not known[belief.probability[DYNAMIC] == 0].any()
-        assert np.linalg.eigvalsh(np.moveaxis(belief.velocity_covariance[:, :, known], -1, 0)).min() > -1e-2
+        assert np.linalg.eigvalsh(np.moveaxis(belief.velocity_covariance[:, :, known], -1, 0)).min() > -1e-4
 
 
 def test_a_turning_vehicle_sees_a_car_move_straight_on():

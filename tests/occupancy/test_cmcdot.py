@@ -140,15 +140,6 @@ def test_same_seed_same_bits_other_seed_other_bits():
     assert not np.array_equal(first[3].probability, other[3].probability)
 
 
-def test_a_jump_of_a_hundred_metres_forgets_everything():
-    tracker = Cmcdot(SMALL, PARAMS)
-    for k in range(3):
-        tracker.step(scan_boxes(street(k * 0.1)), STILL, 0.1)
-    belief = tracker.step(np.empty((0, 4)), PlanarMotion(100, 0, 0.5), 0.1)
-    assert (belief.probability[State.UNKNOWN] == 1).all()
-    assert np.isnan(belief.velocity).all()
-
-
 def test_without_scans_what_was_seen_is_forgotten():
     tracker = Cmcdot(SMALL, PARAMS)
     tracker.step(scan_boxes(street(0.0)), STILL, 0.1)
@@ -188,16 +179,6 @@ def test_without_dynamic_mass_there_is_no_velocity_in_the_first_turning_step():
     belief = Cmcdot(SMALL, PARAMS).step(scan_boxes(street(0)), PlanarMotion(1, 0, 0.01), 0.1)
     assert np.isnan(belief.velocity[:, belief.probability[State.DYNAMIC] == 0]).all()
     assert np.isfinite(belief.velocity).any()
-
-
-def test_what_is_no_scan_or_time_is_refused_and_changes_nothing():
-    tracker, twin = Cmcdot(SMALL, PARAMS), Cmcdot(SMALL, PARAMS)
-    for points, dt, name in ((np.array([[np.nan, 0, 0]]), 0.1, "points"), (np.zeros((1, 3)), -1.0, "dt")):
-        with pytest.raises(ArgumentError, match=name):
-            tracker.step(points, PlanarMotion(1, 0, 0), dt)
-    points = scan_boxes(street(0.0))
-    beliefs = [t.step(points, STILL, 0.1).probability for t in (tracker, twin)]
-    assert np.array_equal(*beliefs)
 
 
 def frames(count: int) -> list[Frame]:
