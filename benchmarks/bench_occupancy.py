@@ -1,7 +1,8 @@
 """Time the occupancy filter, whole, in parts and as it grows: `python benchmarks/bench_occupancy.py [KITTI_ROOT]`.
 
 With a KITTI root, on the real scans of drive 0013, along with the vehicle's own motion; without, on made-up scans
-of the same size. Of each scan the fastest of several passes counts, for a busy machine only slows; then the median.
+of the same size. Processor time is counted, for the filter runs on one thread; of each scan the fastest of several
+passes, for a busy machine only slows; then the median of the scans.
 """
 
 import sys
@@ -89,9 +90,9 @@ def stopwatch(function: Callable, part: str, spent: dict[str, float]) -> Callabl
     """Return the function, that then adds the seconds it takes to a part's."""
 
     def timed(*arguments):
-        start = time.perf_counter()
+        start = time.process_time()
         result = function(*arguments)
-        spent[part] += time.perf_counter() - start
+        spent[part] += time.process_time() - start
         return result
 
     return timed
@@ -137,9 +138,9 @@ def print_lattices(drive: Drive, base: float) -> None:
         lattice, rows = VelocityLattice(spacing=spacing), []
         tracker = Bof(GridSpec.paper(), BofParams(lattice))
         for points, motion in drive * 3:
-            start = time.perf_counter()
+            start = time.process_time()
             tracker.step(points, motion, LIDAR_PERIOD)
-            rows.append(time.perf_counter() - start)
+            rows.append(time.process_time() - start)
         milliseconds = 1e3 * np.median(np.reshape(rows, (3, -1)).min(axis=0))
         print(f"  {len(lattice):3} velocities   {milliseconds:6.1f} ms  time x {milliseconds / base:.2f}")
 
