@@ -43,7 +43,7 @@ def occupancy_colours(probability: NDArray) -> NDArray[np.uint8]:
     Raises
     ------
     ArgumentError
-        When there aren't four states.
+        When there aren't four states, or a probability isn't finite.
 
     Examples
     --------
@@ -52,6 +52,8 @@ def occupancy_colours(probability: NDArray) -> NDArray[np.uint8]:
     """
     if np.ndim(probability) != 3 or len(probability) != len(STATE_COLOURS):
         raise ArgumentError("probability", "shape (4, H, W)", f"shape {np.shape(probability)}")
+    if not np.isfinite(probability).all():
+        raise ArgumentError("probability", "finite numbers", "NaN or infinity")
     mixed = np.einsum("shw,sk->hwk", probability, np.array(STATE_COLOURS, dtype=np.float64))
     return np.clip(np.rint(mixed), 0, 255).astype(np.uint8)
 

@@ -174,6 +174,7 @@ def test_an_animation_of_one_belief_can_be_shown_in_a_notebook():
         (lambda: plotting.velocity_wheel(SPEC, np.zeros((4, 4, 2)), np.zeros((2, 2, 4))), "velocity"),
         (lambda: plotting.velocity_wheel(SPEC, np.zeros((4, 2, 4)), np.zeros((2, 4, 2))), "probability"),
         (lambda: plotting.velocity_wheel(SPEC, np.zeros((3, 4, 2)), np.zeros((2, 4, 2))), "probability"),
+        (lambda: plotting.occupancy_colours(np.full((4, 4, 2), np.nan)), "probability"),
         (lambda: plotting.velocity_colours(np.zeros((3, 4))), "velocity"),
         (lambda: plotting.velocity_spread(np.zeros((3, 2)), np.ones(2)), "velocity"),
         (lambda: plotting.velocity_spread(np.zeros((2, 2)), np.zeros(2)), "weight"),
