@@ -63,6 +63,10 @@ plt.rcParams["figure.dpi"] = 80
 # | $\delta_d$ | height of plane $d$ above the ground, metres | (D,) | `heights` |
 # | $p$ | scores resampled on the planes | (C, D, H, W) | `planes` |
 # | $g$ | semantic grid: probability of each class in each cell | (C, H, W) | `grid`; `refined` after the CRF |
+# | $b$ | belief of one cell: probability of each of its states | (4,) | `probability[:, r, c]` |
+# | $P(z \mid \cdot)$ | evidence: likelihood of a scan $z$ if the cell is occupied, or free | (H, W) | `Evidence` |
+# | $L$ | log-odds of a cell, $\log P / (1 - P)$ | (H, W) | `L` |
+# | $R, M$ | rates of change, 1/s; transition matrix $M = e^{R \Delta t}$ | (4, 4) | `rates`, `transition_matrix` |
 # | $x, y, z$ | grid frame: forward, left, up from the ground below the LIDAR, metres | | `points_grid` |
 # | $X, Y, Z$ | camera frame: right, down, ahead, metres | | `points_camera` |
 # | $u, v$ | pixel: right, down; the centre of the first pixel is (0, 0) | | `pixels` |
@@ -82,10 +86,10 @@ plt.rcParams["figure.dpi"] = 80
 # | lecture | arrow | idea |
 # |---|---|---|
 # | **00** | all | you are here |
-# | 01 | | Bayes' rule on a line: predict, update, repeat |
-# | 02 | $l \to o$ | occupancy grids: evidence, log-odds, and the smear behind a moving car |
-# | 03 | $l \to o$ | BOF: occupancy with velocity |
-# | 04 | $l \to o$ | CMCDOT: four states, particles, resampling |
+# | [01](01_bayes.ipynb) | | Bayes' rule on a line: predict, update, repeat |
+# | [02](02_grids.ipynb) | $l \to o$ | occupancy grids: evidence, log-odds, and the smear behind a moving car |
+# | [03](03_bof.ipynb) | $l \to o$ | BOF: occupancy with velocity |
+# | [04](04_cmcdot.ipynb) | $l \to o$ | CMCDOT: four states, particles, resampling |
 # | 05 | $s \to p$ | from grid to pixel: equation (1) |
 # | 06 | $s \to p$ | sampling that learns: equation (2) and its gradient |
 # | 07 | $i \to s$ | three networks for segmentation |
@@ -309,8 +313,8 @@ plt.show()
 # %% [markdown]
 # Road and sidewalk, both FREE in the occupancy grid, are told apart: that the LIDAR can't do. Fence and house, on the
 # right, stand where the LIDAR met them: that the camera can't do. In the truth, a cell that the camera doesn't see is
-# *unknown-free*, *-static*, *-dynamic* or *-unobserved*, by its occupancy state. Compare: the cars on the left run
-# together, and from 30 to 40 m the sidewalk is called unobserved.
+# *unknown-free*, *-static*, *-dynamic* or *-unobserved*, by its occupancy state. Compare: of the cars on the left some
+# are missing, such as the one 14 m ahead, and from 30 to 45 m the sidewalk is called unobserved.
 
 # %% [markdown]
 # ## Stage 5: refinement by a CRF
@@ -332,7 +336,7 @@ plt.show()
 
 # %% [markdown]
 # White cells on the right have kept their class: about nine in ten. The changes are crumbs, and thin lines along
-# borders. The road grows together on the left and swallows most of the car that is 40 m ahead.
+# borders. The road grows together on the left and swallows most of what was found of the cars 40 m ahead.
 #
 # ## How good is it?
 #
@@ -397,8 +401,8 @@ plt.show()
 
 # %% [markdown]
 # The diagonal is right. For most classes the last column holds the most usual mistake: a cell that the camera sees is
-# called *unobserved*. Sky stands in no cell, so its row is empty. *Unknown-dynamic* is mostly called car: a class that
-# fits what moves, though the camera didn't see it.
+# called *unobserved*. Sky stands in no cell, so its row is empty. A good quarter of *unknown-dynamic* is called car: a
+# class that fits what moves, though the camera didn't see it.
 #
 # ## Play with it
 #
@@ -434,42 +438,49 @@ plt.show()
 
 # %% [markdown]
 # Colours as above. At first nothing is orange: one scan can't tell. After a second the red car that overtakes us is,
-# at the bottom, and so are oncoming cars on the left and two cyclists on the right. The maps agree on road and
-# sidewalk nearby; beyond 40 m they change from one instant to the next.
+# at the bottom, and one that comes towards us on the left; after two, more of those that come, and two cyclists on the
+# right. The maps agree on road and sidewalk nearby; beyond 40 m they change from one instant to the next.
 
 # %% [markdown]
 # ## Where this breaks
 #
 # Three failures, each of them real, none of them repaired for this page.
 #
-# **What has just been seen stands still.** Take, in the last frame, the car ahead that moves most certainly the way
-# we do, and follow it back in time through the truth. In each frame, take the cells that it fills and that the filter
-# holds occupied: how much of them does it call DYNAMIC?
+# **What moves seems to stand, for a while or for long.** In the last frame two cars come towards us on the left, 7 and
+# 14 m ahead, one behind the other. Follow them back in time through the truth. In each frame, take the cells that a car
+# fills and that the filter holds occupied: how much of them does it call DYNAMIC?
 
 # %%
 x = spec.centers()[..., 0]
-truth_maps = [result.frame.labels.birdseye_on(spec) for result in results]
-car_ahead = (truth_maps[-1] == car) & (x > 13) & (now.belief.velocity[0] > 0)
-surest = np.where(car_ahead, now.belief.probability[State.DYNAMIC], 0).argmax()
-place = spec.centers().reshape(-1, 2)[surest]
-dynamic = []
-for result, truth in zip(results[::-1], truth_maps[::-1], strict=True):
-    cars, n_cars = ndimage.label(truth == car)
-    centers = np.array([spec.centers()[cars == n].mean(axis=0) for n in range(1, n_cars + 1)])
-    nearest = np.linalg.norm(centers - place, axis=1).argmin()
-    place = centers[nearest]
-    belief = result.belief.probability[:, cars == nearest + 1]
-    occupied = belief[State.STATIC] + belief[State.DYNAMIC] > 0.5
-    dynamic.append(belief[State.DYNAMIC, occupied].mean() if occupied.any() else np.nan)
+
+
+def dynamic_share(place):
+    """Follow the car at `place`, metres, back from the last frame: P(DYNAMIC) in its occupied cells, first to last."""
+    shares = []
+    for result in results[::-1]:
+        cars, n_cars = ndimage.label(result.frame.labels.birdseye_on(spec) == car)
+        centers = np.array([spec.centers()[cars == n].mean(axis=0) for n in range(1, n_cars + 1)])
+        nearest = np.linalg.norm(centers - place, axis=1).argmin()
+        place = centers[nearest]
+        belief = result.belief.probability[:, cars == nearest + 1]
+        occupied = belief[State.STATIC] + belief[State.DYNAMIC] > 0.5
+        shares.append(belief[State.DYNAMIC, occupied].mean() if occupied.any() else np.nan)
+    return shares[::-1]
+
+
 fig, ax = plt.subplots(figsize=(6, 2.6), layout="constrained")
-ax.plot([result.frame.time for result in results], dynamic[::-1], "o-", color="0.3")
+for ahead, style in ((7, "o-"), (14, "s--")):
+    ax.plot([r.frame.time for r in results], dynamic_share((ahead, 7)), style, color="0.3", label=f"{ahead} m ahead")
 ax.set(xlabel="time since the first scan [s]", ylabel="P(DYNAMIC) on the car", ylim=(0, 1))
+ax.legend(title="in the last frame:")
 plt.show()
 
 # %% [markdown]
 # The first scans show that *something* is there, and nothing says that it moves: STATIC is the better bet. Only when it
-# arrives where free space was seen before does the filter change its mind, and here that takes a second and a half. A
-# planner that trusts the map until then takes a moving car for a parked one.
+# arrives where free space was seen before does the filter change its mind: for the first car that takes a second.
+# The second drives in its wake. While the first still counted as standing, it left STATIC cells along its way; they lay
+# hidden in its shadow, where nobody could take them back, and there the second arrives. Where something stands already,
+# nothing is believed to arrive (lecture 03). A planner that trusts this map takes a moving car for a parked one.
 #
 # **Far away everything is worse.** A cell of half a metre, 60 m ahead, is less than a pixel high in the network's
 # image, and the LIDAR's rings are metres apart there.
@@ -490,7 +501,7 @@ ax.set(xlabel="distance ahead", ylabel="semantic cells right [%]", ylim=(0, 100)
 plt.show()
 
 # %% [markdown]
-# Near the vehicle nine cells in ten are right, beyond 45 m about half.
+# Near the vehicle nearly nine cells in ten are right, beyond 45 m about half.
 #
 # **Small things are lost.** Of all cells that truly hold a class, how many does the map call so?
 
