@@ -154,8 +154,9 @@ plt.show()
 
 # %% [markdown]
 # Both show the same street: a car that overtakes us (orange, 8 m ahead), oncoming cars on the left, walls and parked
-# cars dark. Where they differ, the loop lies up to half a cell beside the vehicle; step 1 tells why. Now each step by
-# itself.
+# cars dark. The dark streak among the oncoming cars, 15 to 22 m ahead, is a mistake that you know from lecture 03:
+# cars that came in one another's shadow. Where the two pictures differ, the loop lies up to half a cell beside the
+# vehicle; step 1 tells why. Now each step by itself.
 
 # %% [markdown]
 # ## Step 1: move, or how not to blur
@@ -174,11 +175,11 @@ plt.show()
 # the nearest old one instead, when we drive 0.4 m a step?
 #
 # <details><summary>Answer</summary>Each step is a coin toss: move by a whole cell or not. After n steps by a fraction
-# f of a cell the post has a standard deviation of the square root of n f (1 - f) cells: the blur grows for ever.
+# q of a cell the post has a standard deviation of the square root of n q (1 - q) cells: the blur grows for ever.
 # Here, 40 steps of half a cell: 3.2 cells. The nearest cell to 0.4 is cell 0: the map never moves at all, and after
 # ten steps the post is four metres from where it belongs.</details>
 #
-# $$ b'(c) = (1 - f)\, b(c + k) + f\, b(c + k + 1), \qquad \text{shift} = k + f \text{ cells},\; 0 \le f < 1 $$
+# $$ b'(c) = (1 - q)\, b(c + k) + q\, b(c + k + 1), \qquad \text{shift} = k + q \text{ cells},\; 0 \le q < 1 $$
 
 
 # %% tags=["cmcdot-1"]
@@ -189,8 +190,8 @@ def enter(b, k):
 
 def shift_bilinear(b, cells):
     """Mix the two old cells that each new cell lies across."""
-    k, f = int(cells), cells % 1
-    return (1 - f) * enter(b, k) + f * enter(b, k + 1)
+    k, q = int(cells), cells % 1
+    return (1 - q) * enter(b, k) + q * enter(b, k + 1)
 
 
 def shift_whole(b, cells, remainder):
@@ -238,29 +239,29 @@ np.testing.assert_array_equal(got[STATIC], enter(post, 2))
 np.testing.assert_array_equal(got[UNKNOWN], 1 - enter(post, 2))  # what enters is UNKNOWN
 
 # %%
-steps, f = 50, 0.4
+steps, q = 50, 0.4
 at = np.arange(60)
 bilinear, scrolled, nearest, remainder = np.eye(60)[40], np.eye(60)[40], np.eye(60)[40], 0.0
 for _ in range(steps):
-    bilinear = shift_bilinear(bilinear, f)
-    nearest = enter(nearest, round(f))
-    scrolled, remainder = shift_whole(scrolled, f, remainder)
+    bilinear = shift_bilinear(bilinear, q)
+    nearest = enter(nearest, round(q))
+    scrolled, remainder = shift_whole(scrolled, q, remainder)
 spread = np.sqrt(bilinear @ (at - bilinear @ at) ** 2)
-np.testing.assert_allclose(spread, np.sqrt(steps * f * (1 - f)))
+np.testing.assert_allclose(spread, np.sqrt(steps * q * (1 - q)))
 print(f"bilinear: a post one cell wide has a standard deviation of {spread:.1f} cells after {steps} steps")
 
 fig, ax = plt.subplots(figsize=(7, 2.4), layout="constrained")
 for values, name, style in ((bilinear, "bilinear", "-"), (nearest, "nearest cell", ":"), (scrolled, "scroll", "--")):
     ax.plot(at, values, style, label=name, drawstyle="steps-mid")
-ax.axvline(40 - steps * f, color="0.7", zorder=0, label="truth")
-ax.set(xlabel="cells ahead of the vehicle", ylabel="P(STATIC)", title=f"a post, after {steps} steps of {f} cells")
+ax.axvline(40 - steps * q, color="0.7", zorder=0, label="truth")
+ax.set(xlabel="cells ahead of the vehicle", ylabel="P(STATIC)", title=f"a post, after {steps} steps of {q} cells")
 ax.legend(frameon=False)
 plt.show()
 
 # %% [markdown]
-# See three posts: one smeared over ten cells, one twenty cells from the truth, one where it should be. Particles have
-# no such trouble. They live in metres, so `move` gives them new coordinates, exactly, and the dynamic mass goes with
-# them.
+# See three posts: one smeared over fifteen cells, one twenty cells from the truth, one where it should be. Particles
+# have no such trouble. They live in metres, so `move` gives them new coordinates, exactly, and the dynamic mass goes
+# with them.
 #
 # Real vehicles turn, too. Here a map is carried along a winding road for five seconds while nothing is seen: drops of
 # ink, one cell each, that should stay where they fell, and a chequerboard of certain cells.
@@ -278,8 +279,9 @@ plt.show()
 
 # %% [markdown]
 # Bilinear mixing loses certainty at every step (right), and with it the place (left). Looking up the nearest cell at
-# every step keeps certainty and drifts. Scrolling keeps both: only when the vehicle has turned by two degrees does
-# the map turn with it, by one look-up, and so the ink stays within a cell (0.2 m) of its place.
+# every step keeps certainty (its line lies under the dashed one) and drifts. Scrolling keeps both: only when the
+# vehicle has turned by two degrees does the map turn with it, by one look-up, and so the ink stays within a cell (0.2
+# m) of its place.
 
 # %% [markdown]
 # ## Step 2: predict
@@ -328,9 +330,9 @@ plt.show()
 
 # %% [markdown]
 # What moves is forgotten first, what stands last. UNKNOWN has no way back: only a look reveals what is there (step
-# 3). And a sliver of every state turns DYNAMIC: it is **born**. By hand, for a cell FREE 0.8, STATIC 0.2, when either
-# turns DYNAMIC at 0.01 a second: in 0.1 s a thousandth, $0.8 \cdot 0.001 + 0.2 \cdot 0.001$. Newborn mass has no
-# velocity yet; step 4 will give it some.
+# 3). And a sliver of FREE and of STATIC turns DYNAMIC: it is **born**. By hand, for a cell FREE 0.8, STATIC 0.2, when
+# either turns DYNAMIC at 0.01 a second: in 0.1 s a thousandth, $0.8 \cdot 0.001 + 0.2 \cdot 0.001$. Newborn mass has
+# no velocity yet; step 4 will give it some.
 
 # %%
 born_slowly = CmcdotParams(rates=((0, 0, 0.01, 0), (0, 0, 0.01, 0), (0, 0, 0, 0), (0, 0, 0, 0)))
@@ -453,8 +455,8 @@ for p, w, speed in zip(x, weight, v, strict=True):
 plt.show()
 
 # %% [markdown]
-# Follow the orange: of cell 1 a third stays, the rest is in cell 2, and behind it all is free. In cell 4 three
-# opinions share the cell evenly.
+# Follow the orange: of cell 1 a third stays, the rest is in cell 2, and behind it all is free. Cell 4 is
+# shared evenly by three states.
 #
 # ### What hardly moves, stands
 #
@@ -587,7 +589,8 @@ np.testing.assert_allclose(update_cell([*known, 0], 0.8, 0.2, sight.first_sight)
 
 # %% [markdown]
 # Particles take part with their weights: each is multiplied by what its cell's DYNAMIC was multiplied by, so that the
-# weights still sum to it. On the drive: left what the scan says, right the belief after it.
+# weights still sum to it. On the drive: left what the scan says (black: hit; pink: seen
+# through; white: nothing), right the belief after it.
 
 # %%
 fig, axes = plt.subplots(1, 2, figsize=(9, 4.6), layout="compressed")
@@ -630,7 +633,7 @@ np.testing.assert_allclose(*ratios, atol=1e-4)
 # <details><summary>Answer</summary>Teeth at 0.125, 0.375, 0.625, 0.875: particles 1, 1, 1, 2; particle 0 dies out.
 # Particle 1 expects 4 · 0.6 = 2.4 copies and gets 2 or 3, never 0, never 4.</details>
 #
-# $$ \text{tooth}_m = \frac{m + \text{offset}}{M},\; m = 0 \ldots M - 1; \qquad
+# $$ \text{tooth}_m = \frac{m + \text{offset}}{N_p},\; m = 0 \ldots N_p - 1; \qquad
 #    \text{drawn}_m = \min\{\, n : \omega_0 + \ldots + \omega_n > \text{tooth}_m \,\} $$
 
 
@@ -667,7 +670,7 @@ for offset in rng.random(20):
 
 # %% [markdown]
 # Why a comb, and not four independent draws, as from an urn? Draw 2000 times from our three weights and count how
-# often particle 1 comes. The urn's variance is $M \omega (1 - \omega) = 0.96$; the comb's can't exceed a quarter.
+# often particle 1 comes. The urn's variance is $N_p\, \omega (1 - \omega) = 0.96$; the comb's can't exceed a quarter.
 
 # %%
 urn = rng.multinomial(4, [0.1, 0.6, 0.3], size=2000)[:, 1]
@@ -718,9 +721,10 @@ for ax, state, title in zip(axes, (updated, resampled), ("before step 4", "after
 plt.show()
 
 # %% [markdown]
-# See blue ahead of us (driving our way) and yellow on the left (coming towards us). Before step 4 every particle of a
-# car is pale, for it has lost weight to the newborn; after it the cars are solid, and there are a few sparks of
-# newborn particles all over the free space: the filter's guesses of what might start to move.
+# See blue ahead of us (driving our way) and yellow on the left (coming towards us). Before step 4 nearly all are
+# pale, for a few have grown a hundred times heavier than the rest; after it the weight is shared out, the cars are
+# solid, and there are a few sparks of newborn particles all over the free space: the filter's guesses of what might
+# start to move.
 
 # %% [markdown]
 # ## Static against dynamic
@@ -777,7 +781,7 @@ plt.show()
 
 # %% [markdown]
 # Left, the orange band is the car passing over the cell: 4 m at 8 m/s is half a second. It comes with no dark before
-# it. Right, the parked car is dark from first sight, and the sliver of orange it starts with is gone in three scans.
+# it. Right, the parked car is dark from first sight, and the sliver of orange it starts with is gone in a few scans.
 # Here is the street after 1.8 s, the particles on the right:
 
 # %%
@@ -903,19 +907,21 @@ Markdown(table(result, "HDL-64E", "paper"))
 # %% [markdown]
 # The first five rows are about cells; so is "left, still occupied": of the cells that something moving has left, how
 # many are still held occupied? The rows below take only cells with returns: movers that have been in view for 1.5 s,
-# and what stands.
+# and what stands. Banks are free ground that is hit because it rises beside the road; the last row of per cents tells
+# how often they are held occupied.
 #
 # Three lessons.
 #
-# 1. **A binary grid can't say DYNAMIC, and pays twice.** It also leaves the smear of lecture 02: of the cells that were
-#    left, several times as many are still occupied.
+# 1. **A binary grid can't say DYNAMIC, and pays twice.** It also leaves the smear of lecture 02: of the cells that
+#    were left, several times as many are still occupied.
 # 2. **Particles cost little.** BOF and CMCDOT stand for the same model, and most of their rows differ by a few per
-#    cent. But the BOF stores 799 numbers a cell, 44 million, on a lattice that ends at 16 m/s; CMCDOT a thirtieth of
-#    that. The exact filter finds somewhat more of what moves, far cars above all, for it never runs out of samples;
-#    CMCDOT is right somewhat more often when it says DYNAMIC.
-# 3. **Time in view decides.** Of all observed cells that move, four in ten are not called so. Of those with returns,
-#    near and in view for 1.5 s, hardly any is missed. What is missed is new, far or grazed. What stands is hardly ever
-#    called DYNAMIC: most cells that are so by mistake are FREE, around something that does move.
+#    cent. But the BOF stores 799 numbers a cell, 44 million, on a lattice that ends at 16 m/s; CMCDOT keeps 1.2
+#    million in all. The exact filter finds somewhat more of what moves, far cars above all, for it never runs out of
+#    samples; CMCDOT is right somewhat more often when it says DYNAMIC.
+# 3. **Time in view decides.** Of all observed cells that move, more than a third aren't called so by CMCDOT. Of those
+#    with returns, near and in view for 1.5 s, hardly any is missed. What is missed is new, far or grazed. What stands
+#    is hardly ever called DYNAMIC. Most cells that are so by mistake are FREE, around something that does move;
+#    among what is hit, banks are the worst.
 
 # %%
 scores = result["scores"]["HDL-64E"]["paper"]
@@ -1058,7 +1064,7 @@ plotting.occupancy(spec, belief.probability, ax=axes[0], legend=False)
 axes[0].set(xlim=(8, -2), ylim=(0, 20), title=f"{t:.1f} s")
 for ax, ahead in zip(axes[1:], (3.2, 12.2), strict=True):
     row, col, _ = spec.cells(np.array([[ahead, 3.2]]))
-    axes[0].plot(3.2, ahead, "o", mfc="none", color="#6a1b9a", ms=9)
+    axes[0].plot(3.2, ahead, "o", mfc="white", color="#6a1b9a", ms=8)
     plotting.state_history(
         np.arange(30) / 10, np.array([b.probability[:, row[0], col[0]] for *_, b, _ in seen]).T, ax=ax
     )
@@ -1073,7 +1079,7 @@ plt.show()
 # This is the **aperture problem**: through the hole of one cell, a long smooth side that slides past looks like a
 # wall, and STATIC predicts a wall perfectly. The same rule keeps the fence beside a moving vehicle from moving, so
 # you can't have one without the other. And its mirror image: as you drive, the end of what you see of a fence runs
-# along the fence. There, 40 m ahead and more, lies the 1 % of the wall above that was called DYNAMIC.
+# along the fence. There, some 40 m ahead, lies the 1 % of the wall above that was called DYNAMIC.
 #
 # **Who starts to walk.** A person stands for two seconds, then walks at 1.4 m/s. A car is hidden by a van: a narrow
 # one, for less than a second, and a wide one, for more than two. How long until the filter knows again?
@@ -1133,9 +1139,9 @@ for name, (times, means) in hidden.items():
 # be worn down. Who brakes for pedestrians only when they are DYNAMIC brakes late.
 #
 # **Who is hidden for long.** Behind the narrow van the car's particles fly on unseen, and when the car comes out it
-# is expected. Behind the wide van they fade as the third picture of step 2 says, with a time of 2 s, and the
-# uncertain rest spreads out. The car comes out as a stranger, and for a second the filter is in doubt. It doesn't
-# know *objects*: that what went in should come out.
+# is expected: mostly DYNAMIC at once, though not yet sure. Behind the wide van they fade as the third picture of step
+# 2 says, by half in each second, and the uncertain rest spreads out. The car comes out as a stranger, and for a
+# second the filter is in doubt. It doesn't know *objects*: that what went in should come out.
 #
 # **Foliage.** Leaves let some beams through. Returns come from anywhere in a bush, and from elsewhere in the next
 # scan. Doesn't that look like something that moves?

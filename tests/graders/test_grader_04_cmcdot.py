@@ -222,6 +222,22 @@ def in_cells(position, velocity, weight, dx, dy, x_max, y_max, cell, shape):
         np.add.at(m[k], (row[ok], col[ok]), (weight * velocity[:, k])[ok])
     return d, m / d""",
         ),
+        mistake(
+            "the two components last",
+            task="in-cells",
+            loses=2,
+            says="expected velocity of shape (2, 3, 3), got (3, 3, 2)",
+            code="""
+def in_cells(position, velocity, weight, dx, dy, x_max, y_max, cell, shape):
+    position = position - np.array([dx, dy])
+    row = np.floor((x_max - position[:, 0]) / cell).astype(int)
+    col = np.floor((y_max - position[:, 1]) / cell).astype(int)
+    ok = (row >= 0) & (row < shape[0]) & (col >= 0) & (col < shape[1])
+    d, m = np.zeros(shape), np.zeros((*shape, 2))
+    np.add.at(d, (row[ok], col[ok]), weight[ok])
+    np.add.at(m, (row[ok], col[ok]), (weight[:, None] * velocity)[ok])
+    return d, m / d[..., None]""",
+        ),
         # ---- task 2
         right(
             "loops",
@@ -324,6 +340,15 @@ def mix(belief, M):
             code="""
 def mix(belief, M):
     return np.tensordot(M.T, belief, axes=1), M[0, 2] * belief[0] + M[1, 2] * belief[1]""",
+        ),
+        mistake(
+            "a row of the matrix instead of a column",
+            task="mix",
+            loses=2,
+            says="in a column of M, not in its row",
+            code="""
+def mix(belief, M):
+    return np.tensordot(M.T, belief, axes=1), sum(M[2, i] * belief[i] for i in (0, 1, 3))""",
         ),
         # ---- task 3
         right(
@@ -471,6 +496,18 @@ def update(belief, occupied, free, first_sight):
     p = b * np.stack([free, occupied, occupied, free])
     return np.where((b[0] == 1) & (free == 0), np.array([0, 0, 0, 1.0])[:, None, None], p / p.sum(axis=0))""",
         ),
+        mistake(
+            "revealed only where something is hit",
+            task="update",
+            loses=2,
+            says="on inputs you haven't seen: UNKNOWN is left in cells that the scan sees",
+            code="""
+def update(belief, occupied, free, first_sight):
+    b = belief + np.where(occupied > free, belief[3], 0) * np.array([*first_sight, -1])[:, None, None]
+    p = b * np.stack([free, occupied, occupied, free])
+    t = p.sum(axis=0)
+    return np.where(t > 0, p / np.where(t > 0, t, 1), np.array([0, 0, 0, 1.0])[:, None, None])""",
+        ),
         # ---- task 4
         right(
             "two pointers",
@@ -586,6 +623,16 @@ def systematic(weight, count, offset):
     ends = np.cumsum(weight)
     return np.searchsorted(ends, (np.arange(count) + offset) / count * ends[-1], side="left")""",
         ),
+        mistake(
+            "offset ignored",
+            task="systematic",
+            loses=3,
+            says="where the comb begins decides",
+            code="""
+def systematic(weight, count, offset):
+    ends = np.cumsum(weight)
+    return np.searchsorted(ends, np.arange(count) / count * ends[-1], side="right")""",
+        ),
         # ---- task 5
         right(
             "the formulas of the lecture",
@@ -652,7 +699,7 @@ def meet(own, arrives):
             "added, then normalised",
             task="meet",
             loses=4,
-            says="you count its DYNAMIC mass twice",
+            says="`arrives and FREE` isn't FREE",
             code="""
 def meet(own, arrives):
     after = own.copy()

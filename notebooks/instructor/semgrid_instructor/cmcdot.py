@@ -64,6 +64,7 @@ def check_update(update: Callable) -> None:
     got = np.asarray(update(belief.copy(), occupied.copy(), free.copy(), (0.5, 0.2, 0.3)))
     assert got.shape == belief.shape, f"shape {got.shape} instead of {belief.shape}"
     assert np.allclose(got.sum(axis=0), 1), "the states of some cells don't sum to 1"
+    assert np.allclose(got[3], 0), "UNKNOWN is left in cells that the scan sees (as free, or as occupied)"
     expected = _scan(belief, occupied, free, (0.5, 0.2, 0.3))
     assert np.allclose(got, expected, atol=1e-5), "sums are right, values are not"
 

@@ -29,11 +29,11 @@ FREE, STATIC, DYNAMIC, UNKNOWN = range(4)
 # %% [markdown]
 # ## Task 1: move, and sum in cells (2 points)
 #
-# Each of N particles has a position (x, y) in metres, a velocity (along x, along y) in m/s and a weight. Positions are in the vehicle's frame of
-# the **last** scan: x forward, y left. Since then the vehicle has driven `dx` metres forward and `dy` to the left; it hasn't turned.
+# Each of N particles has a position (x, y) in metres, a velocity (along x, along y) in m/s, both arrays (N, 2), and a weight, (N,). Positions are in
+# the vehicle's frame of the **last** scan: x forward, y left. Since then the vehicle has driven `dx` metres forward and `dy` to the left; it hasn't turned.
 #
 # The grid is a map around the vehicle **now**, forward up: row 0 is the farthest ahead, column 0 the leftmost; the outer corner of cell (0, 0) lies at
-# `x_max`, `y_max`; `shape` is (H, W).
+# `x_max`, `y_max`, in metres; cells are `cell` metres wide; `shape` is (H, W).
 #
 # Complete `in_cells`: it returns `dynamic`, shape (H, W), the sum of the weights in each cell, and `velocity`, shape (2, H, W), the mean velocity over
 # ground in each cell, **weighed by the weights**; NaN where no particle is. Particles outside the grid count nowhere.
@@ -64,6 +64,7 @@ got = in_cells(position, speed, weight, dx=1, dy=0, x_max=3, y_max=3, cell=1, sh
 assert isinstance(got, (tuple, list)), f"return two arrays, dynamic and velocity; got {got}"
 dynamic, velocity = (np.asarray(a, dtype=float) for a in got)
 assert dynamic.shape == (3, 3), f"expected dynamic of shape (3, 3), got {dynamic.shape}"
+assert velocity.shape == (2, 3, 3), f"expected velocity of shape (2, 3, 3), got {velocity.shape}"
 assert dynamic.any(), "we drove forward, so what stands comes nearer: subtract dx, dy"
 assert not np.isclose(dynamic[0, 1], 0.2), "positions are in the frame of the last scan: we have driven dx, dy since"
 assert not (dynamic[2, 0] > 0.3), "row and column are swapped: rows count along x (forward), columns along y (left)"
@@ -73,6 +74,8 @@ assert not np.isclose(dynamic[2, 1], 0.4), "a particle ahead of the grid fell in
 assert not np.isclose(dynamic[0, 2], 0.3), (
     "two particles share cell (0, 2), you count one: `dynamic[rows, cols] += weight` keeps the last; use np.add.at"
 )
+assert not np.isclose(dynamic[0, 2], 0.2), "dx goes with x, column 0 of `position`, and dy with y"
+assert not np.isclose(dynamic[2, 2], 0.2), "a particle anywhere in a cell belongs to it: round down, not to the nearest"
 np.testing.assert_allclose(dynamic, [[0, 0, 0.4], [0, 0.2, 0], [0, 0, 0]], err_msg="sum of the weights in each cell")
 mean = np.round(velocity[:, 0, 2], 2)
 assert not np.allclose(mean, [6, 2]), "that is the plain mean: one particle carries 0.1, the other 0.3"
@@ -127,6 +130,9 @@ slips = {
     0.22: "that is all that is DYNAMIC after the step: what was DYNAMIC before has its particles and isn't born again",
     0.15: "that is what stays DYNAMIC: newborn is the rest, from the three other states",
     -0.08: "what DYNAMIC loses to other states is no negative birth: sum what comes in from the other three",
+    0: "what DYNAMIC loses to other states hides what is born: sum what comes in from the other three",
+    0.067: "newborn mass comes out of the belief before the step",
+    0.09: "M[i, j] leads from i to j: what turns DYNAMIC is in a column of M, not in its row",
     0.05: "STATIC and UNKNOWN may turn DYNAMIC too",
 }
 for slip, hint in slips.items():
@@ -181,6 +187,7 @@ slips = {
     (0.24, 0.68, 0.07, 0): "DYNAMIC takes P(z | occupied) too, like STATIC",
     (0.14, 0.57, 0.29, 0): "UNKNOWN was thrown away: share it out among the three others",
     (0.8, 0.14, 0.06, 0): "P(z | occupied) and P(z | free) are swapped",
+    (0.13, 0.5, 0.37, 0): "UNKNOWN isn't shared out evenly: `first_sight` has a number for each of the three",
     (0.26, 0.5, 0.24, 0): "share UNKNOWN out before you multiply by the evidence, not after",
 }
 for slip, hint in slips.items():
@@ -249,11 +256,13 @@ slips = {
         2,
         2,
     ): "the teeth reach from end to end: they are a count-th of the line apart, so the last isn't at its end",
+    (1, 1, 1, 2): "the first tooth lies on particle 0, which ends at 1: the weights lie on the line in their own order",
     (-1, 0, 0, 1): "every index is one too small: what begins at 0 is particle 0",
 }
 assert tuple(got.tolist()) not in slips, f"got {got}: {slips.get(tuple(got.tolist()))}"
 np.testing.assert_array_equal(got, [0, 1, 1, 2], err_msg="teeth at 0.75, 3.25, 5.75, 8.25")
 got = np.asarray(systematic(weight.copy(), 4, 0.5))
+assert got.tolist() != [0, 1, 1, 2], "offset 0.5 drew the same as offset 0.3: where the comb begins decides"
 np.testing.assert_array_equal(got, [1, 1, 1, 2], err_msg="offset 0.5: teeth at 1.25, 3.75, 6.25, 8.75")
 ### BEGIN HIDDEN TESTS
 from semgrid_instructor import cmcdot
@@ -289,25 +298,33 @@ def meet(own, arrives):
 
 
 # %% nbgrader={"grade": true, "grade_id": "meet-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-own = np.zeros((4, 1, 2))
+own = np.zeros((4, 1, 3))
 own[:, 0, 0] = [0.5, 0.5, 0, 0]  # four combinations of 1/4 each, one of them impossible
 own[:, 0, 1] = [0.1, 0.2, 0.3, 0.4]  # nothing arrives here
+own[:, 0, 2] = [0.5, 0.5, 0, 0]  # 0.8 arrives: of the combinations 0.4, 0.4, 0.1, 0.1 the second is impossible
 before = own.copy()
-got = meet(own, np.array([[0.5, 0.0]]))
+got = meet(own, np.array([[0.5, 0.0, 0.8]]))
 assert np.array_equal(own, before), "meet changed its argument `own`: make a new array"
-assert np.shape(got) == (4, 1, 2), f"return the belief, of the shape of own, (4, 1, 2); got {np.shape(got)}"
-fence, quiet = np.round(np.asarray(got, dtype=float), 2)[:, 0].T
+assert np.shape(got) == (4, 1, 3), f"return the belief, of the shape of own, (4, 1, 3); got {np.shape(got)}"
+fence, quiet, surer = np.round(np.asarray(got, dtype=float), 2)[:, 0].T
 assert not np.isclose(quiet[DYNAMIC], 0), "the own DYNAMIC of cell (0, 1) got lost: nothing arrives, it is still there"
 assert np.allclose(quiet, [0.1, 0.2, 0.3, 0.4]), f"nothing arrives in cell (0, 1), yet it became {quiet}"
 assert np.isclose(fence.sum(), 1, atol=0.02), f"cell (0, 0) sums to {fence.sum():.2f}: divide by what is left"
 slips = {
     (0.25, 0.25, 0.5, 0): "a thing can't arrive where STATIC stands: strike that combination out",
     (0.5, 0, 0.5, 0): "`doesn't arrive and STATIC` is possible: don't strike it out",
+    (0.5, 0.25, 0.25, 0): "the impossible quarter goes to no state: strike it out, then divide all that is left",
     (0.25, 0.5, 0.25, 0): "STATIC isn't always right: strike the combination out, then divide all that is left",
 }
 for slip, hint in slips.items():
     assert not np.allclose(fence, slip, atol=0.011), f"cell (0, 0) is {fence}: {hint}"
 np.testing.assert_allclose(fence, [0.33, 0.33, 0.33, 0], atol=0.01, err_msg="cell (0, 0): three combinations are left")
+assert not np.allclose(surer, [0.28, 0.28, 0.44, 0], atol=0.011), (
+    "cell (0, 2): `arrives and FREE` isn't FREE; only `doesn't arrive`, 1 - a of it, leaves FREE, STATIC and UNKNOWN"
+)
+np.testing.assert_allclose(
+    surer, [0.17, 0.17, 0.67, 0], atol=0.01, err_msg="cell (0, 2): 0.1, 0.1, 0.4, divided by 0.6"
+)
 ### BEGIN HIDDEN TESTS
 from semgrid_instructor import cmcdot
 
