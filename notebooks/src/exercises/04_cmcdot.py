@@ -75,13 +75,10 @@ assert not np.isclose(dynamic[0, 2], 0.3), (
     "two particles share cell (0, 2), you count one: `dynamic[rows, cols] += weight` keeps the last; use np.add.at"
 )
 assert not np.isclose(dynamic[0, 2], 0.2), "dx goes with x, column 0 of `position`, and dy with y"
-assert not np.isclose(dynamic[2, 2], 0.2), "a particle anywhere in a cell belongs to it: round down, not to the nearest"
 np.testing.assert_allclose(dynamic, [[0, 0, 0.4], [0, 0.2, 0], [0, 0, 0]], err_msg="sum of the weights in each cell")
 mean = np.round(velocity[:, 0, 2], 2)
 assert not np.allclose(mean, [6, 2]), "that is the plain mean: one particle carries 0.1, the other 0.3"
-assert not np.allclose(mean, [1.6, 1.2]), (
-    "that is the sum of weight times velocity: divide it by the sum of the weights"
-)
+assert not np.allclose(mean, [1.6, 1.2]), "that sums weight times velocity: divide it by the sum of the weights"
 assert np.allclose(mean, [4, 3]), f"cell (0, 2): (0.1 * 10 + 0.3 * 2) / 0.4 = 4 and (0.3 * 4) / 0.4 = 3, got {mean}"
 assert np.isnan(velocity[:, 2, 1]).all(), f"no particle is in cell (2, 1): its velocity is NaN, not {velocity[:, 2, 1]}"
 ### BEGIN HIDDEN TESTS
@@ -120,18 +117,15 @@ assert isinstance(got, (tuple, list)), f"return two arrays, after and newborn; g
 assert np.array_equal(belief, before), "mix changed its argument `belief`: make a new array"
 after, newborn = (np.asarray(a, dtype=float) for a in got)
 assert after.shape == (4, 1, 2), f"expected after of shape (4, 1, 2), got {after.shape}"
-assert not np.allclose(after[:, 0, 0], M @ before[:, 0, 0]), (
-    f"cell (0, 0) sums to {after[:, 0, 0].sum():.2f}: M is used the wrong way round, its row is the state before"
-)
+backwards = np.allclose(after[:, 0, 0], M @ before[:, 0, 0])
+assert not backwards, "M is used the wrong way round, its row is the state before"
 assert np.allclose(after.sum(axis=0), 1), f"cell (0, 0) sums to {after[:, 0, 0].sum():.2f}: nothing may get lost"
 np.testing.assert_allclose(after[:, 0, 0], [0.47, 0.2, 0.22, 0.11], err_msg="by hand: sum over i of b_i M[i, j]")
 assert newborn.shape == (1, 2), f"expected newborn of shape (1, 2), got {newborn.shape}"
 slips = {
     0.22: "that is all that is DYNAMIC after the step: what was DYNAMIC before has its particles and isn't born again",
+    **dict.fromkeys((0, -0.08), "what DYNAMIC loses is no negative birth: sum what comes in from the other three"),
     0.15: "that is what stays DYNAMIC: newborn is the rest, from the three other states",
-    -0.08: "what DYNAMIC loses to other states is no negative birth: sum what comes in from the other three",
-    0: "what DYNAMIC loses to other states hides what is born: sum what comes in from the other three",
-    0.067: "newborn mass comes out of the belief before the step",
     0.09: "M[i, j] leads from i to j: what turns DYNAMIC is in a column of M, not in its row",
     0.05: "STATIC and UNKNOWN may turn DYNAMIC too",
 }
@@ -250,12 +244,7 @@ slips = {
     (1, 2, 2, 3): "every index is one too large: particle n ends at w_0 + ... + w_n",
     (1, 1, 2, 2): "the offset is a part of the distance between two teeth: divide it by `count` too",
     (1, 1, 2, 3): "the offset is a part of the distance between two teeth: divide it by `count` too",
-    (
-        0,
-        1,
-        2,
-        2,
-    ): "the teeth reach from end to end: they are a count-th of the line apart, so the last isn't at its end",
+    (0, 1, 2, 2): "the teeth are a count-th of the line apart, so the last isn't at its end",
     (1, 1, 1, 2): "the first tooth lies on particle 0, which ends at 1: the weights lie on the line in their own order",
     (-1, 0, 0, 1): "every index is one too small: what begins at 0 is particle 0",
 }
@@ -319,9 +308,7 @@ slips = {
 for slip, hint in slips.items():
     assert not np.allclose(fence, slip, atol=0.011), f"cell (0, 0) is {fence}: {hint}"
 np.testing.assert_allclose(fence, [0.33, 0.33, 0.33, 0], atol=0.01, err_msg="cell (0, 0): three combinations are left")
-assert not np.allclose(surer, [0.28, 0.28, 0.44, 0], atol=0.011), (
-    "cell (0, 2): `arrives and FREE` isn't FREE; only `doesn't arrive`, 1 - a of it, leaves FREE, STATIC and UNKNOWN"
-)
+assert surer[DYNAMIC] > 0.5, f"cell (0, 2) is {surer}: `arrives and FREE` isn't FREE, only `doesn't arrive and FREE` is"
 np.testing.assert_allclose(
     surer, [0.17, 0.17, 0.67, 0], atol=0.01, err_msg="cell (0, 2): 0.1, 0.1, 0.4, divided by 0.6"
 )
