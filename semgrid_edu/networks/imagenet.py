@@ -49,7 +49,7 @@ def load_imagenet(segmenter: nn.Module, path: str | Path) -> None:
         tensors = torch.load("vgg16.pth", map_location="cpu", weights_only=True)
         safetensors.torch.save_file({name: t.contiguous() for name, t in tensors.items()}, "vgg16.safetensors")
     """
-    wanted = _wanted(segmenter)
+    wanted = imagenet_tensors(segmenter)
     _, tensors = read_tensors(path)
     found = {name: tensors[name] for name in wanted if name in tensors}
     check_tensors(path, found, {name: _as_published(name, own) for name, own in wanted.items()})
@@ -58,11 +58,11 @@ def load_imagenet(segmenter: nn.Module, path: str | Path) -> None:
             own.copy_(found[name].reshape(own.shape))
 
 
-def _wanted(segmenter: nn.Module) -> dict[str, Tensor]:
+def imagenet_tensors(segmenter: nn.Module) -> dict[str, Tensor]:
     """Return the network's tensors that the file fills, by their names in the file."""
     if isinstance(segmenter, SegNet):
-        stages = segmenter.conv_deconv.encoder
-        convolutions = [layer[0] for layer in chain.from_iterable(stages)]
+        convolutions = [layer[0] for layer in chain.from_iterable(segmenter.conv_deconv.encoder)]
+        # The compact encoder has fewer convolutions; its shapes aren't those of the file.
         return _named(dict(zip(_vgg_names(), convolutions, strict=False)))
     if isinstance(segmenter, Fcn):
         convolutions = [layer for layer in segmenter.backbone.features if isinstance(layer, nn.Conv2d)]

@@ -3,6 +3,8 @@
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from semgrid_edu.errors import ArgumentError
+
 EXPANSION = 4
 """Channels that leave a bottleneck for each one inside it (He et al., table 1)."""
 
@@ -24,20 +26,28 @@ class ResNet(nn.Module):
     output_stride : int
         8: the last two stages atrous, with rates 2 and 4, as in DeepLab; 16: the last one; 32: none, as in
         the publication.
+
+    Raises
+    ------
+    ArgumentError
+        When the output stride is none of these.
     """
 
     def __init__(self, width: int, depths: tuple[int, ...], output_stride: int = 8) -> None:
         super().__init__()
+        if output_stride not in (8, 16, 32):
+            raise ArgumentError("output_stride", "8, 16 or 32", output_stride)
         self.conv1 = nn.Conv2d(3, width, 7, stride=2, padding=3, bias=False)
         self.bn1 = nn.BatchNorm2d(width)
         n_in, reached, rate = width, 4, 1
         for stage, depth in enumerate(depths):
             stride = 1 if stage == 0 else 2
+            # The kernel whose stride is left out still sees the map before it: it keeps its rate.
+            first_rate = rate
             if reached * stride > output_stride:
-                first, stride, rate = rate, 1, rate * stride
-            else:
-                first, reached = rate, reached * stride
-            blocks = [Bottleneck(n_in, width << stage, stride, first)]
+                stride, rate = 1, rate * stride
+            reached *= stride
+            blocks = [Bottleneck(n_in, width << stage, stride, first_rate)]
             n_in = EXPANSION * (width << stage)
             blocks += [Bottleneck(n_in, width << stage, 1, rate) for _ in range(depth - 1)]
             self.add_module(f"layer{stage + 1}", nn.Sequential(*blocks))
@@ -48,7 +58,7 @@ class ResNet(nn.Module):
 
         Its cell i lies on pixel stride x i: all strides start at the first pixel.
         """
-        x = F.max_pool2d(F.relu(self.bn1(self.conv1(x))), 3, stride=2, padding=1)
+        x = F.max_pool2d(F.relu(self.bn1(self.conv1(x)), inplace=True), 3, stride=2, padding=1)
         return self.layer4(self.layer3(self.layer2(self.layer1(x))))
 
 
@@ -78,7 +88,7 @@ class Bottleneck(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """Return the sum, (B, n_in, H, W) -> (B, 4 width, H, W), halved where the stride is 2."""
-        residual = F.relu(self.bn1(self.conv1(x)))
-        residual = F.relu(self.bn2(self.conv2(residual)))
+        residual = F.relu(self.bn1(self.conv1(x)), inplace=True)
+        residual = F.relu(self.bn2(self.conv2(residual)), inplace=True)
         residual = self.bn3(self.conv3(residual))
-        return F.relu(residual + (x if self.downsample is None else self.downsample(x)))
+        return F.relu(residual + (x if self.downsample is None else self.downsample(x)), inplace=True)
