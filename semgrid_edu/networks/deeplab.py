@@ -25,9 +25,16 @@ class DeepLab(Segmenter):
     preset : str
         "paper" is ResNet-101 and rates 6, 12, 18, 24; "compact" the same stages, narrow and shallow, with a
         third of the rates: it sees images scaled down to about a quarter, 12 rows of cells, in which a kernel
-        of rate 12 would have a single row left inside the map.
+        of rate 12 would have a single row left inside the map, and with a quarter of the summed scores.
     seed : int
         Of the initial weights.
+
+    Notes
+    -----
+    The quarter changes what a step learns, not what the network can say. The classifiers sum over 36 values
+    of each feature; at the learning rate that suits the other compact networks, 0.05, the plain sum overshoots
+    (the loss climbs from 4.6 to 66 within four steps), while the mean learns as steadily as they do. The
+    publication steps at 2.5e-3 there.
 
     References
     ----------
@@ -36,12 +43,13 @@ class DeepLab(Segmenter):
     """
 
     PRESETS: ClassVar = {
-        "compact": {"width": 8, "depths": (2, 2, 4, 2), "rates": (2, 4, 6, 8)},
-        "paper": {"width": 64, "depths": (3, 4, 23, 3), "rates": (6, 12, 18, 24)},
+        "compact": {"width": 8, "depths": (2, 2, 4, 2), "rates": (2, 4, 6, 8), "scale": 0.25},
+        "paper": {"width": 64, "depths": (3, 4, 23, 3), "rates": (6, 12, 18, 24), "scale": 1.0},
     }
 
-    def build(self, n_classes: int, width: int, depths: tuple[int, ...], rates: tuple[int, ...]) -> None:
+    def build(self, n_classes: int, width: int, depths: tuple[int, ...], rates: tuple[int, ...], scale: float) -> None:
         """Make the ResNet and a classifier for each rate."""
+        self.scale = scale
         self.backbone = ResNet(width, depths, OUTPUT_STRIDE)
         self.aspp = nn.ModuleList(
             nn.Conv2d(self.backbone.n_out, n_classes, 3, padding=rate, dilation=rate) for rate in rates
@@ -50,7 +58,8 @@ class DeepLab(Segmenter):
     def scores(self, x: Tensor) -> Tensor:
         """Return the scores, (B, 3, h, w) -> (B, C, h, w)."""
         features = self.backbone(x)
-        return interpolate(sum(classify(features) for classify in self.aspp), OUTPUT_STRIDE, x.shape[2:])
+        summed = sum(classify(features) for classify in self.aspp)
+        return interpolate(self.scale * summed, OUTPUT_STRIDE, x.shape[2:])
 
 
 def interpolate(scores: Tensor, stride: int, size: tuple[int, int]) -> Tensor:

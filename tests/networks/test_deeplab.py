@@ -4,7 +4,7 @@ from torch import nn
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import ResNet, build_segmenter
-from semgrid_edu.networks.deeplab import interpolate
+from semgrid_edu.networks.deeplab import DeepLab, interpolate
 
 
 def _count(module):
@@ -89,6 +89,17 @@ def test_each_classifier_reaches_as_far_as_its_rate():
     features[0, 0, 20, 20] = 1
     changed = (row_of_scores(features) != before).nonzero().ravel() - 20
     assert changed.tolist() == [-8, -6, -4, -2, 0, 2, 4, 6, 8]
+
+
+@pytest.mark.parametrize(("preset", "scale"), [("compact", 0.25), ("paper", 1.0)])
+def test_scores_of_the_four_rates_are_summed(monkeypatch, preset, scale):
+    monkeypatch.setitem(DeepLab.PRESETS, "paper", {**DeepLab.PRESETS["paper"], "width": 2, "depths": (1, 1, 1, 1)})
+    net = build_segmenter("deeplab", 3, preset).double().eval()
+    image = torch.rand(1, 3, 41, 33, generator=torch.Generator().manual_seed(0), dtype=torch.float64)
+    features = net.backbone((image - net.mean) / net.std)
+    one_by_one = [scale * conv(features) for conv in net.aspp]
+    assert len(one_by_one) == 4
+    torch.testing.assert_close(net(image)[..., ::8, ::8], torch.stack(one_by_one).sum(0))
 
 
 @pytest.mark.parametrize("size", [(33, 41), (38, 35), (40, 40), (1, 8)])

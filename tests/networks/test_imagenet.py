@@ -11,7 +11,7 @@ WIDTHS = (2, 3, 4, 5, 5)
 TINY = {
     "segnet": {"widths": WIDTHS, "depths": (2, 2, 3, 3, 3)},
     "fcn": {"widths": WIDTHS, "hidden": 6, "batch_norm": False},
-    "deeplab": {"width": 2, "depths": (3, 4, 23, 3), "rates": (1, 2)},
+    "deeplab": {"width": 2, "depths": (3, 4, 23, 3), "rates": (1, 2), "scale": 1.0},
 }
 """The published networks' layers with hardly any channels."""
 VGG16 = (0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28)
