@@ -33,8 +33,7 @@ class DeepLab(Segmenter):
     -----
     The quarter changes what a step learns, not what the network can say. The classifiers sum over 36 values
     of each feature; at the learning rate that suits the other compact networks, 0.05, the plain sum overshoots
-    (the loss climbs from 4.6 to 66 within four steps), while the mean learns as steadily as they do. The
-    publication steps at 2.5e-3 there.
+    (the loss climbs from 4.6 to 66 in its first steps), while the mean learns as steadily as they do.
 
     References
     ----------
