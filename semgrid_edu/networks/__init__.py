@@ -2,21 +2,35 @@
 
 from semgrid_edu.networks.build import SEGMENTERS, Architecture, build_net, build_segmenter
 from semgrid_edu.networks.conv_deconv import ConvDeconv
+from semgrid_edu.networks.deeplab import DeepLab
+from semgrid_edu.networks.fcn import Fcn
 from semgrid_edu.networks.fusion import FusionNet
+from semgrid_edu.networks.imagenet import load_imagenet
+from semgrid_edu.networks.resnet import ResNet
+from semgrid_edu.networks.segmenter import Segmenter
 from semgrid_edu.networks.segnet import SegNet
 from semgrid_edu.networks.semantic_grid import SemanticGridNet, Stages
+from semgrid_edu.networks.unet import UNet
+from semgrid_edu.networks.vgg import Vgg
 from semgrid_edu.networks.weights import load_net, save_net
 
 __all__ = [
     "SEGMENTERS",
     "Architecture",
     "ConvDeconv",
+    "DeepLab",
+    "Fcn",
     "FusionNet",
+    "ResNet",
     "SegNet",
+    "Segmenter",
     "SemanticGridNet",
     "Stages",
+    "UNet",
+    "Vgg",
     "build_net",
     "build_segmenter",
+    "load_imagenet",
     "load_net",
     "save_net",
 ]

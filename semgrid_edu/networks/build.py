@@ -2,27 +2,29 @@
 
 from dataclasses import dataclass, field
 
-from torch import nn
-
 from semgrid_edu.camera import Camera
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LABEL_SETS
+from semgrid_edu.networks.deeplab import DeepLab
+from semgrid_edu.networks.fcn import Fcn
+from semgrid_edu.networks.segmenter import Segmenter
 from semgrid_edu.networks.segnet import SegNet
 from semgrid_edu.networks.semantic_grid import SemanticGridNet
+from semgrid_edu.networks.unet import UNet
 from semgrid_edu.planes import PlaneSampler, plane_heights, plane_pixels
 
-SEGMENTERS = {"segnet": SegNet}
+SEGMENTERS = {"segnet": SegNet, "fcn": Fcn, "deeplab": DeepLab, "unet": UNet}
 """Every image network by its name."""
 
 
-def build_segmenter(name: str, n_classes: int, preset: str = "compact", seed: int = 0) -> nn.Module:
+def build_segmenter(name: str, n_classes: int, preset: str = "compact", seed: int = 0) -> Segmenter:
     """Return an image network, i -> s.
 
     Parameters
     ----------
     name : str
-        "segnet".
+        "segnet", "fcn", "deeplab" or "unet".
     n_classes : int
         C.
     preset : str
@@ -32,7 +34,7 @@ def build_segmenter(name: str, n_classes: int, preset: str = "compact", seed: in
 
     Returns
     -------
-    Module
+    Segmenter
         (B, 3, h, w) RGB in 0..1 -> (B, C, h, w) scores, no soft-max.
 
     Raises

@@ -105,7 +105,8 @@ def initialise(net: nn.Module, seed: int) -> None:
     """Draw all weights anew, so that they depend on the seed alone.
 
     Convolutions are normal with the variance that keeps a ReLU network's signals at one size (He et al.,
-    2015), biases zero.
+    2015), biases zero. So are up-convolutions, which no ReLU follows and whose strides leave no overlap: an
+    output pixel sums over the input's channels alone.
 
     Parameters
     ----------
@@ -117,4 +118,9 @@ def initialise(net: nn.Module, seed: int) -> None:
     for module in net.modules():
         if isinstance(module, nn.Conv2d | nn.Conv3d):
             nn.init.kaiming_normal_(module.weight, nonlinearity="relu", generator=generator)
+        elif isinstance(module, nn.ConvTranspose2d):
+            nn.init.normal_(module.weight, std=module.in_channels**-0.5, generator=generator)
+        else:
+            continue
+        if module.bias is not None:
             nn.init.zeros_(module.bias)

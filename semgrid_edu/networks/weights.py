@@ -61,7 +61,7 @@ def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:
         net = build_net(_architecture(json.loads(header["architecture"])), camera)
     except (KeyError, TypeError, json.JSONDecodeError, ArgumentError) as error:
         raise DataError(path, "the architecture of a network in the header", f"{header}: {error}") from error
-    _check_tensors(path, tensors, net.state_dict())
+    check_tensors(path, tensors, net.state_dict())
     net.load_state_dict(tensors)
     return net.eval()
 
@@ -72,8 +72,21 @@ def _architecture(values: dict) -> Architecture:
     return Architecture(**(values | tuples | {"grid": GridSpec(**values["grid"])}))
 
 
-def _check_tensors(path: str | Path, found: dict[str, Tensor], expected: dict[str, Tensor]) -> None:
-    """Refuse tensors that aren't the network's, naming the first."""
+def check_tensors(path: str | Path, found: dict[str, Tensor], expected: dict[str, Tensor]) -> None:
+    """Refuse tensors that aren't the network's, naming the first.
+
+    Parameters
+    ----------
+    path : path-like
+        Where they were found.
+    found, expected : dict of str to Tensor
+        Only their names and shapes count.
+
+    Raises
+    ------
+    DataError
+        When one is missing, too many, or of another shape.
+    """
     for name in sorted(found.keys() | expected.keys()):
         have, want = (
             "nothing" if part is None else tuple(part.shape) for part in (found.get(name), expected.get(name))

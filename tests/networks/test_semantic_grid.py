@@ -104,7 +104,7 @@ def test_the_loss_on_the_grid_teaches_the_first_convolution_of_the_image(small_n
 
 
 def test_unknown_names_are_refused_with_those_there_are(camera):
-    with pytest.raises(ArgumentError, match="name: expected one of segnet, found 'vit'"):
+    with pytest.raises(ArgumentError, match="name: expected one of segnet, fcn, deeplab, unet, found 'vit'"):
         build_segmenter("vit", 14)
     with pytest.raises(ArgumentError, match="preset: expected one of compact, paper, found 'huge'"):
         build_segmenter("segnet", 14, preset="huge")

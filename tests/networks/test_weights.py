@@ -8,7 +8,7 @@ from safetensors.torch import load_file, save_file
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.networks import Architecture, SemanticGridNet, build_net, load_net, save_net
+from semgrid_edu.networks import SEGMENTERS, Architecture, SemanticGridNet, build_net, load_net, save_net
 
 SMALL = Architecture(image_size=(24, 80), grid=GridSpec(0, 30, -6, 6, 1.0), heights=(0.0, 0.5, 1.0))
 
@@ -57,8 +57,25 @@ def test_the_planes_follow_the_camera(net, saved, camera):
     assert not torch.equal(loaded(*_inputs(SMALL)), net(*_inputs(SMALL)))
 
 
-def test_the_compact_network_fits_its_budget(camera, tmp_path):
-    save_net(build_net(Architecture(), camera), tmp_path / "compact.safetensors")
+@pytest.mark.parametrize("segmenter", SEGMENTERS)
+def test_weights_of_every_image_network_come_back(segmenter, camera, tmp_path):
+    architecture = replace(SMALL, segmenter=segmenter)
+    net = build_net(architecture, camera, seed=3).eval()
+    save_net(net, tmp_path / "net.safetensors")
+    loaded = load_net(tmp_path / "net.safetensors", camera)
+    assert loaded.architecture == architecture
+    assert torch.equal(loaded(*_inputs(SMALL)), net(*_inputs(SMALL)))
+
+
+def test_weights_of_another_image_network_are_refused(saved, camera):
+    _rewrite(saved, header={"architecture": json.dumps({**_header(SMALL), "segmenter": "fcn"})})
+    with pytest.raises(DataError, match=r"expected \(16,\) for segmenter.backbone.features.0.bias, found nothing"):
+        load_net(saved, camera)
+
+
+@pytest.mark.parametrize("segmenter", SEGMENTERS)
+def test_the_compact_network_fits_its_budget(segmenter, camera, tmp_path):
+    save_net(build_net(Architecture(segmenter), camera), tmp_path / "compact.safetensors")
     assert (tmp_path / "compact.safetensors").stat().st_size <= 3e6
 
 

@@ -1,0 +1,82 @@
+"""FCN-8s: scores of three depths of VGG16, summed on the way up (paper, section 3.1; Long et al., 2015)."""
+
+from typing import ClassVar
+
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from semgrid_edu.networks.segmenter import Segmenter
+from semgrid_edu.networks.vgg import Vgg, conv_relu
+
+
+class Fcn(Segmenter):
+    """Segment an image by VGG16 made convolutional, and skips that add scores of finer stages.
+
+    The classifier's two hidden layers become a 7x7 convolution, conv6, and a 1x1 one, conv7. A 1x1
+    convolution scores the classes at 1/32 of the resolution; upsampled twofold, it is added to the scores of
+    pool4 at 1/16; upsampled twofold again, to those of pool3 at 1/8; and upsampled eightfold to the image:
+    "8s". Upsampling is bilinear and fixed, as in the authors' released networks.
+
+    Parameters
+    ----------
+    n_classes : int
+        C.
+    preset : str
+        "paper" is VGG16 with 4096 channels in conv6 and conv7; "compact" the same layers, narrow, with batch
+        normalisation, without which so many layers hardly learn from random weights.
+    seed : int
+        Of the initial weights.
+
+    Notes
+    -----
+    What differs from the publication: convolutions are padded to keep the size, where it pads the image by
+    100 pixels and crops by offsets; pooling rounds up in both, so every size works and every cell knows its
+    pixels: a map is cropped at its lower and right end alone. Score layers start random, not at zero, so that
+    the first step already teaches the encoder. There is no dropout, which would draw from a global generator.
+
+    References
+    ----------
+    Long, Shelhamer, Darrell: Fully Convolutional Networks for Semantic Segmentation. CVPR 2015.
+    """
+
+    PRESETS: ClassVar = {
+        "compact": {"widths": (16, 32, 48, 64, 64), "hidden": 48, "batch_norm": True},
+        "paper": {"widths": (64, 128, 256, 512, 512), "hidden": 4096, "batch_norm": False},
+    }
+
+    def build(self, n_classes: int, widths: tuple[int, ...], hidden: int, batch_norm: bool) -> None:
+        """Make VGG16, the hidden layers and the three score layers."""
+        self.backbone = Vgg(widths, batch_norm)
+        self.conv6 = nn.Sequential(*conv_relu(widths[-1], hidden, 7, batch_norm))
+        self.conv7 = nn.Sequential(*conv_relu(hidden, hidden, 1, batch_norm))
+        self.score_conv7 = nn.Conv2d(hidden, n_classes, 1)
+        self.score_pool4 = nn.Conv2d(widths[3], n_classes, 1)
+        self.score_pool3 = nn.Conv2d(widths[2], n_classes, 1)
+
+    def scores(self, x: Tensor) -> Tensor:
+        """Return the scores, (B, 3, h, w) -> (B, C, h, w)."""
+        _, _, pool3, pool4, pool5 = self.backbone(x)
+        at_32 = self.score_conv7(self.conv7(self.conv6(pool5)))
+        at_16 = enlarge(at_32, 2, pool4.shape[2:]) + self.score_pool4(pool4)
+        at_8 = enlarge(at_16, 2, pool3.shape[2:]) + self.score_pool3(pool3)
+        return enlarge(at_8, 8, x.shape[2:])
+
+
+def enlarge(scores: Tensor, factor: int, size: tuple[int, int]) -> Tensor:
+    """Upsample a map whose cell i covers pixels factor i .. factor (i + 1) - 1, bilinear, and crop it to `size`.
+
+    The value of a cell belongs to the middle of its pixels; beyond the outermost middles it stays constant.
+
+    Parameters
+    ----------
+    scores : (B, C, H, W) float
+    factor : int
+    size : (int, int)
+        At most factor times H, W: what stands over at the lower and right end is the last, partial, cell's.
+
+    Returns
+    -------
+    (B, C, *size) float
+    """
+    larger = F.interpolate(scores, scale_factor=factor, mode="bilinear", align_corners=False)
+    return larger[..., : size[0], : size[1]]

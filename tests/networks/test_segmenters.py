@@ -1,0 +1,87 @@
+"""What holds for every image network."""
+
+import pytest
+import torch
+from torch import nn
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.networks import SEGMENTERS, build_segmenter
+
+N_CLASSES = 5
+
+
+@pytest.fixture(params=SEGMENTERS)
+def name(request):
+    return request.param
+
+
+def _images(*shape, dtype=torch.float32):
+    return torch.rand(*shape, generator=torch.Generator().manual_seed(0), dtype=dtype)
+
+
+@pytest.mark.parametrize("size", [(16, 16), (33, 47), (94, 311), (96, 320)])
+def test_scores_are_at_image_resolution(name, size):
+    scores = build_segmenter(name, N_CLASSES).eval()(_images(1, 3, *size))
+    assert scores.shape == (1, N_CLASSES, *size)
+    assert scores.dtype == torch.float32
+
+
+@pytest.mark.parametrize("preset", ["compact", "paper"])
+def test_kitti_images_fit_though_no_multiple_of_32(name, preset):
+    with torch.device("meta"):
+        net = build_segmenter(name, 14, preset)
+        assert net(torch.empty(1, 3, 375, 1242)).shape == (1, 14, 375, 1242)
+
+
+def test_scores_are_no_probabilities(name):
+    scores = build_segmenter(name, N_CLASSES)(_images(2, 3, 32, 40))
+    assert scores.min() < 0
+    assert scores.max() > 0  # nor their logarithms
+
+
+def test_the_seed_alone_decides_the_first_weights(name):
+    before = torch.get_rng_state()
+    one, same, other = (nn.utils.parameters_to_vector(build_segmenter(name, 4, seed=s).parameters()) for s in (1, 1, 2))
+    assert torch.equal(one, same)
+    assert not torch.equal(one, other)
+    assert torch.equal(torch.get_rng_state(), before)
+
+
+def test_images_of_a_batch_do_not_touch(name):
+    net = build_segmenter(name, N_CLASSES).double().eval()
+    images = _images(2, 3, 32, 40, dtype=torch.float64)
+    alone = torch.cat([net(image[None]) for image in images])
+    torch.testing.assert_close(net(images), alone)
+
+
+@pytest.mark.parametrize("size", [(32, 40), (45, 37)])
+def test_the_gradient_reaches_every_weight(name, size):
+    net = build_segmenter(name, N_CLASSES)
+    net(_images(2, 3, *size)).square().mean().backward()
+    for parameter in net.parameters():
+        assert torch.isfinite(parameter.grad).all()
+    first = next(m for m in net.modules() if isinstance(m, nn.Conv2d))
+    assert first.in_channels == 3
+    assert (first.weight.grad != 0).all()
+
+
+def test_images_of_another_shape_or_type_are_refused(name):
+    net = build_segmenter(name, N_CLASSES)
+    with pytest.raises(ArgumentError, match=r"image: expected shape \(B, 3, h, w\), found \(1, 4, 32, 32\)"):
+        net(torch.zeros(1, 4, 32, 32))
+    with pytest.raises(ArgumentError, match=r"image: expected shape \(B, 3, h, w\), found \(3, 32, 32\)"):
+        net(torch.zeros(3, 32, 32))
+    with pytest.raises(ArgumentError, match=r"image: expected floats in 0..1, found torch.uint8"):
+        net(torch.zeros(1, 3, 32, 32, dtype=torch.uint8))
+
+
+def test_unknown_presets_and_class_numbers_are_refused(name):
+    with pytest.raises(ArgumentError, match="preset: expected one of compact, paper, found 'huge'"):
+        build_segmenter(name, 14, preset="huge")
+    with pytest.raises(ArgumentError, match="n_classes: expected at least one class, found 0"):
+        build_segmenter(name, 0)
+
+
+def test_compact_networks_are_of_one_size(name):
+    """What is compared is the architecture, not the number of weights; half a million are 2 MB."""
+    assert 350_000 <= sum(p.numel() for p in build_segmenter(name, 14).parameters()) <= 500_000
