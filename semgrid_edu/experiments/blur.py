@@ -10,9 +10,8 @@ from scipy.special import entr
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.cmcdot import MAX_YAW
 from semgrid_edu.occupancy.motion import PlanarMotion
-from semgrid_edu.occupancy.moving_map import look_up, scroll
+from semgrid_edu.occupancy.moving_map import MAX_YAW, look_up, scroll
 
 SCHEMES = ("bilinear", "nearest", "scrolling")
 WORLD = GridSpec(-5, 24, -9, 14, 0.2)

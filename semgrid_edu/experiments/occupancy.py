@@ -8,14 +8,12 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.cell_scores import BANKS, Estimate, Scores, share
-from semgrid_edu.experiments.scenes import hit_cells, scenes
+from semgrid_edu.experiments.scenes import scenes
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Bof, Cmcdot, LogOddsGrid, PlanarMotion, SensorModel, State
 from semgrid_edu.provenance import versions
 from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.simulation.rig import Lidar, Rig
-
-__all__ = ["GRIDS", "LIDARS", "METHODS", "compare", "hit_cells", "methods", "table", "tables"]
 
 LIDARS = {
     "HDL-64E": Lidar(azimuth_min=-180.0, azimuth_max=180.0, azimuth_step=0.18),

@@ -11,8 +11,7 @@ from semgrid_edu.experiments.cell_truth import CellTruth, true_cells
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import PlanarMotion, SensorModel, State, scan_evidence
-from semgrid_edu.occupancy.cmcdot import MAX_YAW
-from semgrid_edu.occupancy.moving_map import look_up, map_around
+from semgrid_edu.occupancy.moving_map import MAX_YAW, look_up, map_around
 from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive
 
 LEFT_SINCE = 10

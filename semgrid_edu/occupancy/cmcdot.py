@@ -7,16 +7,13 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.evidence import beam_reach, evidence_in_cells
 from semgrid_edu.occupancy.local_belief import local_belief
 from semgrid_edu.occupancy.motion import PlanarMotion
-from semgrid_edu.occupancy.moving_map import map_around, scroll
+from semgrid_edu.occupancy.moving_map import MAX_YAW, map_around, scroll
 from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.particles import cells_of, transform
 from semgrid_edu.occupancy.sensor import prepare_scan
 from semgrid_edu.occupancy.state import Belief, FilterState, Particles
 from semgrid_edu.occupancy.steps import move, predict, resample, update
 from semgrid_edu.occupancy.velocities import velocity_moments
-
-MAX_YAW = np.radians(2)
-"""The map turns with the vehicle only when that has turned this far (a compromise: its margin grows with the angle)."""
 
 
 class Cmcdot:

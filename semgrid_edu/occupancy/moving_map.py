@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.motion import PlanarMotion
 
+MAX_YAW = np.radians(2)
+"""The map turns with the vehicle only when that has turned this far (a compromise: its margin grows with the angle)."""
+
 
 def map_around(spec: GridSpec, max_yaw: float) -> GridSpec:
     """Return the map that covers a grid however the vehicle turns and shifts in it before it scrolls.

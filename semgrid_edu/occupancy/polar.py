@@ -129,23 +129,6 @@ def count_returns(points, low, high, shape, x_max, y_max, cell, dx, dy, dyaw):
     return obstacles, ground
 
 
-def passed_cells(reach, shape, x_max, y_max, cell, dx, dy, dyaw):
-    """Find the cells that their beam passes from end to end.
-
-    Parameters
-    ----------
-    reach : (B,) float32
-        How far each beam sees, metres.
-    shape, x_max, y_max, cell, dx, dy, dyaw
-        The grid and the vehicle's pose in it, as for `count_returns`.
-
-    Returns
-    -------
-    (H, W) bool
-    """
-    return beyond_reach(reach, shape, x_max, y_max, cell, dx, dy, dyaw) <= -cell / 2
-
-
 @njit(cache=True)
 def beyond_reach(reach, shape, x_max, y_max, cell, dx, dy, dyaw):
     """Return how far each cell's centre lies beyond the reach of its beam: look up its azimuth and range.

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.occupancy import hit_cells
+from semgrid_edu.experiments.scenes import hit_cells
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
     Bof,

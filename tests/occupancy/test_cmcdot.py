@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from semgrid_edu.camera import Camera, rigid_transform
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.occupancy import hit_cells
+from semgrid_edu.experiments.scenes import hit_cells
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Cmcdot, CmcdotParams, PlanarMotion, State, track_drive

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from semgrid_edu.datasets import KittiRawDrive
-from semgrid_edu.experiments.occupancy import hit_cells
+from semgrid_edu.experiments.scenes import hit_cells
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import SensorModel, State, track_drive
 from semgrid_edu.occupancy.sensor import prepare_scan
