@@ -90,5 +90,6 @@ def grid_logits(net: SemanticGridNet, batch: Batch) -> Tensor:
     (B, C, H, W) float32
         log g up to a number a cell, unmirrored.
     """
-    planes = net.sampler(image_scores(net, batch))
-    return batch.flip(net.fusion(batch.flip(planes), batch.flip(batch.frames.occupancy)))
+    # What the 1x1 convolution leaves is mirrored: it looks at one cell at a time, and leaves less to move.
+    reduced = net.fusion.reduce(net.sampler(image_scores(net, batch)))
+    return batch.flip(net.fusion.fuse(batch.flip(reduced), batch.flip(batch.frames.occupancy)))

@@ -21,6 +21,9 @@ app.add_typer(reproduce, name="reproduce")
 @app.callback()
 def main() -> None:
     """Probabilistic bird's-eye semantic perception, taught notebook by notebook."""
+    from semgrid_edu.memory import keep_freed_memory
+
+    keep_freed_memory()
 
 
 @app.command()
@@ -136,6 +139,7 @@ def build(folder: Annotated[Path, typer.Argument(help="Missing, empty, or a cour
 def train(
     data: Annotated[Path, typer.Option(help="A data set with train frames, such as data/minikitti.")],
     out: Annotated[Path, typer.Option(help="A folder for the weights, the log and their provenance.")],
+    segmenter: Annotated[str, typer.Option(help="The image network: segnet, fcn, deeplab or unet.")] = "segnet",
     seed: Annotated[int, typer.Option(help="Of the initial weights and of the order of the frames.")] = 0,
     iterations: Annotated[int, typer.Option(min=1, help="Steps of each of the two stages.")] = 2000,
     resume: Annotated[bool, typer.Option("--resume", help="Continue a training that was interrupted.")] = False,
@@ -145,7 +149,7 @@ def train(
     from semgrid_edu.training import TrainingParams
 
     params = TrainingParams(image_iterations=iterations, grid_iterations=iterations)
-    train_compact(data, out, params, seed, resume)
+    train_compact(data, out, segmenter, params, seed, resume)
 
 
 @app.command()

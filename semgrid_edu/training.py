@@ -20,6 +20,7 @@ from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.files import write_text
 from semgrid_edu.labels import IGNORE
+from semgrid_edu.memory import keep_freed_memory
 from semgrid_edu.networks import SemanticGridNet, save_net
 from semgrid_edu.occupancy import N_STATES
 
@@ -129,6 +130,9 @@ class TrainingParams:
         times one of unknown-unobserved in minikitti, and the loss is made of a handful of cells.
     jitter : float
         How far brightness and contrast of the images vary, as a share: 142 frames teach little about light.
+    end_to_end : bool
+        Whether the grid teaches the image network too. If not, training has two separate stages, as in the
+        authors' earlier work: the image network stays as the first one left it.
     """
 
     image_iterations: int = 2000
@@ -138,6 +142,7 @@ class TrainingParams:
     momentum: float = 0.9
     weight_limit: float = 4.0
     jitter: float = 0.2
+    end_to_end: bool = True
 
     @property
     def iterations(self) -> int:
@@ -194,10 +199,13 @@ def train(
     optimiser = torch.optim.SGD(net.parameters(), lr=params.learning_rate, momentum=params.momentum)
     run = json.dumps({"seed": seed, "frames": len(dataset), **asdict(params)})
     start = load_checkpoint(folder / CHECKPOINT, run, net, optimiser) if resume else 0
+    keep_freed_memory()
     net.train()
     with _open_log(folder / LOG, start) as log:
         for iteration in (progress := trange(start, params.iterations, initial=start, total=params.iterations)):
             stage, optimiser.param_groups[0]["lr"] = params.stage(iteration)
+            if stage == "grid" and not params.end_to_end:
+                net.segmenter.eval().requires_grad_(False)
             batch = draw_batch(dataset, params.batch_size, params.jitter, iteration, seed)
             loss = _step(net, optimiser, batch, stage, alpha[stage])
             if not math.isfinite(loss):
@@ -220,7 +228,8 @@ def _step(net: SemanticGridNet, optimiser: torch.optim.SGD, batch: Batch, stage:
     optimiser.zero_grad()
     scores = (image_scores if stage == "image" else grid_logits)(net, batch)
     truth = getattr(batch.frames, TRUTH[stage]).long()
-    loss = F.cross_entropy(scores, truth, weight=alpha, ignore_index=IGNORE)
+    weights = alpha[truth[truth != IGNORE]].sum()
+    loss = F.cross_entropy(scores, truth, weight=alpha, ignore_index=IGNORE, reduction="sum") / weights
     loss.backward()
     optimiser.step()
     return loss.item()

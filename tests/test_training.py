@@ -1,5 +1,6 @@
 import csv
 import json
+from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -131,7 +132,10 @@ def test_a_mirror_changes_what_the_network_sees_and_not_where_it_lies(camera, st
     by_place = SimpleNamespace(
         segmenter=lambda image: seen.append(image) or image * 2,
         sampler=build_net(SMALL, camera).sampler,
-        fusion=lambda planes, occupancy: planes.sum(dim=2) + occupancy[:, :1],
+        fusion=SimpleNamespace(
+            reduce=lambda planes: planes.sum(dim=2, keepdim=True),
+            fuse=lambda reduced, occupancy: reduced.squeeze(2) + occupancy[:, :1],
+        ),
     )
     plain, mirrored = (grid_logits(by_place, Batch(frames, m)) for m in (False, True))
     torch.testing.assert_close(plain, mirrored)
@@ -160,6 +164,15 @@ def test_four_streets_are_learnt_by_heart(camera, streets, tmp_path):
         torch.stack(x) for x in zip(*((s.image, s.occupancy, s.truth) for s in streets), strict=True)
     )
     assert accuracy_score(truth.ravel(), net(image / 255, occupancy).argmax(1).ravel()) >= 0.99
+
+
+@pytest.mark.parametrize("end_to_end", [True, False])
+def test_two_stages_leave_the_image_network_as_it_was(camera, streets, tmp_path, end_to_end):
+    train(build_net(SMALL, camera), streets, tmp_path, replace(QUICK, end_to_end=end_to_end))
+    before, after = (load_file(tmp_path / name) for name in ("image_stage.safetensors", "weights.safetensors"))
+    kept = {name: torch.equal(before[name], after[name]) for name in before}
+    assert all(kept[name] is not end_to_end for name in kept if name.startswith("segmenter"))
+    assert not any(kept[name] for name in kept if name.startswith("fusion") and name.endswith("weight"))
 
 
 def test_the_first_losses_are_those_of_the_definition(camera, streets, tmp_path):

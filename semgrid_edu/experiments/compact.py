@@ -13,7 +13,12 @@ from semgrid_edu.training import TrainingParams, train
 
 
 def train_compact(
-    dataset_dir: str | Path, folder: str | Path, params: TrainingParams, seed: int = 0, resume: bool = False
+    dataset_dir: str | Path,
+    folder: str | Path,
+    segmenter: str,
+    params: TrainingParams,
+    seed: int = 0,
+    resume: bool = False,
 ) -> None:
     """Train on the split "train" of a data set.
 
@@ -23,6 +28,8 @@ def train_compact(
         Such as data/minikitti.
     folder : path-like
         Takes what `train` writes, and `provenance.json`, which also names the data by their index's SHA-256.
+    segmenter : str
+        The image network, as `build_segmenter` takes it.
     params : TrainingParams
     seed : int
         Of the initial weights, and of the order and looks of the frames.
@@ -30,10 +37,10 @@ def train_compact(
         Whether to continue a run that was interrupted.
     """
     dataset, began = TrainingSet(dataset_dir, "train"), datetime.now(UTC)
-    train(build_net(Architecture(), dataset.camera, seed), dataset, folder, params, seed, resume)
+    train(build_net(Architecture(segmenter), dataset.camera, seed), dataset, folder, params, seed, resume)
     command = (
         f"semgrid-edu train --data {Path(dataset_dir).name} --out {Path(folder).name} "
-        f"--seed {seed} --iterations {params.grid_iterations}"
+        f"--segmenter {segmenter} --seed {seed} --iterations {params.grid_iterations}"
     )
     minutes = round((datetime.now(UTC) - began).total_seconds() / 60, 1)
     details = {"date": f"{began:%Y-%m-%d}", "minutes": minutes, "resumed": resume, "params": asdict(params)}

@@ -55,6 +55,9 @@ class FusionNet(nn.Module):
         -------
         (B, C, H, W) float
         """
-        reduced = self.reduce(planes).squeeze(2)
+        return self.fuse(self.reduce(planes), occupancy)
+
+    def fuse(self, reduced: Tensor, occupancy: Tensor) -> Tensor:
+        """Return the logits, as `forward`, of what `reduce` left of the planes, (B, n_reduced, 1, H, W)."""
         occupancy = occupancy.contiguous(memory_format=torch.channels_last)
-        return self.conv_deconv(torch.cat([reduced, occupancy], dim=1))
+        return self.conv_deconv(torch.cat([reduced.squeeze(2), occupancy], dim=1))

@@ -10,7 +10,7 @@ from semgrid_edu.cli import app
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.experiments import compact
 from semgrid_edu.files import sha256, write_text
-from semgrid_edu.networks import Architecture, load_net
+from semgrid_edu.networks import Architecture, Fcn, load_net
 from semgrid_edu.provenance import provenance_problems
 
 
@@ -46,19 +46,32 @@ def test_the_command_leaves_weights_log_and_provenance(monkeypatch, tmp_path):
     monkeypatch.setattr(compact, "TrainingSet", _Noise)
     data, out = tmp_path / "minikitti", tmp_path / "compact"
     write_text(data / "dataset.json", "{}")
-    arguments = ["train", "--data", str(data), "--out", str(out), "--seed", "3", "--iterations", "1"]
+    arguments = [
+        "train",
+        "--data",
+        str(data),
+        "--out",
+        str(out),
+        "--segmenter",
+        "fcn",
+        "--seed",
+        "3",
+        "--iterations",
+        "1",
+    ]
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0, result.output
     names = {"weights.safetensors", "image_stage.safetensors", "log.csv", "provenance.json"}
     assert {path.name for path in out.iterdir()} == names
     assert not provenance_problems(out)
     provenance = json.loads((out / "provenance.json").read_text())
-    assert provenance["command"] == "semgrid-edu train --data minikitti --out compact --seed 3 --iterations 1"
+    options = "--data minikitti --out compact --segmenter fcn --seed 3 --iterations 1"
+    assert provenance["command"] == f"semgrid-edu train {options}"
     assert provenance["seed"] == 3
     assert provenance["params"]["batch_size"] == 6
     assert provenance["dataset"] == sha256(data / "dataset.json")
     assert len((out / "log.csv").read_text().splitlines()) == 3
-    assert load_net(out / "weights.safetensors", _Noise.camera).n_classes == 14
+    assert isinstance(load_net(out / "weights.safetensors", _Noise.camera).segmenter, Fcn)
 
 
 def test_the_command_names_what_is_missing(tmp_path):
