@@ -21,11 +21,10 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.files import write_text
 from semgrid_edu.labels import IGNORE
 from semgrid_edu.memory import keep_freed_memory
-from semgrid_edu.networks import SemanticGridNet, save_net
+from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, save_net
 from semgrid_edu.occupancy import N_STATES
 
 CHECKPOINT, LOG = "checkpoint.safetensors", "log.csv"
-IMAGE_STAGE, WEIGHTS = "image_stage.safetensors", "weights.safetensors"
 LOG_HEADER = "iteration,stage,learning_rate,loss\n"
 CHECKPOINT_EVERY = 100
 """Iterations between checkpoints: some twenty seconds of work is lost at most."""

@@ -12,10 +12,12 @@ from semgrid_edu.networks.segnet import SegNet
 from semgrid_edu.networks.semantic_grid import SemanticGridNet, Stages
 from semgrid_edu.networks.unet import UNet
 from semgrid_edu.networks.vgg import Vgg
-from semgrid_edu.networks.weights import load_net, save_net
+from semgrid_edu.networks.weights import IMAGE_STAGE, WEIGHTS, load_net, save_net
 
 __all__ = [
+    "IMAGE_STAGE",
     "SEGMENTERS",
+    "WEIGHTS",
     "Architecture",
     "ConvDeconv",
     "DeepLab",
