@@ -85,17 +85,6 @@ def excerpt(
     write_excerpt(data, frames, folder)
 
 
-@data.command()
-def ship(
-    run: Annotated[Path, typer.Argument(help="A folder that `semgrid-edu train` wrote.")],
-    folder: Annotated[Path, typer.Argument(help="Takes the weights, the log and their provenance.")],
-) -> None:
-    """Keep a trained network as a sample."""
-    from semgrid_edu.datasets.samples import write_weights
-
-    write_weights(run, folder)
-
-
 @course.callback()
 def needs_tools() -> None:
     """Build the notebooks and the exercises."""
@@ -142,13 +131,14 @@ def train(
     segmenter: Annotated[str, typer.Option(help="The image network: segnet, fcn, deeplab or unet.")] = "segnet",
     seed: Annotated[int, typer.Option(help="Of the initial weights and of the order of the frames.")] = 0,
     iterations: Annotated[int, typer.Option(min=1, help="Steps of each of the two stages.")] = 2000,
+    two_stage: Annotated[bool, typer.Option("--two-stage", help="The grid doesn't teach the image network.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Continue a training that was interrupted.")] = False,
 ) -> None:
     """Train the compact network: its image network first, then all of it on the grid."""
     from semgrid_edu.experiments.compact import train_compact
     from semgrid_edu.training import TrainingParams
 
-    params = TrainingParams(image_iterations=iterations, grid_iterations=iterations)
+    params = TrainingParams(image_iterations=iterations, grid_iterations=iterations, end_to_end=not two_stage)
     train_compact(data, out, segmenter, params, seed, resume)
 
 
@@ -188,6 +178,23 @@ def occupancy(
     result = compare(seed, drives, (grid,) if grid else tuple(GRIDS))
     write_json(out, result)
     typer.echo(f"{tables(result)}\n\nwritten to {out}")
+
+
+@reproduce.command()
+def two_stage(
+    data: Annotated[Path, typer.Option(help="A data set with train and test frames, such as data/minikitti.")],
+    runs: Annotated[Path, typer.Option(help="Takes a folder a training; those that have ended aren't run again.")],
+    seeds: Annotated[int, typer.Option(min=1, help="How many trainings of each kind.")] = 3,
+    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("two_stage.json"),
+) -> None:
+    """Train end to end and in two stages, and score both (lecture 08)."""
+    from semgrid_edu.experiments.two_stage import compare, table
+    from semgrid_edu.files import check_writable, write_json
+
+    check_writable(out)
+    result = compare(data, runs, seeds)
+    write_json(out, result)
+    typer.echo(f"{table(result['scores'])}\n\nwritten to {out}")
 
 
 def _report(problems: list[str], sound: str) -> None:

@@ -1,7 +1,5 @@
 """The shipped samples: a short simulated drive, a few labelled frames and trained compact weights (section 4)."""
 
-import json
-from datetime import UTC, datetime
 from pathlib import Path
 
 import torch
@@ -10,15 +8,15 @@ from semgrid_edu.datasets.kitti_raw import KittiRawDrive
 from semgrid_edu.datasets.training_cache import SEED
 from semgrid_edu.datasets.training_set import Sample, TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.files import write_bytes
+from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS
 from semgrid_edu.provenance import FILE_NAME, provenance_problems, write_provenance
 from semgrid_edu.tensors import read_tensors, write_tensors
 
 FRAMES = "frames.safetensors"
 """The file of an excerpt."""
 
-WEIGHTS = "segnet_compact.safetensors"
-"""The file of the trained network."""
+TRAINED = ("segnet", "fcn", "deeplab")
+"""The image networks of the shipped weights."""
 
 
 def samples_dir() -> Path:
@@ -45,35 +43,31 @@ def sample_drive() -> KittiRawDrive:
     return KittiRawDrive(samples_dir() / "sample", "2026_01_01", "0001")
 
 
-def sample_weights() -> Path:
-    """Return the file of the trained compact network, SegNet and fusion."""
-    return samples_dir() / "weights" / WEIGHTS
-
-
-def write_weights(run: str | Path, folder: str | Path) -> None:
-    """Keep what a training has learnt, with its log and what its provenance says, and leave the rest behind.
+def sample_weights(segmenter: str = "segnet") -> Path:
+    """Return the file of a trained compact network, image network and fusion.
 
     Parameters
     ----------
-    run : path-like
-        The folder that `semgrid-edu train` wrote.
-    folder : path-like
-        Takes `segnet_compact.safetensors`, `log.csv` and `provenance.json`.
+    segmenter : str
+        Its image network: "segnet", "fcn" or "deeplab".
 
     Raises
     ------
-    DataError
-        When the run has no provenance, or its files aren't those that it names.
+    ArgumentError
+        When no such network is shipped.
     """
-    run, folder = Path(run), Path(folder)
-    if problems := provenance_problems(run):
-        raise DataError(run, "a training as it ended", problems[0])
-    for name, kept in (("weights.safetensors", WEIGHTS), ("log.csv", "log.csv")):
-        write_bytes(folder / kept, (run / name).read_bytes())
-    record = json.loads((run / FILE_NAME).read_text())
-    ended = datetime.fromtimestamp((run / "weights.safetensors").stat().st_mtime, UTC)
-    details = {"trained": f"{ended:%Y-%m-%d %H:%M} UTC", "training": record}
-    write_provenance(folder, record["command"], record["seed"], ("torch", "numpy", "safetensors"), **details)
+    return _trained(segmenter) / WEIGHTS
+
+
+def sample_image_stage(segmenter: str = "segnet") -> Path:
+    """Return the file of the same network after its first stage: it has seen labels of images, none of grids."""
+    return _trained(segmenter) / IMAGE_STAGE
+
+
+def _trained(segmenter: str) -> Path:
+    if segmenter not in TRAINED:
+        raise ArgumentError("segmenter", f"one of {', '.join(TRAINED)}", repr(segmenter))
+    return samples_dir() / f"{segmenter}_compact"
 
 
 def sample_frames() -> list[Sample]:

@@ -41,6 +41,7 @@ def train_compact(
     command = (
         f"semgrid-edu train --data {Path(dataset_dir).name} --out {Path(folder).name} "
         f"--segmenter {segmenter} --seed {seed} --iterations {params.grid_iterations}"
+        + ("" if params.end_to_end else " --two-stage")
     )
     minutes = round((datetime.now(UTC) - began).total_seconds() / 60, 1)
     details = {"date": f"{began:%Y-%m-%d}", "minutes": minutes, "resumed": resume, "params": asdict(params)}

@@ -110,13 +110,17 @@ def confusion_matrices(
     return total
 
 
-@torch.inference_mode()
 def learned_grids(net: SemanticGridNet, sample: Sample) -> dict[str, NDArray]:
     """Return the arg-max of the network's grid and of the refined one, (H, W) int."""
-    logits = net(sample.image[None] / 255, sample.occupancy[None])
-    unary = -logits[0].log_softmax(dim=0).numpy()
+    unary = learned_unary(net, sample)
     refined = mean_field(unary, sample.occupancy.numpy(), CrfParams.for_cells(net.architecture.grid.cell))
     return {"network": unary.argmin(axis=0), "network + CRF": refined.argmax(axis=0)}
+
+
+@torch.inference_mode()
+def learned_unary(net: SemanticGridNet, sample: Sample) -> NDArray[np.float32]:
+    """Return phi_u of equation (3) from the network: -log g, (C, H, W)."""
+    return -net(sample.image[None] / 255, sample.occupancy[None])[0].log_softmax(dim=0).numpy()
 
 
 @torch.inference_mode()

@@ -1,7 +1,6 @@
 """The shipped samples, and excerpts like them."""
 
 import json
-import os
 
 import pytest
 import torch
@@ -9,20 +8,19 @@ from tiny_drive import write_tiny_dataset
 
 from semgrid_edu.datasets.samples import (
     FRAMES,
-    WEIGHTS,
+    TRAINED,
     read_excerpt,
     sample_drive,
     sample_frames,
+    sample_image_stage,
     sample_weights,
     samples_problems,
     write_excerpt,
-    write_weights,
 )
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.files import write_bytes
 from semgrid_edu.networks import load_net
-from semgrid_edu.provenance import provenance_problems, write_provenance
 
 
 @pytest.fixture(scope="module")
@@ -53,27 +51,20 @@ def test_samples_are_checked_one_by_one(excerpt):
     assert [problem.rsplit("/", 1)[-1] for problem in samples_problems(samples)] == ["stray: not in provenance.json"]
 
 
-def test_a_kept_training_is_what_it_ended_with(tmp_path):
-    run, kept = tmp_path / "run", tmp_path / "weights"
-    for name in ("weights.safetensors", "image_stage.safetensors", "log.csv"):
-        write_bytes(run / name, name.encode())
-    write_provenance(run, "semgrid-edu train", 3, ("torch",), minutes=9)
-    os.utime(run / "weights.safetensors", (86400, 86400))
-    write_weights(run, kept)
-    assert provenance_problems(kept) == []
-    assert sorted(path.name for path in kept.iterdir()) == ["log.csv", "provenance.json", WEIGHTS]
-    assert (kept / WEIGHTS).read_bytes() == b"weights.safetensors"
-    record = json.loads((kept / "provenance.json").read_text())
-    assert (record["command"], record["seed"], record["training"]["minutes"]) == ("semgrid-edu train", 3, 9)
-    assert record["trained"] == "1970-01-02 00:00 UTC"
+@pytest.mark.parametrize("segmenter", TRAINED)
+def test_shipped_weights_are_whole_trainings(segmenter):
+    folder = sample_weights(segmenter).parent
+    assert sample_image_stage(segmenter).parent == folder
+    names = {"weights.safetensors", "image_stage.safetensors", "log.csv", "provenance.json"}
+    assert {path.name for path in folder.iterdir()} == names
+    assert max(path.stat().st_size for path in folder.iterdir()) <= 3e6
+    command = json.loads((folder / "provenance.json").read_text())["command"]
+    assert f"--out {folder.name} --segmenter {segmenter}" in command
 
 
-def test_a_training_that_was_touched_since_is_not_kept(tmp_path):
-    write_bytes(tmp_path / "run" / "weights.safetensors", b"learnt")
-    write_provenance(tmp_path / "run", "semgrid-edu train", 0, ("torch",))
-    write_bytes(tmp_path / "run" / "weights.safetensors", b"edited")
-    with pytest.raises(DataError, match=r"weights\.safetensors: changed"):
-        write_weights(tmp_path / "run", tmp_path / "kept")
+def test_weights_that_are_not_shipped_are_refused():
+    with pytest.raises(ArgumentError, match="segmenter: expected one of segnet, fcn, deeplab, found 'unet'"):
+        sample_weights("unet")
 
 
 @pytest.mark.parametrize("content", [None, b"", b"no safetensors"])
@@ -89,11 +80,21 @@ def test_no_samples_at_all_is_an_error(tmp_path):
         samples_problems(tmp_path)
 
 
-def test_the_shipped_network_knows_the_shipped_frames():
-    """They come from its training split; a frame's commonest class fills at most six cells in ten."""
-    net, frames = load_net(sample_weights(), sample_drive().camera), sample_frames()
+@pytest.mark.parametrize("segmenter", TRAINED)
+def test_the_shipped_networks_know_the_shipped_frames(segmenter):
+    """They come from their training split; a frame's commonest class fills at most six cells in ten."""
+    net, frames = load_net(sample_weights(segmenter), sample_drive().camera), sample_frames()
     assert len(frames) == 6
     for sample in frames:
         with torch.inference_mode():
             predicted = net(sample.image[None] / 255, sample.occupancy[None])[0].argmax(0)
         assert (predicted == sample.truth).float().mean() > 0.75
+
+
+@pytest.mark.parametrize("segmenter", TRAINED)
+def test_the_shipped_image_networks_know_the_shipped_images(segmenter):
+    net = load_net(sample_image_stage(segmenter), sample_drive().camera)
+    for sample in sample_frames():
+        with torch.inference_mode():
+            predicted = net.segmenter(sample.image[None] / 255)[0].argmax(0)
+        assert (predicted == sample.labels).float().mean() > 0.75

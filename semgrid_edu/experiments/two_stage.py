@@ -1,0 +1,103 @@
+"""End to end against two stages: what the grid gains by teaching the image network too (paper, section 4.1)."""
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+from tqdm.auto import tqdm
+
+from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.experiments.compact import train_compact
+from semgrid_edu.experiments.evaluate import Scores, image_labels, learned_unary, scores
+from semgrid_edu.files import sha256
+from semgrid_edu.metrics import METRICS, confusion_matrix
+from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, load_net
+from semgrid_edu.provenance import FILE_NAME, versions
+from semgrid_edu.training import CHECKPOINT, TrainingParams
+
+METHODS = ("end-to-end", "two-stage")
+
+
+def compare(
+    dataset_dir: str | Path, runs: str | Path, n_seeds: int = 3, params: TrainingParams | None = None
+) -> dict[str, object]:
+    """Train both ways, seed by seed, and score both on frames that none has seen.
+
+    With the same seed, both have the same image network after the first stage, bit for bit, and then see the same
+    batches. In two stages it stays as it is; end to end, the loss on the grid goes on teaching it.
+
+    Parameters
+    ----------
+    dataset_dir : path-like
+        A data set with the splits "train" and "test", such as data/minikitti.
+    runs : path-like
+        Takes a folder a training, such as "end-to-end-0". One that has ended isn't run again, one that was interrupted
+        goes on.
+    n_seeds : int
+        Seeds 0, 1, ... of the initial weights and of the order of the frames.
+    params : TrainingParams, optional
+
+    Returns
+    -------
+    dict
+        "scores": for each of `METHODS` a list with the `Scores` of "grid" and "image" labels, one a seed. With all that
+        made them: it can be written as JSON.
+    """
+    params, test = params or TrainingParams(), TrainingSet(dataset_dir, "test")
+    result: dict[str, list[Scores]] = {method: [] for method in METHODS}
+    for seed in range(n_seeds):
+        for method in METHODS:
+            folder = Path(runs) / f"{method}-{seed}"
+            if not (folder / FILE_NAME).exists():
+                chosen = replace(params, end_to_end=method == "end-to-end")
+                resume = (folder / CHECKPOINT).exists()
+                train_compact(dataset_dir, folder, "segnet", chosen, seed, resume)
+            result[method].append(score(load_net(folder / WEIGHTS, test.camera), test))
+    trained = [Path(runs) / f"{method}-{seed}" for seed in range(n_seeds) for method in METHODS]
+    return {
+        "scores": result,
+        "frames": len(test),
+        "weights": {folder.name: sha256(folder / WEIGHTS) for folder in trained},
+        "image stages": {folder.name: sha256(folder / IMAGE_STAGE) for folder in trained},
+        "command": f"semgrid-edu reproduce two-stage --data {Path(dataset_dir).name} --seeds {n_seeds}",
+        "iterations": [params.image_iterations, params.grid_iterations],
+        "date": f"{datetime.now(UTC):%Y-%m-%d}",
+        "versions": versions("numpy", "torch"),
+    }
+
+
+def score(net: SemanticGridNet, test: TrainingSet) -> Scores:
+    """Score a network's grids, and the labels that its image network gives the pixels.
+
+    Parameters
+    ----------
+    net : SemanticGridNet
+        In evaluation mode.
+    test : TrainingSet
+
+    Returns
+    -------
+    Scores
+        Of "grid" and "image"; an image has no unknown classes, so its "all" and "semantic" are the same.
+    """
+    confusions = {"grid": 0, "image": 0}
+    for k in tqdm(range(len(test)), desc="score", unit="frame"):
+        sample = test[k]
+        for name, truth, predicted in (
+            ("grid", sample.truth, learned_unary(net, sample).argmin(axis=0)),
+            ("image", sample.labels, image_labels(net.segmenter, sample)),
+        ):
+            confusions[name] = confusions[name] + confusion_matrix(truth.numpy(), predicted, net.n_classes)
+    return scores(confusions, test.label_set)
+
+
+def table(result: dict[str, list[Scores]]) -> str:
+    """Return mean and range over the seeds as a table to print, in per cent."""
+    lines = [f"{'':12} {'cells':9}" + "".join(f"{name:>24}" for name in METRICS)]
+    for method, runs in result.items():
+        for part, cells in (("grid", "all"), ("grid", "semantic"), ("image", "all")):
+            values = [[100 * run[part][cells][name] for run in runs] for name in METRICS]
+            shown = "".join(f"{np.mean(v):10.1f} ({min(v):.1f}-{max(v):.1f})".rjust(24) for v in values)
+            lines.append(f"{method:12} {'pixels' if part == 'image' else cells:9}{shown}")
+    return "\n".join(lines)

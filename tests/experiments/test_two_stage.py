@@ -1,0 +1,51 @@
+import pytest
+from tiny_drive import write_tiny_dataset
+
+from semgrid_edu.experiments import two_stage
+from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, load_net
+from semgrid_edu.training import TrainingParams
+
+QUICK = TrainingParams(image_iterations=1, grid_iterations=1, batch_size=2)
+
+
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory):
+    root = write_tiny_dataset(tmp_path_factory.mktemp("tiny"))
+    return root, two_stage.compare(root, root / "runs", 1, QUICK)
+
+
+def test_both_start_from_the_same_image_network_and_one_keeps_it(compared):
+    root, result = compared
+    assert len(set(result["image stages"].values())) == 1
+    assert len(set(result["weights"].values())) == 2
+    camera = two_stage.TrainingSet(root, "test").camera
+    stage, apart, together = (
+        load_net(root / "runs" / name, camera).segmenter.state_dict()
+        for name in (
+            "two-stage-0/image_stage.safetensors",
+            "two-stage-0/weights.safetensors",
+            "end-to-end-0/weights.safetensors",
+        )
+    )
+    assert all(stage[name].equal(apart[name]) for name in stage)
+    assert not any(stage[name].equal(together[name]) for name in stage if name.endswith("weight"))
+
+
+def test_what_has_ended_is_not_trained_again(compared, monkeypatch):
+    root, result = compared
+
+    def fail(*_):
+        raise AssertionError("trained again")
+
+    monkeypatch.setattr(two_stage, "train_compact", fail)
+    assert two_stage.compare(root, root / "runs", 1, QUICK)["scores"] == result["scores"]
+
+
+def test_the_table_gives_mean_and_range_in_per_cent():
+    def run(accuracy):
+        metrics = dict.fromkeys(two_stage.METRICS, accuracy)
+        return {"grid": {"all": metrics, "semantic": metrics}, "image": {"all": metrics}}
+
+    lines = two_stage.table({"end-to-end": [run(0.5), run(0.7)]}).splitlines()
+    assert len(lines) == 4
+    assert all(line.count("60.0 (50.0-70.0)") == 3 for line in lines[1:])
