@@ -22,9 +22,9 @@ def test_both_start_from_the_same_image_network_and_one_keeps_it(compared):
     stage, apart, together = (
         load_net(root / "runs" / name, camera).segmenter.state_dict()
         for name in (
-            "two-stage-0/image_stage.safetensors",
-            "two-stage-0/weights.safetensors",
-            "end-to-end-0/weights.safetensors",
+            f"two-stage-0/{IMAGE_STAGE}",
+            f"two-stage-0/{WEIGHTS}",
+            f"end-to-end-0/{WEIGHTS}",
         )
     )
     assert all(stage[name].equal(apart[name]) for name in stage)
