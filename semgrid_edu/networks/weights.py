@@ -13,6 +13,9 @@ from semgrid_edu.networks.build import Architecture, build_net
 from semgrid_edu.networks.semantic_grid import SemanticGridNet
 from semgrid_edu.tensors import read_tensors, write_tensors
 
+IMAGE_STAGE, WEIGHTS = "image_stage.safetensors", "weights.safetensors"
+"""What a training leaves in its folder: the network after each of its two stages."""
+
 
 def save_net(net: SemanticGridNet, path: str | Path) -> None:
     """Write a network's weights and its architecture, atomically.
