@@ -1,5 +1,7 @@
 """Planes above the ground and what the image says on them, equations (1) and (2) of the paper (section 3.3)."""
 
+from copy import deepcopy
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -68,13 +70,18 @@ def plane_pixels(spec: GridSpec, heights: ArrayLike, camera: Camera) -> tuple[ND
     ArgumentError
         When `heights` isn't a list of finite numbers.
     """
-    heights = np.asarray(heights, dtype=np.float64)
-    if heights.ndim != 1 or not np.isfinite(heights).all():
-        raise ArgumentError("heights", "finite metres, shape (D,)", f"shape {heights.shape}: {heights}")
+    heights = _check_heights(heights)
     points = np.empty((len(heights), *spec.shape, 3))
     points[..., :2] = spec.centers()
     points[..., 2] = heights[:, None, None]
     return project(transform_points(camera.T_camera_from_grid, points), camera)
+
+
+def _check_heights(heights: ArrayLike) -> NDArray[np.float64]:
+    heights = np.asarray(heights, dtype=np.float64)
+    if heights.ndim != 1 or not np.isfinite(heights).all():
+        raise ArgumentError("heights", "finite metres, shape (D,)", f"shape {heights.shape}: {heights}")
+    return heights
 
 
 def sample_planes_naive(scores: ArrayLike, pixels: ArrayLike, visible: ArrayLike) -> NDArray[np.float64]:
@@ -126,7 +133,8 @@ class PlaneSampler(nn.Module):
 
     For a fixed calibration the four pixels around each point and their weights never change, so equation (2)
     is one sparse matrix that maps pixels to points. It and its transpose, which carries gradients back, are
-    built once. Points that aren't visible are empty rows and cost nothing.
+    built once. Points that aren't visible are empty rows and cost nothing. `for_camera` goes all the way from
+    a calibration, and remembers.
 
     Parameters
     ----------
@@ -158,6 +166,36 @@ class PlaneSampler(nn.Module):
         matrix = _bilinear_matrix(pixels, visible, image_size)
         self._register_matrix("matrix", matrix)
         self._register_matrix("transpose", matrix.T.tocsr())
+
+    @staticmethod
+    def for_camera(spec: GridSpec, heights: ArrayLike, camera: Camera) -> "PlaneSampler":
+        """Return the sampler of a calibration: equation (1), then (2), worked out at the first call for it.
+
+        Parameters
+        ----------
+        spec : GridSpec
+            The cells.
+        heights : (D,) float
+            delta_i, metres above the ground.
+        camera : Camera
+            Of the image that the scores are of, at their size.
+
+        Returns
+        -------
+        PlaneSampler
+            A module of its own; its matrices are shared with the others of this calibration until it is moved
+            to another device or type.
+
+        Raises
+        ------
+        ArgumentError
+            As `plane_pixels`.
+        """
+        heights = tuple(_check_heights(heights).tolist())
+        matrices = (np.asarray(T, dtype=np.float64).tobytes() for T in (camera.K, camera.T_camera_from_lidar))
+        built = _build_sampler(spec, heights, *matrices, tuple(camera.size), camera.lidar_height)
+        # What counts as copied already stays shared.
+        return deepcopy(built, {id(part): part for part in built.buffers()})
 
     def _register_matrix(self, name: str, matrix: csr_array) -> None:
         """Keep a sparse matrix as buffers: they follow the module to its device, and stay out of its weights."""
@@ -194,6 +232,21 @@ class PlaneSampler(nn.Module):
         # Stacking copies, which one image, the running pipeline's case, needn't pay for.
         planes = sampled[0][None] if len(sampled) == 1 else torch.stack(sampled)
         return planes.unflatten(1, self.planes_shape).permute(0, 4, 1, 2, 3)
+
+
+# Four calibrations: an operator at the paper's scale holds 67 MB.
+@lru_cache(maxsize=4)
+def _build_sampler(
+    spec: GridSpec,
+    heights: tuple[float, ...],
+    K: bytes,
+    T_camera_from_lidar: bytes,
+    size: tuple[int, int],
+    lidar_height: float,
+) -> PlaneSampler:
+    """Build a sampler from nothing but the key it is remembered by."""
+    matrices = np.frombuffer(K).reshape(3, 3), np.frombuffer(T_camera_from_lidar).reshape(4, 4)
+    return PlaneSampler(*plane_pixels(spec, heights, Camera(*matrices, size, lidar_height)), size)
 
 
 class _SparseMatrix(NamedTuple):

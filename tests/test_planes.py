@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -5,10 +7,13 @@ import torch.nn.functional as F
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import map_coordinates
+from scipy.spatial.transform import Rotation
 
-from semgrid_edu.camera import Camera
+from semgrid_edu import planes
+from semgrid_edu.camera import Camera, rigid_transform
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.networks import Architecture, build_net
 from semgrid_edu.planes import PlaneSampler, plane_heights, plane_pixels, sample_planes_naive
 
 # Grid axes (x ahead, y left, z up) to camera axes (z ahead, x right, y down), one metre above the ground.
@@ -163,6 +168,97 @@ def test_a_drawn_world_lands_in_its_cells():
     np.testing.assert_allclose(planes, spec.centers()[..., 1], atol=0.01)
 
 
+COARSE = GridSpec(x_min=2, x_max=12, y_min=-4, y_max=4, cell=1.0)
+HEIGHTS = (0.0, 0.5)
+
+
+@pytest.fixture
+def built(monkeypatch):
+    """Forget what other tests built; return a list that grows by one for each operator built."""
+    planes._build_sampler.cache_clear()
+    shapes, original = [], planes._bilinear_matrix
+
+    def counted(*arguments):
+        shapes.append((matrix := original(*arguments)).shape)
+        return matrix
+
+    monkeypatch.setattr(planes, "_bilinear_matrix", counted)
+    return shapes
+
+
+def test_the_operator_of_a_calibration_is_built_once(built):
+    camera = _camera()
+    first = PlaneSampler.for_camera(COARSE, HEIGHTS, camera)
+    second = PlaneSampler.for_camera(replace(COARSE), np.array(HEIGHTS), replace(camera, K=camera.K.copy()))
+    assert len(built) == 1
+    by_hand = PlaneSampler(*plane_pixels(COARSE, HEIGHTS, camera), camera.size)
+    for a, b, c in zip(first.buffers(), second.buffers(), by_hand.buffers(), strict=True):
+        assert a.data_ptr() == b.data_ptr()
+        assert torch.equal(a, c)
+
+
+def test_networks_of_one_calibration_share_its_operator(built):
+    for segmenter in ("segnet", "fcn"):
+        build_net(Architecture(segmenter, image_size=(32, 64), grid=COARSE, heights=HEIGHTS), _camera())
+    assert len(built) == 1
+
+
+TURNED = rigid_transform(Rotation.from_euler("z", 0.1).as_matrix(), np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("spec", "heights", "camera"),
+    [
+        (replace(COARSE, cell=0.5), HEIGHTS, _camera()),
+        (COARSE, (0.0, 0.6), _camera()),
+        (COARSE, HEIGHTS, _camera(focal=90.0)),
+        (COARSE, HEIGHTS, replace(_camera(), T_camera_from_lidar=LOOKING_AHEAD @ TURNED)),
+        (COARSE, HEIGHTS, _camera(size=(90, 201))),
+        (COARSE, HEIGHTS, replace(_camera(), lidar_height=1.2)),
+    ],
+    ids=["cells", "heights", "K", "pose", "size", "lidar_height"],
+)
+def test_whatever_decides_the_operator_gets_its_own(built, spec, heights, camera):
+    PlaneSampler.for_camera(COARSE, HEIGHTS, _camera())
+    cached = PlaneSampler.for_camera(spec, heights, camera)
+    assert len(built) == 2
+    by_hand = PlaneSampler(*plane_pixels(spec, heights, camera), camera.size)
+    for a, b in zip(cached.buffers(), by_hand.buffers(), strict=True):
+        assert torch.equal(a, b)
+
+
+def test_a_camera_changed_in_place_gets_its_own_operator(built):
+    camera = _camera()
+    before = PlaneSampler.for_camera(COARSE, HEIGHTS, camera)
+    camera.K[0, 0] = 90
+    after = PlaneSampler.for_camera(COARSE, HEIGHTS, camera)
+    assert len(built) == 2
+    assert not torch.equal(before.matrix_weights, after.matrix_weights)
+
+
+def test_moving_one_sampler_leaves_the_others_alone(built):
+    scores = torch.randn(1, 2, 101, 201, generator=torch.Generator().manual_seed(0))
+    one, other = (PlaneSampler.for_camera(COARSE, HEIGHTS, _camera()) for _ in range(2))
+    before = other(scores)
+    one.double()
+    assert one(scores.double()).dtype == torch.float64
+    assert {part.dtype for part in one.buffers()} == {torch.float64, torch.int32}
+    for sampler in (other, PlaneSampler.for_camera(COARSE, HEIGHTS, _camera())):
+        assert sampler.matrix_weights.dtype == torch.float32
+        assert torch.equal(sampler(scores), before)
+    assert len(built) == 1
+
+
+def test_an_operator_built_for_inference_learns_as_well(built):
+    with torch.inference_mode():
+        PlaneSampler.for_camera(COARSE, HEIGHTS, _camera())
+    scores = torch.ones(1, 1, 101, 201, requires_grad=True)
+    planes = PlaneSampler.for_camera(COARSE, HEIGHTS, _camera())(scores)
+    planes.sum().backward()
+    assert len(built) == 1
+    torch.testing.assert_close(scores.grad.sum(), planes.sum())
+
+
 def test_wrong_inputs_are_named():
     points, visible = np.zeros((1, 2, 2, 2)), np.ones((1, 2, 2), dtype=bool)
     with pytest.raises(ArgumentError, match="visible: expected bool"):
@@ -175,6 +271,9 @@ def test_wrong_inputs_are_named():
         PlaneSampler(points, visible, (4, 5))(torch.zeros(1, 3, 5, 4))
     with pytest.raises(ArgumentError, match="heights"):
         plane_pixels(GridSpec.compact(), [np.nan], _camera())
+    for heights in ([[0.0]], [np.inf]):
+        with pytest.raises(ArgumentError, match="heights"):
+            PlaneSampler.for_camera(GridSpec.compact(), heights, _camera())
     with pytest.raises(ArgumentError, match="n_planes"):
         plane_heights(0)
     with pytest.raises(ArgumentError, match="spacing"):

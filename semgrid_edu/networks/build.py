@@ -12,7 +12,7 @@ from semgrid_edu.networks.segmenter import Segmenter
 from semgrid_edu.networks.segnet import SegNet
 from semgrid_edu.networks.semantic_grid import SemanticGridNet
 from semgrid_edu.networks.unet import UNet
-from semgrid_edu.planes import PlaneSampler, plane_heights, plane_pixels
+from semgrid_edu.planes import PlaneSampler, plane_heights
 
 SEGMENTERS = {"segnet": SegNet, "fcn": Fcn, "deeplab": DeepLab, "unet": UNet}
 """Every image network by its name."""
@@ -105,7 +105,7 @@ def build_net(architecture: Architecture, camera: Camera, seed: int = 0) -> Sema
         raise ArgumentError("label_set", f"one of {', '.join(LABEL_SETS)}", repr(architecture.label_set))
     n_classes = len(LABEL_SETS[architecture.label_set])
     resized = camera.resized(architecture.image_size)
-    sampler = PlaneSampler(*plane_pixels(architecture.grid, architecture.heights, resized), resized.size)
+    sampler = PlaneSampler.for_camera(architecture.grid, architecture.heights, resized)
     segmenter = build_segmenter(architecture.segmenter, n_classes, architecture.preset, seed)
     net = SemanticGridNet(segmenter, sampler, n_classes, seed)
     net.architecture = architecture
