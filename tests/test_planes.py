@@ -50,6 +50,29 @@ def test_equation_1_by_hand():
     assert visible.all()
 
 
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.floats(-0.6, 0.6), min_size=3, max_size=3), st.lists(st.floats(-1, 1), min_size=3, max_size=3))
+def test_equation_1_for_a_camera_that_rolls_pitches_and_yaws(angles, place):
+    """Without 4x4 matrices: turn what leads from the camera to each point, divide by the depth."""
+    turn = Rotation.from_matrix(LOOKING_AHEAD[:3, :3]) * Rotation.from_euler("xyz", angles)
+    eye = np.array([0.0, 0.0, 1.7]) + place  # in the grid frame
+    T_camera_from_grid = rigid_transform(turn.as_matrix(), -turn.apply(eye))
+    T_camera_from_lidar = T_camera_from_grid @ rigid_transform(np.eye(3), [0, 0, 1.73])
+    camera = Camera(np.array([[90.0, 0, 100], [0, 110, 50], [0, 0, 1]]), T_camera_from_lidar, (101, 201), 1.73)
+    spec, heights = GridSpec(x_min=-5, x_max=20, y_min=-8, y_max=8, cell=1.0), np.array([0.0, 0.7, 2.1])
+    pixels, visible = plane_pixels(spec, heights, camera)
+    for i, delta in enumerate(heights):
+        to_points = np.dstack([spec.centers(), np.full(spec.shape, delta)]).reshape(-1, 3) - eye
+        X, Y, Z = turn.apply(to_points).T
+        sure = np.abs(Z) > 1e-9
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u, v = 90 * X / Z + 100, 110 * Y / Z + 50
+        inside = (Z > 0) & (u >= 0) & (u <= 200) & (v >= 0) & (v <= 100)
+        at_border = np.minimum.reduce([abs(u), abs(u - 200), abs(v), abs(v - 100)]) < 1e-9
+        assert (visible[i].ravel() == inside)[sure & ~at_border].all()
+        np.testing.assert_allclose(pixels[i].reshape(-1, 2)[inside & sure], np.c_[u, v][inside & sure], atol=1e-6)
+
+
 def test_points_behind_the_camera_are_not_visible():
     spec = GridSpec(x_min=-4, x_max=4, y_min=-1, y_max=1, cell=1.0)
     pixels, visible = plane_pixels(spec, [1.0], _camera())
@@ -63,6 +86,17 @@ def test_the_image_border_is_the_centre_of_its_last_pixels():
     for y, inside in ((10.0, True), (-10.0, True), (10.01, False), (-10.01, False)):
         spec = GridSpec(x_min=9.5, x_max=10.5, y_min=y - 0.5, y_max=y + 0.5, cell=1.0)
         assert plane_pixels(spec, [1.0], _camera())[1].item() is inside
+
+
+@pytest.mark.parametrize("ahead", [1e-9, 0.0, -0.0, -1e-9, -2.0])
+def test_points_beside_the_lens_are_not_visible(ahead):
+    # Two cells, their centres half a metre left and right of the lens, and hardly ahead of it.
+    spec = GridSpec(x_min=ahead - 0.5, x_max=ahead + 0.5, y_min=-1.0, y_max=1.0, cell=1.0)
+    pixels, visible = plane_pixels(spec, [0.0, 1.0, 2.0], _camera())
+    assert not visible.any()
+    assert np.isnan(pixels).all() == (ahead <= 0)
+    scores = torch.ones(1, 1, *_camera().size)
+    assert (PlaneSampler(pixels, visible, _camera().size)(scores) == 0).all()
 
 
 def test_equation_2_by_hand():
@@ -98,6 +132,31 @@ def test_fast_and_literal_twins_agree(seed, h, w, n_classes, batch):
     assert fast.dtype == np.float32
     np.testing.assert_allclose(fast, literal, atol=2e-6)
     assert (fast[:, :, ~visible] == 0).all()
+
+
+def _near(last):
+    """Where rounding could reach for a pixel that isn't there: on, between and a hair beside centres of pixels."""
+    on = np.arange(2 * last + 1) / 2
+    beside = np.concatenate([np.nextafter(on, -1), np.nextafter(on, last + 1)])
+    return st.sampled_from(np.clip(np.concatenate([on, beside]), 0, last).tolist())
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.data(), st.integers(1, 4), st.integers(1, 5))
+def test_twins_and_their_gradients_agree_on_and_beside_pixels_up_to_the_border(data, h, w):
+    drawn = data.draw(st.lists(st.tuples(_near(w - 1), _near(h - 1)), min_size=6, max_size=6))
+    pixels, visible = np.array(drawn).reshape(1, 2, 3, 2), np.ones((1, 2, 3), dtype=bool)
+    rng = np.random.default_rng(0)
+    scores = torch.from_numpy(rng.normal(size=(1, 2, h, w))).requires_grad_()
+    fast = PlaneSampler(pixels, visible, (h, w)).double()(scores)
+    np.testing.assert_allclose(fast[0].detach(), sample_planes_naive(scores[0].detach(), pixels, visible), atol=1e-6)
+    # dp/ds is the kernel: a point gives each pixel its gradient times k(u - m) k(v - n).
+    grad, literal = rng.normal(size=(2, 1, 2, 3)), np.zeros((2, h, w))
+    for c, i, row, col, n, m in np.ndindex(2, 1, 2, 3, h, w):
+        u, v = pixels[i, row, col]
+        literal[c, n, m] += grad[c, i, row, col] * max(0, 1 - abs(u - m)) * max(0, 1 - abs(v - n))
+    fast.backward(torch.from_numpy(grad)[None])
+    np.testing.assert_allclose(scores.grad[0], literal, atol=1e-6)
 
 
 def test_sampling_is_exact_to_a_thousandth_of_a_pixel():
@@ -141,6 +200,64 @@ def test_the_backward_pass_is_the_adjoint():
     y = torch.from_numpy(rng.normal(size=planes.shape))
     planes.backward(y)
     torch.testing.assert_close((planes * y).sum(), (x * x.grad).sum())
+
+
+def _sampler_and_scores():
+    rng = np.random.default_rng(5)
+    sampler = PlaneSampler(*_random_points(rng, (30, 40), shape=(5, 20, 10)), (30, 40))
+    return sampler, torch.from_numpy(rng.normal(size=(2, 3, 30, 40))).float()
+
+
+def test_layout_in_memory_doesnt_matter():
+    sampler, scores = _sampler_and_scores()
+    expected = sampler(scores)
+    wider = torch.zeros(4, 3, 60, 80)
+    wider[::2, :, ::2, ::2] = scores
+    for same in (
+        scores.contiguous(memory_format=torch.channels_last),
+        scores.transpose(2, 3).contiguous().transpose(2, 3),
+        wider[::2, :, ::2, ::2],
+    ):
+        assert torch.equal(sampler(same), expected)
+    assert expected.permute(0, 2, 3, 4, 1).is_contiguous()
+    one_for_all = scores[:, :1, :1, :1].expand(-1, 3, 30, 40)
+    torch.testing.assert_close(sampler(one_for_all), sampler(one_for_all.clone()), rtol=0, atol=0)
+    upstream = torch.ones(()).expand(expected.shape)  # as .sum().backward() hands it on
+    gradients = [torch.autograd.functional.vjp(sampler, scores, g)[1] for g in (upstream, upstream.clone())]
+    assert torch.equal(*gradients)
+
+
+def test_the_type_of_the_scores_is_kept():
+    sampler, scores = _sampler_and_scores()
+    exact = sampler(scores.double())
+    assert exact.dtype == torch.float64
+    torch.testing.assert_close(sampler(scores).double(), exact, rtol=0, atol=1e-6)
+
+
+def test_mixed_precision_runs_forward_and_backward():
+    sampler, scores = _sampler_and_scores()
+    conv = torch.nn.Conv2d(3, 3, 1)
+    expected = sampler(conv(scores))
+    with torch.autocast("cpu", dtype=torch.bfloat16):
+        planes = sampler(conv(scores))
+    assert planes.dtype == torch.bfloat16
+    planes.float().square().sum().backward()
+    assert torch.isfinite(conv.weight.grad).all()
+    # bfloat16 keeps eight bits.
+    torch.testing.assert_close(planes.float(), expected, rtol=0, atol=0.05)
+
+
+def test_threads_dont_change_a_bit():
+    sampler, scores = _sampler_and_scores()
+    threads, results = torch.get_num_threads(), []
+    try:
+        for n in (1, 2):
+            torch.set_num_threads(n)
+            results.append((sampler(scores), *torch.autograd.functional.vjp(sampler, scores, sampler(scores))))
+    finally:
+        torch.set_num_threads(threads)
+    for one, two in zip(*results, strict=True):
+        assert torch.equal(one, two)
 
 
 def test_a_sampler_holds_no_weights():
@@ -267,6 +384,8 @@ def test_wrong_inputs_are_named():
         PlaneSampler(points[..., 0], visible, (4, 5))
     with pytest.raises(ArgumentError, match="visible points in an image"):
         PlaneSampler(points + 4.5, visible, (4, 5))
+    with pytest.raises(ArgumentError, match="visible points in an image"):
+        PlaneSampler(points * np.nan, visible, (4, 5))
     with pytest.raises(ArgumentError, match=r"scores: expected shape \(B, C, 4, 5\), found \(1, 3, 5, 4\)"):
         PlaneSampler(points, visible, (4, 5))(torch.zeros(1, 3, 5, 4))
     with pytest.raises(ArgumentError, match="heights"):
