@@ -58,6 +58,27 @@ def draw_batch(dataset: Sequence[Sample], size: int, jitter: float, iteration: i
     return Batch(frames._replace(image=image.clamp(0, 1)), mirrored=bool(rng.random() < 0.5))
 
 
+def share_of_batch(batch: Batch, process: int, n_processes: int, device: torch.device | str) -> Batch:
+    """Return the part of a batch that one of several processes takes, on its device.
+
+    Parameters
+    ----------
+    batch : Batch
+        Of B frames.
+    process, n_processes : int
+        The number of the process, from 0, and how many there are; B is a multiple.
+    device : device
+
+    Returns
+    -------
+    Batch
+        Of B / n_processes frames.
+    """
+    size = len(batch.frames.image) // n_processes
+    part = slice(process * size, (process + 1) * size)
+    return batch._replace(frames=Sample(*(field[part].to(device) for field in batch.frames)))
+
+
 def image_scores(net: SemanticGridNet, batch: Batch) -> Tensor:
     """Return the image network's scores of a batch, before any soft-max.
 

@@ -129,17 +129,45 @@ def train(
     data: Annotated[Path, typer.Option(help="A data set with train frames, such as data/minikitti.")],
     out: Annotated[Path, typer.Option(help="A folder for the weights, the log and their provenance.")],
     segmenter: Annotated[str, typer.Option(help="The image network: segnet, fcn, deeplab or unet.")] = "segnet",
+    preset: Annotated[
+        str, typer.Option(help="compact, or paper: published size, whole images, 0.2 m cells.")
+    ] = "compact",
+    imagenet: Annotated[
+        Path | None, typer.Option(help="VGG16 or ResNet-101 as safetensors: first weights for --preset paper.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="Of the initial weights and of the order of the frames.")] = 0,
     iterations: Annotated[int, typer.Option(min=1, help="Steps of each of the two stages.")] = 2000,
     two_stage: Annotated[bool, typer.Option("--two-stage", help="The grid doesn't teach the image network.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Continue a training that was interrupted.")] = False,
+    device: Annotated[str, typer.Option(help="auto (a GPU when there is one), cpu, cuda or cuda:N.")] = "auto",
 ) -> None:
-    """Train the compact network: its image network first, then all of it on the grid."""
-    from semgrid_edu.experiments.compact import train_compact
-    from semgrid_edu.training import TrainingParams
+    """Train a network: its image network first, then all of it on the grid. torchrun runs it in several processes."""
+    from semgrid_edu.experiments.train import how_to_go_on, train_network, training_params
 
-    params = TrainingParams(image_iterations=iterations, grid_iterations=iterations, end_to_end=not two_stage)
-    train_compact(data, out, segmenter, params, seed, resume)
+    params = training_params(preset, iterations, end_to_end=not two_stage, from_imagenet=imagenet is not None)
+    try:
+        train_network(data, out, segmenter, params, seed, resume, preset=preset, imagenet=imagenet, device=device)
+    except KeyboardInterrupt:
+        sys.exit(f"semgrid-edu: interrupted; {how_to_go_on(out)}")
+
+
+@app.command()
+def curves(
+    runs: Annotated[list[Path], typer.Argument(help="Folders that `semgrid-edu train` writes, finished or not.")],
+    out: Annotated[Path, typer.Option(help="Where to write the picture.")] = Path("curves.png"),
+) -> None:
+    """Draw the loss of one or several trainings over their steps."""
+    from semgrid_edu.files import atomic_path
+    from semgrid_edu.plotting import training_curves
+    from semgrid_edu.training_log import LOG, read_log
+
+    names = [run.resolve().name for run in runs]
+    if len(set(names)) < len(names):
+        names = list(map(str, runs))
+    axes = training_curves({name: read_log(run / LOG) for name, run in zip(names, runs, strict=True)})
+    with atomic_path(out) as path:
+        axes.figure.savefig(path, dpi=150)
+    typer.echo(f"written to {out}")
 
 
 @app.command()

@@ -3,11 +3,11 @@
 from pathlib import Path
 
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save
 from torch import Tensor
 
 from semgrid_edu.errors import DataError
-from semgrid_edu.files import atomic_path
+from semgrid_edu.files import write_bytes
 
 
 def write_tensors(path: str | Path, tensors: dict[str, Tensor], header: dict[str, str] | None = None) -> None:
@@ -21,9 +21,13 @@ def write_tensors(path: str | Path, tensors: dict[str, Tensor], header: dict[str
         Contiguous, on the CPU.
     header : dict of str to str, optional
         The order of several entries isn't fixed: with one at most, the same tensors give the same bytes.
+
+    Raises
+    ------
+    OSError
+        Names the file, as when the disk is full; `path` is then as it was.
     """
-    with atomic_path(path) as temporary:
-        save_file(tensors, temporary, metadata=header)
+    write_bytes(path, save(tensors, metadata=header))
 
 
 def read_tensors(path: str | Path) -> tuple[dict[str, str], dict[str, Tensor]]:

@@ -1,110 +1,30 @@
-"""Learning from few frames: median frequency balancing and the training loop (paper, section 4.1)."""
+"""The training loop: stochastic gradient descent, end to end (paper, section 4.1)."""
 
-import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TextIO
 
-import numpy as np
 import torch
-import torch.nn.functional as F
-from numpy.typing import NDArray
-from torch import Tensor
+from torch import Tensor, nn
 from tqdm.auto import trange
 
-from semgrid_edu.batches import Batch, draw_batch, grid_logits, image_scores
+from semgrid_edu.batches import Batch, draw_batch, share_of_batch
 from semgrid_edu.checkpoint import load_checkpoint, save_checkpoint
 from semgrid_edu.datasets.training_set import Sample
-from semgrid_edu.errors import ArgumentError
-from semgrid_edu.files import write_text
-from semgrid_edu.labels import IGNORE
+from semgrid_edu.devices import mixed_precision
+from semgrid_edu.distributed import in_parallel, process_total, rank, shared_batch_norm, world_size
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.loss import TRUTH, Objective, class_weights
 from semgrid_edu.memory import keep_freed_memory
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, save_net
 from semgrid_edu.occupancy import N_STATES
+from semgrid_edu.training_log import LOG, Step, append_step, begin_log
 
-CHECKPOINT, LOG = "checkpoint.safetensors", "log.csv"
-LOG_HEADER = "iteration,stage,learning_rate,loss\n"
+CHECKPOINT = "checkpoint.safetensors"
 CHECKPOINT_EVERY = 100
 """Iterations between checkpoints: some twenty seconds of work is lost at most."""
-
-TRUTH = {"image": "labels", "grid": "truth"}
-"""What each stage learns from: the field of `Sample`."""
-
-
-def class_frequencies(maps: Iterable[NDArray], n_classes: int) -> NDArray[np.float64]:
-    """Return f(c) = cells of c / cells of the maps in which c occurs (paper, section 4.1).
-
-    Parameters
-    ----------
-    maps : sequence of (...) int
-        Grids or images of classes; unlabelled cells, 255, count neither above nor below.
-    n_classes : int
-        C.
-
-    Returns
-    -------
-    (C,) float64
-        0 for a class that occurs in no map.
-
-    Raises
-    ------
-    ArgumentError
-        When a map holds a number that is neither a class nor 255.
-
-    Examples
-    --------
-    >>> class_frequencies([[0, 0, 0, 1], [0, 0, 0, 0]], n_classes=3)
-    array([0.875, 0.25 , 0.   ])
-    """
-    cells_of = np.zeros(n_classes)
-    cells_where_it_occurs = np.zeros(n_classes)
-    for number, classes in enumerate(maps):
-        labelled = np.asarray(classes)[np.asarray(classes) != IGNORE]
-        if labelled.size and not (labelled.min() >= 0 and labelled.max() < n_classes):
-            found = f"{labelled.min()}..{labelled.max()} in map {number}"
-            raise ArgumentError("maps", f"classes 0..{n_classes - 1} or {IGNORE}", found)
-        counts = np.bincount(labelled.astype(np.int64), minlength=n_classes)
-        cells_of += counts
-        cells_where_it_occurs += (counts > 0) * labelled.size
-    return np.divide(cells_of, cells_where_it_occurs, out=np.zeros(n_classes), where=cells_of > 0)
-
-
-def median_frequency_weights(maps: Iterable[NDArray], n_classes: int, limit: float = math.inf) -> NDArray[np.float64]:
-    """Return the weights alpha_c = median f / f(c) that keep frequent classes from buying the loss (section 4.1).
-
-    Parameters
-    ----------
-    maps : sequence of (...) int
-        As for `class_frequencies`.
-    n_classes : int
-        C.
-    limit : float
-        No weight is above `limit` or below 1 / `limit`. The paper has none.
-
-    Returns
-    -------
-    (C,) float64
-        0 for a class that occurs in no map; it isn't part of the median.
-
-    Raises
-    ------
-    ArgumentError
-        When no cell is labelled, or a map holds something else than classes.
-
-    Examples
-    --------
-    >>> median_frequency_weights([[0, 0, 0, 1], [0, 0, 0, 2]], n_classes=4)
-    array([0.33333333, 1.        , 1.        , 0.        ])
-    """
-    f = class_frequencies(maps, n_classes)
-    occurs = f > 0
-    if not occurs.any():
-        raise ArgumentError("maps", "at least one labelled cell", "none")
-    alpha = np.zeros(n_classes)
-    alpha[occurs] = np.clip(np.median(f[occurs]) / f[occurs], 1 / limit, limit)
-    return alpha
 
 
 @dataclass(frozen=True)
@@ -164,16 +84,20 @@ def train(
     params: TrainingParams | None = None,
     seed: int = 0,
     resume: bool = False,
+    device: torch.device | str = "cpu",
 ) -> None:
     """Train a network, leaving a log of every step and a checkpoint to resume from.
 
     All that is random is a function of the seed and the number of the step. So a run that was killed and
-    resumed ends with the same weights, bit for bit, as one that was not.
+    resumed ends with the same weights, bit for bit (on a CPU), as one that was not.
+
+    Inside `process_group` with several processes, each takes its share of every batch, and the sum is the same
+    step; all must see the same data and folder.
 
     Parameters
     ----------
     net : SemanticGridNet
-        Of `build_net`; changed in place, in evaluation mode afterwards.
+        Of `build_net`; changed in place, in evaluation mode afterwards, on `device`.
     dataset : sequence of Sample
         The frames to learn from.
     folder : path-like
@@ -184,88 +108,112 @@ def train(
         Of the order of the frames and of their jitter.
     resume : bool
         Whether to continue from the folder's checkpoint.
+    device : device
+        Where to compute.
 
     Raises
     ------
     ArgumentError
         When the data don't fit the network, the checkpoint is of another run, or the loss isn't finite.
     DataError
-        When there is no checkpoint to resume from, or it is damaged.
+        When there is no checkpoint to resume from, or it is damaged; or there is one, or a trained network, that
+        a training which doesn't resume would overwrite.
     """
-    params, folder = params or TrainingParams(), Path(folder)
+    params, folder, device = params or TrainingParams(), Path(folder), torch.device(device)
+    _check_folder(folder, resume)
     _check_dataset(net, dataset, params)
     alpha = {stage: class_weights(dataset, stage, net.n_classes, params.weight_limit) for stage in TRUTH}
-    optimiser = torch.optim.SGD(net.parameters(), lr=params.learning_rate, momentum=params.momentum)
-    run = json.dumps({"seed": seed, "frames": len(dataset), **asdict(params)})
+    optimiser = torch.optim.SGD(net.to(device).parameters(), lr=params.learning_rate, momentum=params.momentum)
+    run = {"seed": seed, "frames": len(dataset), **asdict(params), **asdict(net.architecture)}
     start = load_checkpoint(folder / CHECKPOINT, run, net, optimiser) if resume else 0
+    if rank() == 0:
+        begin_log(folder / LOG, start)
     keep_freed_memory()
-    net.train()
-    with _open_log(folder / LOG, start) as log:
-        for iteration in (progress := trange(start, params.iterations, initial=start, total=params.iterations)):
+    with shared_batch_norm(net.train()), _gradients_as_found(net):
+        steps = trange(start, params.iterations, initial=start, total=params.iterations, disable=rank() > 0)
+        for iteration in steps:
             stage, optimiser.param_groups[0]["lr"] = params.stage(iteration)
-            if stage == "grid" and not params.end_to_end:
-                net.segmenter.eval().requires_grad_(False)
+            if iteration in (start, params.image_iterations):
+                objective = _objective(net, stage, alpha[stage].to(device), params.end_to_end)
             batch = draw_batch(dataset, params.batch_size, params.jitter, iteration, seed)
-            loss = _step(net, optimiser, batch, stage, alpha[stage])
-            if not math.isfinite(loss):
-                found = f"{params.learning_rate}, with which it is {loss} in iteration {iteration}"
-                raise ArgumentError("learning_rate", "a rate that keeps the loss finite", found)
-            log.write(f"{iteration},{stage},{optimiser.param_groups[0]['lr']:.6g},{loss:.6g}\n")
-            progress.set_postfix(stage=stage, loss=f"{loss:.3f}", refresh=False)
-            if iteration + 1 == params.image_iterations:
-                save_net(net, folder / IMAGE_STAGE)
-            if (iteration + 1) % CHECKPOINT_EVERY == 0:
-                log.flush()
-                save_checkpoint(folder / CHECKPOINT, run, net, optimiser, iteration + 1)
+            loss = _learn(objective, optimiser, share_of_batch(batch, rank(), world_size(), device), device)
+            step = Step(iteration, stage, optimiser.param_groups[0]["lr"], loss)
+            _check_finite(step, params.learning_rate)
+            steps.set_postfix(stage=stage, loss=f"{loss:.3f}", refresh=False)
+            if rank() == 0:
+                _write_down(step, folder, params.image_iterations, run, net, optimiser)
     net.eval()
-    save_net(net, folder / WEIGHTS)
-    (folder / CHECKPOINT).unlink(missing_ok=True)
+    if rank() == 0:
+        save_net(net, folder / WEIGHTS)
+        (folder / CHECKPOINT).unlink(missing_ok=True)
 
 
-def _step(net: SemanticGridNet, optimiser: torch.optim.SGD, batch: Batch, stage: str, alpha: Tensor) -> float:
+def _objective(net: SemanticGridNet, stage: str, alpha: Tensor, end_to_end: bool) -> nn.Module:
+    """Return the loss of a stage that begins, after stopping what doesn't learn in it."""
+    if stage == "grid" and not end_to_end:
+        net.segmenter.eval().requires_grad_(False)
+    return in_parallel(Objective(net, stage, alpha), some_unused=stage == "image")
+
+
+def _learn(objective: nn.Module, optimiser: torch.optim.SGD, batch: Batch, device: torch.device) -> float:
     """Change the weights by one step of gradient descent and return the loss before it."""
     optimiser.zero_grad()
-    scores = (image_scores if stage == "image" else grid_logits)(net, batch)
-    truth = getattr(batch.frames, TRUTH[stage]).long()
-    weights = alpha[truth[truth != IGNORE]].sum()
-    loss = F.cross_entropy(scores, truth, weight=alpha, ignore_index=IGNORE, reduction="sum") / weights
+    with mixed_precision(device):
+        loss = objective(batch)
     loss.backward()
     optimiser.step()
-    return loss.item()
+    return process_total(loss.detach()).item() / world_size()
 
 
-def class_weights(dataset: Sequence[Sample], stage: str, n_classes: int, limit: float) -> Tensor:
-    """Return the loss's weight of each class in a stage.
+def _write_down(
+    step: Step, folder: Path, image_iterations: int, run: dict, net: SemanticGridNet, optimiser: torch.optim.SGD
+) -> None:
+    """Log a step, and save what is due after it."""
+    append_step(folder / LOG, step)
+    done = step.iteration + 1
+    if done == image_iterations:
+        save_net(net, folder / IMAGE_STAGE)
+    if done % CHECKPOINT_EVERY == 0:
+        save_checkpoint(folder / CHECKPOINT, run, net, optimiser, done)
 
-    Parameters
-    ----------
-    dataset : sequence of Sample
-    stage : str
-        "image" or "grid".
-    n_classes, limit
-        As for `median_frequency_weights`.
 
-    Returns
-    -------
-    (C,) float32
-    """
-    maps = (getattr(sample, TRUTH[stage]).numpy() for sample in dataset)
-    return torch.from_numpy(median_frequency_weights(maps, n_classes, limit)).float()
+@contextmanager
+def _gradients_as_found(net: nn.Module) -> Iterator[None]:
+    """Let the weights that learnt before the block learn after it."""
+    found = [(parameter, parameter.requires_grad) for parameter in net.parameters()]
+    try:
+        yield
+    finally:
+        for parameter, learns in found:
+            parameter.requires_grad_(learns)
+
+
+def _check_folder(folder: Path, resume: bool) -> None:
+    """Refuse to overwrite a training."""
+    if (folder / WEIGHTS).exists():
+        raise DataError(folder, "a folder without a trained network, which would be lost", WEIGHTS)
+    if (folder / CHECKPOINT).exists() and not resume:
+        raise DataError(folder, "a folder without a training to resume (--resume continues it)", CHECKPOINT)
 
 
 def _check_dataset(net: SemanticGridNet, dataset: Sequence[Sample], params: TrainingParams) -> None:
-    """Refuse frames that the network can't take."""
+    """Refuse a network that can't be saved, frames that it can't take, and batches that can't be shared."""
+    if not hasattr(net, "architecture"):
+        raise ArgumentError("net", "a network of build_net, which records its architecture", "one made by hand")
     if len(dataset) < params.batch_size:
         raise ArgumentError("dataset", f"at least one batch of {params.batch_size} frames", f"{len(dataset)} frames")
+    if params.batch_size % world_size():
+        raise ArgumentError("batch_size", f"a multiple of {world_size()}, the number of processes", params.batch_size)
     size, shape = net.sampler.image_size, net.sampler.planes_shape[1:]
     expected = Sample((3, *size), size, (N_STATES, *shape), shape)
-    for name, part, want in zip(Sample._fields, dataset[0], expected, strict=True):
-        if tuple(part.shape) != want:
-            raise ArgumentError("dataset", f"{name} of shape {want}", tuple(part.shape))
+    for k, sample in enumerate(dataset):
+        for name, part, want in zip(Sample._fields, sample, expected, strict=True):
+            if tuple(part.shape) != want:
+                raise ArgumentError("dataset", f"{name} of shape {want}", f"{tuple(part.shape)} in frame {k}")
 
 
-def _open_log(path: Path, start: int) -> TextIO:
-    """Open the log for the step `start`, dropping the lines of later ones that no checkpoint holds."""
-    lines = path.read_text().splitlines(keepends=True)[: start + 1] if start else [LOG_HEADER]
-    write_text(path, "".join(lines))
-    return path.open("a", newline="\n")
+def _check_finite(step: Step, learning_rate: float) -> None:
+    """Refuse to go on when nothing can be learnt any more."""
+    if not math.isfinite(step.loss):
+        found = f"{learning_rate}, with which it is {step.loss} in iteration {step.iteration}"
+        raise ArgumentError("learning_rate", "a rate that keeps the loss finite", found)

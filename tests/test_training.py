@@ -1,5 +1,4 @@
 import csv
-import json
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -11,21 +10,17 @@ import torch.nn.functional as F
 from safetensors.torch import load_file, save_file
 from sklearn.metrics import accuracy_score
 
-from semgrid_edu import checkpoint, tensors, training
+from semgrid_edu import checkpoint, training
 from semgrid_edu.batches import Batch, draw_batch, grid_logits, image_scores
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
+from semgrid_edu.loss import median_frequency_weights
 from semgrid_edu.networks import Architecture, build_net
 from semgrid_edu.planes import plane_pixels
-from semgrid_edu.training import (
-    TrainingParams,
-    class_frequencies,
-    median_frequency_weights,
-    train,
-)
+from semgrid_edu.training import TrainingParams, train
 
 SMALL = Architecture(image_size=(24, 80), grid=GridSpec(2, 26, -6, 6, 1.0), heights=(0.0, 0.5, 1.0))
 QUICK = TrainingParams(image_iterations=3, grid_iterations=4, batch_size=2)
@@ -70,38 +65,6 @@ def _street(camera, seed):
 @pytest.fixture(scope="module")
 def streets(camera):
     return [_street(camera, seed) for seed in range(4)]
-
-
-# Median frequency balancing
-
-
-def test_frequencies_and_weights_by_hand():
-    # Class 0: 15 of 24 cells; class 1: 3 of the 16 in whose maps it occurs; class 2: 6 of 8; class 3: none.
-    maps = np.array([[[0, 0, 0, 0], [0, 0, 0, 1]], [[0, 0, 0, 0], [0, 0, 1, 1]], [[0, 0, 2, 2], [2, 2, 2, 2]]])
-    f = np.array([15 / 24, 3 / 16, 6 / 8, 0])
-    np.testing.assert_allclose(class_frequencies(maps, 4), f)
-    np.testing.assert_allclose(median_frequency_weights(maps, 4), [1, 15 / 24 * 16 / 3, 15 / 24 * 8 / 6, 0])
-    np.testing.assert_allclose(median_frequency_weights(maps, 4, limit=2)[1], 2)
-
-
-def test_unlabelled_cells_count_nowhere():
-    maps = [np.array([0, 1, 1, 255, 255]), np.array([255, 0])]
-    np.testing.assert_allclose(class_frequencies(maps, 2), [2 / 4, 2 / 3])
-
-
-def test_balanced_classes_weigh_the_same():
-    np.testing.assert_allclose(median_frequency_weights([np.arange(6) % 3], 3), 1)
-
-
-@pytest.mark.parametrize("wrong", [3, 254, -1])
-def test_wrong_labels_are_named(wrong):
-    with pytest.raises(ArgumentError, match=r"maps: expected classes 0..2 or 255, found .* in map 1"):
-        class_frequencies([np.array([0, 1]), np.array([0, wrong])], 3)
-
-
-def test_no_labels_at_all_are_refused():
-    with pytest.raises(ArgumentError, match="at least one labelled cell"):
-        median_frequency_weights([np.full(4, 255)], 3)
 
 
 # Batches
@@ -218,7 +181,7 @@ def test_a_resumed_run_ends_with_the_same_bytes(camera, streets, tmp_path, monke
     monkeypatch.setattr(training, "CHECKPOINT_EVERY", 2)
     whole, broken = tmp_path / "whole", tmp_path / "broken"
     train(build_net(SMALL, camera, seed=1), streets, whole, QUICK, seed=1)
-    reads = 1 + 2 * len(streets) + QUICK.batch_size * steps_before_the_kill  # the checks, the weights, the steps
+    reads = 3 * len(streets) + QUICK.batch_size * steps_before_the_kill  # check, weights of two stages, steps
     with pytest.raises(_KilledError):
         train(build_net(SMALL, camera, seed=1), _KilledIn(streets, reads), broken, QUICK, seed=1)
     assert (broken / "checkpoint.safetensors").exists()
@@ -258,15 +221,42 @@ def test_frames_that_do_not_fit_are_refused(camera, streets, tmp_path):
         train(net, wrong, tmp_path, QUICK)
 
 
-def _checkpoint(camera, path, run="a run"):
+def _checkpoint(camera, path, run=None):
     net = build_net(SMALL, camera)
-    checkpoint.save_checkpoint(path, run, net, torch.optim.SGD(net.parameters(), lr=0.1, momentum=0.9), 2)
+    checkpoint.save_checkpoint(path, run or {}, net, torch.optim.SGD(net.parameters(), lr=0.1, momentum=0.9), 2)
 
 
-def test_only_its_own_run_is_resumed(camera, streets, tmp_path):
-    _checkpoint(camera, tmp_path / "checkpoint.safetensors", run=json.dumps({"seed": 5}))
-    with pytest.raises(ArgumentError, match=r"resume: expected the run of .*checkpoint.safetensors, \{\"seed\": 5\}"):
-        train(build_net(SMALL, camera), streets, tmp_path, QUICK, resume=True)
+def _killed(camera, streets, folder, monkeypatch, architecture=SMALL):
+    """A training that was killed in its fourth step and has kept a checkpoint after two."""
+    monkeypatch.setattr(training, "CHECKPOINT_EVERY", 2)
+    reads = 3 * len(streets) + 3 * QUICK.batch_size
+    with pytest.raises(_KilledError):
+        train(build_net(architecture, camera), _KilledIn(streets, reads), folder, QUICK)
+
+
+def test_only_its_own_run_is_resumed(camera, streets, tmp_path, monkeypatch):
+    _killed(camera, streets, tmp_path, monkeypatch)
+    before = (tmp_path / "checkpoint.safetensors").read_bytes()
+    for architecture, params, differing in (
+        (SMALL, replace(QUICK, learning_rate=0.1), r"\{'learning_rate': 0.05\}, found \{'learning_rate': 0.1\}"),
+        (replace(SMALL, segmenter="fcn"), QUICK, r"\{'segmenter': 'segnet'\}, found \{'segmenter': 'fcn'\}"),
+        (replace(SMALL, heights=(0.0, 0.5)), QUICK, r"\{'heights': \[0.0, 0.5, 1.0\]\}, found"),
+    ):
+        with pytest.raises(ArgumentError, match=f"resume: expected the run of .*checkpoint.safetensors, {differing}"):
+            train(build_net(architecture, camera), streets, tmp_path, params, resume=True)
+    assert (tmp_path / "checkpoint.safetensors").read_bytes() == before
+
+
+def test_no_training_is_overwritten(camera, streets, tmp_path, monkeypatch):
+    _killed(camera, streets, tmp_path, monkeypatch)
+    with pytest.raises(DataError, match=r"--resume continues it\), found checkpoint.safetensors"):
+        train(build_net(SMALL, camera), streets, tmp_path, QUICK)
+    train(build_net(SMALL, camera), streets, tmp_path, QUICK, resume=True)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    for resume in (False, True):
+        with pytest.raises(DataError, match=r"a trained network, which would be lost, found weights.safetensors"):
+            train(build_net(SMALL, camera), streets, tmp_path, QUICK, resume=resume)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
 def test_a_missing_or_damaged_checkpoint_is_named(camera, streets, tmp_path):
@@ -283,19 +273,3 @@ def test_a_missing_or_damaged_checkpoint_is_named(camera, streets, tmp_path):
     save_file(load_file(path), path)
     with pytest.raises(DataError, match="expected a checkpoint of a training"):
         train(build_net(SMALL, camera), streets, tmp_path, QUICK, resume=True)
-
-
-def test_a_full_disk_keeps_the_checkpoint_before(camera, tmp_path, monkeypatch):
-    path = tmp_path / "checkpoint.safetensors"
-    _checkpoint(camera, path)
-    before = path.read_bytes()
-
-    def fail(_, file, metadata):
-        file.write_bytes(b"half a")
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(tensors, "save_file", fail)
-    with pytest.raises(OSError, match="No space left"):
-        _checkpoint(camera, path, run="later")
-    assert path.read_bytes() == before
-    assert [p.name for p in tmp_path.iterdir()] == [path.name]

@@ -148,7 +148,7 @@ EQUATIONS = (
         literal="semgrid_edu.experiments.baselines.carry_labels",
     ),
     Equation(
-        "median-frequency", "4.1", "Median frequency balancing", literal="semgrid_edu.training.median_frequency_weights"
+        "median-frequency", "4.1", "Median frequency balancing", literal="semgrid_edu.loss.median_frequency_weights"
     ),
     Equation(
         "pixel-accuracy",

@@ -8,8 +8,8 @@ import numpy as np
 from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.training_set import TrainingSet
-from semgrid_edu.experiments.compact import train_compact
 from semgrid_edu.experiments.evaluate import Scores, image_labels, learned_unary, scores
+from semgrid_edu.experiments.train import train_network
 from semgrid_edu.files import sha256
 from semgrid_edu.metrics import METRICS, confusion_matrix
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, load_net
@@ -52,7 +52,7 @@ def compare(
             if not (folder / FILE_NAME).exists():
                 chosen = replace(params, end_to_end=method == "end-to-end")
                 resume = (folder / CHECKPOINT).exists()
-                train_compact(dataset_dir, folder, "segnet", chosen, seed, resume)
+                train_network(dataset_dir, folder, "segnet", chosen, seed, resume)
             result[method].append(score(load_net(folder / WEIGHTS, test.camera), test))
     trained = [Path(runs) / f"{method}-{seed}" for seed in range(n_seeds) for method in METHODS]
     return {

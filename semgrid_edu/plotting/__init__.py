@@ -4,7 +4,7 @@ Grids are drawn as maps with forward up, axes in metres: x upwards, y to the lef
 decreases to the right. Arrays are never flipped: row 0 is the farthest ahead, column 0 the leftmost.
 """
 
-from semgrid_edu.plotting.charts import confusion
+from semgrid_edu.plotting.charts import confusion, training_curves
 from semgrid_edu.plotting.colours import (
     DEPTH_RANGE,
     HEADING_COLOURS,
@@ -50,6 +50,7 @@ __all__ = [
     "probability_line",
     "probability_lines",
     "state_history",
+    "training_curves",
     "velocity",
     "velocity_arrows",
     "velocity_colours",

@@ -1,13 +1,15 @@
-"""Charts of numbers: the confusion matrix (paper, Table 3)."""
+"""Charts of numbers: the confusion matrix (paper, Table 3) and the curves of a training (section 4.1)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.training_log import TrainingLog
 
 
 def confusion(matrix: NDArray, names: Sequence[str], ax: Axes | None = None) -> Axes:
@@ -47,3 +49,64 @@ def confusion(matrix: NDArray, names: Sequence[str], ax: Axes | None = None) -> 
     ax.set_yticks(range(len(names)), names)
     ax.set(xlabel="predicted", ylabel="truth [% of its row]")
     return ax
+
+
+SMOOTHING = 50
+"""Steps that a running mean is taken over; a stage may be shorter."""
+
+
+def training_curves(logs: TrainingLog | Mapping[str, TrainingLog], ax: Axes | None = None) -> Axes:
+    """Draw the loss of trainings over their steps: a point a step, and a line that is their running mean.
+
+    The loss of the image stage and that of the grid stage are of different things, so the line breaks between
+    them. The learning rate, which falls along half a cosine in each stage, isn't drawn.
+
+    Parameters
+    ----------
+    logs : TrainingLog, or mapping of name to TrainingLog
+        See `read_log`. Names go to the legend.
+    ax : Axes, optional
+        Where to draw; a new figure when left out.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ArgumentError
+        When there is no training, or one has no steps.
+    """
+    logs = {"": logs} if isinstance(logs, TrainingLog) else logs
+    if not logs or not all(len(log.loss) for log in logs.values()):
+        raise ArgumentError("logs", "a training or more, each with at least one step", list(logs) or "none")
+    if ax is None:
+        _, ax = plt.subplots(figsize=(8, 4), layout="constrained")
+    for number, (name, log) in enumerate(logs.items()):
+        _curve(ax, log, name, f"C{number}")
+    for stage, begin in _stages(next(iter(logs.values()))):
+        ax.annotate(f"{stage} stage", (begin, 0), (4, 4), ("data", "axes fraction"), "offset points", color="0.3")
+    ax.set_yscale("log")
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:e}"[0] in "2346" else "")
+    ax.set_title(f"points: single steps; lines: running means of {SMOOTHING} steps", loc="left", fontsize="medium")
+    ax.set(xlabel="step", ylabel="loss: weighted cross-entropy [nats]")
+    ax.grid(alpha=0.3)
+    if any(logs):
+        ax.legend(loc="upper right")
+    return ax
+
+
+def _curve(ax: Axes, log: TrainingLog, name: str, colour: str) -> None:
+    """Draw one training, each stage for itself, with a dotted line where it begins."""
+    ax.scatter(log.iteration, log.loss, s=3, color=colour, alpha=0.2, linewidth=0)
+    for stage, begin in _stages(log):
+        here = log.stage == stage
+        smooth = uniform_filter1d(log.loss[here], min(SMOOTHING, here.sum()), mode="reflect")
+        ax.plot(log.iteration[here], smooth, color=colour, linewidth=1.2, label=name if stage == log.stage[0] else None)
+        ax.axvline(begin, color="0.5", linewidth=0.8, linestyle=":")
+
+
+def _stages(log: TrainingLog) -> list[tuple[str, int]]:
+    """Return the stages of a training and the step with which each begins."""
+    return [(stage, log.iteration[log.stage == stage][0]) for stage in dict.fromkeys(log.stage.tolist())]

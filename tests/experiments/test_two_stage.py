@@ -37,7 +37,7 @@ def test_what_has_ended_is_not_trained_again(compared, monkeypatch):
     def fail(*_):
         raise AssertionError("trained again")
 
-    monkeypatch.setattr(two_stage, "train_compact", fail)
+    monkeypatch.setattr(two_stage, "train_network", fail)
     assert two_stage.compare(root, root / "runs", 1, QUICK)["scores"] == result["scores"]
 
 

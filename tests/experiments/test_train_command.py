@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 from semgrid_edu.camera import Camera
 from semgrid_edu.cli import app
 from semgrid_edu.datasets.training_set import Sample
-from semgrid_edu.experiments import compact
+from semgrid_edu.experiments import train as experiment
 from semgrid_edu.files import sha256, write_text
 from semgrid_edu.networks import Architecture, Fcn, load_net
 from semgrid_edu.provenance import provenance_problems
@@ -23,7 +23,7 @@ class _Noise:
         Architecture().image_size,
     )
 
-    def __init__(self, dataset_dir, split):
+    def __init__(self, dataset_dir, split, spec, image_size):
         assert split == "train"
         self.rng = torch.Generator().manual_seed(0)
 
@@ -43,7 +43,7 @@ class _Noise:
 
 
 def test_the_command_leaves_weights_log_and_provenance(monkeypatch, tmp_path):
-    monkeypatch.setattr(compact, "TrainingSet", _Noise)
+    monkeypatch.setattr(experiment, "TrainingSet", _Noise)
     data, out = tmp_path / "minikitti", tmp_path / "compact"
     write_text(data / "dataset.json", "{}")
     arguments = [

@@ -1,0 +1,62 @@
+"""Where a training computes, and with how many bits (section 4.1)."""
+
+import re
+
+import torch
+
+from semgrid_edu.errors import ArgumentError
+
+
+def choose_device(name: str = "auto", process: int = 0) -> torch.device:
+    """Return the device that a command's option `--device` names.
+
+    Parameters
+    ----------
+    name : str
+        "cpu", "cuda", "cuda:N" for the GPU with that number, or "auto": a GPU when there is one.
+    process : int
+        Number of this process on its machine: "cuda" and "auto" give each process a GPU of its own.
+
+    Returns
+    -------
+    torch.device
+
+    Raises
+    ------
+    ArgumentError
+        When it is none of these, or there is no such GPU.
+
+    Examples
+    --------
+    >>> choose_device("cpu")
+    device(type='cpu')
+    """
+    if not re.fullmatch(r"auto|cpu|cuda(:\d+)?", name):
+        raise ArgumentError("--device", "auto, cpu, cuda or cuda:N", repr(name))
+    gpus = torch.cuda.device_count() if torch.cuda.is_available() else 0
+    if name == "cpu" or (name == "auto" and not gpus):
+        return torch.device("cpu")
+    number = int(name.removeprefix("cuda:")) if ":" in name else process
+    if number >= gpus:
+        wanted = f"{name}, the GPU number {number} for process {process}"
+        raise ArgumentError("--device", f"cpu or one of the {gpus} GPUs that PyTorch finds here", wanted)
+    return torch.device("cuda", number)
+
+
+def mixed_precision(device: torch.device) -> torch.autocast:
+    """Return a context in which a GPU convolves in bfloat16, half the bits of float32 at its range.
+
+    Weights, sums and losses stay float32; with that range, gradients need no scaling. A GPU without bfloat16
+    (before NVIDIA's Ampere), and a CPU, compute in float32 throughout.
+
+    Parameters
+    ----------
+    device : torch.device
+
+    Returns
+    -------
+    torch.autocast
+        For the forward pass alone.
+    """
+    able = device.type == "cuda" and torch.cuda.is_bf16_supported(including_emulation=False)
+    return torch.autocast(device.type, torch.bfloat16, enabled=able)
