@@ -47,5 +47,5 @@ def test_a_plane_a_return_lies_on_has_its_pixel(kitti_root):
     in_camera = homogeneous @ calibration.T_cam2_velo.T
     u, v, depth = (in_camera[:, :3] @ calibration.K_cam2.T).T
     off = np.hypot(at[:, 0] - u / depth, at[:, 1] - v / depth)
-    # A step of 0.17 m moves the pixel by up to f sqrt(1 + (X^2 + Y^2) / Z^2) 0.17 / Z; the root is below 1.4 in the image.
+    # 0.17 m move the pixel by at most f sqrt(1 + (X^2 + Y^2) / Z^2) 0.17 / Z, and the root is below 1.4 in the image.
     assert (off[seen] < 1.4 * calibration.K_cam2[0, 0] * np.sqrt(3) * 0.1 / depth[seen]).all()
