@@ -16,7 +16,7 @@ from semgrid_edu.plotting.colours import (
     velocity_colours,
 )
 from semgrid_edu.plotting.grids import grid_labels, grid_values, label_maps, occupancy, velocity, velocity_arrows
-from semgrid_edu.plotting.images import image_labels, image_values, points_on_image
+from semgrid_edu.plotting.images import image_labels, image_values, plane_on_image, points_on_image
 from semgrid_edu.plotting.legends import class_legend
 from semgrid_edu.plotting.lines import belief_history, probability_line, probability_lines, state_history
 from semgrid_edu.plotting.motion import (
@@ -46,6 +46,7 @@ __all__ = [
     "occupancy",
     "occupancy_colours",
     "particles",
+    "plane_on_image",
     "points_on_image",
     "probability_line",
     "probability_lines",

@@ -1,4 +1,4 @@
-"""What lives in the camera image: LIDAR points by depth, label overlays, scores (eq. (1), section 3.1)."""
+"""What lives in the camera image: LIDAR points and planes by depth, labels, scores (eq. (1), section 3.1)."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from semgrid_edu.camera import project, transform_points
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
+from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.plotting.colours import DEPTH_RANGE, depth_colours
 from semgrid_edu.plotting.legends import class_legend
@@ -40,6 +41,46 @@ def points_on_image(frame: Frame, ax: Axes | None = None, size: float = 3.0, col
     """
     ax = draw_image(frame.need_image(), ax)
     pixels, depth = visible_points(frame)
+    return _draw_by_depth(pixels, depth, ax, size, colour_bar)
+
+
+def plane_on_image(
+    spec: GridSpec, height: float, frame: Frame, ax: Axes | None = None, size: float = 3.0, colour_bar: bool = True
+) -> Axes:
+    """Draw the camera image with the cells of the grid, lifted to a height, where equation (1) puts their centres.
+
+    Parameters
+    ----------
+    spec : GridSpec
+    height : float
+        delta_d, metres above the ground.
+    frame : Frame
+        With an image.
+    ax : Axes, optional
+        Where to draw; a new figure when left out.
+    size : float
+        Of a point, points squared.
+    colour_bar : bool
+        Whether to explain the colours, in metres; they are those of `points_on_image`.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ArgumentError
+        When the frame has no image.
+    """
+    ax = draw_image(frame.need_image(), ax)
+    centers = np.dstack([spec.centers(), np.full(spec.shape, height)])
+    points_camera = transform_points(frame.camera.T_camera_from_grid, centers)
+    pixels, visible = project(points_camera, frame.camera)
+    return _draw_by_depth(pixels[visible], points_camera[visible, 2], ax, size, colour_bar)
+
+
+def _draw_by_depth(pixels: NDArray, depth: NDArray, ax: Axes, size: float, colour_bar: bool) -> Axes:
+    """Add points to a picture, (N, 2) pixels, coloured by their depth, (N,) metres."""
     ax.scatter(*pixels.T, s=size, c=depth_colours(depth) / 255, linewidths=0)
     if colour_bar:
         mapping = ScalarMappable(LogNorm(*DEPTH_RANGE), "plasma_r")
