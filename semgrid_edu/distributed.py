@@ -1,6 +1,7 @@
 """One training in several processes, each with its share of every batch (section 4.1)."""
 
 import os
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import timedelta
@@ -122,7 +123,9 @@ def in_parallel(module: nn.Module, some_unused: bool) -> nn.Module:
     """
     if world_size() == 1:
         return module
-    return DistributedDataParallel(module, find_unused_parameters=some_unused, broadcast_buffers=False)
+    with warnings.catch_warnings():  # PyTorch 2.13 has a new name for `broadcast_buffers`, which 2.6 doesn't know
+        warnings.simplefilter("ignore", FutureWarning)
+        return DistributedDataParallel(module, find_unused_parameters=some_unused, broadcast_buffers=False)
 
 
 @contextmanager

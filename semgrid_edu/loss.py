@@ -136,8 +136,10 @@ class Objective(nn.Module):
 
         With several processes, whose mean is taken, the lower sum is over the batches of all of them.
         """
-        scores = (image_scores if self.stage == "image" else grid_logits)(self.net, batch).float()
+        scores = (image_scores if self.stage == "image" else grid_logits)(self.net, batch)
+        scores = scores.to(torch.promote_types(scores.dtype, torch.float32))  # of mixed precision
+        alpha = self.alpha.to(scores)
         truth = getattr(batch.frames, TRUTH[self.stage]).long()
-        weights = process_total(self.alpha[truth[truth != IGNORE]].sum())
-        losses = F.cross_entropy(scores, truth, weight=self.alpha, ignore_index=IGNORE, reduction="sum")
+        weights = process_total(alpha[truth[truth != IGNORE]].sum())
+        losses = F.cross_entropy(scores, truth, weight=alpha, ignore_index=IGNORE, reduction="sum")
         return world_size() * losses / weights

@@ -3,26 +3,20 @@ from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 import torch
 import torch.nn.functional as F
 from safetensors.torch import load_file, save_file
 from sklearn.metrics import accuracy_score
+from tiny_streets import CAMERA, SMALL, tiny_streets
 
 from semgrid_edu import checkpoint, training
 from semgrid_edu.batches import Batch, draw_batch, grid_logits, image_scores
-from semgrid_edu.camera import Camera
-from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import KITTI_14
 from semgrid_edu.loss import median_frequency_weights
-from semgrid_edu.networks import Architecture, build_net
-from semgrid_edu.planes import plane_pixels
+from semgrid_edu.networks import build_net
 from semgrid_edu.training import TrainingParams, train
 
-SMALL = Architecture(image_size=(24, 80), grid=GridSpec(2, 26, -6, 6, 1.0), heights=(0.0, 0.5, 1.0))
 QUICK = TrainingParams(image_iterations=3, grid_iterations=4, batch_size=2)
 
 
@@ -37,34 +31,12 @@ def _one_thread():
 
 @pytest.fixture(scope="module")
 def camera():
-    K = np.array([[721.5, 0, 609.6], [0, 721.5, 172.9], [0, 0, 1]])
-    T_camera_from_lidar = np.array([[0, -1, 0, 0.06], [0, 0, -1, -0.08], [1, 0, 0, -0.27], [0, 0, 0, 1]])
-    return Camera(K, T_camera_from_lidar, (375, 1242))
-
-
-def _street(camera, seed):
-    """A flat street in blocks of three colours, one a class, as the camera sees it and as it is."""
-    rng = np.random.default_rng(seed)
-    spec, size = SMALL.grid, SMALL.image_size
-    blocks = rng.integers(0, 3, (4, 2)).astype(np.uint8)
-    truth = np.kron(blocks, np.ones((6, 6), dtype=np.uint8))
-    fine = GridSpec(spec.x_min, spec.x_max, spec.y_min, spec.y_max, 0.05)
-    pixels, visible = plane_pixels(fine, [0.0], camera.resized(size))
-    labels = np.full(size, KITTI_14.index("sky"), dtype=np.uint8)
-    rows, cols, _ = spec.cells(fine.centers()[visible[0]])
-    u, v = np.rint(pixels[visible]).astype(int).T
-    labels[v, u] = truth[rows, cols]
-    seen = plane_pixels(spec, [0.0], camera.resized(size))[1][0]
-    truth[~seen] = KITTI_14.index("unknown-unobserved")
-    occupancy = np.where(seen, 1.0, 0.0)
-    planes = np.stack([occupancy, 0 * occupancy, 0 * occupancy, 1 - occupancy]).astype(np.float32)
-    image = KITTI_14.colours(labels).transpose(2, 0, 1)
-    return Sample(*map(torch.from_numpy, (image.copy(), labels, planes, truth)))
+    return CAMERA
 
 
 @pytest.fixture(scope="module")
-def streets(camera):
-    return [_street(camera, seed) for seed in range(4)]
+def streets():
+    return tiny_streets()
 
 
 # Batches
