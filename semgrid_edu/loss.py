@@ -108,9 +108,18 @@ def class_weights(dataset: Sequence[Sample], stage: str, n_classes: int, limit: 
     Returns
     -------
     (C,) float32
+
+    Raises
+    ------
+    ArgumentError
+        When nothing is labelled, or with something else than classes.
     """
     maps = (getattr(sample, TRUTH[stage]).numpy() for sample in dataset)
-    return torch.from_numpy(median_frequency_weights(maps, n_classes, limit)).float()
+    try:
+        return torch.from_numpy(median_frequency_weights(maps, n_classes, limit)).float()
+    except ArgumentError as error:
+        _, expected, found = error.args
+        raise ArgumentError(f"{TRUTH[stage]} of the dataset", expected, found) from None
 
 
 class Objective(nn.Module):

@@ -102,7 +102,7 @@ def begin_log(path: Path, start: int) -> None:
     if start:
         lines = path.read_text(encoding="utf-8").splitlines(keepends=True)[: start + 1] if path.exists() else []
         if len(lines) <= start or not lines[-1].endswith("\n"):
-            raise DataError(path, f"the {start} steps that the checkpoint continues", f"{max(len(lines) - 1, 0)}")
+            raise DataError(path, f"the {start} steps that the checkpoint continues", max(len(lines) - 1, 0) or "none")
     write_text(path, "".join(lines))
 
 

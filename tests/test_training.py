@@ -1,4 +1,4 @@
-import csv
+import resource
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -14,9 +14,11 @@ from semgrid_edu import checkpoint, training
 from semgrid_edu.batches import Batch, draw_batch, grid_logits, image_scores
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.loss import median_frequency_weights
-from semgrid_edu.networks import build_net
+from semgrid_edu.networks import SEGMENTERS, build_net
 from semgrid_edu.training import TrainingParams, train
+from semgrid_edu.training_log import read_log
 
+ENDED = {"image_stage.safetensors", "log.csv", "weights.safetensors"}
 QUICK = TrainingParams(image_iterations=3, grid_iterations=4, batch_size=2)
 
 
@@ -110,6 +112,33 @@ def test_two_stages_leave_the_image_network_as_it_was(camera, streets, tmp_path,
     assert not any(kept[name] for name in kept if name.startswith("fusion") and name.endswith("weight"))
 
 
+def test_what_learnt_before_learns_after(camera, streets, tmp_path):
+    """Two-stage training stops the image network for a while; what the caller stopped stays so."""
+    net = build_net(SMALL, camera)
+    stopped = net.fusion.reduce[0].weight.requires_grad_(False)
+    before = stopped.clone()
+    train(net, streets, tmp_path, replace(QUICK, end_to_end=False))
+    assert [parameter for parameter in net.parameters() if not parameter.requires_grad] == [stopped]
+    assert torch.equal(stopped, before)
+    assert not any(module.training for module in net.modules())
+
+
+@pytest.mark.parametrize("segmenter", SEGMENTERS)
+def test_mixed_precision_learns_too(camera, streets, tmp_path, monkeypatch, segmenter):
+    """What a GPU does, on the CPU: convolutions in bfloat16, weights and loss in float32."""
+    monkeypatch.setattr(training, "mixed_precision", lambda device: torch.autocast(device.type, torch.bfloat16))
+    net, types = build_net(replace(SMALL, segmenter=segmenter), camera), set()
+    net.sampler.register_forward_hook(lambda _, scores, planes: types.update((scores[0].dtype, planes.dtype)))
+    train(net, streets, tmp_path, TrainingParams(10, 15, batch_size=4, learning_rate=0.1))
+    log = read_log(tmp_path / "log.csv")
+    for stage in ("image", "grid"):
+        loss = log.loss[log.stage == stage]
+        assert loss[-1] < 0.6 * loss[0]
+    # DeepLab ends with an interpolation, which is float32 on a CPU.
+    assert types == {torch.float32 if segmenter == "deeplab" else torch.bfloat16}
+    assert {parameter.dtype for parameter in net.parameters()} == {torch.float32}
+
+
 def test_the_first_losses_are_those_of_the_definition(camera, streets, tmp_path):
     """Weighted cross-entropy over labelled pixels, written out."""
     net = build_net(SMALL, camera)
@@ -122,19 +151,19 @@ def test_the_first_losses_are_those_of_the_definition(camera, streets, tmp_path)
     chosen = log_p.gather(1, labels.long()[:, None])[:, 0]
     expected = -(weight * chosen).sum() / weight.sum()
     train(build_net(SMALL, camera), streets, tmp_path, QUICK)
-    first = next(csv.DictReader((tmp_path / "log.csv").read_text().splitlines()))
-    assert float(first["loss"]) == pytest.approx(expected.item(), rel=1e-4)
+    first = read_log(tmp_path / "log.csv").loss[0]
+    assert first == pytest.approx(expected.item(), rel=1e-4)
 
 
 class _KilledError(Exception):
     pass
 
 
-class _KilledIn:
-    """Streets that can be read so many times before the power fails."""
+class _Watched:
+    """Streets, and what happens as they are read: `event` gets how many reads are left."""
 
-    def __init__(self, streets, reads):
-        self.streets, self.reads = streets, reads
+    def __init__(self, streets, reads, event):
+        self.streets, self.reads, self.event = streets, reads, event
 
     def __len__(self):
         return len(self.streets)
@@ -142,10 +171,21 @@ class _KilledIn:
     def __getitem__(self, k):
         if k >= len(self.streets):
             raise IndexError(k)
+        self.event(self.reads)
         self.reads -= 1
-        if self.reads < 0:
-            raise _KilledError
         return self.streets[k]
+
+
+def _kill(reads):
+    """The power fails."""
+    if reads == 0:
+        raise _KilledError
+
+
+def _same_files(first, second):
+    assert {path.name for path in first.iterdir()} == {path.name for path in second.iterdir()} == ENDED
+    for name in ENDED:
+        assert (first / name).read_bytes() == (second / name).read_bytes(), name
 
 
 @pytest.mark.parametrize("steps_before_the_kill", [2, 5])
@@ -155,13 +195,10 @@ def test_a_resumed_run_ends_with_the_same_bytes(camera, streets, tmp_path, monke
     train(build_net(SMALL, camera, seed=1), streets, whole, QUICK, seed=1)
     reads = 3 * len(streets) + QUICK.batch_size * steps_before_the_kill  # check, weights of two stages, steps
     with pytest.raises(_KilledError):
-        train(build_net(SMALL, camera, seed=1), _KilledIn(streets, reads), broken, QUICK, seed=1)
+        train(build_net(SMALL, camera, seed=1), _Watched(streets, reads, _kill), broken, QUICK, seed=1)
     assert (broken / "checkpoint.safetensors").exists()
     train(build_net(SMALL, camera, seed=9), streets, broken, QUICK, seed=1, resume=True)
-    names = {"image_stage.safetensors", "log.csv", "weights.safetensors"}
-    assert {path.name for path in whole.iterdir()} == {path.name for path in broken.iterdir()} == names
-    for name in names:
-        assert (whole / name).read_bytes() == (broken / name).read_bytes(), name
+    _same_files(whole, broken)
 
 
 def test_another_seed_gives_other_weights(camera, streets, tmp_path):
@@ -188,9 +225,26 @@ def test_frames_that_do_not_fit_are_refused(camera, streets, tmp_path):
         train(net, cut, tmp_path, QUICK)
     with pytest.raises(ArgumentError, match="at least one batch of 2 frames, found 1 frames"):
         train(net, streets[:1], tmp_path, QUICK)
-    wrong = [sample._replace(truth=torch.full_like(sample.truth, 77)) for sample in streets]
-    with pytest.raises(ArgumentError, match=r"classes 0..13 or 255, found 77..77"):
-        train(net, wrong, tmp_path, QUICK)
+    cut = [*streets[:3], streets[3]._replace(truth=streets[3].truth[:, :2])]
+    with pytest.raises(ArgumentError, match=r"truth of shape \(24, 12\), found \(24, 2\) in frame 3"):
+        train(net, cut, tmp_path, QUICK)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("field", ["labels", "truth"])
+def test_wrong_labels_are_refused(camera, streets, tmp_path, field):
+    wrong = [*streets[:2], streets[2]._replace(**{field: torch.full_like(getattr(streets[2], field), 77)})]
+    message = f"{field} of the dataset: expected classes 0..13 or 255, found 77..77 in map 2"
+    with pytest.raises(ArgumentError, match=message):
+        train(build_net(SMALL, camera), wrong, tmp_path, QUICK)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_network_that_could_not_be_saved_is_not_trained(camera, streets, tmp_path):
+    net = build_net(SMALL, camera)
+    del net.architecture
+    with pytest.raises(ArgumentError, match="net: expected a network of build_net"):
+        train(net, streets, tmp_path, QUICK)
 
 
 def _checkpoint(camera, path, run=None):
@@ -203,7 +257,7 @@ def _killed(camera, streets, folder, monkeypatch, architecture=SMALL):
     monkeypatch.setattr(training, "CHECKPOINT_EVERY", 2)
     reads = 3 * len(streets) + 3 * QUICK.batch_size
     with pytest.raises(_KilledError):
-        train(build_net(architecture, camera), _KilledIn(streets, reads), folder, QUICK)
+        train(build_net(architecture, camera), _Watched(streets, reads, _kill), folder, QUICK)
 
 
 def test_only_its_own_run_is_resumed(camera, streets, tmp_path, monkeypatch):
@@ -229,6 +283,32 @@ def test_no_training_is_overwritten(camera, streets, tmp_path, monkeypatch):
         with pytest.raises(DataError, match=r"a trained network, which would be lost, found weights.safetensors"):
             train(build_net(SMALL, camera), streets, tmp_path, QUICK, resume=resume)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_full_disk_keeps_the_checkpoint_before(camera, streets, tmp_path, monkeypatch):
+    """A limit to the size of files does what a full disk does: the system refuses to write on."""
+    monkeypatch.setattr(training, "CHECKPOINT_EVERY", 2)
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    path, hard = broken / "checkpoint.safetensors", resource.getrlimit(resource.RLIMIT_FSIZE)[1]
+    train(build_net(SMALL, camera), streets, whole, QUICK)
+
+    def fill(reads):
+        if reads == 0:  # in the third step, after the first checkpoint
+            kept.append(path.read_bytes())
+            resource.setrlimit(resource.RLIMIT_FSIZE, (len(kept[0]), hard))
+
+    kept = []
+    watched = _Watched(streets, 3 * len(streets) + 2 * QUICK.batch_size, fill)
+    try:
+        with pytest.raises(OSError, match="File too large") as caught:
+            train(build_net(SMALL, camera), watched, broken, QUICK)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
+    assert caught.value.filename == str(path)
+    assert path.read_bytes() == kept[0]
+    assert {p.name for p in broken.iterdir()} == {path.name, "image_stage.safetensors", "log.csv"}
+    train(build_net(SMALL, camera), streets, broken, QUICK, resume=True)
+    _same_files(whole, broken)
 
 
 def test_a_missing_or_damaged_checkpoint_is_named(camera, streets, tmp_path):
