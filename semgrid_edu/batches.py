@@ -30,7 +30,9 @@ class Batch(NamedTuple):
         return x.flip(-1) if self.mirrored else x
 
 
-def draw_batch(dataset: Sequence[Sample], size: int, jitter: float, iteration: int, seed: int) -> Batch:
+def draw_batch(
+    dataset: Sequence[Sample], size: int, jitter: float, iteration: int, seed: int, mirror: bool = True
+) -> Batch:
     """Return the frames of a step: each pass over the data takes them in a new order, whole batches only.
 
     Parameters
@@ -43,6 +45,8 @@ def draw_batch(dataset: Sequence[Sample], size: int, jitter: float, iteration: i
     iteration : int
         Number of the step; with the seed, it decides everything.
     seed : int
+    mirror : bool
+        Whether half of the batches are to be seen in a mirror.
 
     Returns
     -------
@@ -55,7 +59,7 @@ def draw_batch(dataset: Sequence[Sample], size: int, jitter: float, iteration: i
     rng = np.random.default_rng((seed, 1, iteration))
     contrast, brightness = rng.uniform(-jitter, jitter, (2, size, 1, 1, 1)).astype(np.float32)
     image = (frames.image / 255 - 0.5) * (1 + torch.from_numpy(contrast)) + 0.5 + torch.from_numpy(brightness)
-    return Batch(frames._replace(image=image.clamp(0, 1)), mirrored=bool(rng.random() < 0.5))
+    return Batch(frames._replace(image=image.clamp(0, 1)), mirrored=mirror and bool(rng.random() < 0.5))
 
 
 def share_of_batch(batch: Batch, process: int, n_processes: int, device: torch.device | str) -> Batch:

@@ -52,6 +52,8 @@ class TrainingParams:
     end_to_end : bool
         Whether the grid teaches the image network too. If not, training has two separate stages, as in the
         authors' earlier work: the image network stays as the first one left it.
+    mirror : bool
+        Whether every other batch, by chance, is seen in a mirror: streets are as likely to be the other way round.
     """
 
     image_iterations: int = 2000
@@ -62,6 +64,7 @@ class TrainingParams:
     weight_limit: float = 4.0
     jitter: float = 0.2
     end_to_end: bool = True
+    mirror: bool = True
 
     @property
     def iterations(self) -> int:
@@ -135,7 +138,7 @@ def train(
             stage, optimiser.param_groups[0]["lr"] = params.stage(iteration)
             if iteration in (start, params.image_iterations):
                 objective = _objective(net, stage, alpha[stage].to(device), params.end_to_end)
-            batch = draw_batch(dataset, params.batch_size, params.jitter, iteration, seed)
+            batch = draw_batch(dataset, params.batch_size, params.jitter, iteration, seed, params.mirror)
             loss = _learn(objective, optimiser, share_of_batch(batch, rank(), world_size(), device), device)
             step = Step(iteration, stage, optimiser.param_groups[0]["lr"], loss)
             _check_finite(step, params.learning_rate)
