@@ -4,14 +4,12 @@ The street is made up: classes in patches, noisy network scores, occupancy state
 libraries take turns, so that a busy machine slows both; the best of the rounds counts.
 """
 
-import time
-from collections.abc import Callable
-
 import numpy as np
 import pydensecrf.densecrf as densecrf
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 from scipy.special import softmax
+from timing import best_times
 
 from semgrid_edu.crf import CrfParams, mean_field, mean_field_naive, unary_from_probability
 from semgrid_edu.grid import GridSpec
@@ -50,17 +48,6 @@ def partner(unary: NDArray, values: NDArray, params: CrfParams, iterations: int 
             normalization=densecrf.NORMALIZE_SYMMETRIC,
         )
     return np.asarray(crf.inference(iterations)).reshape(unary.shape)
-
-
-def best_times(functions: list[Callable], rounds: int) -> list[float]:
-    """Call the functions in turn; return each one's shortest time, in milliseconds."""
-    times = np.empty((rounds, len(functions)))
-    for row in times:
-        for i, function in enumerate(functions):
-            start = time.perf_counter()
-            function()
-            row[i] = 1e3 * (time.perf_counter() - start)
-    return list(times.min(axis=0))
 
 
 def main() -> None:

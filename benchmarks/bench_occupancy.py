@@ -9,7 +9,8 @@ import sys
 import time
 import timeit
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -71,28 +72,35 @@ def step_times(drive: Drive, spec: GridSpec, particles: int, passes: int = 9) ->
     """Return the milliseconds of a whole step and of its parts, medians over the drive after a pass to warm up."""
     tracker = Cmcdot(spec, replace(CmcdotParams(), particles=particles))
     spent, rows = defaultdict(float), []
-    originals = {name: getattr(cmcdot, name) for name in PARTS}
-    for name, part in PARTS.items():
-        setattr(cmcdot, name, stopwatch(originals[name], part, spent))
-    try:
+    with stopwatches(spent, time.process_time):
         for points, motion in drive * passes:
             spent.clear()
-            stopwatch(tracker.step, WHOLE, spent)(points, motion, LIDAR_PERIOD)
+            stopwatch(tracker.step, WHOLE, spent, time.process_time)(points, motion, LIDAR_PERIOD)
             rows.append([spent[name] for name in (WHOLE, *dict.fromkeys(PARTS.values()))])
-    finally:
-        for name, original in originals.items():
-            setattr(cmcdot, name, original)
     fastest = np.reshape(rows, (passes, len(drive), -1))[1:].min(axis=0)
     return dict(zip((WHOLE, *dict.fromkeys(PARTS.values())), 1e3 * np.median(fastest, axis=0), strict=True))
 
 
-def stopwatch(function: Callable, part: str, spent: dict[str, float]) -> Callable:
+@contextmanager
+def stopwatches(spent: dict[str, float], clock: Callable[[], float]) -> Iterator[None]:
+    """Time the parts of every step that is made inside, adding up the seconds of each."""
+    originals = {name: getattr(cmcdot, name) for name in PARTS}
+    for name, part in PARTS.items():
+        setattr(cmcdot, name, stopwatch(originals[name], part, spent, clock))
+    try:
+        yield
+    finally:
+        for name, original in originals.items():
+            setattr(cmcdot, name, original)
+
+
+def stopwatch(function: Callable, part: str, spent: dict[str, float], clock: Callable[[], float]) -> Callable:
     """Return the function, that then adds the seconds it takes to a part's."""
 
     def timed(*arguments):
-        start = time.process_time()
+        start = clock()
         result = function(*arguments)
-        spent[part] += time.process_time() - start
+        spent[part] += clock() - start
         return result
 
     return timed

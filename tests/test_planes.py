@@ -81,11 +81,15 @@ def test_points_behind_the_camera_are_not_visible():
     assert np.isnan(pixels[0, 4:]).all()
 
 
-def test_the_image_border_is_the_centre_of_its_last_pixels():
-    # At 10 m, u = 100 - 10 y: y = 10 m is the first column, y = -10 m the last one.
-    for y, inside in ((10.0, True), (-10.0, True), (10.01, False), (-10.01, False)):
-        spec = GridSpec(x_min=9.5, x_max=10.5, y_min=y - 0.5, y_max=y + 0.5, cell=1.0)
-        assert plane_pixels(spec, [1.0], _camera())[1].item() is inside
+@pytest.mark.parametrize(
+    ("y", "height"), [(10.0, 1.0), (-10.0, 1.0), (0.0, 6.0), (0.0, -4.0)], ids=["left", "right", "top", "bottom"]
+)
+def test_the_image_border_is_the_centre_of_its_last_pixels(y, height):
+    # At 10 m, u = 100 - 10 y and v = 60 - 10 delta: the cases are the first and last column and row of 101 x 201.
+    for beyond, inside in ((1.0, True), (1.001, False)):
+        left, up = y * beyond, 1 + (height - 1) * beyond
+        spec = GridSpec(x_min=9.5, x_max=10.5, y_min=left - 0.5, y_max=left + 0.5, cell=1.0)
+        assert plane_pixels(spec, [up], _camera())[1].item() is inside
 
 
 @pytest.mark.parametrize("ahead", [1e-9, 0.0, -0.0, -1e-9, -2.0])

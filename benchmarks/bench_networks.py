@@ -1,0 +1,71 @@
+"""Time the compact networks on the shipped frames, learning and inferring: `python benchmarks/bench_networks.py`.
+
+A training step is a whole turn of `train`'s loop: a batch of six frames drawn and jittered, forward, backward, weights
+changed, loss logged. Inference is a frame from image and occupancy grid to logits.
+"""
+
+import io
+import tempfile
+import time
+from contextlib import redirect_stderr
+
+import numpy as np
+import torch
+from timing import best_times
+
+from semgrid_edu.datasets.samples import sample_drive, sample_frames
+from semgrid_edu.datasets.training_set import Sample
+from semgrid_edu.memory import keep_freed_memory
+from semgrid_edu.networks import SEGMENTERS, Architecture, SemanticGridNet, build_net
+from semgrid_edu.training import TrainingParams, train
+
+STEPS, WARM_UP, ROUNDS = 30, 3, 30
+"""Of each stage; those before the times count; calls of inference."""
+
+
+class ReadingFrames(list[Sample]):
+    """Frames that note when each is read. A step reads each of the six once, as the first thing it does."""
+
+    def __init__(self, frames: list[Sample]) -> None:
+        super().__init__(frames)
+        self.read_at: list[float] = []
+
+    def __getitem__(self, index: int) -> Sample:
+        self.read_at.append(time.perf_counter())
+        return super().__getitem__(index)
+
+
+def step_times(net: SemanticGridNet) -> tuple[np.ndarray, np.ndarray]:
+    """Return the milliseconds of the steps of both stages, image and grid."""
+    frames = ReadingFrames(sample_frames())
+    params = TrainingParams(image_iterations=STEPS, grid_iterations=STEPS, batch_size=len(frames))
+    with tempfile.TemporaryDirectory() as folder, redirect_stderr(io.StringIO()):
+        train(net, frames, folder, params)
+    starts = np.array(frames.read_at)[-2 * STEPS * len(frames) :: len(frames)]  # before the loop, train looks at one
+    steps = 1e3 * np.diff(starts)
+    return steps[WARM_UP : STEPS - 1], steps[STEPS + WARM_UP :]
+
+
+def inference_time(net: SemanticGridNet) -> float:
+    """Return the milliseconds from image and occupancy grid to logits."""
+    frame = sample_frames()[0]
+    image, occupancy = frame.image[None] / 255, frame.occupancy[None]
+    with torch.inference_mode():
+        return best_times([lambda: net(image, occupancy)], ROUNDS)[0]
+
+
+def main() -> None:
+    keep_freed_memory()
+    camera = sample_drive().camera
+    print("compact       parameters               step, ms: median (fastest)        inference")
+    print("network      image     fusion          image stage      grid stage       ms a frame")
+    for name in SEGMENTERS:
+        net = build_net(Architecture(name), camera)
+        image, grid = step_times(net)
+        sizes = [sum(p.numel() for p in part.parameters()) for part in (net.segmenter, net.fusion)]
+        steps = "".join(f"{np.median(stage):10.0f} ({stage.min():3.0f})" for stage in (image, grid))
+        print(f"{name:8} {sizes[0]:10,} {sizes[1]:10,} {steps} {inference_time(net):14.1f}")
+
+
+if __name__ == "__main__":
+    main()
