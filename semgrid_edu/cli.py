@@ -225,6 +225,21 @@ def two_stage(
     typer.echo(f"{table(result['scores'])}\n\nwritten to {out}")
 
 
+@reproduce.command()
+def overfit(
+    seed: Annotated[int, typer.Option(min=0, help="Of the initial weights.")] = 0,
+    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("overfit.json"),
+) -> None:
+    """Learn four frames by heart with each image network (lecture 08)."""
+    from semgrid_edu.experiments.overfit import overfit, table
+    from semgrid_edu.files import check_writable, write_json
+
+    check_writable(out)
+    result = overfit(seed)
+    write_json(out, result)
+    typer.echo(f"{table(result['networks'])}\n\nwritten to {out}")
+
+
 def _report(problems: list[str], sound: str) -> None:
     """Say what is wrong, each problem on its line, and exit with 1; or that nothing is."""
     if problems:
