@@ -45,7 +45,7 @@ from semgrid_edu.networks import load_net
 from semgrid_edu.pipeline import network_image
 from semgrid_edu.planes import PlaneSampler, plane_heights, plane_pixels, sample_planes_naive
 
-plt.rcParams["figure.dpi"] = 80
+plt.rcParams["figure.dpi"] = 72
 torch.set_num_threads(1)
 
 # %% [markdown]
@@ -163,9 +163,9 @@ fig, axes = plt.subplots(1, 3, figsize=(10, 3.6), layout="constrained")
 for ax, ahead in zip(axes, (8, 20, 45), strict=True):
     (row,), (col,), _ = spec.cells(np.array([[ahead, -0.2]]))
     u, v = pixels[0, row, col]
-    ax.imshow(image)
+    ax.imshow(image, interpolation="nearest")
     ax.plot(*pixels[0][visible[0]].T, ".", color="yellow", markersize=4)
-    ax.set(xlim=(u - 9.5, u + 9.5), ylim=(v + 6.5, v - 6.5), title=f"{ahead} m ahead", xlabel="u [pixels]")
+    ax.set(xlim=(u - 12.5, u + 12.5), ylim=(v + 8.5, v - 8.5), title=f"{ahead} m ahead", xlabel="u [pixels]")
 axes[0].set_ylabel("v [pixels]")
 plt.show()
 
@@ -244,17 +244,17 @@ sampler = PlaneSampler(pixels, visible, camera.size)
 scores = torch.zeros(1, 1, *camera.size, requires_grad=True)
 sampler(scores).sum().backward()
 voice = np.ma.masked_equal(scores.grad[0, 0].numpy(), 0)
-fig, axes = plt.subplots(2, 1, figsize=(8, 5), layout="constrained")
-plotting.image_values(voice, "points read", ax=axes[0], norm=LogNorm(0.1, 1000), cmap="viridis")
-axes[1].imshow(image)
-axes[1].set(xticks=[], yticks=[])
+_, ax = plt.subplots(figsize=(8, 2.5), layout="constrained")
+style = {"norm": LogNorm(0.1, 1000), "cmap": "viridis", "interpolation": "nearest"}
+plotting.image_values(voice, "sum of weights", ax=ax, **style)
 plt.show()
 print(f"{100 * voice.mask.mean():.0f} % of the pixels are read by no point, so they never learn from the map")
 
 # %% [markdown]
-# White pixels have no voice. They lie at the lower and the upper border, where the points of the grid nearest to the
-# vehicle go, and fall so far apart that they miss most pixels. Along the horizon a pixel answers for a hundred points,
-# near the vehicle for less than one: what the network learns from the map, it learns mostly in the middle.
+# The frame is the image's; white pixels have no voice. They lie at the lower and the upper border, where the points
+# nearest to the vehicle go, and fall so far apart that they miss most pixels. Along the horizon a pixel answers for a
+# hundred points, near the vehicle for less than one: what the network learns from the map, it learns mostly in the
+# middle.
 #
 # ## The whole of equation (2) is one matrix
 #
@@ -292,8 +292,8 @@ A = matrix_of(three, s.shape)
 np.testing.assert_allclose(A @ s.ravel(), [read(s, u, v) for u, v in three])
 np.testing.assert_allclose(A.T @ p_bar, give_back(p_bar, three, s.shape).ravel())
 rng = np.random.default_rng(0)
-x, y = rng.normal(size=9), rng.normal(size=3)
-np.testing.assert_allclose(y @ (A @ x), (A.T @ y) @ x)
+some_s, some_p_bar = rng.normal(size=9), rng.normal(size=3)
+np.testing.assert_allclose(some_p_bar @ (A @ some_s), (A.T @ some_p_bar) @ some_s)
 print(f"p_bar . (A s) = {p_bar @ (A @ s.ravel()):.3f},  (A^T p_bar) . s = {(A.T @ p_bar) @ s.ravel():.3f}")
 
 # %%
@@ -309,16 +309,16 @@ axes[1].set_title("transposed: blame to pixels", fontsize="medium")
 plt.show()
 
 # %% [markdown]
-# Left: at most four weights a row, wherever the point lies. Right: a row may have none (pixel 2 has one, pixels 3 and 6
-# none) or any number of them. That is why the usual backward pass *scatters*: each point adds its blame to four pixels,
-# and points that share a pixel must wait for each other. Build the transpose once, and each pixel *gathers* from its
-# readers instead. `PlaneSampler` is that: two sparse matrices, built once for a calibration, and the same fast product
-# for both directions.
+# Left: at most four weights a row, wherever the point lies. Right: a row may have none (pixels 3, 6 and 8) or any
+# number of them. That is why the usual backward pass *scatters*: each point adds its blame to four pixels, and points
+# that share a pixel must wait for each other. Build the transpose once, and each pixel *gathers* from its readers
+# instead. `PlaneSampler` is that: two sparse matrices, built once for a calibration, and the same fast product for both
+# directions.
 #
 # On the drive: twenty planes of 142 x 62 cells, 96 x 320 pixels.
 
 # %%
-n_points, n_pixels, weights = visible.size, np.prod(camera.size), 4 * visible.sum()
+n_points, n_pixels = visible.size, np.prod(camera.size)
 bytes_sparse = sum(buffer.nbytes for buffer in sampler.buffers())
 print(f"A: {n_points:,} x {n_pixels:,}, {100 * visible.mean():.0f} % of its rows have weights")
 print(
@@ -333,10 +333,11 @@ with torch.inference_mode():
 some = np.s_[:, ::10, ::10]  # the literal twin takes its time: every tenth row and column of cells
 literal = sample_planes_naive(scores[0].numpy(), pixels[some], visible[some])
 np.testing.assert_allclose(planes[:, *some], literal, atol=1e-4)
-x, y = scores.clone().requires_grad_(), torch.from_numpy(rng.normal(size=(1, *planes.shape)).astype(np.float32))
-sampler(x).backward(y)
-forward, backward = (y[0].double().numpy() * planes).sum(), (x.grad.double() * scores).sum()
-np.testing.assert_allclose(forward, backward, atol=1e-6 * np.abs(y[0].numpy() * planes).sum())
+leaf = scores.clone().requires_grad_()
+blame = torch.from_numpy(rng.normal(size=(1, *planes.shape)).astype(np.float32))
+sampler(leaf).backward(blame)
+forward, backward = (blame[0].double().numpy() * planes).sum(), (leaf.grad.double() * scores).sum()
+np.testing.assert_allclose(forward, backward, atol=1e-6 * np.abs(blame[0].numpy() * planes).sum())
 print("fast == literal, and the transpose is the adjoint")
 
 
@@ -359,14 +360,14 @@ def seconds(run, repeats=5):
 
 last = np.array(camera.size)[::-1] - 1
 where = torch.from_numpy(np.where(visible[..., None], 2 * pixels / last - 1, -2)).float().reshape(1, 1, -1, 2)
-usual = F.grid_sample(x, where, align_corners=True)
+usual = F.grid_sample(leaf, where, align_corners=True)
 np.testing.assert_allclose(usual.detach().numpy().ravel(), planes.ravel(), atol=1e-3)
 slow = seconds(lambda: sample_planes_naive(scores[0].numpy(), pixels[some], visible[some]), repeats=1)
 slow *= visible.sum() / visible[some].sum()
 print(f"literal, forward: {slow:.0f} s; PlaneSampler, forward: {1000 * seconds(lambda: sampler(scores)):.0f} ms")
-scatter = seconds(lambda: F.grid_sample(x, where, align_corners=True).sum().backward())
+scatter = seconds(lambda: F.grid_sample(leaf, where, align_corners=True).sum().backward())
 print(f"there and back: grid_sample {1000 * scatter:.0f} ms", end=", ")
-print(f"PlaneSampler {1000 * seconds(lambda: sampler(x).sum().backward()):.0f} ms")
+print(f"PlaneSampler {1000 * seconds(lambda: sampler(leaf).sum().backward()):.0f} ms")
 
 # %% [markdown]
 # ## Pixels that learn from the map alone
@@ -404,17 +405,21 @@ on_road = heard & np.isin(true_labels, flat)
 print(f"of those on road and sidewalk {100 * (learnt == true_labels)[on_road].mean():.0f} % are right")
 
 # %%
-fig, axes = plt.subplots(2, 1, figsize=(9, 5.2), layout="constrained")
+fig, axes = plt.subplots(2, 1, figsize=(8, 4), layout="constrained")
 plotting.image_labels(image, learnt, KITTI_14, ax=axes[0], opacity=1).set_title("learnt from the map")
 plotting.image_labels(image, true_labels, KITTI_14, ax=axes[1]).set_title("truth, which nobody has shown to it")
+for ax in axes:
+    ax.images[0].set_interpolation("nearest")
+    ax.set_ylim(95.5, 35.5)
 plt.show()
 
 # %% [markdown]
-# Top: where the photograph shines through, nobody asked. The road and the kerbs are right, and no pixel was ever
-# labelled: this is end-to-end training in miniature. Wrong is what stands up. The right end of the fence is called
-# vegetation, and the posts of the sign sidewalk: from where the camera stands, the lawn and the pavement *behind* them
-# have the same pixels. With twenty planes, an occupancy grid and a network that shares its weights over all pixels, the
-# real training has a way out of both, dots and blame (lecture 08).
+# Top: where the photograph shines through, nobody asked. Nine in ten pixels on road and sidewalk are right, and none of
+# them was ever labelled: this is end-to-end training in miniature. (Most of the others lie at the foot of a car.) Wrong
+# is what stands up. The right end of the fence is called vegetation, and the post of the sign sidewalk: from where the
+# camera stands, the lawn and the pavement *behind* them have the same pixels. With twenty planes, an occupancy grid and
+# a network that shares its weights over all pixels, the real training has a way out of both, dots and blame (lecture
+# 08).
 
 # %% [markdown]
 # ## If the point moves: the gradient in u and v
@@ -719,7 +724,7 @@ print(f"a K that was multiplied, not resized: off by {np.abs(blind):.2f} pixels 
 # at 10, 30 and 60 m?
 #
 # <details><summary>Answer</summary>300 / 30.5 = 9.8, 300 / 10.5 = 28.6, 300 / 5.5 = 54.5 m: off by 0.2, 1.4 and 5.5
-# metres. Ten cells.</details>
+# metres. Eleven cells.</details>
 #
 # $$ Z = \frac{f_v\, z_\text{cam}}{v - c_v}, \qquad
 #    \left|\frac{\partial Z}{\partial v}\right| = \frac{Z^2}{f_v\, z_\text{cam}} $$
@@ -843,11 +848,11 @@ with torch.inference_mode():
     cars = torch.from_numpy(true_labels == car).float()[None, None]
     truly = sampler(cars)[0, 0].numpy()
 outline = (truth == car) & seen
-fig, axes = plt.subplots(2, 4, figsize=(9, 7.6), layout="compressed", sharex=True, sharey=True)
+fig, axes = plt.subplots(2, 4, figsize=(7.5, 6.4), layout="compressed", sharex=True, sharey=True)
 for column_axes, d in zip(axes.T, (0, 3, 6, 10), strict=True):
     for ax, values in zip(column_axes, (truly[d], on_planes[d]), strict=True):
         shown = np.where(visible[d], values, np.nan)
-        ax.imshow(shown, extent=(spec.y_max, spec.y_min, 0, 71), cmap="Blues", vmin=0, vmax=1)
+        ax.imshow(shown, extent=(spec.y_max, spec.y_min, 0, 71), cmap="Blues", vmin=0, vmax=1, interpolation="nearest")
         ax.contour(*spec.centers()[0, :, 1:].T, spec.centers()[:, 0, 0], outline, [0.5], colors="tab:red")
         ax.set_ylim(0, 45)
     column_axes[0].set_title(f"plane at {heights[d]:.1f} m", fontsize="medium")
