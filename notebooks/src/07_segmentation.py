@@ -48,6 +48,7 @@ from semgrid_edu.networks.imagenet import imagenet_tensors
 from semgrid_edu.plotting.images import draw_image
 
 plt.rcParams["figure.dpi"] = 72
+plt.rcParams["image.interpolation"] = "nearest"  # pixels stay pixels
 POLE, PEDESTRIAN = KITTI_14.index("signage"), KITTI_14.index("pedestrian")
 
 
@@ -187,15 +188,15 @@ def lead_of(c, scores):
     return scores[c] - others
 
 
-fig, axes = plt.subplots(3, 1, figsize=(7, 7.2), layout="compressed")
+fig, axes = plt.subplots(3, 1, figsize=(4.9, 5.2), layout="compressed")
 draw_image(images[8], ax=axes[0]).set_title("image i, frame 8")
 plotting.image_values(lead_of(POLE, s), "lead", ax=axes[1], cmap="PuOr_r", vmin=-4, vmax=4).set_title("lead of signage")
 draw_image(KITTI_14.colours(s.argmax(dim=0)), ax=axes[2]).set_title("the class with the largest score")
-plotting.class_legend(axes[2], KITTI_14, s.argmax(dim=0), loc="upper left", bbox_to_anchor=(0, -0.02), ncols=5)
+plotting.class_legend(axes[2], KITTI_14, s.argmax(dim=0), loc="upper left", bbox_to_anchor=(0, -0.02), ncols=4)
 plt.show()
 
 # %% [markdown]
-# In the middle, orange is where signage leads. There are a lamp post in this picture, right of the cyclist, and the
+# In the middle, orange is where signage leads. There is a lamp post in this picture, right of the cyclist, and the
 # thin post of a warning sign to its left. The network notices that something of the kind is there, and has no idea of
 # its outline; it takes two windows of the house for signs as well. Why thin things are so hard is the subject of this
 # lecture.
@@ -261,10 +262,10 @@ print("stride 2, the pole one pixel to the left:", convolve(moved, thin, stride=
 # %%
 grey = images[8].mean(axis=-1) / 255
 answer = F.conv2d(to_torch(grey), to_torch([[-1, 2, -1]] * 3), padding=1)[0, 0]
-fig, axes = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained")
+fig, axes = plt.subplots(1, 2, figsize=(6.5, 2.6), layout="constrained")
 draw_image(grey[:, 150:270], ax=axes[0], cmap="gray").set_title("part of frame 8, grey")
 plotting.image_values(answer[:, 150:270], "answer", ax=axes[1], cmap="PuOr_r", vmin=-1, vmax=1)
-axes[1].set_title("thin and bright orange, thin and dark violet")
+axes[1].set_title("thin: bright orange, dark violet")
 plt.show()
 
 # %% [markdown]
@@ -404,33 +405,33 @@ print("indices of the 4x4 map:", max_pool(by_hand)[1].tolist())
 # The indices cost two bits a window, no weights, and bring back exactly what max-pooling forgot. Note what they don't
 # bring back: whatever was second.
 #
-# The same on the drive: the channel of the trained SegNet, before its first pooling, that the post of the warning
-# sign in frame 0 stirs most. Once pooled, then brought back in two ways.
+# The same on the drive: two channels of the trained SegNet before its first pooling, at the warning sign of frame 0.
+# Pooled once, then brought back in two ways.
 
 # %%
 with torch.inference_mode():
     segnet = nets["segnet"]
     features = segnet.conv_deconv.encoder[0]((as_input(images[:1]) - segnet.mean) / segnet.std)
-rows, columns = slice(40, 76), slice(210, 246)  # the post is in column 227
-stirred = features[0, :, 50:75, 227].mean(dim=1) / features[0].mean(dim=(1, 2))
-channel = features[:, [stirred.argmax()]]
-pooled, indices = F.max_pool2d(channel, 2, return_indices=True)
-ways = {
-    "before pooling": channel,
-    "back, each to all four": F.interpolate(pooled, scale_factor=2),
-    "back, by the indices": F.max_unpool2d(pooled, indices, 2),
-}
-fig, axes = plt.subplots(1, 4, figsize=(10, 2.8), layout="constrained")
-draw_image(images[0][rows, columns], ax=axes[0]).set_title("part of frame 0")
-for ax, (name, part) in zip(axes[1:], ways.items(), strict=True):
-    draw_image(part[0, 0, rows, columns], ax=ax, cmap="magma", vmin=0, vmax=channel[0, 0, rows, columns].max())
+fig, axes = plt.subplots(2, 4, figsize=(9, 4.6), layout="constrained")
+sign, post = (14, slice(16, 44), slice(214, 242)), (6, slice(44, 72), slice(214, 242))  # channel, rows, columns
+for row, (number, rows, columns) in zip(axes, (sign, post), strict=True):
+    channel = features[:, [number]]
+    pooled, indices = F.max_pool2d(channel, 2, return_indices=True)
+    ways = (channel, F.interpolate(pooled, scale_factor=2), F.max_unpool2d(pooled, indices, 2))
+    draw_image(images[0][rows, columns], ax=row[0])
+    for ax, way in zip(row[1:], ways, strict=True):
+        draw_image(way[0, 0, rows, columns], ax=ax, cmap="magma")
+for ax, name in zip(
+    axes[0], ("part of frame 0", "before pooling", "back, each to all four", "back, by the indices"), strict=True
+):
     ax.set_title(name)
 plt.show()
 
 # %% [markdown]
-# This channel has learnt to answer to upright edges: second picture, the post in the middle, slats of the fence to
-# its right. Given back to all four pixels of a window, edges become two pixels wide. By the indices each value lies
-# where it lay, with holes between: a dotted line that the decoder's convolutions have to close.
+# Above, a channel that has learnt to answer to the rim of the sign; below, one that answers to upright edges, as
+# those of the post. Given back to all four pixels of a window (third column), lines become two pixels wide and jump
+# in steps of two. By the indices each value lies where it lay, with holes between: a dotted line, which the decoder's
+# convolutions have to close.
 #
 # ## FCN: add what finer maps say
 #
@@ -536,6 +537,25 @@ np.testing.assert_allclose(convolve(image, kernel, rate=2)[::2, ::2], strided)
 # DeepLab compromises: it halves three times and goes atrous for the rest, and its scores have 1/8 of the image's
 # height and width, enlarged without any skip.
 #
+# The same on the drive. At its end DeepLab looks at one map with four kernels side by side, of rates 2, 4, 6 and 8 in
+# the compact network, and sums their scores: *atrous spatial pyramid pooling*.
+
+# %%
+deeplab = nets["deeplab"]
+with torch.inference_mode():
+    features = deeplab.backbone((as_input(images[8:9]) - deeplab.mean) / deeplab.std)
+    parts = [classify(features) for classify in deeplab.aspp]
+    summed = deeplab.scale * sum(parts)
+    torch.testing.assert_close(interpolate(summed, 8, SIZE), deeplab(as_input(images[8:9])))
+fig, axes = plt.subplots(1, 5, figsize=(11, 1.3), layout="constrained")
+for ax, name, part in zip(axes, ("rate 2", "rate 4", "rate 6", "rate 8", "sum"), [*parts, summed], strict=True):
+    draw_image(KITTI_14.colours(part[0].argmax(dim=0)), ax=ax).set_title(name)
+plt.show()
+
+# %% [markdown]
+# The class with the largest score in each cell of 8 pixels; colours as above. No rate by itself is right: near ones
+# are speckled, far ones name what is usual at that height of the image. Their sum is the street.
+#
 # ### Gridding
 #
 # There is a second price. Three layers of rate 2, one on top of the other: the field is 13 pixels. **Predict before
@@ -573,6 +593,10 @@ plt.show()
 #
 # **Predict before you run.** A pole of 1, one pixel wide. Which ways say in which column it stands? Which keep it one
 # pixel wide? For each way: the brightest column, and the number of columns at least half as bright.
+#
+# <details><summary>Answer</summary>Indices, skips and atrous find the column, all four times; nearest and bilinear
+# make one picture of the four; strided is right in column 8, and in column 10 only because its top is flat from 8 to
+# 12, with 10 as the mean. Only the indices keep the width: skips make it two, atrous five.</details>
 
 
 # %%
@@ -589,10 +613,6 @@ for column in (8, 9, 10, 11):
     print(f"{column:14}  ", *(f"{place:5g} / {width:2d}" for place, width in found))
 
 # %% [markdown]
-# <details><summary>Answer</summary>Indices, skips and atrous find the column, all four times; nearest and bilinear
-# make one picture of the four; strided is right in column 8, and in column 10 only because its top is flat from 8 to
-# 12, with 10 as the mean. Only the indices keep the width: skips make it two, atrous five.</details>
-#
 # Play with it. The upper row is what comes in and what comes back; the bars are its brightest row.
 
 
@@ -612,7 +632,8 @@ def draw_ways(column, width):
     plt.show()
 
 
-interact(draw_ways, column=IntSlider(9, 4, 16), width=IntSlider(1, 1, 6))
+_ = interact(draw_ways, column=IntSlider(9, 4, 16), width=IntSlider(1, 1, 6))
+
 # %% [markdown]
 # Without a kernel: a pole of one pixel, in columns 9 and 10, and one of four pixels. The orange band is where it
 # truly stands.
@@ -625,7 +646,8 @@ for column, width in ((9, 1), (10, 1), (9, 4)):
 # **Indices** are sharp, in the right place, and full of holes: a dotted line. **Skips** are right and have a foot of
 # what the coarse maps think. **Strided** is blurred, and how bright it is depends on where the pole stands (compare
 # columns 9 and 10). **Atrous** is as blurred, but the same wherever the pole stands: shift the pole, and the answer
-# shifts. Four pixels wide, hardly anything is lost by any of them. The trouble is with thin things only.
+# shifts. A pole of four pixels comes back bright and in its place whichever way it went, though nearest makes it
+# eight wide and the indices keep two dotted columns of it. The trouble is with thin things.
 #
 # ## The same, learnt
 #
@@ -717,7 +739,7 @@ for name in SEGMENTERS:
 # image? (The pictures show the square root, so that small slopes can be seen too.)
 
 # %%
-fig, axes = plt.subplots(3, 1, figsize=(7, 6.8), layout="compressed")
+fig, axes = plt.subplots(3, 1, figsize=(4.7, 4.8), layout="compressed")
 for ax, name in zip(axes, TRAINED, strict=True):
     x = as_input(images[8:9]).requires_grad_()
     nets[name](x)[0, POLE, 40, 198].backward()
@@ -726,20 +748,19 @@ for ax, name in zip(axes, TRAINED, strict=True):
     share = slope.sum(dim=0).cumsum(0) / slope.sum()
     half = np.searchsorted(share, [0.25, 0.75])
     assert np.ptp(across) < receptive_field(CHAINS[name])[0]
-    draw_image((slope / slope.max()).sqrt(), ax=ax, cmap="magma")
+    draw_image((slope / slope.max()).sqrt().mul(15).round(), ax=ax, cmap="magma")
     ax.plot(198, 40, "x", color="tab:red")
     for column in half:
         ax.axvline(column, color="white", linewidth=1, linestyle=":")
-    ax.set_title(f"{NAMES[name]}: half of the slope between the dotted lines, {np.ptp(half)} columns")
+    ax.set_title(f"{NAMES[name]}: half within {np.ptp(half)} columns (dotted)")
 plt.show()
 
 # %% [markdown]
-# A field is a limit, not a habit. SegNet's ends where you computed it, 64 pixels to either side; half of what moves
-# its score lies within 27 columns. FCN and DeepLab could see the whole width, and look at some 60 columns for the
-# first half. Now look closely at DeepLab's picture: blocks with dark gaps between them. That is the gridding of
-# above, in a trained network: its atrous layers jump over pixels, eight apart, that no other layer brings back.
-
-# %% [markdown]
+# A field is a limit, not a habit. SegNet's ends where you computed it, 64 pixels to either side, and half of what
+# moves its score lies within 27 columns. FCN and DeepLab could see the whole width, and half of what moves theirs
+# lies within some 60 columns. DeepLab's picture is made of blocks of 8 pixels, the cells of its map: one cell may
+# count a lot and its neighbour hardly at all, for kernels with holes leap from cell to cell.
+#
 # ### Before the first label: ImageNet
 #
 # The paper doesn't start from random weights. It takes the encoders' weights from a network that has learnt to name
@@ -748,7 +769,7 @@ plt.show()
 # 128, 256, 256, 256, and six times 512. By hand, the first two: 9 · 3 · 64 + 64 = 1,792 and 9 · 64 · 64 + 64 =
 # 36,928.
 #
-# **Predict before you run.** Which weighs more: all ten layers up to the 512 channels, or the last three?
+# **Predict before you run.** Which weighs more: the first ten layers, or the last three?
 #
 # <details><summary>Answer</summary>The last three weigh 7,079,424, the ten before them 7,635,264: about the same.
 # Weights are where channels are many, time is where pixels are many.</details>
@@ -797,7 +818,7 @@ for name in TRAINED:
     with torch.inference_mode():
         called[name] = nets[name](as_input(images)).argmax(dim=1).numpy()
     matrices[name] = confusion_matrix(truths, called[name], len(KITTI_14))
-fig, axes = plt.subplots(4, 2, figsize=(10, 6.8), layout="constrained")
+fig, axes = plt.subplots(4, 2, figsize=(9.8, 6.6), layout="compressed")
 for column, k in enumerate((0, 8)):
     draw_image(KITTI_14.colours(truths[k]), ax=axes[0, column]).set_title(f"truth, frame {k}")
     for ax, name in zip(axes[1:, column], TRAINED, strict=True):
@@ -829,9 +850,9 @@ print(
 # few, is put to the test in lecture 12.
 #
 # The pictures differ more than the numbers. SegNet's borders are detailed and ragged, with specks; FCN and DeepLab,
-# which score every eighth pixel, draw smooth blobs, and a fence without gaps. Sharp isn't right, though: of the
-# pixels of signage none finds more than a third, and of what they call signage three quarters is something else. Of
-# pedestrians more is found, at a price: three to five times as many pixels are called pedestrian as there are.
+# which score every eighth pixel, draw smooth blobs. Sharp isn't right, though: of the pixels of signage none finds
+# more than a third, and of what they call signage three quarters is something else. Of pedestrians more is found, at
+# a price: three to five times as many pixels are called pedestrian as there are.
 #
 # So where are the three mechanisms, if no network draws the post? Above, they decided how well a task was solved that
 # had nothing but poles. Here two pixels in a hundred are signage and three in a thousand pedestrian, in only 142
@@ -911,12 +932,12 @@ for change, changed in changes.items():
     print(f"{change:<22}", *(f"{100 * share:12.0f}" for share in right))
 
 # %% [markdown]
-# Half the light costs little: training varied brightness, though by a fifth only. Noise that a human hardly minds
-# takes half of SegNet's accuracy and little of DeepLab's, whose first layer averages over 7x7 pixels before anything
-# else is done; a maximum over noisy values is a noisy value's. Two colours swapped, the commonest bug there is
-# (OpenCV reads blue first), costs a quarter and raises no error. Upside down the networks are worse than a program
-# that calls everything vegetation (23 %): they know where sky and road *belong*, not only what they look like. Real
-# images are further away than any of these: lecture 13.
+# Half the light costs 3 to 12 points: training varied brightness, though by a fifth only. Noise that a human hardly
+# minds takes half of SegNet's accuracy, and little of DeepLab's, whose first layer averages over 7x7 pixels before
+# anything else is done, while a maximum of noisy values is the noisiest. Two colours swapped, the commonest bug there
+# is (OpenCV reads blue first), costs 16 to 30 points and raises no error. Upside down, the networks are worse than a
+# program that calls everything vegetation (23 %): they know where sky and road *belong*, not only what they look
+# like. Real images are further away than most of these: lecture 13.
 #
 # **Small classes.** Pixel accuracy doesn't see them. Take from SegNet all that it calls signage, pedestrian or
 # bicycle, and let it say the second best:

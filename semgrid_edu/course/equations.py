@@ -45,6 +45,30 @@ class Equation:
 
 EQUATIONS = (
     Equation(
+        "segnet",
+        "3.1",
+        "SegNet: up by the indices of max-pooling",
+        literal="semgrid_edu.networks.SegNet",
+        lecture="07_segmentation#unpool",
+        exercise="07_segmentation#pool",
+    ),
+    Equation(
+        "fcn",
+        "3.1",
+        "FCN: scores of three depths, summed",
+        literal="semgrid_edu.networks.Fcn",
+        lecture="07_segmentation#skips",
+        exercise="07_segmentation#skip",
+    ),
+    Equation(
+        "deeplab",
+        "3.1",
+        "DeepLab v2: atrous convolutions",
+        literal="semgrid_edu.networks.DeepLab",
+        lecture="07_segmentation#atrous",
+        exercise="07_segmentation#atrous",
+    ),
+    Equation(
         "sensor-model",
         "3.2",
         "What a scan says of each cell",
@@ -125,6 +149,8 @@ EQUATIONS = (
         "A plane takes its value from the scores there",
         literal="semgrid_edu.planes.sample_planes_naive",
         fast="semgrid_edu.planes.PlaneSampler",
+        lecture="06_planes#eq-2",
+        exercise="06_planes#sample-plane",
     ),
     Equation(
         "fusion",
