@@ -75,6 +75,36 @@ def test_images_of_another_shape_or_type_are_refused(name):
         net(torch.zeros(1, 3, 32, 32, dtype=torch.uint8))
 
 
+def test_half_precision_images_are_taken(name):
+    """What a file holds in 16 bits needs no conversion: weights and scores stay in 32."""
+    net = build_segmenter(name, N_CLASSES).eval()
+    images = _images(1, 3, 33, 47).half()
+    with torch.no_grad():
+        scores = net(images)
+        torch.testing.assert_close(scores, net(images.float()), rtol=1e-3, atol=1e-3)
+    assert scores.dtype == torch.float32
+
+
+def test_a_single_image_can_be_learnt_from(name):
+    """Batch normalisation needs two values of each channel, which the pixels of one image give."""
+    net = build_segmenter(name, N_CLASSES).train()
+    net(_images(1, 3, 96, 320)).square().mean().backward()
+    assert all(torch.isfinite(parameter.grad).all() for parameter in net.parameters())
+
+
+@pytest.mark.parametrize("size", [(15, 40), (40, 15), (1, 1)])
+def test_the_smallest_images_work_or_are_refused(name, size):
+    """Four poolings that round down leave nothing of 15 pixels; those that round up, and strides, leave one."""
+    net, image = build_segmenter(name, N_CLASSES).eval(), _images(1, 3, *size)
+    if name in ("segnet", "unet"):
+        with pytest.raises(ArgumentError, match=r"expected .*16 x 16"):
+            net(image)
+    else:
+        scores = net(image)
+        assert scores.shape == (1, N_CLASSES, *size)
+        assert torch.isfinite(scores).all()
+
+
 def test_unknown_presets_and_class_numbers_are_refused(name):
     with pytest.raises(ArgumentError, match="preset: expected one of compact, paper, found 'huge'"):
         build_segmenter(name, 14, preset="huge")
