@@ -140,8 +140,8 @@ EQUATIONS = (
         "From a point of a plane to its pixel",
         literal="semgrid_edu.camera.project",
         fast="semgrid_edu.planes.plane_pixels",
-        lecture="00_tour#eq-1",
-        exercise="00_tour#pixel-of",
+        lecture="05_pixels#eq-1",
+        exercise="05_pixels#plane-pixels",
     ),
     Equation(
         "eq-2",
@@ -157,6 +157,8 @@ EQUATIONS = (
         "3.4",
         "Reduction of the planes, fusion with the occupancy grid",
         literal="semgrid_edu.networks.FusionNet",
+        lecture="08_fusion#fusion",
+        exercise="08_fusion#reduce-planes",
     ),
     Equation("eq-3", "3.5", "Energy of a labelling", literal="semgrid_edu.crf.energy"),
     Equation("eq-4", "3.5", "What two cells with different labels cost", literal="semgrid_edu.crf.pair_weights"),
@@ -174,7 +176,20 @@ EQUATIONS = (
         literal="semgrid_edu.experiments.baselines.carry_labels",
     ),
     Equation(
-        "median-frequency", "4.1", "Median frequency balancing", literal="semgrid_edu.loss.median_frequency_weights"
+        "median-frequency",
+        "4.1",
+        "Median frequency balancing",
+        literal="semgrid_edu.loss.median_frequency_weights",
+        lecture="08_fusion#median-frequency",
+        exercise="08_fusion#balance",
+    ),
+    Equation(
+        "loss",
+        "4.1",
+        "Cross-entropy, weighted by class",
+        literal="semgrid_edu.loss.Objective",
+        lecture="08_fusion#loss",
+        exercise="08_fusion#weighted-loss",
     ),
     Equation(
         "pixel-accuracy",
