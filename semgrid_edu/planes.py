@@ -2,15 +2,14 @@
 
 from copy import deepcopy
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 import torch
-import torch.nn.functional as F
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 from torch import Tensor, nn
 
+from semgrid_edu.bilinear import SparseMatrix, SparseProduct, bilinear_matrix
 from semgrid_edu.camera import Camera, project, transform_points
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
@@ -68,19 +67,22 @@ def plane_pixels(spec: GridSpec, heights: ArrayLike, camera: Camera) -> tuple[ND
     Raises
     ------
     ArgumentError
-        When `heights` isn't a list of finite numbers.
+        When `heights` isn't a list of one or more finite numbers.
     """
-    heights = _check_heights(heights)
-    points = np.empty((len(heights), *spec.shape, 3))
-    points[..., :2] = spec.centers()
-    points[..., 2] = heights[:, None, None]
-    return project(transform_points(camera.T_camera_from_grid, points), camera)
+    centers, T_camera_from_grid = spec.centers(), camera.T_camera_from_grid
+    # Plane by plane, as in `bilinear_matrix`: what is computed on the way stays in the processor's cache.
+    planes = []
+    for delta in _check_heights(heights):
+        points = np.dstack([centers, np.full(spec.shape, delta)])
+        planes.append(project(transform_points(T_camera_from_grid, points), camera))
+    pixels, visible = map(np.stack, zip(*planes, strict=True))
+    return pixels, visible
 
 
 def _check_heights(heights: ArrayLike) -> NDArray[np.float64]:
     heights = np.asarray(heights, dtype=np.float64)
-    if heights.ndim != 1 or not np.isfinite(heights).all():
-        raise ArgumentError("heights", "finite metres, shape (D,)", f"shape {heights.shape}: {heights}")
+    if heights.ndim != 1 or not heights.size or not np.isfinite(heights).all():
+        raise ArgumentError("heights", "one or more finite metres, shape (D,)", f"shape {heights.shape}: {heights}")
     return heights
 
 
@@ -163,7 +165,7 @@ class PlaneSampler(nn.Module):
         _check_points(pixels, visible, image_size)
         self.image_size = tuple(image_size)
         self.planes_shape = visible.shape
-        matrix = _bilinear_matrix(pixels, visible, image_size)
+        matrix = bilinear_matrix(pixels, visible, image_size)
         self._register_matrix("matrix", matrix)
         self._register_matrix("transpose", matrix.T.tocsr())
 
@@ -199,11 +201,11 @@ class PlaneSampler(nn.Module):
 
     def _register_matrix(self, name: str, matrix: csr_array) -> None:
         """Keep a sparse matrix as buffers: they follow the module to its device, and stay out of its weights."""
-        for part, values in zip(_SparseMatrix._fields, (matrix.indices, matrix.indptr, matrix.data), strict=True):
+        for part, values in zip(SparseMatrix._fields, (matrix.indices, matrix.indptr, matrix.data), strict=True):
             self.register_buffer(f"{name}_{part}", torch.from_numpy(values), persistent=False)
 
-    def _matrix(self, name: str) -> "_SparseMatrix":
-        return _SparseMatrix(*(getattr(self, f"{name}_{part}") for part in _SparseMatrix._fields))
+    def _matrix(self, name: str) -> SparseMatrix:
+        return SparseMatrix(*(getattr(self, f"{name}_{part}") for part in SparseMatrix._fields))
 
     def forward(self, scores: Tensor) -> Tensor:
         """Return the planes of each image.
@@ -228,7 +230,7 @@ class PlaneSampler(nn.Module):
             )
         rows = scores.permute(0, 2, 3, 1).flatten(1, 2)
         matrix, transpose = self._matrix("matrix"), self._matrix("transpose")
-        sampled = [_SparseProduct.apply(image, matrix, transpose) for image in rows]
+        sampled = [SparseProduct.apply(image, matrix, transpose) for image in rows]
         # Stacking copies, which one image, the running pipeline's case, needn't pay for.
         planes = sampled[0][None] if len(sampled) == 1 else torch.stack(sampled)
         return planes.unflatten(1, self.planes_shape).permute(0, 4, 1, 2, 3)
@@ -249,73 +251,13 @@ def _build_sampler(
     return PlaneSampler(*plane_pixels(spec, heights, Camera(*matrices, size, lidar_height)), size)
 
 
-class _SparseMatrix(NamedTuple):
-    """Compressed sparse rows: row r holds weights[offsets[r]:offsets[r + 1]] in the columns indices[...]."""
-
-    indices: Tensor
-    offsets: Tensor
-    weights: Tensor
-
-    def multiply(self, rows: Tensor) -> Tensor:
-        """Return the product with a matrix, (columns, C) -> (rows, C).
-
-        PyTorch's bag of embeddings is just that, a weighted sum of gathered rows, and several times
-        faster on a CPU than its sparse matrices.
-        """
-        weights = self.weights.to(rows.dtype)
-        return F.embedding_bag(
-            self.indices, rows, self.offsets, mode="sum", per_sample_weights=weights, include_last_offset=True
-        )
-
-
-class _SparseProduct(torch.autograd.Function):
-    """y = A x, whose gradient is A^T dL/dy; the transpose is given, so that nothing is scattered."""
-
-    @staticmethod
-    def forward(ctx, rows: Tensor, matrix: _SparseMatrix, transpose: _SparseMatrix) -> Tensor:
-        ctx.matrices = matrix, transpose
-        return matrix.multiply(rows.contiguous())
-
-    @staticmethod
-    def backward(ctx, grad: Tensor) -> tuple[Tensor, None, None]:
-        matrix, transpose = ctx.matrices
-        return _SparseProduct.apply(grad, transpose, matrix), None, None
-
-
-def _bilinear_matrix(pixels: NDArray, visible: NDArray, image_size: tuple[int, int]) -> csr_array:
-    """Return equation (2) as a matrix: a row a point, a column a pixel, four weights in each visible row."""
-    height, width = image_size
-    u, v = pixels[visible].T
-    left, top = np.floor(u), np.floor(v)
-    right_weight, lower_weight = u - left, v - top
-    # On the last column or row the far neighbour has no weight, but it must exist.
-    right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
-    indices = np.stack(
-        [top * width + left, top * width + right, bottom * width + left, bottom * width + right], axis=-1
-    )
-    weights = np.stack(
-        [
-            (1 - lower_weight) * (1 - right_weight),
-            (1 - lower_weight) * right_weight,
-            lower_weight * (1 - right_weight),
-            lower_weight * right_weight,
-        ],
-        axis=-1,
-    )
-    offsets = np.concatenate([[0], np.cumsum(4 * visible.ravel())])
-    return csr_array(
-        (weights.ravel().astype(np.float32), indices.ravel().astype(np.int32), offsets.astype(np.int32)),
-        shape=(visible.size, height * width),
-    )
-
-
 def _check_points(pixels: NDArray, visible: NDArray, image_size: tuple[int, int]) -> None:
     """Refuse points that don't fit each other or the image."""
-    if visible.ndim != 3 or visible.dtype != bool:
-        raise ArgumentError("visible", "bool, shape (D, H, W)", f"{visible.dtype}, shape {visible.shape}")
+    if visible.ndim != 3 or not visible.size or visible.dtype != bool:
+        raise ArgumentError("visible", "bool, shape (D, H, W), not empty", f"{visible.dtype}, shape {visible.shape}")
     if pixels.shape != (*visible.shape, 2):
         raise ArgumentError("pixels", f"shape {(*visible.shape, 2)}", pixels.shape)
     last = np.array(image_size)[::-1] - 1
-    seen = pixels[visible]
-    if not ((seen >= 0) & (seen <= last)).all():
+    planes = zip(pixels, visible, strict=True)
+    if not all(((points >= 0) & (points <= last))[seen].all() for points, seen in planes):
         raise ArgumentError("pixels", f"visible points in an image of {image_size} pixels", "points outside it")

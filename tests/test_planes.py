@@ -297,13 +297,13 @@ HEIGHTS = (0.0, 0.5)
 def built(monkeypatch):
     """Forget what other tests built; return a list that grows by one for each operator built."""
     planes._build_sampler.cache_clear()
-    shapes, original = [], planes._bilinear_matrix
+    shapes, original = [], planes.bilinear_matrix
 
     def counted(*arguments):
         shapes.append((matrix := original(*arguments)).shape)
         return matrix
 
-    monkeypatch.setattr(planes, "_bilinear_matrix", counted)
+    monkeypatch.setattr(planes, "bilinear_matrix", counted)
     return shapes
 
 
@@ -384,6 +384,8 @@ def test_wrong_inputs_are_named():
     points, visible = np.zeros((1, 2, 2, 2)), np.ones((1, 2, 2), dtype=bool)
     with pytest.raises(ArgumentError, match="visible: expected bool"):
         PlaneSampler(points, visible.astype(int), (4, 5))
+    with pytest.raises(ArgumentError, match="not empty"):
+        PlaneSampler(points[:0], visible[:0], (4, 5))
     with pytest.raises(ArgumentError, match=r"pixels: expected shape \(1, 2, 2, 2\)"):
         PlaneSampler(points[..., 0], visible, (4, 5))
     with pytest.raises(ArgumentError, match="visible points in an image"):
@@ -394,7 +396,7 @@ def test_wrong_inputs_are_named():
         PlaneSampler(points, visible, (4, 5))(torch.zeros(1, 3, 5, 4))
     with pytest.raises(ArgumentError, match="heights"):
         plane_pixels(GridSpec.compact(), [np.nan], _camera())
-    for heights in ([[0.0]], [np.inf]):
+    for heights in ([[0.0]], [np.inf], []):
         with pytest.raises(ArgumentError, match="heights"):
             PlaneSampler.for_camera(GridSpec.compact(), heights, _camera())
     with pytest.raises(ArgumentError, match="n_planes"):

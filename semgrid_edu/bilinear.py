@@ -1,0 +1,99 @@
+"""Equation (2) as a product with a sparse matrix, its transpose bringing gradients back (section 3.3)."""
+
+from typing import NamedTuple
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from torch import Tensor
+
+
+def bilinear_matrix(pixels: NDArray, visible: NDArray, image_size: tuple[int, int]) -> csr_array:
+    """Return equation (2) as a matrix: a row a point, a column a pixel, four weights in each visible row.
+
+    Parameters
+    ----------
+    pixels : (D, H, W, 2) float
+        u, v of each point; of a visible one, inside the image.
+    visible : (D, H, W) bool
+        The rows of the others are empty.
+    image_size : (int, int)
+        h, w.
+
+    Returns
+    -------
+    (D H W, h w) float32
+
+    Examples
+    --------
+    >>> bilinear_matrix(np.full((1, 1, 1, 2), 0.25), np.ones((1, 1, 1), bool), (2, 2)).toarray()
+    array([[0.5625, 0.1875, 0.1875, 0.0625]], dtype=float32)
+    """
+    # Plane by plane, what is computed on the way stays in the processor's cache.
+    corners = [_corners(points[seen], image_size) for points, seen in zip(pixels, visible, strict=True)]
+    indices, weights = map(np.concatenate, zip(*corners, strict=True))
+    offsets = np.concatenate([[0], np.cumsum(4 * visible.ravel())])
+    return csr_array(
+        (weights.ravel(), indices.ravel(), offsets.astype(np.int32)),
+        shape=(visible.size, image_size[0] * image_size[1]),
+    )
+
+
+def _corners(points: NDArray, image_size: tuple[int, int]) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Return the four pixels around each point, (N, 4) columns of the matrix, and their weights."""
+    height, width = image_size
+    u, v = points.T
+    left, top = np.floor(u), np.floor(v)
+    right_weight, lower_weight = u - left, v - top
+    # On the last column or row the far neighbour has no weight, but it must exist.
+    right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
+    indices = np.stack(
+        [top * width + left, top * width + right, bottom * width + left, bottom * width + right], axis=-1
+    )
+    weights = np.stack(
+        [
+            (1 - lower_weight) * (1 - right_weight),
+            (1 - lower_weight) * right_weight,
+            lower_weight * (1 - right_weight),
+            lower_weight * right_weight,
+        ],
+        axis=-1,
+    )
+    return indices.astype(np.int32), weights.astype(np.float32)
+
+
+class SparseMatrix(NamedTuple):
+    """Compressed sparse rows: row r holds weights[offsets[r]:offsets[r + 1]] in the columns indices[...]."""
+
+    indices: Tensor
+    offsets: Tensor
+    weights: Tensor
+
+    def multiply(self, rows: Tensor) -> Tensor:
+        """Return the product with a dense matrix, (columns, C) -> (rows, C), in the type of `rows`.
+
+        PyTorch's bag of embeddings is just that, a weighted sum of gathered rows, and several times
+        faster on a CPU than its sparse matrices.
+        """
+        weights = self.weights.to(rows.dtype)
+        return F.embedding_bag(
+            self.indices, rows, self.offsets, mode="sum", per_sample_weights=weights, include_last_offset=True
+        )
+
+
+class SparseProduct(torch.autograd.Function):
+    """y = A x, whose gradient is A^T dL/dy; the transpose is given, so that nothing is scattered."""
+
+    @staticmethod
+    def forward(ctx, rows: Tensor, matrix: SparseMatrix, transpose: SparseMatrix) -> Tensor:
+        """Return A x; `rows` is x, (columns, C)."""
+        ctx.matrices = matrix, transpose
+        return matrix.multiply(rows.contiguous())
+
+    @staticmethod
+    def backward(ctx, grad: Tensor) -> tuple[Tensor, None, None]:
+        """Return A^T dL/dy, which can be differentiated again; the matrices are fixed."""
+        matrix, transpose = ctx.matrices
+        return SparseProduct.apply(grad, transpose, matrix), None, None
