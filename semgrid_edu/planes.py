@@ -69,13 +69,14 @@ def plane_pixels(spec: GridSpec, heights: ArrayLike, camera: Camera) -> tuple[ND
     ArgumentError
         When `heights` isn't a list of one or more finite numbers.
     """
+    heights = _check_heights(heights)
     centers, T_camera_from_grid = spec.centers(), camera.T_camera_from_grid
+    visible = np.empty((len(heights), *spec.shape), dtype=bool)
+    pixels = np.empty((*visible.shape, 2))
     # Plane by plane, as in `bilinear_matrix`: what is computed on the way stays in the processor's cache.
-    planes = []
-    for delta in _check_heights(heights):
+    for i, delta in enumerate(heights):
         points = np.dstack([centers, np.full(spec.shape, delta)])
-        planes.append(project(transform_points(T_camera_from_grid, points), camera))
-    pixels, visible = map(np.stack, zip(*planes, strict=True))
+        pixels[i], visible[i] = project(transform_points(T_camera_from_grid, points), camera)
     return pixels, visible
 
 
