@@ -56,7 +56,7 @@ coarse = GridSpec(spec.x_min, spec.x_max, spec.y_min, spec.y_max, cell=1.0)  # t
 # | $f_u, f_v$ | focal lengths, pixels | `K[0, 0]`, `K[1, 1]` |
 # | $c_u, c_v$ | principal point: where the camera's axis meets the image, pixels | `K[0, 2]`, `K[1, 2]` |
 # | $z_\text{cam}$ | height of the camera above the ground, metres | `z_cam` |
-# | $\psi$ | a small angle by which the camera is turned | `angle` |
+# | $\psi$ | a small angle by which the camera is turned | `degrees` |
 #
 # ## Two similar triangles
 #
@@ -158,7 +158,7 @@ def pixel(point, K):
 
 for point in ([1.5, 1, 10], [3, 2, 20], [0.15, 0.1, 1]):
     np.testing.assert_allclose(pixel(np.array(point), K), pinhole(*point))
-    print(f"{point!s:<14} -> {(K @ point).tolist()!s:<22} -> {pixel(np.array(point), K).tolist()}")
+    print(f"{point!s:<14} -> {(K @ point).tolist()!s:<22} -> {pixel(np.array(point), K).round(6).tolist()}")
 
 # %% [markdown]
 # ### Where parallels meet
@@ -262,33 +262,33 @@ print("K times one half misses the dot by {:.2f} and {:.2f} pixels".format(*np.a
 #
 # Check the last row: right is -y; ahead is x; and the top of the post is 1 m lower than the camera, so $Y$ = 1.
 #
-# Each step turns and shifts, $R p + t$. As 4 x 4 matrices on $(x, y, z, 1)$ a turn with its shift is one factor, and
-# the names tell the order: **neighbours that are equal cancel**, from right to left.
+# Each step turns and shifts. As 4 x 4 matrices on $(x, y, z, 1)$ a turn with its shift is one factor, and the names
+# tell the order: **neighbours that are equal cancel**, from right to left.
 #
 # $$ T_\text{camera←grid} = T_\text{camera←lidar}\; T_\text{lidar←grid}, \qquad
-#    T = \begin{pmatrix} R & t \\ 0 & 1 \end{pmatrix}, \qquad
-#    T^{-1} = \begin{pmatrix} R^\top & -R^\top t \\ 0 & 1 \end{pmatrix} $$
+#    T = \begin{pmatrix} T_\text{turn} & T_\text{shift} \\ 0 & 1 \end{pmatrix}, \qquad
+#    T^{-1} = \begin{pmatrix} T_\text{turn}^\top & -T_\text{turn}^\top T_\text{shift} \\ 0 & 1 \end{pmatrix} $$
 #
 # **Predict before you run.** $T^{-1}$ of `T_camera_from_grid` is called `T_grid_from_camera`. What does it make of (0,
-# 0, 0), in the toy car? And why is it not simply $-t$?
+# 0, 0), in the toy car? And why is it not simply $-T_\text{shift}$?
 #
-# <details><summary>Answer</summary>The camera's own place, seen from the grid: (0, 0, 1.5). The shift $t$ = (0, 1.5, 0)
-# is written in the *camera's* axes, where down is $Y$. $-t$ would put the camera 1.5 m to the right, since the second
-# axis of the grid points to the left.</details>
+# <details><summary>Answer</summary>The camera's own place, seen from the grid: (0, 0, 1.5). The shift, (0, 1.5, 0),
+# is written in the *camera's* axes, where down is $Y$. Its negative would put the camera 1.5 m to the right, since the
+# second axis of the grid points to the left.</details>
 
 # %%
 axes_of_camera = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])  # X is -y, Y is -z, Z is x
 
 
-def transform(R, t):
+def transform(turn, shift):
     """Return the 4 x 4 matrix that turns, then shifts."""
-    return np.vstack([np.column_stack([R, t]), [0, 0, 0, 1]])
+    return np.vstack([np.column_stack([turn, shift]), [0, 0, 0, 1]])
 
 
 def inverse(T):
     """Return the way back: undo the shift, then the turn."""
-    R, t = T[:3, :3], T[:3, 3]
-    return transform(R.T, -R.T @ t)
+    turn, shift = T[:3, :3], T[:3, 3]
+    return transform(turn.T, -turn.T @ shift)
 
 
 T_lidar_from_grid = transform(np.eye(3), [0, 0, -2])
@@ -299,7 +299,7 @@ np.testing.assert_allclose(T_lidar_from_grid, lidar_from_grid(2.0))
 np.testing.assert_allclose(T_camera_from_grid, toy.T_camera_from_grid)
 np.testing.assert_allclose(inverse(T_camera_from_grid), invert_rigid(T_camera_from_grid))
 print("post, from the camera:", (T_camera_from_grid @ [10, -2, 0.5, 1])[:3])
-print("camera, from the grid:", inverse(T_camera_from_grid)[:3, 3])
+print("camera, from the grid:", np.abs(inverse(T_camera_from_grid)[:3, 3]))  # no -0
 
 # %%
 fig, ax = plt.subplots(figsize=(8, 2.8), layout="constrained")
@@ -422,7 +422,7 @@ plt.show()
 # there**. It is also where the plane at the camera's height lies. So whatever is higher than the camera rises above the
 # horizon in the image, whatever is lower stays below, *at any distance*.
 #
-# **Predict before you run.** The drive's camera is 1.65 m above the road, its horizon in row 86. The two pedestrians
+# **Predict before you run.** The drive's camera is 1.66 m above the road, its horizon in row 86. The two pedestrians
 # from above are 9 m and 19 m ahead. In which rows are the tops of their heads?
 #
 # <details><summary>Answer</summary>They are 1.7 m tall, about as tall as the camera stands: so their heads are on the
@@ -578,10 +578,10 @@ axes[3].legend(fontsize="x-small")
 plt.show()
 
 # %% [markdown]
-# Red: one cell of half a metre in the compact network's image, each panel 18 pixels wide. 15 m ahead it is already a
-# slit, 40 m ahead a hair. On the right, the pixels of a cell by distance: straight lines that fall by three decades a
-# decade. Below the grey line a cell has less than a pixel of its own: it says what its neighbours say. Count it: how
-# many different pixels do the cells of the ground plane meet?
+# Red: one cell of half a metre in the compact network's image, each panel 18 pixels wide (white: below the border). 15
+# m ahead it is already a slit, 40 m ahead a hair. On the right, the pixels of a cell by distance: straight lines that
+# fall by three decades a decade. Below the grey line a cell has less than a pixel of its own: it says what its
+# neighbours say. Count it: how many different pixels do the cells of the ground plane meet?
 
 # %%
 (pixels,), (visible,) = plane_pixels(spec, [0.0], compact)
@@ -678,10 +678,10 @@ axes[2].legend(markerscale=6, fontsize="small")
 plt.show()
 
 # %% [markdown]
-# Left, from the side: the pixels of the car, the rays of three of them, and where the flat world puts these (crosses).
-# In the middle, from above: the true places, black, are a small L, back and side of the car; red is the car on the
-# ground plane, thrown over the map like the shadow that a lamp casts. Right, on the plane at 0.8 m: what is lower lies
-# too near now, what is higher too far, and the roof is still thrown 25 m away.
+# Left, from the side: the pixels of the car, coloured by height, the rays of three of them, and where the flat world
+# puts these (crosses). In the middle, from above: the true places, black, are a small L, back and side of the car; red
+# is the car on the ground plane, thrown over the map like the shadow that a lamp casts. Right, on the plane at 0.8 m:
+# what is lower lies too near now, what is higher too far, and the roof is still thrown more than 20 m.
 #
 # If we had the right height for each pixel, all would be well. With twenty planes, 20 cm apart, the right one is at
 # most 10 cm away. How far off is each pixel on the best of the planes, if we take every plane, every second one, and so
@@ -733,8 +733,9 @@ for ax, height in zip(axes.flat, (0.5, 1.2, 1.65, 3.0), strict=True):
 plt.show()
 
 # %% [markdown]
-# Black: the horizon. At 0.5 m the table top cuts the red car at its number plate; at 1.5 m, 15 cm below the camera, all
-# cells share a few rows; at 1.65 m they are one line; at 3 m they are a ceiling.
+# Black: the horizon. At 0.5 m and 1.2 m the grid is a table top, seen from above, flatter and flatter; at 1.65 m, half
+# a centimetre below the camera, it is a line; at 3 m a ceiling, seen from below. In all four the same 71 m fit between
+# the near edge and the horizon. (The number plate hangs at about 0.7 m: there the dots 6.5 m ahead run across it.)
 #
 # ## Where this breaks
 #
@@ -754,7 +755,7 @@ plt.show()
 # the error: the camera looks at the road at a very flat angle.</details>
 #
 # With $\tan\psi \approx \psi$ the focal length drops out: yaw moves a place by $x\,\psi$, and pitch makes a place of
-# the ground at $x$ read another one, at $x'$:
+# the ground at $x$ read another one, at $x'$ (minus with the nose up, plus with the nose down):
 #
 # $$ \frac{1}{x'} = \frac{1}{x} \mp \frac{\psi}{z_\text{cam}} $$
 
@@ -762,8 +763,8 @@ plt.show()
 # %%
 def turned(camera, axis, degrees):
     """Return the camera after a small turn about its own axis: "x" nods, "y" turns to the side."""
-    R = Rotation.from_euler(axis, degrees, degrees=True).as_matrix()
-    T = rigid_transform(R, np.zeros(3)) @ camera.T_camera_from_lidar
+    turn = Rotation.from_euler(axis, degrees, degrees=True).as_matrix()
+    T = rigid_transform(turn, np.zeros(3)) @ camera.T_camera_from_lidar
     return Camera(camera.K, T, camera.size, camera.lidar_height)
 
 
@@ -779,7 +780,7 @@ for name, axis, sign in (("nose down", "x", 1), ("nose up", "x", -1), ("to the s
     x, y = read_instead(30.0, toy, turned(toy, axis, sign))
     if axis == "x":
         np.testing.assert_allclose(1 / x, 1 / 30 + sign * np.radians(1) / 1.5, rtol=0.01)
-    print(f"{name:<12} the cell at (30, 0) reads the ground at ({x:.1f}, {y:.1f})")
+    print(f"{name:<12} the cell 30 m ahead reads the ground {x:.1f} m ahead, {abs(y):.1f} m to the side")
 
 # %%
 fig, axes = plt.subplots(1, 3, figsize=(8, 2.7), layout="constrained", width_ratios=(1.7, 1, 1))
@@ -838,8 +839,8 @@ for side, name in ((0.04, "uphill"), (-0.04, "downhill")):
 # **Predict before you run.** On the drive, of all cells whose point on the ground lies in the image: how many does the
 # camera not see, since something is in the way?
 #
-# <details><summary>Answer</summary>Run the cell. On this street it is more than half. Behind the first row of parked
-# cars, hedges and fences, the map from above is mostly what *isn't* in the picture.</details>
+# <details><summary>Answer</summary>More than half, 57 %. Behind the first row of cars, hedges and fences the map from
+# above is mostly what *isn't* in the picture.</details>
 
 # %%
 (pixels,), (visible,) = plane_pixels(spec, [0.0], camera)
@@ -858,14 +859,14 @@ print(f"{100 * hidden.sum() / visible.sum():.0f} % of the cells in the image are
 # Left: the true labels of the image, laid on the ground by equation (1); right: the true map; hatched: hidden cells.
 # Where nothing is hatched the two agree: that is equation (1) at work. Where it is, the left map shows what stands in
 # front, drawn out to the edge of the grid: the cars on the left, the cyclists (dark red), the pedestrian (red) and the
-# fence on the right. No camera model repairs that. The LIDAR knows which cells are hidden, and calls them UNKNOWN: this
-# is why the paper needs both.
+# fence on the right. No camera model repairs that. The LIDAR knows which cells are hidden, and the occupancy grid
+# calls them UNKNOWN: this is why the paper needs both.
 #
 # ## In five lines
 #
 # 1. $(X/Z, Y/Z)$ is the picture one metre ahead; $K$ turns it into pixels. Resized, $K$ moves by half pixels; cropped,
 #    it shifts.
-# 2. Transforms are read by names, right to left; the inverse is $R^\top$ and $-R^\top t$.
+# 2. Transforms are read by names, right to left; the inverse undoes the shift first, then the turn.
 # 3. Every place has one pixel, (1); a pixel has a whole ray of places. All planes meet at the horizon, and the one at
 #    the camera's height is seen edge-on.
 # 4. Pixels a cell fall like $Z^{-3}$; the error of a wrong height grows like $1 / (z_\text{cam} - z)$. Twenty planes

@@ -111,10 +111,10 @@ assert not complaint, complaint
 def now_from_before(T_world_from_now, T_world_from_before):
     """Return T_now_from_before, (4, 4)."""
     ### BEGIN SOLUTION
-    R, t = T_world_from_now[:3, :3], T_world_from_now[:3, 3]
+    turn, shift = T_world_from_now[:3, :3], T_world_from_now[:3, 3]
     T_now_from_world = np.eye(4)
-    T_now_from_world[:3, :3] = R.T
-    T_now_from_world[:3, 3] = -R.T @ t
+    T_now_from_world[:3, :3] = turn.T
+    T_now_from_world[:3, 3] = -turn.T @ shift
     return T_now_from_world @ T_world_from_before
     ### END SOLUTION
 
@@ -134,10 +134,10 @@ slips = {
     (2, 3): "that is T_before_from_now: turn the other one round",
     (10, 15): "no matrix was turned round: T_world_from_now ends in 'world', so it can't stand on the left as it is",
     (5, 14): "the order is wrong: with the factors swapped, no neighbours cancel",
-    (-10, -15): "the shift of the inverse isn't -t: it must be turned as well, -R^T t",
+    (-10, -15): "the shift of the inverse isn't just minus the shift: it must be turned as well",
     (-2, -3): "that is the way in the world's axes: turn it into those of the car, which looks along the world's y",
     (3, -2): "turned the wrong way: the inverse of a rotation is its transpose",
-    (7, -22): "the sign of the shift is missing: the inverse undoes it, -R^T t",
+    (7, -22): "the sign of the shift is missing: the inverse undoes it",
 }
 x, y = np.asarray(got)[:2, 3]
 for slip, hint in slips.items():
