@@ -44,7 +44,7 @@ plt.rcParams["image.interpolation"] = "nearest"
 spec, drive = GridSpec.compact(), sample_drive()
 frame = drive[len(drive) - 1]
 camera = frame.camera
-grey = (120 + frame.image.mean(axis=2, keepdims=True) // 8 * 4).astype(np.uint8)
+grey = (120 + frame.image.mean(axis=2, keepdims=True) // 16 * 8).astype(np.uint8)
 pale = replace(frame, image=np.repeat(grey, 3, axis=2))  # to draw on
 coarse = GridSpec(spec.x_min, spec.x_max, spec.y_min, spec.y_max, cell=1.0)  # to draw, so that dots stay apart
 
@@ -662,7 +662,7 @@ np.testing.assert_allclose(drawn(0.0)[0, 0] - eye[0], x_once)
 print(f"{len(places)} pixels of one car, {places[:, 0].min():.1f} to {places[:, 0].max():.1f} m ahead")
 
 # %%
-fig, axes = plt.subplots(1, 3, figsize=(9, 4.4), layout="constrained", width_ratios=(2, 1, 1))
+fig, axes = plt.subplots(1, 3, figsize=(9, 3.8), layout="constrained", width_ratios=(2, 1, 1))
 axes[0].scatter(*places[::7, [0, 2]].T, s=2, c=plt.get_cmap("viridis")(places[::7, 2] / 1.7))
 for z in (0.4, 0.9, 1.3):
     k = np.abs(places[:, 2] - z).argmin()
@@ -727,7 +727,7 @@ def show(height):
 _ = interact(show, height=FloatSlider(value=0.0, min=0.0, max=3.8, step=0.05, description="height [m]"))
 
 # %%
-fig, axes = plt.subplots(2, 2, figsize=(9, 3.1), layout="constrained")
+fig, axes = plt.subplots(2, 2, figsize=(8, 2.8), layout="constrained")
 for ax, height in zip(axes.flat, (0.5, 1.2, 1.65, 3.0), strict=True):
     draw_plane(ax, height, colour_bar=False)
 plt.show()
@@ -783,7 +783,7 @@ for name, axis, sign in (("nose down", "x", 1), ("nose up", "x", -1), ("to the s
     print(f"{name:<12} the cell 30 m ahead reads the ground {x:.1f} m ahead, {abs(y):.1f} m to the side")
 
 # %%
-fig, axes = plt.subplots(1, 3, figsize=(8, 2.7), layout="constrained", width_ratios=(1.7, 1, 1))
+fig, axes = plt.subplots(1, 3, figsize=(8, 2.9), layout="constrained", width_ratios=(1.5, 1, 1))
 x = np.linspace(6.5, 60, 100)
 axes[0].plot([0, 60], [0, 60], color="0.6", linewidth=1, label="as calibrated")
 for degrees, style in ((0.25, ":"), (0.5, "--"), (1.0, "-")):

@@ -195,11 +195,9 @@ slips = {
     (64.3, -322.9): "you use the inverse transform: T_camera_from_grid takes grid to camera as it is",
     (32, 70): "that is (v, u): u counts to the right and comes first",
     (20, 12): "the principal point is missing: the third column of K",
-    (30, 32): "left and right are swapped: y points left, X right; T takes care of it",
     (69.5, 31.7): "you divide by the distance: Z is the depth along the camera's axis only",
     (74, 30): "f_u and f_v are swapped",
     (70.5, 32.5): "half a pixel too much: the centre of the first pixel is (0, 0)",
-    (69.5, 31.5): "half a pixel too little: the centre of the first pixel is (0, 0)",
 }
 u, v = pixels[0]
 for slip, hint in slips.items():
