@@ -41,6 +41,8 @@ from semgrid_edu.experiments.pole_nets import draw_poles, learn, score
 from semgrid_edu.experiments.thin_pole import MECHANISMS, carry, place_and_width
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
+
+# %%
 from semgrid_edu.networks import SEGMENTERS, build_segmenter, load_net
 from semgrid_edu.networks.deeplab import interpolate
 from semgrid_edu.networks.fcn import enlarge
@@ -318,6 +320,7 @@ def pixels_that_count(layers, size=400):
     return int(row.grad.count_nonzero())
 
 
+# %%
 by_hand = [CONV, HALVE, CONV, (3, 1, 2)]
 assert receptive_field(by_hand) == (pixels_that_count(by_hand), 2) == (16, 2)
 halving = ([CONV, CONV, HALVE] * 5)[:14]  # ten convolutions, four halvings
@@ -392,6 +395,7 @@ def unpool(pooled, indices, shape):
     return image
 
 
+# %%
 by_hand = np.array([[1.0, 0, 0, 2], [0, 3, 0, 0], [0, 0, 4, 0], [5, 0, 0, 0]])
 for image in (by_hand, rng.normal(size=(6, 10))):
     pooled, indices = max_pool(image)
@@ -499,8 +503,9 @@ plt.show()
 
 # %% [markdown]
 # At 1/32 signage leads nowhere. With pool4 two patches are barely ahead; pool3 breaks them up into a few small ones,
-# one of them the warning sign left of the lamp post. But the finest map has cells of 8 pixels, and the post is three
-# pixels wide. A skip gives back what its finest map holds, and no more.
+# one of them a distant street lamp (upper middle), another at the foot of the lamp post and the sign. But the finest
+# map has cells of 8 pixels, and the post is three pixels wide. A skip gives back what its finest map holds, and no
+# more.
 #
 # ## DeepLab: don't halve, spread the kernel
 #
@@ -553,8 +558,9 @@ for ax, name, part in zip(axes, ("rate 2", "rate 4", "rate 6", "rate 8", "sum"),
 plt.show()
 
 # %% [markdown]
-# The class with the largest score in each cell of 8 pixels; colours as above. No rate by itself is right: near ones
-# are speckled, far ones name what is usual at that height of the image. Their sum is the street.
+# The class with the largest score in each cell of 8 pixels; colours as above. No rate by itself is right: rate 2 sees
+# signs all over, rate 4 a fence along the whole street, rate 8 signs in the sky. None was ever asked to be right but
+# as a part of the sum, and the sum is the street.
 #
 # ### Gridding
 #
@@ -735,7 +741,7 @@ for name in SEGMENTERS:
 
 # %% [markdown]
 # The field is what a pixel *can* see. What it does look at is another question, and the gradient answers it: by how
-# much does the score of signage at one pixel, on the lamp post of frame 8 (red cross), change with each pixel of the
+# much does the score of signage at one pixel, on the lamp post of frame 8 (cross), change with each pixel of the
 # image? (The pictures show the square root, so that small slopes can be seen too.)
 
 # %%
@@ -749,7 +755,7 @@ for ax, name in zip(axes, TRAINED, strict=True):
     half = np.searchsorted(share, [0.25, 0.75])
     assert np.ptp(across) < receptive_field(CHAINS[name])[0]
     draw_image((slope / slope.max()).sqrt().mul(15).round(), ax=ax, cmap="magma")
-    ax.plot(198, 40, "x", color="tab:red")
+    ax.plot(198, 40, "x", color="cyan")
     for column in half:
         ax.axvline(column, color="white", linewidth=1, linestyle=":")
     ax.set_title(f"{NAMES[name]}: half within {np.ptp(half)} columns (dotted)")
@@ -809,8 +815,8 @@ with torch.inference_mode():
 # labelled images. **Predict before you run.** Which network draws thin posts best? And how far apart are the three in
 # pixel accuracy, the share of all pixels called right?
 #
-# <details><summary>Answer</summary>None draws a post: where one stands, there are yellow patches. And three points of
-# a hundred lie between the best and the last. Look, and read on.</details>
+# <details><summary>Answer</summary>None draws a post: where one stands, there is a yellow patch at best. And three
+# points of a hundred lie between the best and the last. Look, and read on.</details>
 
 # %%
 called, matrices = {}, {}
@@ -874,13 +880,13 @@ fig, axes = plt.subplots(1, 6, figsize=(11, 2.2), layout="constrained")
 for pair, name, image in zip(axes.reshape(3, 2), ("pole", "wall and pole", "slope"), (pole, wall, slope), strict=True):
     draw_image(image, ax=pair[0], cmap="magma", vmin=0, vmax=2).set_title(name)
     back = unpool(*max_pool(image), image.shape)
-    draw_image(back, ax=pair[1], cmap="magma", vmin=0, vmax=2).set_title("pooled and unpooled")
+    draw_image(back, ax=pair[1], cmap="magma", vmin=0, vmax=2).set_title("there and back")
 plt.show()
 
 # %% [markdown]
 # Left, the pole becomes a dotted line. In the middle it is gone: each of its windows has a brighter pixel. Right, a
 # smooth slope comes back as dots on a lattice that isn't there in the world. It is the decoder's job to smooth it
-# again, and after a single convolution you would still see it: that is why both ends of SegNet have two.
+# again, and after a single convolution you would still see it: that is why SegNet has two at full size.
 #
 # **Checkerboards.** Instead of unpooling, a network may *learn* to double: a transposed convolution puts a copy of
 # its kernel, times the value, at every second pixel, and adds up. By hand, a kernel of three ones and a row of ones:

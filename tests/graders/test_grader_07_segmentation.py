@@ -356,13 +356,12 @@ def unpool(pooled, indices, shape):
             "a larger kernel with zeros, and scipy",
             task="atrous",
             code="""
-from scipy.signal import correlate2d
+from scipy.ndimage import correlate
 
 def atrous(image, kernel, rate):
     spread = np.zeros((2 * rate + 1, 2 * rate + 1))
     spread[::rate, ::rate] = kernel
-    padded = np.pad(image, rate)
-    return correlate2d(padded, spread, mode="valid")""",
+    return correlate(image, spread, mode="constant")""",
         ),
         mistake(
             "rate taken for a stride",
@@ -582,7 +581,7 @@ def add_skip(coarse, fine):
         mistake(
             "added in place",
             task="skip",
-            loses=3,
+            loses=2,
             says="add_skip changed its argument",
             code=enlarging(result="np.add(fine, up, out=fine)"),
         ),

@@ -4,8 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
-from scipy.signal import correlate2d
+from scipy.ndimage import correlate, map_coordinates
 from scipy.special import log_softmax
 
 from semgrid_instructor import hidden
@@ -78,7 +77,7 @@ def check_atrous(atrous: Callable) -> None:
         assert got.shape == shape, f"rate {rate}: not the shape of the image"
         spread = np.zeros((2 * rate + 1, 2 * rate + 1))
         spread[::rate, ::rate] = kernel
-        assert np.allclose(got, correlate2d(np.pad(image, rate), spread, mode="valid")), f"wrong with rate {rate}"
+        assert np.allclose(got, correlate(image, spread, mode="constant")), f"wrong with rate {rate}"
 
 
 @hidden

@@ -9,7 +9,7 @@
 # | 1 | how far a chain of layers sees | 2 |
 # | 2 | max-pooling with indices, and the way back | 2 + 1 |
 # | 3 | a convolution with holes | 3 |
-# | 4 | a skip: enlarge, crop, add | 3 |
+# | 4 | a skip: enlarge, crop, add | 2 + 1 |
 # | 5 | the loss of an image | 2 + 1 |
 # | 6 | in your own words | 2 |
 #
@@ -180,15 +180,13 @@ def atrous(image, kernel, rate):
 image, kernel = np.zeros((5, 7)), np.arange(1.0, 10).reshape(3, 3)  # 1 2 3 / 4 5 6 / 7 8 9
 image[2, 3] = 1
 got = atrous(image, kernel, rate=2)
-assert got is not None, "atrous returned nothing: did you forget `return`?"
 slips = {
+    (): "atrous returned nothing: did you forget `return`?",
     (3, 4): "you take the rate for a stride: every pixel has an output, it is the weights that lie apart",
     (3, 5): "with rate 2 the kernel reaches 2 pixels beyond the border: pad by rate, not by 1",
     (1, 3): "the border is missing: pad with `rate` zeros on each side",
 }
-assert np.shape(got) == (5, 7), (
-    f"shape {np.shape(got)}: {slips.get(np.shape(got), 'expected the shape of the image, (5, 7)')}"
-)
+assert np.shape(got) == (5, 7), f"shape {np.shape(got)}: {slips.get(np.shape(got), 'that of the image is (5, 7)')}"
 assert not np.isclose(got[2, 2], 6), "the pixel's neighbour answers: with rate 2 the kernel skips it"
 assert np.isclose(got[2, 3], 5), f"the middle weight, 5, meets the pixel at (2, 3) itself; got {got[2, 3]:g}"
 slips = {
@@ -199,12 +197,11 @@ slips = {
 }
 assert got[0, 1] not in slips, f"the output at (0, 1) is {got[0, 1]:g}: {slips[got[0, 1]]}"
 assert not np.isclose(got[4, 3], 4), "rows and columns of the kernel are swapped: n counts rows, m columns"
-by_hand = np.zeros((5, 7))
-by_hand[::2, 1::2] = kernel[::-1, ::-1]
-np.testing.assert_allclose(got, by_hand, err_msg="one pixel of 1 in the middle")
+np.testing.assert_allclose(got[::2, 1::2], kernel[::-1, ::-1], err_msg="one pixel of 1 in the middle")
 got = atrous(np.ones((5, 7)), kernel, rate=2)
-assert not np.isclose(got[0, 0], 45), "an image of ones gives 45 in the corner, too: outside, everything is zero"
-assert np.isclose(got[0, 0], 28), f"in the corner of an image of ones: expected 5 + 6 + 8 + 9 = 28, got {got[0, 0]:g}"
+assert np.isclose(got[0, 0], 28), (
+    f"ones give {got[0, 0]:g} in the corner, not 5 + 6 + 8 + 9: outside, everything is zero"
+)
 ### BEGIN HIDDEN TESTS
 from semgrid_instructor import segmentation
 
@@ -213,7 +210,7 @@ assert not complaint, complaint
 ### END HIDDEN TESTS
 
 # %% [markdown]
-# ## Task 4: a skip: enlarge, crop, add (3 points)
+# ## Task 4: a skip: enlarge, crop, add (2 + 1 points)
 #
 # `coarse` are the scores of a deep map, `(C, h, w)`, and `fine` those of the map above it, `(C, H, W)`, where H is 2h or 2h - 1, and W is 2w or 2w - 1. Cell i of the
 # coarse map covers rows (or columns) 2i and 2i + 1 of the fine one, so its value belongs between the two, at 2i + ½. In between, interpolate bilinearly; beyond the
@@ -237,24 +234,18 @@ def add_skip(coarse, fine):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "skip-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "skip-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 coarse, fine = np.array([[[4.0, 8, 0, 8]]]), np.zeros((1, 2, 7))
 fine[0, :, 3] = 10
-before = fine.copy()
 got = add_skip(coarse, fine)
-assert got is not None, "add_skip returned nothing: did you forget `return`?"
-assert np.array_equal(fine, before), "add_skip changed its argument `fine`: make a new array (no +=)"
+assert np.count_nonzero(fine) == 2, "add_skip changed its argument `fine`: make a new array (no +=)"
 assert np.shape(got) != (1, 2, 8), "a column too many: the fine map has only seven, cut off the last one"
 assert np.shape(got) == (1, 2, 7), f"expected the shape of the fine map, (1, 2, 7), got {np.shape(got)}"
 assert not np.allclose(got, fine), "the coarse scores got lost"
 slips = {  # of columns 0 to 2; by hand 4, a quarter of the way from 4 to 8, three quarters of it
     (4, 4, 8): "each value is repeated (nearest): interpolate between the places 2i + 1/2",
     (4, 6, 8): "you put value i at column 2i: it covers 2i and 2i + 1, so it belongs between them",
-    (
-        4,
-        5.714,
-        7.429,
-    ): "first and last value lie on the first and last column (align_corners): they belong to 1/2 and 6 1/2",
+    (4, 5.714, 7.429): "the ends are aligned (align_corners): the first value belongs to 1/2, not to 0",
     (5, 7, 6): "the first column is cut off: cut at the right end",
     (3, 5, 7): "before the first place, 1/2, the value stays at 4: neither extrapolate nor mix with zeros",
     (2, 2.5, 3.5): "that is the mean: a skip adds",
@@ -265,9 +256,24 @@ for slip, hint in slips.items():
 assert not np.isclose(got[0, 0, 3], 6), "column 3 is 6, the coarse map alone: add the fine scores"
 assert not np.isclose(got[0, 0, 3], 60), "column 3 is 60: a skip adds scores, it doesn't multiply them"
 np.testing.assert_allclose(got[0, 0], [4, 5, 7, 16, 2, 2, 6], err_msg="row 0; coarse alone: 4 5 7 6 2 2 6")
-np.testing.assert_allclose(got[0, 1], got[0, 0], err_msg="the coarse map has one row, so both rows are alike")
-got = add_skip(np.array([[[0.0], [4]], [[8], [0]]]), np.zeros((2, 3, 2)))  # two classes, two rows, one column
-np.testing.assert_allclose(got[:, :, 0], [[0, 1, 3], [8, 6, 2]], err_msg="rows are interpolated too, classes are not")
+### BEGIN HIDDEN TESTS
+from semgrid_instructor import segmentation
+
+complaint = segmentation.check_skip(add_skip)
+assert not complaint, complaint
+### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "rows-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+coarse, fine = np.array([[[0.0], [4]], [[8], [0]]]), np.full((2, 3, 2), 10.0)  # two classes, two rows, one column
+got = add_skip(coarse, fine)
+assert np.shape(got) == (2, 3, 2), f"expected the shape of the fine map, (2, 3, 2), got {np.shape(got)}: cut rows too"
+assert not np.allclose(got[0, :, 0], [10, 10, 14]), "the rows are repeated: rows are interpolated too"
+np.testing.assert_allclose(
+    got[:, :, 0], [[10, 11, 13], [18, 16, 12]], err_msg="by hand 0 1 3 and 8 6 2, and 10 to each"
+)
+np.testing.assert_allclose(
+    got[:, :, 1], got[:, :, 0], err_msg="the coarse map has one column, so both columns are alike"
+)
 ### BEGIN HIDDEN TESTS
 from semgrid_instructor import segmentation
 
