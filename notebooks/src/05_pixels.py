@@ -40,7 +40,7 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.planes import plane_heights, plane_pixels
 
 plt.rcParams["figure.dpi"] = 72
-plt.rcParams["image.interpolation"] = "nearest"
+plt.rcParams.update({"image.interpolation": "nearest", "hatch.color": "white"})
 spec, drive = GridSpec.compact(), sample_drive()
 frame = drive[len(drive) - 1]
 camera = frame.camera
