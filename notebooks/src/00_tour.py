@@ -90,10 +90,10 @@ plt.rcParams["figure.dpi"] = 80
 # | [02](02_grids.ipynb) | $l \to o$ | occupancy grids: evidence, log-odds, and the smear behind a moving car |
 # | [03](03_bof.ipynb) | $l \to o$ | BOF: occupancy with velocity |
 # | [04](04_cmcdot.ipynb) | $l \to o$ | CMCDOT: four states, particles, resampling |
-# | 05 | $s \to p$ | from grid to pixel: equation (1) |
-# | 06 | $s \to p$ | sampling that learns: equation (2) and its gradient |
-# | 07 | $i \to s$ | three networks for segmentation |
-# | 08 | $(p, o) \to g$ | reduction, fusion, training end to end |
+# | [05](05_pixels.ipynb) | $s \to p$ | from grid to pixel: equation (1) |
+# | [06](06_planes.ipynb) | $s \to p$ | sampling that learns: equation (2) and its gradient |
+# | [07](07_segmentation.ipynb) | $i \to s$ | three networks for segmentation |
+# | [08](08_fusion.ipynb) | $(p, o) \to g$ | reduction, fusion, training end to end |
 # | 09 | | where ground truth comes from |
 # | 10 | $g \to g$ | the CRF by hand: equations (3) and (4) |
 # | 11 | $g \to g$ | the fast CRF |
