@@ -737,7 +737,7 @@ def parameters(name, preset):
 print("                parameters   (paper)   field [pixels]   a score every ... pixels")
 for name in SEGMENTERS:
     sizes = f"{parameters(name, 'compact'):11,} {parameters(name, 'paper'):12,}"
-    print(f"{NAMES[name]:<11} {sizes} {receptive_field(CHAINS[name])[0]:12} {EVERY[name]:16}")
+    print(f"{NAMES[name]:<11} {sizes} {receptive_field(CHAINS[name])[0]:12.0f} {EVERY[name]:16}")
 
 # %% [markdown]
 # The field is what a pixel *can* see. What it does look at is another question, and the gradient answers it: by how
