@@ -238,11 +238,12 @@ plotting.image_labels(small, now.scores.argmax(axis=0), KITTI_14)
 plt.show()
 
 # %% [markdown]
-# Look for what is easy (road, sidewalk, near cars, walls) and what isn't: the fence is taken for a building, the
-# cyclist for a car, and of the pedestrian little is found. The network learnt in two steps: first from labelled
-# images, then end to end, when only the map counted: the map's mistakes travel back through fusion, planes and
-# equation (2) into these scores. So don't expect clean outlines: the scores are whatever helps the map (lectures 07
-# and 08). Yellow tree tops, *signage*, do it no harm: the map asks for nothing that stands higher than 4 m.
+# Look for what is easy (road, sidewalk, near cars, walls) and what isn't: the fence is taken for building and signage,
+# the cyclist is torn between car and pedestrian, and the pedestrian behind him is part of the wall. The network learnt
+# in two steps: first from labelled images, then end to end, when only the map counted: the map's mistakes travel back
+# through fusion, planes and equation (2) into these scores. So don't expect clean outlines: the scores are whatever
+# helps the map, and as labels of pixels they got worse by it (lectures 07 and 08). Yellow tree tops, *signage*, do no
+# harm: the map asks for nothing that stands higher than 4 m.
 
 # %% [markdown]
 # ## Stage 3, $s \to p$: from pixels to places
@@ -314,7 +315,8 @@ plt.show()
 # Road and sidewalk, both FREE in the occupancy grid, are told apart: that the LIDAR can't do. Fence and house, on the
 # right, stand where the LIDAR met them: that the camera can't do. In the truth, a cell that the camera doesn't see is
 # *unknown-free*, *-static*, *-dynamic* or *-unobserved*, by its occupancy state. Compare: of the cars on the left some
-# are missing, such as the one 14 m ahead, and from 30 to 45 m the sidewalk is called unobserved.
+# are missing, such as the one 14 m ahead. The sidewalk from 27 to 40 m is called *bicycle*: it lies behind the cyclists,
+# on the rays that they block. And beyond 57 m the road has turned into vegetation.
 
 # %% [markdown]
 # ## Stage 5: refinement by a CRF
@@ -336,7 +338,8 @@ plt.show()
 
 # %% [markdown]
 # White cells on the right have kept their class: about nine in ten. The changes are crumbs, and thin lines along
-# borders. The road grows together on the left and swallows most of what was found of the cars 40 m ahead.
+# borders. The road grows together on the left and swallows most of what was found of the cars 40 m ahead. The wrong
+# bicycle on the sidewalk only gets straight edges: tidy isn't true.
 #
 # ## How good is it?
 #
@@ -401,7 +404,7 @@ plt.show()
 
 # %% [markdown]
 # The diagonal is right. For most classes the last column holds the most usual mistake: a cell that the camera sees is
-# called *unobserved*. Sky stands in no cell, so its row is empty. A good quarter of *unknown-dynamic* is called car: a
+# called *unobserved*. Sky stands in no cell, so its row is empty. A third of *unknown-dynamic* is called car: a
 # class that fits what moves, though the camera didn't see it.
 #
 # ## Play with it
@@ -501,7 +504,7 @@ ax.set(xlabel="distance ahead", ylabel="semantic cells right [%]", ylim=(0, 100)
 plt.show()
 
 # %% [markdown]
-# Near the vehicle nearly nine cells in ten are right, beyond 45 m about half.
+# Near the vehicle nearly nine cells in ten are right, beyond 45 m about four.
 #
 # **Small things are lost.** Of all cells that truly hold a class, how many does the map call so?
 
