@@ -723,15 +723,16 @@ fig = plotting.label_maps(spec, {"learnt by heart": recited[0], "truth": four[0]
 plt.show()
 
 # %% [markdown]
-# A frame recited. Large areas are there, and so are most cars; edges and single cells take longest. Given ten times
-# as many steps, from random weights on, each image network gets hold of them too (`semgrid-edu reproduce overfit`):
+# A frame recited. Large areas are there, and so are most cars; edges and single cells take longest. With 400 steps,
+# from random weights on and every cell counting alike, all four image networks get them too (`semgrid-edu reproduce
+# overfit`):
 
 # %%
 by_network = json.loads(Path("../docs/results/overfit.json").read_text(encoding="utf-8"))["networks"]
 lines = ["| image network | steps | cells right, of four frames [%] | minutes |", "|---|---|---|---|"]
 for name, run in by_network.items():
     right = 100 * run["pixel accuracy"]["evaluation"]
-    lines.append(f"| {name} | {run['iterations']} | {right:.1f} | {run['minutes']:.0f} |")
+    lines.append(f"| {name} | {run['iterations']} | {right:.1f} | {run['minutes']:.1f} |")
 Markdown("\n".join(lines))
 
 # %% [markdown]
