@@ -315,8 +315,8 @@ plt.show()
 # Road and sidewalk, both FREE in the occupancy grid, are told apart: that the LIDAR can't do. Fence and house, on the
 # right, stand where the LIDAR met them: that the camera can't do. In the truth, a cell that the camera doesn't see is
 # *unknown-free*, *-static*, *-dynamic* or *-unobserved*, by its occupancy state. Compare: of the cars on the left some
-# are missing, such as the one 14 m ahead. The sidewalk from 27 to 40 m is called *bicycle*: it lies behind the cyclists,
-# on the rays that they block. And beyond 57 m the road has turned into vegetation.
+# are missing, such as the one 14 m ahead. The sidewalk from 27 to 40 m is called *bicycle*: it lies behind the
+# cyclists, on the rays that they block. And beyond 57 m the road has turned into vegetation.
 
 # %% [markdown]
 # ## Stage 5: refinement by a CRF
