@@ -21,9 +21,6 @@ app.add_typer(reproduce, name="reproduce")
 @app.callback()
 def main() -> None:
     """Probabilistic bird's-eye semantic perception, taught notebook by notebook."""
-    from semgrid_edu.memory import keep_freed_memory
-
-    keep_freed_memory()
 
 
 @app.command()
@@ -178,12 +175,11 @@ def evaluate(
 ) -> None:
     """Score a trained network and two simple baselines on the test frames."""
     from semgrid_edu.experiments.evaluate import evaluate, table
-    from semgrid_edu.files import check_writable, write_json
+    from semgrid_edu.files import check_writable
 
     check_writable(out)
     result = evaluate(data, weights)
-    write_json(out, result)
-    typer.echo(f"{table(result['scores'])}\n\nwritten to {out}")
+    _keep(result, table(result["scores"]), out)
 
 
 @reproduce.callback()
@@ -200,12 +196,11 @@ def occupancy(
 ) -> None:
     """Score log-odds grid, BOF and CMCDOT on simulated drives (lecture 04)."""
     from semgrid_edu.experiments.occupancy import GRIDS, compare, tables
-    from semgrid_edu.files import check_writable, write_json
+    from semgrid_edu.files import check_writable
 
     check_writable(out)
     result = compare(seed, drives, (grid,) if grid else tuple(GRIDS))
-    write_json(out, result)
-    typer.echo(f"{tables(result)}\n\nwritten to {out}")
+    _keep(result, tables(result), out)
 
 
 @reproduce.command()
@@ -217,12 +212,11 @@ def two_stage(
 ) -> None:
     """Train end to end and in two stages, and score both (lecture 08)."""
     from semgrid_edu.experiments.two_stage import compare, table
-    from semgrid_edu.files import check_writable, write_json
+    from semgrid_edu.files import check_writable
 
     check_writable(out)
     result = compare(data, runs, seeds)
-    write_json(out, result)
-    typer.echo(f"{table(result['scores'])}\n\nwritten to {out}")
+    _keep(result, table(result["scores"]), out)
 
 
 @reproduce.command()
@@ -232,12 +226,19 @@ def overfit(
 ) -> None:
     """Learn four frames by heart with each image network (lecture 08)."""
     from semgrid_edu.experiments.overfit import overfit, table
-    from semgrid_edu.files import check_writable, write_json
+    from semgrid_edu.files import check_writable
 
     check_writable(out)
     result = overfit(seed)
+    _keep(result, table(result["networks"]), out)
+
+
+def _keep(result: dict[str, object], shown: str, out: Path) -> None:
+    """Write an experiment's result, and show what matters of it."""
+    from semgrid_edu.files import write_json
+
     write_json(out, result)
-    typer.echo(f"{table(result['networks'])}\n\nwritten to {out}")
+    typer.echo(f"{shown}\n\nwritten to {out}")
 
 
 def _report(problems: list[str], sound: str) -> None:
