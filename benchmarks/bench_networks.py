@@ -2,6 +2,9 @@
 
 A training step is a whole turn of `train`'s loop: a batch of six frames drawn and jittered, forward, backward, weights
 changed, loss logged. Inference is a frame from image and occupancy grid to logits.
+
+Steps are made of multiplications, so beside them stands how fast the machine multiplies matrices in the same minute: on
+a shared one that varies by two thirds, and the steps with it.
 """
 
 import io
@@ -12,7 +15,9 @@ from contextlib import redirect_stderr
 import numpy as np
 import torch
 from timing import best_times
+from torch.utils.flop_counter import FlopCounterMode
 
+from semgrid_edu.batches import draw_batch, grid_logits, image_scores
 from semgrid_edu.datasets.samples import sample_drive, sample_frames
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.memory import keep_freed_memory
@@ -46,6 +51,26 @@ def step_times(net: SemanticGridNet) -> tuple[np.ndarray, np.ndarray]:
     return steps[WARM_UP : STEPS - 1], steps[STEPS + WARM_UP :]
 
 
+def step_arithmetic(net: SemanticGridNet) -> list[float]:
+    """Return the 1e9 additions and multiplications in the products of a step of both stages, forward and backward."""
+    frames = sample_frames()
+    batch = draw_batch(frames, len(frames), jitter=0, iteration=0, seed=0)
+    counts = []
+    for scores in (image_scores, grid_logits):
+        net.zero_grad()
+        with FlopCounterMode(display=False) as counter:
+            scores(net.train(), batch).sum().backward()
+        counts.append(counter.get_total_flops() / 1e9)
+    return counts
+
+
+def matrix_product_rate(size: int = 2048) -> float:
+    """Return the 1e9 additions and multiplications a second of a product of two square matrices, the median."""
+    a = torch.randn(size, size, generator=torch.Generator().manual_seed(0))
+    times = [best_times([lambda: a @ a], rounds=1)[0] for _ in range(ROUNDS)]
+    return 2 * size**3 / 1e6 / float(np.median(times))
+
+
 def inference_time(net: SemanticGridNet) -> float:
     """Return the milliseconds from image and occupancy grid to logits."""
     frame = sample_frames()[0]
@@ -57,14 +82,17 @@ def inference_time(net: SemanticGridNet) -> float:
 def main() -> None:
     keep_freed_memory()
     camera = sample_drive().camera
-    print("compact       parameters               step, ms: median (fastest)        inference")
-    print("network      image     fusion          image stage      grid stage       ms a frame")
+    print("                                 step, ms: median (fastest), at GFLOP/s     matrix product  inference")
+    print("network      image     fusion          image stage            grid stage           GFLOP/s  ms a frame")
     for name in SEGMENTERS:
         net = build_net(Architecture(name), camera)
-        image, grid = step_times(net)
+        arithmetic, stages, product = step_arithmetic(net), step_times(net), matrix_product_rate()
         sizes = [sum(p.numel() for p in part.parameters()) for part in (net.segmenter, net.fusion)]
-        steps = "".join(f"{np.median(stage):10.0f} ({stage.min():3.0f})" for stage in (image, grid))
-        print(f"{name:8} {sizes[0]:10,} {sizes[1]:10,} {steps} {inference_time(net):14.1f}")
+        steps = [
+            f"{np.median(times):10.0f} ({times.min():3.0f}) {1e3 * flops / np.median(times):6.0f}"
+            for times, flops in zip(stages, arithmetic, strict=True)
+        ]
+        print(f"{name:8} {sizes[0]:10,} {sizes[1]:10,} {' '.join(steps)} {product:17.0f} {inference_time(net):11.1f}")
 
 
 if __name__ == "__main__":

@@ -82,6 +82,17 @@ class SparseMatrix(NamedTuple):
             self.indices, rows, self.offsets, mode="sum", per_sample_weights=weights, include_last_offset=True
         )
 
+    def block_diagonal(self, n_blocks: int, n_columns: int) -> "SparseMatrix":
+        """Return the matrix of this one `n_blocks` times along its diagonal, having `n_columns` itself."""
+        block = torch.arange(n_blocks, dtype=self.offsets.dtype, device=self.offsets.device)[:, None]
+        n_weights = self.offsets[-1:]
+        starts = (self.offsets[:-1] + block * n_weights).flatten()
+        return SparseMatrix(
+            indices=(self.indices + block * n_columns).flatten(),
+            offsets=torch.cat([starts, n_blocks * n_weights]),
+            weights=self.weights.repeat(n_blocks),
+        )
+
 
 class SparseProduct(torch.autograd.Function):
     """y = A x, whose gradient is A^T dL/dy; the transpose is given, so that nothing is scattered."""

@@ -2,6 +2,7 @@
 
 from copy import deepcopy
 from functools import lru_cache
+from math import prod
 
 import numpy as np
 import torch
@@ -205,8 +206,10 @@ class PlaneSampler(nn.Module):
         for part, values in zip(SparseMatrix._fields, (matrix.indices, matrix.indptr, matrix.data), strict=True):
             self.register_buffer(f"{name}_{part}", torch.from_numpy(values), persistent=False)
 
-    def _matrix(self, name: str) -> SparseMatrix:
-        return SparseMatrix(*(getattr(self, f"{name}_{part}") for part in SparseMatrix._fields))
+    def _matrix(self, name: str, n_images: int, n_columns: int) -> SparseMatrix:
+        """Return a matrix for as many images side by side: their planes then needn't be copied into one batch."""
+        matrix = SparseMatrix(*(getattr(self, f"{name}_{part}") for part in SparseMatrix._fields))
+        return matrix if n_images == 1 else _block_diagonal(matrix, n_images, n_columns)
 
     def forward(self, scores: Tensor) -> Tensor:
         """Return the planes of each image.
@@ -229,12 +232,15 @@ class PlaneSampler(nn.Module):
             raise ArgumentError(
                 "scores", f"shape (B, C, {self.image_size[0]}, {self.image_size[1]})", tuple(scores.shape)
             )
-        rows = scores.permute(0, 2, 3, 1).flatten(1, 2)
-        matrix, transpose = self._matrix("matrix"), self._matrix("transpose")
-        sampled = [SparseProduct.apply(image, matrix, transpose) for image in rows]
-        # Stacking copies, which one image, the running pipeline's case, needn't pay for.
-        planes = sampled[0][None] if len(sampled) == 1 else torch.stack(sampled)
-        return planes.unflatten(1, self.planes_shape).permute(0, 4, 1, 2, 3)
+        n_images, n_pixels, n_points = len(scores), prod(self.image_size), prod(self.planes_shape)
+        matrix = self._matrix("matrix", n_images, n_pixels)
+        transpose = self._matrix("transpose", n_images, n_points)
+        planes = SparseProduct.apply(scores.permute(0, 2, 3, 1).flatten(0, 2), matrix, transpose)
+        return planes.unflatten(0, (n_images, *self.planes_shape)).permute(0, 4, 1, 2, 3)
+
+
+# One matrix and its transpose: all batches of a training are of one size.
+_block_diagonal = lru_cache(maxsize=2)(SparseMatrix.block_diagonal)
 
 
 # Four calibrations: an operator at the paper's scale holds 67 MB.

@@ -1,6 +1,6 @@
 import numpy as np
 import torch
-from scipy.sparse import random_array
+from scipy.sparse import block_diag, random_array
 
 from semgrid_edu.bilinear import SparseMatrix, SparseProduct, bilinear_matrix
 
@@ -29,6 +29,13 @@ def test_products_are_those_of_scipy():
     assert (np.diff(matrix.indptr) == 0).any()  # empty rows among them
     x = torch.randn(20, 3, generator=torch.Generator().manual_seed(0))
     torch.testing.assert_close(_tensors(matrix).multiply(x), torch.from_numpy(matrix @ x.numpy()))
+
+
+def test_blocks_along_a_diagonal_are_those_of_scipy():
+    matrix = _random_matrix()
+    x = torch.randn(60, 3, generator=torch.Generator().manual_seed(0))
+    product = _tensors(matrix).block_diagonal(3, n_columns=20).multiply(x)
+    torch.testing.assert_close(product, torch.from_numpy(block_diag([matrix] * 3) @ x.numpy()))
 
 
 def test_the_gradient_of_a_product_is_that_by_the_transpose():

@@ -370,10 +370,11 @@ def test_moving_one_sampler_leaves_the_others_alone(built):
     assert len(built) == 1
 
 
-def test_an_operator_built_for_inference_learns_as_well(built):
+@pytest.mark.parametrize("n_images", [1, 3])
+def test_an_operator_built_for_inference_learns_as_well(built, n_images):
     with torch.inference_mode():
-        PlaneSampler.for_camera(COARSE, HEIGHTS, _camera())
-    scores = torch.ones(1, 1, 101, 201, requires_grad=True)
+        PlaneSampler.for_camera(COARSE, HEIGHTS, _camera())(torch.ones(n_images, 1, 101, 201))
+    scores = torch.ones(n_images, 1, 101, 201, requires_grad=True)
     planes = PlaneSampler.for_camera(COARSE, HEIGHTS, _camera())(scores)
     planes.sum().backward()
     assert len(built) == 1
