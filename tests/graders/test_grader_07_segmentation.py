@@ -184,6 +184,40 @@ def receptive_field(layers):
             code=field(result="field, 2"),
         ),
         mistake(
+            "from the last layer to the first, by the formula of the first to the last",
+            task="field",
+            loses=2,
+            says="you walk from the last layer to the first",
+            code=field().replace("in layers", "in layers[::-1]"),
+        ),
+        mistake(
+            "rate and stride swapped",
+            task="field",
+            loses=2,
+            says="each layer is (kernel, stride, rate)",
+            code=field().replace("kernel, stride, rate in", "kernel, rate, stride in"),
+        ),
+        mistake(
+            "jump first",
+            task="field",
+            loses=2,
+            says="return the field first, then the jump",
+            code=field(result="jump, field"),
+        ),
+        mistake(
+            "pixels counted without the holes",
+            task="field",
+            loses=2,
+            says="on inputs you haven't seen: wrong field (from the first pixel to the last",
+            code="""
+def receptive_field(layers):
+    seen, jump = {0}, 1
+    for kernel, stride, rate in reversed(layers):
+        seen = {stride * place + rate * k for place in seen for k in range(kernel)}
+        jump *= stride
+    return len(seen), jump""",
+        ),
+        mistake(
             "strides are 2 or nothing",
             task="field",
             loses=2,
@@ -222,6 +256,31 @@ def unpool(pooled, indices, shape):
     image = np.zeros(shape[0] * shape[1])
     np.put(image, indices, pooled)
     return image.reshape(shape)""",
+        ),
+        right(
+            "lists of numbers",
+            task="pool",
+            code="""
+def max_pool(image):
+    h, w = image.shape
+    best = [
+        [max((image[v + n, u + m], (v + n) * w + u + m) for n in (0, 1) for m in (0, 1)) for u in range(0, w, 2)]
+        for v in range(0, h, 2)
+    ]
+    return [[value for value, _ in row] for row in best], [[place for _, place in row] for row in best]
+
+def unpool(pooled, indices, shape):
+    image = [[0.0] * shape[1] for _ in range(shape[0])]
+    for value, index in zip(np.ravel(pooled), np.ravel(indices)):
+        image[index // shape[1]][index % shape[1]] = value
+    return image""",
+        ),
+        mistake(
+            "decimals cut off",
+            task="pool",
+            loses=1,
+            says="on inputs you haven't seen: a maximum isn't where its index says, or isn't what it was",
+            code=pool(unpool=UNPOOL.replace("np.zeros(shape)", "np.zeros(shape, int)")),
         ),
         mistake(
             "index in the window",
@@ -534,6 +593,20 @@ def add_skip(coarse, fine):
             code=enlarging("np.linspace(0, 2 * len(values) - 1, len(values))"),
         ),
         mistake(
+            "stretched to the fine map's size",
+            task="skip",
+            loses=3,
+            says="double it to eight, then cut one off",
+            code="""
+from scipy.ndimage import map_coordinates
+
+def add_skip(coarse, fine):
+    C, H, W = fine.shape
+    rows, cols = (np.arange(H) + 0.5) * coarse.shape[1] / H - 0.5, (np.arange(W) + 0.5) * coarse.shape[2] / W - 0.5
+    places = np.stack(np.meshgrid(rows, cols, indexing="ij"))
+    return np.array([map_coordinates(s, places, order=1, mode="nearest") for s in coarse]) + fine""",
+        ),
+        mistake(
             "cropped at the wrong end",
             task="skip",
             loses=3,
@@ -687,6 +760,13 @@ def cross_entropy(scores, truth):
             loses=3,
             says="those are the scores themselves",
             code=loss("scores", "-p.mean()"),
+        ),
+        mistake(
+            "mean over classes",
+            task="loss",
+            loses=3,
+            says="you average over classes",
+            code=loss(result="np.mean([-np.log(p[truth[v, u] == c]).mean() for c in set(truth[v, u])])"),
         ),
         mistake(
             "logarithm of the mean",

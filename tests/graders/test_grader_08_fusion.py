@@ -83,6 +83,11 @@ def reduce_planes(planes, theta, beta):
     return maps""",
         ),
         right(
+            "a list of maps",
+            task="reduce-planes",
+            code=reduction("[(t[..., None, None] * planes).sum(axis=(0, 1)) + b for t, b in zip(theta, beta)]"),
+        ),
+        right(
             "a product of two matrices",
             task="reduce-planes",
             code="""
@@ -107,6 +112,13 @@ def reduce_planes(planes, theta, beta):
             loses=2,
             says="the bias is missing",
             code=reduction("np.einsum('kcd,cdhw->khw', theta, planes)"),
+        ),
+        mistake(
+            "bias by column",
+            task="reduce-planes",
+            loses=2,
+            says="your bias changes along the columns",
+            code=reduction("np.einsum('kcd,cdhw->khw', theta, planes) + beta"),
         ),
         mistake(
             "bias with every term",
@@ -203,6 +215,16 @@ def reduce_back(planes, theta, blamed):
         theta_bar[k, c, d] = np.sum(planes[c, d] * blamed[k])
         planes_bar[c, d] += theta[k, c, d] * blamed[k]
     return theta_bar, [np.sum(b) for b in blamed], planes_bar""",
+        ),
+        right(
+            "lists of numbers and maps",
+            task="reduce-back",
+            code="""
+def reduce_back(planes, theta, blamed):
+    K, C, D = theta.shape
+    theta_bar = [[[(planes[c, d] * blamed[k]).sum() for d in range(D)] for c in range(C)] for k in range(K)]
+    planes_bar = [[sum(theta[k, c, d] * blamed[k] for k in range(K)) for d in range(D)] for c in range(C)]
+    return theta_bar, [b.sum() for b in blamed], planes_bar""",
         ),
         right(
             "transposed matrices",
@@ -643,6 +665,48 @@ def weighted_loss(logits, truth, alpha):
     return -(w * np.take_along_axis(log_g, truth[None], axis=0)[0]).sum() / w.sum()""",
         ),
         mistake(
+            "unlabelled is class 0",
+            task="weighted-loss",
+            loses=4,
+            says="you count the unlabelled cell as class 0",
+            code=loss().replace("rows,", "truth = np.where(truth == 255, 0, truth)\n    rows,", 1),
+        ),
+        mistake(
+            "unlabelled clipped to the last class",
+            task="weighted-loss",
+            loses=4,
+            says="you count the unlabelled cell as the last class",
+            code=loss().replace("rows,", "truth = np.minimum(truth, len(alpha) - 1)\n    rows,", 1),
+        ),
+        mistake(
+            "unlabelled weighs as class 0 below",
+            task="weighted-loss",
+            loses=4,
+            says="weighs below as class 0",
+            code=loss("-(w * of_truth).sum() / alpha[np.where(truth == 255, 0, truth)].sum()"),
+        ),
+        mistake(
+            "soft-max of a soft-max",
+            task="weighted-loss",
+            loses=4,
+            says="that is the soft-max of a soft-max",
+            code=loss().replace("    m =", "    logits = np.exp(logits) / np.exp(logits).sum(axis=0)\n    m ="),
+        ),
+        mistake(
+            "divided by the weights of all classes",
+            task="weighted-loss",
+            loses=4,
+            says="you divide by the weights of all classes",
+            code=loss("-(w * of_truth).sum() / alpha.sum()"),
+        ),
+        mistake(
+            "logarithm of a probability that is zero",
+            task="weighted-loss",
+            loses=1,
+            says="keep log g, g itself is 0 here",
+            code=loss(log_g="np.log(np.exp(logits - m) / np.exp(logits - m).sum(axis=0))"),
+        ),
+        mistake(
             "overflow",
             task="weighted-loss",
             loses=1,
@@ -722,6 +786,20 @@ def momentum_step(theta, delta, gradient, eta, kappa):
             loses=2,
             says="that is Nesterov's momentum",
             code=step(theta="theta - eta * (gradient + kappa * new)"),
+        ),
+        mistake(
+            "delta first",
+            task="momentum-step",
+            loses=2,
+            says="that is delta: return theta first",
+            code=step(theta="new", returned="theta - eta * new"),
+        ),
+        mistake(
+            "rate and momentum swapped",
+            task="momentum-step",
+            loses=2,
+            says="eta and kappa are swapped",
+            code=step(delta="eta * delta + gradient", theta="theta - kappa * new"),
         ),
         mistake(
             "old delta",

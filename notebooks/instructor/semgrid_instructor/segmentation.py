@@ -27,7 +27,7 @@ def check_field(receptive_field: Callable) -> None:
         chain = [tuple(map(int, layer)) for layer in rng.integers(1, 4, size=(5, 3))]
         field, jump = receptive_field(list(chain))
         assert jump == np.prod([stride for _, stride, _ in chain]), "wrong jump (strides need not be 1 or 2)"
-        assert field == max(_pixels_seen(chain)) + 1, "wrong field"
+        assert field == max(_pixels_seen(chain)) + 1, "wrong field (from the first pixel to the last, holes and all)"
 
 
 def _pool(image: NDArray) -> tuple[NDArray, NDArray]:
@@ -64,7 +64,7 @@ def check_unpool(unpool: Callable) -> None:
         got = np.asarray(unpool(values.copy(), places.copy(), shape))
         assert got.shape == shape, "not the shape that was asked for (it may be odd)"
         kept = np.isin(np.arange(image.size), places).reshape(shape)
-        assert np.allclose(got, image * kept), "a maximum isn't where its index says"
+        assert np.allclose(got, image * kept), "a maximum isn't where its index says, or isn't what it was"
 
 
 @hidden

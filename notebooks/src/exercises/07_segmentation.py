@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Exercise 07: three networks for segmentation
 #
-# Five small functions, the parts that tell SegNet, FCN and DeepLab apart and the loss that teaches all of them, and one question to answer in words. About
+# Six small functions, the parts that tell SegNet, FCN and DeepLab apart and the loss that teaches all of them, and one question to answer in words. About
 # 75 minutes. The lecture is [07: three networks for segmentation](../07_segmentation.ipynb).
 #
 # | task | about | points |
@@ -33,7 +33,7 @@ warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number d
 # $$ \text{field} \leftarrow \text{field} + (\text{kernel} - 1) \cdot \text{rate} \cdot \text{jump}, \qquad
 #    \text{jump} \leftarrow \text{jump} \cdot \text{stride} $$
 #
-# Both are 1 before the first layer. Do the chain of the test below on paper first.
+# Both are 1 before the first layer, so they are 1 and 1 for a chain without layers. Do the chain of the test below on paper first.
 
 
 # %% nbgrader={"grade": false, "grade_id": "field", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -63,6 +63,9 @@ slips = {
     36: "the rate spreads a kernel, it doesn't move outputs apart: it is no part of the jump",
     16: "you add up the kernels: each adds kernel - 1, in steps of rate times jump",
     30: "a kernel of 3 with rate 2 spans 5 pixels, not 6: it adds (3 - 1) * 2",
+    25: "you walk from the last layer to the first: `layers` begins at the image, where the jump is 1",
+    17: "rate and stride are swapped: each layer is (kernel, stride, rate)",
+    4: "that is the jump: return the field first, then the jump",
 }
 assert field not in slips, f"a field of {field}: {slips[field]}"
 assert field == 28, f"expected a field of 28 pixels, got {field}"
@@ -135,7 +138,7 @@ assert not complaint, complaint
 
 # %% nbgrader={"grade": true, "grade_id": "unpool-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 pooled, indices = np.array([[2.0, 4, 7], [6, 8, 3]]), np.array([[1, 8, 4], [18, 21, 22]])
-got = unpool(pooled, indices, (4, 6))
+got = np.asarray(unpool(pooled, indices, (4, 6)))
 assert np.shape(got) == (4, 6), f"expected the shape that was asked for, (4, 6), got {np.shape(got)}"
 assert np.count_nonzero(got) < 7, (
     "more than six numbers aren't zero: a maximum goes to one place, not to its whole window"
@@ -159,7 +162,7 @@ assert not complaint, complaint
 # Complete `atrous(image, kernel, rate)`: the 3x3 convolution of one channel whose weights lie `rate` pixels apart. The output has the size of the image; outside
 # the image everything is zero. As everywhere in deep learning the kernel isn't turned round:
 #
-# $$ \text{out}[v, u] = \sum_{n=0}^{2} \sum_{m=0}^{2} \kappa[n, m]\;
+# $$ \text{out}[v, u] = \sum_{n=0}^{2} \sum_{m=0}^{2} \text{kernel}[n, m]\;
 #    \text{in}[v + \text{rate} \cdot (n - 1),\; u + \text{rate} \cdot (m - 1)] $$
 
 
@@ -179,7 +182,7 @@ def atrous(image, kernel, rate):
 # %% nbgrader={"grade": true, "grade_id": "atrous-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 image, kernel = np.zeros((5, 7)), np.arange(1.0, 10).reshape(3, 3)  # 1 2 3 / 4 5 6 / 7 8 9
 image[2, 3] = 1
-got = atrous(image, kernel, rate=2)
+got = np.asarray(atrous(image, kernel, rate=2))
 slips = {
     (): "atrous returned nothing: did you forget `return`?",
     (3, 4): "you take the rate for a stride: every pixel has an output, it is the weights that lie apart",
@@ -198,7 +201,7 @@ slips = {
 assert got[0, 1] not in slips, f"the output at (0, 1) is {got[0, 1]:g}: {slips[got[0, 1]]}"
 assert not np.isclose(got[4, 3], 4), "rows and columns of the kernel are swapped: n counts rows, m columns"
 np.testing.assert_allclose(got[::2, 1::2], kernel[::-1, ::-1], err_msg="one pixel of 1 in the middle")
-got = atrous(np.ones((5, 7)), kernel, rate=2)
+got = np.asarray(atrous(np.ones((5, 7)), kernel, rate=2))
 assert np.isclose(got[0, 0], 28), (
     f"ones give {got[0, 0]:g} in the corner, not 5 + 6 + 8 + 9: outside, everything is zero"
 )
@@ -237,7 +240,7 @@ def add_skip(coarse, fine):
 # %% nbgrader={"grade": true, "grade_id": "skip-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 coarse, fine = np.array([[[4.0, 8, 0, 8]]]), np.zeros((1, 2, 7))
 fine[0, :, 3] = 10
-got = add_skip(coarse, fine)
+got = np.asarray(add_skip(coarse, fine))
 assert np.count_nonzero(fine) == 2, "add_skip changed its argument `fine`: make a new array (no +=)"
 assert np.shape(got) != (1, 2, 8), "a column too many: the fine map has only seven, cut off the last one"
 assert np.shape(got) == (1, 2, 7), f"expected the shape of the fine map, (1, 2, 7), got {np.shape(got)}"
@@ -247,6 +250,7 @@ slips = {  # of columns 0 to 2; by hand 4, a quarter of the way from 4 to 8, thr
     (4, 6, 8): "you put value i at column 2i: it covers 2i and 2i + 1, so it belongs between them",
     (4, 5.714, 7.429): "the ends are aligned (align_corners): the first value belongs to 1/2, not to 0",
     (5, 7, 6): "the first column is cut off: cut at the right end",
+    (4, 5.429, 7.714): "you stretch the coarse map to seven columns: double it to eight, then cut one off",
     (3, 5, 7): "before the first place, 1/2, the value stays at 4: neither extrapolate nor mix with zeros",
     (2, 2.5, 3.5): "that is the mean: a skip adds",
 }
@@ -265,7 +269,7 @@ assert not complaint, complaint
 
 # %% nbgrader={"grade": true, "grade_id": "rows-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 coarse, fine = np.array([[[0.0], [4]], [[8], [0]]]), np.full((2, 3, 2), 10.0)  # two classes, two rows, one column
-got = add_skip(coarse, fine)
+got = np.asarray(add_skip(coarse, fine))
 assert np.shape(got) == (2, 3, 2), f"expected the shape of the fine map, (2, 3, 2), got {np.shape(got)}: cut rows too"
 assert not np.allclose(got[0, :, 0], [10, 10, 14]), "the rows are repeated: rows are interpolated too"
 np.testing.assert_allclose(
@@ -285,8 +289,8 @@ assert not complaint, complaint
 # ## Task 5: the loss of an image (2 + 1 points)
 #
 # `scores` has the shape `(C, h, w)`, `truth` the shape `(h, w)`: the class of each pixel, or 255 where it isn't labelled. Complete `cross_entropy`: the mean of $-\log
-# P(c^*)$ over the labelled pixels, natural logarithm, where $P$ is the soft-max of the pixel's scores. For one more point it must stay a number where scores are large:
-# adding the same to all scores of a pixel changes nothing, so add something that keeps $e^s$ small.
+# P(c^*)$ over the labelled pixels, natural logarithm, where $P$ is the soft-max of the pixel's scores. For one more point it must stay right where scores are
+# thousands, of either sign, or thousands apart: adding the same to all scores of a pixel changes nothing, so add something that keeps $e^s$ small.
 #
 # $$ P(c) = \frac{e^{s_c}}{\sum_{c'} e^{s_{c'}}} $$
 
@@ -319,6 +323,7 @@ slips = {
     0.375: "that is the mean of P(true class): take -log of each",
     0.625: "that is the mean of 1 - P: take -log P of each",
     -0.924: "those are the scores themselves: without soft-max a score says nothing",
+    1.040: "you average over classes: the mean is over labelled pixels, whatever their classes",
     0.981: "you take the logarithm of the mean: first the logarithm of each pixel, then their mean",
     1.386: "you count the unlabelled pixel as class 0: 255 means that nobody knows",
     0.938: "you count the unlabelled pixel as the last class: 255 means that nobody knows",

@@ -51,10 +51,12 @@ planes = np.array([[[[3.0, 1.0]], [[1.0, 0.0]]], [[[0.0, 4.0]], [[2.0, 2.0]]]])
 theta, beta = np.array([[[1.0, -1.0], [2.0, 0.5]], [[0.0, 1.0], [1.0, 1.0]]]), np.array([0.5, -4.0])
 got = reduce_planes(planes.copy(), theta.copy(), beta.copy())
 assert got is not None, "reduce_planes returned nothing: did you forget `return`?"
+got = np.asarray(got)
 assert np.shape(got) == (2, 1, 2), f"expected K maps of one row and two columns, (2, 1, 2), got {np.shape(got)}"
 slips = {
     -1.5: "class and plane are swapped: theta is (K, C, D), planes (C, D, H, W), so theta[k, c, d] belongs to planes[c, d]",
     10.0: "the bias is missing: add beta[k], once",
+    6.0: "your bias changes along the columns: beta[k] belongs to map k, to all cells of it",
     12.0: "the bias is added with every term: add beta[k] once, after the sum",
     11.0: "the bias is added with every plane or class: add beta[k] once, after the sum",
     3.0: "that is a mean over classes and planes: take the sum, the weights know how much each counts",
@@ -102,7 +104,7 @@ blamed = np.array([[[2.0, -1.0]], [[0.0, 3.0]]])
 got = reduce_back(planes.copy(), theta.copy(), blamed.copy())
 assert got is not None, "reduce_back returned nothing: did you forget `return`?"
 assert len(got) == 3, "return three arrays: by theta, by beta, by the planes"
-theta_bar, beta_bar, _ = got
+theta_bar, beta_bar = (np.asarray(part) for part in got[:2])
 assert np.shape(theta_bar) == (2, 2, 2), f"by theta: one number a weight, shape (2, 2, 2), got {np.shape(theta_bar)}"
 assert np.shape(beta_bar) == (2,), f"by beta: one number a map, (K,) = (2,), got {np.shape(beta_bar)}"
 slips = {
@@ -129,7 +131,7 @@ assert not complaint, complaint
 
 # %% nbgrader={"grade": true, "grade_id": "planes-bar-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 # By hand, the score of class 1 on plane 0 in the second cell went into map 0 by 2 and into map 1 by 1: 2 * -1 + 1 * 3 = 1.
-_, _, planes_bar = reduce_back(planes.copy(), theta.copy(), blamed.copy())
+planes_bar = np.asarray(reduce_back(planes.copy(), theta.copy(), blamed.copy())[2])
 assert np.shape(planes_bar) == (2, 2, 1, 2), (
     f"by planes: one number a score, (C, D, H, W) = (2, 2, 1, 2), got {np.shape(planes_bar)}"
 )
@@ -227,8 +229,8 @@ assert not complaint, complaint
 #
 # $$ \text{loss} = -\frac{\sum_j \alpha_{c(j)} \log g_{c(j),j}}{\sum_j \alpha_{c(j)}} $$
 #
-# Complete `weighted_loss`: it returns one number. For one more point: logits may be as large as 1000, where $e^{1000}$ is more than a computer holds. You may add any number to
-# all logits of a cell without changing its soft-max.
+# Complete `weighted_loss`: it returns one number. For one more point: logits may be 1000 or -1000, where $e^{1000}$ is more than a computer holds and $e^{-1000}$ less, and the
+# true class may trail by as much. You may add any number to all logits of a cell without changing its soft-max.
 
 
 # %% nbgrader={"grade": false, "grade_id": "weighted-loss", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -259,6 +261,10 @@ slips = {
     -1.213: "the sign is swapped: log of a probability is negative, a loss positive",
     0.527: "that is the logarithm to base 10: take the natural one",
     0.693: "the unlabelled cell is counted below",
+    0.996: "you count the unlabelled cell as class 0: 255 means that nobody knows",
+    1.605: "you count the unlabelled cell as the last class: 255 means that nobody knows",
+    0.970: "the unlabelled cell weighs below as class 0: leave it out there too",
+    0.904: "that is the soft-max of a soft-max: once is enough",
     0.3125: "that is the mean probability of the truth: take its logarithm",
     1.432: "your soft-max runs along the row of cells: it is over the classes, axis 0",
     2.666: "your soft-max runs over all numbers at once: each cell has its own, over the classes, axis 0",
@@ -267,6 +273,9 @@ slips = {
 for slip, hint in slips.items():
     assert not np.isclose(got, slip, atol=1e-3), f"the loss is {float(got):.3f}: {hint}"
 np.testing.assert_allclose(got, 1.213, atol=1e-3, err_msg="(1 * log 2 + 3 * log 4) / 4")
+got = weighted_loss(logits.copy(), np.array([[0, IGNORE, IGNORE]]), alpha.copy())
+assert not np.isclose(got, 0.173, atol=1e-3), "you divide by the weights of all classes: sum alpha over labelled cells"
+np.testing.assert_allclose(got, 0.693, atol=1e-3, err_msg="with the first cell alone labelled: 1 * log 2 / 1")
 ### BEGIN HIDDEN TESTS
 from semgrid_instructor import fusion
 
@@ -282,6 +291,9 @@ assert np.isfinite(got), (
 )
 hint = "if you added a small number against log 0, or subtracted one number from all cells, don't: subtract each cell's largest"
 np.testing.assert_allclose(got, (np.log(4) + 3 * np.log(2)) / 4, atol=1e-6, err_msg=f"(log 4 + 3 log 2) / 4; {hint}")
+got = weighted_loss(np.array([[[-1000.0]], [[0.0]]]), np.array([[0]]), alpha)
+assert np.isfinite(got), f"the loss is {got}: a truth that trails by 1000 costs 1000; keep log g, g itself is 0 here"
+np.testing.assert_allclose(got, 1000, err_msg="a truth that trails by 1000 costs 1000")
 ### BEGIN HIDDEN TESTS
 from semgrid_instructor import fusion
 
@@ -325,6 +337,8 @@ slips = {
     0.900: "you step by the old delta: update it first",
     0.960: "that is plain descent: step by delta, not by the gradient",
     0.874: "kappa damps the new gradient too: only the old delta fades",
+    0.650: "that is delta: return theta first",
+    0.730: "eta and kappa are swapped: eta is the rate of the step, kappa what is left of the old delta",
     0.860: "the old delta doesn't fade: multiply it by kappa",
     0.950: "the gradient is subtracted from delta and delta from theta: two minus signs go uphill",
 }
