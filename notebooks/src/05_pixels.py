@@ -63,7 +63,7 @@ coarse = GridSpec(spec.x_min, spec.x_max, spec.y_min, spec.y_max, cell=1.0)  # t
 # Take a box with a tiny hole in front and a film 200 pixels behind the hole. (A distance in pixels? The film's pixels
 # are its unit of length: with pixels of 0.02 mm it is 4 mm.) Ten metres ahead stands a pole, 2 m tall. Light runs
 # straight through the hole, so the pole and its picture are two triangles of the same shape: the picture is to 200
-# pixels as 2 m are to 10 m. 200 · 2 / 10 = 40 pixels.
+# pixels as 2 m are to 10 m. 200 · 2 / 10 = 40 pixels. (It stands on its head; a camera turns it back.)
 #
 # **Predict before you run.** How tall is the picture when the pole is 20 m away? And that of a toy pole of 20 cm, 1 m
 # away?
@@ -307,7 +307,7 @@ frames = {"grid": (0, "x", "z", 1), "LIDAR": (2, "x", "z", 1), "camera": (1.5, "
 for (name, (up, first, second, sign)), colour in zip(frames.items(), ("0.3", "tab:blue", "tab:red"), strict=True):
     for dx, dz, axis in ((1.2, 0, first), (0, 0.4 * sign, second)):
         ax.annotate("", (dx, up + dz), (0, up), arrowprops={"arrowstyle": "->", "color": colour})
-        ax.text(1.15 * dx + 0.08, up + 1.15 * dz, axis, color=colour, fontsize="small", va="center")
+        ax.text(1.15 * dx + 0.08, up + 1.15 * dz, axis, color=colour, va="center")
     ax.text(-0.2, up, name, color=colour, ha="right", va="center")
 ax.plot([10, 10], [0, 0.5], color="black", linewidth=3)
 ax.plot([0, 10], [1.5, 0.5], color="tab:red", linewidth=0.8, linestyle=":")
@@ -426,8 +426,8 @@ plt.show()
 # from above are 9 m and 19 m ahead. In which rows are the tops of their heads?
 #
 # <details><summary>Answer</summary>They are 1.7 m tall, about as tall as the camera stands: so their heads are on the
-# horizon, or just above, both of them. Look at a crowd on a square: if you are as tall as they are, all heads are on
-# one line.</details>
+# horizon, or just above, both of them. (A few rows above: they walk on the sidewalk, and the kerb lifts them by 12 cm.)
+# Look at a crowd on a square: if you are as tall as they are, all heads are on one line.</details>
 
 
 # %%
@@ -497,8 +497,8 @@ print(f"of the course's grid {100 * ground.mean():.0f} % can be read on the grou
 # Left: dark is nothing, yellow all twenty, and nothing comes from behind. The wedge is the camera's angle of view.
 # Within it, near the car, planes drop out: the ground below the lower border of the image, the high ones above the
 # upper. Right, closer: inside its line a plane is in view (the triangle is the LIDAR). Those near the camera's height
-# begin at 2 or 3 m, the ground and the plane at 3 m at 6 m. For the cells next to the car only the occupancy grid has
-# something to say.
+# begin 2 or 3 m ahead; the ground, and the plane 3 m up, only 6 m ahead. For the cells next to the car only the
+# occupancy grid has something to say.
 #
 # ## How many pixels is a cell?
 #
@@ -638,7 +638,7 @@ for z in (0.0, 0.5, 1.0, 1.4, 2.0):
 
 # %%
 cars, _ = ndimage.label(frame.labels.image == KITTI_14.index("car"))
-rows, cols = np.nonzero((cars == cars[150, 150]) & (frame.labels.depth < 12))
+rows, cols = np.nonzero((cars == cars[150, 150]) & (frame.labels.depth < 11))
 T_grid_from_camera = invert_rigid(camera.T_camera_from_grid)
 eye = T_grid_from_camera[:3, 3]
 
@@ -698,7 +698,8 @@ for D in (1, 2, 5, 10, 20):
 # %% [markdown]
 # (Two planes, at 0 m and 2 m, are no better than one: the second is above the camera, and the rays of this car point
 # down.) This is why there are twenty planes and not one. They don't *know* which height is right. They only make sure
-# that a good answer is among those offered, less than a cell away, and leave the choice to what is learnt (lecture 08).
+# that a good answer is among those offered, here for half of the pixels less than a cell away, and leave the choice to
+# what is learnt (lecture 08).
 
 # %% [markdown]
 # ## Play with it
@@ -751,8 +752,8 @@ plt.show()
 # And if it nods (pitch), so that the row of the ground at 30 m, 48 + 300 / 30 = 58, is really row 54.5 or 61.5?
 #
 # <details><summary>Answer</summary>To the side: 30 · tan 1° = 0.52 m, one cell. Nodding: rows 6.5 and 13.5 below the
-# horizon are 300 / 6.5 = 46 m and 300 / 13.5 = 22 m: 16 m too far, or 8 m too near. The same degree, and thirty times
-# the error: the camera looks at the road at a very flat angle.</details>
+# horizon are 300 / 6.5 = 46 m and 300 / 13.5 = 22 m: 16 m too far, or 8 m too near. The same degree, and up to
+# thirty times the error: the camera looks at the road at a very flat angle.</details>
 #
 # With $\tan\psi \approx \psi$ the focal length drops out: yaw moves a place by $x\,\psi$, and pitch makes a place of
 # the ground at $x$ read another one, at $x'$ (minus with the nose up, plus with the nose down):
@@ -854,13 +855,16 @@ for ax in fig.axes:
     ax.contourf(spec.centers()[0, :, 1], spec.centers()[:, 0, 0], hidden, [0.5, 1.5], colors="none", hatches=["////"])
 plt.show()
 print(f"{100 * hidden.sum() / visible.sum():.0f} % of the cells in the image are hidden behind something")
+right = (label == frame.labels.birdseye_on(spec))[visible & ~hidden].mean()
+print(f"of the others {100 * right:.0f} % read their true class")
 
 # %% [markdown]
 # Left: the true labels of the image, laid on the ground by equation (1); right: the true map; hatched: hidden cells.
-# Where nothing is hatched the two agree: that is equation (1) at work. Where it is, the left map shows what stands in
-# front, drawn out to the edge of the grid: the cars on the left, the cyclists (dark red), the pedestrian (red) and the
-# fence on the right. No camera model repairs that. The LIDAR knows which cells are hidden, and the occupancy grid
-# calls them UNKNOWN: this is why the paper needs both.
+# Where nothing is hatched five cells in six agree: that is equation (1) at work. (The sixth lies on an edge, below a
+# car or at the foot of a fence, or so far ahead that one pixel is metres deep.) Where it is hatched, the left map shows
+# what stands in front, drawn out to the edge of the grid: the cars on the left, the cyclists (dark red), the pedestrian
+# (red) and the fence on the right. No camera model repairs that. The LIDAR knows which cells are hidden, and the
+# occupancy grid calls them UNKNOWN: this is why the paper needs both.
 #
 # ## In five lines
 #

@@ -151,7 +151,8 @@ plt.show()
 # or 45 m ahead? In which do two points share the same four pixels?
 #
 # <details><summary>Answer</summary>The farther, the more: perspective draws the cells together. At 8 m most pixels are
-# read by nobody; at 45 m, several points share each pixel. Both will matter.</details>
+# read by nobody. At 20 m, straight ahead, neighbours begin to share their four pixels; at 45 m about seven points do.
+# Both will matter.</details>
 
 # %%
 drive, spec, heights = sample_drive(), GridSpec.compact(), plane_heights()
@@ -252,9 +253,10 @@ print(f"{100 * voice.mask.mean():.0f} % of the pixels are read by no point, so t
 
 # %% [markdown]
 # The frame is the image's; white pixels have no voice. They lie at the lower and the upper border, where the points
-# nearest to the vehicle go, and fall so far apart that they miss most pixels. Along the horizon a pixel answers for a
-# hundred points, near the vehicle for less than one: what the network learns from the map, it learns mostly in the
-# middle.
+# nearest to the vehicle go, and fall so far apart that they miss most pixels. The white streaks are what you see
+# between the trees of an orchard: directions in which no cell's centre lies near by, whatever its height. Along the
+# horizon a pixel answers for some seventy points, near the vehicle for less than one: what the network learns from the
+# map, it learns mostly in the middle.
 #
 # ## The whole of equation (2) is one matrix
 #
@@ -529,9 +531,9 @@ for _ in range(4):
 
 # %% [markdown]
 # On the drive, suppose that the calibration is two degrees off: the camera points lower, or higher, than we believe.
-# What we have is labels of its images, and a map of road and sidewalk. Turn the ground's points by an unknown *pitch*,
-# equation (1), read the labels there, equation (2), compare with the map, and let the chain rule run all the way back
-# to one number:
+# What we have is labels of its images, and a map of road and sidewalk, 8 to 25 m ahead. Turn the ground's points by an
+# unknown *pitch*, equation (1), read the labels there, equation (2), compare with the map, and let the chain rule run
+# all the way back to one number:
 #
 # $$ \frac{\partial\,\text{loss}}{\partial\,\text{pitch}} = \sum_{c,d,j} \bar p_{c,d,j} \left(
 #    \frac{\partial p}{\partial u} \frac{\partial u}{\partial\,\text{pitch}} +
@@ -540,7 +542,7 @@ for _ in range(4):
 
 # %%
 def lesson(frame):
-    """Return labels of an image (C, h, w), visible ground points in the camera frame, and their classes (C, J)."""
+    """Return labels of an image (C, h, w), classes of ground cells that it sees (C, J), their places (J, 3)."""
     truth, x = frame.labels.birdseye_on(spec), spec.centers()[..., 0]
     cells = frame.labels.visible_on(spec) & np.isin(truth, flat) & (x > 8) & (x < 25)
     on_ground = np.concatenate([spec.centers()[cells], np.zeros((cells.sum(), 1))], axis=1)
@@ -773,8 +775,9 @@ for near, far in ((6, 20), (20, 40), (40, 71)):
 # %% [markdown]
 # Left and middle, a road painted light and dark: its colour must change on the red lines, at 10, 30 and 60 m. Half a
 # pixel too low, and what lies at 54 m is drawn at 60. (The far edges are soft even on the left: there one row of pixels
-# covers ten metres.) Right, the drive's true labels: the farther, the more cells change their class, most of all beside
-# edges and thin things. A network that *learns* with the shift learns to undo it, until somebody corrects the bug.
+# covers ten metres.) Right, the drive's true labels: coloured are the cells that now read another class, and the colour
+# says which. The farther, the more of them, most of all beside edges and thin things. A network that *learns* with the
+# shift learns to undo it, until somebody corrects the bug.
 #
 # ## No depth is used
 #
@@ -862,12 +865,13 @@ axes[1, 0].set_ylabel("network's P(car)\nx, forward [m]")
 plt.show()
 
 # %% [markdown]
-# Red: where the cars that the camera sees stand. Top: perfect labels; bottom: those of the network, softer, but the
-# same smear. On the ground plane a car lies *behind* its place, thrown away from the camera like a shadow: only the
-# wheels are right. On the plane at 0.6 m what is lower falls short, what is higher overshoots, and the bodywork at that
-# height is right. At 1.2 m the smear is longest. At 2 m, above the camera, rays rise, and only what towers over it is
-# left: the roof of a van. At best a quarter of the cells that read *car* are one. No plane is right, each is right for
-# something, and it takes the LIDAR's occupancy to say where along the smear the car stands: lecture 08.
+# Red: where the cars that the camera sees stand. Blue: how much a cell reads *car*, from 0, white, to 1, dark. Top:
+# perfect labels; bottom: those of the network, softer, but the same smear. On the ground plane a car lies *behind* its
+# place, thrown away from the camera like a shadow: only the wheels are right. On the plane at 0.6 m what is lower falls
+# short, what is higher overshoots, and the bodywork at that height is right. At 1.2 m the smear is longest. At 2 m,
+# above the camera, rays rise, and only what towers over it is left: the roof of a van. At best a quarter of the cells
+# that read *car* are one. No plane is right, each is right for something, and it takes the LIDAR's occupancy to say
+# where along the smear the car stands: lecture 08.
 #
 # ## Play with it
 #
@@ -893,15 +897,15 @@ _ = interact(
 
 # %%
 fig, axes = plt.subplots(1, 3, figsize=(10, 3.8), layout="constrained")
-for ax, place in zip(axes, ((0.5, 0.5), (1.0, 1.5), (1.95, 0.05)), strict=True):
+for ax, place in zip(axes, ((0.5, 0.5), (1.0, 0.5), (1.95, 0.05)), strict=True):
     draw_point(ax, *place)
     ax.set_xlabel("u [pixels]\nslope in u {:+.2f}, in v {:+.2f}".format(*slopes(s, *place)))
 plt.show()
 
 # %% [markdown]
-# Left, the middle of four pixels: their mean. In the middle, on a column's centre, only two pixels count, and the
-# slope in u that is written there is none of the two true ones (`sign(0)` is 0). On the right, nearly on the corner,
-# one pixel has nine tenths.
+# Left, the middle of four pixels: their mean. In the middle, on a column's centre, only two pixels count, and the slope
+# in u that is written there, 0, is neither the one on its left, +4, nor that on its right, -1 (`sign(0)` is 0). On the
+# right, nearly on the corner, one pixel has nine tenths.
 #
 # ## Where this breaks
 #
@@ -942,7 +946,7 @@ for ahead in (7.25, 15.25, 24.25, 60.25):
 # Near by, read more: the mean over the patch (a blurred image for near cells, as computer graphics does with mip-maps),
 # or several points a cell. The other nineteen planes help a little, since their points fall between those of the
 # ground. Far away, nothing helps but more pixels: the paper's 375 rows and its focal length of 720 move the point where
-# cells begin to share pixels from 24 to 60 m, and its smaller cells move it back to 32.
+# cells begin to share pixels from 24 to 60 m, and its smaller cells move it back to 33.
 #
 # **A slope is felt only near by.** The gradient in u and v knows four pixels. Turn the camera of our calibration not by
 # two degrees but by eight:
