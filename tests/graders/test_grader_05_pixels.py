@@ -119,6 +119,20 @@ def new_intrinsics(K, left, top, scale_u, scale_v):
             code=intrinsics(c_u="(K[0, 2] + 0.5) * scale_u - 0.5 - left", c_v="(K[1, 2] + 0.5) * scale_v - 0.5 - top"),
         ),
         mistake(
+            "half a pixel added, never taken off",
+            task="new-intrinsics",
+            loses=3,
+            says="half a pixel too much",
+            code=intrinsics(c_u="(K[0, 2] - left + 0.5) * scale_u", c_v="(K[1, 2] - top + 0.5) * scale_v"),
+        ),
+        mistake(
+            "divided by the scale",
+            task="new-intrinsics",
+            loses=2,
+            says="you divide by the scale",
+            code=intrinsics(f_u="K[0, 0] / scale_u", f_v="K[1, 1] / scale_v"),
+        ),
+        mistake(
             "cut added",
             task="new-intrinsics",
             loses=3,
@@ -283,6 +297,29 @@ def now_from_before(T_world_from_now, T_world_from_before):
             code=frames(turn="R", shift="-R @ t"),
         ),
         mistake(
+            "only the shift turned",
+            task="now-from-before",
+            loses=3,
+            says="the rotation of the inverse is missing",
+            code=frames(turn="R"),
+        ),
+        mistake(
+            "the product turned round",
+            task="now-from-before",
+            loses=3,
+            says="you turned the product round",
+            code="""
+def now_from_before(T_world_from_now, T_world_from_before):
+    return np.linalg.inv(T_world_from_now @ T_world_from_before)""",
+        ),
+        mistake(
+            "entry by entry",
+            task="now-from-before",
+            loses=3,
+            says="a product of matrices is `@`",
+            code=frames(result="now_from_world * T_world_from_before"),
+        ),
+        mistake(
             "only yaw",
             task="now-from-before",
             loses=3,
@@ -393,7 +430,7 @@ def plane_pixels(xy, height, K, T_camera_from_grid, size):
             "a level camera taken for granted",
             task="plane-pixels",
             loses=5,
-            says="on inputs you haven't seen: wrong pixels (the camera needn't be level",
+            says="on inputs you haven't seen: wrong pixels (no camera is quite level",
             code=plane(T="T_level").replace(
                 "    h, w = size",
                 "    z_cam = T_camera_from_grid[1, 3]\n"
@@ -435,6 +472,27 @@ def plane_pixels(xy, height, K, T_camera_from_grid, size):
             loses=2,
             says="the last pixel's centre is at w - 1",
             code=plane(inside="0 <= u < w and 0 <= v < h"),
+        ),
+        mistake(
+            "without the border, on the left",
+            task="plane-pixels",
+            loses=2,
+            says="the border belongs to the image",
+            code=plane(inside="0 < u <= w - 1 and 0 <= v <= h - 1"),
+        ),
+        mistake(
+            "without the border, below",
+            task="plane-pixels",
+            loses=2,
+            says="on inputs you haven't seen: wrong at the lower border of the image",
+            code=plane(inside="0 <= u <= w - 1 and 0 <= v < h - 1"),
+        ),
+        mistake(
+            "rounded to whole pixels",
+            task="plane-pixels",
+            loses=5,
+            says="no pixel quite whole",
+            code=plane(result="round(f_u * X / Z + c_u), round(f_v * Y / Z + c_v)"),
         ),
         mistake(
             "outside the image no pixel",
@@ -562,6 +620,20 @@ def reach(cell, f_u, f_v, z_cam, delta):
             loses=2,
             says="that is the area at Z = 1 m",
             code=far("f_u * f_v * abs(z_cam - delta) * cell**2"),
+        ),
+        mistake(
+            "a third of it",
+            task="reach",
+            loses=2,
+            says="write `** (1 / 3)`",
+            code=far("(f_u * f_v * abs(z_cam - delta) * cell**2) ** 1 / 3"),
+        ),
+        mistake(
+            "the cell beside the root",
+            task="reach",
+            loses=2,
+            says="it belongs under the root, squared",
+            code=far("(f_u * f_v * abs(z_cam - delta)) ** (1 / 3) * cell"),
         ),
         mistake(
             "square root",

@@ -463,6 +463,13 @@ def give_back(p_bar, pixels, visible, h, w):
             code=back("s_bar[k] += visible[r, c] * p_bar[k, r, c] * x", seen="True"),
         ),
         mistake(
+            "NaN sent to the first pixel",
+            task="give-back",
+            loses=3,
+            says="the point that isn't visible teaches this pixel",
+            code=back(seen="True").replace("= pixels[r, c]", "= np.nan_to_num(pixels[r, c])"),
+        ),
+        mistake(
             "NaN taken for not visible",
             task="give-back",
             loses=3,
@@ -567,6 +574,13 @@ def slopes(s, u, v):
             loses=2,
             says="in v: expected",
             code=slope(in_v="a * (x - p) + (1 - a) * (y - q)"),
+        ),
+        mistake(
+            "two steps, divided by one",
+            task="slopes",
+            loses=2,
+            says="there are two steps",
+            code=by_steps(1e-6).replace("2e-06", "1e-6"),
         ),
         mistake(
             "a step of a tenth of a pixel",
