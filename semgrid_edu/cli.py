@@ -132,7 +132,7 @@ def train(
     imagenet: Annotated[
         Path | None, typer.Option(help="VGG16 or ResNet-101 as safetensors: first weights for --preset paper.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of the initial weights and of the order of the frames.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the initial weights and of the order of the frames.")] = 0,
     iterations: Annotated[int, typer.Option(min=1, help="Steps of each of the two stages.")] = 2000,
     two_stage: Annotated[bool, typer.Option("--two-stage", help="The grid doesn't teach the image network.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Continue a training that was interrupted.")] = False,

@@ -143,7 +143,8 @@ class Objective(nn.Module):
     def forward(self, batch: Batch) -> Tensor:
         """Return sum_j alpha_c(j) (-log g_c(j)) / sum_j alpha_c(j), c(j) being the true class of pixel or cell j.
 
-        With several processes, whose mean is taken, the lower sum is over the batches of all of them.
+        With several processes, whose mean is taken, the lower sum is over the batches of all of them. A batch in
+        which nothing is labelled teaches nothing: its loss is 0, not 0/0.
         """
         scores = (image_scores if self.stage == "image" else grid_logits)(self.net, batch)
         scores = scores.to(torch.promote_types(scores.dtype, torch.float32))  # of mixed precision
@@ -151,4 +152,4 @@ class Objective(nn.Module):
         truth = getattr(batch.frames, TRUTH[self.stage]).long()
         weights = process_total(alpha[truth[truth != IGNORE]].sum())
         losses = F.cross_entropy(scores, truth, weight=alpha, ignore_index=IGNORE, reduction="sum")
-        return world_size() * losses / weights
+        return world_size() * losses / weights.clamp_min(torch.finfo(weights.dtype).tiny)

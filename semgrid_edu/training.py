@@ -54,6 +54,11 @@ class TrainingParams:
         authors' earlier work: the image network stays as the first one left it.
     mirror : bool
         Whether every other batch, by chance, is seen in a mirror: streets are as likely to be the other way round.
+
+    Raises
+    ------
+    ArgumentError
+        When nothing can be learnt with one of the numbers.
     """
 
     image_iterations: int = 2000
@@ -65,6 +70,20 @@ class TrainingParams:
     jitter: float = 0.2
     end_to_end: bool = True
     mirror: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that nothing can be learnt with."""
+        for name, expected, fits in (
+            ("image_iterations", "0 or more", self.image_iterations >= 0),
+            ("grid_iterations", "0 or more", self.grid_iterations >= 0),
+            ("batch_size", "at least one frame", self.batch_size >= 1),
+            ("learning_rate", "a positive number", 0 < self.learning_rate < math.inf),
+            ("momentum", "a share from 0 to below 1", 0 <= self.momentum < 1),
+            ("weight_limit", "1 or more", self.weight_limit >= 1),
+            ("jitter", "a share of at least 0", 0 <= self.jitter < math.inf),
+        ):
+            if not fits:
+                raise ArgumentError(name, expected, getattr(self, name))
 
     @property
     def iterations(self) -> int:

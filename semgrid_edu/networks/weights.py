@@ -62,7 +62,7 @@ def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:
     header, tensors = read_tensors(path)
     try:
         net = build_net(_architecture(json.loads(header["architecture"])), camera)
-    except (KeyError, TypeError, json.JSONDecodeError, ArgumentError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise DataError(path, "the architecture of a network in the header", f"{header}: {error}") from error
     check_tensors(path, tensors, net.state_dict())
     net.load_state_dict(tensors)

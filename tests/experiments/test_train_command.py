@@ -81,6 +81,14 @@ def test_the_command_leaves_weights_log_and_provenance(monkeypatch, tmp_path):
     assert isinstance(load_net(out / "weights.safetensors", _Noise.camera).segmenter, Fcn)
 
 
+@pytest.mark.parametrize("option", ["--seed=-1", "--iterations=0"])
+def test_numbers_that_cannot_be_are_refused(tmp_path, option):
+    result = CliRunner().invoke(app, ["train", "--data", str(tmp_path), "--out", str(tmp_path / "out"), option])
+    assert result.exit_code == 2
+    assert f"Invalid value for '{option.split('=')[0]}'" in result.output
+    assert not (tmp_path / "out").exists()
+
+
 def test_the_command_names_what_is_missing(tmp_path):
     arguments = ["train", "--data", str(tmp_path / "nowhere"), "--out", str(tmp_path / "out")]
     with pytest.raises(ValueError, match=r"nowhere.dataset.json"):
@@ -109,16 +117,18 @@ def test_the_options_reach_the_training(monkeypatch, tmp_path):
     for path in (data / "dataset.json", imagenet):
         write_text(path, "{}")
     options = ["--preset", "paper", "--imagenet", str(imagenet), "--seed", "2", "--iterations", "7", "--two-stage"]
+    options += ["--resume"]
     result = CliRunner().invoke(app, ["train", "--data", str(data), "--out", str(out), *options, "--device", "cpu"])
     assert result.exit_code == 0, result.output
     assert given["net"] == experiment.architecture("segnet", "paper")
     assert given["imagenet"] == (_Net.segmenter, imagenet)
     net, _, folder, params, seed, resume, device = given["train"]
-    assert (net, folder, seed, resume, device) == (_Net, out, 2, False, torch.device("cpu"))
+    assert (net, folder, seed, resume, device) == (_Net, out, 2, True, torch.device("cpu"))
     assert params == experiment.training_params("paper", 7, end_to_end=False, from_imagenet=True)
     provenance = json.loads((out / "provenance.json").read_text())
     written = "--segmenter segnet --preset paper --imagenet vgg16.safetensors --seed 2 --iterations 7 --two-stage"
     assert provenance["command"] == f"semgrid-edu train --data minikitti --out out {written}"
+    assert provenance["resumed"] is True
     assert provenance["params"]["weight_limit"] == "inf"
     assert provenance["imagenet"] == sha256(imagenet)
 

@@ -1,9 +1,13 @@
 import pytest
+import torch
+from sklearn.metrics import accuracy_score
 from tiny_drive import write_tiny_dataset
 
 from semgrid_edu.experiments import two_stage
+from semgrid_edu.labels import IGNORE
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, load_net
-from semgrid_edu.training import TrainingParams
+from semgrid_edu.provenance import FILE_NAME
+from semgrid_edu.training import CHECKPOINT, TrainingParams
 
 QUICK = TrainingParams(image_iterations=1, grid_iterations=1, batch_size=2)
 
@@ -39,6 +43,36 @@ def test_what_has_ended_is_not_trained_again(compared, monkeypatch):
 
     monkeypatch.setattr(two_stage, "train_network", fail)
     assert two_stage.compare(root, root / "runs", 1, QUICK)["scores"] == result["scores"]
+
+
+def test_what_was_interrupted_goes_on(compared, monkeypatch):
+    root, _ = compared
+    resumed = {}
+    for folder in ("end-to-end-0", "two-stage-0"):
+        (root / "runs" / folder / FILE_NAME).rename(root / folder)
+    (root / "runs" / "two-stage-0" / CHECKPOINT).touch()
+
+    def ended(_data, folder, _segmenter, params, _seed, resume):
+        resumed[folder.name] = params.end_to_end, resume
+        (root / folder.name).rename(folder / FILE_NAME)
+        (folder / CHECKPOINT).unlink(missing_ok=True)
+
+    monkeypatch.setattr(two_stage, "train_network", ended)
+    two_stage.compare(root, root / "runs", 1, QUICK)
+    assert resumed == {"end-to-end-0": (True, False), "two-stage-0": (False, True)}
+
+
+def test_scores_are_those_of_the_grid_and_of_the_image(compared):
+    root, result = compared
+    sample, camera = two_stage.TrainingSet(root, "test")[0], two_stage.TrainingSet(root, "test").camera
+    for method in two_stage.METHODS:
+        net = load_net(root / "runs" / f"{method}-0" / WEIGHTS, camera)
+        with torch.no_grad():
+            stages = net.stages(sample.image[None] / 255, sample.occupancy[None])
+        for name, scores, truth in (("grid", stages.logits, sample.truth), ("image", stages.scores, sample.labels)):
+            labelled = truth != IGNORE
+            accuracy = accuracy_score(truth[labelled], scores[0].argmax(0)[labelled])
+            assert result["scores"][method][0][name]["all"]["pixel accuracy"] == pytest.approx(accuracy)
 
 
 def test_the_table_gives_mean_and_range_in_per_cent():

@@ -133,6 +133,7 @@ def test_a_missing_or_extra_tensor_is_refused(saved, camera):
         {"architecture": "no json"},
         {"architecture": json.dumps({**_header(SMALL), "segmenter": "vit"})},
         {"architecture": json.dumps({**_header(SMALL), "more": 1})},
+        {"architecture": json.dumps({**_header(SMALL), "heights": ["low"]})},
         {"architecture": "[]"},
     ],
 )
