@@ -238,9 +238,9 @@ plotting.image_labels(small, now.scores.argmax(axis=0), KITTI_14)
 plt.show()
 
 # %% [markdown]
-# Look for what is easy (road, sidewalk, near cars, walls) and what isn't: the fence is taken for building and signage,
-# the cyclist is torn between car and pedestrian, and the pedestrian behind him is part of the wall. The network learnt
-# in two steps: first from labelled images, then end to end, when only the map counted: the map's mistakes travel back
+# Look for what is easy (road, sidewalk, near cars, walls, the fence) and what isn't: the cyclist is torn between
+# bicycle and pedestrian, the pedestrian behind him has the head of a car, and red crumbs of pedestrian lie along the
+# hedge on the left, where nobody walks. The network learnt in two steps: first from labelled images, then end to end, when only the map counted: the map's mistakes travel back
 # through fusion, planes and equation (2) into these scores. So don't expect clean outlines: the scores are whatever
 # helps the map, and as labels of pixels they got worse by it (lectures 07 and 08). Yellow tree tops, *signage*, do no
 # harm: the map asks for nothing that stands higher than 4 m.
@@ -315,8 +315,8 @@ plt.show()
 # Road and sidewalk, both FREE in the occupancy grid, are told apart: that the LIDAR can't do. Fence and house, on the
 # right, stand where the LIDAR met them: that the camera can't do. In the truth, a cell that the camera doesn't see is
 # *unknown-free*, *-static*, *-dynamic* or *-unobserved*, by its occupancy state. Compare: of the cars on the left some
-# are missing, such as the one 14 m ahead. The sidewalk from 27 to 40 m is called *bicycle*: it lies behind the
-# cyclists, on the rays that they block. And beyond 57 m the road has turned into vegetation.
+# are missing, such as the one 14 m ahead, and the one 26 m ahead is half a bicycle. More bicycles lie on the sidewalk
+# 27 to 30 m ahead, and along the border of the road from 42 m on: behind the cyclists, on the rays that they block.
 
 # %% [markdown]
 # ## Stage 5: refinement by a CRF
@@ -338,8 +338,8 @@ plt.show()
 
 # %% [markdown]
 # White cells on the right have kept their class: about nine in ten. The changes are crumbs, and thin lines along
-# borders. The road grows together on the left and swallows most of what was found of the cars 40 m ahead. The wrong
-# bicycle on the sidewalk only gets straight edges: tidy isn't true.
+# borders. The road grows together on the left and swallows what was found of the cars 40 and 60 m ahead. The crumbs
+# of bicycle on the sidewalk go, but beyond 45 m they become one block with straight edges: tidy isn't true.
 #
 # ## How good is it?
 #
@@ -404,8 +404,8 @@ plt.show()
 
 # %% [markdown]
 # The diagonal is right. For most classes the last column holds the most usual mistake: a cell that the camera sees is
-# called *unobserved*. Sky stands in no cell, so its row is empty. A third of *unknown-dynamic* is called car: a
-# class that fits what moves, though the camera didn't see it.
+# called *unobserved*. Sky stands in no cell, so its row is empty. Four in ten cells of *unknown-dynamic* are called
+# car: a class that fits what moves, though the camera didn't see it.
 #
 # ## Play with it
 #
@@ -504,7 +504,7 @@ ax.set(xlabel="distance ahead", ylabel="semantic cells right [%]", ylim=(0, 100)
 plt.show()
 
 # %% [markdown]
-# Near the vehicle nearly nine cells in ten are right, beyond 45 m about four.
+# Near the vehicle nearly nine cells in ten are right, beyond 45 m about half.
 #
 # **Small things are lost.** Of all cells that truly hold a class, how many does the map call so?
 

@@ -29,7 +29,7 @@ class SegNet(Segmenter):
     """
 
     PRESETS: ClassVar = {
-        "compact": {"widths": (16, 32, 64, 96), "depths": (2, 1, 2, 2)},
+        "compact": {"widths": (16, 32, 48, 64), "depths": (2, 1, 1, 2)},
         "paper": {"widths": (64, 128, 256, 512, 512), "depths": (2, 2, 3, 3, 3)},
     }
 

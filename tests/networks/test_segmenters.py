@@ -1,8 +1,10 @@
 """What holds for every image network."""
 
+import numpy as np
 import pytest
 import torch
 from torch import nn
+from torch.utils.flop_counter import FlopCounterMode
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import SEGMENTERS, build_segmenter
@@ -31,6 +33,15 @@ def test_kitti_images_fit_though_no_multiple_of_32(name, preset):
     with torch.device("meta"):
         net = build_segmenter(name, 14, preset)
         assert net(torch.empty(1, 3, 375, 1242)).shape == (1, 14, 375, 1242)
+
+
+def test_images_are_normalised_as_imagenets_were(name, monkeypatch):
+    """Red, green and blue have mean 0 and deviation 1 over ImageNet: its published statistics."""
+    net, seen = build_segmenter(name, N_CLASSES), []
+    monkeypatch.setattr(net, "scores", lambda x: seen.append(x) or x)
+    mean, deviation = np.array([0.485, 0.456, 0.406]), np.array([0.229, 0.224, 0.225])
+    net(torch.from_numpy(np.stack([mean, mean + deviation])[..., None, None]).float().expand(2, 3, 16, 16))
+    torch.testing.assert_close(seen[0], torch.tensor([0.0, 1.0])[:, None, None, None].expand(2, 3, 16, 16))
 
 
 def test_scores_are_no_probabilities(name):
@@ -112,6 +123,11 @@ def test_unknown_presets_and_class_numbers_are_refused(name):
         build_segmenter(name, 0)
 
 
-def test_compact_networks_are_of_one_size(name):
-    """What is compared is the architecture, not the number of weights; half a million are 2 MB."""
-    assert 350_000 <= sum(p.numel() for p in build_segmenter(name, 14).parameters()) <= 500_000
+def test_compact_networks_cost_alike(name):
+    """What is compared is the architecture, not the effort: additions and multiplications of a forward pass, weights."""
+    net, image = build_segmenter(name, 14).eval(), _images(1, 3, 96, 320)
+    assert sum(p.numel() for p in net.parameters()) <= 500_000
+    with torch.inference_mode(), FlopCounterMode(display=False) as counter:
+        net(image)
+    assert 0.3e9 < counter.get_total_flops() < 0.9e9
+
