@@ -394,7 +394,7 @@ assert not complaint, complaint
 # %% [markdown]
 # ## Task 6: in your own words (2 points)
 #
-# In the lecture the planes above 1 m could fall silent, and the shipped network found as much as before. A colleague concludes: "what stands above 1 m isn't
+# In the lecture the planes above 1 m could fall silent, and the shipped network found nearly as much as before. A colleague concludes: "what stands above 1 m isn't
 # needed to see a street from above, so ten planes will do, also for our lorry, whose camera sits 3 m high." What does the measurement say, and what
 # doesn't it? Name one experiment that would tell. Five sentences are enough.
 
