@@ -39,11 +39,13 @@ def alone(tmp_path_factory):
     torch.set_num_threads(1)
     torch.set_default_dtype(torch.float64)
     losses = worker.exact_losses()
-    for name, params in worker.RUNS.items():
-        train(worker.precise_net(), worker.noisy_streets(), folder / name, params)
-    training.append_step = append_step
-    torch.set_default_dtype(torch.float32)
-    torch.set_num_threads(threads)
+    try:
+        for name, params in worker.RUNS.items():
+            train(worker.precise_net(), worker.noisy_streets(), folder / name, params)
+    finally:  # what other tests find
+        training.append_step = append_step
+        torch.set_default_dtype(torch.float32)
+        torch.set_num_threads(threads)
     return folder, losses
 
 
