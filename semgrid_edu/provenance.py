@@ -28,7 +28,8 @@ def write_provenance(folder: str | Path, command: str, seed: int, packages: tupl
     Parameters
     ----------
     folder : path-like
-        The folder; all files below it are recorded with their SHA-256, but for `cache/`, which is made of them.
+        The folder; all files below it are recorded with their SHA-256, but for `cache/`, which is made of them, and
+        hidden ones, such as an atomic write leaves that was killed.
     command : str
         The command that made them.
     seed : int
@@ -83,4 +84,8 @@ def provenance_problems(folder: str | Path) -> list[str]:
 def _checksums(folder: Path) -> dict[str, str]:
     files = {path.relative_to(folder): path for path in sorted(folder.rglob("*")) if path.is_file()}
     left_out = (FILE_NAME, "cache")
-    return {name.as_posix(): sha256(path) for name, path in files.items() if name.parts[0] not in left_out}
+    return {
+        name.as_posix(): sha256(path)
+        for name, path in files.items()
+        if name.parts[0] not in left_out and not name.name.startswith(".")
+    }

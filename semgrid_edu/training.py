@@ -16,7 +16,7 @@ from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.devices import mixed_precision
 from semgrid_edu.distributed import in_parallel, process_total, rank, shared_batch_norm, world_size
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.loss import TRUTH, Objective, class_weights
+from semgrid_edu.loss import Objective, class_weights
 from semgrid_edu.memory import keep_freed_memory
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, save_net
 from semgrid_edu.occupancy import N_STATES
@@ -144,9 +144,11 @@ def train(
     params, folder, device = params or TrainingParams(), Path(folder), torch.device(device)
     _check_folder(folder, resume)
     _check_dataset(net, dataset, params)
-    alpha = {stage: class_weights(dataset, stage, net.n_classes, params.weight_limit) for stage in TRUTH}
+    stages = {params.stage(iteration)[0] for iteration in (0, params.iterations - 1)}
+    alpha = {stage: class_weights(dataset, stage, net.n_classes, params.weight_limit) for stage in sorted(stages)}
     optimiser = torch.optim.SGD(net.to(device).parameters(), lr=params.learning_rate, momentum=params.momentum)
     run = {"seed": seed, "frames": len(dataset), **asdict(params), **asdict(net.architecture)}
+    run |= {f"{stage} class weights": weights.tolist() for stage, weights in alpha.items()}
     start = load_checkpoint(folder / CHECKPOINT, run, net, optimiser) if resume else 0
     if rank() == 0:
         begin_log(folder / LOG, start)

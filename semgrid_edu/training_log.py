@@ -65,13 +65,22 @@ def read_log(path: str | Path) -> TrainingLog:
     path = Path(path)
     if not path.is_file():
         raise DataError(path, "the log of a training", "no such file")
-    header, *lines = path.read_text(encoding="utf-8", errors="replace").splitlines() or [""]
-    if header != HEADER.strip():
-        raise DataError(path, f"{HEADER.strip()} in line 1", repr(header))
-    steps = [_step(path, number, line) for number, line in enumerate(lines, start=2)]
+    steps = _steps(path, _lines(path))
     columns = zip(*steps, strict=True) if steps else [()] * len(Step._fields)
     types = (np.int64, np.str_, np.float64, np.float64)
     return TrainingLog(*(np.array(column, kind) for column, kind in zip(columns, types, strict=True)))
+
+
+def _lines(path: Path) -> list[str]:
+    return path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)
+
+
+def _steps(path: Path, lines: list[str]) -> list[Step]:
+    """Return what the lines of a log say, after checking all of them."""
+    header, *others = [line.rstrip("\n") for line in lines] or [""]
+    if header != HEADER.strip():
+        raise DataError(path, f"{HEADER.strip()} in line 1", repr(header))
+    return [_step(path, number, line) for number, line in enumerate(others, start=2)]
 
 
 def _step(path: Path, number: int, line: str) -> Step:
@@ -96,13 +105,14 @@ def begin_log(path: Path, start: int) -> None:
     Raises
     ------
     DataError
-        When steps before `start` are missing.
+        When a step before `start` is missing, or its line, which is named, isn't one of a log.
     """
     lines = [HEADER]
     if start:
-        lines = path.read_text(encoding="utf-8").splitlines(keepends=True)[: start + 1] if path.exists() else []
+        lines = _lines(path)[: start + 1] if path.exists() else []
         if len(lines) <= start or not lines[-1].endswith("\n"):
             raise DataError(path, f"the {start} steps that the checkpoint continues", max(len(lines) - 1, 0) or "none")
+        _steps(path, lines)
     write_text(path, "".join(lines))
 
 

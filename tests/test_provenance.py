@@ -49,6 +49,11 @@ def test_what_is_cached_beside_the_files_is_no_part_of_them(recorded):
     assert provenance_problems(recorded) == []
 
 
+def test_what_a_killed_write_left_is_no_part_of_them(recorded):
+    write_text(recorded / ".1-abc.txt", "half of i")
+    assert provenance_problems(recorded) == []
+
+
 def test_changed_missing_and_added_files_are_each_named(recorded):
     write_text(recorded / "2.txt", "tow")
     (recorded / "a" / "1.txt").unlink()

@@ -371,6 +371,9 @@ def test_only_its_own_run_is_resumed(streets, tmp_path, monkeypatch):
     ):
         with pytest.raises(ArgumentError, match=f"resume: expected the run of .*checkpoint.safetensors, {differing}"):
             train(build_net(architecture, CAMERA), streets, tmp_path, params, resume=True)
+    others = [sample._replace(truth=torch.zeros_like(sample.truth)) for sample in streets]
+    with pytest.raises(ArgumentError, match=r"checkpoint.safetensors, \{'grid class weights': .*found \{'grid class w"):
+        train(build_net(SMALL, CAMERA), others, tmp_path, QUICK, resume=True)
     assert (tmp_path / "checkpoint.safetensors").read_bytes() == before
 
 

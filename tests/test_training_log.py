@@ -45,6 +45,14 @@ def test_going_on_needs_the_steps_before(path, content):
         begin_log(path, 2)
 
 
+@pytest.mark.parametrize("damage", [b"\xff\xfe", b"1,both,0,1\n0,"])
+def test_going_on_from_a_damaged_log_is_refused(path, damage):
+    header, first, *others = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join([header, first, damage, *others]))
+    with pytest.raises(DataError, match=r"log.csv: expected iteration,stage,learning_rate,loss in line 3"):
+        begin_log(path, 2)
+
+
 @pytest.mark.parametrize(
     "line", ["3,grid,0.05", "3,grid,0.05,x", "3,both,0.05,1", "3.5,grid,0.05,1", "", "3,grid,1,1,1"]
 )

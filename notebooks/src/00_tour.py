@@ -240,10 +240,10 @@ plt.show()
 # %% [markdown]
 # Look for what is easy (road, sidewalk, near cars, walls, the fence) and what isn't: the cyclist is torn between
 # bicycle and pedestrian, the pedestrian behind him has the head of a car, and red crumbs of pedestrian lie along the
-# hedge on the left, where nobody walks. The network learnt in two steps: first from labelled images, then end to end, when only the map counted: the map's mistakes travel back
-# through fusion, planes and equation (2) into these scores. So don't expect clean outlines: the scores are whatever
-# helps the map, and as labels of pixels they got worse by it (lectures 07 and 08). Yellow tree tops, *signage*, do no
-# harm: the map asks for nothing that stands higher than 4 m.
+# hedge on the left, where nobody walks. The network learnt in two steps: first from labelled images, then end to end,
+# when only the map counted: the map's mistakes travel back through fusion, planes and equation (2) into these scores.
+# So don't expect clean outlines: the scores are whatever helps the map, and as labels of pixels they got worse by it
+# (lectures 07 and 08). Yellow tree tops, *signage*, do no harm: the map asks for nothing that stands higher than 4 m.
 
 # %% [markdown]
 # ## Stage 3, $s \to p$: from pixels to places

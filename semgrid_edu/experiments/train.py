@@ -138,13 +138,18 @@ def _command(
 ) -> str:
     """Return the command that trains so."""
     options = [
-        f"--data {Path(dataset_dir).name} --out {Path(folder).name} --segmenter {description.segmenter}",
+        f"--data {_name(dataset_dir)} --out {_name(folder)} --segmenter {description.segmenter}",
         f"--preset {description.preset}" if description.preset != Architecture.preset else "",
-        f"--imagenet {Path(imagenet).name}" if imagenet else "",
+        f"--imagenet {_name(imagenet)}" if imagenet else "",
         f"--seed {seed} --iterations {params.grid_iterations}",
         "" if params.end_to_end else "--two-stage",
     ]
     return " ".join(["semgrid-edu train", *filter(None, options)])
+
+
+def _name(path: str | Path) -> str:
+    """Return the last part of a path, that of the current folder too."""
+    return Path(path).resolve().name
 
 
 def how_to_go_on(folder: str | Path) -> str:

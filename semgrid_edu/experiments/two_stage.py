@@ -13,7 +13,7 @@ from semgrid_edu.experiments.train import train_network
 from semgrid_edu.files import sha256
 from semgrid_edu.metrics import METRICS, confusion_matrix
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, load_net
-from semgrid_edu.provenance import FILE_NAME, versions
+from semgrid_edu.provenance import versions
 from semgrid_edu.training import CHECKPOINT, TrainingParams
 
 METHODS = ("end-to-end", "two-stage")
@@ -49,7 +49,7 @@ def compare(
     for seed in range(n_seeds):
         for method in METHODS:
             folder = Path(runs) / f"{method}-{seed}"
-            if not (folder / FILE_NAME).exists():
+            if not (folder / WEIGHTS).exists():
                 chosen = replace(params, end_to_end=method == "end-to-end")
                 resume = (folder / CHECKPOINT).exists()
                 train_network(dataset_dir, folder, "segnet", chosen, seed, resume)

@@ -6,7 +6,6 @@ from tiny_drive import write_tiny_dataset
 from semgrid_edu.experiments import two_stage
 from semgrid_edu.labels import IGNORE
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, load_net
-from semgrid_edu.provenance import FILE_NAME
 from semgrid_edu.training import CHECKPOINT, TrainingParams
 
 QUICK = TrainingParams(image_iterations=1, grid_iterations=1, batch_size=2)
@@ -49,12 +48,12 @@ def test_what_was_interrupted_goes_on(compared, monkeypatch):
     root, _ = compared
     resumed = {}
     for folder in ("end-to-end-0", "two-stage-0"):
-        (root / "runs" / folder / FILE_NAME).rename(root / folder)
+        (root / "runs" / folder / WEIGHTS).rename(root / folder)
     (root / "runs" / "two-stage-0" / CHECKPOINT).touch()
 
     def ended(_data, folder, _segmenter, params, _seed, resume):
         resumed[folder.name] = params.end_to_end, resume
-        (root / folder.name).rename(folder / FILE_NAME)
+        (root / folder.name).rename(folder / WEIGHTS)
         (folder / CHECKPOINT).unlink(missing_ok=True)
 
     monkeypatch.setattr(two_stage, "train_network", ended)

@@ -124,10 +124,9 @@ def test_unknown_presets_and_class_numbers_are_refused(name):
 
 
 def test_compact_networks_cost_alike(name):
-    """What is compared is the architecture, not the effort: additions and multiplications of a forward pass, weights."""
+    """What is compared is the architecture, not the effort: weights, and arithmetic of a forward pass."""
     net, image = build_segmenter(name, 14).eval(), _images(1, 3, 96, 320)
     assert sum(p.numel() for p in net.parameters()) <= 500_000
     with torch.inference_mode(), FlopCounterMode(display=False) as counter:
         net(image)
     assert 0.3e9 < counter.get_total_flops() < 0.9e9
-
