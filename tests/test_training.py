@@ -1,7 +1,10 @@
 import math
+import os
 import resource
+import signal
 from dataclasses import replace
 from itertools import pairwise
+from multiprocessing import get_context
 from types import SimpleNamespace
 
 import numpy as np
@@ -282,6 +285,29 @@ def test_a_resumed_run_ends_with_the_same_bytes(
     assert (broken / "checkpoint.safetensors").exists()
     train(build_net(SMALL, CAMERA, seed=9), streets, broken, params, seed=1, resume=True)
     _same_files(whole, broken)
+
+
+def _kill_for_good(reads):
+    """No block ends, nothing is tidied up."""
+    if reads == 0:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def _train_until_killed(folder):
+    torch.set_num_threads(1)
+    training.CHECKPOINT_EVERY, streets = 2, tiny_streets()
+    reads = 3 * len(streets) + 5 * QUICK.batch_size
+    train(build_net(SMALL, CAMERA), _Watched(streets, reads, _kill_for_good), folder, QUICK)
+
+
+def test_a_run_killed_by_the_system_goes_on(streets, tmp_path):
+    train(build_net(SMALL, CAMERA), streets, tmp_path / "whole", QUICK)
+    process = get_context("spawn").Process(target=_train_until_killed, args=(tmp_path / "broken",))
+    process.start()
+    process.join()
+    assert process.exitcode == -signal.SIGKILL
+    train(build_net(SMALL, CAMERA), streets, tmp_path / "broken", QUICK, resume=True)
+    _same_files(tmp_path / "whole", tmp_path / "broken")
 
 
 def test_another_seed_gives_other_weights(streets, tmp_path):
