@@ -144,8 +144,8 @@ def train(
     params, folder, device = params or TrainingParams(), Path(folder), torch.device(device)
     _check_folder(folder, resume)
     _check_dataset(net, dataset, params)
-    stages = {params.stage(iteration)[0] for iteration in (0, params.iterations - 1)}
-    alpha = {stage: class_weights(dataset, stage, net.n_classes, params.weight_limit) for stage in sorted(stages)}
+    stages = [stage for stage, n in (("image", params.image_iterations), ("grid", params.grid_iterations)) if n]
+    alpha = {stage: class_weights(dataset, stage, net.n_classes, params.weight_limit) for stage in stages}
     optimiser = torch.optim.SGD(net.to(device).parameters(), lr=params.learning_rate, momentum=params.momentum)
     run = {"seed": seed, "frames": len(dataset), **asdict(params), **asdict(net.architecture)}
     run |= {f"{stage} class weights": weights.tolist() for stage, weights in alpha.items()}

@@ -310,6 +310,14 @@ def test_a_run_killed_by_the_system_goes_on(streets, tmp_path):
     _same_files(tmp_path / "whole", tmp_path / "broken")
 
 
+def test_without_a_first_stage_images_need_no_labels(streets, tmp_path):
+    unlabelled = [sample._replace(labels=torch.full_like(sample.labels, IGNORE)) for sample in streets]
+    for name, frames in (("with", streets), ("without", unlabelled)):
+        train(build_net(SMALL, CAMERA), frames, tmp_path / name, replace(QUICK, image_iterations=0))
+    with_labels, without = ((tmp_path / name / "weights.safetensors").read_bytes() for name in ("with", "without"))
+    assert with_labels == without
+
+
 def test_another_seed_gives_other_weights(streets, tmp_path):
     for seed in (1, 2):
         train(build_net(SMALL, CAMERA), streets, tmp_path / str(seed), QUICK, seed=seed)
