@@ -3,66 +3,112 @@
 from grader_checks import GraderChecks, mistake, right
 
 
-def field(start="1", adds="(kernel - 1) * rate * jump", then="jump *= stride", result="field, jump"):
-    """Return an answer to task 1 that adds and multiplies like this."""
+def field(
+    start="1, 1, 0",
+    adds="reach * jump",
+    moves="(reach / 2 - padding) * jump",
+    then="jump *= stride",
+    result="field, jump, centre",
+):
+    """Return an answer to task 1 that begins, adds, moves the centre and multiplies like this."""
     return f"""
 def receptive_field(layers):
-    field, jump = {start}, 1
-    for kernel, stride, rate in layers:
+    field, jump, centre = {start}
+    for kernel, stride, rate, padding in layers:
+        reach = (kernel - 1) * rate
         field += {adds}
+        centre += {moves}
         {then}
     return {result}"""
 
 
 MAX_POOL = """
-def max_pool(image):
-    h, w = image.shape
-    pooled, indices = np.zeros((h // 2, w // 2)), np.zeros((h // 2, w // 2), int)
-    for v in range(h // 2):
-        for u in range(w // 2):
-            window = image[2 * v : 2 * v + 2, 2 * u : 2 * u + 2]
-            n, m = np.unravel_index(window.argmax(), (2, 2))
-            pooled[v, u] = window[n, m]
-            indices[v, u] = INDEX
-    return pooled, indices
+def max_pool(maps, kernel, stride):
+    C, h, w = maps.shape
+    shape = C, DOWN, ACROSS
+    pooled, indices = np.zeros(shape), np.zeros(shape, int)
+    for c in range(C):
+        for v in range(shape[1]):
+            for u in range(shape[2]):
+                top, left = stride * v, stride * u
+                window = maps[c, top : top + kernel, left : left + kernel]
+                n, m = np.unravel_index(window.argmax(), window.shape)
+                pooled[c, v, u] = window[n, m]
+                indices[c, v, u] = INDEX
+    return RESULT
+"""
+LECTURE_POOL = """
+def max_pool(maps, kernel, stride):
+    pooled, indices = [], []
+    for image in maps:
+        h, w = image.shape
+        windows = image[: h // 2 * 2, : w // 2 * 2].reshape(h // 2, 2, w // 2, 2).swapaxes(1, 2)
+        windows = windows.reshape(h // 2, w // 2, 4)
+        row, column = np.divmod(windows.argmax(axis=-1), 2)
+        v, u = np.ogrid[: h // 2, : w // 2]
+        pooled.append(windows.max(axis=-1))
+        indices.append((2 * v + row) * w + 2 * u + column)
+    return np.array(pooled), np.array(indices)
 """
 UNPOOL = """
-def unpool(pooled, indices, shape):
-    image = np.zeros(shape)
-    for value, index in zip(pooled.ravel(), indices.ravel()):
-        image[index // shape[1], index % shape[1]] = value
-    return image
+def unpool(values, indices, shape):
+    maps = np.zeros(shape)
+    for c in range(shape[0]):
+        for value, index in zip(values[c].ravel(), indices[c].ravel()):
+            maps[c, index // shape[2], index % shape[2]] += value
+    return maps
 """
 
 
-def pool(index="(2 * v + n) * w + 2 * u + m", unpool=UNPOOL):
-    """Return an answer to task 2 with this index, or another way back."""
-    return MAX_POOL.replace("INDEX", index) + unpool
+def pool(
+    index="(top + n) * w + left + m",
+    down="(h - kernel) // stride + 1",
+    across="(w - kernel) // stride + 1",
+    result="pooled, indices",
+    unpool=UNPOOL,
+):
+    """Return an answer to task 2 with this index, this number of windows, this result, or another way back."""
+    parts = {"INDEX": index, "DOWN": down, "ACROSS": across, "RESULT": result}
+    code = MAX_POOL
+    for name, part in parts.items():
+        code = code.replace(name, part)
+    return code + unpool
 
 
 ATROUS = """
-def atrous(image, kernel, rate):
-    h, w = image.shape
-    out = np.zeros((h, w))
-    for v in range(h):
-        for u in range(w):
-            for n in range(3):
-                for m in range(3):
-                    y, x = v + rate * (n - 1), u + rate * (m - 1)
-                    if 0 <= y < h and 0 <= x < w:
-                        out[v, u] += kernel[n, m] * image[y, x]
+def atrous(maps, kernels, bias, stride, rate):
+    _, C, N, _ = kernels.shape
+    h, w = maps.shape[1:]
+    out = np.zeros((len(bias), -(-h // stride), -(-w // stride)))
+    for k, v, u in np.ndindex(out.shape):
+        total = 0
+        for n, m in np.ndindex(N, N):
+            y, x = stride * v + rate * (n - (N - 1) // 2), stride * u + rate * (m - (N - 1) // 2)
+            if 0 <= y < h and 0 <= x < w:
+                total += sum(kernels[k, c, n, m] * maps[c, y, x] for c in range(C))
+        out[k, v, u] = total + bias[k]
     return out
 """
 
 
-def loss(softmax="np.exp(scores) / np.exp(scores).sum(axis=0)", result="-np.log(p).mean()"):
-    """Return an answer to task 5 with another soft-max or another mean; none survives large scores."""
+def loss(
+    softmax="np.exp(scores) / np.exp(scores).sum(axis=0)",
+    result="-np.log(p).mean()",
+    gradient="gradient / len(v)",
+    labelled="np.nonzero(truth != 255)",
+    true="truth",
+):
+    """Return an answer to task 5 with another soft-max, mean, gradient or truth; none survives large scores."""
     return f"""
-def cross_entropy(scores, truth):
+def loss_and_gradient(scores, truth):
     P = {softmax}
-    v, u = np.nonzero(truth != 255)
-    p = P[truth[v, u], v, u]
-    return {result}"""
+    v, u = {labelled}
+    true = {true}
+    p = P[true[v, u], v, u]
+    gradient = np.zeros(P.shape)
+    gradient[:, v, u] = P[:, v, u]
+    gradient[true[v, u], v, u] -= 1
+    return {result}, {gradient}"""
 
 
 def enlarging(places="2 * np.arange(len(values)) + 0.5", result="up + fine"):
@@ -83,23 +129,25 @@ class TestSegmentation(GraderChecks):
     entries = (
         # ---- task 1
         right(
-            "from the last layer back to the first",
+            "first and last pixel, from the last layer back to the first",
             task="field",
             code="""
 def receptive_field(layers):
-    field = 1
-    for kernel, stride, rate in reversed(layers):
-        field = (field - 1) * stride + rate * (kernel - 1) + 1
-    return field, int(np.prod([stride for _, stride, _ in layers]))""",
+    first = last = 0
+    for kernel, stride, rate, padding in reversed(layers):
+        first = stride * first - padding
+        last = stride * last - padding + rate * (kernel - 1)
+    return last - first + 1, int(np.prod([layer[1] for layer in layers])), (first + last) / 2""",
         ),
         right(
-            "no loop",
+            "no loop, and a list",
             task="field",
             code="""
 def receptive_field(layers):
-    kernel, stride, rate = np.array(layers, int).reshape(-1, 3).T
+    kernel, stride, rate, padding = np.array(layers, int).reshape(-1, 4).T
     jumps = np.cumprod([1, *stride])
-    return 1 + int(((kernel - 1) * rate * jumps[:-1]).sum()), int(jumps[-1])""",
+    reach = (kernel - 1) * rate * jumps[:-1]
+    return [1 + reach.sum(), jumps[-1], reach.sum() / 2 - padding @ jumps[:-1]]""",
         ),
         right(
             "recursion",
@@ -107,277 +155,586 @@ def receptive_field(layers):
             code="""
 def receptive_field(layers):
     if not layers:
-        return 1, 1
-    field, jump = receptive_field(layers[:-1])
-    kernel, stride, rate = layers[-1]
-    return field + (kernel - 1) * rate * jump, jump * stride""",
+        return 1, 1, 0
+    field, jump, centre = receptive_field(layers[:-1])
+    kernel, stride, rate, padding = layers[-1]
+    reach = (kernel - 1) * rate
+    return field + reach * jump, jump * stride, centre + jump * (reach - 2 * padding) / 2""",
         ),
         mistake(
             "jump forgotten",
             task="field",
-            loses=2,
-            says="the jump is forgotten",
+            loses=1,
+            says="the jump is forgotten: after a halving each step of a kernel",
             code=field(adds="(kernel - 1) * rate"),
         ),
         mistake(
             "a layer's own stride counted in it",
             task="field",
-            loses=2,
-            says="a layer's own stride counts from the next layer on",
+            loses=1,
+            says="a layer's own stride counts from the next layer on: first the field",
             code=field(adds="(kernel - 1) * rate * jump * stride"),
         ),
         mistake(
             "kernel instead of kernel - 1",
             task="field",
-            loses=2,
+            loses=1,
             says="a kernel of 3 adds its two neighbours",
             code=field(adds="kernel * rate * jump"),
         ),
         mistake(
             "rate forgotten",
             task="field",
-            loses=2,
+            loses=1,
             says="the rate is forgotten",
             code=field(adds="(kernel - 1) * jump"),
         ),
-        mistake("field starts at 0", task="field", loses=2, says="start with a field of 1", code=field(start="0")),
         mistake(
-            "strides added",
-            task="field",
-            loses=2,
-            says="strides multiply",
-            code=field(then="jump += stride"),
+            "field starts at 0", task="field", loses=1, says="start with a field of 1", code=field(start="0, 1, 0")
         ),
+        mistake("strides added", task="field", loses=3, says="strides multiply", code=field(then="jump += stride")),
         mistake(
             "rate applied to the stride",
             task="field",
-            loses=2,
+            loses=3,
             says="it is no part of the jump",
             code=field(then="jump *= stride * rate"),
         ),
         mistake(
             "kernels added up",
             task="field",
-            loses=2,
+            loses=3,
             says="you add up the kernels",
-            code="def receptive_field(layers):\n    return sum(k for k, _, _ in layers), 4",
+            code="""def receptive_field(layers):
+    return sum(layer[0] for layer in layers), 4, 6.5""",
         ),
         mistake(
             "a kernel of 3 with rate 2 taken for one of 6",
             task="field",
-            loses=2,
+            loses=1,
             says="spans 5 pixels, not 6",
             code=field(adds="(kernel * rate - 1) * jump"),
         ),
         mistake(
-            "field only",
+            "padding added to the field",
             task="field",
-            loses=2,
-            says="return two numbers",
-            code=field(result="field"),
+            loses=1,
+            says="the field doesn't know of it",
+            code=field(adds="((kernel - 1) * rate + 2 * padding) * jump"),
+        ),
+        mistake(
+            "the lecture's two numbers",
+            task="field",
+            loses=3,
+            says="return three numbers",
+            code=field(result="field, jump"),
         ),
         mistake(
             "jump of one stride",
             task="field",
-            loses=2,
+            loses=1,
             says="so outputs lie 4 pixels apart",
-            code=field(result="field, 2"),
+            code=field(result="field, 2, centre"),
         ),
         mistake(
             "from the last layer to the first, by the formula of the first to the last",
             task="field",
-            loses=2,
-            says="you walk from the last layer to the first",
+            loses=3,
+            says="you walk from the last layer to the first: `layers` begins at the image, where the jump is 1",
             code=field().replace("in layers", "in layers[::-1]"),
         ),
         mistake(
             "rate and stride swapped",
             task="field",
-            loses=2,
-            says="each layer is (kernel, stride, rate)",
-            code=field().replace("kernel, stride, rate in", "kernel, rate, stride in"),
+            loses=3,
+            says="each layer is (kernel, stride, rate, padding)",
+            code=field().replace("kernel, stride, rate, padding in", "kernel, rate, stride, padding in"),
         ),
         mistake(
             "jump first",
             task="field",
-            loses=2,
+            loses=1,
             says="return the field first, then the jump",
-            code=field(result="jump, field"),
+            code=field(result="jump, field, centre"),
         ),
         mistake(
             "pixels counted without the holes",
             task="field",
-            loses=2,
+            loses=1,
             says="on inputs you haven't seen: wrong field (from the first pixel to the last",
             code="""
 def receptive_field(layers):
     seen, jump = {0}, 1
-    for kernel, stride, rate in reversed(layers):
-        seen = {stride * place + rate * k for place in seen for k in range(kernel)}
+    for kernel, stride, rate, padding in reversed(layers):
+        seen = {stride * place + rate * k - padding for place in seen for k in range(kernel)}
         jump *= stride
-    return len(seen), jump""",
+    return len(seen), jump, (min(seen) + max(seen)) / 2""",
         ),
         mistake(
             "strides are 2 or nothing",
             task="field",
-            loses=2,
+            loses=3,
             says="on inputs you haven't seen: wrong jump",
             code=field(then="jump *= 2 if stride > 1 else 1"),
         ),
         mistake(
             "waits for the list to be empty",
             task="field",
-            loses=2,
+            loses=3,
             says="No reply from kernel before timeout",
             code="""
 def receptive_field(layers):
     field, jump = 1, 1
     while layers:
-        kernel, stride, rate = layers[0]
+        kernel, stride, rate, padding = layers[0]
         field += (kernel - 1) * rate * jump
         jump *= stride
-    return field, jump""",
+    return field, jump, 0""",
+        ),
+        mistake(
+            "padding forgotten",
+            task="field",
+            loses=2,
+            says="the padding is forgotten",
+            code=field(moves="reach / 2 * jump"),
+        ),
+        mistake(
+            "padding not in pixels",
+            task="field",
+            loses=2,
+            says="a zero is as wide as the jump",
+            code=field(moves="reach / 2 * jump - padding"),
+        ),
+        mistake(
+            "centre without the jump",
+            task="field",
+            loses=2,
+            says="the jump is forgotten: after a halving each step is two",
+            code=field(moves="reach / 2 - padding"),
+        ),
+        mistake(
+            "centre with the layer's own stride",
+            task="field",
+            loses=2,
+            says="first the centre, then the jump",
+            code=field(moves="(reach / 2 - padding) * jump * stride"),
+        ),
+        mistake(
+            "centre without the rate",
+            task="field",
+            loses=2,
+            says="the rate spreads the kernel",
+            code=field(moves="((kernel - 1) / 2 - padding) * jump"),
+        ),
+        mistake(
+            "padding spread by the rate",
+            task="field",
+            loses=2,
+            says="padding stays",
+            code=field(moves="(reach / 2 - padding * rate) * jump"),
+        ),
+        mistake(
+            "half a kernel too wide",
+            task="field",
+            loses=2,
+            says="of two half a step: (kernel - 1) / 2",
+            code=field(moves="(kernel * rate / 2 - padding) * jump"),
+        ),
+        mistake(
+            "rounded down",
+            task="field",
+            loses=2,
+            says="half a pixel is lost",
+            code=field(moves="(reach // 2 - padding) * jump"),
+        ),
+        mistake(
+            "kernel // 2",
+            task="field",
+            loses=2,
+            says="half a pixel too far",
+            code=field(moves="(kernel // 2 * rate - padding) * jump"),
+        ),
+        mistake(
+            "padding added",
+            task="field",
+            loses=2,
+            says="the sign of the padding",
+            code=field(moves="(reach / 2 + padding) * jump"),
+        ),
+        mistake(
+            "padding on both sides",
+            task="field",
+            loses=2,
+            says="the padding counts twice",
+            code=field(moves="(reach / 2 - 2 * padding) * jump"),
+        ),
+        mistake(
+            "half of the padding",
+            task="field",
+            loses=2,
+            says="half of the padding is lost",
+            code=field(moves="(reach - padding) / 2 * jump"),
+        ),
+        mistake(
+            "the first pixel",
+            task="field",
+            loses=2,
+            says="that is the first pixel of the field",
+            code=field(moves="-padding * jump"),
+        ),
+        mistake(
+            "the last pixel",
+            task="field",
+            loses=2,
+            says="that is the last pixel of the field",
+            code=field(moves="(reach - padding) * jump"),
+        ),
+        mistake(
+            "sign of the centre",
+            task="field",
+            loses=2,
+            says="what a kernel reaches to the right is added",
+            code=field(moves="(padding - reach / 2) * jump"),
+        ),
+        mistake(
+            "pixel 0 lies at a half",
+            task="field",
+            loses=2,
+            says="half a pixel too far: pixel 0 lies at 0",
+            code=field(start="1, 1, 0.5"),
+        ),
+        mistake(
+            "half the field",
+            task="field",
+            loses=2,
+            says="that is half the field",
+            code=field(result="field, jump, field / 2"),
+        ),
+        mistake(
+            "the middle of the field, padding forgotten",
+            task="field",
+            loses=2,
+            says="the padding is forgotten",
+            code=field(result="field, jump, (field - 1) / 2"),
+        ),
+        mistake(
+            "rounded only where it is negative",
+            task="field",
+            loses=2,
+            says="on inputs you haven't seen: wrong centre (it may lie between pixels, or below 0)",
+            code=field(result="field, jump, max(0, centre)"),
         ),
         # ---- task 2
-        right("loops", task="pool", code=pool()),
         right(
-            "four shifted maps",
+            "numpy's windows, and add.at",
             task="pool",
             code="""
-def max_pool(image):
-    places = np.arange(image.size).reshape(image.shape)
-    corners = [(n, m) for n in (0, 1) for m in (0, 1)]
-    values = np.stack([image[n::2, m::2] for n, m in corners])
-    best = values.argmax(axis=0)[None]
-    places = np.stack([places[n::2, m::2] for n, m in corners])
-    return np.take_along_axis(values, best, 0)[0], np.take_along_axis(places, best, 0)[0]
+def max_pool(maps, kernel, stride):
+    windows = np.lib.stride_tricks.sliding_window_view(maps, (kernel, kernel), axis=(1, 2))[:, ::stride, ::stride]
+    windows = windows.reshape(*windows.shape[:3], -1)
+    row, column = np.divmod(windows.argmax(axis=-1), kernel)
+    v, u = np.ogrid[: windows.shape[1], : windows.shape[2]]
+    return windows.max(axis=-1), (stride * v + row) * maps.shape[2] + stride * u + column
 
-def unpool(pooled, indices, shape):
-    image = np.zeros(shape[0] * shape[1])
-    np.put(image, indices, pooled)
-    return image.reshape(shape)""",
+def unpool(values, indices, shape):
+    maps = np.zeros(shape)
+    for channel, some, places in zip(maps, values, indices):
+        np.add.at(channel.reshape(-1), places, some)
+    return maps""",
+        ),
+        right(
+            "the running maximum of shifted maps, and bincount",
+            task="pool",
+            code="""
+def max_pool(maps, kernel, stride):
+    C, h, w = maps.shape
+    H, W = (h - kernel) // stride + 1, (w - kernel) // stride + 1
+    places = np.arange(h * w).reshape(h, w)
+    best, where = np.full((C, H, W), -np.inf), np.zeros((C, H, W), int)
+    for n, m in np.ndindex(kernel, kernel):
+        part = maps[:, n::stride, m::stride][:, :H, :W]
+        where = np.where(part > best, places[n::stride, m::stride][:H, :W], where)
+        best = np.maximum(best, part)
+    return best, where
+
+def unpool(values, indices, shape):
+    size = shape[1] * shape[2]
+    flat = [np.bincount(np.ravel(i), np.ravel(v), size) for v, i in zip(values, indices)]
+    return np.reshape(flat, shape)""",
         ),
         right(
             "lists of numbers",
             task="pool",
             code="""
-def max_pool(image):
-    h, w = image.shape
+def max_pool(maps, kernel, stride):
+    C, h, w = maps.shape
     best = [
-        [max((image[v + n, u + m], (v + n) * w + u + m) for n in (0, 1) for m in (0, 1)) for u in range(0, w, 2)]
-        for v in range(0, h, 2)
+        [
+            [
+                max((maps[c, v + n, u + m], -(v + n) * w - u - m) for n in range(kernel) for m in range(kernel))
+                for u in range(0, w - kernel + 1, stride)
+            ]
+            for v in range(0, h - kernel + 1, stride)
+        ]
+        for c in range(C)
     ]
-    return [[value for value, _ in row] for row in best], [[place for _, place in row] for row in best]
+    return (
+        [[[value for value, _ in row] for row in channel] for channel in best],
+        [[[-place for _, place in row] for row in channel] for channel in best],
+    )
 
-def unpool(pooled, indices, shape):
-    image = [[0.0] * shape[1] for _ in range(shape[0])]
-    for value, index in zip(np.ravel(pooled), np.ravel(indices)):
-        image[index // shape[1]][index % shape[1]] = value
-    return image""",
+def unpool(values, indices, shape):
+    maps = [[[0.0] * shape[2] for _ in range(shape[1])] for _ in range(shape[0])]
+    for channel, some, places in zip(maps, values, indices):
+        for value, index in zip(np.ravel(some), np.ravel(places)):
+            channel[index // shape[2]][index % shape[2]] += value
+    return maps""",
+        ),
+        right(
+            "unpooling by one index over all channels",
+            task="pool",
+            code=pool(
+                unpool="""
+def unpool(values, indices, shape):
+    C, h, w = shape
+    everywhere = np.asarray(indices) + h * w * np.arange(C)[:, None, None]
+    return np.bincount(everywhere.ravel(), np.ravel(values), C * h * w).reshape(shape)"""
+            ),
         ),
         mistake(
-            "decimals cut off",
-            task="pool",
-            loses=1,
-            says="on inputs you haven't seen: a maximum isn't where its index says, or isn't what it was",
-            code=pool(unpool=UNPOOL.replace("np.zeros(shape)", "np.zeros(shape, int)")),
-        ),
-        mistake(
-            "index in the window",
-            task="pool",
-            loses=2,
-            says="that is the index in the window",
-            code=pool("2 * n + m"),
-        ),
-        mistake(
-            "row times height",
-            task="pool",
-            loses=2,
-            says="you multiply the row by the height",
-            code=pool("(2 * v + n) * h + 2 * u + m"),
-        ),
-        mistake(
-            "column by column",
-            task="pool",
-            loses=2,
-            says="you count column by column",
-            code=pool("(2 * u + m) * h + 2 * v + n"),
-        ),
-        mistake(
-            "width of the pooled map",
-            task="pool",
-            loses=2,
-            says="you multiply the row by the width of the pooled map",
-            code=pool("(2 * v + n) * (w // 2) + 2 * u + m"),
-        ),
-        mistake(
-            "counted from 1",
-            task="pool",
-            loses=2,
-            says="you count from 1",
-            code=pool("(2 * v + n) * w + 2 * u + m + 1"),
-        ),
-        mistake(
-            "the window's corner",
-            task="pool",
-            loses=2,
-            says="that is the window's first number",
-            code=pool("2 * v * w + 2 * u"),
-        ),
-        mistake(
-            "windows that overlap",
-            task="pool",
-            loses=2,
-            says="your windows overlap",
-            code="""
-def max_pool(image):
-    h, w = image.shape
-    pooled = np.array([[image[v : v + 2, u : u + 2].max() for u in range(w - 1)] for v in range(h - 1)])
-    return pooled, np.zeros_like(pooled)
-"""
-            + UNPOOL,
-        ),
-        mistake(
-            "mean pooling",
-            task="pool",
-            loses=2,
-            says="that is the mean of the window",
-            code=pool().replace("window[n, m]", "window.mean()"),
+            "the lecture's windows of 2 x 2", task="pool", loses=2, says="and not of 3 x 3,", code=LECTURE_POOL + UNPOOL
         ),
         mistake(
             "minima",
             task="pool",
             loses=2,
-            says="those are the minima",
+            says="the smallest number of the first window",
             code=pool().replace("argmax", "argmin"),
+        ),
+        mistake(
+            "mean pooling",
+            task="pool",
+            loses=1,
+            says="is the mean of the first window",
+            code=pool().replace("= window[n, m]", "= window.mean()"),
+        ),
+        mistake(
+            "windows one pixel apart",
+            task="pool",
+            loses=2,
+            says="your windows begin one pixel apart",
+            code=pool().replace("max_pool(maps, kernel, stride):", "max_pool(maps, kernel, stride):\n    stride = 1"),
+        ),
+        mistake(
+            "windows side by side",
+            task="pool",
+            loses=2,
+            says="your windows don't overlap",
+            code=pool().replace(
+                "max_pool(maps, kernel, stride):", "max_pool(maps, kernel, stride):\n    stride = kernel"
+            ),
+        ),
+        mistake(
+            "a smaller window at the end of a row",
+            task="pool",
+            loses=2,
+            says="the last window of a row has fewer than three columns",
+            code=pool(across="-(-(w - kernel) // stride) + 1"),
+        ),
+        mistake(
+            "smaller windows all along the border",
+            task="pool",
+            loses=2,
+            says="windows at the border have fewer than 3 x 3 pixels",
+            code=pool(down="-(-h // stride)", across="-(-w // stride)"),
+        ),
+        mistake(
+            "maximum over channels",
+            task="pool",
+            loses=1,
+            says="each channel has its own",
+            code=pool(result="pooled.max(axis=0), indices"),
+        ),
+        mistake(
+            "maxima only",
+            task="pool",
+            loses=2,
+            says="return two arrays, the maxima and their indices",
+            code="""
+def max_pool(maps, kernel, stride):
+    windows = np.lib.stride_tricks.sliding_window_view(maps, (kernel, kernel), axis=(1, 2))[:, ::stride, ::stride]
+    return list(windows.max(axis=(3, 4)))[:1]
+"""
+            + UNPOOL,
         ),
         mistake(
             "a maximum that starts at 0",
             task="pool",
-            loses=2,
+            loses=1,
             says="on inputs you haven't seen: wrong maxima (a map may be negative everywhere)",
             code=pool().replace("= window[n, m]", "= max(0, window[n, m])"),
         ),
         mistake(
-            "spread over the window",
+            "3 and 2 written in",
             task="pool",
-            loses=1,
-            says="a maximum goes to one place, not to its whole window",
-            code=pool(
-                unpool="def unpool(pooled, indices, shape):\n    return pooled.repeat(2, axis=0).repeat(2, axis=1)"
+            loses=2,
+            says="on inputs you haven't seen: wrong shape of the maxima, kernel 2, stride 2",
+            code=pool().replace(
+                "max_pool(maps, kernel, stride):", "max_pool(maps, kernel, stride):\n    kernel, stride = 3, 2"
             ),
         ),
         mistake(
-            "into the window's corner",
+            "index in the window",
             task="pool",
             loses=1,
-            says="2 lies at (0, 0), a corner of its window",
+            says="that is the index in the window",
+            code=pool("kernel * n + m"),
+        ),
+        mistake(
+            "row times height",
+            task="pool",
+            loses=1,
+            says="you multiply the row by the height",
+            code=pool("(top + n) * h + left + m"),
+        ),
+        mistake(
+            "column by column",
+            task="pool",
+            loses=1,
+            says="you count column by column",
+            code=pool("(left + m) * h + top + n"),
+        ),
+        mistake(
+            "width of the pooled map",
+            task="pool",
+            loses=1,
+            says="you multiply the row by the windows of a row",
+            code=pool("(top + n) * shape[2] + left + m"),
+        ),
+        mistake(
+            "counted from 1", task="pool", loses=1, says="you count from 1", code=pool("(top + n) * w + left + m + 1")
+        ),
+        mistake(
+            "the window's corner",
+            task="pool",
+            loses=1,
+            says="that is the window's first number",
+            code=pool("top * w + left"),
+        ),
+        mistake(
+            "width of what the windows cover",
+            task="pool",
+            loses=1,
+            says="column 7 is in no window",
+            code=pool("(top + n) * (w - 1) + left + m"),
+        ),
+        mistake(
+            "stride left out of the index", task="pool", loses=1, says="not at 1, 1", code=pool("(v + n) * w + u + m")
+        ),
+        mistake(
+            "kernel for stride in the index",
+            task="pool",
+            loses=1,
+            says="windows begin `stride` pixels apart, not `kernel`",
+            code=pool("(kernel * v + n) * w + kernel * u + m"),
+        ),
+        mistake(
+            "stride of 2 in the index",
+            task="pool",
+            loses=1,
+            says="on inputs you haven't seen: wrong indices, kernel 3, stride 1",
+            code=pool("(2 * v + n) * w + 2 * u + m"),
+        ),
+        mistake(
+            "channels counted on",
+            task="pool",
+            loses=1,
+            says="each channel begins at 0",
+            code=pool("c * h * w + (top + n) * w + left + m"),
+        ),
+        mistake(
+            "the last of equal numbers",
+            task="pool",
+            loses=1,
+            says="of equal numbers the one with the smaller index wins",
+            code=pool().replace("window.argmax()", "window.size - 1 - window.ravel()[::-1].argmax()"),
+        ),
+        mistake(
+            "one index for all channels",
+            task="pool",
+            loses=1,
+            says="one index a window",
+            code=pool(result="pooled, indices[0]"),
+        ),
+        mistake(
+            "the lecture's unpooling, channel by channel",
+            task="pool",
+            loses=1,
+            says="the second value has replaced the first",
             code=pool(
                 unpool="""
-def unpool(pooled, indices, shape):
-    image = np.zeros(shape)
-    image[::2, ::2] = pooled
-    return image"""
+def unpool(values, indices, shape):
+    maps = np.zeros(shape)
+    for c in range(shape[0]):
+        maps[c].flat[indices[c].ravel()] = values[c].ravel()
+    return maps"""
+            ),
+        ),
+        mistake(
+            "+= with repeated indices",
+            task="pool",
+            loses=1,
+            says="adds only once where an index repeats",
+            code=pool(
+                unpool="""
+def unpool(values, indices, shape):
+    maps = np.zeros((shape[0], shape[1] * shape[2]))
+    for c in range(shape[0]):
+        maps[c, indices[c].ravel()] += values[c].ravel()
+    return maps.reshape(shape)"""
+            ),
+        ),
+        mistake(
+            "the larger of two",
+            task="pool",
+            loses=1,
+            says="only the first value, or the larger, has got there",
+            code=pool(
+                unpool="""
+def unpool(values, indices, shape):
+    maps = np.zeros(shape)
+    for c, v, u in np.ndindex(indices.shape):
+        index = indices[c, v, u]
+        maps[c].flat[index] = max(maps[c].flat[index], values[c, v, u])
+    return maps"""
+            ),
+        ),
+        mistake(
+            "the mean of two",
+            task="pool",
+            loses=1,
+            says="that is their mean",
+            code=pool(
+                unpool="""
+def unpool(values, indices, shape):
+    maps, times = np.zeros(shape), np.zeros(shape)
+    for c, v, u in np.ndindex(indices.shape):
+        maps[c].flat[indices[c, v, u]] += values[c, v, u]
+        times[c].flat[indices[c, v, u]] += 1
+    return maps / np.maximum(times, 1)"""
+            ),
+        ),
+        mistake(
+            "everything into channel 0",
+            task="pool",
+            loses=1,
+            says="channel 1 is empty",
+            code=pool(
+                unpool="""
+def unpool(values, indices, shape):
+    maps = np.zeros(shape)
+    np.add.at(maps.reshape(-1), indices.ravel(), values.ravel())
+    return maps"""
             ),
         ),
         mistake(
@@ -387,49 +744,114 @@ def unpool(pooled, indices, shape):
             says="divide by the width",
             code=pool(
                 unpool="""
-def unpool(pooled, indices, shape):
-    image = np.zeros((6, 6))
-    for value, index in zip(pooled.ravel(), indices.ravel()):
-        image[index // shape[0], index % shape[0]] = value
-    return image[: shape[0], : shape[1]]"""
+def unpool(values, indices, shape):
+    maps = np.zeros((shape[0], 8, 8))
+    for c, v, u in np.ndindex(indices.shape):
+        index = indices[c, v, u]
+        maps[c, index // shape[1], index % shape[1]] += values[c, v, u]
+    return maps[:, : shape[1], : shape[2]]"""
             ),
         ),
         mistake(
-            "twice the pooled size whatever is asked for",
+            "spread over the window",
             task="pool",
             loses=1,
-            says="on inputs you haven't seen: not the shape that was asked for",
+            says="a value goes to one place, not to a window",
             code=pool(
                 unpool="""
-def unpool(pooled, indices, shape):
-    image = np.zeros((2 * pooled.shape[0], 2 * pooled.shape[1]))
-    rows, columns = np.divmod(indices, shape[1])
-    inside = (rows < image.shape[0]) & (columns < image.shape[1])
-    image[rows[inside], columns[inside]] = pooled[inside]
-    return image"""
+def unpool(values, indices, shape):
+    return values.repeat(3, axis=1).repeat(3, axis=2)[:, : shape[1], : shape[2]]"""
+            ),
+        ),
+        mistake(
+            "one channel",
+            task="pool",
+            loses=1,
+            says="expected the shape that was asked for",
+            code=pool(
+                unpool="""
+def unpool(values, indices, shape):
+    return np.zeros(shape[1:])"""
+            ),
+        ),
+        mistake(
+            "decimals cut off",
+            task="pool",
+            loses=1,
+            says="on inputs you haven't seen: a value isn't where its index says, or isn't what it was",
+            code=pool(
+                unpool="""
+def unpool(values, indices, shape):
+    maps = np.zeros(shape, int)
+    for c, v, u in np.ndindex(indices.shape):
+        maps[c].flat[indices[c, v, u]] += int(values[c, v, u])
+    return maps"""
             ),
         ),
         # ---- task 3
-        right("four loops", task="atrous", code=ATROUS),
+        right("loops", task="atrous", code=ATROUS),
         right(
-            "a larger kernel with zeros, and scipy",
+            "a list, by scipy and larger kernels with zeros",
             task="atrous",
             code="""
 from scipy.ndimage import correlate
 
-def atrous(image, kernel, rate):
-    spread = np.zeros((2 * rate + 1, 2 * rate + 1))
-    spread[::rate, ::rate] = kernel
-    return correlate(image, spread, mode="constant")""",
+def atrous(maps, kernels, bias, stride, rate):
+    K, C, N, _ = kernels.shape
+    size = rate * (N - 1) + 1
+    spread = np.zeros((K, C, size, size))
+    spread[..., ::rate, ::rate] = kernels
+    whole = [sum(correlate(maps[c], spread[k, c], mode="constant") for c in range(C)) + bias[k] for k in range(K)]
+    return [output[::stride, ::stride].tolist() for output in whole]""",
+        ),
+        right(
+            "shifted maps and einsum",
+            task="atrous",
+            code="""
+def atrous(maps, kernels, bias, stride, rate):
+    (C, h, w), N = maps.shape, kernels.shape[-1]
+    reach = rate * (N - 1) // 2
+    padded = np.pad(maps, ((0, 0), (reach, reach), (reach, reach)))
+    seen = np.array([[padded[:, rate * n :, rate * m :][:, :h:stride, :w:stride] for m in range(N)] for n in range(N)])
+    return np.einsum("kcnm,nmcvu->kvu", kernels, seen) + bias[:, None, None]""",
+        ),
+        mistake(
+            "the lecture's function for each pair, not summed",
+            task="atrous",
+            loses=3,
+            says="sum over the input channels",
+            code="""
+def atrous(maps, kernels, bias, stride, rate):
+    h, w = maps.shape[1:]
+    padded = np.pad(maps, ((0, 0), (rate, rate), (rate, rate)))
+    out = np.zeros((*kernels.shape[:2], -(-h // stride), -(-w // stride)))
+    for k, c, n, m in np.ndindex(kernels.shape):
+        seen = padded[c, rate * n : rate * n + h : stride, rate * m : rate * m + w : stride]
+        out[k, c] += kernels[k, c, n, m] * seen
+    return out""",
+        ),
+        mistake(
+            "output channels summed",
+            task="atrous",
+            loses=3,
+            says="one output channel is missing",
+            code=ATROUS.replace("return out", "return out.sum(axis=0)"),
+        ),
+        mistake(
+            "nothing returned",
+            task="atrous",
+            loses=3,
+            says="did you forget `return`?",
+            code=ATROUS.replace("return out", "pass"),
         ),
         mistake(
             "rate taken for a stride",
             task="atrous",
             loses=3,
             says="you take the rate for a stride",
-            code=ATROUS.replace("rate * (n - 1), u + rate * (m - 1)", "n - 1, u + m - 1").replace(
-                "return out", "return out[::rate, ::rate]"
-            ),
+            code=ATROUS.replace("rate * (n", "(n")
+            .replace("rate * (m", "(m")
+            .replace("return out", "return out[:, ::rate, ::rate]"),
         ),
         mistake(
             "padded by 1",
@@ -437,12 +859,15 @@ def atrous(image, kernel, rate):
             loses=3,
             says="pad by rate, not by 1",
             code="""
-def atrous(image, kernel, rate):
-    padded = np.pad(image, 1)
-    h, w = padded.shape[0] - 2 * rate, padded.shape[1] - 2 * rate
-    return sum(
-        kernel[n, m] * padded[rate * n : rate * n + h, rate * m : rate * m + w] for n in range(3) for m in range(3)
-    )""",
+def atrous(maps, kernels, bias, stride, rate):
+    _, h, w = maps.shape
+    padded = np.pad(maps, ((0, 0), (1, 1), (1, 1)))
+    h, w = h + 2 - 2 * rate, w + 2 - 2 * rate
+    out = bias[:, None, None]
+    for n, m in np.ndindex(3, 3):
+        seen = padded[:, rate * n : rate * n + h : stride, rate * m : rate * m + w : stride]
+        out = out + np.tensordot(kernels[:, :, n, m], seen, axes=1)
+    return out""",
         ),
         mistake(
             "not padded",
@@ -450,97 +875,251 @@ def atrous(image, kernel, rate):
             loses=3,
             says="the border is missing",
             code="""
-def atrous(image, kernel, rate):
-    h, w = image.shape[0] - 2 * rate, image.shape[1] - 2 * rate
-    return sum(
-        kernel[n, m] * image[rate * n : rate * n + h, rate * m : rate * m + w] for n in range(3) for m in range(3)
-    )""",
+def atrous(maps, kernels, bias, stride, rate):
+    _, h, w = maps.shape
+    padded = np.pad(maps, ((0, 0), (0, 0), (0, 0)))
+    h, w = h - 2 * rate, w - 2 * rate
+    out = bias[:, None, None]
+    for n, m in np.ndindex(3, 3):
+        seen = padded[:, rate * n : rate * n + h : stride, rate * m : rate * m + w : stride]
+        out = out + np.tensordot(kernels[:, :, n, m], seen, axes=1)
+    return out""",
+        ),
+        mistake("no bias", task="atrous", loses=3, says="the bias is missing", code=ATROUS.replace("+ bias[k]", "")),
+        mistake(
+            "bias for each input channel",
+            task="atrous",
+            loses=3,
+            says="added for each input channel",
+            code=ATROUS.replace("+ bias[k]", "+ C * bias[k]"),
+        ),
+        mistake(
+            "bias for each weight",
+            task="atrous",
+            loses=3,
+            says="added for each weight: once",
+            code=ATROUS.replace("+ bias[k]", "+ N * N * bias[k]"),
+        ),
+        mistake(
+            "bias for each weight and channel",
+            task="atrous",
+            loses=3,
+            says="added for each weight and each channel",
+            code=ATROUS.replace("+ bias[k]", "+ C * N * N * bias[k]"),
+        ),
+        mistake(
+            "channel 0 alone",
+            task="atrous",
+            loses=3,
+            says="that is channel 0 alone",
+            code=ATROUS.replace("for c in range(C)", "for c in range(1)"),
+        ),
+        mistake(
+            "only the last channel stays",
+            task="atrous",
+            loses=3,
+            says="that is the last channel alone",
+            code=ATROUS.replace("for c in range(C)", "for c in range(C - 1, C)"),
+        ),
+        mistake(
+            "mean over channels",
+            task="atrous",
+            loses=3,
+            says="that is the mean over channels",
+            code=ATROUS.replace("+ bias[k]", "/ C + bias[k]"),
+        ),
+        mistake(
+            "input and output channel swapped",
+            task="atrous",
+            loses=3,
+            says="input and output channel are swapped",
+            code=ATROUS.replace("kernels[k, c,", "kernels[c, k,"),
+        ),
+        mistake(
+            "one kernel for all inputs",
+            task="atrous",
+            loses=3,
+            says="each pair of channels has its own",
+            code=ATROUS.replace("kernels[k, c,", "kernels[k, 0,"),
+        ),
+        mistake(
+            "one kernel for all outputs",
+            task="atrous",
+            loses=3,
+            says="output 1 at the same place",
+            code=ATROUS.replace("kernels[k, c,", "kernels[0, c,"),
+        ),
+        mistake(
+            "two channels written in",
+            task="atrous",
+            loses=2,
+            says="on inputs you haven't seen: wrong with 3 inputs",
+            code=ATROUS.replace("for c in range(C)", "for c in range(2) if c < C"),
         ),
         mistake(
             "rate ignored",
             task="atrous",
-            loses=3,
-            says="the pixel's neighbour answers",
+            loses=2,
+            says="the neighbour at (2, 3) answers",
             code=ATROUS.replace("rate *", "1 *"),
-        ),
-        mistake(
-            "kernel turned round",
-            task="atrous",
-            loses=3,
-            says="the kernel is turned round: for the output at (0, 1)",
-            code=ATROUS.replace("kernel[n, m]", "kernel[2 - n, 2 - m]"),
-        ),
-        mistake(
-            "rows of the kernel turned round",
-            task="atrous",
-            loses=3,
-            says="the kernel is turned round from top to bottom",
-            code=ATROUS.replace("kernel[n, m]", "kernel[2 - n, m]"),
-        ),
-        mistake(
-            "columns of the kernel turned round",
-            task="atrous",
-            loses=3,
-            says="the kernel is turned round from left to right",
-            code=ATROUS.replace("kernel[n, m]", "kernel[n, 2 - m]"),
         ),
         mistake(
             "rate on the rows only",
             task="atrous",
-            loses=3,
-            says="the pixel's neighbour answers",
-            code=ATROUS.replace("u + rate * (m - 1)", "u + (m - 1)"),
+            loses=2,
+            says="the neighbour at (2, 3) answers",
+            code=ATROUS.replace("rate * (m", "(m"),
+        ),
+        mistake(
+            "kernel turned round",
+            task="atrous",
+            loses=2,
+            says="the kernel is turned round: the ones lie",
+            code=ATROUS.replace("c, n, m]", "c, N - 1 - n, N - 1 - m]"),
+        ),
+        mistake(
+            "rows of the kernel turned round",
+            task="atrous",
+            loses=2,
+            says="from top to bottom",
+            code=ATROUS.replace("c, n, m]", "c, N - 1 - n, m]"),
+        ),
+        mistake(
+            "columns of the kernel turned round",
+            task="atrous",
+            loses=2,
+            says="from left to right",
+            code=ATROUS.replace("c, n, m]", "c, n, N - 1 - m]"),
         ),
         mistake(
             "one hole too many",
             task="atrous",
-            loses=3,
-            says="is the rate applied to rows and to columns?",
+            loses=2,
+            says="(rate + 1) is too far",
             code=ATROUS.replace("rate *", "(rate + 1) *"),
         ),
         mistake(
             "kernel transposed",
             task="atrous",
-            loses=3,
+            loses=2,
             says="rows and columns of the kernel are swapped",
-            code=ATROUS.replace("kernel[n, m]", "kernel[m, n]"),
+            code=ATROUS.replace("c, n, m]", "c, m, n]"),
         ),
         mistake(
             "kernel not centred",
             task="atrous",
             loses=3,
-            says="the middle weight, 5, meets the pixel",
-            code=ATROUS.replace("(n - 1), u + rate * (m - 1)", "n, u + rate * m"),
+            says="the middle weights, 5 and 14, meet",
+            code=ATROUS.replace("(n - (N - 1) // 2)", "n").replace("(m - (N - 1) // 2)", "m"),
         ),
         mistake(
             "border repeated",
             task="atrous",
-            loses=3,
-            says="outside, everything is zero",
-            code=ATROUS.replace(
-                "if 0 <= y < h and 0 <= x < w:",
-                "y, x = np.clip(y, 0, h - 1), np.clip(x, 0, w - 1)\n                    if True:",
+            loses=2,
+            says="outside is zero",
+            code=ATROUS.replace("if 0 <= y < h and 0 <= x < w", "if True").replace(
+                "maps[c, y, x]", "maps[c, min(max(y, 0), h - 1), min(max(x, 0), w - 1)]"
             ),
         ),
         mistake(
-            "np.roll: what leaves on the right comes back on the left",
+            "what leaves on the right comes back on the left",
             task="atrous",
-            loses=3,
-            says="outside, everything is zero",
-            code="""
-def atrous(image, kernel, rate):
-    return sum(
-        kernel[n, m] * np.roll(image, (-rate * (n - 1), -rate * (m - 1)), axis=(0, 1))
-        for n in range(3)
-        for m in range(3)
-    )""",
+            loses=2,
+            says="outside is zero",
+            code=ATROUS.replace("if 0 <= y < h and 0 <= x < w", "if True").replace(
+                "maps[c, y, x]", "maps[c, y % h, x % w]"
+            ),
         ),
         mistake(
             "rate 2 written in",
             task="atrous",
-            loses=3,
-            says="on inputs you haven't seen: wrong with rate 1",
+            loses=2,
+            says="on inputs you haven't seen: wrong with 2 inputs, 2 outputs, N 3, stride 1, rate 1",
             code=ATROUS.replace("rate *", "2 *"),
+        ),
+        mistake(
+            "stride ignored",
+            task="atrous",
+            loses=1,
+            says="the stride is ignored",
+            code=ATROUS.replace("_, C, N, _", "stride = 1\n    _, C, N, _"),
+        ),
+        mistake(
+            "stride rounded down",
+            task="atrous",
+            loses=1,
+            says="of five rows the stride keeps 0, 2 and 4",
+            code=ATROUS.replace("-(-h // stride), -(-w // stride)", "h // stride, w // stride"),
+        ),
+        mistake(
+            "stride down only",
+            task="atrous",
+            loses=1,
+            says="the stride counts across as well as down",
+            code=ATROUS.replace("-(-w // stride)", "w").replace("stride * u", "u"),
+        ),
+        mistake(
+            "stride across only",
+            task="atrous",
+            loses=1,
+            says="the stride counts down as well as across",
+            code=ATROUS.replace("-(-h // stride)", "h").replace("stride * v", "v"),
+        ),
+        mistake(
+            "first the stride, then the holes",
+            task="atrous",
+            loses=1,
+            says="the rate counts inputs, also where a stride leaves outputs out",
+            code=ATROUS.replace("rate *", "rate * stride *"),
+        ),
+        mistake(
+            "places one pixel on",
+            task="atrous",
+            loses=1,
+            says="belongs to pixel (2, 4), the ones themselves",
+            code=ATROUS.replace("stride * v", "v + (stride - 1) * (v + 1)").replace(
+                "stride * u", "u + (stride - 1) * (u + 1)"
+            ),
+        ),
+        mistake(
+            "kernels of 3 x 3 written in",
+            task="atrous",
+            loses=2,
+            says="take N from kernels.shape",
+            code=ATROUS.replace("_, C, N, _ = kernels.shape", "C, N = len(maps), 3"),
+        ),
+        mistake(
+            "padded by the rate whatever the kernel",
+            task="atrous",
+            loses=2,
+            says="kernels of 1 x 1 reach beyond nothing",
+            code="""
+def atrous(maps, kernels, bias, stride, rate):
+    padded = np.pad(maps, ((0, 0), (rate, rate), (rate, rate)))
+    N = kernels.shape[-1]
+    h, w = padded.shape[1] - rate * (N - 1), padded.shape[2] - rate * (N - 1)
+    out = bias[:, None, None]
+    for n, m in np.ndindex(N, N):
+        seen = padded[:, rate * n : rate * n + h : stride, rate * m : rate * m + w : stride]
+        out = out + np.tensordot(kernels[:, :, n, m], seen, axes=1)
+    return out""",
+        ),
+        mistake(
+            "padded by 1 and the size of a larger kernel forgotten",
+            task="atrous",
+            loses=2,
+            says="on inputs you haven't seen: wrong shape with 2 inputs, 3 outputs, N 5, stride 1, rate 1",
+            code="""
+def atrous(maps, kernels, bias, stride, rate):
+    N = kernels.shape[-1]
+    reach = rate if N > 1 else 0
+    padded = np.pad(maps, ((0, 0), (reach, reach), (reach, reach)))
+    h, w = padded.shape[1] - rate * (N - 1), padded.shape[2] - rate * (N - 1)
+    out = bias[:, None, None]
+    for n, m in np.ndindex(N, N):
+        seen = padded[:, rate * n : rate * n + h : stride, rate * m : rate * m + w : stride]
+        out = out + np.tensordot(kernels[:, :, n, m], seen, axes=1)
+    return out""",
         ),
         # ---- task 4
         right(
@@ -674,36 +1253,43 @@ def add_skip(coarse, fine):
         ),
         # ---- task 5
         right(
-            "a loop, the largest score subtracted",
+            "a loop, the largest score subtracted, and lists",
             task="loss",
             code="""
-def cross_entropy(scores, truth):
-    losses = []
+def loss_and_gradient(scores, truth):
+    losses, gradient = [], np.zeros(scores.shape)
     for v in range(truth.shape[0]):
         for u in range(truth.shape[1]):
             if truth[v, u] != 255:
                 s = scores[:, v, u] - scores[:, v, u].max()
                 losses.append(np.log(np.exp(s).sum()) - s[truth[v, u]])
-    return sum(losses) / len(losses)""",
+                gradient[:, v, u] = np.exp(s) / np.exp(s).sum()
+                gradient[truth[v, u], v, u] -= 1
+    return [sum(losses) / len(losses), (gradient / len(losses)).tolist()]""",
         ),
         right(
-            "scipy's log-soft-max and a one-hot truth",
+            "scipy's soft-max and a one-hot truth",
             task="loss",
             code="""
-from scipy.special import log_softmax
+from scipy.special import log_softmax, softmax
 
-def cross_entropy(scores, truth):
+def loss_and_gradient(scores, truth):
     true = np.arange(len(scores))[:, None, None] == truth
-    return -log_softmax(scores, axis=0)[true].mean()""",
+    gradient = np.where(truth == 255, 0, softmax(scores, axis=0) - true) / true.sum()
+    return -log_softmax(scores, axis=0)[true].mean(), gradient""",
         ),
         right(
             "how far the others lead",
             task="loss",
             code="""
-def cross_entropy(scores, truth):
-    labelled = truth != 255
-    true = np.take_along_axis(scores, np.where(labelled, truth, 0)[None], axis=0)
-    return np.logaddexp.reduce(scores - true, axis=0)[labelled].mean()""",
+def loss_and_gradient(scores, truth):
+    v, u = np.nonzero(truth != 255)
+    s, c, count = scores[:, v, u], truth[v, u], len(v)
+    total = np.logaddexp.reduce(s, axis=0)
+    gradient = np.zeros(scores.shape)
+    gradient[:, v, u] = np.exp(s - total) / count
+    gradient[c, v, u] -= 1 / count
+    return (total - s[c, np.arange(count)]).mean(), gradient""",
         ),
         mistake(
             "no protection against large scores",
@@ -720,114 +1306,239 @@ def cross_entropy(scores, truth):
             code=loss("np.exp(scores - scores.max(axis=0)) / np.exp(scores - scores.max(axis=0)).sum(axis=0)"),
         ),
         mistake(
+            "a loss for large scores, a gradient that isn't",
+            task="loss",
+            loses=1,
+            says="the loss is right, the gradient no number",
+            code="""
+def loss_and_gradient(scores, truth):
+    s = scores - scores.max(axis=0)
+    log_P = s - np.log(np.exp(s).sum(axis=0))
+    v, u = np.nonzero(truth != 255)
+    gradient = np.zeros(scores.shape)
+    gradient[:, v, u] = (np.exp(scores) / np.exp(scores).sum(axis=0))[:, v, u]
+    gradient[truth[v, u], v, u] -= 1
+    return -log_P[truth[v, u], v, u].mean(), gradient / len(v)""",
+        ),
+        mistake(
             "one largest score for the whole image",
             task="loss",
             loses=1,
             says="on inputs you haven't seen: no number: subtract each pixel's own largest score",
             code="""
-def cross_entropy(scores, truth):
+def loss_and_gradient(scores, truth):
     s = scores - scores.max() + 600
     log_P = s - np.log(np.exp(s).sum(axis=0))
     v, u = np.nonzero(truth != 255)
-    return -log_P[truth[v, u], v, u].mean()""",
+    gradient = np.zeros(scores.shape)
+    gradient[:, v, u] = np.exp(log_P)[:, v, u]
+    gradient[truth[v, u], v, u] -= 1
+    return -log_P[truth[v, u], v, u].mean(), gradient / len(v)""",
+        ),
+        mistake(
+            "the largest score subtracted in place",
+            task="loss",
+            loses=1,
+            says="changed its argument `scores`",
+            code="""
+def loss_and_gradient(scores, truth):
+    scores -= scores.max(axis=0)
+    s = scores
+    log_P = s - np.log(np.exp(s).sum(axis=0))
+    v, u = np.nonzero(truth != 255)
+    gradient = np.zeros(scores.shape)
+    gradient[:, v, u] = np.exp(log_P)[:, v, u]
+    gradient[truth[v, u], v, u] -= 1
+    return -log_P[truth[v, u], v, u].mean(), gradient / len(v)""",
+        ),
+        mistake(
+            "no gradient",
+            task="loss",
+            loses=4,
+            says="return two things, the loss and its gradient",
+            code=loss().replace(", gradient / len(v)", ""),
         ),
         mistake(
             "divided by all pixels",
             task="loss",
-            loses=3,
+            loses=2,
             says="you divide by all four pixels",
             code=loss(result="-np.log(p).sum() / truth.size"),
         ),
-        mistake("sum", task="loss", loses=3, says="that is the sum", code=loss(result="-np.log(p).sum()")),
-        mistake("sign", task="loss", loses=3, says="the sign is swapped", code=loss(result="np.log(p).mean()")),
+        mistake("sum", task="loss", loses=2, says="that is the sum", code=loss(result="-np.log(p).sum()")),
+        mistake(
+            "sign",
+            task="loss",
+            loses=2,
+            says="the sign is swapped: a loss is -log P",
+            code=loss(result="np.log(p).mean()"),
+        ),
         mistake(
             "log10",
             task="loss",
-            loses=3,
+            loses=2,
             says="that is the logarithm to base 10",
             code=loss(result="-np.log10(p).mean()"),
         ),
         mistake(
-            "log2", task="loss", loses=3, says="that is the logarithm to base 2", code=loss(result="-np.log2(p).mean()")
+            "log2", task="loss", loses=2, says="that is the logarithm to base 2", code=loss(result="-np.log2(p).mean()")
         ),
         mistake(
-            "no logarithm", task="loss", loses=3, says="that is the mean of P(true class)", code=loss(result="p.mean()")
+            "no logarithm", task="loss", loses=2, says="that is the mean of P(true class)", code=loss(result="p.mean()")
         ),
-        mistake("1 - P", task="loss", loses=3, says="that is the mean of 1 - P", code=loss(result="(1 - p).mean()")),
-        mistake(
-            "no soft-max",
-            task="loss",
-            loses=3,
-            says="those are the scores themselves",
-            code=loss("scores", "-p.mean()"),
-        ),
+        mistake("1 - P", task="loss", loses=2, says="that is the mean of 1 - P", code=loss(result="(1 - p).mean()")),
         mistake(
             "mean over classes",
             task="loss",
-            loses=3,
+            loses=2,
             says="you average over classes",
             code=loss(result="np.mean([-np.log(p[truth[v, u] == c]).mean() for c in set(truth[v, u])])"),
         ),
         mistake(
             "logarithm of the mean",
             task="loss",
-            loses=3,
+            loses=2,
             says="you take the logarithm of the mean",
             code=loss(result="-np.log(p.mean())"),
         ),
         mistake(
+            "three labelled pixels written in",
+            task="loss",
+            loses=2,
+            says="on inputs you haven't seen: wrong loss",
+            code=loss(result="-np.log(p).sum() / 3"),
+        ),
+        mistake(
+            "one loss a pixel",
+            task="loss",
+            loses=2,
+            says="expected one number first, the mean",
+            code=loss(result="-np.log(p)"),
+        ),
+        mistake(
+            "no soft-max",
+            task="loss",
+            loses=4,
+            says="those are the scores themselves",
+            code=loss("scores", "-p.mean()"),
+        ),
+        mistake(
             "soft-max over rows",
             task="loss",
-            loses=3,
+            loses=4,
             says="the soft-max runs over the rows",
             code=loss("np.exp(scores) / np.exp(scores).sum(axis=1, keepdims=True)"),
         ),
         mistake(
             "soft-max over columns",
             task="loss",
-            loses=3,
+            loses=4,
             says="the soft-max runs over the columns",
             code=loss("np.exp(scores) / np.exp(scores).sum(axis=-1, keepdims=True)"),
         ),
         mistake(
             "soft-max over everything",
             task="loss",
-            loses=3,
+            loses=4,
             says="the soft-max runs over the whole image",
             code=loss("np.exp(scores) / np.exp(scores).sum()"),
         ),
         mistake(
             "unlabelled is class 0",
             task="loss",
-            loses=3,
+            loses=4,
             says="you count the unlabelled pixel as class 0",
-            code=loss().replace(
-                "v, u = np.nonzero(truth != 255)",
-                "truth = np.where(truth == 255, 0, truth)\n    v, u = np.nonzero(truth < 255)",
-            ),
+            code=loss(labelled="np.nonzero(truth < 256)", true="np.where(truth == 255, 0, truth)"),
         ),
         mistake(
             "unlabelled clipped to the last class",
             task="loss",
-            loses=3,
+            loses=4,
             says="you count the unlabelled pixel as the last class",
-            code=loss().replace(
-                "v, u = np.nonzero(truth != 255)",
-                "truth = np.clip(truth, 0, len(P) - 1)\n    v, u = np.nonzero(truth < 255)",
-            ),
+            code=loss(labelled="np.nonzero(truth < 256)", true="np.clip(truth, 0, len(P) - 1)"),
         ),
         mistake(
             "unlabelled not ignored",
             task="loss",
-            loses=3,
+            loses=4,
             says="index 255 is out of bounds",
-            code=loss().replace("truth != 255", "truth >= 0"),
+            code=loss(labelled="np.nonzero(truth < 256)"),
         ),
         mistake(
-            "three labelled pixels written in",
+            "gradient of a sum",
             task="loss",
             loses=3,
-            says="on inputs you haven't seen: wrong loss",
-            code=loss(result="-np.log(p).sum() / 3"),
+            says="in a mean of three it counts a third",
+            code=loss(gradient="gradient"),
+        ),
+        mistake(
+            "gradient divided by all pixels",
+            task="loss",
+            loses=3,
+            says="you divide by all four pixels: one isn't labelled, so divide by three",
+            code=loss(gradient="gradient / truth.size"),
+        ),
+        mistake(
+            "gradient divided by all scores",
+            task="loss",
+            loses=3,
+            says="you divide by all scores of the image",
+            code=loss(gradient="gradient / gradient.size"),
+        ),
+        mistake(
+            "sign of the gradient",
+            task="loss",
+            loses=3,
+            says="a higher score of the true class makes the loss smaller",
+            code=loss(gradient="-gradient / len(v)"),
+        ),
+        mistake(
+            "truth not subtracted",
+            task="loss",
+            loses=3,
+            says="that is P alone",
+            code=loss(gradient="np.where(truth != 255, P, 0) / len(v)"),
+        ),
+        mistake(
+            "derivative by P",
+            task="loss",
+            loses=3,
+            says="that is the derivative by P, -1 / P",
+            code=loss(gradient="np.where(gradient < 0, -1 / P, 0) / len(v)"),
+        ),
+        mistake(
+            "logarithm forgotten",
+            task="loss",
+            loses=3,
+            says="that is the derivative of the mean of -P",
+            code=loss(gradient="np.where(gradient < 0, P * gradient, 0) / len(v)"),
+        ),
+        mistake(
+            "the true class alone",
+            task="loss",
+            loses=3,
+            says="the other classes' scores have a gradient too",
+            code=loss(gradient="np.minimum(gradient, 0) / len(v)"),
+        ),
+        mistake(
+            "unlabelled pixels learn",
+            task="loss",
+            loses=3,
+            says="the pixel that isn't labelled has no part in the loss",
+            code=loss(gradient="np.where(truth == 255, P, gradient) / len(v)"),
+        ),
+        mistake(
+            "gradient of each pixel, in a list",
+            task="loss",
+            loses=3,
+            says="one derivative a score",
+            code=loss(gradient="gradient[:, v, u] / len(v)"),
+        ),
+        mistake(
+            "three labelled pixels written in the gradient",
+            task="loss",
+            loses=3,
+            says="on inputs you haven't seen: wrong gradient",
+            code=loss(gradient="gradient / 3"),
         ),
     )

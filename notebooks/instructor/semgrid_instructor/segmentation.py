@@ -1,8 +1,10 @@
 """Hidden tests of exercise 07, segmentation: scipy is the reference; PyTorch takes seconds to load, a cell has few."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.ndimage import correlate, map_coordinates
 from scipy.special import log_softmax
@@ -10,80 +12,151 @@ from scipy.special import log_softmax
 from semgrid_instructor import hidden
 
 
-def _pixels_seen(layers: list[tuple[int, int, int]]) -> set[int]:
+def _pixels_seen(layers: list[tuple[int, int, int, int]]) -> set[int]:
     """Return the pixels of a row that output 0 of a chain depends on, walked from the last layer to the first."""
     seen = {0}
-    for kernel, stride, rate in reversed(layers):
-        seen = {stride * place + rate * k for place in seen for k in range(kernel)}
+    for kernel, stride, rate, padding in reversed(layers):
+        seen = {stride * place + rate * k - padding for place in seen for k in range(kernel)}
     return seen
+
+
+def _chains(seed: int) -> list[list[tuple[int, int, int, int]]]:
+    """Return random chains of five layers, kernels from 1 to 4, paddings from 0 to 3."""
+    layers = np.random.default_rng(seed).integers((1, 1, 1, 0), (5, 4, 4, 4), size=(12, 5, 4))
+    return [[tuple(layer) for layer in chain] for chain in layers.tolist()]
 
 
 @hidden
 def check_field(receptive_field: Callable) -> None:
-    """No layer, one layer, and random chains, whose pixels are counted one by one."""
-    assert tuple(receptive_field([])) == (1, 1), "an empty chain sees its own pixel: field 1, jump 1"
-    rng = np.random.default_rng(71)
-    for _ in range(12):
-        chain = [tuple(map(int, layer)) for layer in rng.integers(1, 4, size=(5, 3))]
-        field, jump = receptive_field(list(chain))
-        assert jump == np.prod([stride for _, stride, _ in chain]), "wrong jump (strides need not be 1 or 2)"
-        assert field == max(_pixels_seen(chain)) + 1, "wrong field (from the first pixel to the last, holes and all)"
-
-
-def _pool(image: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the maxima of whole 2x2 windows and their indices, the windows taken one by one."""
-    h, w = image.shape[0] // 2, image.shape[1] // 2
-    places = np.arange(image.size).reshape(image.shape)
-    indices = np.zeros((h, w), int)
-    for v, u in np.ndindex(h, w):
-        window = places[2 * v : 2 * v + 2, 2 * u : 2 * u + 2].ravel()
-        indices[v, u] = max(window, key=image.ravel().__getitem__)
-    return image.ravel()[indices], indices
+    """No layer, and random chains, whose pixels are counted one by one."""
+    assert tuple(receptive_field([]))[:2] == (1, 1), "an empty chain sees its own pixel: field 1, jump 1"
+    for chain in _chains(71):
+        field, jump, _ = receptive_field(list(chain))
+        seen = _pixels_seen(chain)
+        assert jump == np.prod([stride for _, stride, _, _ in chain]), "wrong jump (strides need not be 1 or 2)"
+        assert field == max(seen) - min(seen) + 1, "wrong field (from the first pixel to the last, holes and all)"
 
 
 @hidden
-def check_pool(max_pool: Callable) -> None:
-    """Random maps of other shapes, with numbers below zero; all different, so that no maximum is tied."""
-    rng = np.random.default_rng(72)
-    for shape, shift in (((2, 2), 0.0), ((6, 4), 0.0), ((4, 10), -20.0)):
-        image = rng.normal(size=shape) + shift
-        pooled, indices = max_pool(image.copy())
-        values, places = _pool(image)
-        assert np.shape(pooled) == values.shape, "wrong shape of the maxima"
-        assert np.allclose(pooled, values), "wrong maxima (a map may be negative everywhere)"
-        assert np.array_equal(indices, places), "the maxima are right, their indices are not"
+def check_centre(receptive_field: Callable) -> None:
+    """No layer, and random chains, kernels of even size among them."""
+    assert receptive_field([])[2] == 0, "output 0 of an empty chain is pixel 0"
+    for chain in _chains(72):
+        seen = _pixels_seen(chain)
+        centre = receptive_field(list(chain))[2]
+        assert np.isclose(centre, (min(seen) + max(seen)) / 2), "wrong centre (it may lie between pixels, or below 0)"
+
+
+def _pool(maps: NDArray, kernel: int, stride: int) -> tuple[NDArray, NDArray]:
+    """Return the maxima of whole windows and their indices: sorted, with equal numbers left in their order."""
+    corners = sliding_window_view(np.arange(maps[0].size).reshape(maps.shape[1:]), (kernel, kernel))
+    windows = corners[::stride, ::stride].reshape(*corners[::stride, ::stride].shape[:2], -1)
+    values = maps.reshape(len(maps), -1)[:, windows]
+    first = np.argsort(-values, axis=-1, kind="stable")[..., :1]
+    indices = np.take_along_axis(np.broadcast_to(windows, values.shape), first, axis=-1)
+    return np.take_along_axis(values, first, axis=-1)[..., 0], indices[..., 0]
+
+
+def _maps_to_pool(seed: int) -> list[tuple[NDArray, int, int]]:
+    """Return maps with ties, kernels and strides: windows that overlap, touch, and lie apart; maps all below zero."""
+    rng = np.random.default_rng(seed)
+    cases = (
+        ((3, 7, 5), 3, 2, 0.0),
+        ((2, 6, 9), 2, 2, -9.0),
+        ((1, 8, 10), 3, 1, 0.0),
+        ((4, 5, 4), 1, 2, -9.0),
+        ((2, 9, 6), 4, 3, 0.0),
+    )
+    return [(rng.integers(-2, 4, size=shape) + shift, kernel, stride) for shape, kernel, stride, shift in cases]
+
+
+@hidden
+def check_maxima(max_pool: Callable) -> None:
+    """Other maps, kernels and strides."""
+    for maps, kernel, stride in _maps_to_pool(73):
+        pooled = np.asarray(max_pool(maps.copy(), kernel, stride)[0])
+        expected = _pool(maps, kernel, stride)[0]
+        assert pooled.shape == expected.shape, f"wrong shape of the maxima, kernel {kernel}, stride {stride}"
+        assert np.allclose(pooled, expected), "wrong maxima (a map may be negative everywhere)"
+
+
+@hidden
+def check_indices(max_pool: Callable) -> None:
+    """Other maps, kernels and strides."""
+    for maps, kernel, stride in _maps_to_pool(74):
+        indices = np.asarray(max_pool(maps.copy(), kernel, stride)[1])
+        assert np.array_equal(indices, _pool(maps, kernel, stride)[1]), (
+            f"wrong indices, kernel {kernel}, stride {stride}"
+        )
 
 
 @hidden
 def check_unpool(unpool: Callable) -> None:
-    """Random maps, also with an odd number of rows or columns."""
-    rng = np.random.default_rng(73)
-    for shape in ((4, 6), (5, 6), (6, 9), (7, 3)):
-        image = rng.normal(size=shape)
-        values, places = _pool(image)
-        got = np.asarray(unpool(values.copy(), places.copy(), shape))
-        assert got.shape == shape, "not the shape that was asked for (it may be odd)"
-        kept = np.isin(np.arange(image.size), places).reshape(shape)
-        assert np.allclose(got, image * kept), "a maximum isn't where its index says, or isn't what it was"
+    """Take indices of random maps, and values that have nothing to do with them."""
+    rng = np.random.default_rng(75)
+    for maps, kernel, stride in _maps_to_pool(76):
+        indices = _pool(maps, kernel, stride)[1]
+        values = rng.normal(size=indices.shape)
+        got = np.asarray(unpool(values.copy(), indices.copy(), maps.shape))
+        assert got.shape == maps.shape, "not the shape that was asked for (it may be odd)"
+        pairs = zip(indices.reshape(len(maps), -1), values.reshape(len(maps), -1), strict=True)
+        expected = [np.bincount(places, weights, maps[0].size) for places, weights in pairs]
+        assert np.allclose(got, np.reshape(expected, maps.shape)), (
+            "a value isn't where its index says, or isn't what it was"
+        )
+
+
+def _layer(maps: NDArray, kernels: NDArray, bias: NDArray, stride: int, rate: int) -> NDArray:
+    """Return the outputs of a layer, (K, h', w'), by scipy: each kernel spread with zeros, then every output."""
+    reach = rate * (kernels.shape[-1] - 1)
+    spread = np.zeros((*kernels.shape[:2], reach + 1, reach + 1))
+    spread[..., ::rate, ::rate] = kernels
+    outputs = [sum(map(partial(correlate, mode="constant"), maps, of_one)) for of_one in spread]
+    return (np.array(outputs) + bias[:, None, None])[:, ::stride, ::stride]
+
+
+def _check_layer(atrous: Callable, seed: int, cases: tuple, middle: bool = False) -> None:
+    """Compare with `_layer` on random maps; with `middle` the kernels' middle weights alone aren't zero."""
+    rng = np.random.default_rng(seed)
+    for n_outputs, shape, size, stride, rate in cases:
+        maps, bias = rng.normal(size=shape), rng.normal(size=n_outputs)
+        kernels = rng.normal(size=(n_outputs, shape[0], size, size))
+        if middle:
+            kernels[..., [0, 0, 0, 1, 1, 2, 2, 2], [0, 1, 2, 0, 2, 0, 1, 2]] = 0
+        expected = _layer(maps, kernels, bias, stride, rate)
+        got = np.asarray(atrous(maps.copy(), kernels.copy(), bias.copy(), stride, rate))
+        which = f"{shape[0]} inputs, {n_outputs} outputs, N {size}, stride {stride}, rate {rate}"
+        assert got.shape == expected.shape, f"wrong shape with {which}"
+        assert np.allclose(got, expected), f"wrong with {which}"
 
 
 @hidden
-def check_atrous(atrous: Callable) -> None:
-    """Random images and kernels, other rates, one of them as large as the image."""
-    rng = np.random.default_rng(74)
-    for rate, shape in ((1, (4, 6)), (2, (9, 5)), (3, (8, 11)), (6, (6, 7))):
-        image, kernel = rng.normal(size=shape), rng.normal(size=(3, 3))
-        got = np.asarray(atrous(image.copy(), kernel.copy(), rate))
-        assert got.shape == shape, f"rate {rate}: not the shape of the image"
-        spread = np.zeros((2 * rate + 1, 2 * rate + 1))
-        spread[::rate, ::rate] = kernel
-        assert np.allclose(got, correlate(image, spread, mode="constant")), f"wrong with rate {rate}"
+def check_channels(atrous: Callable) -> None:
+    """Other numbers of channels; the outputs depend on channels and bias alone."""
+    _check_layer(atrous, 77, ((4, (3, 5, 6), 3, 1, 1), (1, (5, 6, 4), 3, 1, 2)), middle=True)
+
+
+@hidden
+def check_holes(atrous: Callable) -> None:
+    """Other rates, one of them as large as the maps, and other kernels."""
+    cases = ((2, (2, 4, 6), 3, 1, 1), (2, (2, 8, 11), 3, 1, 3), (2, (2, 6, 7), 3, 1, 6))
+    _check_layer(atrous, 78, (*cases, (3, (2, 8, 10), 5, 1, 1), (2, (1, 9, 7), 1, 1, 4)))
+
+
+@hidden
+def check_layer(atrous: Callable) -> None:
+    """Other strides, kernels and rates."""
+    _check_layer(
+        atrous,
+        79,
+        ((2, (3, 9, 6), 3, 3, 1), (3, (2, 8, 10), 5, 1, 1), (2, (2, 9, 7), 5, 2, 3), (2, (1, 5, 5), 1, 4, 3)),
+    )
 
 
 @hidden
 def check_skip(add_skip: Callable) -> None:
     """Random scores of several classes, even and odd sizes."""
-    rng = np.random.default_rng(75)
+    rng = np.random.default_rng(80)
     for n_classes, (h, w), (height, width) in ((3, (3, 5), (6, 10)), (4, (4, 3), (7, 5)), (3, (1, 6), (2, 11))):
         coarse, fine = rng.normal(size=(n_classes, h, w)), rng.normal(size=(n_classes, height, width))
         got = np.asarray(add_skip(coarse.copy(), fine.copy()))
@@ -109,19 +182,33 @@ def _cross_entropy(scores: NDArray, truth: NDArray) -> float:
 
 
 @hidden
-def check_loss(cross_entropy: Callable) -> None:
+def check_loss(loss_and_gradient: Callable) -> None:
     """Other shapes and classes, from no unlabelled pixel to nearly all of them."""
-    for seed, shape, unlabelled in ((76, (4, 3, 5), 0.4), (77, (14, 6, 2), 0.0), (78, (2, 4, 4), 0.9)):
+    for seed, shape, unlabelled in ((81, (4, 3, 5), 0.4), (82, (14, 6, 2), 0.0), (83, (2, 4, 4), 0.9)):
         scores, truth = _labelled(seed, shape, unlabelled)
-        got = cross_entropy(scores.copy(), truth.copy())
+        got = loss_and_gradient(scores.copy(), truth.copy())[0]
         assert np.isclose(got, _cross_entropy(scores, truth)), "wrong loss"
 
 
 @hidden
-def check_large(cross_entropy: Callable) -> None:
+def check_gradient(loss_and_gradient: Callable) -> None:
+    """Against the loss itself, each score nudged up and down."""
+    for seed, shape, unlabelled in ((84, (4, 3, 2), 0.4), (85, (3, 2, 2), 0.0), (86, (2, 3, 3), 0.9)):
+        scores, truth = _labelled(seed, shape, unlabelled)
+        got = np.asarray(loss_and_gradient(scores.copy(), truth.copy())[1])
+        assert got.shape == shape, "wrong shape of the gradient"
+        nudges = 1e-5 * np.eye(scores.size).reshape(-1, *shape)
+        slopes = [_cross_entropy(scores + nudge, truth) - _cross_entropy(scores - nudge, truth) for nudge in nudges]
+        assert np.allclose(got.ravel(), np.array(slopes) / 2e-5, atol=1e-7), "wrong gradient"
+
+
+@hidden
+def check_large(loss_and_gradient: Callable) -> None:
     """Scores of thousands, of both signs, of which each pixel has its own."""
-    scores, truth = _labelled(79, (5, 4, 3), 0.2)
-    scores += np.linspace(-4000, 4000, 12).reshape(4, 3)
-    got = cross_entropy(scores.copy(), truth.copy())
-    assert np.isfinite(got), "no number: subtract each pixel's own largest score, not one for the whole image"
-    assert np.isclose(got, _cross_entropy(scores, truth)), "wrong loss"
+    scores, truth = _labelled(87, (5, 4, 3), 0.2)
+    shift = np.linspace(-4000, 4000, 12).reshape(4, 3)
+    loss, gradient = loss_and_gradient(scores + shift, truth.copy())
+    assert np.isfinite(loss), "no number: subtract each pixel's own largest score, not one for the whole image"
+    assert np.isclose(loss, _cross_entropy(scores, truth)), "wrong loss"
+    expected = loss_and_gradient(scores.copy(), truth.copy())[1]
+    assert np.allclose(gradient, expected), "the gradient changes where the same is added to all scores of a pixel"

@@ -1,20 +1,20 @@
 # %% [markdown]
 # # Exercise 07: three networks for segmentation
 #
-# Six small functions, the parts that tell SegNet, FCN and DeepLab apart and the loss that teaches all of them, and one question to answer in words. About
-# 75 minutes. The lecture is [07: three networks for segmentation](../07_segmentation.ipynb).
+# Six functions, the parts that tell SegNet, FCN and DeepLab apart and the loss that teaches all of them, and one question to answer in words. Where the lecture
+# has a row, a channel or a pixel, you take them a step further, to what a network computes. About 100 minutes. The lecture is [07: three networks for segmentation](../07_segmentation.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
-# | 1 | how far a chain of layers sees | 2 |
-# | 2 | max-pooling with indices, and the way back | 2 + 1 |
-# | 3 | a convolution with holes | 3 |
+# | 1 | how far a chain of layers sees, and where it looks | 1 + 2 |
+# | 2 | pooling with windows that overlap, and the way back | 1 + 1 + 1 |
+# | 3 | a layer, with channels, holes and stride | 1 + 1 + 1 |
 # | 4 | a skip: enlarge, crop, add | 2 + 1 |
-# | 5 | the loss of an image | 2 + 1 |
+# | 5 | the loss of an image, and its gradient | 1 + 2 + 1 |
 # | 6 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
-# you are wrong. Your instructor's tests use other numbers. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
+# you are wrong. Your instructor's tests use other numbers. Your functions leave their arguments as they are. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
 
 # %% nbgrader={"grade": false, "grade_id": "setup", "locked": true, "schema_version": 3, "solution": false, "task": false}
 import warnings
@@ -24,35 +24,40 @@ import numpy as np
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
 
 # %% [markdown]
-# ## Task 1: how far a chain of layers sees (2 points)
+# ## Task 1: how far a chain of layers sees, and where it looks (1 + 2 points)
 #
-# `layers` is a list of `(kernel, stride, rate)`, the first layer of the network first. Complete `receptive_field`: it returns two numbers. First the
-# **field**: how many pixels a side of the image one output of the chain depends on. Second the **jump**: how many pixels of the image two neighbouring outputs
-# lie apart.
+# `layers` is a list of `(kernel, stride, rate, padding)`, the first layer of the network first. Each layer puts `padding` zeros before the first of its inputs and
+# as many after the last; for output 0, the first weight of its kernel meets the first of these zeros. Complete `receptive_field`: it returns three numbers.
 #
-# $$ \text{field} \leftarrow \text{field} + (\text{kernel} - 1) \cdot \text{rate} \cdot \text{jump}, \qquad
-#    \text{jump} \leftarrow \text{jump} \cdot \text{stride} $$
+# - The **field**: how many pixels a side of the image one output of the chain depends on, zeros of the padding included, as if the image went on.
+# - The **jump**: how many pixels of the image two neighbouring outputs lie apart.
+# - The **centre**: where output 0 lies in the image, in the middle between the first and the last pixel of its field. Pixel 0 lies at 0, a zero before it at -1; so
+#   a centre may be a half, or less than 0.
 #
-# Both are 1 before the first layer, so they are 1 and 1 for a chain without layers. Do the chain of the test below on paper first.
+# Field and jump are in the lecture. For the centre ask of each layer: how far from *input* 0 does its output 0 lie, and how many *pixels* wide is a step there? A 3x3
+# convolution with padding 1 leaves output 0 where input 0 was; a 2x2 window moves it by half a step. That is why a pooled map has to be enlarged in another way than a
+# strided one. Do the chain of the test on paper first.
 
 
 # %% nbgrader={"grade": false, "grade_id": "field", "locked": false, "schema_version": 3, "solution": true, "task": false}
 def receptive_field(layers):
-    """Return field and jump of a chain of layers, in pixels of the image."""
+    """Return field, jump and centre of a chain of layers, in pixels of the image."""
     ### BEGIN SOLUTION
-    field, jump = 1, 1
-    for kernel, stride, rate in layers:
-        field += (kernel - 1) * rate * jump
+    field, jump, centre = 1, 1, 0
+    for kernel, stride, rate, padding in layers:
+        reach = (kernel - 1) * rate
+        field += reach * jump
+        centre += (reach / 2 - padding) * jump
         jump *= stride
-    return field, jump
+    return field, jump, centre
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "field-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-# By hand: 1 + 2 = 3; halve: + 1 = 4, jump 2; + 4 * 2 = 12; rate 2, stride 2: + 2 * 2 * 2 = 20, jump 4; + 2 * 4 = 28.
-got = receptive_field([(3, 1, 1), (2, 2, 1), (5, 1, 1), (3, 2, 2), (3, 1, 1)])
-assert np.size(got) == 2, f"return two numbers, field and jump; got {got}"
-field, jump = got
+# %% nbgrader={"grade": true, "grade_id": "field-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# Field by hand: 1 + 2 = 3; halve: + 1 = 4, jump 2; + 4 * 2 = 12; rate 2, stride 2: + 2 * 2 * 2 = 20, jump 4; + 2 * 4 = 28.
+got = receptive_field([(3, 1, 1, 1), (2, 2, 1, 0), (5, 1, 1, 2), (3, 2, 2, 1), (3, 1, 1, 0)])
+assert np.size(got) == 3, f"return three numbers, field, jump and centre; got {got}"
+field, jump, _ = got
 slips = {
     14: "the jump is forgotten: after a halving each step of a kernel is two pixels of the image",
     37: "a layer's own stride counts from the next layer on: first the field, then the jump",
@@ -64,8 +69,9 @@ slips = {
     16: "you add up the kernels: each adds kernel - 1, in steps of rate times jump",
     30: "a kernel of 3 with rate 2 spans 5 pixels, not 6: it adds (3 - 1) * 2",
     25: "you walk from the last layer to the first: `layers` begins at the image, where the jump is 1",
-    17: "rate and stride are swapped: each layer is (kernel, stride, rate)",
-    4: "that is the jump: return the field first, then the jump",
+    17: "rate and stride are swapped: each layer is (kernel, stride, rate, padding)",
+    42: "padding makes a map longer, not a kernel: the field doesn't know of it",
+    4: "that is the jump: return the field first, then the jump, then the centre",
 }
 assert field not in slips, f"a field of {field}: {slips[field]}"
 assert field == 28, f"expected a field of 28 pixels, got {field}"
@@ -77,78 +83,161 @@ complaint = segmentation.check_field(receptive_field)
 assert not complaint, complaint
 ### END HIDDEN TESTS
 
-# %% [markdown]
-# ## Task 2: max-pooling with indices, and the way back (2 + 1 points)
-#
-# `max_pool(image)` takes a map `(h, w)` with even sides, in windows of 2 x 2 that don't overlap. It returns the maxima, `(h / 2, w / 2)`, and of each where it was, as
-# an **index of the map**, counted row by row from 0: row · w + column. `unpool(pooled, indices, shape)` is the way back: a map of `shape` that is zero but where
-# the indices say. The shape is given, since a map of five rows is pooled to two.
-
-
-# %% nbgrader={"grade": false, "grade_id": "pool", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def max_pool(image):
-    """Return the maxima of 2x2 windows and their indices, both (h / 2, w / 2)."""
-    ### BEGIN SOLUTION
-    h, w = image.shape
-    windows = image.reshape(h // 2, 2, w // 2, 2).swapaxes(1, 2).reshape(h // 2, w // 2, 4)
-    row, column = np.divmod(windows.argmax(axis=-1), 2)
-    v, u = np.ogrid[: h // 2, : w // 2]
-    return windows.max(axis=-1), (2 * v + row) * w + 2 * u + column
-    ### END SOLUTION
-
-
-def unpool(pooled, indices, shape):
-    """Return a map of `shape` with each maximum where it was."""
-    ### BEGIN SOLUTION
-    image = np.zeros(shape)
-    image.flat[indices.ravel()] = pooled.ravel()
-    return image
-    ### END SOLUTION
-
-
-# %% nbgrader={"grade": true, "grade_id": "pool-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-image = np.array([[1.0, 2, 0, 0, 7, 1], [0, 0, 4, 3, 0, 0], [0, 5, 0, 0, 0, 1], [6, 0, 0, 8, 3, 0]])
-got = max_pool(image)
-assert got is not None, "max_pool returned nothing: did you forget `return`?"
-assert len(got) == 2, "return two arrays, the maxima and their indices"
-pooled, indices = (np.asarray(part) for part in got)
-assert pooled.shape != (3, 5), "your windows overlap: from one to the next it is two rows or columns"
-assert pooled.shape == (2, 3), f"a (4, 6) map has 2 x 3 windows, got maxima of shape {pooled.shape}"
-assert not np.allclose(pooled, 0), "those are the minima: take the largest of each window"
-assert not np.isclose(pooled[0, 0], 0.75), "that is the mean of the window: take its maximum"
-np.testing.assert_allclose(pooled, [[2, 4, 7], [6, 8, 3]], err_msg="the largest number of each window")
-assert indices.shape == (2, 3), f"expected one index a window, row * w + column, shape (2, 3), got {indices.shape}"
+# %% nbgrader={"grade": true, "grade_id": "centre-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# By hand: 0; the window of 2: + 1/2; + 0; reaching 2 to either side, padded by 1 only: + 1 * 2 = 2.5; not padded: + 1 * 4 = 6.5.
+centre = float(receptive_field([(3, 1, 1, 1), (2, 2, 1, 0), (5, 1, 1, 2), (3, 2, 2, 1), (3, 1, 1, 0)])[2])
 slips = {
-    (2, 3): "that is the index in the window: after unpooling nobody would know which window; count in the whole map",
-    (6, 15): "you multiply the row by the height: a row of the map has w = 6 numbers",
-    (9, 15): "you count column by column: numpy and PyTorch count row by row",
-    (5, 12): "you multiply the row by the width of the pooled map: the index is that of the large map, w = 6",
-    (9, 22): "you count from 1: the first number of the map has index 0",
-    (2, 14): "that is the window's first number: where in the window is the maximum?",
+    13.5: "the padding is forgotten: zeros before a map move output 0 to the left",
+    9.5: "padding counts in steps of its layer's input: a zero is as wide as the jump",
+    2.5: "the jump is forgotten: after a halving each step is two pixels of the image",
+    9.0: "a layer's own stride counts from the next layer on: first the centre, then the jump",
+    4.5: "the rate spreads the kernel, whose middle is (kernel - 1) * rate / 2 from its first weight; padding stays",
+    12.5: "from the first to the middle of three it is one step, of two half a step: (kernel - 1) / 2",
+    6.0: "half a pixel is lost: the middle of a 2x2 window lies between two pixels, so don't round",
+    7.0: "half a pixel too far: pixel 0 lies at 0, the middle of a 2x2 window half a step on, not a whole one",
+    20.5: "the sign of the padding: zeros before a map move output 0 to the left",
+    -0.5: "the padding counts twice: zeros after the map don't move output 0",
+    10.0: "half of the padding is lost: `padding` zeros stand before the map, and as many after it",
+    -7.0: "that is the first pixel of the field: its middle is asked for",
+    20.0: "that is the last pixel of the field: its middle is asked for",
+    14.0: "that is half the field: from the first to the middle of 28 pixels it is 13.5, and padding counts too",
+    3.0: "you walk from the last layer to the first: `layers` begins at the image, where the jump is 1",
+    -6.5: "the sign: what a kernel reaches to the right is added, padding is subtracted",
 }
-found = (int(indices[0, 1]), int(indices[1, 1]))
-assert found not in slips, f"the indices of 4 and of 8 are {found[0]} and {found[1]}: {slips[found]}"
-np.testing.assert_array_equal(indices, [[1, 8, 4], [18, 21, 22]], err_msg="4 is in row 1, column 2: 1 * 6 + 2 = 8")
+assert centre not in slips, f"a centre of {centre}: {slips[centre]}"
+assert centre == 6.5, f"expected a centre of 1/2 + 2 + 4 = 6.5, got {centre}"
 ### BEGIN HIDDEN TESTS
 from semgrid_instructor import segmentation
 
-complaint = segmentation.check_pool(max_pool)
+complaint = segmentation.check_centre(receptive_field)
+assert not complaint, complaint
+### END HIDDEN TESTS
+
+# %% [markdown]
+# ## Task 2: pooling with windows that overlap, and the way back (1 + 1 + 1 points)
+#
+# SegNet pools in windows of 2 x 2, side by side; DeepLab's ResNet in windows of 3 x 3 that begin two pixels apart, so that they overlap. `max_pool(maps, kernel, stride)` takes C maps,
+# `(C, h, w)`, in windows of `kernel` x `kernel` pixels. The first stands in the top left corner, the next begins `stride` pixels further on, and only whole windows
+# count: what is left at the right or at the bottom is in none. It returns two arrays, `(C, rows of windows, windows a row)`: the maxima, and of each where it was, as an **index of its
+# channel**, counted row by row from 0: row · w + column. Where the largest number stands twice in a window (after a ReLU, 0 often does), the one with the smaller
+# index wins.
+#
+# `unpool(values, indices, shape)` is the way back: maps of `shape`, `(C, h, w)`, zero but where the indices say. The values come out of a decoder and are new ones; where windows
+# overlap and two of them name the same place, their values **add up**. (It is also how a gradient gets through max-pooling: a pixel that was the largest of two windows
+# answers for both.)
+
+
+# %% nbgrader={"grade": false, "grade_id": "pool", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def max_pool(maps, kernel, stride):
+    """Return the maxima of the windows of each channel, and their indices."""
+    ### BEGIN SOLUTION
+    C, h, w = maps.shape
+    shape = C, (h - kernel) // stride + 1, (w - kernel) // stride + 1
+    pooled, indices = np.zeros(shape), np.zeros(shape, int)
+    for c, v, u in np.ndindex(shape):
+        top, left = stride * v, stride * u
+        window = maps[c, top : top + kernel, left : left + kernel]
+        n, m = np.unravel_index(window.argmax(), window.shape)
+        pooled[c, v, u], indices[c, v, u] = window[n, m], (top + n) * w + left + m
+    return pooled, indices
+    ### END SOLUTION
+
+
+def unpool(values, indices, shape):
+    """Return maps of `shape` in which each value is added at its place."""
+    ### BEGIN SOLUTION
+    maps = np.zeros(shape)
+    for c, v, u in np.ndindex(indices.shape):
+        maps[c].flat[indices[c, v, u]] += values[c, v, u]
+    return maps
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": false, "grade_id": "pool-maps", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# The maps of the next tests. In channel 0 two windows share the 7, and none has the 9; in channel 1 there are ties.
+maps = np.zeros((2, 5, 8))
+maps[0, 0, [1, 6, 7]] = 1, 2, 9
+maps[0, 1, [2, 3]] = 7, 2
+maps[0, [2, 3, 4, 4], [0, 4, 0, 3]] = 3, 5, 4, 6
+maps[1, [0, 1, 3], [3, 3, 1]] = 2, 2, 5
+print(maps.astype(int))
+
+# %% nbgrader={"grade": true, "grade_id": "pool-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+got = max_pool(maps.copy(), kernel=3, stride=2)
+assert got is not None, "max_pool returned nothing: did you forget `return`?"
+assert len(got) == 2, "return two arrays, the maxima and their indices"
+pooled = np.asarray(got[0])
+slips = {0: "the smallest number", 11 / 9: "the mean", 1: "the largest of 2 x 2 pixels, and not of 3 x 3,"}
+for slip, hint in slips.items():
+    assert not np.isclose(pooled.flat[0], slip), f"{slip:.2f} is {hint} of the first window, its largest is 7"
+slips = {
+    (2, 3, 6): "your windows begin one pixel apart: take one every `stride` pixels",
+    (2, 1, 2): "your windows don't overlap: they begin `stride` pixels apart, not `kernel`",
+    (2, 2, 4): "the last window of a row has fewer than three columns: only whole windows count",
+    (2, 3, 4): "windows at the border have fewer than 3 x 3 pixels: only whole windows count",
+    (2, 3): "you take the maximum over channels too: each channel has its own",
+}
+shape = pooled.shape
+assert shape == (2, 2, 3), f"maxima of shape {shape}: {slips.get(shape, '2 channels of 2 x 3 windows were expected')}"
+np.testing.assert_allclose(pooled, [[[7, 7, 2], [4, 6, 5]], [[0, 2, 0], [5, 0, 0]]], err_msg="window by window")
+### BEGIN HIDDEN TESTS
+from semgrid_instructor import segmentation
+
+complaint = segmentation.check_maxima(max_pool)
+assert not complaint, complaint
+### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "indices-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+indices = np.asarray(max_pool(maps.copy(), kernel=3, stride=2)[1])
+assert indices.shape == (2, 2, 3), f"one index a window, row * w + column, shape (2, 2, 3); got {indices.shape}"
+slips = {
+    7: "that is the index in the window: after unpooling nobody would know which window; count in the whole map",
+    23: "you multiply the row by the height: a row of the map has w = 8 numbers",
+    19: "you count column by column: numpy and PyTorch count row by row",
+    15: "you multiply the row by the windows of a row: the index is that of the large map, w = 8",
+    36: "you count from 1: the first number of the map has index 0",
+    18: "that is the window's first number: where in the window is the maximum?",
+    31: "column 7 is in no window, but a row of the map still has 8 numbers",
+    26: "the window begins at row 2, column 2, not at 1, 1: windows are `stride` pixels apart",
+    44: "windows begin `stride` pixels apart, not `kernel`",
+}
+found = int(indices[0, 1, 1])
+assert found not in slips, f"the index of 6 is {found}: {slips[found]}"
+assert found == 35, f"6 is in row 4, column 3, so its index is 4 * 8 + 3 = 35, got {found}"
+assert indices[1, 1, 0] != 65, "the index of 5 in channel 1 is 65: don't count channel 0, each channel begins at 0"
+assert indices[1, 0, 1] != 11, "2 stands in row 0 and in row 1: of equal numbers the one with the smaller index wins"
+np.testing.assert_array_equal(indices[0], [[10, 10, 6], [32, 35, 28]], err_msg="channel 0; 7 is in two windows")
+np.testing.assert_array_equal(indices[1], [[0, 3, 4], [25, 18, 20]], err_msg="channel 1: of equal numbers the first")
+### BEGIN HIDDEN TESTS
+from semgrid_instructor import segmentation
+
+complaint = segmentation.check_indices(max_pool)
 assert not complaint, complaint
 ### END HIDDEN TESTS
 
 # %% nbgrader={"grade": true, "grade_id": "unpool-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-pooled, indices = np.array([[2.0, 4, 7], [6, 8, 3]]), np.array([[1, 8, 4], [18, 21, 22]])
-got = np.asarray(unpool(pooled, indices, (4, 6)))
-assert np.shape(got) == (4, 6), f"expected the shape that was asked for, (4, 6), got {np.shape(got)}"
-assert np.count_nonzero(got) < 7, (
-    "more than six numbers aren't zero: a maximum goes to one place, not to its whole window"
+indices = np.array([[[10, 10, 6], [32, 35, 28]], [[0, 3, 4], [25, 18, 20]]])
+values = np.arange(12.0, 0, -1).reshape(2, 2, 3)  # 12 11 10 / 9 8 7 and 6 5 4 / 3 2 1
+got = np.asarray(unpool(values.copy(), indices.copy(), (2, 5, 8)))
+assert np.shape(got) == (2, 5, 8), f"expected the shape that was asked for, (2, 5, 8), got {np.shape(got)}"
+assert np.count_nonzero(got) < 12, "more than eleven numbers aren't zero: a value goes to one place, not to a window"
+assert got[1].any(), "channel 1 is empty: an index counts in its own channel"
+assert got[0, 2, 0] == 0, (
+    "row 2, column 0 isn't zero: index 10 is row 10 // 8 = 1, column 10 % 8 = 2: divide by the width"
 )
-assert not np.isclose(got[0, 0], 2), "2 lies at (0, 0), a corner of its window: its index 1 is row 0, column 1"
-assert not np.isclose(got[2, 0], 4), (
-    "4 lies at (2, 0): index 8 is row 8 // 6 = 1, column 8 % 6 = 2: divide by the width"
+slips = {
+    11: "the second value has replaced the first. (numpy's maps[indices] += values adds only once where an index repeats.)",
+    12: "only the first value, or the larger, has got there",
+    11.5: "that is their mean",
+}
+at_7 = float(got[0, 1, 2])
+assert at_7 not in slips, (
+    f"two windows name row 1, column 2, with 12 and 11, and it is {at_7:g}: {slips[at_7]}. They add up"
 )
-by_hand = [[0, 2, 0, 0, 7, 0], [0, 0, 4, 0, 0, 0], [0, 0, 0, 0, 0, 0], [6, 0, 0, 8, 3, 0]]
-np.testing.assert_allclose(got, by_hand, err_msg="each maximum where it was, all else zero")
+by_hand = np.zeros((2, 5, 8))
+by_hand[0, [1, 0, 4, 4, 3], [2, 6, 0, 3, 4]] = 23, 10, 9, 8, 7
+by_hand[1, [0, 0, 0, 3, 2, 2], [0, 3, 4, 1, 2, 4]] = 6, 5, 4, 3, 2, 1
+np.testing.assert_allclose(got, by_hand, err_msg="each value where its index says, 12 + 11 where two say the same")
 ### BEGIN HIDDEN TESTS
 from semgrid_instructor import segmentation
 
@@ -157,58 +246,127 @@ assert not complaint, complaint
 ### END HIDDEN TESTS
 
 # %% [markdown]
-# ## Task 3: a convolution with holes (3 points)
+# ## Task 3: a layer, with channels, holes and stride (1 + 1 + 1 points)
 #
-# Complete `atrous(image, kernel, rate)`: the 3x3 convolution of one channel whose weights lie `rate` pixels apart. The output has the size of the image; outside
-# the image everything is zero. As everywhere in deep learning the kernel isn't turned round:
+# A layer of a network has a kernel for each pair of an output channel $k$ and an input channel $c$, and a bias for each output channel. `maps` is `(C, h, w)`, `kernels` is
+# `(K, C, N, N)` with an odd N (3, but also 1 or 7), `bias` is `(K,)`. The weights lie `rate` inputs apart, the outputs `stride` inputs. Outside the maps everything
+# is zero, and as everywhere in deep learning the kernel isn't turned round:
 #
-# $$ \text{out}[v, u] = \sum_{n=0}^{2} \sum_{m=0}^{2} \text{kernel}[n, m]\;
-#    \text{in}[v + \text{rate} \cdot (n - 1),\; u + \text{rate} \cdot (m - 1)] $$
+# $$ \text{out}[k, v, u] = \text{bias}[k] + \sum_c \sum_{n=0}^{N-1} \sum_{m=0}^{N-1} \text{kernels}[k, c, n, m]\;
+#    \text{in}\left[c,\; \text{stride}\, v + \text{rate}\, \left(n - \tfrac{N-1}{2}\right),\; \text{stride}\, u + \text{rate}\, \left(m - \tfrac{N-1}{2}\right)\right] $$
+#
+# Complete `atrous`: it returns the outputs of all places $(\text{stride}\, v, \text{stride}\, u)$ that lie in the map. With stride 1 these are h x w, whatever N and rate are.
+# One point is for channels and bias, one for holes and for any odd N, one for the stride (again with any N).
 
 
 # %% nbgrader={"grade": false, "grade_id": "atrous", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def atrous(image, kernel, rate):
-    """Return the convolution of an image (h, w) with a kernel (3, 3), (h, w)."""
+def atrous(maps, kernels, bias, stride, rate):
+    """Return the K outputs of a layer, (K, places down, places across)."""
     ### BEGIN SOLUTION
-    h, w = image.shape
-    padded = np.pad(image, rate)
-    out = np.zeros((h, w))
-    for n, m in np.ndindex(3, 3):
-        out += kernel[n, m] * padded[rate * n : rate * n + h, rate * m : rate * m + w]
+    _, h, w = maps.shape
+    N = kernels.shape[-1]
+    reach = rate * (N - 1) // 2
+    padded = np.pad(maps, ((0, 0), (reach, reach), (reach, reach)))
+    out = bias[:, None, None]
+    for n, m in np.ndindex(N, N):
+        seen = padded[:, rate * n : rate * n + h : stride, rate * m : rate * m + w : stride]
+        out = out + np.tensordot(kernels[:, :, n, m], seen, axes=1)
     return out
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "atrous-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
-image, kernel = np.zeros((5, 7)), np.arange(1.0, 10).reshape(3, 3)  # 1 2 3 / 4 5 6 / 7 8 9
-image[2, 3] = 1
-got = np.asarray(atrous(image, kernel, rate=2))
+# %% nbgrader={"grade": false, "grade_id": "layer-inputs", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# The layer of the next tests. For output 0, input 0 meets 1 2 3 / 4 5 6 / 7 8 9, input 1 meets 10 11 12 / 13 14 15 / 16 17 18.
+inputs, kernels, bias = np.zeros((2, 5, 8)), np.arange(1.0, 37).reshape(2, 2, 3, 3), np.array([0.5, 0.25])
+inputs[:, 2, 4] = 1, 100
+
+# %% nbgrader={"grade": true, "grade_id": "atrous-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+got = np.asarray(atrous(inputs.copy(), kernels.copy(), bias.copy(), stride=1, rate=2))
 slips = {
     (): "atrous returned nothing: did you forget `return`?",
-    (3, 4): "you take the rate for a stride: every pixel has an output, it is the weights that lie apart",
-    (3, 5): "with rate 2 the kernel reaches 2 pixels beyond the border: pad by rate, not by 1",
-    (1, 3): "the border is missing: pad with `rate` zeros on each side",
+    (2, 2, 5, 8): "sum over the input channels",
+    (5, 8): "one output channel is missing, or the two are summed",
+    (2, 3, 4): "you take the rate for a stride: it is the weights that lie apart, not the outputs",
+    (2, 3, 6): "with rate 2 the kernel reaches 2 pixels beyond the border: pad by rate, not by 1",
+    (2, 1, 4): "the border is missing: pad with zeros on each side",
 }
-assert np.shape(got) == (5, 7), f"shape {np.shape(got)}: {slips.get(np.shape(got), 'that of the image is (5, 7)')}"
-assert not np.isclose(got[2, 2], 6), "the pixel's neighbour answers: with rate 2 the kernel skips it"
-assert np.isclose(got[2, 3], 5), f"the middle weight, 5, meets the pixel at (2, 3) itself; got {got[2, 3]:g}"
+assert got.shape == (2, 5, 8), f"shape {got.shape}: {slips.get(got.shape, '2 outputs of 5 x 8 were expected')}"
+slips = {  # by hand 5 + 14 * 100 + 0.5
+    1405: "the bias is missing",
+    1406: "the bias is added for each input channel: once is enough",
+    1409.5: "the bias is added for each weight: once is enough",
+    1414: "the bias is added for each weight and each channel: once is enough",
+    5.5: "that is channel 0 alone: sum over c",
+    1400.5: "that is the last channel alone: sum over c",
+    703: "that is the mean over channels: sum over c",
+    2305.5: "input and output channel are swapped: kernels are (K, C, N, N)",
+    505.5: "all inputs meet the kernel of channel 0: each pair of channels has its own",
+}
+middle = round(float(got[0, 2, 4]), 6)
+assert middle not in slips, f"output 0 at the ones themselves, (2, 4), is {middle:g}: {slips[middle]}"
+assert middle == 1405.5, f"the middle weights, 5 and 14, meet 1 and 100: expected 5 + 1400 + 0.5, got {middle:g}"
+assert np.isclose(got[1, 2, 4], 3223.25), f"output 1 at the same place: expected 23 + 3200 + 0.25, got {got[1, 2, 4]:g}"
+### BEGIN HIDDEN TESTS
+from semgrid_instructor import segmentation
+
+complaint = segmentation.check_channels(atrous)
+assert not complaint, complaint
+### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "holes-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+got = np.asarray(atrous(inputs.copy(), kernels.copy(), bias.copy(), stride=1, rate=2))[0]
+assert not np.isclose(got[2, 3], 1506.5), "the neighbour at (2, 3) answers: with rate 2 the kernel skips it"
 slips = {
-    1: "the kernel is turned round: for the output at (0, 1) the pixel lies below and to the right, so it meets weight 9",
-    3: "the kernel is turned round from top to bottom",
-    7: "the kernel is turned round from left to right",
-    0: "nothing arrives there: is the rate applied to rows and to columns?",
+    1001.5: "the kernel is turned round: the ones lie below and to the right, so they meet 9 and 18",
+    1203.5: "the kernel is turned round from top to bottom: the ones lie below, so they meet its last row",
+    1607.5: "the kernel is turned round from left to right: the ones lie to the right, so they meet its last column",
+    0.5: "nothing arrives there: (rate + 1) is too far, rate is the distance from weight to weight",
 }
-assert got[0, 1] not in slips, f"the output at (0, 1) is {got[0, 1]:g}: {slips[got[0, 1]]}"
-assert not np.isclose(got[4, 3], 4), "rows and columns of the kernel are swapped: n counts rows, m columns"
-np.testing.assert_allclose(got[::2, 1::2], kernel[::-1, ::-1], err_msg="one pixel of 1 in the middle")
-got = np.asarray(atrous(np.ones((5, 7)), kernel, rate=2))
-assert np.isclose(got[0, 0], 28), (
-    f"ones give {got[0, 0]:g} in the corner, not 5 + 6 + 8 + 9: outside, everything is zero"
+corner = round(float(got[0, 2]), 6)
+assert corner not in slips, f"output 0 at (0, 2) is {corner:g}: {slips[corner]}"
+assert not np.isclose(got[4, 4], 1304.5), "rows and columns of the kernel are swapped: n counts rows, m columns"
+by_hand = [[1809.5, 1708.5, 1607.5], [1506.5, 1405.5, 1304.5], [1203.5, 1102.5, 1001.5]]
+np.testing.assert_allclose(got[::2, 2::2], by_hand, err_msg="output 0 at every second pixel around the ones")
+ones = np.asarray(atrous(np.ones((2, 5, 8)), kernels.copy(), bias.copy(), stride=1, rate=2))
+corner = float(ones[0, 0, 0])  # by hand 5 + 6 + 8 + 9 and 14 + 15 + 17 + 18
+assert np.isclose(corner, 92.5), f"maps of ones give {corner:g} in the corner, not 28 + 64 + 0.5: outside is zero"
+try:
+    got = np.asarray(atrous(inputs.copy(), kernels[:, :, 1:2, 1:2].copy(), bias.copy(), stride=1, rate=2))
+except IndexError:
+    raise AssertionError("kernels of 1 x 1 are refused: take N from kernels.shape") from None
+assert got.shape != (2, 9, 12), "kernels of 1 x 1 reach beyond nothing: pad by rate * (N - 1) / 2"
+assert got.shape == (2, 5, 8), f"kernels of 1 x 1, stride 1: expected the shape (2, 5, 8), got {got.shape}"
+assert np.isclose(got[0, 2, 4], 1405.5), (
+    f"a kernel of 1 x 1 meets the pixel itself: expected 1405.5, got {got[0, 2, 4]:g}"
 )
 ### BEGIN HIDDEN TESTS
 from semgrid_instructor import segmentation
 
-complaint = segmentation.check_atrous(atrous)
+complaint = segmentation.check_holes(atrous)
+assert not complaint, complaint
+### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "stride-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+got = np.asarray(atrous(inputs.copy(), kernels.copy(), bias.copy(), stride=2, rate=2))
+slips = {
+    (2, 5, 8): "the stride is ignored",
+    (2, 2, 4): "of five rows the stride keeps 0, 2 and 4: three",
+    (2, 3, 8): "the stride counts across as well as down",
+    (2, 5, 4): "the stride counts down as well as across",
+}
+assert got.shape == (2, 3, 4), f"shape {got.shape}: {slips.get(got.shape, '2 outputs of 3 x 4 were expected')}"
+middle, corner = float(got[0, 1, 2]), float(got[0, 0, 1])
+assert np.isclose(middle, 1405.5), (
+    f"output 0 at (1, 2) belongs to pixel (2, 4), the ones themselves: 1405.5, got {middle:g}"
+)
+assert not np.isclose(corner, 0.5), (
+    "output 0 at (0, 1) is 0.5, nothing but bias: the rate counts inputs, also where a stride leaves outputs out"
+)
+assert np.isclose(corner, 1809.5), f"output 0 at (0, 1) belongs to pixel (0, 2): expected 1809.5, got {corner:g}"
+### BEGIN HIDDEN TESTS
+from semgrid_instructor import segmentation
+
+complaint = segmentation.check_layer(atrous)
 assert not complaint, complaint
 ### END HIDDEN TESTS
 
@@ -286,34 +444,44 @@ assert not complaint, complaint
 ### END HIDDEN TESTS
 
 # %% [markdown]
-# ## Task 5: the loss of an image (2 + 1 points)
+# ## Task 5: the loss of an image, and its gradient (1 + 2 + 1 points)
 #
-# `scores` has the shape `(C, h, w)`, `truth` the shape `(h, w)`: the class of each pixel, or 255 where it isn't labelled. Complete `cross_entropy`: the mean of $-\log
-# P(c^*)$ over the labelled pixels, natural logarithm, where $P$ is the soft-max of the pixel's scores. For one more point it must stay right where scores are
-# thousands, of either sign, or thousands apart: adding the same to all scores of a pixel changes nothing, so add something that keeps $e^s$ small.
+# `scores` has the shape `(C, h, w)`, `truth` the shape `(h, w)`: the class of each pixel, or 255 where it isn't labelled. The loss is the mean of $-\log P(c^*)$ over
+# the labelled pixels, natural logarithm, where $P$ is the soft-max of the pixel's scores.
 #
 # $$ P(c) = \frac{e^{s_c}}{\sum_{c'} e^{s_{c'}}} $$
+#
+# Complete `loss_and_gradient`: it returns two things, the loss and its derivative by each score, `(C, h, w)`. The lecture has the derivative of one pixel's loss; what
+# becomes of it in a mean, and what does a pixel teach that nobody has labelled? `scores` stays as it is.
+#
+# For the last point both must stay right where scores are thousands, of either sign, or thousands apart: adding the same to all scores of a pixel changes nothing, so add
+# something that keeps $e^s$ small.
 
 
 # %% nbgrader={"grade": false, "grade_id": "loss", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def cross_entropy(scores, truth):
-    """Return the mean over labelled pixels of -log P(true class)."""
+def loss_and_gradient(scores, truth):
+    """Return the mean over labelled pixels of -log P(true class), and its derivative by the scores."""
     ### BEGIN SOLUTION
     labelled = truth != 255
-    s = scores[:, labelled]
-    s = s - s.max(axis=0)
-    log_P = s - np.log(np.exp(s).sum(axis=0))
-    return -log_P[truth[labelled], np.arange(labelled.sum())].mean()
+    shifted = scores - scores.max(axis=0)
+    log_P = shifted - np.log(np.exp(shifted).sum(axis=0))
+    is_true = np.arange(len(scores))[:, None, None] == truth
+    gradient = labelled * (np.exp(log_P) - is_true) / labelled.sum()
+    return -log_P[is_true].mean(), gradient
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "loss-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-# The scores are logarithms of these odds: three classes, two rows, two columns.
+# %% nbgrader={"grade": false, "grade_id": "loss-image", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# The image of the next tests: three classes, two rows, two columns. Scores are logarithms of odds: P(true class) is 4/8, 1/8; -, 4/8.
 odds = np.array([[[4.0, 1], [1, 2]], [[2, 3], [1, 4]], [[2, 4], [6, 2]]])
-truth = np.array([[0, 0], [255, 1]])  # P(true class): 4/8, 1/8; -, 4/8
-got = cross_entropy(np.log(odds), truth)
-assert got is not None, "cross_entropy returned nothing: did you forget `return`?"
-assert np.ndim(got) == 0, f"expected one number, the mean, got shape {np.shape(got)}"
+scores, truth = np.log(odds), np.array([[0, 0], [255, 1]])
+
+# %% nbgrader={"grade": true, "grade_id": "loss-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+got = loss_and_gradient(scores, truth)
+assert isinstance(got, tuple | list), f"return two things, the loss and its gradient; got {got}"
+assert np.array_equal(scores, np.log(odds)), "loss_and_gradient changed its argument `scores`: make a new array (no -=)"
+loss = got[0]
+assert np.ndim(loss) == 0, f"expected one number first, the mean, got shape {np.shape(loss)}"
 slips = {
     0.866: "you divide by all four pixels: one isn't labelled, so divide by three",
     3.466: "that is the sum: take the mean over the labelled pixels",
@@ -332,30 +500,68 @@ slips = {
     2.542: "the soft-max runs over the whole image: each pixel's classes sum to 1, so sum over axis 0",
 }
 for slip, hint in slips.items():
-    assert not np.isclose(got, slip, atol=2e-3), f"a loss of {got:.3f}: {hint}"
-assert np.isclose(got, 1.1552, atol=1e-3), f"expected (log 2 + log 8 + log 2) / 3 = 1.155, got {got:.3f}"
+    assert not np.isclose(loss, slip, atol=2e-3), f"a loss of {loss:.3f}: {hint}"
+assert np.isclose(loss, 1.1552, atol=1e-3), f"expected (log 2 + log 8 + log 2) / 3 = 1.155, got {loss:.3f}"
 ### BEGIN HIDDEN TESTS
 from semgrid_instructor import segmentation
 
-complaint = segmentation.check_loss(cross_entropy)
+complaint = segmentation.check_loss(loss_and_gradient)
+assert not complaint, complaint
+### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "gradient-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# By hand, the pixel in row 0, column 1: P is 1/8, 3/8, 4/8 and class 0 is true, so (1/8 - 1, 3/8, 4/8), and a third of it in the mean.
+gradient = np.asarray(loss_and_gradient(np.log(odds), truth)[1])
+assert gradient.shape == (3, 2, 2), f"one derivative a score, shape (3, 2, 2), got {gradient.shape}"
+assert np.allclose(gradient[:, 1, 0], 0), "the pixel that isn't labelled has no part in the loss: its gradient is 0"
+slips = {
+    -0.875: "that is the gradient of this pixel's loss: in a mean of three it counts a third",
+    -0.219: "you divide by all four pixels: one isn't labelled, so divide by three",
+    -0.073: "you divide by all scores of the image: the mean is over three labelled pixels",
+    0.292: "the sign is swapped: a higher score of the true class makes the loss smaller",
+    0.042: "that is P alone: probability minus truth, where truth is 1 for the true class",
+    -2.667: "that is the derivative by P, -1 / P: go on to the scores",
+    -0.036: "that is the derivative of the mean of -P: the loss is the mean of -log P",
+}
+of_true = float(gradient[0, 0, 1])
+for slip, hint in slips.items():
+    assert not np.isclose(of_true, slip, atol=2e-3), (
+        f"by the true class's score in row 0, column 1: {of_true:.3f}: {hint}"
+    )
+assert np.isclose(of_true, -0.2917, atol=1e-3), f"by the true class's score: expected -7/24 = -0.292, got {of_true:.3f}"
+others = gradient[1:, 0, 1]
+assert others.any(), "the other classes' scores have a gradient too: they stand in the sum below the fraction"
+np.testing.assert_allclose(others, [1 / 8, 1 / 6], err_msg="by the other two scores, 3/8 and 4/8, a third of each")
+np.testing.assert_allclose(
+    gradient[:, 1, 1], [1 / 12, -1 / 6, 1 / 12], err_msg="row 1, column 1, where class 1 is true"
+)
+### BEGIN HIDDEN TESTS
+from semgrid_instructor import segmentation
+
+complaint = segmentation.check_gradient(loss_and_gradient)
 assert not complaint, complaint
 ### END HIDDEN TESTS
 
 # %% nbgrader={"grade": true, "grade_id": "large-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-got = cross_entropy(np.array([[[1000.0]], [[1003.0]]]), np.array([[1]]))
-assert not np.isnan(got), (
+loss, gradient = loss_and_gradient(np.array([[[1000.0]], [[1003.0]]]), np.array([[1]]))
+assert not np.isnan(loss), (
     "scores of 1000 and 1003 give no number, for e^1000 overflows: subtract the pixel's largest score"
 )
-assert np.isclose(got, 0.0486, atol=1e-4), f"scores 1000 and 1003 must give what 0 and 3 give, 0.049; got {got:.4f}"
-got = cross_entropy(np.array([[[-1000.0, 500]], [[0.0, 500]]]), np.array([[0, 1]]))
-assert np.isfinite(got), (
+assert np.isclose(loss, 0.0486, atol=1e-4), f"scores 1000 and 1003 must give what 0 and 3 give, 0.049; got {loss:.4f}"
+assert not np.isnan(gradient).any(), "the loss is right, the gradient no number: subtract the largest score there too"
+loss, gradient = loss_and_gradient(np.array([[[-1000.0, 500]], [[0.0, 500]]]), np.array([[0, 1]]))
+assert np.isfinite(loss), (
     "a score of -1000 against 0 costs 1000, not infinity: keep log P, don't take the logarithm of P"
 )
-assert np.isclose(got, (1000 + np.log(2)) / 2), f"expected (1000 + 0.693) / 2 = 500.35, got {got:.2f}"
+assert np.isclose(loss, (1000 + np.log(2)) / 2), f"expected (1000 + 0.693) / 2 = 500.35, got {loss:.2f}"
+by_hand = [[[-0.5, 0.25]], [[0.5, -0.25]]]
+np.testing.assert_allclose(
+    gradient, by_hand, atol=1e-6, err_msg="P is 0 and 1, then 1/2 and 1/2; half of it in the mean"
+)
 ### BEGIN HIDDEN TESTS
 from semgrid_instructor import segmentation
 
-complaint = segmentation.check_large(cross_entropy)
+complaint = segmentation.check_large(loss_and_gradient)
 assert not complaint, complaint
 ### END HIDDEN TESTS
 
