@@ -66,7 +66,7 @@ def to_torch(array):
 # |---|---|---|
 # | $s_c$ | score of class $c$ at one pixel | `scores[c, v, u]` |
 # | $c^*$ | true class of a pixel; 255 where nobody has labelled it | `truth[v, u]` |
-# | $\kappa$ | the weights of a convolution, its kernel | `kernel` |
+# | kernel | the weights of a convolution | `kernel[n, m]` |
 # | stride | the outputs of a layer lie this many of its inputs apart | `stride` |
 # | rate | the weights of a kernel lie this many inputs apart | `rate`; `dilation` in PyTorch |
 # | jump | neighbours in a map lie this many pixels of the *image* apart | `jump` |
@@ -198,10 +198,9 @@ plotting.class_legend(axes[2], KITTI_14, s.argmax(dim=0), loc="upper left", bbox
 plt.show()
 
 # %% [markdown]
-# In the middle, orange is where signage leads. There is a lamp post in this picture, right of the cyclist, and the
-# thin post of a warning sign to its left. The network notices that something of the kind is there, and has no idea of
-# its outline; it takes two windows of the house for signs as well. Why thin things are so hard is the subject of this
-# lecture.
+# In the middle, orange is where signage leads. There is a lamp post in this picture, right of the cyclist, and the thin
+# post of a warning sign to its left. The network notices that something of the kind is there, and has no idea of its
+# outline; it takes tree tops for signs as well. Why thin things are so hard is the subject of this lecture.
 #
 # ## Down: to see what is around
 #
@@ -226,7 +225,7 @@ plt.show()
 # <details><summary>Answer</summary>Columns 0 and 2 are now -1 and -1, and after ReLU nothing: the pole is gone. What
 # a strided layer sees of a thin thing depends on whether it stands in an even or an odd column.</details>
 #
-# $$ \text{out}[v, u] = \sum_{n=0}^{2} \sum_{m=0}^{2} \kappa[n, m]\;
+# $$ \text{out}[v, u] = \sum_{n=0}^{2} \sum_{m=0}^{2} \text{kernel}[n, m]\;
 #    \text{in}[\text{stride}\, v + \text{rate}\, (n - 1),\; \text{stride}\, u + \text{rate}\, (m - 1)] $$
 
 
@@ -417,7 +416,7 @@ with torch.inference_mode():
     segnet = nets["segnet"]
     features = segnet.conv_deconv.encoder[0]((as_input(images[:1]) - segnet.mean) / segnet.std)
 fig, axes = plt.subplots(2, 4, figsize=(9, 4.6), layout="constrained")
-sign, post = (14, slice(16, 44), slice(214, 242)), (6, slice(44, 72), slice(214, 242))  # channel, rows, columns
+sign, post = (5, slice(16, 44), slice(214, 242)), (13, slice(44, 72), slice(214, 242))  # channel, rows, columns
 for row, (number, rows, columns) in zip(axes, (sign, post), strict=True):
     channel = features[:, [number]]
     pooled, indices = F.max_pool2d(channel, 2, return_indices=True)
@@ -457,7 +456,7 @@ plt.show()
 # map as if its cells covered pixels 8 $i$ to 8 $i$ + 7: by how much is every pole off?
 #
 # <details><summary>Answer</summary>The middle of pixels 0 to 7 is 3.5. So everything lands 3.5 pixels too far right,
-# and as far too low: the `align_corners` of many a library. Half a cell, as in lecture 06.</details>
+# and as far too low: nearly half a cell. It is the mistake of lecture 06, where it was half a pixel.</details>
 
 
 # %% tags=["skips"]
@@ -526,8 +525,8 @@ plt.show()
 # starting at an even one reads even ones only: just what the strided row holds. Nothing changes but that the answers
 # in between are there too. So a network trained with strides can be made dense without new weights.</details>
 #
-# $$ \kappa \ast_{\text{rate } 2} \text{in}\;\Big|_{\text{every second}} \;=\; \kappa \ast_{\text{rate } 1}
-#    \left(\text{in}\;\Big|_{\text{every second}}\right) $$
+# $$ \text{kernel} \ast_{\text{rate } 2} \text{in}\;\Big|_{\text{every second}} \;=\;
+#    \text{kernel} \ast_{\text{rate } 1} \left(\text{in}\;\Big|_{\text{every second}}\right) $$
 
 # %% tags=["atrous"]
 row, kernel = np.eye(8)[[3]], np.zeros((3, 3))
@@ -584,6 +583,9 @@ axes[0].set_ylabel("rows down [pixels]")
 plt.show()
 
 # %% [markdown]
+# The pixels that the output in the middle depends on, the brighter the more paths lead there; white ones never count.
+# In the middle picture three pixels of four are white, however many such layers follow.
+#
 # ## One pole, six ways back
 #
 # Now all of them on one picture, nothing learnt: halve it twice, and come back to full size.
@@ -652,8 +654,8 @@ for column, width in ((9, 1), (10, 1), (9, 4)):
 # **Indices** are sharp, in the right place, and full of holes: a dotted line. **Skips** are right and have a foot of
 # what the coarse maps think. **Strided** is blurred, and how bright it is depends on where the pole stands (compare
 # columns 9 and 10). **Atrous** is as blurred, but the same wherever the pole stands: shift the pole, and the answer
-# shifts. A pole of four pixels comes back bright and in its place whichever way it went, though nearest makes it
-# eight wide and the indices keep two dotted columns of it. The trouble is with thin things.
+# shifts. A pole of four pixels comes back much brighter, in its place or nearly, whichever way it went, though
+# nearest makes it eight wide and the indices keep two dotted columns of it. The trouble is with thin things.
 #
 # ## The same, learnt
 #
@@ -686,13 +688,13 @@ plt.show()
 
 # %% [markdown]
 # Each row is one unseen picture; the thin bright thing in the second column is the pole, and the other bright bar of
-# the image is the wall. Numbers vary a little from machine to machine. With five seeds the order was always the same:
-# strided (IoU 30 to 41 %), then nearest and bilinear (47 to 67 %), indices (68 to 79 %), atrous (86 to 93 %) and
-# skips (92 to 94 %).
+# the image is the wall. Numbers vary a little from machine to machine. With five seeds the order of the groups was
+# always the same: strided (IoU 30 to 41 %), nearest and bilinear (47 to 67 %), indices (68 to 79 %), and ahead atrous
+# (86 to 93 %) and skips (92 to 94 %), of which now one won, now the other.
 #
 # Two things for the sake of honesty. Atrous pays: it computes nearly three times as much as the networks that pool,
 # and eight times as much as strided. And training closes a part of the gap: with 250 steps instead of 150, indices
-# come to 76 to 85 % and bilinear to 65 to 75 %. A mechanism doesn't decide what can be learnt; it decides what
+# come to 83 to 89 % and bilinear to 62 to 78 %. A mechanism doesn't decide what can be learnt; it decides what
 # needn't be.
 
 # %% [markdown]
@@ -708,8 +710,8 @@ plt.show()
 # | DeepLab v2 | ResNet: halves three times, then atrous | bilinear, 8x | a map that never got small |
 # | U-Net | max-pooling, four times | learnt doubling | whole maps of the encoder, side by side with its own |
 #
-# **Predict before you run.** All four compact networks have about 0.4 million weights. Which of them sees farthest?
-# And which computes its scores on the finest map?
+# **Predict before you run.** The four compact networks have 0.2 to 0.5 million weights each. Which of them sees
+# farthest? And which computes its scores on the finest map?
 #
 # <details><summary>Answer</summary>FCN, with a 7x7 kernel at 1/32 of the size: 404 pixels, more than the image has.
 # DeepLab's atrous layers see nearly as far. SegNet and U-Net score at every pixel, FCN and DeepLab at every
@@ -720,7 +722,7 @@ HALVING_CONV, ATROUS = (3, 2, 1), [(3, 1, 2)] * 4 + [(3, 1, 4), (3, 1, 8)]
 VGG16 = [CONV, CONV, HALVE] * 2 + [CONV, CONV, CONV, HALVE] * 3
 down, up = [HALVE, CONV, CONV], [DOUBLE, CONV, CONV]
 CHAINS = {
-    "segnet": [CONV, CONV, HALVE, CONV, *down, *down, HALVE, *up, *up, DOUBLE, CONV, *up],
+    "segnet": [CONV, CONV, *[HALVE, CONV] * 2, *down, HALVE, *up, *[DOUBLE, CONV] * 2, *up],
     "fcn": [*VGG16, (7, 1, 1)],
     "deeplab": [(7, 2, 1), HALVING_CONV, CONV, CONV, HALVING_CONV, CONV, CONV, *ATROUS],
     "unet": [CONV, CONV, *down * 4, *up * 4],
@@ -762,10 +764,10 @@ for ax, name in zip(axes, TRAINED, strict=True):
 plt.show()
 
 # %% [markdown]
-# A field is a limit, not a habit. SegNet's ends where you computed it, 64 pixels to either side, and half of what
-# moves its score lies within 27 columns. FCN and DeepLab could see the whole width, and half of what moves theirs
-# lies within some 60 columns. DeepLab's picture is made of blocks of 8 pixels, the cells of its map: one cell may
-# count a lot and its neighbour hardly at all, for kernels with holes leap from cell to cell.
+# A field is a limit, not a habit. SegNet's ends where you computed it, 56 pixels to either side, and half of what
+# moves its score lies much nearer, between the dotted lines. FCN and DeepLab could see the whole width, and half of
+# what moves theirs lies within a fifth of it. DeepLab's picture is made of blocks of 8 pixels, the cells of its map:
+# one cell may count a lot and its neighbour hardly at all, for kernels with holes leap from cell to cell.
 #
 # ### Before the first label: ImageNet
 #
@@ -815,7 +817,7 @@ with torch.inference_mode():
 # labelled images. **Predict before you run.** Which network draws thin posts best? And how far apart are the three in
 # pixel accuracy, the share of all pixels called right?
 #
-# <details><summary>Answer</summary>None draws a post: where one stands, there is a yellow patch at best. And three
+# <details><summary>Answer</summary>None draws a post: where one stands, there is a yellow patch at best. And a few
 # points of a hundred lie between the best and the last. Look, and read on.</details>
 
 # %%
@@ -851,14 +853,14 @@ print(
 )
 
 # %% [markdown]
-# Pixel accuracy: FCN 80 %, SegNet 79 %, DeepLab 77 %; class accuracy, the mean over classes: 70, 71 and 69 %. One
-# street, one seed: no ground to rank them. The paper's first claim, SegNet before FCN before DeepLab when images are
-# few, is put to the test in lecture 12.
+# The first two columns are pixel accuracy and class accuracy, the mean over classes. A few points lie between the
+# three, on one street, with one seed each: no ground to rank them. The paper's first claim, SegNet before FCN before
+# DeepLab when images are few, is put to the test in lecture 12.
 #
 # The pictures differ more than the numbers. SegNet's borders are detailed and ragged, with specks; FCN and DeepLab,
-# which score every eighth pixel, draw smooth blobs. Sharp isn't right, though: of the pixels of signage none finds
-# more than a third, and of what they call signage three quarters is something else. Of pedestrians more is found, at
-# a price: three to five times as many pixels are called pedestrian as there are.
+# which score every eighth pixel, draw smooth blobs. Sharp isn't right, though: of the pixels of signage each
+# finds about a third at best, and most of what they call signage is something else. Of pedestrians more is found, at
+# a price: several times as many pixels are called pedestrian as there are (area).
 #
 # So where are the three mechanisms, if no network draws the post? Above, they decided how well a task was solved that
 # had nothing but poles. Here two pixels in a hundred are signage and three in a thousand pedestrian, in only 142
@@ -886,7 +888,8 @@ plt.show()
 # %% [markdown]
 # Left, the pole becomes a dotted line. In the middle it is gone: each of its windows has a brighter pixel. Right, a
 # smooth slope comes back as dots on a lattice that isn't there in the world. It is the decoder's job to smooth it
-# again, and after a single convolution you would still see it: that is why SegNet has two at full size.
+# again. This lattice one kernel would close, 1 2 1 across and down; but in an image the dots lie elsewhere in each
+# window, and no one kernel suits them all.
 #
 # **Checkerboards.** Instead of unpooling, a network may *learn* to double: a transposed convolution puts a copy of
 # its kernel, times the value, at every second pixel, and adds up. By hand, a kernel of three ones and a row of ones:
@@ -911,10 +914,10 @@ for ax, (name, picture) in zip(axes, ways.items(), strict=True):
 plt.show()
 
 # %% [markdown]
-# A flat map goes in. With a kernel of 3 the pattern is in the arithmetic; 4 and 2, multiples of the stride, add up
-# evenly (4 but for the border). On the right, the four weights of a 2x2 kernel differ, as they do before and often
-# after training: a checkerboard again. If a map of yours shows a pattern of a period of 2, 4 or 8 pixels, suspect the
-# way up, not the street.
+# A flat map goes in, bright is large. With a kernel of 3 the pattern is in the arithmetic; 4 and 2, multiples of the
+# stride, add up evenly (4 but for the border; 2 gives one value, so one colour). On the right, the four weights of a
+# 2x2 kernel differ, as they do before and often after training: a checkerboard again. If a map of yours shows a
+# pattern of a period of 2, 4 or 8 pixels, suspect the way up, not the street.
 #
 # **Another world.** The networks have seen simulated streets by daylight. Take the same twenty frames, and change
 # what no human would stumble over.
@@ -938,12 +941,12 @@ for change, changed in changes.items():
     print(f"{change:<22}", *(f"{100 * share:12.0f}" for share in right))
 
 # %% [markdown]
-# Half the light costs 3 to 12 points: training varied brightness, though by a fifth only. Noise that a human hardly
-# minds takes half of SegNet's accuracy, and little of DeepLab's, whose first layer averages over 7x7 pixels before
-# anything else is done, while a maximum of noisy values is the noisiest. Two colours swapped, the commonest bug there
-# is (OpenCV reads blue first), costs 16 to 30 points and raises no error. Upside down, the networks are worse than a
-# program that calls everything vegetation (23 %): they know where sky and road *belong*, not only what they look
-# like. Real images are further away than most of these: lecture 13.
+# Half the light costs some points: training varied brightness, though by a fifth only. Noise that a human hardly
+# minds costs the two that pool maxima dearly, and DeepLab little. Its first layer sums over 7x7 pixels before
+# anything else is done, while a maximum of noisy values is the noisiest; that may be why. Two colours swapped, a
+# common bug (OpenCV reads blue first), cost more than half the light and raise no error. Upside down, the networks
+# are worse than a program that calls everything vegetation (23 %): they know where sky and road *belong*, not only
+# what they look like. Real images are further away than most of these: lecture 13.
 #
 # **Small classes.** Pixel accuracy doesn't see them. Take from SegNet all that it calls signage, pedestrian or
 # bicycle, and let it say the second best:
@@ -958,9 +961,9 @@ for name, m in (("as trained", matrices["segnet"]), ("blind to small things", bl
     print(f"{name:<22} pixel accuracy {100 * pixel_accuracy(m):.0f} %   class accuracy {100 * class_accuracy(m):.0f} %")
 
 # %% [markdown]
-# Blind, the network gains a point of pixel accuracy, for it calls fewer pixels pedestrian that are none, and loses
-# ten of class accuracy. By the first number alone you would choose the network that runs people over. That is why the
-# paper gives both, and why the loss weighs classes by their frequency (lecture 08).
+# Blind, the network gains in pixel accuracy, if little, for it calls fewer pixels pedestrian that are none, and loses
+# a lot of class accuracy. By the first number alone you would choose the network that runs people over. That is why
+# the paper gives both, and why the loss weighs classes by their frequency (lecture 08).
 #
 # ## In five lines
 #
@@ -990,5 +993,6 @@ for name, m in (("as trained", matrices["segnet"]), ("blind to small things", bl
 #
 # ## Exercise
 #
-# [Exercise 07](exercises/07_segmentation.ipynb): the field of a chain of layers, pooling and unpooling, a convolution
-# with holes, a skip, the loss, and one question. Next: lecture 08, from planes to the semantic grid.
+# [Exercise 07](exercises/07_segmentation.ipynb): the field of a chain and where it looks, pooling with overlap and the
+# way back, a whole layer with holes, a skip, the loss and its gradient, and one question. Next: lecture 08, from planes
+# to the semantic grid.
