@@ -24,7 +24,7 @@ def choose_device(name: str = "auto", process: int = 0) -> torch.device:
     Raises
     ------
     ArgumentError
-        When it is none of these, or there is no such GPU.
+        When it is none of these, there is no such GPU, or several processes are to share it.
 
     Examples
     --------
@@ -36,6 +36,8 @@ def choose_device(name: str = "auto", process: int = 0) -> torch.device:
     gpus = torch.cuda.device_count() if torch.cuda.is_available() else 0
     if name == "cpu" or (name == "auto" and not gpus):
         return torch.device("cpu")
+    if ":" in name and process > 0:
+        raise ArgumentError("--device", "auto, cpu or cuda: each process takes a GPU of its own", repr(name))
     number = int(name.removeprefix("cuda:")) if ":" in name else process
     if number >= gpus:
         wanted = f"{name}, the GPU number {number} for process {process}"

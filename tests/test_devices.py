@@ -34,6 +34,7 @@ def test_a_gpu_is_chosen_where_there_is_one(monkeypatch, gpus, name, process, ex
     [
         (0, "cuda", 0, "--device: expected cpu or one of the 0 GPUs that PyTorch finds here, found cuda"),
         (2, "cuda:2", 0, "--device: expected cpu or one of the 2 GPUs"),
+        (2, "cuda:0", 1, "--device: expected auto, cpu or cuda: each process takes a GPU of its own, found 'cuda:0'"),
         (2, "auto", 2, "--device: expected .*, found auto, the GPU number 2 for process 2"),
         (2, "tpu", 0, "--device: expected auto, cpu, cuda or cuda:N, found 'tpu'"),
         (2, "cuda:-1", 0, "--device: expected auto, cpu, cuda or cuda:N"),
