@@ -3,8 +3,8 @@
 A training step is a whole turn of `train`'s loop: a batch of six frames drawn and jittered, forward, backward, weights
 changed, loss logged. Inference is a frame from image and occupancy grid to logits.
 
-Steps are made of multiplications, so beside them stands how fast the machine multiplies matrices in the same minute: on
-a shared one that varies by two thirds, and the steps with it.
+Steps are made of multiplications, so beside them stands how fast the machine multiplies matrices in the same minute. On
+a shared one that varies, and the steps with it.
 """
 
 import io

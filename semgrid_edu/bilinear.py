@@ -65,15 +65,37 @@ def _corners(points: NDArray, image_size: tuple[int, int]) -> tuple[NDArray[np.i
 
 
 class SparseMatrix(NamedTuple):
-    """Compressed sparse rows: row r holds weights[offsets[r]:offsets[r + 1]] in the columns indices[...]."""
+    """Compressed sparse rows: row r holds weights[offsets[r]:offsets[r + 1]] in the columns indices[...].
+
+    Parameters
+    ----------
+    indices : (N,) int32
+        The column of each weight.
+    offsets : (rows + 1,) int32
+        Where each row begins, and where the last one ends.
+    weights : (N,) float
+        No unit; those of equation (2) sum to 1 in each visible row.
+    """
 
     indices: Tensor
     offsets: Tensor
     weights: Tensor
 
     def multiply(self, rows: Tensor) -> Tensor:
-        """Return the product with a dense matrix, (columns, C) -> (rows, C), in the type of `rows`.
+        """Return the product with a dense matrix, equation (2) for all points at once.
 
+        Parameters
+        ----------
+        rows : (columns, C) float
+            A row a pixel: its scores.
+
+        Returns
+        -------
+        (rows, C) float
+            In the type of `rows`.
+
+        Notes
+        -----
         PyTorch's bag of embeddings is just that, a weighted sum of gathered rows, and several times
         faster on a CPU than its sparse matrices.
         """
@@ -83,7 +105,20 @@ class SparseMatrix(NamedTuple):
         )
 
     def block_diagonal(self, n_blocks: int, n_columns: int) -> "SparseMatrix":
-        """Return the matrix of this one `n_blocks` times along its diagonal, having `n_columns` itself."""
+        """Return the matrix that multiplies several dense ones at once, laid one below the other.
+
+        Parameters
+        ----------
+        n_blocks : int
+            How often this matrix stands along the diagonal: once an image.
+        n_columns : int
+            The columns of this matrix, which its empty last ones don't show.
+
+        Returns
+        -------
+        SparseMatrix
+            Of n_blocks times as many rows, columns and weights.
+        """
         block = torch.arange(n_blocks, dtype=self.offsets.dtype, device=self.offsets.device)[:, None]
         n_weights = self.offsets[-1:]
         starts = (self.offsets[:-1] + block * n_weights).flatten()

@@ -137,8 +137,8 @@ class PlaneSampler(nn.Module):
 
     For a fixed calibration the four pixels around each point and their weights never change, so equation (2)
     is one sparse matrix that maps pixels to points. It and its transpose, which carries gradients back, are
-    built once. Points that aren't visible are empty rows and cost nothing. `for_camera` goes all the way from
-    a calibration, and remembers.
+    built once; for a batch they stand along a diagonal, once an image, and the last batch's are kept. Points that
+    aren't visible are empty rows and cost nothing. `for_camera` goes all the way from a calibration, and remembers.
 
     Parameters
     ----------

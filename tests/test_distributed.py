@@ -38,8 +38,8 @@ def alone(tmp_path_factory):
     folder, threads, append_step = tmp_path_factory.mktemp("alone"), torch.get_num_threads(), training.append_step
     torch.set_num_threads(1)
     torch.set_default_dtype(torch.float64)
-    losses = worker.exact_losses()
     try:
+        losses = worker.exact_losses()
         for name, params in worker.RUNS.items():
             train(worker.precise_net(), worker.noisy_streets(), folder / name, params)
     finally:  # what other tests find

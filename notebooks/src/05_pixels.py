@@ -674,6 +674,7 @@ for ax, delta in zip(axes[1:], (0.0, 0.8), strict=True):
     ax.scatter(*drawn(delta)[::3, ::-1].T, s=1, color="tab:red", label="drawn")
     ax.scatter(*places[::3, 1::-1].T, s=1, color="black", label="true")
     ax.set(xlim=(15.5, -5), ylim=(0, 50), aspect="equal", xlabel="y, to the left [m]", title=f"plane at {delta} m")
+axes[1].set_ylabel("x, forward [m]")
 axes[2].legend(markerscale=6, fontsize="small")
 plt.show()
 
