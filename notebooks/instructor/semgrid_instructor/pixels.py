@@ -78,7 +78,7 @@ def check_plane_pixels(plane_pixels: Callable) -> None:
 
 @hidden
 def check_visible(plane_pixels: Callable) -> None:
-    """Many points all around the camera, several heights; each border of the image, half a pixel to either side."""
+    """Many points all around the camera, several heights; each border of the image, on it and a little beside it."""
     rng = np.random.default_rng(55)
     for height in (0.0, 1.0, 2.6):
         camera, xy = _camera(rng), rng.uniform((-30, -20), (40, 20), size=(600, 2))
