@@ -4,14 +4,161 @@ Prints what each stretch found: cells that don't sum to 1, memory, and whether t
 """
 
 import argparse
+import hashlib
+import math
+import os
 import time
-from dataclasses import asdict
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
+from pathlib import Path
 
-from semgrid_edu.experiments.long_run import Checkpoint, long_run
-from semgrid_edu.files import write_json
+import numpy as np
+
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.provenance import versions
+from semgrid_edu.illustrations.boxes import Box, scan_boxes
+from semgrid_edu.occupancy import Belief, Cmcdot, CmcdotParams, PlanarMotion
+from semgrid_edu.storage.files import write_json
+from semgrid_edu.storage.provenance import versions
+
+RADIUS, SPEED = 25.0, 5.0
+"""Of the circle on which the vehicle drives, metres, and how fast, m/s: one lap takes half a minute."""
+LAP = 2 * np.pi * RADIUS / SPEED
+STANDING = [
+    Box.around(RADIUS * np.sin(angle) * far, RADIUS - RADIUS * np.cos(angle) * far, size, size, height)
+    for count, far, size, height in ((12, 1.45, 6.0, 5.0), (9, 1.25, 1.8, 1.5), (7, 0.8, 0.4, 2.5))
+    for angle in 2 * np.pi / count * np.arange(count)
+]
+"""Houses and parked cars outside the circle, posts inside."""
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """What was found since the last one.
+
+    Parameters
+    ----------
+    step : int
+        Steps done.
+    worst_sum : float
+        Largest distance of a cell's four probabilities from summing to 1; NaN if a cell held one.
+    lowest : float
+        Smallest probability of all.
+    velocities : int
+        Cells that had a velocity in the last step.
+    memory : float
+        Resident memory of the process, MB; NaN where the system doesn't tell.
+    digest : str
+        SHA-256 of all beliefs since the start.
+    """
+
+    step: int
+    worst_sum: float
+    lowest: float
+    velocities: int
+    memory: float
+    digest: str
+
+
+def long_run(
+    steps: int, every: int, spec: GridSpec, params: CmcdotParams | None = None, seed: int = 0
+) -> Iterator[Checkpoint]:
+    """Drive round and round through a toy world, and look at every belief.
+
+    The scanner's period wavers by some milliseconds, as real ones do, so no lap is like another.
+
+    Parameters
+    ----------
+    steps : int
+        Scans.
+    every : int
+        Steps between checkpoints; the last comes after the last step.
+    spec : GridSpec
+    params : CmcdotParams, optional
+    seed : int
+        Decides the filter's draws, the noise of ranges and the times of scans.
+
+    Yields
+    ------
+    Checkpoint
+
+    Raises
+    ------
+    ArgumentError
+        When there is no step, or none between checkpoints.
+    """
+    if min(steps, every) < 1:
+        raise ArgumentError("steps, every", "at least one", f"{steps}, {every}")
+    tracker, rng, digest = Cmcdot(spec, params, seed), np.random.default_rng(seed), hashlib.sha256()
+    time, before, worst_sum, lowest = 0.0, pose_at(0.0), 0.0, 1.0
+    for step in range(1, steps + 1):
+        dt = 0.1 + rng.uniform(-0.004, 0.004)
+        time += dt
+        pose = pose_at(time)
+        points = scan_boxes(
+            scene_at(time), pose.dx, pose.dy, pose.dyaw, columns=150, rings=24, field=120, noise=0.02, rng=rng
+        )
+        motion = PlanarMotion(*before.to_now(np.array([pose.dx, pose.dy])), pose.dyaw - before.dyaw)
+        belief, before = tracker.step(points, motion, dt), pose
+        worst_sum = np.maximum(worst_sum, np.abs(belief.probability.sum(axis=0, dtype=np.float64) - 1).max())
+        lowest = np.minimum(lowest, belief.probability.min())
+        _add(digest, belief)
+        if step % every == 0 or step == steps:
+            known = int(np.isfinite(belief.velocity[0]).sum())
+            yield Checkpoint(step, float(worst_sum), float(lowest), known, resident_memory(), digest.hexdigest())
+            worst_sum, lowest = 0.0, 1.0
+
+
+def pose_at(time: float) -> PlanarMotion:
+    """Return where the vehicle is on its circle: it starts at the origin of the world, looks along x and turns left.
+
+    Parameters
+    ----------
+    time : float
+        Seconds.
+
+    Returns
+    -------
+    PlanarMotion
+        Its pose in the world.
+    """
+    yaw = SPEED * time / RADIUS
+    return PlanarMotion(float(RADIUS * np.sin(yaw)), float(RADIUS - RADIUS * np.cos(yaw)), yaw)
+
+
+def scene_at(time: float) -> list[Box]:
+    """Return what stands, a car ahead on the circle, one that comes towards us outside it, and a pedestrian.
+
+    Parameters
+    ----------
+    time : float
+        Seconds.
+
+    Returns
+    -------
+    list of Box
+        In the world.
+    """
+    angles = 2 * np.pi * np.array([time / LAP + 0.11, 0.3 - time / LAP])
+    x, y = np.array([1.0, 1.12]) * RADIUS * np.sin(angles), RADIUS * (1 - np.array([1.0, 1.12]) * np.cos(angles))
+    cars = [Box.around(x[k], y[k], 3, 3, 1.5) for k in range(2)]
+    walked = abs(1.4 * time % 24 - 12)  # to and fro inside the circle
+    return [*STANDING, *cars, Box.around(RADIUS - 16 + walked, RADIUS, 0.5, 0.5, 1.75)]
+
+
+def resident_memory() -> float:
+    """Return the memory that this process holds now, MB; NaN where the system doesn't keep it in /proc."""
+    if not (numbers := Path("/proc/self/statm")).exists():
+        return math.nan
+    pages = int(numbers.read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def _add(digest, belief: Belief) -> None:
+    """Add the bits of a belief to what has been digested."""
+    for field in (belief.probability, belief.velocity, belief.velocity_covariance):
+        digest.update(np.ascontiguousarray(field))
 
 
 def main() -> None:

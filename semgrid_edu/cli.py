@@ -139,7 +139,7 @@ def train(
     device: Annotated[str, typer.Option(help="auto (a GPU when there is one), cpu, cuda or cuda:N.")] = "auto",
 ) -> None:
     """Train a network: its image network first, then all of it on the grid. torchrun runs it in several processes."""
-    from semgrid_edu.experiments.train import how_to_go_on, train_network, training_params
+    from semgrid_edu.training.run import how_to_go_on, train_network, training_params
 
     params = training_params(preset, iterations, end_to_end=not two_stage, from_imagenet=imagenet is not None)
     try:
@@ -154,9 +154,9 @@ def curves(
     out: Annotated[Path, typer.Option(help="Where to write the picture.")] = Path("curves.png"),
 ) -> None:
     """Draw the loss of one or several trainings over their steps."""
-    from semgrid_edu.files import atomic_path
     from semgrid_edu.plotting import training_curves
-    from semgrid_edu.training_log import LOG, read_log
+    from semgrid_edu.storage.files import atomic_path
+    from semgrid_edu.training.log import LOG, read_log
 
     names = [run.resolve().name for run in runs]
     if len(set(names)) < len(names):
@@ -175,7 +175,7 @@ def evaluate(
 ) -> None:
     """Score a trained network and two simple baselines on the test frames."""
     from semgrid_edu.experiments.evaluate import evaluate, table
-    from semgrid_edu.files import check_writable
+    from semgrid_edu.storage.files import check_writable
 
     check_writable(out)
     result = evaluate(data, weights)
@@ -196,7 +196,7 @@ def occupancy(
 ) -> None:
     """Score log-odds grid, BOF and CMCDOT on simulated drives (lecture 04)."""
     from semgrid_edu.experiments.occupancy import GRIDS, compare, tables
-    from semgrid_edu.files import check_writable
+    from semgrid_edu.storage.files import check_writable
 
     check_writable(out)
     result = compare(seed, drives, (grid,) if grid else tuple(GRIDS))
@@ -212,7 +212,7 @@ def two_stage(
 ) -> None:
     """Train end to end and in two stages, and score both (lecture 08)."""
     from semgrid_edu.experiments.two_stage import compare, table
-    from semgrid_edu.files import check_writable
+    from semgrid_edu.storage.files import check_writable
 
     check_writable(out)
     result = compare(data, runs, seeds)
@@ -226,7 +226,7 @@ def overfit(
 ) -> None:
     """Learn four frames by heart with each image network (lecture 08)."""
     from semgrid_edu.experiments.overfit import overfit, table
-    from semgrid_edu.files import check_writable
+    from semgrid_edu.storage.files import check_writable
 
     check_writable(out)
     result = overfit(seed)
@@ -235,7 +235,7 @@ def overfit(
 
 def _keep(result: dict[str, object], shown: str, out: Path) -> None:
     """Write an experiment's result, and show what matters of it."""
-    from semgrid_edu.files import write_json
+    from semgrid_edu.storage.files import write_json
 
     write_json(out, result)
     typer.echo(f"{shown}\n\nwritten to {out}")

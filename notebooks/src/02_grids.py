@@ -54,10 +54,10 @@ from semgrid_edu.occupancy import (
 from semgrid_edu.occupancy.evidence import Evidence, beam_reach, walk_ray
 from semgrid_edu.occupancy.ground_literal import walk_sector
 from semgrid_edu.occupancy.polar import beyond_reach
-from semgrid_edu.simulation.boxes import Box, cells_in, scan_boxes
+from semgrid_edu.illustrations.boxes import Box, cells_in, scan_boxes
 from semgrid_edu.simulation.drive import SimulatedDrive
-from semgrid_edu.simulation.materials import Kind
-from semgrid_edu.simulation.plan import Wishes
+from semgrid_edu.simulation.things.materials import Kind
+from semgrid_edu.simulation.street.plan import Wishes
 
 plt.rcParams["figure.dpi"] = 80
 

@@ -32,7 +32,7 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.occupancy import Bof, BofParams, BofState, CmcdotParams, Evidence, LogOddsGrid, PlanarMotion, State
 from semgrid_edu.occupancy import VelocityLattice, bof_predict, bof_predict_literal, bof_update, bof_velocity
 from semgrid_edu.occupancy import scan_evidence, smear_area, transition_matrix
-from semgrid_edu.simulation.boxes import Box, cells_in, scan_boxes
+from semgrid_edu.illustrations.boxes import Box, cells_in, scan_boxes
 
 plt.rcParams["figure.dpi"] = 80
 FREE, STATIC, DYNAMIC, UNKNOWN = State

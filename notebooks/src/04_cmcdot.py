@@ -37,13 +37,13 @@ from semgrid_edu import plotting
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.datasets.samples import sample_drive
-from semgrid_edu.experiments.blur import SCHEMES, blur_of, winding_road
-from semgrid_edu.experiments.convergence import convergence
+from semgrid_edu.illustrations.blur import SCHEMES, blur_of, winding_road
+from semgrid_edu.illustrations.convergence import convergence
 from semgrid_edu.experiments.occupancy import table
 from semgrid_edu.experiments.scenes import hit_cells
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import confusion_matrix
-from semgrid_edu.simulation.boxes import Box, cells_in, scan_boxes
+from semgrid_edu.illustrations.boxes import Box, cells_in, scan_boxes
 
 # %%
 from semgrid_edu.occupancy import (

@@ -37,8 +37,8 @@ from ipywidgets import IntSlider, interact
 from semgrid_edu import plotting
 from semgrid_edu.datasets.resizing import resize_image, resize_labels
 from semgrid_edu.datasets.samples import sample_drive, sample_image_stage
-from semgrid_edu.experiments.pole_nets import draw_poles, learn, score
-from semgrid_edu.experiments.thin_pole import MECHANISMS, carry, place_and_width
+from semgrid_edu.illustrations.pole_nets import draw_poles, learn, score
+from semgrid_edu.illustrations.thin_pole import MECHANISMS, carry, place_and_width
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 

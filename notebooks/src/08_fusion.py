@@ -40,7 +40,7 @@ from IPython.display import Markdown
 from ipywidgets import FloatRangeSlider, interact
 
 from semgrid_edu import plotting
-from semgrid_edu.batches import Batch, draw_batch, grid_logits
+from semgrid_edu.training.batches import Batch, draw_batch, grid_logits
 from semgrid_edu.camera import rigid_transform
 from semgrid_edu.datasets.resizing import resize_image
 from semgrid_edu.datasets.samples import sample_drive, sample_frames, sample_image_stage, sample_weights
@@ -48,8 +48,8 @@ from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.datasets.truth import grid_truth
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
-from semgrid_edu.loss import class_frequencies, class_weights, median_frequency_weights
-from semgrid_edu.memory import keep_freed_memory
+from semgrid_edu.training.loss import class_frequencies, class_weights, median_frequency_weights
+from semgrid_edu.training.allocator import keep_freed_memory
 
 # %%
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy, semantic_cells
@@ -60,7 +60,7 @@ from semgrid_edu.planes import plane_heights, plane_pixels
 from semgrid_edu.plotting.grids import draw_map
 from semgrid_edu.plotting.images import draw_image
 from semgrid_edu.training import TrainingParams, train
-from semgrid_edu.training_log import read_log
+from semgrid_edu.training.log import read_log
 
 plt.rcParams["figure.dpi"] = 80
 keep_freed_memory()  # training is faster when the allocator keeps what is freed

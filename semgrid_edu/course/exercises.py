@@ -21,7 +21,7 @@ from traitlets.config import PyFileConfigLoader
 
 from semgrid_edu.course.notebooks import NOTEBOOKS, read_percent, write_notebook
 from semgrid_edu.errors import DataError
-from semgrid_edu.files import write_json, write_text
+from semgrid_edu.storage.files import write_json, write_text
 
 RELEASE_STEPS = (LockCells, ClearSolutions, ClearOutput, ClearHiddenTests, ComputeChecksums, CheckCellMetadata)
 """What nbgrader's generate_assignment does to a notebook, without its gradebook."""

@@ -9,7 +9,7 @@ from nbclient import NotebookClient
 from nbformat import NotebookNode
 
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.files import write_text
+from semgrid_edu.storage.files import write_text
 
 NOTEBOOKS = Path(__file__).resolve().parents[2] / "notebooks"
 """The lectures and exercises of a checkout; they are not part of the wheel."""

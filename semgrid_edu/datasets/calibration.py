@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, rigid_transform
-from semgrid_edu.datasets.reading import parse_numbers, read_text
 from semgrid_edu.errors import DataError
+from semgrid_edu.storage.reading import parse_numbers, read_text
 
 ROTATION_TOLERANCE = 1e-4
 """The largest entry of R R^T - I that passes: KITTI prints seven digits, which leaves about 1e-6."""

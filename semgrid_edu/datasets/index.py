@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from semgrid_edu.datasets.reading import read_text
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import LABEL_SETS, LabelSet
+from semgrid_edu.storage.reading import read_text
 
 INDEX_FILE = "dataset.json"
 

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.datasets.reading import read_png, read_text
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID, FrameLabels
 from semgrid_edu.labels import IGNORE, LABEL_SETS, LabelSet
+from semgrid_edu.storage.reading import read_png, read_text
 
 KINDS = ("image", "depth", "birdseye", "visible")
 """What there is to a labelled frame, a folder each."""

@@ -14,10 +14,10 @@ from semgrid_edu.camera import Camera, invert_rigid
 from semgrid_edu.datasets.calibration import read_camera, read_rectification, read_rigid
 from semgrid_edu.datasets.kitti_labels import KINDS, is_labelled, read_label, read_labels
 from semgrid_edu.datasets.oxts import mercator_pose, mercator_scale, read_packet
-from semgrid_edu.datasets.reading import read_bytes, read_png
 from semgrid_edu.datasets.timestamps import read_timestamps
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import Frame, FrameLabels
+from semgrid_edu.storage.reading import read_bytes, read_png
 
 LIDAR_RANGE = 250.0
 """Metres. The HDL-64E of KITTI sees 120; what lies beyond twice that is no measurement."""

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import rigid_transform
-from semgrid_edu.datasets.reading import parse_numbers, read_text
 from semgrid_edu.errors import DataError
+from semgrid_edu.storage.reading import parse_numbers, read_text
 
 EARTH_RADIUS = 6378137.0
 """Metres, at the equator (WGS 84), as the KITTI development kit takes it."""

@@ -9,8 +9,8 @@ from semgrid_edu.datasets.training_cache import SEED
 from semgrid_edu.datasets.training_set import Sample, TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS
-from semgrid_edu.provenance import FILE_NAME, provenance_problems, write_provenance
-from semgrid_edu.tensors import read_tensors, write_tensors
+from semgrid_edu.storage.provenance import FILE_NAME, provenance_problems, write_provenance
+from semgrid_edu.storage.tensors import read_tensors, write_tensors
 
 FRAMES = "frames.safetensors"
 """The file of an excerpt."""

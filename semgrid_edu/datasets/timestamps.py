@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.datasets.reading import read_text
 from semgrid_edu.errors import DataError
+from semgrid_edu.storage.reading import read_text
 
 _STAMP = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{9}")
 

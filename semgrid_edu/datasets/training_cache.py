@@ -15,22 +15,22 @@ from tqdm.auto import tqdm
 import semgrid_edu
 from semgrid_edu.datasets.index import INDEX_FILE, DatasetIndex
 from semgrid_edu.datasets.kitti_raw import KittiRawDrive, drive_folder
-from semgrid_edu.datasets.reading import read_text
 from semgrid_edu.datasets.resizing import resize_image, resize_labels
 from semgrid_edu.datasets.returns import seen_returns
 from semgrid_edu.datasets.truth import grid_truth
 from semgrid_edu.errors import DataError
-from semgrid_edu.files import sha256, write_json
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams, track_drive
-from semgrid_edu.workers import worker_pool
+from semgrid_edu.storage.files import sha256, write_json
+from semgrid_edu.storage.reading import read_text
+from semgrid_edu.storage.workers import worker_pool
 
 SEED = 0
 """Of the occupancy filter's particles, in each drive."""
 
 CODE = (
-    *("camera", "frame", "grid", "labels"),
-    *(f"datasets/{name}" for name in ("calibration", "kitti_labels", "kitti_raw", "oxts", "reading", "resizing")),
+    *("camera", "frame", "grid", "labels", "storage/reading"),
+    *(f"datasets/{name}" for name in ("calibration", "kitti_labels", "kitti_raw", "oxts", "resizing")),
     *(f"datasets/{name}" for name in ("returns", "timestamps", "training_cache", "truth")),
 )
 """The modules that decide what comes out, beside all of occupancy/."""

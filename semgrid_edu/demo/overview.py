@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from semgrid_edu import plotting
 from semgrid_edu.datasets.truth import grid_truth
 from semgrid_edu.demo.rasters import scores_layer
-from semgrid_edu.files import atomic_path
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.pipeline import Result
 from semgrid_edu.plotting.images import draw_image
 from semgrid_edu.plotting.legends import colour_patches
+from semgrid_edu.storage.files import atomic_path
 
 REACH = 50.0
 """Metres ahead that the picture shows: beyond, few cells are seen."""

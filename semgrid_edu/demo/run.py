@@ -8,10 +8,10 @@ from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.demo.overview import save_overview
 from semgrid_edu.demo.page import Summary, page_html
 from semgrid_edu.demo.record import Record
-from semgrid_edu.files import write_text
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.networks import load_net
 from semgrid_edu.pipeline import run_pipeline
+from semgrid_edu.storage.files import write_text
 
 SHOWN = 40
 """The page holds no more frames than this, evenly spaced, so that it stays near 10 MB."""

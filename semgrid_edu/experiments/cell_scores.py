@@ -11,7 +11,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.occupancy import N_STATES, Belief, State
 from semgrid_edu.simulation.drive import PERIOD
-from semgrid_edu.simulation.materials import Kind
+from semgrid_edu.simulation.things.materials import Kind
 
 UNDECIDED = 0.05
 """A log-odds grid knows nothing of a cell while its P(occupied) is this near to the prior of one half."""

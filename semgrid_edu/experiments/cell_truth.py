@@ -9,7 +9,7 @@ from semgrid_edu.frame import blocks
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import State
 from semgrid_edu.simulation.drive import SimulatedDrive
-from semgrid_edu.simulation.materials import Kind
+from semgrid_edu.simulation.things.materials import Kind
 
 MOVES = 0.05
 """m/s: what is faster moves."""

@@ -14,11 +14,11 @@ from semgrid_edu.datasets.training_cache import SEED
 from semgrid_edu.datasets.training_set import Sample, TrainingSet
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.baselines import carry_labels, close_gaps, majority_class
-from semgrid_edu.files import sha256
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS, confusion_matrix, semantic_cells
 from semgrid_edu.networks import IMAGE_STAGE, SemanticGridNet, load_net
-from semgrid_edu.provenance import versions
+from semgrid_edu.storage.files import sha256
+from semgrid_edu.storage.provenance import versions
 
 Scores = dict[str, dict[str, dict[str, float]]]
 """By method, by cells ("all" or "semantic"), by metric; 0..1."""

@@ -11,9 +11,9 @@ from semgrid_edu.experiments.cell_scores import BANKS, Estimate, Scores, share
 from semgrid_edu.experiments.scenes import scenes
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Bof, Cmcdot, LogOddsGrid, PlanarMotion, SensorModel, State
-from semgrid_edu.provenance import versions
 from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive
-from semgrid_edu.simulation.rig import Lidar, Rig
+from semgrid_edu.simulation.sensors.rig import Lidar, Rig
+from semgrid_edu.storage.provenance import versions
 
 LIDARS = {
     "HDL-64E": Lidar(azimuth_min=-180.0, azimuth_max=180.0, azimuth_step=0.18),

@@ -15,9 +15,9 @@ from semgrid_edu.datasets.samples import sample_drive, sample_frames
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.metrics import confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import SEGMENTERS, Architecture, SemanticGridNet, build_net
-from semgrid_edu.provenance import versions
+from semgrid_edu.storage.provenance import versions
 from semgrid_edu.training import TrainingParams, train
-from semgrid_edu.training_log import LOG, read_log
+from semgrid_edu.training.log import LOG, read_log
 
 FRAMES = 4
 PARAMS = TrainingParams(

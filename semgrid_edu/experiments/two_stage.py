@@ -9,12 +9,12 @@ from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.experiments.evaluate import Scores, image_labels, learned_unary, scores
-from semgrid_edu.experiments.train import train_network
-from semgrid_edu.files import sha256
 from semgrid_edu.metrics import METRICS, confusion_matrix
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, load_net
-from semgrid_edu.provenance import versions
+from semgrid_edu.storage.files import sha256
+from semgrid_edu.storage.provenance import versions
 from semgrid_edu.training import CHECKPOINT, TrainingParams
+from semgrid_edu.training.run import train_network
 
 METHODS = ("end-to-end", "two-stage")
 

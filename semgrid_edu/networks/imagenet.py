@@ -12,7 +12,7 @@ from semgrid_edu.networks.fcn import Fcn
 from semgrid_edu.networks.segnet import SegNet
 from semgrid_edu.networks.vgg import DEPTHS
 from semgrid_edu.networks.weights import check_tensors
-from semgrid_edu.tensors import read_tensors
+from semgrid_edu.storage.tensors import read_tensors
 
 FCN_HIDDEN = {"classifier.0": "conv6.0", "classifier.3": "conv7.0"}
 """VGG16's fully connected layers and the convolutions that FCN makes of them."""

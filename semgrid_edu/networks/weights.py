@@ -11,7 +11,7 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks.build import Architecture, build_net
 from semgrid_edu.networks.semantic_grid import SemanticGridNet
-from semgrid_edu.tensors import read_tensors, write_tensors
+from semgrid_edu.storage.tensors import read_tensors, write_tensors
 
 IMAGE_STAGE, WEIGHTS = "image_stage.safetensors", "weights.safetensors"
 """What a training leaves in its folder: the network after each of its two stages."""

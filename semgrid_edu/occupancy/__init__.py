@@ -20,8 +20,8 @@ from semgrid_edu.occupancy.log_odds import (
     smear_area,
     update_log_odds,
 )
-from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.params import CmcdotParams, transition_matrix
+from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.sensor import SensorModel
 from semgrid_edu.occupancy.state import N_STATES, Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import move, predict, resample, update

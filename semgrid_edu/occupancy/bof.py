@@ -7,8 +7,8 @@ from semgrid_edu.occupancy.bof_state import BofParams, BofState
 from semgrid_edu.occupancy.bof_steps import bof_move, bof_predict, bof_update, bof_velocity
 from semgrid_edu.occupancy.evidence import beam_reach, evidence_in_cells
 from semgrid_edu.occupancy.local_belief import local_belief
-from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.moving_map import MAX_YAW, map_around, scroll
+from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.sensor import prepare_scan
 from semgrid_edu.occupancy.state import Belief
 

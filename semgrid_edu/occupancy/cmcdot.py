@@ -6,10 +6,10 @@ from numpy.typing import NDArray
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.evidence import beam_reach, evidence_in_cells
 from semgrid_edu.occupancy.local_belief import local_belief
-from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.moving_map import MAX_YAW, map_around, scroll
 from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.particles import cells_of, transform
+from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.sensor import prepare_scan
 from semgrid_edu.occupancy.state import Belief, FilterState, Particles
 from semgrid_edu.occupancy.steps import move, predict, resample, update

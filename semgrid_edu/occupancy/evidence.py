@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.motion import PlanarMotion
+from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.polar import beyond_reach, count_returns, fill_gaps, polar_profile, reach
 from semgrid_edu.occupancy.sensor import SensorModel, prepare_scan
 from semgrid_edu.occupancy.state import check_shape

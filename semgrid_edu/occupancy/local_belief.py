@@ -5,9 +5,9 @@ from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.evidence import Evidence
-from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.moving_map import look_up
 from semgrid_edu.occupancy.params import CmcdotParams
+from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN, update
 from semgrid_edu.occupancy.velocities import turn_moments

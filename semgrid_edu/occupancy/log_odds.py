@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.evidence import Evidence, beam_reach, evidence_in_cells
-from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.moving_map import MAX_YAW, look_up, map_around, scroll
+from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.sensor import SensorModel, prepare_scan
 
 TINY = np.float32(1e-30)

@@ -7,7 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.motion import PlanarMotion
+from semgrid_edu.occupancy.planar_motion import PlanarMotion
 
 MAX_YAW = np.radians(2)
 """The map turns with the vehicle only when that has turned this far (a compromise: its margin grows with the angle)."""

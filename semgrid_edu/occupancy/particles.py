@@ -7,7 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.motion import PlanarMotion
+from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import Particles
 
 OUTSIDE = -1

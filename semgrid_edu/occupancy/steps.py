@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.cellwise import bayes, make_room, meet, mix, represent
 from semgrid_edu.occupancy.evidence import Evidence
-from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.moving_map import look_up
 from semgrid_edu.occupancy.params import CmcdotParams, transition_matrix
 from semgrid_edu.occupancy.particles import (
@@ -20,6 +19,7 @@ from semgrid_edu.occupancy.particles import (
     transform,
     weight_in_cells,
 )
+from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.resampling import draw_again, draw_newborn
 from semgrid_edu.occupancy.state import FilterState, Particles, State, check_shape
 

@@ -7,8 +7,8 @@ import numpy as np
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.cmcdot import Cmcdot
-from semgrid_edu.occupancy.motion import PlanarMotion
 from semgrid_edu.occupancy.params import CmcdotParams
+from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import Belief
 
 LIDAR_PERIOD = 0.1

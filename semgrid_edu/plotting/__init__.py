@@ -19,7 +19,7 @@ from semgrid_edu.plotting.grids import grid_labels, grid_values, label_maps, occ
 from semgrid_edu.plotting.images import image_labels, image_values, plane_on_image, points_on_image
 from semgrid_edu.plotting.legends import class_legend
 from semgrid_edu.plotting.lines import belief_history, probability_line, probability_lines, state_history
-from semgrid_edu.plotting.motion import (
+from semgrid_edu.plotting.moving import (
     animate_occupancy,
     particles,
     velocity_ellipse,

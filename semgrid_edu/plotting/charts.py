@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.training_log import TrainingLog
+from semgrid_edu.training.log import TrainingLog
 
 
 def confusion(matrix: NDArray, names: Sequence[str], ax: Axes | None = None) -> Axes:

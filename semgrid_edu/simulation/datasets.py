@@ -13,13 +13,11 @@ from tqdm.auto import tqdm
 from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.files import write_json
 from semgrid_edu.labels import LABEL_SETS
-from semgrid_edu.provenance import versions, write_provenance
 from semgrid_edu.simulation.drive import SimulatedDrive
-from semgrid_edu.simulation.plan import ANY, Wishes
-from semgrid_edu.simulation.rig import Rig
-from semgrid_edu.simulation.sample import SAMPLE_WISHES
+from semgrid_edu.simulation.sample_cast import SAMPLE_WISHES
+from semgrid_edu.simulation.sensors.rig import Rig
+from semgrid_edu.simulation.street.plan import ANY, Wishes
 from semgrid_edu.simulation.writer import (
     DATE,
     depth_as_points,
@@ -27,7 +25,9 @@ from semgrid_edu.simulation.writer import (
     write_calibration,
     write_drive,
 )
-from semgrid_edu.workers import worker_pool
+from semgrid_edu.storage.files import write_json
+from semgrid_edu.storage.provenance import versions, write_provenance
+from semgrid_edu.storage.workers import worker_pool
 
 FORMAT = 1
 """Goes up when the simulator changes what a seed gives, so that old and new drives don't mix in one folder."""

@@ -8,18 +8,18 @@ from numpy.typing import NDArray
 
 from semgrid_edu.camera import transform_points
 from semgrid_edu.frame import LABEL_GRID, Frame
-from semgrid_edu.simulation.footprints import table
-from semgrid_edu.simulation.lidar import scan
-from semgrid_edu.simulation.motion import Ego, Pace, Path
-from semgrid_edu.simulation.oxts import Geodesy
-from semgrid_edu.simulation.picture import Picture, take_picture
-from semgrid_edu.simulation.plan import ANY, Plan, Wishes, draw_plan
-from semgrid_edu.simulation.raycast import Instant, Scene
-from semgrid_edu.simulation.rig import Rig
-from semgrid_edu.simulation.road_users import fill_street
-from semgrid_edu.simulation.scenery import build_scenery
-from semgrid_edu.simulation.traffic import Actor, Traffic
-from semgrid_edu.simulation.truth import birdseye_kinds, visible_cells, world_cells
+from semgrid_edu.simulation.sensors.camera import Picture, take_picture
+from semgrid_edu.simulation.sensors.gps import Geodesy
+from semgrid_edu.simulation.sensors.lidar import scan
+from semgrid_edu.simulation.sensors.raycast import Instant, Scene
+from semgrid_edu.simulation.sensors.rig import Rig
+from semgrid_edu.simulation.sensors.truth import birdseye_kinds, visible_cells, world_cells
+from semgrid_edu.simulation.street.footprints import table
+from semgrid_edu.simulation.street.paths import Ego, Pace, Path
+from semgrid_edu.simulation.street.plan import ANY, Plan, Wishes, draw_plan
+from semgrid_edu.simulation.street.road_users import fill_street
+from semgrid_edu.simulation.street.scenery import build_scenery
+from semgrid_edu.simulation.street.traffic import Actor, Traffic
 
 PERIOD = 0.1
 """Seconds between frames: KITTI's LIDAR turns ten times a second."""

@@ -13,12 +13,12 @@ from PIL import Image
 
 from semgrid_edu.datasets.kitti_labels import DEPTH_UNIT
 from semgrid_edu.datasets.kitti_raw import drive_folder
-from semgrid_edu.files import write_text
 from semgrid_edu.labels import KITTI_14, LabelSet
 from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive, SimulatedFrame
-from semgrid_edu.simulation.materials import class_of_kind
-from semgrid_edu.simulation.oxts import DATAFORMAT, packet
-from semgrid_edu.simulation.rig import Rig
+from semgrid_edu.simulation.sensors.gps import DATAFORMAT, packet
+from semgrid_edu.simulation.sensors.rig import Rig
+from semgrid_edu.simulation.things.materials import class_of_kind
+from semgrid_edu.storage.files import write_text
 
 DATE = "2026_01_01"
 """The day of all simulated drives."""

@@ -19,8 +19,8 @@ from semgrid_edu.datasets.samples import (
 )
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.files import write_bytes
 from semgrid_edu.networks import load_net
+from semgrid_edu.storage.files import write_bytes
 
 
 @pytest.fixture(scope="module")

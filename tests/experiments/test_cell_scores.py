@@ -9,9 +9,9 @@ from semgrid_edu.experiments.cell_truth import CellTruth, pool_truth
 from semgrid_edu.experiments.scenes import Past, Scene
 from semgrid_edu.frame import LABEL_GRID, Frame
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.illustrations.boxes import Box, cells_in, scan_boxes
 from semgrid_edu.occupancy import Belief, PlanarMotion, SensorModel, State
-from semgrid_edu.simulation.boxes import Box, cells_in, scan_boxes
-from semgrid_edu.simulation.materials import Kind
+from semgrid_edu.simulation.things.materials import Kind
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 ROW = GridSpec(0, 1, 0, 5, 1)

@@ -9,10 +9,10 @@ from tiny_drive import write_tiny_dataset
 
 from semgrid_edu.datasets import KittiRawDrive, training_cache
 from semgrid_edu.experiments.evaluate import confusion_matrices, evaluate, scores, table
-from semgrid_edu.files import sha256
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import Architecture, build_net, save_net
+from semgrid_edu.storage.files import sha256
 
 ROAD, CAR, FREE, STATIC = (KITTI_14.index(name) for name in ("road", "car", "unknown-free", "unknown-static"))
 TRUTH = np.array([[[ROAD, CAR], [FREE, STATIC]]], np.uint8)

@@ -14,14 +14,14 @@ from semgrid_edu.experiments.occupancy import GRIDS, LIDARS, METHODS, compare, t
 from semgrid_edu.experiments.scenes import scenes
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Cmcdot, SensorModel
-from semgrid_edu.simulation.cars import car_size
 from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive
-from semgrid_edu.simulation.materials import Kind
-from semgrid_edu.simulation.motion import STAND, Pace
-from semgrid_edu.simulation.motion import Path as Way
-from semgrid_edu.simulation.plan import Wishes
-from semgrid_edu.simulation.rig import Rig
-from semgrid_edu.simulation.traffic import Traffic
+from semgrid_edu.simulation.sensors.rig import Rig
+from semgrid_edu.simulation.street.paths import STAND, Pace
+from semgrid_edu.simulation.street.paths import Path as Way
+from semgrid_edu.simulation.street.plan import Wishes
+from semgrid_edu.simulation.street.traffic import Traffic
+from semgrid_edu.simulation.things.cars import car_size
+from semgrid_edu.simulation.things.materials import Kind
 
 COMMITTED = Path(semgrid_edu.__file__).parents[1] / "docs" / "results" / "occupancy.json"
 WALKERS = "walking pedestrians, to 25 m"

@@ -11,11 +11,11 @@ from scipy.ndimage import minimum_filter
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.illustrations.boxes import Box, scan_boxes
 from semgrid_edu.occupancy import Evidence, PlanarMotion, SensorModel, scan_evidence, scan_evidence_literal
 from semgrid_edu.occupancy.evidence import walk_ray
 from semgrid_edu.occupancy.polar import fill_gaps
-from semgrid_edu.simulation.boxes import Box, scan_boxes
-from semgrid_edu.simulation.rig import HDL64E_ELEVATIONS
+from semgrid_edu.simulation.sensors.rig import HDL64E_ELEVATIONS
 
 RAY = GridSpec(x_min=0, x_max=5, y_min=-0.5, y_max=0.5, cell=1)
 SENSOR = SensorModel()

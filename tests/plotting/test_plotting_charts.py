@@ -4,7 +4,7 @@ import pytest
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.plotting import training_curves
-from semgrid_edu.training_log import TrainingLog
+from semgrid_edu.training.log import TrainingLog
 
 
 def _log(image=200, grid=100):

@@ -12,7 +12,7 @@ from semgrid_edu import plotting
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Belief, BofState, Particles, State, VelocityLattice, bof_velocity
-from semgrid_edu.plotting.motion import MAX_POINTS, wheel_colours
+from semgrid_edu.plotting.moving import MAX_POINTS, wheel_colours
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 FORWARD, LEFT, BACK, RIGHT = plotting.HEADING_COLOURS

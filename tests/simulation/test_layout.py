@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from semgrid_edu.simulation.layout import (
+from semgrid_edu.simulation.street.layout import (
     KERB_HEIGHT,
     Road,
     Side,
@@ -16,8 +16,8 @@ from semgrid_edu.simulation.layout import (
     to_road,
     to_world,
 )
-from semgrid_edu.simulation.materials import Kind
-from semgrid_edu.simulation.terrain import Extent, ground_mesh
+from semgrid_edu.simulation.street.terrain import Extent, ground_mesh
+from semgrid_edu.simulation.things.materials import Kind
 
 SIDE = Side(edge=4.0, strip=0.0, walk=2.0, bank_rise=0.8, bank_width=3.0)
 STRAIGHT = Road(0.0, 0.0, 0.0, 3.5, 1, 1, SIDE, SIDE, 0.0, 0.0, False, False, 4.0, False, False)

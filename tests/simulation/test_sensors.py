@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, project, rigid_transform, transform_points
-from semgrid_edu.simulation.layout import Road, Side
-from semgrid_edu.simulation.lidar import scan
-from semgrid_edu.simulation.light import Light
-from semgrid_edu.simulation.materials import Kind, Material
-from semgrid_edu.simulation.picture import take_picture
-from semgrid_edu.simulation.raycast import Instant, Scene
-from semgrid_edu.simulation.rig import Lidar, Rig
-from semgrid_edu.simulation.shapes import box, quads
+from semgrid_edu.simulation.sensors.camera import take_picture
+from semgrid_edu.simulation.sensors.lidar import scan
+from semgrid_edu.simulation.sensors.raycast import Instant, Scene
+from semgrid_edu.simulation.sensors.rig import Lidar, Rig
+from semgrid_edu.simulation.street.layout import Road, Side
+from semgrid_edu.simulation.street.light import Light
+from semgrid_edu.simulation.things.materials import Kind, Material
+from semgrid_edu.simulation.things.shapes import box, quads
 
 SIDE = Side(5.0, 0.0, 2.0, 0.0, 3.0)
 ROAD = Road(0.0, 0.0, 0.0, 3.5, 1, 1, SIDE, SIDE, 0.0, 0.0, False, False, 4.0, False, True)

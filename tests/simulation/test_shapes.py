@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 import trimesh
 
-from semgrid_edu.simulation.bicycles import bicycle
-from semgrid_edu.simulation.buildings import House, build
-from semgrid_edu.simulation.cars import BODIES, car, car_size
-from semgrid_edu.simulation.furniture import FENCES, SIGNS, fence, sign
-from semgrid_edu.simulation.materials import Kind, Material
-from semgrid_edu.simulation.people import Person, rider, walker
-from semgrid_edu.simulation.plants import TREES, bush, hedge, tree
-from semgrid_edu.simulation.shapes import ball, box, merge, quads, tube
+from semgrid_edu.simulation.things.bicycles import bicycle
+from semgrid_edu.simulation.things.buildings import House, build
+from semgrid_edu.simulation.things.cars import BODIES, car, car_size
+from semgrid_edu.simulation.things.furniture import FENCES, SIGNS, fence, sign
+from semgrid_edu.simulation.things.materials import Kind, Material
+from semgrid_edu.simulation.things.people import Person, rider, walker
+from semgrid_edu.simulation.things.plants import TREES, bush, hedge, tree
+from semgrid_edu.simulation.things.shapes import ball, box, merge, quads, tube
 
 STYLE = {"colour": (0.5, 0.5, 0.5), "material": Material.MATTE, "kind": Kind.POLE}
 

@@ -13,12 +13,12 @@ import pytest
 from semgrid_edu.datasets import KittiRawDrive, load_index
 from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.files import sha256
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.simulation import datasets
 from semgrid_edu.simulation.datasets import RECIPES, Recipe, Route, make, make_recipe
-from semgrid_edu.simulation.plan import Wishes
+from semgrid_edu.simulation.street.plan import Wishes
 from semgrid_edu.simulation.writer import DATE
+from semgrid_edu.storage.files import sha256
 
 QUIET = Wishes(density=0.2, layout="straight", styles=("park", "park"))
 TINY = Recipe("tiny", "KITTI-14", (Route("train", 2, False, QUIET), Route("test", 1, True, QUIET)))

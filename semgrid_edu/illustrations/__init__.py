@@ -1,0 +1,1 @@
+"""Small worlds and measurements that the lectures show."""

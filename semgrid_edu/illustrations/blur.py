@@ -1,0 +1,147 @@
+"""How a map blurs that moves with the vehicle: three ways to carry it, compared (paper, section 3.2, step 1)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+from scipy.special import entr
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.moving_map import MAX_YAW, look_up, scroll
+from semgrid_edu.occupancy.planar_motion import PlanarMotion
+
+SCHEMES = ("bilinear", "nearest", "scrolling")
+WORLD = GridSpec(-5, 24, -9, 14, 0.2)
+"""A map that holds what is around the start during all of `winding_road`."""
+SQUARE = 1.0
+"""Side of the squares of the chequerboard, metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class Blur:
+    """What carrying a map did to it, after each step.
+
+    Parameters
+    ----------
+    entropy : (T,) float
+        Of a chequerboard of certain cells, bits a cell: 0 as long as each is certain, 1 when all is grey.
+    left : (T,) float
+        Of what cells held at the start, the share that no longer lies in the cell where its place is.
+    displacement : (T,) float
+        How far it lies from its place, root mean square, metres.
+    """
+
+    entropy: NDArray[np.float64]
+    left: NDArray[np.float64]
+    displacement: NDArray[np.float64]
+
+
+def winding_road(steps: int = 50, turn: float = 0.013) -> list[PlanarMotion]:
+    """Return the motions of a vehicle that gathers speed, 2 to 5 m/s at ten steps a second, and turns all the while.
+
+    Parameters
+    ----------
+    steps : int
+    turn : float
+        Radians a step, to the left.
+
+    Returns
+    -------
+    list of PlanarMotion
+    """
+    return [PlanarMotion(float(dx), 0.0, turn) for dx in np.linspace(0.2, 0.5, steps)]
+
+
+def blur_of(
+    scheme: str, motions: Sequence[PlanarMotion], spec: GridSpec = WORLD, drops: int = 20, seed: int = 0
+) -> Blur:
+    """Carry a map of a world that stands still along with a vehicle, and measure what becomes of it.
+
+    Nothing is forgotten and nothing is seen: all that changes the map is that its cells move. It holds a
+    chequerboard and, each in a map of its own, drops of ink: single cells that hold 1.
+
+    Parameters
+    ----------
+    scheme : str
+        "bilinear": each step, every cell takes the mean of the four old cells around its centre, by their nearness.
+        "nearest": each step, every cell takes the old cell that its centre lies in. "scrolling": as `Cmcdot` does it.
+    motions : sequence of PlanarMotion
+        Of the vehicle, T steps.
+    spec : GridSpec
+        The cells of the map; it must hold the middle of the world at every step.
+    drops : int
+        How many.
+    seed : int
+        Where they fall.
+
+    Returns
+    -------
+    Blur
+        In the map itself. Handing a scrolling map out in the vehicle's cells adds one look-up, a displacement
+        of cell / sqrt(6), once, whatever the number of steps.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such scheme, no step or no drop, or the vehicle leaves the map.
+    """
+    if scheme not in SCHEMES:
+        raise ArgumentError("scheme", " or ".join(SCHEMES), scheme)
+    if not motions or drops < 1:
+        raise ArgumentError("motions, drops", "at least one of each", f"{len(motions)}, {drops}")
+    held = _always_held(spec, motions)
+    row, col = np.random.default_rng(seed).permutation(np.argwhere(held))[:drops].T
+    fields = np.zeros((len(row) + 1, *spec.shape), np.float32)
+    fields[np.arange(len(row)), row, col] = 1
+    fields[-1] = np.floor(spec.centers() / SQUARE).sum(axis=-1) % 2
+    start, rest, T_start_from_map = spec.centers()[row, col], PlanarMotion(), PlanarMotion()
+    measured = []
+    for motion in motions:
+        moved, rest = _follow(scheme, rest.then(motion), spec.cell)
+        fields = _carry(scheme, fields, spec, moved)
+        T_start_from_map = T_start_from_map.then(moved)
+        measured.append(_measure(fields, spec, T_start_from_map, start, held))
+    return Blur(*np.array(measured).T)
+
+
+def _always_held(spec: GridSpec, motions: Sequence[PlanarMotion], margin: float = 1.5) -> NDArray[np.bool_]:
+    """Return which cells of the first map stay in the map, `margin` metres from its borders, (H, W)."""
+    held, pose = np.ones(spec.shape, bool), PlanarMotion()
+    for motion in [PlanarMotion(), *motions]:
+        pose = pose.then(motion)
+        x, y = np.moveaxis(pose.to_now(spec.centers()), -1, 0)
+        held &= (x > spec.x_min + margin) & (x < spec.x_max - margin)
+        held &= (y > spec.y_min + margin) & (y < spec.y_max - margin)
+    if not held.any():
+        raise ArgumentError("motions", "a way that leaves some of the map in it", f"{pose} in {spec}")
+    return held
+
+
+def _follow(scheme: str, pose: PlanarMotion, cell: float) -> tuple[PlanarMotion, PlanarMotion]:
+    """Return how the map moves when the vehicle is at `pose` in it, and the vehicle's pose in it then."""
+    return scroll(pose, cell, MAX_YAW) if scheme == "scrolling" else (pose, PlanarMotion())
+
+
+def _carry(scheme: str, fields: NDArray[np.float32], spec: GridSpec, moved: PlanarMotion) -> NDArray[np.float32]:
+    """Express fields (K, H, W) in the frame whose pose is `moved`; what enters is 0."""
+    if scheme != "bilinear":
+        return look_up(fields, np.zeros(len(fields), np.float32), spec, spec, moved)
+    index = ((spec.x_max, spec.y_max) - moved.to_previous(spec.centers())) / spec.cell - 0.5
+    return np.stack([map_coordinates(field, np.moveaxis(index, -1, 0), order=1) for field in fields])
+
+
+def _measure(
+    fields: NDArray[np.float32], spec: GridSpec, T_start_from_map: PlanarMotion, start: NDArray, held: NDArray[np.bool_]
+) -> tuple[float, float, float]:
+    """Return entropy, share that left its cell, and displacement of what is in the fields."""
+    place = T_start_from_map.to_previous(spec.centers())
+    rows, cols, inside = spec.cells(place.reshape(-1, 2))
+    grey = fields[-1].ravel()[inside & held[rows, cols]]
+    entropy = (entr(grey) + entr(1 - grey)).mean() / np.log(2)
+    ink, (rows, cols, _) = fields[:-1], spec.cells(T_start_from_map.to_now(start))
+    stayed = ink[np.arange(len(ink)), rows, cols].sum() / ink.sum()
+    distance2 = ((place - start[:, None, None]) ** 2).sum(axis=-1)
+    return entropy, 1 - stayed, np.sqrt((ink * distance2).sum() / ink.sum())

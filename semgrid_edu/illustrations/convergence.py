@@ -1,0 +1,203 @@
+"""CMCDOT tends to the BOF as its particles grow in number: measured on two cars that pass (paper, section 3.2)."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.illustrations.boxes import Box, cells_in
+from semgrid_edu.occupancy import (
+    BofParams,
+    BofState,
+    CmcdotParams,
+    Evidence,
+    FilterState,
+    Particles,
+    State,
+    VelocityLattice,
+    bof_predict,
+    bof_update,
+    bof_velocity,
+    predict,
+    resample,
+    update,
+)
+from semgrid_edu.occupancy.particles import cells_of
+from semgrid_edu.occupancy.velocities import velocity_moments
+
+SPEC = GridSpec(0, 16, -4, 4, 0.5)
+DT = 0.125
+"""Seconds a step, in which 4 m/s are exactly one cell: so particles on the lattice do what its mass does."""
+STEPS = 6
+PARAMS = BofParams(
+    VelocityLattice(max_speed=8.0, spacing=4.0),
+    CmcdotParams(
+        rates=((0.0, 0.02, 0.0, 0.3), (0.02, 0.0, 0.0, 0.1), (0.1, 0.1, 0.0, 0.5), (0.0, 0.0, 0.0, 0.0)),
+        first_sight=(0.85, 0.15, 0.0),
+        max_acceleration=0.0,
+        birth_share=1e-9,
+    ),
+)
+"""The default world, but nothing accelerates or is born: its velocity would lie between those of the lattice."""
+WORTH_COMPARING = 0.1
+"""Cells count in which the BOF's dynamic probability is above this: elsewhere there is no velocity to speak of."""
+
+
+class Convergence(NamedTuple):
+    """How far CMCDOT is from the BOF.
+
+    Parameters
+    ----------
+    numbers : (K,) int64
+        Of particles.
+    dynamic : (K,) float64
+        Root mean square difference of the dynamic probability.
+    velocity : (K,) float64
+        Root mean square length of the difference of mean velocities, m/s.
+    """
+
+    numbers: NDArray[np.int64]
+    dynamic: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+
+    @property
+    def slopes(self) -> tuple[float, float]:
+        """Exponents of N in both errors, fitted in log-log: -1/2 says that they fall like N^-1/2."""
+        return tuple(float(np.polyfit(np.log(self.numbers), np.log(e), 1)[0]) for e in (self.dynamic, self.velocity))
+
+
+def convergence(numbers: Sequence[int], seeds: Sequence[int]) -> Convergence:
+    """Compare CMCDOT with the exact filter for several numbers of particles.
+
+    Two cars pass each other, believed at first to move anyhow. Particles start anywhere in their cells with velocities
+    drawn from the lattice's prior, so the BOF is the very limit of `predict`, `update` and `resample`. By
+    the central limit theorem a mean over N particles errs like N^-1/2.
+
+    Parameters
+    ----------
+    numbers : sequence of int
+        Of particles.
+    seeds : sequence of int
+        The errors are taken over all of them.
+
+    Returns
+    -------
+    Convergence
+        Over all cells worth comparing, steps and seeds.
+
+    Examples
+    --------
+    >>> few, many = convergence([1000, 100_000], seeds=[0]).dynamic
+    >>> bool(many < 0.2 * few)
+    True
+    """
+    exact = list(run_bof())
+    errors = np.zeros((len(numbers), 2))
+    for k, number in enumerate(numbers):
+        pairs = [pair for seed in seeds for pair in zip(exact, run_cmcdot(number, seed), strict=True)]
+        errors[k] = np.sqrt(np.mean([_squared_errors(*pair) for pair in pairs], axis=0))
+    return Convergence(np.array(numbers), *errors.T)
+
+
+def cars(step: int) -> list[Box]:
+    """Return where two cars are, one that drives ahead at 8 m/s and one that comes towards us at 8 m/s.
+
+    Parameters
+    ----------
+    step : int
+        Steps of `DT` since the start.
+
+    Returns
+    -------
+    list of Box
+    """
+    travelled = 8 * DT * step
+    return [Box.around(3 + travelled, -1, 2, 1, 1.5), Box.around(13 - travelled, 1, 2, 1, 1.5)]
+
+
+def evidence_of(boxes: list[Box]) -> Evidence:
+    """Return the evidence of one hit in each cell of the boxes, and of a beam through each other cell.
+
+    Parameters
+    ----------
+    boxes : list of Box
+
+    Returns
+    -------
+    Evidence
+        Over `SPEC`.
+    """
+    sensor = PARAMS.world.sensor
+    hit = np.any([cells_in(box, SPEC) for box in boxes], axis=0)
+    occupied = np.where(hit, sensor.p_hit_occupied, sensor.p_pass_occupied)
+    free = np.where(hit, sensor.p_hit_free, sensor.p_pass_free)
+    return Evidence(occupied.astype(np.float32), free.astype(np.float32))
+
+
+def first_belief() -> NDArray[np.float32]:
+    """Return the belief to start from, (4, H, W): where the cars are something probably moves, else space is free."""
+    hit = np.any([cells_in(box, SPEC) for box in cars(0)], axis=0)
+    return np.where(hit, np.array([0.1, 0.2, 0.6, 0.1])[:, None, None], np.array([0.8, 0.1, 0, 0.1])[:, None, None])
+
+
+def run_bof() -> Iterator[tuple[NDArray, NDArray]]:
+    """Run the BOF past the two cars.
+
+    Yields
+    ------
+    dynamic : (H, W) float32
+        P(DYNAMIC) after each step.
+    velocity : (2, H, W) float32
+        Mean velocity, m/s; NaN where nothing moves.
+    """
+    belief, lattice = first_belief().astype(np.float32), PARAMS.lattice
+    occupied = belief[State.DYNAMIC] * lattice.prior[:, None, None].astype(np.float32)
+    occupied[0] = belief[State.STATIC]
+    remainder = np.zeros((len(lattice), 2))
+    state = BofState(belief[State.FREE], belief[State.UNKNOWN], occupied, lattice.velocities, remainder)
+    for step in range(1, STEPS + 1):
+        state = bof_update(bof_predict(state, SPEC, PARAMS, DT), SPEC, evidence_of(cars(step)), PARAMS)
+        yield state.probability[State.DYNAMIC], bof_velocity(state)[0]
+
+
+def run_cmcdot(number: int, seed: int) -> Iterator[tuple[NDArray, NDArray]]:
+    """Run CMCDOT past the two cars; it yields what `run_bof` does.
+
+    Parameters
+    ----------
+    number : int
+        Of particles.
+    seed : int
+        Decides everything that is drawn.
+    """
+    rng, params = np.random.default_rng(seed), replace(PARAMS.world, particles=number)
+    state = _first_particles(number, rng)
+    for step in range(1, STEPS + 1):
+        predicted = predict(state, SPEC, params, DT, rng)
+        state = resample(update(predicted, SPEC, evidence_of(cars(step)), params), SPEC, params, rng)
+        cells = cells_of(state.particles.position, SPEC)
+        yield state.probability[State.DYNAMIC], velocity_moments(state.particles, cells, SPEC.shape)[0]
+
+
+def _first_particles(number: int, rng: np.random.Generator) -> FilterState:
+    """Spread particles over the cells where something moves, with velocities from the lattice's prior."""
+    belief = first_belief().astype(np.float32)
+    dynamic = belief[State.DYNAMIC].ravel()
+    cells = np.resize(np.flatnonzero(dynamic), number)
+    corner = np.stack(np.divmod(cells, SPEC.shape[1]), axis=1) + rng.random((number, 2))
+    velocity = PARAMS.lattice.velocities[rng.choice(len(PARAMS.lattice), number, p=PARAMS.lattice.prior)]
+    weight = dynamic[cells] / np.bincount(cells, minlength=dynamic.size)[cells]
+    position = (SPEC.x_max, SPEC.y_max) - corner * SPEC.cell
+    particles = Particles(*(a.astype(np.float32) for a in (position, velocity, weight)))
+    return FilterState(belief, particles, np.zeros(SPEC.shape, np.float32))
+
+
+def _squared_errors(exact: tuple[NDArray, NDArray], sampled: tuple[NDArray, NDArray]) -> tuple[float, float]:
+    """Return the mean squared errors of dynamic probability and mean velocity."""
+    worth = exact[0] > WORTH_COMPARING
+    dynamic = np.square(sampled[0] - exact[0])[worth]
+    velocity = np.square(sampled[1] - exact[1]).sum(axis=0)[worth]
+    return dynamic.mean(), np.nanmean(velocity)

@@ -1,0 +1,105 @@
+"""Planes above the ground and the pixel that sees each of their points: equation (1) of the paper (section 3.3)."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from semgrid_edu.camera import Camera, project, transform_points
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+
+
+def plane_heights(n_planes: int = 20, spacing: float = 0.2) -> NDArray[np.float64]:
+    """Return the heights delta_i of the planes above the ground, the lowest on it.
+
+    Parameters
+    ----------
+    n_planes : int
+        D; the paper's 20 (section 4.1).
+    spacing : float
+        The constant d between planes, metres. The paper doesn't give it. 0.2 m is the side of the paper's
+        cells; 20 planes then reach 3.8 m, above cars, people, trucks and most signs.
+
+    Returns
+    -------
+    (D,) float64
+        Metres.
+
+    Examples
+    --------
+    >>> plane_heights(4, spacing=0.5)
+    array([0. , 0.5, 1. , 1.5])
+    """
+    if n_planes < 1:
+        raise ArgumentError("n_planes", "at least one plane", n_planes)
+    if not (np.isfinite(spacing) and spacing > 0):
+        raise ArgumentError("spacing", "a positive distance in metres", spacing)
+    return np.arange(n_planes) * float(spacing)
+
+
+def plane_pixels(spec: GridSpec, heights: ArrayLike, camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Find the pixel that sees each point of each plane: equation (1).
+
+    The point of plane i above cell j lies at (x_j, y_j, delta_i) in the grid frame, and T_camera_from_grid
+    takes it to the camera.
+
+    Parameters
+    ----------
+    spec : GridSpec
+        The cells, (H, W) of them.
+    heights : (D,) float
+        delta_i, metres above the ground.
+    camera : Camera
+
+    Returns
+    -------
+    pixels : (D, H, W, 2) float64
+        u, v; NaN behind the camera.
+    visible : (D, H, W) bool
+        In front of the camera and inside the image.
+
+    Raises
+    ------
+    ArgumentError
+        When `heights` isn't a list of one or more finite numbers.
+    """
+    heights = check_heights(heights)
+    centers, T_camera_from_grid = spec.centers(), camera.T_camera_from_grid
+    visible = np.empty((len(heights), *spec.shape), dtype=bool)
+    pixels = np.empty((*visible.shape, 2))
+    # Plane by plane, as in `sparse.bilinear_matrix`: what is computed on the way stays in the processor's cache.
+    for i, delta in enumerate(heights):
+        points = np.dstack([centers, np.full(spec.shape, delta)])
+        pixels[i], visible[i] = project(transform_points(T_camera_from_grid, points), camera)
+    return pixels, visible
+
+
+def check_heights(heights: ArrayLike) -> NDArray[np.float64]:
+    """Return the heights of planes as an array, (D,) metres, or refuse them.
+
+    Raises
+    ------
+    ArgumentError
+        When they aren't a list of one or more finite numbers.
+    """
+    heights = np.asarray(heights, dtype=np.float64)
+    if heights.ndim != 1 or not heights.size or not np.isfinite(heights).all():
+        raise ArgumentError("heights", "one or more finite metres, shape (D,)", f"shape {heights.shape}: {heights}")
+    return heights
+
+
+def check_points(pixels: NDArray, visible: NDArray, image_size: tuple[int, int]) -> None:
+    """Refuse points that don't fit each other or the image.
+
+    Raises
+    ------
+    ArgumentError
+        When the shapes don't agree or a visible point lies outside the image.
+    """
+    if visible.ndim != 3 or not visible.size or visible.dtype != bool:
+        raise ArgumentError("visible", "bool, shape (D, H, W), not empty", f"{visible.dtype}, shape {visible.shape}")
+    if pixels.shape != (*visible.shape, 2):
+        raise ArgumentError("pixels", f"shape {(*visible.shape, 2)}", pixels.shape)
+    last = np.array(image_size)[::-1] - 1
+    planes = zip(pixels, visible, strict=True)
+    if not all(((points >= 0) & (points <= last))[seen].all() for points, seen in planes):
+        raise ArgumentError("pixels", f"visible points in an image of {image_size} pixels", "points outside it")

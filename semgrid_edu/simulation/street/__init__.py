@@ -1,0 +1,1 @@
+"""The street: ground, plan and scenery, and who moves along it."""

@@ -1,0 +1,91 @@
+"""Provenance: which command, seed and versions made a result, and the checksums that prove it unchanged."""
+
+import json
+import platform
+from importlib.metadata import version
+from pathlib import Path
+
+from semgrid_edu.errors import DataError
+from semgrid_edu.storage.files import sha256, write_json
+
+FILE_NAME = "provenance.json"
+
+
+def versions(*packages: str) -> dict[str, str]:
+    """Return the versions of Python, semgrid_edu and the named packages.
+
+    Examples
+    --------
+    >>> sorted(versions("numpy"))
+    ['numpy', 'python', 'semgrid_edu']
+    """
+    return {"python": platform.python_version()} | {name: version(name) for name in ("semgrid_edu", *packages)}
+
+
+def write_provenance(folder: str | Path, command: str, seed: int, packages: tuple[str, ...], **details: object) -> None:
+    """Record how the files of a folder were made, as its `provenance.json`.
+
+    Parameters
+    ----------
+    folder : path-like
+        The folder; all files below it are recorded with their SHA-256, but for `cache/`, which is made of them, and
+        hidden ones, such as an atomic write leaves that was killed.
+    command : str
+        The command that made them.
+    seed : int
+        The seed it ran with.
+    packages : tuple of str
+        The packages whose versions matter to the result.
+    **details
+        What else a reader should know: a date, a duration, scores. Anything that JSON can hold.
+    """
+    folder = Path(folder)
+    write_json(
+        folder / FILE_NAME,
+        {"command": command, "seed": seed, "versions": versions(*packages), **details, "sha256": _checksums(folder)},
+    )
+
+
+def provenance_problems(folder: str | Path) -> list[str]:
+    """Compare the files of a folder with its `provenance.json`.
+
+    Parameters
+    ----------
+    folder : path-like
+
+    Returns
+    -------
+    list of str
+        One line for each file that is missing, changed or not recorded; empty when all is as it was made.
+
+    Raises
+    ------
+    DataError
+        When the folder has no readable `provenance.json`.
+    """
+    folder = Path(folder)
+    record = folder / FILE_NAME
+    try:
+        expected = json.loads(record.read_text())["sha256"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DataError(record, "a provenance file with checksums", f"{type(error).__name__}: {error}") from error
+    found = _checksums(folder)
+    return (
+        [f"{folder / name}: missing" for name in sorted(expected.keys() - found.keys())]
+        + [f"{folder / name}: not in {FILE_NAME}" for name in sorted(found.keys() - expected.keys())]
+        + [
+            f"{folder / name}: changed"
+            for name in sorted(expected.keys() & found.keys())
+            if expected[name] != found[name]
+        ]
+    )
+
+
+def _checksums(folder: Path) -> dict[str, str]:
+    files = {path.relative_to(folder): path for path in sorted(folder.rglob("*")) if path.is_file()}
+    left_out = (FILE_NAME, "cache")
+    return {
+        name.as_posix(): sha256(path)
+        for name, path in files.items()
+        if name.parts[0] not in left_out and not name.name.startswith(".")
+    }

@@ -1,0 +1,57 @@
+"""Named tensors on disk: safetensors files with a header of strings, written whole or not at all."""
+
+from pathlib import Path
+
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
+from torch import Tensor
+
+from semgrid_edu.errors import DataError
+from semgrid_edu.storage.files import write_bytes
+
+
+def write_tensors(path: str | Path, tensors: dict[str, Tensor], header: dict[str, str] | None = None) -> None:
+    """Write tensors, and what a reader should know of them, to one file, atomically.
+
+    Parameters
+    ----------
+    path : path-like
+        A safetensors file.
+    tensors : dict of str to Tensor
+        Contiguous, on the CPU.
+    header : dict of str to str, optional
+        The order of several entries isn't fixed: with one at most, the same tensors give the same bytes.
+
+    Raises
+    ------
+    OSError
+        Names the file, as when the disk is full; `path` is then as it was.
+    """
+    write_bytes(path, save(tensors, metadata=header))
+
+
+def read_tensors(path: str | Path) -> tuple[dict[str, str], dict[str, Tensor]]:
+    """Read the header and the tensors of a safetensors file.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    header : dict of str to str
+        Empty when the file has none.
+    tensors : dict of str to Tensor
+
+    Raises
+    ------
+    DataError
+        When the file is missing or damaged.
+    """
+    if not Path(path).is_file():
+        raise DataError(path, "a safetensors file", "no such file")
+    try:
+        with safe_open(path, framework="pt") as file:
+            return file.metadata() or {}, {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+    except (OSError, SafetensorError) as error:
+        raise DataError(path, "a safetensors file", error) from error

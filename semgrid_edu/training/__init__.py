@@ -1,0 +1,16 @@
+"""Learning the weights: batches, loss, loop, checkpoints, devices and processes (paper, section 4.1)."""
+
+from semgrid_edu.training.loop import CHECKPOINT, CHECKPOINT_EVERY, train
+from semgrid_edu.training.loss import Objective, class_frequencies, class_weights, median_frequency_weights
+from semgrid_edu.training.params import TrainingParams
+
+__all__ = [
+    "CHECKPOINT",
+    "CHECKPOINT_EVERY",
+    "Objective",
+    "TrainingParams",
+    "class_frequencies",
+    "class_weights",
+    "median_frequency_weights",
+    "train",
+]

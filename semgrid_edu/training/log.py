@@ -1,0 +1,133 @@
+"""What a training writes down of every step (section 4.1)."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import DataError
+from semgrid_edu.storage.files import named_errors, write_text
+
+LOG = "log.csv"
+"""The file's name in the folder of a training."""
+
+
+class Step(NamedTuple):
+    """One line: number of the step, its stage ("image" or "grid"), its learning rate, and the loss before it."""
+
+    iteration: int
+    stage: str
+    learning_rate: float
+    loss: float
+
+
+HEADER = ",".join(Step._fields) + "\n"
+
+
+class TrainingLog(NamedTuple):
+    """All steps of a training, an array each.
+
+    Parameters
+    ----------
+    iteration : (N,) int
+        The number of the step, from 0.
+    stage : (N,) str
+        "image" or "grid".
+    learning_rate : (N,) float
+    loss : (N,) float
+        Weighted cross-entropy of the batch before the step, nats.
+    """
+
+    iteration: NDArray[np.int64]
+    stage: NDArray[np.str_]
+    learning_rate: NDArray[np.float64]
+    loss: NDArray[np.float64]
+
+
+def read_log(path: str | Path) -> TrainingLog:
+    """Read the log of a training, ended or not.
+
+    Parameters
+    ----------
+    path : path-like
+        The `log.csv` that `train` writes.
+
+    Returns
+    -------
+    TrainingLog
+
+    Raises
+    ------
+    DataError
+        When there is no such file, or one of its lines, which is named, isn't that of a log.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise DataError(path, "the log of a training", "no such file")
+    steps = _steps(path, _lines(path))
+    columns = zip(*steps, strict=True) if steps else [()] * len(Step._fields)
+    types = (np.int64, np.str_, np.float64, np.float64)
+    return TrainingLog(*(np.array(column, kind) for column, kind in zip(columns, types, strict=True)))
+
+
+def _lines(path: Path) -> list[str]:
+    return path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)
+
+
+def _steps(path: Path, lines: list[str]) -> list[Step]:
+    """Return what the lines of a log say, after checking all of them."""
+    header, *others = [line.rstrip("\n") for line in lines] or [""]
+    if header != HEADER.strip():
+        raise DataError(path, f"{HEADER.strip()} in line 1", repr(header))
+    return [_step(path, number, line) for number, line in enumerate(others, start=2)]
+
+
+def _step(path: Path, number: int, line: str) -> Step:
+    try:
+        iteration, stage, learning_rate, loss = line.split(",")
+        if stage not in ("image", "grid"):
+            raise ValueError
+        return Step(int(iteration), stage, float(learning_rate), float(loss))
+    except ValueError:
+        raise DataError(path, f"{HEADER.strip()} in line {number}", repr(line)) from None
+
+
+def begin_log(path: Path, start: int) -> None:
+    """Begin a log, or go on with it before the step `start`, dropping later ones that no checkpoint holds.
+
+    Parameters
+    ----------
+    path : Path
+    start : int
+        The number of the first step to come.
+
+    Raises
+    ------
+    DataError
+        When a step before `start` is missing, or its line, which is named, isn't one of a log.
+    """
+    lines = [HEADER]
+    if start:
+        lines = _lines(path)[: start + 1] if path.exists() else []
+        if len(lines) <= start or not lines[-1].endswith("\n"):
+            raise DataError(path, f"the {start} steps that the checkpoint continues", max(len(lines) - 1, 0) or "none")
+        _steps(path, lines)
+    write_text(path, "".join(lines))
+
+
+def append_step(path: Path, step: Step) -> None:
+    """Add a line; it is in the file at once, for whoever watches.
+
+    Parameters
+    ----------
+    path : Path
+    step : Step
+
+    Raises
+    ------
+    OSError
+        Names the file, as when the disk is full.
+    """
+    with named_errors(path), path.open("a", encoding="utf-8", newline="\n") as log:
+        log.write(f"{step.iteration},{step.stage},{step.learning_rate:.6g},{step.loss:.6g}\n")

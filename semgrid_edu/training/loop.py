@@ -1,0 +1,172 @@
+"""The training loop: stochastic gradient descent, end to end (paper, section 4.1)."""
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+
+import torch
+from torch import Tensor, nn
+from tqdm.auto import trange
+
+from semgrid_edu.datasets.training_set import Sample
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, save_net
+from semgrid_edu.occupancy import N_STATES
+from semgrid_edu.training.allocator import keep_freed_memory
+from semgrid_edu.training.batches import Batch, draw_batch, share_of_batch
+from semgrid_edu.training.checkpoint import load_checkpoint, save_checkpoint
+from semgrid_edu.training.devices import mixed_precision
+from semgrid_edu.training.distributed import in_parallel, process_total, rank, shared_batch_norm, world_size
+from semgrid_edu.training.log import LOG, Step, append_step, begin_log
+from semgrid_edu.training.loss import Objective, class_weights
+from semgrid_edu.training.params import TrainingParams
+
+CHECKPOINT = "checkpoint.safetensors"
+CHECKPOINT_EVERY = 100
+"""Iterations between checkpoints: some twenty seconds of work is lost at most."""
+
+
+def train(
+    net: SemanticGridNet,
+    dataset: Sequence[Sample],
+    folder: str | Path,
+    params: TrainingParams | None = None,
+    seed: int = 0,
+    resume: bool = False,
+    device: torch.device | str = "cpu",
+) -> None:
+    """Train a network, leaving a log of every step and a checkpoint to resume from.
+
+    All that is random is a function of the seed and the number of the step. So a run that was killed and
+    resumed ends with the same weights, bit for bit (on a CPU), as one that was not.
+
+    Inside `process_group` with several processes, each takes its share of every batch, and the sum is the same
+    step; all must see the same data and folder.
+
+    Parameters
+    ----------
+    net : SemanticGridNet
+        Of `build_net`; changed in place, in evaluation mode afterwards, on `device`.
+    dataset : sequence of Sample
+        The frames to learn from.
+    folder : path-like
+        Takes `log.csv`, the network after the first stage as `image_stage.safetensors`, the trained one as
+        `weights.safetensors` and, until that is there, `checkpoint.safetensors`.
+    params : TrainingParams, optional
+    seed : int
+        Of the order of the frames and of their jitter.
+    resume : bool
+        Whether to continue from the folder's checkpoint.
+    device : device
+        Where to compute.
+
+    Raises
+    ------
+    ArgumentError
+        When the data don't fit the network, the checkpoint is of another run, or the loss isn't finite.
+    DataError
+        When there is no checkpoint to resume from, or it is damaged; or there is one, or a trained network, that
+        a training which doesn't resume would overwrite.
+    """
+    params, folder, device = params or TrainingParams(), Path(folder), torch.device(device)
+    _check_folder(folder, resume)
+    _check_dataset(net, dataset, params)
+    stages = [stage for stage, n in (("image", params.image_iterations), ("grid", params.grid_iterations)) if n]
+    alpha = {stage: class_weights(dataset, stage, net.n_classes, params.weight_limit) for stage in stages}
+    optimiser = torch.optim.SGD(net.to(device).parameters(), lr=params.learning_rate, momentum=params.momentum)
+    run = {"seed": seed, "frames": len(dataset), **asdict(params), **asdict(net.architecture)}
+    run |= {f"{stage} class weights": weights.tolist() for stage, weights in alpha.items()}
+    start = load_checkpoint(folder / CHECKPOINT, run, net, optimiser) if resume else 0
+    if rank() == 0:
+        begin_log(folder / LOG, start)
+    keep_freed_memory()
+    with shared_batch_norm(net.train()), _gradients_as_found(net):
+        steps = trange(start, params.iterations, initial=start, total=params.iterations, disable=rank() > 0)
+        for iteration in steps:
+            stage, optimiser.param_groups[0]["lr"] = params.stage(iteration)
+            if iteration in (start, params.image_iterations):
+                objective = _objective(net, stage, alpha[stage].to(device), params.end_to_end)
+            batch = draw_batch(dataset, params.batch_size, params.jitter, iteration, seed, params.mirror)
+            loss = _learn(objective, optimiser, share_of_batch(batch, rank(), world_size(), device), device)
+            step = Step(iteration, stage, optimiser.param_groups[0]["lr"], loss)
+            _check_finite(step, params.learning_rate)
+            steps.set_postfix(stage=stage, loss=f"{loss:.3f}", refresh=False)
+            if rank() == 0:
+                _write_down(step, folder, params.image_iterations, run, net, optimiser)
+    net.eval()
+    if rank() == 0:
+        save_net(net, folder / WEIGHTS)
+        (folder / CHECKPOINT).unlink(missing_ok=True)
+
+
+def _objective(net: SemanticGridNet, stage: str, alpha: Tensor, end_to_end: bool) -> nn.Module:
+    """Return the loss of a stage that begins, after stopping what doesn't learn in it."""
+    if stage == "grid" and not end_to_end:
+        net.segmenter.eval().requires_grad_(False)
+    return in_parallel(Objective(net, stage, alpha), some_unused=stage == "image")
+
+
+def _learn(objective: nn.Module, optimiser: torch.optim.SGD, batch: Batch, device: torch.device) -> float:
+    """Change the weights by one step of gradient descent and return the loss before it."""
+    optimiser.zero_grad()
+    with mixed_precision(device):
+        loss = objective(batch)
+    loss.backward()
+    optimiser.step()
+    return process_total(loss.detach()).item() / world_size()
+
+
+def _write_down(
+    step: Step, folder: Path, image_iterations: int, run: dict, net: SemanticGridNet, optimiser: torch.optim.SGD
+) -> None:
+    """Log a step, and save what is due after it."""
+    append_step(folder / LOG, step)
+    done = step.iteration + 1
+    if done == image_iterations:
+        save_net(net, folder / IMAGE_STAGE)
+    if done % CHECKPOINT_EVERY == 0:
+        save_checkpoint(folder / CHECKPOINT, run, net, optimiser, done)
+
+
+@contextmanager
+def _gradients_as_found(net: nn.Module) -> Iterator[None]:
+    """Let the weights that learnt before the block learn after it."""
+    found = [(parameter, parameter.requires_grad) for parameter in net.parameters()]
+    try:
+        yield
+    finally:
+        for parameter, learns in found:
+            parameter.requires_grad_(learns)
+
+
+def _check_folder(folder: Path, resume: bool) -> None:
+    """Refuse to overwrite a training."""
+    if (folder / WEIGHTS).exists():
+        raise DataError(folder, "a folder without a trained network, which would be lost", WEIGHTS)
+    if (folder / CHECKPOINT).exists() and not resume:
+        raise DataError(folder, "a folder without a training to resume (--resume continues it)", CHECKPOINT)
+
+
+def _check_dataset(net: SemanticGridNet, dataset: Sequence[Sample], params: TrainingParams) -> None:
+    """Refuse a network that can't be saved, frames that it can't take, and batches that can't be shared."""
+    if not hasattr(net, "architecture"):
+        raise ArgumentError("net", "a network of build_net, which records its architecture", "one made by hand")
+    if len(dataset) < params.batch_size:
+        raise ArgumentError("dataset", f"at least one batch of {params.batch_size} frames", f"{len(dataset)} frames")
+    if params.batch_size % world_size():
+        raise ArgumentError("batch_size", f"a multiple of {world_size()}, the number of processes", params.batch_size)
+    size, shape = net.sampler.image_size, net.sampler.planes_shape[1:]
+    expected = Sample((3, *size), size, (N_STATES, *shape), shape)
+    for k, sample in enumerate(dataset):
+        for name, part, want in zip(Sample._fields, sample, expected, strict=True):
+            if tuple(part.shape) != want:
+                raise ArgumentError("dataset", f"{name} of shape {want}", f"{tuple(part.shape)} in frame {k}")
+
+
+def _check_finite(step: Step, learning_rate: float) -> None:
+    """Refuse to go on when nothing can be learnt any more."""
+    if not math.isfinite(step.loss):
+        found = f"{learning_rate}, with which it is {step.loss} in iteration {step.iteration}"
+        raise ArgumentError("learning_rate", "a rate that keeps the loss finite", found)

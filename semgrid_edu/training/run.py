@@ -1,0 +1,158 @@
+"""Train a network on a data set, with its provenance (paper, section 4.1)."""
+
+import math
+from dataclasses import asdict, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+from semgrid_edu.datasets.index import INDEX_FILE
+from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.networks import Architecture, build_net, load_imagenet
+from semgrid_edu.storage.files import sha256
+from semgrid_edu.storage.provenance import write_provenance
+from semgrid_edu.training.distributed import first_process_first, process_group, rank, world_size
+from semgrid_edu.training.loop import CHECKPOINT, TrainingParams, train
+
+PAPER_IMAGE = (375, 1242)
+"""Height and width of KITTI's images, pixels, which the paper's networks see as they are."""
+
+
+def architecture(segmenter: str, preset: str = "compact") -> Architecture:
+    """Return the network that a preset names, with the images and the grid that belong to it.
+
+    Parameters
+    ----------
+    segmenter : str
+        The image network, as `build_segmenter` takes it.
+    preset : str
+        "compact" for the CPU; "paper" has the published networks, KITTI's images as they are, and 0.2 m cells.
+
+    Returns
+    -------
+    Architecture
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such preset.
+    """
+    if preset == "compact":
+        return Architecture(segmenter)
+    if preset == "paper":
+        return Architecture(segmenter, preset, image_size=PAPER_IMAGE, grid=GridSpec.paper())
+    raise ArgumentError("--preset", "compact or paper", repr(preset))
+
+
+def training_params(
+    preset: str, iterations: int, end_to_end: bool = True, from_imagenet: bool = False
+) -> TrainingParams:
+    """Return how a preset learns.
+
+    Parameters
+    ----------
+    preset : str
+        "compact" for the defaults; "paper" for section 4.1: a learning rate of 1e-3, and weights of the classes as
+        they come.
+    iterations : int
+        Of each stage.
+    end_to_end : bool
+        Whether the grid teaches the image network too.
+    from_imagenet : bool
+        Whether the image network has learnt on ImageNet: end to end, it then needs no first stage.
+
+    Returns
+    -------
+    TrainingParams
+    """
+    image_iterations = 0 if from_imagenet and end_to_end else iterations
+    params = TrainingParams(image_iterations, iterations, end_to_end=end_to_end)
+    return params if preset == "compact" else replace(params, learning_rate=1e-3, weight_limit=math.inf)
+
+
+def train_network(
+    dataset_dir: str | Path,
+    folder: str | Path,
+    segmenter: str,
+    params: TrainingParams,
+    seed: int = 0,
+    resume: bool = False,
+    *,
+    preset: str = "compact",
+    imagenet: str | Path | None = None,
+    device: str = "cpu",
+) -> None:
+    """Train on the split "train" of a data set; under torchrun, in all its processes.
+
+    Parameters
+    ----------
+    dataset_dir : path-like
+        Such as data/minikitti.
+    folder : path-like
+        Takes what `train` writes, and `provenance.json`, which also names the data by their index's SHA-256.
+    segmenter, preset : str
+        As `architecture` takes them.
+    params : TrainingParams
+    seed : int
+        Of the initial weights, and of the order and looks of the frames.
+    resume : bool
+        Whether to continue a run that was interrupted.
+    imagenet : path-like, optional
+        First weights of the image network, for the preset "paper": see `load_imagenet`.
+    device : str
+        As `choose_device` takes it.
+    """
+    began, description = datetime.now(UTC), architecture(segmenter, preset)
+    with process_group(device) as chosen:
+        with first_process_first():
+            dataset = TrainingSet(dataset_dir, "train", description.grid, description.image_size)
+        net = build_net(description, dataset.camera, seed)
+        if imagenet:
+            load_imagenet(net.segmenter, imagenet)
+        train(net, dataset, folder, params, seed, resume, chosen)
+        processes, is_first = world_size(), rank() == 0
+    if is_first:
+        details = {
+            "date": f"{began:%Y-%m-%d}",
+            "minutes": round((datetime.now(UTC) - began).total_seconds() / 60, 1),
+            "resumed": resume,
+            "device": chosen.type,
+            "processes": processes,
+            # JSON has no infinity.
+            "params": {name: str(value) if value == math.inf else value for name, value in asdict(params).items()},
+            "dataset": sha256(Path(dataset_dir) / INDEX_FILE),
+            **({"imagenet": sha256(imagenet)} if imagenet else {}),
+        }
+        command = _command(dataset_dir, folder, description, imagenet, seed, params)
+        write_provenance(folder, command, seed, ("torch", "numpy", "safetensors"), **details)
+
+
+def _command(
+    dataset_dir: str | Path,
+    folder: str | Path,
+    description: Architecture,
+    imagenet: str | Path | None,
+    seed: int,
+    params: TrainingParams,
+) -> str:
+    """Return the command that trains so."""
+    options = [
+        f"--data {_name(dataset_dir)} --out {_name(folder)} --segmenter {description.segmenter}",
+        f"--preset {description.preset}" if description.preset != Architecture.preset else "",
+        f"--imagenet {_name(imagenet)}" if imagenet else "",
+        f"--seed {seed} --iterations {params.grid_iterations}",
+        "" if params.end_to_end else "--two-stage",
+    ]
+    return " ".join(["semgrid-edu train", *filter(None, options)])
+
+
+def _name(path: str | Path) -> str:
+    """Return the last part of a path, that of the current folder too."""
+    return Path(path).resolve().name
+
+
+def how_to_go_on(folder: str | Path) -> str:
+    """Return what to do after a training was interrupted: its steps since the last checkpoint are lost."""
+    path = Path(folder) / CHECKPOINT
+    return f"--resume goes on from {path}" if path.exists() else f"start again: there is no {path} yet"

@@ -1,0 +1,48 @@
+"""What benchmarks compare does the same, and what they time is there; how long it takes is no test's business."""
+
+import bench_frame
+import bench_networks
+import bench_planes
+import numpy as np
+import torch
+
+from semgrid_edu.datasets.samples import sample_drive
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.networks import Architecture, build_net
+from semgrid_edu.planes import plane_pixels
+
+
+def test_all_ways_to_sample_planes_give_the_same(monkeypatch):
+    camera = bench_planes.kitti_camera().resized((48, 160))
+    monkeypatch.setattr(bench_planes, "KITTI_SIZE", camera.size)
+    pixels, visible = plane_pixels(GridSpec(-4, 68, -16, 16, cell=2.0), [0.0, 0.9, 2.0], camera)
+    assert not visible.all()
+    generator = torch.Generator().manual_seed(0)
+    scores = torch.randn(1, 4, *camera.size, generator=generator, requires_grad=True)
+    weight = torch.randn(5, 4, 3, 1, 1, generator=generator, requires_grad=True)
+    ways = {
+        name: bench_planes.tasks(name, way(pixels, visible), scores, weight)
+        for name, way in bench_planes.SAMPLINGS.items()
+    }
+    bench_planes.check_agreement(ways, scores, weight)
+    sampled, forward, learnt = (run() for run in ways[bench_planes.OURS].values())
+    assert sampled.shape == (1, 4, 3, 36, 16)
+    expected = torch.einsum("bcdhw,kcd->bkhw", sampled, weight[..., 0, 0])
+    for reduced in (forward, learnt):
+        torch.testing.assert_close(reduced, expected, rtol=1e-4, atol=1e-4)
+
+
+def test_each_step_of_both_stages_is_timed(monkeypatch):
+    monkeypatch.setattr(bench_networks, "STEPS", 3)
+    monkeypatch.setattr(bench_networks, "WARM_UP", 1)
+    image, grid = bench_networks.step_times(build_net(Architecture(), sample_drive().camera))
+    assert len(image) == len(grid) == 1  # without warming up and the last, which ends with what comes after it
+    assert min(*image, *grid) > 0
+
+
+def test_each_part_of_a_frame_is_timed():
+    drive = sample_drive()
+    times = bench_frame.frame_times([drive[0], drive[1]], build_net(Architecture(), drive.camera).eval())
+    assert times.shape == (2, len(bench_frame.ROWS) + 2)
+    assert (times > 0).all()
+    np.testing.assert_allclose(times[:, : len(bench_frame.ROWS)].sum(axis=1), times[:, -2])

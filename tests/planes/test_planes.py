@@ -1,0 +1,406 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+import torch.nn.functional as F
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.ndimage import map_coordinates
+from scipy.spatial.transform import Rotation
+
+from semgrid_edu.camera import Camera, rigid_transform
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.networks import Architecture, build_net
+from semgrid_edu.planes import PlaneSampler, plane_heights, plane_pixels, sample_planes_naive
+from semgrid_edu.planes import sampler as sampling
+
+# Grid axes (x ahead, y left, z up) to camera axes (z ahead, x right, y down), one metre above the ground.
+LOOKING_AHEAD = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]])
+
+
+def _camera(size=(101, 201), focal=100.0):
+    K = np.array([[focal, 0, 100], [0, focal, 50], [0, 0, 1.0]])
+    return Camera(K, LOOKING_AHEAD, size, lidar_height=1.0)
+
+
+def _random_points(rng, size, shape=(2, 3, 4)):
+    """Pixels anywhere in an image of that size, its borders included, and about a quarter of them not visible."""
+    last = np.array(size)[::-1] - 1
+    pixels = rng.uniform(0, 1, (*shape, 2)) * last
+    pixels[0, 0, :3] = [[0, 0], last, [last[0], 0]]
+    visible = rng.random(shape) < 0.75
+    pixels[~visible] = np.nan
+    return pixels, visible
+
+
+def test_planes_stand_on_the_ground_at_equal_distances():
+    heights = plane_heights()
+    assert len(heights) == 20
+    assert heights[0] == 0
+    np.testing.assert_allclose(np.diff(heights), heights[1])
+
+
+def test_equation_1_by_hand():
+    # One cell, its centre 10 m ahead and 2 m to the left: X = -2, Z = 10, and Y = 1 on the ground, 0 at 1 m.
+    spec = GridSpec(x_min=9.5, x_max=10.5, y_min=1.5, y_max=2.5, cell=1.0)
+    pixels, visible = plane_pixels(spec, [0.0, 1.0], _camera())
+    np.testing.assert_allclose(pixels[:, 0, 0], [[80, 60], [80, 50]])
+    assert visible.all()
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.floats(-0.6, 0.6), min_size=3, max_size=3), st.lists(st.floats(-1, 1), min_size=3, max_size=3))
+def test_equation_1_for_a_camera_that_rolls_pitches_and_yaws(angles, place):
+    """Without 4x4 matrices: turn what leads from the camera to each point, divide by the depth."""
+    turn = Rotation.from_matrix(LOOKING_AHEAD[:3, :3]) * Rotation.from_euler("xyz", angles)
+    eye = np.array([0.0, 0.0, 1.7]) + place  # in the grid frame
+    T_camera_from_grid = rigid_transform(turn.as_matrix(), -turn.apply(eye))
+    T_camera_from_lidar = T_camera_from_grid @ rigid_transform(np.eye(3), [0, 0, 1.73])
+    camera = Camera(np.array([[90.0, 0, 100], [0, 110, 50], [0, 0, 1]]), T_camera_from_lidar, (101, 201), 1.73)
+    spec, heights = GridSpec(x_min=-5, x_max=20, y_min=-8, y_max=8, cell=1.0), np.array([0.0, 0.7, 2.1])
+    pixels, visible = plane_pixels(spec, heights, camera)
+    for i, delta in enumerate(heights):
+        to_points = np.dstack([spec.centers(), np.full(spec.shape, delta)]).reshape(-1, 3) - eye
+        X, Y, Z = turn.apply(to_points).T
+        sure = np.abs(Z) > 1e-9
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u, v = 90 * X / Z + 100, 110 * Y / Z + 50
+        inside = (Z > 0) & (u >= 0) & (u <= 200) & (v >= 0) & (v <= 100)
+        at_border = np.minimum.reduce([abs(u), abs(u - 200), abs(v), abs(v - 100)]) < 1e-9
+        assert (visible[i].ravel() == inside)[sure & ~at_border].all()
+        np.testing.assert_allclose(pixels[i].reshape(-1, 2)[inside & sure], np.c_[u, v][inside & sure], atol=1e-6)
+
+
+def test_points_behind_the_camera_are_not_visible():
+    spec = GridSpec(x_min=-4, x_max=4, y_min=-1, y_max=1, cell=1.0)
+    pixels, visible = plane_pixels(spec, [1.0], _camera())
+    assert visible[0, :4].all()
+    assert not visible[0, 4:].any()
+    assert np.isnan(pixels[0, 4:]).all()
+
+
+@pytest.mark.parametrize(
+    ("y", "height"), [(10.0, 1.0), (-10.0, 1.0), (0.0, 6.0), (0.0, -4.0)], ids=["left", "right", "top", "bottom"]
+)
+def test_the_image_border_is_the_centre_of_its_last_pixels(y, height):
+    # At 10 m, u = 100 - 10 y and v = 60 - 10 delta: the cases are the first and last column and row of 101 x 201.
+    for beyond, inside in ((1.0, True), (1.001, False)):
+        left, up = y * beyond, 1 + (height - 1) * beyond
+        spec = GridSpec(x_min=9.5, x_max=10.5, y_min=left - 0.5, y_max=left + 0.5, cell=1.0)
+        assert plane_pixels(spec, [up], _camera())[1].item() is inside
+
+
+@pytest.mark.parametrize("ahead", [1e-9, 0.0, -0.0, -1e-9, -2.0])
+def test_points_beside_the_lens_are_not_visible(ahead):
+    # Two cells, their centres half a metre left and right of the lens, and hardly ahead of it.
+    spec = GridSpec(x_min=ahead - 0.5, x_max=ahead + 0.5, y_min=-1.0, y_max=1.0, cell=1.0)
+    pixels, visible = plane_pixels(spec, [0.0, 1.0, 2.0], _camera())
+    assert not visible.any()
+    assert np.isnan(pixels).all() == (ahead <= 0)
+    scores = torch.ones(1, 1, *_camera().size)
+    assert (PlaneSampler(pixels, visible, _camera().size)(scores) == 0).all()
+
+
+def test_equation_2_by_hand():
+    scores = np.arange(9.0).reshape(1, 3, 3)  # row n holds 3 n, 3 n + 1, 3 n + 2
+    cases = {(0, 0): 0, (1, 2): 7, (2, 2): 8, (0.5, 0): 0.5, (0, 0.5): 1.5, (0.25, 1.5): 4.75, (1.75, 0.75): 4.0}
+    pixels = np.array(list(cases), dtype=float).reshape(1, 1, -1, 2)
+    visible = np.ones(pixels.shape[:3], dtype=bool)
+    np.testing.assert_allclose(sample_planes_naive(scores, pixels, visible).ravel(), list(cases.values()))
+
+
+def test_the_literal_twin_takes_lists_and_tensors_too():
+    scores, points, visible = [[[0.0, 1.0], [2.0, 3.0]]], [[[[0.5, 0.5]]]], [[[True]]]
+    assert sample_planes_naive(scores, points, visible).item() == 1.5
+    assert sample_planes_naive(*map(torch.tensor, (scores, points, visible))).item() == 1.5
+
+
+def test_each_kernel_weight_by_hand():
+    scores = np.zeros((1, 3, 3))
+    scores[0, 1:, 1:] = [[1, 10], [100, 1000]]
+    # u = 1.25, v = 1.5: weights (3/4, 1/4) across and (1/2, 1/2) down.
+    value = sample_planes_naive(scores, np.full((1, 1, 1, 2), (1.25, 1.5)), np.ones((1, 1, 1), dtype=bool))
+    assert value.item() == pytest.approx(0.375 * 1 + 0.125 * 10 + 0.375 * 100 + 0.125 * 1000)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 6), st.integers(1, 7), st.integers(1, 4), st.integers(1, 3))
+def test_fast_and_literal_twins_agree(seed, h, w, n_classes, batch):
+    rng = np.random.default_rng(seed)
+    pixels, visible = _random_points(rng, (h, w))
+    scores = rng.normal(size=(batch, n_classes, h, w))
+    fast = PlaneSampler(pixels, visible, (h, w))(torch.from_numpy(scores).float()).numpy()
+    literal = np.stack([sample_planes_naive(image, pixels, visible) for image in scores])
+    assert fast.dtype == np.float32
+    np.testing.assert_allclose(fast, literal, atol=2e-6)
+    assert (fast[:, :, ~visible] == 0).all()
+
+
+def _near(last):
+    """Where rounding could reach for a pixel that isn't there: on, between and a hair beside centres of pixels."""
+    on = np.arange(2 * last + 1) / 2
+    beside = np.concatenate([np.nextafter(on, -1), np.nextafter(on, last + 1)])
+    return st.sampled_from(np.clip(np.concatenate([on, beside]), 0, last).tolist())
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.data(), st.integers(1, 4), st.integers(1, 5))
+def test_twins_and_their_gradients_agree_on_and_beside_pixels_up_to_the_border(data, h, w):
+    drawn = data.draw(st.lists(st.tuples(_near(w - 1), _near(h - 1)), min_size=6, max_size=6))
+    pixels, visible = np.array(drawn).reshape(1, 2, 3, 2), np.ones((1, 2, 3), dtype=bool)
+    rng = np.random.default_rng(0)
+    scores = torch.from_numpy(rng.normal(size=(1, 2, h, w))).requires_grad_()
+    fast = PlaneSampler(pixels, visible, (h, w)).double()(scores)
+    np.testing.assert_allclose(fast[0].detach(), sample_planes_naive(scores[0].detach(), pixels, visible), atol=1e-6)
+    # dp/ds is the kernel: a point gives each pixel its gradient times k(u - m) k(v - n).
+    grad, literal = rng.normal(size=(2, 1, 2, 3)), np.zeros((2, h, w))
+    for c, i, row, col, n, m in np.ndindex(2, 1, 2, 3, h, w):
+        u, v = pixels[i, row, col]
+        literal[c, n, m] += grad[c, i, row, col] * max(0, 1 - abs(u - m)) * max(0, 1 - abs(v - n))
+    fast.backward(torch.from_numpy(grad)[None])
+    np.testing.assert_allclose(scores.grad[0], literal, atol=1e-6)
+
+
+def test_sampling_is_exact_to_a_thousandth_of_a_pixel():
+    # On the ramps s = u and s = v the value read is the pixel read from: an offset shows as it is.
+    rng = np.random.default_rng(0)
+    h, w = 96, 320
+    pixels, visible = _random_points(rng, (h, w), shape=(4, 20, 30))
+    v, u = np.mgrid[:h, :w].astype(np.float32)
+    read = PlaneSampler(pixels, visible, (h, w))(torch.from_numpy(np.stack([u, v]))[None])[0].numpy()
+    np.testing.assert_allclose(read[:, visible].T, pixels[visible], atol=1e-3)
+
+
+@pytest.mark.parametrize("size", [(96, 320), (7, 5)])
+def test_sampling_agrees_with_scipy_and_torch(size):
+    rng = np.random.default_rng(1)
+    pixels, visible = _random_points(rng, size, shape=(3, 8, 9))
+    scores = rng.normal(size=(2, *size)).astype(np.float32)
+    ours = PlaneSampler(pixels, visible, size)(torch.from_numpy(scores)[None])[0].numpy()
+    by_scipy = [map_coordinates(image, pixels[visible].T[::-1], order=1) for image in scores]
+    np.testing.assert_allclose(ours[:, visible], by_scipy, atol=1e-4)
+    grid = torch.from_numpy(2 * pixels[visible] / (size[1] - 1, size[0] - 1) - 1).float()
+    by_torch = F.grid_sample(torch.from_numpy(scores)[None], grid[None, None], align_corners=True)[0, :, 0]
+    np.testing.assert_allclose(ours[:, visible], by_torch, atol=1e-4)
+
+
+def test_the_gradient_is_exact():
+    rng = np.random.default_rng(2)
+    pixels, visible = _random_points(rng, (4, 5))
+    sampler = PlaneSampler(pixels, visible, (4, 5)).double()
+    scores = torch.from_numpy(rng.normal(size=(2, 3, 4, 5))).requires_grad_()
+    assert torch.autograd.gradcheck(sampler, scores)
+    assert torch.autograd.gradgradcheck(sampler, scores)
+
+
+def test_the_backward_pass_is_the_adjoint():
+    # <A x, y> = <x, A^T y> for every x and y.
+    rng = np.random.default_rng(3)
+    pixels, visible = _random_points(rng, (30, 40), shape=(5, 20, 10))
+    x = torch.from_numpy(rng.normal(size=(2, 3, 30, 40))).requires_grad_()
+    planes = PlaneSampler(pixels, visible, (30, 40)).double()(x)
+    y = torch.from_numpy(rng.normal(size=planes.shape))
+    planes.backward(y)
+    torch.testing.assert_close((planes * y).sum(), (x * x.grad).sum())
+
+
+def _sampler_and_scores():
+    rng = np.random.default_rng(5)
+    sampler = PlaneSampler(*_random_points(rng, (30, 40), shape=(5, 20, 10)), (30, 40))
+    return sampler, torch.from_numpy(rng.normal(size=(2, 3, 30, 40))).float()
+
+
+def test_layout_in_memory_doesnt_matter():
+    sampler, scores = _sampler_and_scores()
+    expected = sampler(scores)
+    wider = torch.zeros(4, 3, 60, 80)
+    wider[::2, :, ::2, ::2] = scores
+    for same in (
+        scores.contiguous(memory_format=torch.channels_last),
+        scores.transpose(2, 3).contiguous().transpose(2, 3),
+        wider[::2, :, ::2, ::2],
+    ):
+        assert torch.equal(sampler(same), expected)
+    assert expected.permute(0, 2, 3, 4, 1).is_contiguous()
+    one_for_all = scores[:, :1, :1, :1].expand(-1, 3, 30, 40)
+    torch.testing.assert_close(sampler(one_for_all), sampler(one_for_all.clone()), rtol=0, atol=0)
+    upstream = torch.ones(()).expand(expected.shape)  # as .sum().backward() hands it on
+    gradients = [torch.autograd.functional.vjp(sampler, scores, g)[1] for g in (upstream, upstream.clone())]
+    assert torch.equal(*gradients)
+
+
+def test_the_type_of_the_scores_is_kept():
+    sampler, scores = _sampler_and_scores()
+    exact = sampler(scores.double())
+    assert exact.dtype == torch.float64
+    torch.testing.assert_close(sampler(scores).double(), exact, rtol=0, atol=1e-6)
+
+
+def test_mixed_precision_runs_forward_and_backward():
+    sampler, scores = _sampler_and_scores()
+    conv = torch.nn.Conv2d(3, 3, 1)
+    expected = sampler(conv(scores))
+    with torch.autocast("cpu", dtype=torch.bfloat16):
+        planes = sampler(conv(scores))
+    assert planes.dtype == torch.bfloat16
+    planes.float().square().sum().backward()
+    assert torch.isfinite(conv.weight.grad).all()
+    # bfloat16 keeps eight bits.
+    torch.testing.assert_close(planes.float(), expected, rtol=0, atol=0.05)
+
+
+def test_threads_dont_change_a_bit():
+    sampler, scores = _sampler_and_scores()
+    threads, results = torch.get_num_threads(), []
+    try:
+        for n in (1, 2):
+            torch.set_num_threads(n)
+            results.append((sampler(scores), *torch.autograd.functional.vjp(sampler, scores, sampler(scores))))
+    finally:
+        torch.set_num_threads(threads)
+    for one, two in zip(*results, strict=True):
+        assert torch.equal(one, two)
+
+
+def test_a_sampler_holds_no_weights():
+    sampler = PlaneSampler(*_random_points(np.random.default_rng(4), (4, 5)), (4, 5))
+    assert not list(sampler.parameters())
+    assert not sampler.state_dict()
+
+
+def test_nothing_visible_gives_zero():
+    sampler = PlaneSampler(np.full((1, 2, 2, 2), np.nan), np.zeros((1, 2, 2), dtype=bool), (4, 5))
+    assert (sampler(torch.ones(1, 3, 4, 5)) == 0).all()
+
+
+def test_a_drawn_world_lands_in_its_cells():
+    """Paint the ground's y coordinate in an image by a ray through each pixel: plane 0 must read it back."""
+    camera = _camera(size=(101, 201))
+    v, u = np.mgrid[51:101, :201].astype(float)
+    depth = 100.0 / (v - 50)  # where the ray meets the ground, 1 m below
+    left = np.zeros(camera.size)
+    left[51:] = -(u - 100) / 100 * depth
+    spec = GridSpec(x_min=2.0, x_max=5.0, y_min=-1.5, y_max=1.5, cell=0.5)
+    pixels, visible = plane_pixels(spec, [0.0], camera)
+    scores = torch.from_numpy(left).float()[None, None]
+    planes = PlaneSampler(pixels, visible, camera.size)(scores)[0, 0, 0]
+    np.testing.assert_allclose(planes, spec.centers()[..., 1], atol=0.01)
+
+
+COARSE = GridSpec(x_min=2, x_max=12, y_min=-4, y_max=4, cell=1.0)
+HEIGHTS = (0.0, 0.5)
+
+
+@pytest.fixture
+def built(monkeypatch):
+    """Forget what other tests built; return a list that grows by one for each operator built."""
+    sampling._build_sampler.cache_clear()
+    shapes, original = [], sampling.bilinear_matrix
+
+    def counted(*arguments):
+        shapes.append((matrix := original(*arguments)).shape)
+        return matrix
+
+    monkeypatch.setattr(sampling, "bilinear_matrix", counted)
+    return shapes
+
+
+def test_the_operator_of_a_calibration_is_built_once(built):
+    camera = _camera()
+    first = PlaneSampler.for_camera(COARSE, HEIGHTS, camera)
+    second = PlaneSampler.for_camera(replace(COARSE), np.array(HEIGHTS), replace(camera, K=camera.K.copy()))
+    assert len(built) == 1
+    by_hand = PlaneSampler(*plane_pixels(COARSE, HEIGHTS, camera), camera.size)
+    for a, b, c in zip(first.buffers(), second.buffers(), by_hand.buffers(), strict=True):
+        assert a.data_ptr() == b.data_ptr()
+        assert torch.equal(a, c)
+
+
+def test_networks_of_one_calibration_share_its_operator(built):
+    for segmenter in ("segnet", "fcn"):
+        build_net(Architecture(segmenter, image_size=(32, 64), grid=COARSE, heights=HEIGHTS), _camera())
+    assert len(built) == 1
+
+
+TURNED = rigid_transform(Rotation.from_euler("z", 0.1).as_matrix(), np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("spec", "heights", "camera"),
+    [
+        (replace(COARSE, cell=0.5), HEIGHTS, _camera()),
+        (COARSE, (0.0, 0.6), _camera()),
+        (COARSE, HEIGHTS, _camera(focal=90.0)),
+        (COARSE, HEIGHTS, replace(_camera(), T_camera_from_lidar=LOOKING_AHEAD @ TURNED)),
+        (COARSE, HEIGHTS, _camera(size=(90, 201))),
+        (COARSE, HEIGHTS, replace(_camera(), lidar_height=1.2)),
+    ],
+    ids=["cells", "heights", "K", "pose", "size", "lidar_height"],
+)
+def test_whatever_decides_the_operator_gets_its_own(built, spec, heights, camera):
+    PlaneSampler.for_camera(COARSE, HEIGHTS, _camera())
+    cached = PlaneSampler.for_camera(spec, heights, camera)
+    assert len(built) == 2
+    by_hand = PlaneSampler(*plane_pixels(spec, heights, camera), camera.size)
+    for a, b in zip(cached.buffers(), by_hand.buffers(), strict=True):
+        assert torch.equal(a, b)
+
+
+def test_a_camera_changed_in_place_gets_its_own_operator(built):
+    camera = _camera()
+    before = PlaneSampler.for_camera(COARSE, HEIGHTS, camera)
+    camera.K[0, 0] = 90
+    after = PlaneSampler.for_camera(COARSE, HEIGHTS, camera)
+    assert len(built) == 2
+    assert not torch.equal(before.matrix_weights, after.matrix_weights)
+
+
+def test_moving_one_sampler_leaves_the_others_alone(built):
+    scores = torch.randn(1, 2, 101, 201, generator=torch.Generator().manual_seed(0))
+    one, other = (PlaneSampler.for_camera(COARSE, HEIGHTS, _camera()) for _ in range(2))
+    before = other(scores)
+    one.double()
+    assert one(scores.double()).dtype == torch.float64
+    assert {part.dtype for part in one.buffers()} == {torch.float64, torch.int32}
+    for sampler in (other, PlaneSampler.for_camera(COARSE, HEIGHTS, _camera())):
+        assert sampler.matrix_weights.dtype == torch.float32
+        assert torch.equal(sampler(scores), before)
+    assert len(built) == 1
+
+
+@pytest.mark.parametrize("n_images", [1, 3])
+def test_an_operator_built_for_inference_learns_as_well(built, n_images):
+    with torch.inference_mode():
+        PlaneSampler.for_camera(COARSE, HEIGHTS, _camera())(torch.ones(n_images, 1, 101, 201))
+    scores = torch.ones(n_images, 1, 101, 201, requires_grad=True)
+    planes = PlaneSampler.for_camera(COARSE, HEIGHTS, _camera())(scores)
+    planes.sum().backward()
+    assert len(built) == 1
+    torch.testing.assert_close(scores.grad.sum(), planes.sum())
+
+
+def test_wrong_inputs_are_named():
+    points, visible = np.zeros((1, 2, 2, 2)), np.ones((1, 2, 2), dtype=bool)
+    with pytest.raises(ArgumentError, match="visible: expected bool"):
+        PlaneSampler(points, visible.astype(int), (4, 5))
+    with pytest.raises(ArgumentError, match="not empty"):
+        PlaneSampler(points[:0], visible[:0], (4, 5))
+    with pytest.raises(ArgumentError, match=r"pixels: expected shape \(1, 2, 2, 2\)"):
+        PlaneSampler(points[..., 0], visible, (4, 5))
+    with pytest.raises(ArgumentError, match="visible points in an image"):
+        PlaneSampler(points + 4.5, visible, (4, 5))
+    with pytest.raises(ArgumentError, match="visible points in an image"):
+        PlaneSampler(points * np.nan, visible, (4, 5))
+    with pytest.raises(ArgumentError, match=r"scores: expected shape \(B, C, 4, 5\), found \(1, 3, 5, 4\)"):
+        PlaneSampler(points, visible, (4, 5))(torch.zeros(1, 3, 5, 4))
+    with pytest.raises(ArgumentError, match="heights"):
+        plane_pixels(GridSpec.compact(), [np.nan], _camera())
+    for heights in ([[0.0]], [np.inf], []):
+        with pytest.raises(ArgumentError, match="heights"):
+            PlaneSampler.for_camera(GridSpec.compact(), heights, _camera())
+    with pytest.raises(ArgumentError, match="n_planes"):
+        plane_heights(0)
+    with pytest.raises(ArgumentError, match="spacing"):
+        plane_heights(20, spacing=0.0)

@@ -1,0 +1,180 @@
+import json
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import torch
+from typer.testing import CliRunner
+
+from semgrid_edu.camera import Camera
+from semgrid_edu.cli import app
+from semgrid_edu.datasets.training_set import Sample
+from semgrid_edu.experiments import train as experiment
+from semgrid_edu.networks import Architecture, Fcn, load_net
+from semgrid_edu.storage.files import sha256, write_text
+from semgrid_edu.storage.provenance import provenance_problems
+from semgrid_edu.training import CHECKPOINT
+from semgrid_edu.training.log import LOG, Step, append_step, begin_log
+
+
+class _Noise:
+    """Six frames of noise, in the place of a data set on disk."""
+
+    camera = Camera(
+        np.array([[186, 0, 157], [0, 184, 44], [0, 0, 1.0]]),
+        np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]]),
+        Architecture().image_size,
+    )
+
+    def __init__(self, dataset_dir, split, spec, image_size):
+        assert split == "train"
+        self.rng = torch.Generator().manual_seed(0)
+
+    def __len__(self):
+        return 6
+
+    def __getitem__(self, k):
+        if k >= len(self):
+            raise IndexError(k)
+        size, shape = Architecture().image_size, Architecture().grid.shape
+        image, labels = (
+            torch.randint(high, (*channels, *size), generator=self.rng) for high, channels in ((256, (3,)), (10, ()))
+        )
+        occupancy = torch.rand(4, *shape, generator=self.rng).softmax(0)
+        truth = torch.randint(14, shape, generator=self.rng)
+        return Sample(image.to(torch.uint8), labels.to(torch.uint8), occupancy, truth.to(torch.uint8))
+
+
+class _Net:
+    segmenter = object()
+
+
+def test_the_command_leaves_weights_log_and_provenance(monkeypatch, tmp_path):
+    monkeypatch.setattr(experiment, "TrainingSet", _Noise)
+    data, out = tmp_path / "minikitti", tmp_path / "compact"
+    write_text(data / "dataset.json", "{}")
+    arguments = [
+        "train",
+        "--data",
+        str(data),
+        "--out",
+        str(out),
+        "--segmenter",
+        "fcn",
+        "--seed",
+        "3",
+        "--iterations",
+        "1",
+    ]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    names = {"weights.safetensors", "image_stage.safetensors", "log.csv", "provenance.json"}
+    assert {path.name for path in out.iterdir()} == names
+    assert not provenance_problems(out)
+    provenance = json.loads((out / "provenance.json").read_text())
+    options = "--data minikitti --out compact --segmenter fcn --seed 3 --iterations 1"
+    assert provenance["command"] == f"semgrid-edu train {options}"
+    assert provenance["seed"] == 3
+    assert provenance["params"]["batch_size"] == 6
+    assert provenance["dataset"] == sha256(data / "dataset.json")
+    assert len((out / "log.csv").read_text().splitlines()) == 3
+    assert isinstance(load_net(out / "weights.safetensors", _Noise.camera).segmenter, Fcn)
+
+
+@pytest.mark.parametrize("option", ["--seed=-1", "--iterations=0"])
+def test_numbers_that_cannot_be_are_refused(tmp_path, option):
+    result = CliRunner().invoke(app, ["train", "--data", str(tmp_path), "--out", str(tmp_path / "out"), option])
+    assert result.exit_code == 2
+    assert f"Invalid value for '{option.split('=')[0]}'" in result.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_command_names_what_is_missing(tmp_path):
+    arguments = ["train", "--data", str(tmp_path / "nowhere"), "--out", str(tmp_path / "out")]
+    with pytest.raises(ValueError, match=r"nowhere.dataset.json"):
+        CliRunner().invoke(app, arguments, catch_exceptions=False)
+
+
+def test_a_paper_preset_is_the_papers():
+    """Section 4.1: KITTI's images, 31 m x 71 m in 0.2 m cells, 20 planes, batch 6, rate 1e-3, momentum 0.9."""
+    description = experiment.architecture("deeplab", "paper")
+    assert (description.image_size, description.grid.shape, len(description.heights)) == ((375, 1242), (355, 155), 20)
+    params = experiment.training_params("paper", 2000, from_imagenet=True)
+    assert (params.batch_size, params.learning_rate, params.momentum) == (6, 1e-3, 0.9)
+    assert (params.image_iterations, params.grid_iterations, params.weight_limit) == (0, 2000, np.inf)
+    assert experiment.training_params("paper", 5).image_iterations == 5
+    assert experiment.training_params("paper", 5, end_to_end=False, from_imagenet=True).image_iterations == 5
+
+
+def test_the_options_reach_the_training(monkeypatch, tmp_path):
+    """The paper's networks don't fit a test: what trains them is looked at instead."""
+    given = {}
+    monkeypatch.setattr(experiment, "TrainingSet", _Noise)
+    monkeypatch.setattr(experiment, "build_net", lambda description, *_: given.update(net=description) or _Net)
+    monkeypatch.setattr(experiment, "load_imagenet", lambda segmenter, path: given.update(imagenet=(segmenter, path)))
+    monkeypatch.setattr(experiment, "train", lambda *args: given.update(train=args))
+    data, imagenet, out = tmp_path / "minikitti", tmp_path / "vgg16.safetensors", tmp_path / "out"
+    for path in (data / "dataset.json", imagenet):
+        write_text(path, "{}")
+    options = ["--preset", "paper", "--imagenet", str(imagenet), "--seed", "2", "--iterations", "7", "--two-stage"]
+    options += ["--resume"]
+    result = CliRunner().invoke(app, ["train", "--data", str(data), "--out", str(out), *options, "--device", "cpu"])
+    assert result.exit_code == 0, result.output
+    assert given["net"] == experiment.architecture("segnet", "paper")
+    assert given["imagenet"] == (_Net.segmenter, imagenet)
+    net, _, folder, params, seed, resume, device = given["train"]
+    assert (net, folder, seed, resume, device) == (_Net, out, 2, True, torch.device("cpu"))
+    assert params == experiment.training_params("paper", 7, end_to_end=False, from_imagenet=True)
+    provenance = json.loads((out / "provenance.json").read_text())
+    written = "--segmenter segnet --preset paper --imagenet vgg16.safetensors --seed 2 --iterations 7 --two-stage"
+    assert provenance["command"] == f"semgrid-edu train --data minikitti --out out {written}"
+    assert provenance["resumed"] is True
+    assert provenance["params"]["weight_limit"] == "inf"
+    assert provenance["imagenet"] == sha256(imagenet)
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_ctrl_c_says_how_to_go_on(monkeypatch, tmp_path, kept):
+    monkeypatch.setattr(experiment, "TrainingSet", _Noise)
+
+    def interrupted(*_):
+        if kept:
+            write_text(tmp_path / CHECKPOINT, "some steps")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(experiment, "train", interrupted)
+    result = CliRunner().invoke(app, ["train", "--data", str(tmp_path), "--out", str(tmp_path)])
+    path = tmp_path / CHECKPOINT
+    advice = f"--resume goes on from {path}" if kept else f"start again: there is no {path} yet"
+    assert result.output.splitlines()[-1] == f"semgrid-edu: interrupted; {advice}"
+    assert result.exit_code == 1
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        (["--device", "cuda:99"], "--device: expected cpu or one of the"),
+        (["--preset", "huge"], "--preset: expected compact or paper, found 'huge'"),
+        (["--segmenter", "unknown"], "name: expected one of segnet, fcn, deeplab, unet"),
+        (["--imagenet", "nowhere.safetensors"], "nowhere.safetensors: expected a safetensors file"),
+    ],
+)
+def test_an_option_that_cannot_be_is_named(monkeypatch, tmp_path, option, message):
+    monkeypatch.setattr(experiment, "TrainingSet", _Noise)
+    with pytest.raises(ValueError, match=message):
+        CliRunner().invoke(
+            app, ["train", "--data", str(tmp_path), "--out", str(tmp_path / "out"), *option], catch_exceptions=False
+        )
+    assert not (tmp_path / "out").exists()
+
+
+def test_curves_of_several_runs_are_in_one_picture(tmp_path):
+    for run in ("a/run", "b/run", "c"):
+        begin_log(tmp_path / run / LOG, 0)
+        append_step(tmp_path / run / LOG, Step(0, "image", 0.1, 3.0))
+    for runs in (["a/run"], ["a/run", "c"], ["a/run", "b/run"]):
+        out = tmp_path / f"{len(runs)}.png"
+        result = CliRunner().invoke(app, ["curves", *(str(tmp_path / run) for run in runs), "--out", str(out)])
+        assert result.exit_code == 0, result.output
+        assert plt.imread(out).shape == (600, 1200, 4)
+    plt.close("all")

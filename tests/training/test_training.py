@@ -1,0 +1,477 @@
+import math
+import os
+import resource
+import signal
+from dataclasses import replace
+from itertools import pairwise
+from multiprocessing import get_context
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import torch
+import torch.nn.functional as F
+from safetensors.torch import load_file, save_file
+from sklearn.metrics import accuracy_score
+from tiny_streets import CAMERA, SMALL, tiny_streets
+
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.labels import IGNORE
+from semgrid_edu.networks import SEGMENTERS, build_net
+from semgrid_edu.storage.tensors import read_tensors, write_tensors
+from semgrid_edu.training import TrainingParams, checkpoint, train
+from semgrid_edu.training import loop as training
+from semgrid_edu.training.batches import Batch, draw_batch, grid_logits, image_scores
+from semgrid_edu.training.log import read_log
+from semgrid_edu.training.loss import median_frequency_weights
+
+ENDED = {"image_stage.safetensors", "log.csv", "weights.safetensors"}
+QUICK = TrainingParams(image_iterations=3, grid_iterations=4, batch_size=2)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _one_thread():
+    """Networks this small only wait for a second one."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
+
+
+@pytest.fixture(scope="module")
+def streets():
+    return tiny_streets()
+
+
+# Batches
+
+
+def test_each_pass_takes_every_frame_once_in_a_new_order(streets):
+    frames, orders = [sample.truth.numpy().tobytes() for sample in streets], set()
+    for epoch in range(5):
+        batches = [draw_batch(streets, 2, 0.0, 2 * epoch + k, seed=0).frames.truth for k in range(2)]
+        order = [frames.index(truth.numpy().tobytes()) for truth in torch.cat(batches)]
+        assert sorted(order) == [0, 1, 2, 3]
+        orders.add(tuple(order))
+    assert len(orders) > 1
+
+
+def test_a_batch_is_a_function_of_seed_and_step(streets):
+    def image(iteration, seed):
+        return draw_batch(streets, 2, 0.2, iteration, seed).frames.image
+
+    assert torch.equal(image(5, 1), image(5, 1))
+    assert not torch.equal(image(5, 1), image(6, 1))
+    assert not torch.equal(image(5, 1), image(5, 2))
+
+
+def test_each_frame_has_a_brightness_and_a_contrast_of_its_own(streets):
+    """Fitted as a line through what a frame shows: at most a share `jitter` off, about the middle grey."""
+    found = []
+    for iteration in range(20):
+        plain, varied = (draw_batch(streets, 4, jitter, iteration, seed=0).frames.image for jitter in (0.0, 0.2))
+        assert varied.min() >= 0
+        assert varied.max() <= 1
+        for before, after in zip(plain - 0.5, varied - 0.5, strict=True):
+            inside = (after.abs() < 0.5).numpy()
+            found.append(np.polyfit(before.numpy()[inside], after.numpy()[inside], 1))
+    contrast, brightness = np.transpose(found) - [[1], [0]]
+    for values in (contrast, brightness):
+        assert -0.2 <= values.min() < -0.15
+        assert 0.15 < values.max() <= 0.2
+    assert np.ptp(contrast.reshape(20, 4), axis=1).min() > 0  # in each batch
+    assert abs(np.corrcoef(contrast, brightness)[0, 1]) < 0.3
+
+
+def test_every_other_batch_is_mirrored_by_chance(streets):
+    mirrored = [draw_batch(streets, 2, 0.0, iteration, seed=0).mirrored for iteration in range(200)]
+    assert 80 <= sum(mirrored) <= 120
+    assert not any(draw_batch(streets, 2, 0.0, iteration, seed=0, mirror=False).mirrored for iteration in range(20))
+
+
+def test_a_mirror_changes_what_the_networks_see_and_not_where_it_lies(streets):
+    """Networks that answer each place by itself can't tell a mirror from the street."""
+    frames, seen = draw_batch(streets, 2, 0.0, 0, seed=0).frames, []
+    occupancy = torch.rand(frames.occupancy.shape, generator=torch.Generator().manual_seed(0))
+
+    def answer(*maps):
+        seen.append(maps)
+        return sum(x.sum(1, keepdim=True) for x in maps)
+
+    by_place = SimpleNamespace(
+        segmenter=answer,
+        sampler=build_net(SMALL, CAMERA).sampler,
+        fusion=SimpleNamespace(
+            reduce=lambda planes: planes.sum(dim=2, keepdim=True),
+            fuse=lambda reduced, occupancy: answer(reduced.squeeze(2), occupancy),
+        ),
+    )
+    plain, mirrored = (grid_logits(by_place, Batch(frames._replace(occupancy=occupancy), m)) for m in (False, True))
+    torch.testing.assert_close(plain, mirrored)
+    for as_it_is, in_the_mirror in zip(seen[:2], seen[2:], strict=True):
+        for x, y in zip(as_it_is, in_the_mirror, strict=True):
+            assert torch.equal(x, y.flip(-1))
+            assert not torch.equal(x, y)
+
+
+# The loop
+
+
+def test_the_learning_rate_falls_to_zero_along_half_a_cosine_in_each_stage():
+    params = TrainingParams(image_iterations=12, grid_iterations=24, learning_rate=0.1)
+    stages, rates = zip(*map(params.stage, range(params.iterations)), strict=True)
+    assert stages == ("image",) * 12 + ("grid",) * 24
+    # cos 60 degrees is a half, so that a third of the way takes a quarter of the rate.
+    for start, length in ((0, 12), (12, 24)):
+        third = [rates[start + k * length // 3] for k in range(3)]
+        assert third == pytest.approx([0.1, 0.075, 0.025])
+    assert 0 < rates[11] < 0.002
+    assert 0 < rates[35] < 0.0005
+    assert all(after < before for stage in (rates[:12], rates[12:]) for before, after in pairwise(stage))
+
+
+def test_four_streets_are_learnt_by_heart(streets, tmp_path):
+    params = TrainingParams(image_iterations=30, grid_iterations=60, batch_size=4, learning_rate=0.1, jitter=0.0)
+    net = build_net(SMALL, CAMERA)
+    train(net, streets, tmp_path, params)
+    image, occupancy, truth = (
+        torch.stack(x) for x in zip(*((s.image, s.occupancy, s.truth) for s in streets), strict=True)
+    )
+    assert accuracy_score(truth.ravel(), net(image / 255, occupancy).argmax(1).ravel()) >= 0.99
+
+
+@pytest.mark.parametrize("end_to_end", [True, False])
+def test_two_stages_leave_the_image_network_as_it_was(streets, tmp_path, end_to_end):
+    train(build_net(SMALL, CAMERA), streets, tmp_path, replace(QUICK, end_to_end=end_to_end))
+    before, after = (load_file(tmp_path / name) for name in ("image_stage.safetensors", "weights.safetensors"))
+    for name, tensor in build_net(SMALL, CAMERA).fusion.state_dict().items():
+        assert torch.equal(before[f"fusion.{name}"], tensor)  # not its turn yet
+    kept = {name: torch.equal(before[name], after[name]) for name in before}
+    assert all(kept[name] is not end_to_end for name in kept if name.startswith("segmenter"))
+    assert not any(kept[name] for name in kept if name.startswith("fusion") and name.endswith("weight"))
+
+
+def test_what_learnt_before_learns_after(streets, tmp_path):
+    """Two-stage training stops the image network for a while; what the caller stopped stays so."""
+    net = build_net(SMALL, CAMERA)
+    stopped = net.fusion.reduce[0].weight.requires_grad_(False)
+    before = stopped.clone()
+    train(net, streets, tmp_path, replace(QUICK, end_to_end=False))
+    assert [parameter for parameter in net.parameters() if not parameter.requires_grad] == [stopped]
+    assert torch.equal(stopped, before)
+    assert not any(module.training for module in net.modules())
+
+
+@pytest.mark.parametrize("segmenter", SEGMENTERS)
+def test_mixed_precision_learns_too(streets, tmp_path, monkeypatch, segmenter):
+    """What a GPU does, on the CPU: convolutions in bfloat16, weights and loss in float32."""
+    monkeypatch.setattr(training, "mixed_precision", lambda device: torch.autocast(device.type, torch.bfloat16))
+    net, types = build_net(replace(SMALL, segmenter=segmenter), CAMERA), set()
+    net.sampler.register_forward_hook(lambda _, scores, planes: types.update((scores[0].dtype, planes.dtype)))
+    train(net, streets, tmp_path, TrainingParams(10, 15, batch_size=4, learning_rate=0.1))
+    log = read_log(tmp_path / "log.csv")
+    for stage in ("image", "grid"):
+        loss = log.loss[log.stage == stage]
+        assert loss[-1] < 0.6 * loss[0]
+    # DeepLab ends with an interpolation, which is float32 on a CPU.
+    assert types == {torch.float32 if segmenter == "deeplab" else torch.bfloat16}
+    assert {parameter.dtype for parameter in net.parameters()} == {torch.float32}
+
+
+@pytest.mark.parametrize(
+    ("field", "scores", "params"),
+    [("labels", image_scores, QUICK), ("truth", grid_logits, replace(QUICK, image_iterations=0))],
+    ids=["image", "grid"],
+)
+def test_the_first_loss_is_that_of_the_definition(streets, tmp_path, field, scores, params):
+    """Weighted cross-entropy over what is labelled, written out; the log keeps six digits."""
+    streets = [street._replace(**{field: getattr(street, field).clone()}) for street in streets]
+    for street in streets:
+        getattr(street, field)[::2, 3:] = IGNORE
+    batch = draw_batch(streets, params.batch_size, params.jitter, 0, seed=0)
+    g = scores(build_net(SMALL, CAMERA).train(), batch).softmax(dim=1).detach().numpy()
+    alpha = median_frequency_weights([getattr(s, field).numpy() for s in streets], 14, params.weight_limit)
+    above = below = 0.0
+    for (frame, row, column), c in np.ndenumerate(getattr(batch.frames, field)):
+        if c != IGNORE:
+            above -= alpha[c] * math.log(g[frame, c, row, column])
+            below += alpha[c]
+    train(build_net(SMALL, CAMERA), streets, tmp_path, params)
+    assert read_log(tmp_path / "log.csv").loss[0] == pytest.approx(above / below, rel=1e-5)
+
+
+def test_a_step_goes_down_the_gradient_with_momentum(streets, tmp_path):
+    """v <- 0.9 v + dL/dw, w <- w - rate v, written out."""
+    params = replace(QUICK, image_iterations=0, grid_iterations=3, momentum=0.9, mirror=False)
+    net = build_net(SMALL, CAMERA).train()
+    alpha = torch.from_numpy(median_frequency_weights([s.truth.numpy() for s in streets], 14, params.weight_limit))
+    velocities = [torch.zeros_like(w) for w in net.parameters()]
+    for k in range(3):
+        batch = draw_batch(streets, params.batch_size, params.jitter, k, seed=3)._replace(mirrored=False)
+        loss = F.cross_entropy(grid_logits(net, batch), batch.frames.truth.long(), weight=alpha.float())
+        gradients = torch.autograd.grad(loss, list(net.parameters()))
+        with torch.no_grad():
+            for w, v, g in zip(net.parameters(), velocities, gradients, strict=True):
+                w -= params.stage(k)[1] * v.mul_(0.9).add_(g)
+    train(build_net(SMALL, CAMERA), streets, tmp_path, params, seed=3)
+    trained = load_file(tmp_path / "weights.safetensors")
+    for name, w in net.named_parameters():
+        torch.testing.assert_close(trained[name], w.detach(), rtol=1e-3, atol=1e-4)
+    assert any(draw_batch(streets, 2, 0.0, k, seed=3).mirrored for k in range(3))  # had `mirror` not been off
+
+
+def test_a_batch_without_labels_teaches_nothing(streets, tmp_path):
+    """Its loss is 0, not 0/0: training goes on."""
+    nothing = {name: torch.full_like(getattr(streets[0], name), IGNORE) for name in ("labels", "truth")}
+    train(
+        build_net(SMALL, CAMERA), [streets[0]._replace(**nothing), *streets[1:]], tmp_path, replace(QUICK, batch_size=1)
+    )
+    loss = read_log(tmp_path / "log.csv").loss
+    drawn = [draw_batch(streets, 1, 0.0, k, seed=0).frames.truth[0] for k in range(QUICK.iterations)]
+    unlabelled = np.array([truth.equal(streets[0].truth) for truth in drawn])
+    assert 0 < unlabelled.sum() < len(loss)
+    assert (loss[unlabelled] == 0).all()
+    assert (loss[~unlabelled] > 0).all()
+
+
+class _KilledError(Exception):
+    pass
+
+
+class _Watched:
+    """Streets, and what happens as they are read: `event` gets how many reads are left."""
+
+    def __init__(self, streets, reads, event):
+        self.streets, self.reads, self.event = streets, reads, event
+
+    def __len__(self):
+        return len(self.streets)
+
+    def __getitem__(self, k):
+        if k >= len(self.streets):
+            raise IndexError(k)
+        self.event(self.reads)
+        self.reads -= 1
+        return self.streets[k]
+
+
+def _kill(reads):
+    """The power fails."""
+    if reads == 0:
+        raise _KilledError
+
+
+def _same_files(first, second):
+    assert {path.name for path in first.iterdir()} == {path.name for path in second.iterdir()} == ENDED
+    for name in ENDED:
+        assert (first / name).read_bytes() == (second / name).read_bytes(), name
+
+
+@pytest.mark.parametrize("end_to_end", [True, False])
+@pytest.mark.parametrize(
+    ("checkpoint_every", "steps_before_the_kill"),
+    [(2, 2), (3, 4), (2, 5)],
+    ids=["in the first stage", "between the stages", "in the second stage"],
+)
+def test_a_resumed_run_ends_with_the_same_bytes(
+    streets, tmp_path, monkeypatch, checkpoint_every, steps_before_the_kill, end_to_end
+):
+    monkeypatch.setattr(training, "CHECKPOINT_EVERY", checkpoint_every)
+    whole, broken, params = tmp_path / "whole", tmp_path / "broken", replace(QUICK, end_to_end=end_to_end)
+    train(build_net(SMALL, CAMERA, seed=1), streets, whole, params, seed=1)
+    reads = 3 * len(streets) + params.batch_size * steps_before_the_kill  # check, weights of two stages, steps
+    with pytest.raises(_KilledError):
+        train(build_net(SMALL, CAMERA, seed=1), _Watched(streets, reads, _kill), broken, params, seed=1)
+    assert (broken / "checkpoint.safetensors").exists()
+    train(build_net(SMALL, CAMERA, seed=9), streets, broken, params, seed=1, resume=True)
+    _same_files(whole, broken)
+
+
+def _kill_for_good(reads):
+    """No block ends, nothing is tidied up."""
+    if reads == 0:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def _train_until_killed(folder):
+    torch.set_num_threads(1)
+    training.CHECKPOINT_EVERY, streets = 2, tiny_streets()
+    reads = 3 * len(streets) + 5 * QUICK.batch_size
+    train(build_net(SMALL, CAMERA), _Watched(streets, reads, _kill_for_good), folder, QUICK)
+
+
+def test_a_run_killed_by_the_system_goes_on(streets, tmp_path):
+    train(build_net(SMALL, CAMERA), streets, tmp_path / "whole", QUICK)
+    process = get_context("spawn").Process(target=_train_until_killed, args=(tmp_path / "broken",))
+    process.start()
+    process.join()
+    assert process.exitcode == -signal.SIGKILL
+    train(build_net(SMALL, CAMERA), streets, tmp_path / "broken", QUICK, resume=True)
+    _same_files(tmp_path / "whole", tmp_path / "broken")
+
+
+def test_without_a_first_stage_images_need_no_labels(streets, tmp_path):
+    unlabelled = [sample._replace(labels=torch.full_like(sample.labels, IGNORE)) for sample in streets]
+    for name, frames in (("with", streets), ("without", unlabelled)):
+        train(build_net(SMALL, CAMERA), frames, tmp_path / name, replace(QUICK, image_iterations=0))
+    with_labels, without = ((tmp_path / name / "weights.safetensors").read_bytes() for name in ("with", "without"))
+    assert with_labels == without
+
+
+def test_another_seed_gives_other_weights(streets, tmp_path):
+    for seed in (1, 2):
+        train(build_net(SMALL, CAMERA), streets, tmp_path / str(seed), QUICK, seed=seed)
+    first, second = ((tmp_path / str(seed) / "weights.safetensors").read_bytes() for seed in (1, 2))
+    assert first != second
+
+
+# What can go wrong
+
+
+def test_a_loss_that_is_not_finite_stops_the_run(streets, tmp_path):
+    wild = TrainingParams(image_iterations=50, grid_iterations=1, batch_size=2, learning_rate=1e30)
+    with pytest.raises(ArgumentError, match="learning_rate: expected a rate that keeps the loss finite"):
+        train(build_net(SMALL, CAMERA), streets, tmp_path, wild)
+    assert not (tmp_path / "weights.safetensors").exists()
+
+
+@pytest.mark.parametrize(
+    ("numbers", "message"),
+    [
+        ({"image_iterations": -1}, "image_iterations: expected 0 or more, found -1"),
+        ({"grid_iterations": -1}, "grid_iterations: expected 0 or more, found -1"),
+        ({"batch_size": 0}, "batch_size: expected at least one frame, found 0"),
+        ({"learning_rate": 0.0}, "learning_rate: expected a positive number, found 0.0"),
+        ({"learning_rate": math.nan}, "learning_rate: expected a positive number, found nan"),
+        ({"momentum": 1.0}, "momentum: expected a share from 0 to below 1, found 1.0"),
+        ({"weight_limit": 0.5}, "weight_limit: expected 1 or more, found 0.5"),
+        ({"jitter": -0.1}, "jitter: expected a share of at least 0, found -0.1"),
+    ],
+)
+def test_numbers_that_nothing_is_learnt_with_are_refused(numbers, message):
+    with pytest.raises(ArgumentError, match=f"^{message}$"):
+        TrainingParams(**numbers)
+
+
+def test_frames_that_do_not_fit_are_refused(streets, tmp_path):
+    net = build_net(SMALL, CAMERA)
+    cut = [sample._replace(image=sample.image[..., 1:]) for sample in streets]
+    with pytest.raises(ArgumentError, match=r"image of shape \(3, 24, 80\), found \(3, 24, 79\)"):
+        train(net, cut, tmp_path, QUICK)
+    with pytest.raises(ArgumentError, match="at least one batch of 2 frames, found 1 frames"):
+        train(net, streets[:1], tmp_path, QUICK)
+    cut = [*streets[:3], streets[3]._replace(truth=streets[3].truth[:, :2])]
+    with pytest.raises(ArgumentError, match=r"truth of shape \(24, 12\), found \(24, 2\) in frame 3"):
+        train(net, cut, tmp_path, QUICK)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("field", ["labels", "truth"])
+def test_wrong_labels_are_refused(streets, tmp_path, field):
+    wrong = [*streets[:2], streets[2]._replace(**{field: torch.full_like(getattr(streets[2], field), 77)})]
+    message = f"{field} of the dataset: expected classes 0..13 or 255, found 77..77 in map 2"
+    with pytest.raises(ArgumentError, match=message):
+        train(build_net(SMALL, CAMERA), wrong, tmp_path, QUICK)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_network_that_could_not_be_saved_is_not_trained(streets, tmp_path):
+    net = build_net(SMALL, CAMERA)
+    del net.architecture
+    with pytest.raises(ArgumentError, match="net: expected a network of build_net"):
+        train(net, streets, tmp_path, QUICK)
+
+
+def _checkpoint(path):
+    net = build_net(SMALL, CAMERA)
+    checkpoint.save_checkpoint(path, {}, net, torch.optim.SGD(net.parameters(), lr=0.1, momentum=0.9), 2)
+
+
+def _killed(streets, folder, monkeypatch, architecture=SMALL):
+    """A training that was killed in its fourth step and has kept a checkpoint after two."""
+    monkeypatch.setattr(training, "CHECKPOINT_EVERY", 2)
+    reads = 3 * len(streets) + 3 * QUICK.batch_size
+    with pytest.raises(_KilledError):
+        train(build_net(architecture, CAMERA), _Watched(streets, reads, _kill), folder, QUICK)
+
+
+def test_only_its_own_run_is_resumed(streets, tmp_path, monkeypatch):
+    _killed(streets, tmp_path, monkeypatch)
+    before = (tmp_path / "checkpoint.safetensors").read_bytes()
+    for architecture, params, differing in (
+        (SMALL, replace(QUICK, learning_rate=0.1), r"\{'learning_rate': 0.05\}, found \{'learning_rate': 0.1\}"),
+        (replace(SMALL, segmenter="fcn"), QUICK, r"\{'segmenter': 'segnet'\}, found \{'segmenter': 'fcn'\}"),
+        (replace(SMALL, heights=(0.0, 0.5)), QUICK, r"\{'heights': \[0.0, 0.5, 1.0\]\}, found"),
+    ):
+        with pytest.raises(ArgumentError, match=f"resume: expected the run of .*checkpoint.safetensors, {differing}"):
+            train(build_net(architecture, CAMERA), streets, tmp_path, params, resume=True)
+    others = [sample._replace(truth=torch.zeros_like(sample.truth)) for sample in streets]
+    with pytest.raises(ArgumentError, match=r"checkpoint.safetensors, \{'grid class weights': .*found \{'grid class w"):
+        train(build_net(SMALL, CAMERA), others, tmp_path, QUICK, resume=True)
+    assert (tmp_path / "checkpoint.safetensors").read_bytes() == before
+
+
+def test_no_training_is_overwritten(streets, tmp_path, monkeypatch):
+    _killed(streets, tmp_path, monkeypatch)
+    with pytest.raises(DataError, match=r"--resume continues it\), found checkpoint.safetensors"):
+        train(build_net(SMALL, CAMERA), streets, tmp_path, QUICK)
+    train(build_net(SMALL, CAMERA), streets, tmp_path, QUICK, resume=True)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    for resume in (False, True):
+        with pytest.raises(DataError, match=r"a trained network, which would be lost, found weights.safetensors"):
+            train(build_net(SMALL, CAMERA), streets, tmp_path, QUICK, resume=resume)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_full_disk_keeps_the_checkpoint_before(streets, tmp_path, monkeypatch):
+    """A limit to the size of files does what a full disk does: the system refuses to write on."""
+    monkeypatch.setattr(training, "CHECKPOINT_EVERY", 2)
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    path, hard = broken / "checkpoint.safetensors", resource.getrlimit(resource.RLIMIT_FSIZE)[1]
+    train(build_net(SMALL, CAMERA), streets, whole, QUICK)
+
+    def fill(reads):
+        if reads == 0:  # in the third step, after the first checkpoint
+            kept.append(path.read_bytes())
+            resource.setrlimit(resource.RLIMIT_FSIZE, (len(kept[0]), hard))
+
+    kept = []
+    watched = _Watched(streets, 3 * len(streets) + 2 * QUICK.batch_size, fill)
+    try:
+        with pytest.raises(OSError, match="File too large") as caught:
+            train(build_net(SMALL, CAMERA), watched, broken, QUICK)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
+    assert caught.value.filename == str(path)
+    assert path.read_bytes() == kept[0]
+    assert {p.name for p in broken.iterdir()} == {path.name, "image_stage.safetensors", "log.csv"}
+    train(build_net(SMALL, CAMERA), streets, broken, QUICK, resume=True)
+    _same_files(whole, broken)
+
+
+def test_a_missing_or_damaged_checkpoint_is_named(streets, tmp_path):
+    path = tmp_path / "checkpoint.safetensors"
+    with pytest.raises(DataError, match=r"checkpoint.safetensors: expected a safetensors file, found no such file"):
+        train(build_net(SMALL, CAMERA), streets, tmp_path, QUICK, resume=True)
+    _checkpoint(path)
+    whole = path.read_bytes()
+    for content in (whole[:100], whole[: len(whole) // 2], b""):
+        path.write_bytes(content)
+        with pytest.raises(DataError, match=r"checkpoint.safetensors: expected a safetensors file"):
+            train(build_net(SMALL, CAMERA), streets, tmp_path, QUICK, resume=True)
+    path.write_bytes(whole)
+    save_file(load_file(path), path)
+    with pytest.raises(DataError, match="expected a checkpoint of a training"):
+        train(build_net(SMALL, CAMERA), streets, tmp_path, QUICK, resume=True)
+
+
+def test_a_checkpoint_that_lacks_a_tensor_is_refused(streets, tmp_path, monkeypatch):
+    _killed(streets, tmp_path, monkeypatch)
+    path = tmp_path / "checkpoint.safetensors"
+    header, tensors = read_tensors(path)
+    del tensors["net.fusion.reduce.0.bias"]
+    write_tensors(path, tensors, header)
+    with pytest.raises(
+        DataError, match=r"checkpoint.safetensors: expected \(16,\) for fusion.reduce.0.bias, found nothing"
+    ):
+        train(build_net(SMALL, CAMERA), streets, tmp_path, QUICK, resume=True)
