@@ -9,11 +9,11 @@ from typer.testing import CliRunner
 from semgrid_edu.camera import Camera
 from semgrid_edu.cli import app
 from semgrid_edu.datasets.training_set import Sample
-from semgrid_edu.experiments import train as experiment
 from semgrid_edu.networks import Architecture, Fcn, load_net
 from semgrid_edu.storage.files import sha256, write_text
 from semgrid_edu.storage.provenance import provenance_problems
 from semgrid_edu.training import CHECKPOINT
+from semgrid_edu.training import run as experiment
 from semgrid_edu.training.log import LOG, Step, append_step, begin_log
 
 
