@@ -22,8 +22,11 @@ NODE = 0.56
 SQUARE = 0.14
 """Side of a factor."""
 
-BELOW_LEFT, ABOVE_RIGHT = np.array([0.45, 0.65]), np.array([0.45, 0.42])
-"""How far a plate reaches beyond the centres of its nodes; its text stands under them."""
+MARGIN = 0.45
+"""How far a plate and the picture reach beyond the centres of nodes, at least."""
+
+LETTER = 0.12
+"""Width of a letter, roughly, in a figure of its own."""
 
 INCHES = 0.8
 """From one node to the next in a figure of its own."""
@@ -93,22 +96,22 @@ def draw(
     observed, highlight = as_names(observed), as_names(highlight)
     _check(model, positions or {}, equations, observed, highlight, labels, *plates.values())
     places = _places(model, positions or {})
-    low, high = _extent(places, plates, equations)
+    said = {name: _said(name, labels) for name in model.names}
+    boxes = {text: _box(text, of, places, said) for text, of in plates.items()}
+    texts = [(text, _beside(name, places, said)) for name, text in equations.items()]
+    low, high = _extent(places, said, boxes, texts)
     if ax is None:
         ax = plt.subplots(figsize=INCHES * (high - low), layout="constrained")[1]
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     ax.set_axis_off()
     size = _font_size(ax, high - low)
     nodes = {
-        name: _variable(name, places[name], _said(name, labels), size, name in observed, name in highlight)
-        for name in model.names
+        name: _variable(name, places[name], text, size, name in observed, name in highlight)
+        for name, text in said.items()
     }
-    things = [*_plates(plates, places, size), *_edges(model, places, nodes), *nodes.values()]
-    _render(things, ax)
-    for name, text in equations.items():
-        x, y = places[name]
-        aside = _half_width(nodes[name]) if name in nodes else SQUARE
-        ax.text(x + aside + 0.08, y, text, fontsize=size, ha="left", va="center")
+    _render([*_plates(boxes, size), *_edges(model, places, nodes), *nodes.values()], ax)
+    for text, place in texts:
+        ax.text(*place, text, fontsize=size, ha="left", va="center")
     return ax
 
 
@@ -122,41 +125,48 @@ def _check(model: GraphicalModel, positions, equations, *groups) -> None:
 
 def _places(model: GraphicalModel, positions: Mapping[str, Place]) -> dict[str, Place]:
     """Return the place of every variable and, by label, of every factor."""
-    places = (automatic(model) if set(model.names) - set(positions) else {}) | dict(positions)
-    for label, factor in zip(model.labels, model.factors, strict=True):
-        if label not in places and not model.directed and factor.names:
+    places = automatic(model) if set(model.names) - set(positions) else {}
+    places |= {name: (float(x), float(y)) for name, (x, y) in positions.items()}
+    factors = [] if model.directed else list(zip(model.labels, model.factors, strict=True))
+    # Factors of one variable can stand anywhere around it, so they come last.
+    for label, factor in sorted(factors, key=lambda pair: len(pair[1].names), reverse=True):
+        if label not in places and factor.names:
             places[label] = _factor_place(factor.names, places)
-    crowded = {place for place in places.values() if list(places.values()).count(place) > 1}
-    if crowded:
-        raise ArgumentError("positions", "a place of its own for each node", f"several at {sorted(crowded)[0]}")
+    taken = list(places.values())
+    if crowded := [name for name, place in places.items() if taken.count(place) > 1]:
+        raise ArgumentError("positions", "a place of its own for each node", f"one for {', '.join(crowded)}")
     return places
 
 
 def _factor_place(names: tuple[str, ...], places: Mapping[str, Place]) -> Place:
-    """Put a factor in the middle of its variables; that of a single variable above it, further factors beside it."""
+    """Put a factor in the middle of its variables, or beside its only one: the first place that is clear of others."""
     x, y = np.mean([places[name] for name in names], axis=0)
-    y += 0.55 if len(names) == 1 else 0.0
-    while any(np.hypot(x - other_x, y - other_y) < 0.2 for other_x, other_y in places.values()):
-        x += 0.25
-    return float(x), float(y)
+    around = [(-0.35, 0.35), (0.0, 0.5), (0.35, 0.35), (-0.35, -0.35), (0.35, -0.35), (0.0, -0.5)]
+    tried = [(float(x + right), float(y + up)) for right, up in ([(0.0, 0.0)] if len(names) > 1 else []) + around]
+    taken = np.array(list(places.values()))
+    return next((place for place in tried if np.hypot(*(taken - place).T).min() > 0.3), tried[-1])
 
 
 def _said(name: str, labels: Mapping[str, str]) -> str:
     """Return the text of a node: m1 and m_1 are symbols with an index, a single letter a symbol, all else a word."""
     index = re.fullmatch(r"([A-Za-z])_?([\d,]*)", name)
-    return labels.get(name, f"${index[1]}_{{{index[2]}}}$" if index else name)
+    return labels.get(name, _symbol(*index.groups()) if index else name)
+
+
+def _symbol(letter: str, index: str) -> str:
+    return f"${letter}_{{{index}}}$" if index else f"${letter}$"
 
 
 def _variable(name: str, place: Place, text: str, size: float, observed: bool, highlight: bool) -> daft.Node:
     style = {"ec": HIGHLIGHT, "lw": 3.0} if highlight else {}
-    # A letter is about 0.6 of its height wide, and a node of diameter 1 holds four of them.
     return daft.Node(
-        name, text, *place, aspect=max(1.0, _letters(text) / 4), observed=observed, fontsize=size, plot_params=style
+        name, text, *place, aspect=_half_width(text) / (NODE / 2), observed=observed, fontsize=size, plot_params=style
     )
 
 
-def _half_width(node: daft.Node) -> float:
-    return NODE * node.aspect / 2
+def _half_width(text: str) -> float:
+    """Return how far a node reaches to either side of its centre: words make it wider."""
+    return max(NODE, LETTER * _letters(text)) / 2
 
 
 def _edges(model: GraphicalModel, places: Mapping[str, Place], nodes: Mapping[str, daft.Node]) -> list:
@@ -180,28 +190,34 @@ def _edges(model: GraphicalModel, places: Mapping[str, Place], nodes: Mapping[st
     return things
 
 
-def _plates(plates: Mapping[str, tuple[str, ...]], places: Mapping[str, Place], size: float) -> list[daft.Plate]:
-    boxes = {text: _box(of, places) for text, of in plates.items()}
+def _plates(boxes: Mapping[str, tuple[np.ndarray, np.ndarray]], size: float) -> list[daft.Plate]:
     return [
-        daft.Plate(
-            [*low, *(high - low)], label=text, position="bottom right", fontsize=size, rect_params={"fc": "none"}
-        )
+        daft.Plate([*low, *(high - low)], label=text, fontsize=size, rect_params={"fc": "none"})
         for text, (low, high) in boxes.items()
     ]
 
 
-def _box(names: Iterable[str], places: Mapping[str, Place]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lower left and upper right corner of a plate around nodes."""
-    corners = np.array([places[name] for name in names])
-    return corners.min(axis=0) - BELOW_LEFT, corners.max(axis=0) + ABOVE_RIGHT
+def _box(text: str, names: tuple[str, ...], places, said) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lower left and upper right corner of a plate; its text stands at the lower left, clear of arrows."""
+    centres = np.array([places[name] for name in names])
+    aside = max(MARGIN, *(_half_width(said[name]) + 0.1 for name in names))
+    left = max(aside, LETTER * _letters(text) + 0.15)
+    return centres.min(axis=0) - (left, 0.55), centres.max(axis=0) + np.array([aside, MARGIN])
 
 
-def _extent(places, plates, equations) -> tuple[np.ndarray, np.ndarray]:
+def _beside(name: str, places, said) -> Place:
+    """Return where an equation begins: to the right of a variable, above a factor."""
+    x, y = places[name]
+    return (x + _half_width(said[name]) + 0.08, y) if name in said else (x - 0.06, y + 0.2)
+
+
+def _extent(places, said, boxes, texts) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners of the picture: nodes, plates and, at a guess, the texts beside nodes."""
+    reach = np.array([(max(MARGIN, _half_width(said.get(name, "")) + 0.05), MARGIN) for name in places])
     centres = np.array(list(places.values()))
-    boxes = np.array([_box(of, places) for of in plates.values()]).reshape(-1, 2)
-    texts = [(places[name][0] + NODE / 2 + 0.12 * _letters(text), places[name][1]) for name, text in equations.items()]
-    corners = np.concatenate([centres - 0.45, centres + 0.45, boxes, np.array(texts).reshape(-1, 2)])
+    ends = [(x + LETTER * _letters(text), y) for text, (x, y) in texts]
+    corners = [centres - reach, centres + reach, np.reshape(ends, (-1, 2)), *map(np.array, boxes.values())]
+    corners = np.concatenate(corners)
     return corners.min(axis=0) - 0.03, corners.max(axis=0) + 0.03
 
 

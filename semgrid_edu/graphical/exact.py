@@ -147,7 +147,7 @@ def max_product(model: GraphicalModel, given: Mapping[str, int] = NOTHING) -> di
     >>> max_product(GraphicalModel([rain, wet], {"wet": ("rain",)}), given={"wet": 1})
     {'rain': 1}
     """
-    model = possible(model.given(**given))
+    model = possible(model, given)
     factors, cliques = list(model.factors), []
     for name in min_fill_order(model):
         clique = product(factor for factor in factors if name in factor.names).normalised()

@@ -49,7 +49,7 @@ class Factor:
     table: NDArray[np.float64]
 
     def __post_init__(self) -> None:
-        names, table = as_names(self.names), np.array(self.table, dtype=np.float64)
+        names, table = as_names(self.names), np.array(self.table, dtype=np.float64, order="C")
         table.setflags(write=False)
         object.__setattr__(self, "names", names)
         object.__setattr__(self, "table", table)

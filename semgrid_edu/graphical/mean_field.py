@@ -66,7 +66,7 @@ def mean_field_graph(
     """
     if iterations < 1:
         raise ArgumentError("iterations", "at least 1", iterations)
-    model = possible(model.given(**given))
+    model = possible(model, given)
     q = _start(model, seed)
     free_energy: list[float] = []
     converged = False

@@ -60,7 +60,7 @@ def sum_product(
         raise ArgumentError("iterations", "at least 1", iterations)
     if not 0 <= damping < 1:
         raise ArgumentError("damping", "0 <= damping < 1", damping)
-    sliced = possible(model.given(**given))
+    sliced = possible(model, given)
     factors = {label: factor for label, factor in zip(model.labels, sliced.factors, strict=True) if factor.names}
     links = _links(factors, sliced.names)
     outwards = _breadth_first(links)

@@ -137,13 +137,15 @@ class GraphicalModel:
         return prod(float(factor.table[tuple(assignment[name] for name in factor.names)]) for factor in self.factors)
 
 
-def possible(model: GraphicalModel) -> GraphicalModel:
-    """Return the model itself, unless one of its factors is zero everywhere.
+def possible(model: GraphicalModel, given: Mapping[str, int]) -> GraphicalModel:
+    """Return the model of the variables that aren't given, unless what is given makes a factor zero everywhere.
 
     Parameters
     ----------
     model : GraphicalModel
-        Often one from which given variables have been sliced away.
+        Directed or not.
+    given : dict of str to int
+        The states of known variables.
 
     Returns
     -------
@@ -152,12 +154,13 @@ def possible(model: GraphicalModel) -> GraphicalModel:
     Raises
     ------
     ArgumentError
-        Names the factor that is zero.
+        Names the factor that is zero, or the unknown variable or state.
     """
-    for label, factor in zip(model.labels, model.factors, strict=True):
+    sliced = model.given(**given)
+    for label, factor in zip(model.labels, sliced.factors, strict=True):
         if not factor.table.any():
             raise ArgumentError(f"factor {label}", "a positive entry for what is given", "only zeros: it can't happen")
-    return model
+    return sliced
 
 
 def _conditional(child: str, parents: Mapping[str, Iterable[str]]) -> str:
