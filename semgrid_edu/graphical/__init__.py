@@ -1,0 +1,33 @@
+"""Discrete graphical models, small enough to be solved exactly: the language in which every stage can be written.
+
+A model is a product of factors. `enumerate_marginals` is the definition of inference, `eliminate` and `max_product`
+are exact and efficient, `sum_product` is exact on trees, `mean_field_graph` approximates. `d_separated` reads
+independences off the graph, and `draw` shows it.
+"""
+
+from semgrid_edu.graphical.beliefs import Beliefs
+from semgrid_edu.graphical.drawing import draw
+from semgrid_edu.graphical.exact import eliminate, enumerate_marginals, max_product, min_fill_order
+from semgrid_edu.graphical.factor import Factor, product
+from semgrid_edu.graphical.layout import in_rows
+from semgrid_edu.graphical.mean_field import mean_field_graph
+from semgrid_edu.graphical.messages import sum_product
+from semgrid_edu.graphical.model import GraphicalModel
+from semgrid_edu.graphical.separation import d_separated, why_dependent
+
+__all__ = [
+    "Beliefs",
+    "Factor",
+    "GraphicalModel",
+    "d_separated",
+    "draw",
+    "eliminate",
+    "enumerate_marginals",
+    "in_rows",
+    "max_product",
+    "mean_field_graph",
+    "min_fill_order",
+    "product",
+    "sum_product",
+    "why_dependent",
+]

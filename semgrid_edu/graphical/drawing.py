@@ -1,0 +1,240 @@
+"""Pictures of graphical models: circles are variables, arrows conditional distributions, black squares factors.
+
+daft (https://docs.daft-pgm.org) draws nodes, edges and plates; this module decides where they stand and what they say.
+"""
+
+import re
+from collections.abc import Iterable, Mapping
+
+import daft
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.graphical.layout import Place, automatic
+from semgrid_edu.graphical.model import GraphicalModel
+from semgrid_edu.graphical.variables import as_names, check_name
+
+NODE = 0.56
+"""Diameter of a node, when neighbours are 1 apart."""
+
+SQUARE = 0.14
+"""Side of a factor."""
+
+MARGIN = 0.45
+"""How far a plate and the picture reach beyond the centres of nodes, at least."""
+
+LETTER = 0.12
+"""Width of a letter, roughly, in a figure of its own."""
+
+INCHES = 0.8
+"""From one node to the next in a figure of its own."""
+
+FONT_SIZES = 8.0, 12.0
+"""Points: labels are never smaller than the first, nor larger than the second."""
+
+HIGHLIGHT = "#d95f02"
+"""Outline of the highlighted node, which is three times as thick as the others: colour isn't the only mark."""
+
+
+def draw(
+    model: GraphicalModel,
+    ax: Axes | None = None,
+    *,
+    observed: str | Iterable[str] = (),
+    highlight: str | Iterable[str] = (),
+    positions: Mapping[str, Place] | None = None,
+    labels: Mapping[str, str] | None = None,
+    equations: Mapping[str, str] | None = None,
+    plates: Mapping[str, Iterable[str]] | None = None,
+) -> Axes:
+    r"""Draw a model: arrows from parents to children, or the factor graph of an undirected model.
+
+    Parameters
+    ----------
+    model : GraphicalModel
+        `GraphicalModel(model.factors)` draws the factor graph of a directed one.
+    ax : matplotlib Axes, optional
+        Where to draw; a new figure of fitting size when left out.
+    observed : str or iterable of str
+        Variables to shade; a dictionary of evidence serves too.
+    highlight : str or iterable of str
+        Variables with a thick coloured outline: the ones the text is about.
+    positions : dict of str to (float, float), optional
+        x to the right and y upwards, neighbours about 1 apart; see `in_rows`. It may also place factors, by their
+        label of `model.labels`. What it leaves out is placed automatically: parents above children, undirected
+        graphs from left to right, factors in the middle of their variables.
+    labels : dict of str to str, optional
+        What nodes say; "m1" says $m_1$ unless told otherwise.
+    equations : dict of str to str, optional
+        Text to the right of a variable or factor, by name or label.
+    plates : dict of str to iterable of str, optional
+        What is repeated: {"$k = 1 \ldots K$": ("m", "z")} draws a box around m and z.
+
+    Returns
+    -------
+    matplotlib Axes
+        With equal scales and without frame.
+
+    Raises
+    ------
+    ArgumentError
+        When a name isn't a variable (or factor, in `positions` and `equations`) of the model.
+
+    Examples
+    --------
+    >>> from semgrid_edu.graphical import Factor, in_rows
+    >>> beam = GraphicalModel([Factor("m", [0.8, 0.2]), Factor(("m", "z"), [[0.9, 0.1], [0.2, 0.8]])], {"z": ("m",)})
+    >>> ax = draw(beam, observed="z", highlight="m", positions=in_rows(["m"], ["z"]))
+    """
+    labels, equations, plates = (
+        labels or {},
+        equations or {},
+        {text: as_names(of) for text, of in (plates or {}).items()},
+    )
+    observed, highlight = as_names(observed), as_names(highlight)
+    _check(model, positions or {}, equations, observed, highlight, labels, *plates.values())
+    places = _places(model, positions or {})
+    said = {name: _said(name, labels) for name in model.names}
+    boxes = {text: _box(text, of, places, said) for text, of in plates.items()}
+    texts = [(text, _beside(name, places, said)) for name, text in equations.items()]
+    low, high = _extent(places, said, boxes, texts)
+    if ax is None:
+        ax = plt.subplots(figsize=INCHES * (high - low), layout="constrained")[1]
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    ax.set_axis_off()
+    size = _font_size(ax, high - low)
+    nodes = {
+        name: _variable(name, places[name], text, size, name in observed, name in highlight)
+        for name, text in said.items()
+    }
+    _render([*_plates(boxes, size), *_edges(model, places, nodes), *nodes.values()], ax)
+    for text, place in texts:
+        ax.text(*place, text, fontsize=size, ha="left", va="center")
+    return ax
+
+
+def _check(model: GraphicalModel, positions, equations, *groups) -> None:
+    for argument, names in (("positions", positions), ("equations", equations)):
+        for name in names:
+            check_name(argument, name, (*model.names, *model.labels))
+    for name in (name for group in groups for name in group):
+        check_name("observed, highlight, labels, plates", name, model.names)
+
+
+def _places(model: GraphicalModel, positions: Mapping[str, Place]) -> dict[str, Place]:
+    """Return the place of every variable and, by label, of every factor."""
+    places = automatic(model) if set(model.names) - set(positions) else {}
+    places |= {name: (float(x), float(y)) for name, (x, y) in positions.items()}
+    factors = [] if model.directed else list(zip(model.labels, model.factors, strict=True))
+    # Factors of one variable can stand anywhere around it, so they come last.
+    for label, factor in sorted(factors, key=lambda pair: len(pair[1].names), reverse=True):
+        if label not in places and factor.names:
+            places[label] = _factor_place(factor.names, places)
+    taken = list(places.values())
+    if crowded := [name for name, place in places.items() if taken.count(place) > 1]:
+        raise ArgumentError("positions", "a place of its own for each node", f"one for {', '.join(crowded)}")
+    return places
+
+
+def _factor_place(names: tuple[str, ...], places: Mapping[str, Place]) -> Place:
+    """Put a factor in the middle of its variables, or beside its only one: the first place that is clear of others."""
+    x, y = np.mean([places[name] for name in names], axis=0)
+    around = [(-0.35, 0.35), (0.0, 0.5), (0.35, 0.35), (-0.35, -0.35), (0.35, -0.35), (0.0, -0.5)]
+    tried = [(float(x + right), float(y + up)) for right, up in ([(0.0, 0.0)] if len(names) > 1 else []) + around]
+    taken = np.array(list(places.values()))
+    return next((place for place in tried if np.hypot(*(taken - place).T).min() > 0.3), tried[-1])
+
+
+def _said(name: str, labels: Mapping[str, str]) -> str:
+    """Return the text of a node: m1 and m_1 are symbols with an index, a single letter a symbol, all else a word."""
+    index = re.fullmatch(r"([A-Za-z])_?([\d,]*)", name)
+    return labels.get(name, _symbol(*index.groups()) if index else name)
+
+
+def _symbol(letter: str, index: str) -> str:
+    return f"${letter}_{{{index}}}$" if index else f"${letter}$"
+
+
+def _variable(name: str, place: Place, text: str, size: float, observed: bool, highlight: bool) -> daft.Node:
+    style = {"ec": HIGHLIGHT, "lw": 3.0} if highlight else {}
+    return daft.Node(
+        name, text, *place, aspect=_half_width(text) / (NODE / 2), observed=observed, fontsize=size, plot_params=style
+    )
+
+
+def _half_width(text: str) -> float:
+    """Return how far a node reaches to either side of its centre: words make it wider."""
+    return max(NODE, LETTER * _letters(text)) / 2
+
+
+def _edges(model: GraphicalModel, places: Mapping[str, Place], nodes: Mapping[str, daft.Node]) -> list:
+    """Return the arrows of a directed model, or the squares of an undirected one and the lines to them."""
+    if model.parents is not None:
+        arrow = {"head_length": 0.14, "head_width": 0.1}
+        return [
+            daft.Edge(nodes[above], nodes[child], plot_params=arrow)
+            for child, family in model.parents.items()
+            for above in family
+        ]
+    things = []
+    for label, factor in zip(model.labels, model.factors, strict=True):
+        if factor.names:
+            square = daft.Node(
+                label, "", *places[label], scale=SQUARE / NODE, plot_params={"fc": "k"}, shape="rectangle"
+            )
+            # daft can't end an upright line at a rectangle, so lines end at a circle under the square.
+            circle = daft.Node(label, "", *places[label], scale=SQUARE / NODE)
+            things += [daft.Edge(nodes[name], circle, directed=False) for name in factor.names] + [square]
+    return things
+
+
+def _plates(boxes: Mapping[str, tuple[np.ndarray, np.ndarray]], size: float) -> list[daft.Plate]:
+    return [
+        daft.Plate([*low, *(high - low)], label=text, fontsize=size, rect_params={"fc": "none"})
+        for text, (low, high) in boxes.items()
+    ]
+
+
+def _box(text: str, names: tuple[str, ...], places, said) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lower left and upper right corner of a plate; its text stands at the lower left, clear of arrows."""
+    centres = np.array([places[name] for name in names])
+    aside = max(MARGIN, *(_half_width(said[name]) + 0.1 for name in names))
+    left = max(aside, LETTER * _letters(text) + 0.15)
+    return centres.min(axis=0) - (left, 0.55), centres.max(axis=0) + np.array([aside, MARGIN])
+
+
+def _beside(name: str, places, said) -> Place:
+    """Return where an equation begins: to the right of a variable, above a factor."""
+    x, y = places[name]
+    return (x + _half_width(said[name]) + 0.08, y) if name in said else (x - 0.06, y + 0.2)
+
+
+def _extent(places, said, boxes, texts) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners of the picture: nodes, plates and, at a guess, the texts beside nodes."""
+    reach = np.array([(max(MARGIN, _half_width(said.get(name, "")) + 0.05), MARGIN) for name in places])
+    centres = np.array(list(places.values()))
+    ends = [(x + LETTER * _letters(text), y) for text, (x, y) in texts]
+    corners = [centres - reach, centres + reach, np.reshape(ends, (-1, 2)), *map(np.array, boxes.values())]
+    corners = np.concatenate(corners)
+    return corners.min(axis=0) - 0.03, corners.max(axis=0) + 0.03
+
+
+def _letters(text: str) -> int:
+    """Return about how many letters wide a text is, mathematics included."""
+    return len(re.sub(r"\\[A-Za-z]+", "x", text).translate(str.maketrans("", "", "${}_^\\")))
+
+
+def _font_size(ax: Axes, extent: np.ndarray) -> float:
+    """Return points that fit a node at the scale of the axes, within `FONT_SIZES`."""
+    width, height = ax.get_window_extent().size / ax.figure.dpi * 72
+    return float(np.clip(0.24 * min(width / extent[0], height / extent[1]), *FONT_SIZES))
+
+
+def _render(things: Iterable, ax: Axes) -> None:
+    """Draw daft's objects into our axes: `daft.PGM.render` would open a figure of its own."""
+    context = daft.PGM(grid_unit=1.0, node_unit=NODE)._ctx
+    context._ax = ax
+    for thing in things:
+        thing.render(context)

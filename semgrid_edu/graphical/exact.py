@@ -1,0 +1,222 @@
+"""Exact inference: the sum over all assignments, and variable elimination (Koller and Friedman, chapters 9 and 13)."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import combinations
+from itertools import product as every_combination
+from math import prod
+from types import MappingProxyType
+
+import numpy as np
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.graphical.factor import Factor, product
+from semgrid_edu.graphical.model import GraphicalModel, possible
+from semgrid_edu.graphical.variables import as_names, check_name
+
+MAX_ASSIGNMENTS = 10**6
+"""As many assignments as a loop in Python visits in about half a minute."""
+
+NOTHING: Mapping[str, int] = MappingProxyType({})
+"""No variable is given."""
+
+
+def enumerate_marginals(
+    model: GraphicalModel, names: str | Sequence[str], given: Mapping[str, int] = NOTHING
+) -> Factor:
+    """Sum the product of all factors over every assignment of the other variables: the definition of a marginal.
+
+    Like `eliminate`, it doesn't normalise. The sum of all entries is then P(given) in a directed model and the
+    partition function Z in an undirected one; `.normalised()` gives P(names | given).
+
+    Parameters
+    ----------
+    model : GraphicalModel
+        Directed or not.
+    names : str or sequence of str
+        The variables to keep, in the order of the result's axes; () gives the total alone.
+    given : dict of str to int
+        The states of known variables.
+
+    Returns
+    -------
+    Factor
+        Over `names`, not normalised.
+
+    Raises
+    ------
+    ArgumentError
+        When there are more than `MAX_ASSIGNMENTS` assignments, or a variable or state is unknown.
+
+    Examples
+    --------
+    >>> rain, wet = Factor("rain", [0.8, 0.2]), Factor(("rain", "wet"), [[0.9, 0.1], [0.2, 0.8]])
+    >>> found = enumerate_marginals(GraphicalModel([rain, wet], {"wet": ("rain",)}), "rain", given={"wet": 1})
+    >>> found.table.round(2), found.table.sum().round(2), found.normalised().table.round(2)
+    (array([0.08, 0.16]), np.float64(0.24), array([0.33, 0.67]))
+    """
+    model = model.given(**given)
+    names = _wanted(model, names, given)
+    count = prod(model.cardinalities.values())
+    if count > MAX_ASSIGNMENTS:
+        raise ArgumentError("model", f"at most {MAX_ASSIGNMENTS:,} assignments to sum over; eliminate", f"{count:,}")
+    table = np.zeros([model.cardinalities[name] for name in names])
+    for states in every_combination(*map(range, model.cardinalities.values())):
+        assignment = dict(zip(model.names, states, strict=True))
+        table[tuple(assignment[name] for name in names)] += model.weight(assignment)
+    return Factor(names, table)
+
+
+def eliminate(
+    model: GraphicalModel,
+    names: str | Sequence[str],
+    given: Mapping[str, int] = NOTHING,
+    order: Sequence[str] | None = None,
+) -> Factor:
+    """Sum out one variable after the other, each from the product of only those factors that contain it.
+
+    The result isn't normalised, because its total is worth having: P(given) in a directed model, the partition
+    function Z in an undirected one. `.normalised()` gives P(names | given). A directed model without anything
+    given has the total 1, so its marginals come out normalised.
+
+    Parameters
+    ----------
+    model : GraphicalModel
+        Directed or not.
+    names : str or sequence of str
+        The variables to keep, in the order of the result's axes; () gives the total alone.
+    given : dict of str to int
+        The states of known variables.
+    order : sequence of str, optional
+        The order in which all other variables are summed out; `min_fill_order` when left out.
+
+    Returns
+    -------
+    Factor
+        Over `names`, not normalised.
+
+    Raises
+    ------
+    ArgumentError
+        When a product would have more than 10^7 entries (the message names its variables), a variable or state is
+        unknown, or `order` isn't a permutation of the variables to sum out.
+
+    Examples
+    --------
+    >>> rain, wet = Factor("rain", [0.8, 0.2]), Factor(("rain", "wet"), [[0.9, 0.1], [0.2, 0.8]])
+    >>> found = eliminate(GraphicalModel([rain, wet], {"wet": ("rain",)}), "rain", given={"wet": 1})
+    >>> found.table.round(2), found.table.sum().round(2), found.normalised().table.round(2)
+    (array([0.08, 0.16]), np.float64(0.24), array([0.33, 0.67]))
+    """
+    model = model.given(**given)
+    names = _wanted(model, names, given)
+    factors = list(model.factors)
+    for name in _checked_order(model, names, order):
+        clique = product(factor for factor in factors if name in factor.names)
+        factors = [factor for factor in factors if name not in factor.names] + [clique.sum(name)]
+    return product(factors).ordered(*names)
+
+
+def max_product(model: GraphicalModel, given: Mapping[str, int] = NOTHING) -> dict[str, int]:
+    """Find a most likely assignment of all variables that aren't given: elimination with max in place of sum.
+
+    A variable that is maximised out remembers its best state for each state of its neighbours. Going back
+    through the variables in reverse order reads the assignment off, so that it is consistent even when several are
+    equally likely; one of them is returned, the same each time. On a chain this is the Viterbi algorithm. It is
+    exact on every graph, with or without loops, as long as no table exceeds 10^7 entries.
+
+    Parameters
+    ----------
+    model : GraphicalModel
+        Directed or not.
+    given : dict of str to int
+        The states of known variables.
+
+    Returns
+    -------
+    dict of str to int
+        A state for every variable that isn't given, in the model's order.
+
+    Raises
+    ------
+    ArgumentError
+        When every assignment has probability 0, a table is too large, or a variable or state is unknown.
+
+    Examples
+    --------
+    >>> rain, wet = Factor("rain", [0.8, 0.2]), Factor(("rain", "wet"), [[0.9, 0.1], [0.2, 0.8]])
+    >>> max_product(GraphicalModel([rain, wet], {"wet": ("rain",)}), given={"wet": 1})
+    {'rain': 1}
+    """
+    model = possible(model, given)
+    factors, cliques = list(model.factors), []
+    for name in min_fill_order(model):
+        clique = product(factor for factor in factors if name in factor.names).normalised()
+        cliques.append((name, clique))
+        factors = [factor for factor in factors if name not in factor.names] + [clique.max(name)]
+    best: dict[str, int] = {}
+    for name, clique in reversed(cliques):
+        known = {other: best[other] for other in clique.names if other != name}
+        best[name] = int(np.argmax(clique.given(**known).table))
+    return {name: best[name] for name in model.names}
+
+
+def min_fill_order(model: GraphicalModel, keep: Iterable[str] = ()) -> tuple[str, ...]:
+    """Order variables for elimination: next is always the one whose elimination links the fewest strangers.
+
+    Eliminating a variable couples all its neighbours. Pairs that weren't neighbours before are the fill; few of them
+    keep the tables small. Among equals the first in the model's order is taken.
+
+    Parameters
+    ----------
+    model : GraphicalModel
+        Directed or not; two variables are neighbours when a factor contains both.
+    keep : iterable of str
+        Variables that aren't eliminated.
+
+    Returns
+    -------
+    tuple of str
+
+    Examples
+    --------
+    >>> chain = GraphicalModel([Factor(("a", "b"), np.ones((2, 2))), Factor(("b", "c"), np.ones((2, 2)))])
+    >>> min_fill_order(chain)
+    ('a', 'b', 'c')
+    """
+    neighbours, keep = model.neighbours, set(keep)
+    order: list[str] = []
+    while left := [name for name in model.names if name in neighbours and name not in keep]:
+        name = min(left, key=lambda name: len(_fill(neighbours, name)))
+        for one, other in _fill(neighbours, name):
+            neighbours[one].add(other)
+            neighbours[other].add(one)
+        for other in neighbours.pop(name):
+            neighbours[other].discard(name)
+        order.append(name)
+    return tuple(order)
+
+
+def _fill(neighbours: Mapping[str, set[str]], name: str) -> list[tuple[str, str]]:
+    """Return the pairs of neighbours of a variable that aren't neighbours of each other."""
+    return [(one, other) for one, other in combinations(sorted(neighbours[name]), 2) if other not in neighbours[one]]
+
+
+def _wanted(model: GraphicalModel, names: str | Sequence[str], given: Mapping[str, int]) -> tuple[str, ...]:
+    """Check the variables that are asked for against a model from which the given ones have been sliced away."""
+    names = as_names(names)
+    if known := [name for name in names if name in given]:
+        raise ArgumentError("names", "variables that aren't given", f"{known[0]}, which is given as {given[known[0]]}")
+    if len(set(names)) < len(names):
+        raise ArgumentError("names", "each variable once", names)
+    for name in names:
+        check_name("names", name, model.names)
+    return names
+
+
+def _checked_order(model: GraphicalModel, names: tuple[str, ...], order: Sequence[str] | None) -> tuple[str, ...]:
+    hidden = sorted(set(model.names) - set(names))
+    if order is None:
+        return min_fill_order(model, keep=names)
+    if sorted(order) != hidden:
+        raise ArgumentError("order", f"each variable to sum out once: {', '.join(hidden)}", ", ".join(order))
+    return tuple(order)

@@ -1,0 +1,236 @@
+"""A factor: a non-negative table with one named axis per variable, and what inference does with it.
+
+Product, sum, maximum, slice: every algorithm of this package is a sequence of these four (Koller and Friedman,
+Probabilistic Graphical Models, section 4.2 and chapter 9).
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import reduce
+from math import prod
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.graphical.variables import as_names, check_name, check_states, shared_cardinalities
+
+MAX_ENTRIES = 10**7
+"""The largest table that a product may have: 80 MB of float64."""
+
+
+@dataclass(frozen=True, eq=False)
+class Factor:
+    """A non-negative table over named variables.
+
+    Parameters
+    ----------
+    names : tuple of str
+        One name per axis of the table; a single name may stand alone. () makes a constant.
+    table : (K_1, ..., K_n) float
+        Non-negative and finite, kept as a read-only float64 copy. K_i is the number of states of variable i.
+
+    Raises
+    ------
+    ArgumentError
+        When a name occurs twice, names and axes differ in number, or an entry is negative, NaN or infinite.
+
+    Examples
+    --------
+    >>> rain = Factor("rain", [0.8, 0.2])
+    >>> wet = Factor(("rain", "wet"), [[0.9, 0.1], [0.2, 0.8]])
+    >>> (rain * wet).sum("rain").table
+    array([0.76, 0.24])
+    >>> (rain * wet).given(wet=1).normalised().table.round(2)
+    array([0.33, 0.67])
+    """
+
+    names: tuple[str, ...]
+    table: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        names, table = as_names(self.names), np.array(self.table, dtype=np.float64, order="C")
+        table.setflags(write=False)
+        object.__setattr__(self, "names", names)
+        object.__setattr__(self, "table", table)
+        if len(set(names)) < len(names):
+            raise ArgumentError("names", "each variable once", names)
+        if table.ndim != len(names) or table.size == 0:
+            raise ArgumentError("table", f"one axis of at least one state for each of {names}", f"shape {table.shape}")
+        if not (np.isfinite(table).all() and (table >= 0).all()):
+            raise ArgumentError("table", "finite entries, none of them negative", table.min())
+
+    @property
+    def cardinalities(self) -> dict[str, int]:
+        """How many states each variable has: {name: K}."""
+        return dict(zip(self.names, self.table.shape, strict=True))
+
+    def __mul__(self, other: "Factor") -> "Factor":
+        """Multiply entry by entry; the result is a table over the variables of both.
+
+        Parameters
+        ----------
+        other : Factor
+            A variable that occurs in both must have the same number of states in both.
+
+        Returns
+        -------
+        Factor
+            Its axes: those of the left factor, then those that only the right one has.
+
+        Raises
+        ------
+        ArgumentError
+            When the two disagree about a variable's number of states.
+        """
+        names = tuple(dict.fromkeys(self.names + other.names))
+        shared_cardinalities([self.cardinalities, other.cardinalities])
+        return Factor(names, self._spread(names) * other._spread(names))
+
+    def _spread(self, names: tuple[str, ...]) -> NDArray[np.float64]:
+        """Return the table with its axes in the order of `names`, and an axis of length 1 for each foreign name."""
+        states = self.cardinalities
+        own = self.ordered(*(name for name in names if name in states))
+        return own.table.reshape([states.get(name, 1) for name in names])
+
+    def ordered(self, *names: str) -> "Factor":
+        """Return the same factor with its axes in the order of `names`, which must be all of its own.
+
+        Parameters
+        ----------
+        *names : str
+            Every variable of the factor, once.
+
+        Returns
+        -------
+        Factor
+
+        Raises
+        ------
+        ArgumentError
+            When `names` aren't the factor's variables.
+
+        Examples
+        --------
+        >>> Factor(("x", "y"), [[1, 2, 3], [4, 5, 6]]).ordered("y", "x").table.shape
+        (3, 2)
+        """
+        if sorted(names) != sorted(self.names):
+            raise ArgumentError("names", f"the variables {self.names} in some order", names)
+        return Factor(names, self.table.transpose([self.names.index(name) for name in names]))
+
+    def sum(self, *names: str) -> "Factor":
+        """Sum variables out: f.sum("x"), f.sum("x", "y").
+
+        Parameters
+        ----------
+        *names : str
+            The variables that disappear.
+
+        Returns
+        -------
+        Factor
+            Over the other variables; a constant when none is left.
+
+        Raises
+        ------
+        ArgumentError
+            When the factor has no such variable.
+        """
+        return self._reduce(np.sum, names)
+
+    def max(self, *names: str) -> "Factor":
+        """Maximise variables out: the largest entry over all their states.
+
+        Parameters
+        ----------
+        *names : str
+            The variables that disappear.
+
+        Returns
+        -------
+        Factor
+            Over the other variables; a constant when none is left.
+
+        Raises
+        ------
+        ArgumentError
+            When the factor has no such variable.
+        """
+        return self._reduce(np.max, names)
+
+    def _reduce(self, operation, names: tuple[str, ...]) -> "Factor":
+        for name in names:
+            check_name("names", name, self.names)
+        axes = tuple(self.names.index(name) for name in names)
+        return Factor(tuple(name for name in self.names if name not in names), operation(self.table, axis=axes))
+
+    def given(self, /, **states: int) -> "Factor":
+        """Return the slice of the table where variables have known states: f.given(x=1).
+
+        Parameters
+        ----------
+        **states : int
+            The state of each known variable, from 0.
+
+        Returns
+        -------
+        Factor
+            Over the other variables, not normalised.
+
+        Raises
+        ------
+        ArgumentError
+            When the factor has no such variable, or the variable no such state.
+        """
+        check_states(states, self.cardinalities)
+        index = tuple(int(states[name]) if name in states else slice(None) for name in self.names)
+        return Factor(tuple(name for name in self.names if name not in states), self.table[index])
+
+    def normalised(self) -> "Factor":
+        """Divide by the sum of all entries, so that they sum to 1.
+
+        Returns
+        -------
+        Factor
+
+        Raises
+        ------
+        ArgumentError
+            When all entries are 0: what is given can't happen under the model.
+        """
+        total = self.table.sum()
+        if total == 0:
+            raise ArgumentError(
+                f"factor over {self.names}",
+                "at least one positive entry to normalise by",
+                "only zeros: no assignment agrees with all factors and with what is given",
+            )
+        return Factor(self.names, self.table / total)
+
+
+def product(factors: Iterable[Factor]) -> Factor:
+    """Multiply factors, after checking that the table of the product isn't too large.
+
+    Parameters
+    ----------
+    factors : iterable of Factor
+        None at all gives the constant 1.
+
+    Returns
+    -------
+    Factor
+
+    Raises
+    ------
+    ArgumentError
+        When the product has more than `MAX_ENTRIES` entries; the message names its variables.
+    """
+    factors = tuple(factors)
+    states = shared_cardinalities(factor.cardinalities for factor in factors)
+    entries = prod(states.values())
+    if entries > MAX_ENTRIES:
+        raise ArgumentError(
+            f"clique ({', '.join(states)})", f"a table of at most {MAX_ENTRIES:,} entries", f"{entries:,}"
+        )
+    return reduce(Factor.__mul__, factors, Factor((), 1.0))

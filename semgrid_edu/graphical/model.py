@@ -1,0 +1,167 @@
+"""A graphical model: a product of factors; directed when each is the distribution of a child given its parents."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from math import prod
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.graphical.directed import check_directed, families
+from semgrid_edu.graphical.factor import Factor
+from semgrid_edu.graphical.variables import check_states, shared_cardinalities
+
+
+@dataclass(frozen=True, eq=False)
+class GraphicalModel:
+    """A joint distribution over discrete variables, proportional to the product of its factors.
+
+    Parameters
+    ----------
+    factors : iterable of Factor
+        In a directed model exactly one per variable: P(child | parents), its axes in any order.
+    parents : dict of str to tuple of str, optional
+        The parents of each child; a variable that is left out has none. None makes the model undirected.
+
+    Attributes
+    ----------
+    cardinalities : dict of str to int
+        How many states each variable has, in the order in which the variables first occur.
+    labels : tuple of str
+        One label per factor: "P(r | m1, m2)" in a directed model, "f(x, y)" in an undirected one; the second factor
+        over the same variables is "f(x, y) #2".
+
+    Raises
+    ------
+    ArgumentError
+        When factors disagree about a variable's number of states; in a directed model also when there is a cycle,
+        when a factor is missing, and when one doesn't sum to 1 over its child.
+
+    Examples
+    --------
+    >>> rain, wet = Factor("rain", [0.8, 0.2]), Factor(("rain", "wet"), [[0.9, 0.1], [0.2, 0.8]])
+    >>> model = GraphicalModel([rain, wet], parents={"wet": ("rain",)})
+    >>> model.names, model.labels
+    (('rain', 'wet'), ('P(rain)', 'P(wet | rain)'))
+    """
+
+    factors: tuple[Factor, ...]
+    parents: Mapping[str, tuple[str, ...]] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "factors", tuple(self.factors))
+        if strangers := [factor for factor in self.factors if not isinstance(factor, Factor)]:
+            raise ArgumentError("factors", "objects of the class Factor", type(strangers[0]).__name__)
+        names = self.names
+        if self.parents is not None:
+            object.__setattr__(self, "parents", check_directed(self.factors, self.parents, names))
+
+    @cached_property
+    def cardinalities(self) -> dict[str, int]:
+        """How many states each variable has: {name: K}, in the order in which the variables first occur."""
+        return shared_cardinalities(factor.cardinalities for factor in self.factors)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The variables, in the order in which they first occur."""
+        return tuple(self.cardinalities)
+
+    @property
+    def directed(self) -> bool:
+        """Whether the model has parents and children."""
+        return self.parents is not None
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """One label per factor, unique: "P(r | m1, m2)" or "f(x, y)"."""
+        if self.parents is not None:
+            owners = {frozenset(family): child for child, family in families(self.parents).items()}
+            return tuple(_conditional(owners[frozenset(factor.names)], self.parents) for factor in self.factors)
+        labels = [f"f({', '.join(factor.names)})" for factor in self.factors]
+        earlier = [labels[:k].count(label) for k, label in enumerate(labels)]
+        return tuple(label if k == 0 else f"{label} #{k + 1}" for label, k in zip(labels, earlier, strict=True))
+
+    @property
+    def neighbours(self) -> dict[str, set[str]]:
+        """The variables that share a factor with each variable: in a directed model, the moral graph."""
+        adjacent: dict[str, set[str]] = {name: set() for name in self.names}
+        for factor in self.factors:
+            for name in factor.names:
+                adjacent[name] |= set(factor.names) - {name}
+        return adjacent
+
+    def given(self, /, **states: int) -> "GraphicalModel":
+        """Return the model of the other variables when these states are known: every factor is sliced.
+
+        Parameters
+        ----------
+        **states : int
+            The state of each known variable, from 0; `model.given(**evidence)` for a dictionary.
+
+        Returns
+        -------
+        GraphicalModel
+            Undirected, not normalised, with one factor for each of this model's, in the same order. A factor
+            whose variables are all known becomes a constant.
+
+        Raises
+        ------
+        ArgumentError
+            When the model has no such variable, or the variable no such state.
+        """
+        check_states(states, self.cardinalities)
+        return GraphicalModel(
+            factor.given(**{name: states[name] for name in factor.names if name in states}) for factor in self.factors
+        )
+
+    def weight(self, assignment: Mapping[str, int]) -> float:
+        """Return the product of all factors at one assignment of all variables.
+
+        Parameters
+        ----------
+        assignment : dict of str to int
+            The state of every variable.
+
+        Returns
+        -------
+        float
+            In a directed model the probability of the assignment; in an undirected one it is Z times that.
+
+        Raises
+        ------
+        ArgumentError
+            When a variable is missing or unknown, or has no such state.
+        """
+        check_states(assignment, self.cardinalities)
+        if missing := set(self.names) - set(assignment):
+            raise ArgumentError("assignment", "a state for every variable", f"none for {', '.join(sorted(missing))}")
+        return prod(float(factor.table[tuple(assignment[name] for name in factor.names)]) for factor in self.factors)
+
+
+def possible(model: GraphicalModel, given: Mapping[str, int]) -> GraphicalModel:
+    """Return the model of the variables that aren't given, unless what is given makes a factor zero everywhere.
+
+    Parameters
+    ----------
+    model : GraphicalModel
+        Directed or not.
+    given : dict of str to int
+        The states of known variables.
+
+    Returns
+    -------
+    GraphicalModel
+
+    Raises
+    ------
+    ArgumentError
+        Names the factor that is zero, or the unknown variable or state.
+    """
+    sliced = model.given(**given)
+    for label, factor in zip(model.labels, sliced.factors, strict=True):
+        if not factor.table.any():
+            raise ArgumentError(f"factor {label}", "a positive entry for what is given", "only zeros: it can't happen")
+    return sliced
+
+
+def _conditional(child: str, parents: Mapping[str, Iterable[str]]) -> str:
+    return f"P({child} | {', '.join(parents[child])})" if parents[child] else f"P({child})"

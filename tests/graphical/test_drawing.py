@@ -1,0 +1,119 @@
+"""Drawings: every variable, arrow, factor and text is there, large enough to read, where it was asked for."""
+
+import itertools
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.patches import Ellipse, FancyArrow, Rectangle
+from random_models import chain, one_of_you, random_directed, random_undirected
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.graphical import Factor, GraphicalModel, draw, in_rows
+
+ROWS = in_rows(["m1", "m2"], ["z"])
+
+
+@pytest.fixture(autouse=True)
+def _close_figures():
+    yield
+    plt.close("all")
+
+
+def pieces(ax, kind):
+    return [artist for artist in ax.get_children() if type(artist) is kind and artist is not ax.patch]
+
+
+def said(ax):
+    return {text.get_text() for text in ax.texts} - {""}
+
+
+def centres(ax):
+    return {tuple(np.round(ellipse.center, 9)) for ellipse in pieces(ax, Ellipse)}
+
+
+def test_a_directed_model_has_a_node_per_variable_and_an_arrow_per_parent():
+    ax = draw(one_of_you(), positions=ROWS)
+    assert said(ax) == {"$m_{1}$", "$m_{2}$", "$z$"}
+    assert centres(ax) == set(ROWS.values())
+    assert len(pieces(ax, FancyArrow)) == 2
+    assert not pieces(ax, Rectangle)
+
+
+def test_an_undirected_model_has_a_square_per_factor_and_a_line_per_variable_of_it():
+    model = GraphicalModel([Factor("a", [1, 2]), Factor(("a", "b"), [[2, 1], [1, 2]])])
+    ax = draw(model)
+    assert len(pieces(ax, Rectangle)) == 2
+    assert len(ax.lines) == 3
+    assert not pieces(ax, FancyArrow)
+
+
+def test_observed_nodes_are_shaded_and_the_highlighted_one_is_thick():
+    ax = draw(one_of_you(), observed={"z": 1}, highlight="m1", positions=ROWS)
+    shaded = {tuple(e.center) for e in pieces(ax, Ellipse) if e.get_facecolor()[:3] == to_rgb("0.7")}
+    thick = {tuple(e.center) for e in pieces(ax, Ellipse) if e.get_linewidth() > 2}
+    assert shaded == {ROWS["z"]}
+    assert thick == {ROWS["m1"]}
+
+
+def test_plates_surround_their_nodes():
+    ax = draw(one_of_you(), positions=ROWS, plates={"$k = 1, 2$": ["m1", "m2"]})
+    (plate,) = pieces(ax, Rectangle)
+    inside = [name for name, place in ROWS.items() if plate.get_bbox().contains(*place)]
+    assert inside == ["m1", "m2"]
+    assert "$k = 1, 2$" in said(ax)
+
+
+def test_equations_and_own_labels_are_written():
+    ax = draw(one_of_you(), equations={"z": "$P(z | m)$", "m1": "$P(z | m)$"}, labels={"m1": "left"}, positions=ROWS)
+    assert {"$P(z | m)$", "left"} <= said(ax)
+    assert [text.get_text() for text in ax.texts].count("$P(z | m)$") == 2
+
+
+def test_it_draws_into_the_given_axes_and_opens_no_figure():
+    figure, axes = plt.subplots(1, 2, figsize=(4, 2))
+    for ax, model in zip(axes, (one_of_you(), GraphicalModel(one_of_you().factors)), strict=True):
+        assert draw(model, ax=ax) is ax
+    figure.canvas.draw()
+    assert plt.get_fignums() == [figure.number]
+    assert min(text.get_fontsize() for ax in axes for text in ax.texts) >= 8
+
+
+@pytest.mark.parametrize("make", [random_directed, random_undirected])
+@pytest.mark.parametrize("seed", range(8))
+def test_automatic_places_keep_nodes_apart_and_inside(make, seed):
+    model = make(seed)
+    ax = draw(model)
+    ax.figure.canvas.draw()
+    places = centres(ax)
+    assert len(places) >= len(model.names)
+    assert all(np.hypot(*np.subtract(one, other)) > 0.2 for one, other in itertools.combinations(places, 2))
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    assert all(left < x < right and bottom < y < top for x, y in places)
+
+
+def test_parents_stand_above_their_children():
+    model = chain(3)[0]
+    ax = draw(model)
+    heights = {text.get_text(): text.xy[1] for text in ax.texts}
+    assert heights["$x_{0}$"] > heights["$x_{1}$"] > heights["$x_{2}$"] > heights["$z_{2}$"]
+
+
+def test_rows_are_centred_and_gaps_stay_free():
+    assert in_rows(["a", "b", "c"], ["d"]) == {"a": (0, 0), "b": (1, 0), "c": (2, 0), "d": (1, -1)}
+    assert in_rows(["a", None, "c"], [None, "d"]) == {"a": (0, 0), "c": (2, 0), "d": (1.5, -1)}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ({"highlight": "w"}, "found w"),
+        ({"plates": {"K": ["w"]}}, "found w"),
+        ({"equations": {"P(w)": "w"}}, r"equations: .* found P\(w\)"),
+        ({"positions": dict.fromkeys(["m1", "m2", "z"], (0, 0))}, "one for m1, m2, z"),
+    ],
+)  # fmt: skip
+def test_unknown_names_and_nodes_on_top_of_each_other_are_refused(arguments, says):
+    with pytest.raises(ArgumentError, match=says):
+        draw(one_of_you(), **arguments)

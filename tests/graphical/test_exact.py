@@ -1,0 +1,171 @@
+"""Exact inference: by hand, against the sum over every assignment, and against pyagrum (test_pyagrum.py)."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from random_models import assignments, chain, one_of_you, random_directed, random_undirected, some_evidence
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.graphical import Factor, GraphicalModel, eliminate, enumerate_marginals, max_product, min_fill_order
+
+SEEDS = st.integers(0, 10**6)
+MODELS = st.sampled_from([random_directed, random_undirected])
+ZEROS = st.sampled_from([0.0, 0.3])
+
+
+@pytest.mark.parametrize("inference", [enumerate_marginals, eliminate])
+def test_explaining_away_by_hand(inference):
+    """Cell 2 is occupied with 0.2; with 0.20 / 0.36 after "one of you"; with 0.2 again once cell 1 explains it."""
+    model = one_of_you()
+    assert inference(model, "m2").table[1] == pytest.approx(0.2)
+    seen = inference(model, ("m2",), given={"z": 1})
+    assert seen.table.sum() == pytest.approx(0.36)
+    assert seen.normalised().table[1] == pytest.approx(0.2 / 0.36)
+    assert inference(model, ("m2",), given={"z": 1, "m1": 1}).normalised().table[1] == pytest.approx(0.2)
+    table = inference(model, ("m1", "m2"), given={"z": 1}).normalised().table
+    np.testing.assert_allclose(table, [[0, 0.16 / 0.36], [0.16 / 0.36, 0.04 / 0.36]])
+
+
+@pytest.mark.parametrize("inference", [enumerate_marginals, eliminate])
+def test_without_variables_the_total_is_left(inference):
+    """Z of two tied spins by hand: 2 (e + 1/e)."""
+    tied = GraphicalModel([Factor(("a", "b"), np.exp([[1, -1], [-1, 1]]))])
+    assert inference(tied, ()).table == pytest.approx(2 * (np.e + 1 / np.e))
+    assert inference(one_of_you(), (), given={"m1": 1, "m2": 0, "z": 1}).table == pytest.approx(0.16)
+
+
+def test_impossible_evidence_has_probability_zero():
+    nothing = eliminate(one_of_you(), "m1", given={"m2": 1, "z": 0})
+    assert nothing.table.tolist() == [0, 0]
+    with pytest.raises(ArgumentError, match="no assignment agrees"):
+        nothing.normalised()
+
+
+@settings(max_examples=40, deadline=None)
+@given(MODELS, SEEDS, ZEROS)
+def test_elimination_is_the_sum_over_every_assignment(make, seed, zeros):
+    model = make(seed, zeros=zeros)
+    evidence, hidden = some_evidence(model, seed) if eliminate(model, ()).table > 0 else ({}, model.names)
+    names = hidden[:2][::-1]
+    wanted = enumerate_marginals(model, names, evidence)
+    np.testing.assert_allclose(eliminate(model, names, evidence).table, wanted.table, rtol=1e-12)
+    order = np.random.default_rng(seed).permutation(hidden[2:]).tolist()
+    found = eliminate(model, names, evidence, order=order)
+    assert found.names == tuple(names)
+    np.testing.assert_allclose(found.table, wanted.table, rtol=1e-12)
+
+
+def test_a_row_of_eight_cells_and_four_noisy_beams():
+    """The world of thick walls, against a sum over all 256 maps that shares nothing with the package."""
+    cells, prior, hit, clutter, ranges, sigma = 8, 0.2, 0.9, 0.01, [4.0, 4.6, 3.6, 4.2], 1.0
+    maps = np.array(list(itertools.product([0, 1], repeat=cells)))
+    reflects = np.where(maps == 1, hit, clutter)
+    first = reflects * np.cumprod(np.c_[np.ones(len(maps)), 1 - reflects[:, :-1]], axis=1)
+    readings = [np.exp(-0.5 * ((np.arange(cells) - z) / sigma) ** 2) for z in ranges]
+    weight = np.prod(np.where(maps == 1, prior, 1 - prior), axis=1) * np.prod([first @ r for r in readings], axis=0)
+
+    names = [f"m{k}" for k in range(cells)]
+    table = np.c_[first, 1 - first.sum(axis=1)].reshape([2] * cells + [cells + 1])
+    factors = [Factor(name, [1 - prior, prior]) for name in names]
+    for i, reading in enumerate(readings):
+        factors += [Factor((*names, f"r{i}"), table), Factor(f"r{i}", [*reading, 0])]
+    model = GraphicalModel(factors)
+    assert eliminate(model, ()).table == pytest.approx(weight.sum(), rel=1e-12)
+    exact = weight @ maps / weight.sum()
+    assert exact[5] == pytest.approx(0.34, abs=0.005)
+    for k, name in enumerate(names):
+        np.testing.assert_allclose(eliminate(model, name).normalised().table[1], exact[k], rtol=1e-12)
+
+
+def test_min_fill_takes_the_ends_of_a_star_before_its_centre():
+    star = GraphicalModel([Factor(("c", f"l{k}"), np.ones((2, 2))) for k in range(5)])
+    assert min_fill_order(star).index("c") >= 4
+    assert min_fill_order(star, keep=["c"]) == ("l0", "l1", "l2", "l3", "l4")
+
+
+def test_min_fill_solves_a_tree_of_300_variables_and_a_bad_order_is_refused_before_it_fills_memory():
+    model = GraphicalModel([Factor((f"v{k // 3}", f"v{k}"), [[2, 1], [1, 2]]) for k in range(1, 300)])
+    np.testing.assert_allclose(eliminate(model, "v7").normalised().table, [0.5, 0.5])
+    star = GraphicalModel([Factor(("c", f"l{k}"), np.ones((2, 2))) for k in range(30)])
+    with pytest.raises(ArgumentError, match=r"clique \(c, l0, .*, l29\): .* found 2,147,483,648"):
+        eliminate(star, (), order=["c", *(f"l{k}" for k in range(30))])
+
+
+@settings(max_examples=40, deadline=None)
+@given(MODELS, SEEDS, ZEROS)
+def test_max_product_finds_the_largest_of_all_weights(make, seed, zeros):
+    model = make(seed, zeros=zeros)
+    evidence, hidden = some_evidence(model, seed) if eliminate(model, ()).table > 0 else (None, None)
+    if evidence is None:
+        with pytest.raises(ArgumentError):
+            max_product(model)
+        return
+    found = max_product(model, evidence)
+    assert list(found) == hidden
+    agreeing = [a for a in assignments(model) if evidence.items() <= a.items()]
+    assert model.weight(evidence | found) == pytest.approx(max(map(model.weight, agreeing)), rel=1e-12)
+
+
+def test_ties_are_broken_together():
+    """Unequal neighbours in a ring of four: two labellings are best, and argmaxes of marginals are none of them."""
+    differ = np.array([[1, 2], [2, 1]])
+    ring = GraphicalModel([Factor((f"v{k}", f"v{(k + 1) % 4}"), differ) for k in range(4)])
+    assert list(max_product(ring).values()) in ([0, 1, 0, 1], [1, 0, 1, 0])
+
+
+def viterbi(first, move, read, seen):
+    """The textbook recursion in logarithms."""
+    score, back = np.log(first * read[:, seen[0]]), []
+    for z in seen[1:]:
+        candidates = score[:, None] + np.log(move)
+        back.append(candidates.argmax(axis=0))
+        score = candidates.max(axis=0) + np.log(read[:, z])
+    path = [int(score.argmax())]
+    for pointers in reversed(back):
+        path.append(int(pointers[path[-1]]))
+    return path[::-1]
+
+
+@pytest.mark.parametrize("steps", [1, 5, 400])
+def test_on_a_chain_max_product_is_viterbi(steps):
+    """400 steps with 30 readings have a probability below 1e-308: only rescaled products reach the end."""
+    model, first, move, read = chain(steps, seed=4, states=4, symbols=30)
+    seen = np.random.default_rng(1).integers(0, 30, size=steps).tolist()
+    found = max_product(model, {f"z{t}": z for t, z in enumerate(seen)})
+    assert [found[f"x{t}"] for t in range(steps)] == viterbi(first, move, read, seen)
+
+
+@pytest.mark.parametrize("inference", [enumerate_marginals, eliminate])
+def test_wrong_questions_are_refused(inference):
+    for names, evidence, says in (
+        ("w", {}, "found w"),
+        (("m1", "m1"), {}, "each variable once"),
+        ("z", {"z": 1}, "z, which is given as 1"),
+        ("m1", {"w": 1}, "found w"),
+        ("m1", {"z": 5}, "given z"),
+    ):
+        with pytest.raises(ArgumentError, match=says):
+            inference(one_of_you(), names, evidence)
+
+
+def test_an_order_must_name_what_is_summed_out():
+    with pytest.raises(ArgumentError, match="order: expected each variable to sum out once: m2, z, found m2"):
+        eliminate(one_of_you(), "m1", order=["m2"])
+
+
+def test_too_many_assignments_are_refused_by_count():
+    coins = GraphicalModel([Factor(f"v{k}", [0.5, 0.5]) for k in range(20)])
+    with pytest.raises(ArgumentError, match="found 1,048,576"):
+        enumerate_marginals(coins, "v0")
+    assert eliminate(coins, "v0").table.tolist() == [0.5, 0.5]
+
+
+def test_the_most_likely_assignment_of_the_impossible_is_refused():
+    with pytest.raises(ArgumentError, match=r"factor P\(z \| m1, m2\): .* it can't happen"):
+        max_product(one_of_you(), {"m1": 1, "m2": 1, "z": 0})
+    never = GraphicalModel([Factor(("a", "b"), np.eye(2)), Factor(("a", "b"), 1 - np.eye(2))])
+    with pytest.raises(ArgumentError, match="no assignment agrees"):
+        max_product(never)
