@@ -1,0 +1,5 @@
+"""The model of each stage of the paper, at toy size, built from the functions that the pipeline itself calls."""
+
+from semgrid_edu.graphical.stages.stage_graph import CutEdge, StageGraph
+
+__all__ = ["CutEdge", "StageGraph"]

@@ -1,0 +1,84 @@
+"""What belongs to the graph of a stage: its model, how it is drawn, and the edges that the real system cuts."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from matplotlib.axes import Axes
+
+from semgrid_edu.graphical.drawing import draw
+from semgrid_edu.graphical.model import GraphicalModel
+
+
+class CutEdge(NamedTuple):
+    """A dependence of the exact model that the real system leaves out.
+
+    Parameters
+    ----------
+    edge : str
+        Its two ends, such as "m1 - m2" or "s -> o".
+    price : str
+        One sentence: what the system leaves out there, and what that costs.
+    """
+
+    edge: str
+    price: str
+
+
+@dataclass(frozen=True, eq=False)
+class StageGraph:
+    """One stage of the paper as a graphical model of toy size.
+
+    Parameters
+    ----------
+    title : str
+        The stage, in a few words.
+    model : GraphicalModel
+        Built from the package's own functions, small enough for exact inference.
+    observed : tuple of str
+        The variables that the sensors give; drawn shaded.
+    positions : dict of str to (float, float), optional
+        Where `draw` puts each node.
+    labels, equations : dict of str to str
+        As `draw` takes them.
+    plates : dict of str to tuple of str
+        As `draw` takes them: what is repeated for every cell, beam or step.
+    cut : tuple of CutEdge
+        The edges that the real system cuts, each with a sentence.
+    """
+
+    title: str
+    model: GraphicalModel
+    observed: tuple[str, ...] = ()
+    positions: Mapping[str, tuple[float, float]] | None = None
+    labels: Mapping[str, str] = field(default_factory=dict)
+    equations: Mapping[str, str] = field(default_factory=dict)
+    plates: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    cut: tuple[CutEdge, ...] = ()
+
+    def draw(self, ax: Axes | None = None, highlight: Iterable[str] = ()) -> Axes:
+        """Draw the graph.
+
+        Parameters
+        ----------
+        ax : Axes, optional
+            Axes to draw into; new ones when left out.
+        highlight : iterable of str
+            The nodes that a lecture is about.
+
+        Returns
+        -------
+        Axes
+        """
+        ax = draw(
+            self.model,
+            ax,
+            observed=self.observed,
+            highlight=highlight,
+            positions=self.positions,
+            labels=self.labels,
+            equations=self.equations,
+            plates=self.plates,
+        )
+        ax.set_title(self.title)
+        return ax
