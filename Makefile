@@ -12,7 +12,7 @@ demo: .venv/made
 
 test: lint
 	$(PYTEST) -n 2 --dist loadfile --doctest-modules semgrid_edu tests
-	$(BIN)/python -m pytest --nbval --nbval-current-env --nbval-cell-timeout=300 -n 2 --dist loadscope -p no:cacheprovider notebooks/*.ipynb
+	$(BIN)/python -m pytest --nbval --nbval-current-env --nbval-cell-timeout=300 -n 2 --dist loadscope -p no:cacheprovider $(wildcard notebooks/*.ipynb notebooks/deeper/*.ipynb)
 
 test-real: .venv/made
 	@test -n "$(KITTI)" || { echo "usage: make test-real KITTI=<folder that holds 2011_09_26>"; exit 2; }

@@ -92,16 +92,30 @@ def needs_tools() -> None:
 
 @course.command()
 def notebooks(
-    names: Annotated[list[str] | None, typer.Argument(help="Such as 00_tour; all by default.")] = None,
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Such as 00_tour or graphical_models; all by default.")
+    ] = None,
 ) -> None:
-    """Execute lectures and write the students' exercises, from their sources."""
+    """Execute lectures and companions and write the students' exercises, from their sources."""
     from semgrid_edu.course.exercises import build_exercise, exercise_sources
-    from semgrid_edu.course.notebooks import build_lecture, lecture_sources, named
+    from semgrid_edu.course.notebooks import build_lecture, companion_sources, lecture_sources, named, notebook_name
 
-    for source in named(exercise_sources(), names):
-        typer.echo(f"exercise {source.stem}: {build_exercise(source)}")
-    for source in named(lecture_sources(), names):
-        typer.echo(f"lecture {source.stem}: {build_lecture(source)}")
+    for source in named([*exercise_sources(), *lecture_sources(), *companion_sources()], names):
+        build = build_exercise if source in exercise_sources() else build_lecture
+        typer.echo(f"{notebook_name(source)}: {build(source)}")
+
+
+@course.command()
+def minutes(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Such as 00_tour, for its sections; all by default.")
+    ] = None,
+) -> None:
+    """Tell how many minutes each notebook takes a student, and what takes them."""
+    from semgrid_edu.course.minutes import minutes_table
+    from semgrid_edu.course.notebooks import companion_sources, lecture_sources, named
+
+    typer.echo(minutes_table(named([*lecture_sources(), *companion_sources()], names)))
 
 
 @course.command()

@@ -6,29 +6,53 @@ from pathlib import Path
 import nbformat
 from nbformat import NotebookNode
 
+from semgrid_edu.course.exceptions import EXCEPTIONS, rule_problems
 from semgrid_edu.course.exercises import exercise_sources, student_version
-from semgrid_edu.course.notebooks import NOTEBOOKS, lecture_sources, read_percent
+from semgrid_edu.course.notebooks import (
+    NOTEBOOKS,
+    built_path,
+    companion_sources,
+    lecture_sources,
+    notebook_name,
+    read_percent,
+)
+from semgrid_edu.course.rules import RULES, Rule
 
 MAX_LINES = 25
 """Lines of a code cell that a student can still take in."""
 
-MAX_BYTES = 1_500_000
-"""Size of a lecture; all together stay under 8 MB."""
+MAX_BYTES = 2_000_000
+"""Size of a lecture or companion: figures and one or two animations."""
 
-PARTS = {
+MAX_BYTES_TOGETHER = 16_000_000
+"""Size of all notebooks, so that the project is quick to clone."""
+
+COMMON_PARTS = {
     "a thesis": r"\*\*In one sentence\.\*\*",
     "what the student will be able to do": r"\*\*You will be able to\*\*",
     "prerequisites": r"\*\*Prerequisites\.\*\*",
     "minutes": r"\*\*Time\.\*\* \d+ minutes",
+    "further reading": r"^## Further reading",
+}
+
+LECTURE_PARTS = COMMON_PARTS | {
     "the paper's sections and equations": r"\*\*Paper\.\*\*",
     "a prediction": r"\*\*Predict before you run\.\*\*(?s:.*?)<details><summary>Answer</summary>",
     "a failure": r"^## Where this breaks",
     "a summary": r"^## In five lines",
-    "further reading": r"^## Further reading",
     "the link to its exercise": r"\]\(exercises/\d\d_\w+\.ipynb\)",
     "something to play with": r"\binteract\(",
 }
 """The parts of a lecture, and how each is recognised in its source."""
+
+COMPANION_PARTS = COMMON_PARTS | {
+    "a limit": r"^## (Where this breaks|What this does not show)",
+    "the link back to its lecture or exercise": r"\]\(\.\./(exercises/)?\w+\.ipynb\)",
+}
+"""The parts of a companion, and how each is recognised in its source."""
+
+COMPANION_RULES = {name: rule for name, rule in RULES.items() if name != "length"}
+"""A companion may be long: nobody has to read it."""
 
 MACHINE = re.compile(r"(?<![\w.:/<])(?:/(?:home|root|tmp|work|usr|opt|mnt|srv|private|Users)/|[A-Z]:\\\\)\S*")
 ADDRESS = re.compile(r"\bat 0x[0-9a-f]{6,}\b")
@@ -41,27 +65,23 @@ def lecture_problems(source: Path) -> list[str]:
     Parameters
     ----------
     source : Path
-        `notebooks/src/NN_name.py`; the executed notebook is looked for two folders up.
+        `notebooks/src/NN_name.py`; the executed notebook is looked for where `built_path` puts it.
 
     Returns
     -------
     list of str
         One sentence each, naming the notebook; empty when all is well.
     """
-    path = source.parents[1] / f"{source.stem}.ipynb"
-    wanted = read_percent(source)
-    problems = _missing_parts(wanted)
-    if not path.is_file():
-        return [f"{path.name}: {problem}" for problem in [*problems, "not built; run `semgrid-edu course notebooks`"]]
-    notebook = nbformat.read(path, as_version=4)
-    if _inputs(notebook) != _inputs(wanted):
-        problems.append(f"differs from src/{source.name}; run `semgrid-edu course notebooks {source.stem}`")
-    if path.stat().st_size > MAX_BYTES:
-        problems.append(f"{path.stat().st_size / 1e6:.1f} MB, more than {MAX_BYTES / 1e6} MB")
-    for number, cell in enumerate((c for c in notebook.cells if c.cell_type == "code"), start=1):
-        problems += [f"code cell {number} {problem}" for problem in _run_problems(cell, number)]
-    problems += text_problems(notebook, path.parent)
-    return [f"{path.name}: {problem}" for problem in problems]
+    return [f"{built_path(source).name}: {problem}" for problem in _problems(source, LECTURE_PARTS, RULES)]
+
+
+def companion_problems(source: Path) -> list[str]:
+    """List all that is wrong with a companion, `notebooks/src/deeper/NAME.py`; as `lecture_problems`."""
+    name = f"{notebook_name(source)}.ipynb"
+    problems = _problems(source, COMPANION_PARTS, COMPANION_RULES)
+    if not any(f"]({name})" in lecture.read_text(encoding="utf-8") for lecture in source.parents[1].glob("*.py")):
+        problems.append(f"no lecture links to it; write ]({name}) where it helps")
+    return [f"{name}: {problem}" for problem in problems]
 
 
 def exercise_problems(source: Path) -> list[str]:
@@ -70,14 +90,14 @@ def exercise_problems(source: Path) -> list[str]:
     Parameters
     ----------
     source : Path
-        `notebooks/src/exercises/NN_name.py`.
+        `notebooks/src/exercises/NAME.py`.
 
     Returns
     -------
     list of str
         One sentence each, naming the notebook; empty when all is well.
     """
-    path = source.parents[2] / "exercises" / f"{source.stem}.ipynb"
+    path = built_path(source)
     if not path.is_file():
         return [f"exercises/{path.name}: not built; run `semgrid-edu course notebooks`"]
     notebook = nbformat.read(path, as_version=4)
@@ -88,9 +108,14 @@ def exercise_problems(source: Path) -> list[str]:
 
 
 def course_problems(folder: Path = NOTEBOOKS) -> list[str]:
-    """List all that is wrong with the lectures and the students' exercises in a folder of notebooks."""
-    lectures = [problem for source in lecture_sources(folder) for problem in lecture_problems(source)]
-    return lectures + [problem for source in exercise_sources(folder) for problem in exercise_problems(source)]
+    """List all that is wrong with the lectures, companions and students' exercises in a folder of notebooks."""
+    problems = [problem for source in lecture_sources(folder) for problem in lecture_problems(source)]
+    problems += [problem for source in companion_sources(folder) for problem in companion_problems(source)]
+    problems += [problem for source in exercise_sources(folder) for problem in exercise_problems(source)]
+    together = sum(path.stat().st_size for path in folder.rglob("*.ipynb"))
+    if together > MAX_BYTES_TOGETHER:
+        problems.append(f"all notebooks together: {together / 1e6:.1f} MB, more than {MAX_BYTES_TOGETHER / 1e6:.0f} MB")
+    return problems
 
 
 def text_problems(notebook: NotebookNode, folder: Path) -> list[str]:
@@ -116,10 +141,21 @@ def text_problems(notebook: NotebookNode, folder: Path) -> list[str]:
     return problems
 
 
-def _missing_parts(notebook: NotebookNode) -> list[str]:
-    """List the parts of a lecture that its source lacks."""
-    text = "\n\n".join(cell.source for cell in notebook.cells)
-    return [f"lacks {part}" for part, pattern in PARTS.items() if not re.search(pattern, text, re.MULTILINE)]
+def _problems(source: Path, parts: dict[str, str], rules: dict[str, Rule]) -> list[str]:
+    """List what is wrong with a lecture or a companion; they differ in the parts they need and the rules they keep."""
+    wanted, path, name = read_percent(source), built_path(source), notebook_name(source)
+    text = "\n\n".join(cell.source for cell in wanted.cells)
+    problems = [f"lacks {part}" for part, pattern in parts.items() if not re.search(pattern, text, re.MULTILINE)]
+    if not path.is_file():
+        return [*problems, "not built; run `semgrid-edu course notebooks`"]
+    notebook = nbformat.read(path, as_version=4)
+    if _inputs(notebook) != _inputs(wanted):
+        problems.append(f"differs from src/{name}.py; run `semgrid-edu course notebooks {source.stem}`")
+    if path.stat().st_size > MAX_BYTES:
+        problems.append(f"{path.stat().st_size / 1e6:.1f} MB, more than {MAX_BYTES / 1e6} MB")
+    for number, cell in enumerate((c for c in notebook.cells if c.cell_type == "code"), start=1):
+        problems += [f"code cell {number} {problem}" for problem in _run_problems(cell, number)]
+    return problems + text_problems(notebook, path.parent) + rule_problems(notebook, rules, EXCEPTIONS.get(name, ()))
 
 
 def _run_problems(cell: NotebookNode, number: int) -> list[str]:

@@ -1,10 +1,8 @@
 """The equation register: where each equation and procedure of the paper stands in code, lectures and exercises."""
 
 from dataclasses import dataclass
-from importlib import import_module
-from pathlib import Path
 
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.course.links import code_link, notebook_link
 
 
 @dataclass(frozen=True)
@@ -212,41 +210,12 @@ EQUATIONS = (
 """In the order of the paper."""
 
 
-def find_code(name: str) -> object:
-    """Return the function or class that a dotted name stands for.
-
-    Raises
-    ------
-    ArgumentError
-        When there is none.
-    """
-    module, _, attribute = name.rpartition(".")
-    try:
-        return getattr(import_module(module), attribute)
-    except (ImportError, AttributeError):
-        raise ArgumentError("name", "the dotted name of something that can be imported", name) from None
-
-
 def equation_table() -> str:
     """Return the register as a Markdown table, with links that work from the folder of notebooks."""
     rows = ["| | paper | what | literal code | fast code | lecture | exercise |", "|---|---|---|---|---|---|---|"]
     for entry in EQUATIONS:
         number = f"({entry.id[3:]})" if entry.id.startswith("eq-") else ""
-        code = [_code_link(entry.literal), _code_link(entry.fast) if entry.fast else "the same"]
-        places = [_notebook_link(entry.lecture), _notebook_link(entry.exercise, Path("exercises"))]
+        code = [code_link(entry.literal), code_link(entry.fast) if entry.fast else "the same"]
+        places = [notebook_link(entry.lecture), notebook_link(entry.exercise, "exercises/")]
         rows.append("| " + " | ".join([number, entry.section, entry.title, *code, *places]) + " |")
     return "\n".join(rows)
-
-
-def _code_link(name: str) -> str:
-    """Link a dotted name to the module that defines it."""
-    module = find_code(name).__module__
-    return f"[`{name.rpartition('.')[2]}`](../{module.replace('.', '/')}.py)"
-
-
-def _notebook_link(place: str | None, folder: Path = Path()) -> str:
-    """Link "notebook#part" to its notebook."""
-    if place is None:
-        return "to come"
-    name, _, part = place.partition("#")
-    return f"[{name[:2]}]({(folder / name).as_posix()}.ipynb), `{part}`"

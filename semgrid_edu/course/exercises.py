@@ -19,7 +19,7 @@ from nbgrader.preprocessors import (
 )
 from traitlets.config import PyFileConfigLoader
 
-from semgrid_edu.course.notebooks import NOTEBOOKS, read_percent, write_notebook
+from semgrid_edu.course.notebooks import NOTEBOOKS, built_path, read_percent, write_notebook
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import write_json, write_text
 
@@ -31,8 +31,8 @@ MARKER = "semgrid_course.json"
 
 
 def exercise_sources(folder: Path = NOTEBOOKS) -> list[Path]:
-    """Return the percent sources of all exercises, in the order of the course."""
-    return sorted((folder / "src" / "exercises").glob("[0-9][0-9]_*.py"))
+    """Return the percent sources of all exercises: in the order of the course, then those of companions by name."""
+    return sorted((folder / "src" / "exercises").glob("*.py"))
 
 
 def student_version(source: Path) -> NotebookNode:
@@ -41,7 +41,7 @@ def student_version(source: Path) -> NotebookNode:
     Parameters
     ----------
     source : Path
-        `notebooks/src/exercises/NN_name.py`, with nbgrader's markers and metadata.
+        `notebooks/src/exercises/NAME.py`, with nbgrader's markers and metadata.
 
     Returns
     -------
@@ -55,8 +55,8 @@ def student_version(source: Path) -> NotebookNode:
 
 
 def build_exercise(source: Path) -> Path:
-    """Write the student version of an exercise to `notebooks/exercises/NN_name.ipynb`, and return that path."""
-    target = source.parents[2] / "exercises" / f"{source.stem}.ipynb"
+    """Write the student version of an exercise to `notebooks/exercises/NAME.ipynb`, and return that path."""
+    target = built_path(source)
     write_notebook(student_version(source), target)
     return target
 

@@ -8,6 +8,7 @@ import nbformat
 from nbclient import NotebookClient
 from nbformat import NotebookNode
 
+from semgrid_edu.course.figures import finish_figures
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.files import write_text
 
@@ -43,16 +44,47 @@ def lecture_sources(folder: Path = NOTEBOOKS) -> list[Path]:
     return sources
 
 
+def companion_sources(folder: Path = NOTEBOOKS) -> list[Path]:
+    """Return the percent sources of all companion notebooks, by name; there may be none."""
+    return sorted((folder / "src" / "deeper").glob("*.py"))
+
+
+def notebook_name(source: Path) -> str:
+    """Return the name of a source's notebook, such as "03_bof", "exercises/03_bof" or "deeper/graphical_models"."""
+    sources = next(folder for folder in source.parents if folder.name == "src")
+    return source.relative_to(sources).with_suffix("").as_posix()
+
+
+def built_path(source: Path) -> Path:
+    """Return where the notebook of a source belongs: the same place without `src`.
+
+    Examples
+    --------
+    >>> built_path(Path("notebooks/src/deeper/graphical_models.py")).as_posix()
+    'notebooks/deeper/graphical_models.ipynb'
+    """
+    sources = next(folder for folder in source.parents if folder.name == "src")
+    return sources.parent / f"{notebook_name(source)}.ipynb"
+
+
 def named(sources: list[Path], names: list[str] | None) -> list[Path]:
     """Keep the sources that are named; all of them when no name is given.
+
+    Parameters
+    ----------
+    sources : list of Path
+        A lecture and its exercise have the same name, and are chosen together.
+    names : list of str, optional
+        Such as "03_bof" or "graphical_models".
 
     Raises
     ------
     ArgumentError
-        When a name isn't that of a lecture or exercise.
+        When a name isn't that of any source.
     """
+    known = sorted({source.stem for source in sources})
     for name in names or []:
-        if name not in (known := [source.stem for source in sources]):
+        if name not in known:
             raise ArgumentError("names", f"some of {', '.join(known)}", name)
     return [source for source in sources if not names or source.stem in names]
 
@@ -109,7 +141,8 @@ def execute(notebook: NotebookNode, folder: Path, timeout: int = 300) -> Noteboo
     Returns
     -------
     NotebookNode
-        The same notebook, with outputs. The views of widgets are left out: without a kernel they show nothing.
+        The same notebook, with outputs. The views of widgets are left out: without a kernel they show nothing. Figures
+        are made smaller where nobody sees the difference, and carry the alternative text of their cell.
 
     Raises
     ------
@@ -122,23 +155,14 @@ def execute(notebook: NotebookNode, folder: Path, timeout: int = 300) -> Noteboo
     for cell in notebook.cells:
         if cell.cell_type == "code":
             cell.outputs = [output for output in cell.outputs if LIVE not in output.get("data", {})]
+            finish_figures(cell)
     notebook.metadata = nbformat.from_dict(METADATA)
     return notebook
 
 
 def build_lecture(source: Path) -> Path:
-    """Execute a lecture and write it beside the folder of its source.
-
-    Parameters
-    ----------
-    source : Path
-        `notebooks/src/NN_name.py`.
-
-    Returns
-    -------
-    Path
-        `notebooks/NN_name.ipynb`.
-    """
-    target = source.parents[1] / f"{source.stem}.ipynb"
+    """Execute a lecture or a companion, write it, and return where `built_path` puts it."""
+    target = built_path(source)
+    target.parent.mkdir(exist_ok=True)
     write_notebook(execute(read_percent(source), target.parent), target)
     return target

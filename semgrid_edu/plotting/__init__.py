@@ -4,6 +4,7 @@ Grids are drawn as maps with forward up, axes in metres: x upwards, y to the lef
 decreases to the right. Arrays are never flipped: row 0 is the farthest ahead, column 0 the leftmost.
 """
 
+from semgrid_edu.plotting.animations import MAX_ANIMATION_BYTES, Animation, animate
 from semgrid_edu.plotting.charts import confusion, training_curves
 from semgrid_edu.plotting.colours import (
     DEPTH_RANGE,
@@ -27,12 +28,19 @@ from semgrid_edu.plotting.moving import (
     velocity_wheel,
 )
 
+FIGURE_DPI = 110
+"""Dots per inch of every figure in a notebook: `plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI`."""
+
 __all__ = [
     "DEPTH_RANGE",
+    "FIGURE_DPI",
     "HEADING_COLOURS",
+    "MAX_ANIMATION_BYTES",
     "STATE_COLOURS",
     "STATE_NAMES",
     "WHEEL_SPEED",
+    "Animation",
+    "animate",
     "animate_occupancy",
     "belief_history",
     "class_legend",

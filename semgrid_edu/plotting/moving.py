@@ -1,20 +1,19 @@
 """What moves: velocity as a colour wheel, particles, spread of velocity, occupancy over a drive (section 3.2)."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.animation import FuncAnimation
 from matplotlib.axes import Axes
-from matplotlib.image import AxesImage
+from matplotlib.figure import Figure
 from matplotlib.offsetbox import AnnotationBbox, HPacker, OffsetImage, TextArea, VPacker
 from matplotlib.patches import Ellipse
-from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Belief, Particles, State
+from semgrid_edu.plotting.animations import Animation, animate
 from semgrid_edu.plotting.colours import (
     STATE_COLOURS,
     STATE_NAMES,
@@ -186,12 +185,9 @@ def velocity_ellipse(mean: NDArray, covariance: NDArray, ax: Axes) -> Axes:
 
 
 def animate_occupancy(
-    spec: GridSpec, beliefs: Iterable[Belief], times: Iterable[float], ax: Axes | None = None
-) -> FuncAnimation:
+    spec: GridSpec, beliefs: Iterable[Belief], times: Iterable[float], alt: str, ax: Axes | None = None
+) -> Animation:
     """Animate the pictures of `velocity_wheel` over a drive, with the time as title, as fast as it went.
-
-    Save it by `animation.save("drive.gif", writer="pillow")`, or show it in a notebook by
-    `HTML(animation.to_jshtml())`, which takes 50 kB and more a frame.
 
     Parameters
     ----------
@@ -199,19 +195,22 @@ def animate_occupancy(
     beliefs : iterable of Belief
         Such as what `track_drive` yields; only their pictures are kept.
     times : iterable of float
-        One a belief, ascending, seconds; the title counts from the first.
+        One per belief, ascending, seconds; the title counts from the first.
+    alt : str
+        What happens in it, for readers who can't see it.
     ax : Axes, optional
-        Where to draw; a new figure when left out.
+        Where to draw; a new figure when left out. The whole figure becomes the animation.
 
     Returns
     -------
-    FuncAnimation
-        Keep it until it is shown or saved: matplotlib drops an animation that nobody holds.
+    Animation
+        Leave it as the last value of a cell to show it.
 
     Raises
     ------
     ArgumentError
-        When there is no belief, times don't match or don't ascend, or a belief doesn't fit `spec`.
+        When there is no belief, times don't match or don't ascend, a belief doesn't fit `spec`, or the animation
+        gets too large.
     """
     pictures = [wheel_colours(spec, belief.probability, belief.velocity) for belief in beliefs]
     times = np.array(list(times), dtype=np.float64)
@@ -219,12 +218,13 @@ def animate_occupancy(
         raise ArgumentError("times", f"one ascending time for each of {len(pictures)} beliefs, at least one", times)
     ax = _wheel_legend(draw_map(spec, pictures[0], ax))
 
-    def draw(k: int) -> tuple[AxesImage, Text]:
-        ax.images[-1].set_data(pictures[k])
-        return ax.images[-1], ax.set_title(f"{times[k] - times[0]:.1f} s")
+    def frames() -> Iterator[Figure]:
+        for picture, time in zip(pictures, times - times[0], strict=True):
+            ax.images[-1].set_data(picture)
+            ax.set_title(f"{time:.1f} s")
+            yield ax.figure
 
-    period = np.diff(times).mean() if len(times) > 1 else 1.0
-    return FuncAnimation(ax.figure, draw, len(pictures), interval=round(1000 * period), init_func=lambda: draw(0))
+    return animate(frames(), np.diff(times).mean() if len(times) > 1 else 1.0, alt)
 
 
 def _wheel_legend(ax: Axes) -> Axes:

@@ -6,8 +6,9 @@ import sys
 
 import pytest
 
-from semgrid_edu.course.equations import EQUATIONS, equation_table, find_code
+from semgrid_edu.course.equations import EQUATIONS, equation_table
 from semgrid_edu.course.grading import tasks
+from semgrid_edu.course.links import find_code
 from semgrid_edu.course.notebooks import NOTEBOOKS, read_percent
 from semgrid_edu.errors import ArgumentError
 

@@ -1,0 +1,173 @@
+"""How long a notebook takes a student, computed from what is in it, so that its header can be honest."""
+
+import re
+from dataclasses import astuple, dataclass
+from pathlib import Path
+
+import nbformat
+from nbformat import NotebookNode
+
+from semgrid_edu.course.figures import figures
+from semgrid_edu.course.notebooks import built_path, notebook_name, read_percent
+
+PREDICTION = "**Predict before you run.**"
+"""How every prediction begins."""
+
+STATED = re.compile(r"\*\*Time\.\*\* (\d+) minutes")
+"""How a header states its minutes."""
+
+BLOCK_OF_CODE = re.compile(r"^(```|~~~).*?^\1", re.MULTILINE | re.DOTALL)
+DISPLAY_EQUATION = re.compile(
+    r"\$\$.+?\$\$|\\\[.+?\\\]|\\begin\{(align|equation|gather|multline)\*?\}.+?\\end\{\1\*?\}", re.DOTALL
+)
+PICTURE = re.compile(r"!\[[^\]]*\]\([^)]*\)|<img\b[^>]*>")
+IN_LINE = re.compile(r"`[^`]+`|\$[^$]+\$")
+LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")
+TAG = re.compile(r"<[A-Za-z/!][^>]*>")
+WORD = re.compile(r"\S*[^\W_]\S*")
+SECTION = re.compile(r"^(?=## )", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class ReadingTime:
+    r"""What there is to read, look at and think about.
+
+    Parameters
+    ----------
+    words : int
+        Of text, headings, tables and folded answers. A formula or a piece of code within a line is one word. The
+        targets of links, blocks of code in the text and all that cells print don't count.
+    equations : int
+        Displayed ones: `$$...$$`, `\[...\]` or an `align`, `equation`, `gather` or `multline` without dollars.
+    figures : int
+        Images below cells or in the text, animations too.
+    predictions : int
+        Of the words `PREDICTION`.
+    lines : int
+        Of code that isn't collapsed; comments count, blank lines don't.
+
+    Examples
+    --------
+    >>> ReadingTime(words=260, equations=1, lines=20).minutes
+    6.0
+    """
+
+    words: int = 0
+    equations: int = 0
+    figures: int = 0
+    predictions: int = 0
+    lines: int = 0
+
+    @property
+    def parts(self) -> dict[str, float]:
+        """The minutes of each kind of work."""
+        return {
+            "prose": self.words / 130,
+            "equations": 2.0 * self.equations,
+            "figures": 0.5 * self.figures,
+            "predictions": 1.5 * self.predictions,
+            "code": self.lines / 10,
+        }
+
+    @property
+    def minutes(self) -> float:
+        """All of them together."""
+        return sum(self.parts.values())
+
+    def __add__(self, other: "ReadingTime") -> "ReadingTime":
+        """Add up two pieces of a notebook."""
+        return ReadingTime(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+
+def reading_time(notebook: NotebookNode) -> ReadingTime:
+    """Return the reading time of a notebook; of one that hasn't run it misses the figures."""
+    return sum(section_times(notebook).values(), ReadingTime())
+
+
+def section_times(notebook: NotebookNode) -> dict[str, ReadingTime]:
+    """Return the reading time of each section.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+
+    Returns
+    -------
+    dict of str to ReadingTime
+        By the text of the section's heading (`## ...`), in order; what stands before the first is "(header)".
+    """
+    section = "(header)"
+    times = {section: ReadingTime()}
+    for cell in notebook.cells:
+        if cell.cell_type == "code":
+            times[section] += _time_of_code(cell)
+            continue
+        for piece in SECTION.split(cell.source):
+            if piece.startswith("## "):
+                section = piece[3:].split("\n")[0].strip()
+            times[section] = times.get(section, ReadingTime()) + time_of_text(piece)
+    return times
+
+
+def time_of_text(text: str) -> ReadingTime:
+    """Return the reading time of a text in Markdown.
+
+    Examples
+    --------
+    >>> time_of_text("See [the map](map.ipynb): $a < b$ is `true`.").words
+    6
+    """
+    text = BLOCK_OF_CODE.sub(" ", text)
+    prose = DISPLAY_EQUATION.sub(" ", text)
+    words = TAG.sub(" ", LINK.sub(r"\1", IN_LINE.sub("x", PICTURE.sub(" ", prose))))
+    return ReadingTime(
+        words=len(WORD.findall(words)),
+        equations=len(DISPLAY_EQUATION.findall(text)),
+        figures=len(PICTURE.findall(prose)),
+        predictions=prose.count(PREDICTION),
+    )
+
+
+def stated_minutes(notebook: NotebookNode) -> int | None:
+    """Return the minutes in the header of a notebook; None without any."""
+    found = STATED.search("\n".join(cell.source for cell in notebook.cells))
+    return int(found[1]) if found else None
+
+
+def minutes_table(sources: list[Path]) -> str:
+    """Tell where the time goes: a line for each notebook, or for each section when there is one notebook only.
+
+    Parameters
+    ----------
+    sources : list of Path
+        Percent sources of lectures and companions. Figures are counted in the executed notebooks, where there are any.
+
+    Returns
+    -------
+    str
+        A table of minutes; "stated" is what the header says.
+    """
+    notebooks = {notebook_name(source): _built(source) for source in sources}
+    rows = {name: reading_time(notebook) for name, notebook in notebooks.items()}
+    stated = {name: stated_minutes(notebook) for name, notebook in notebooks.items()}
+    if len(notebooks) == 1:
+        [notebook] = notebooks.values()
+        rows = section_times(notebook) | rows
+    lines = ["".join(f"{column:>12}" for column in ("stated", "computed", *ReadingTime().parts))]
+    for name, time in rows.items():
+        numbers = "".join(f"{minutes:12.1f}" for minutes in (time.minutes, *time.parts.values()))
+        lines.append(f"{stated.get(name) or '':>12}{numbers}  {name}")
+    return "\n".join(lines)
+
+
+def _time_of_code(cell: NotebookNode) -> ReadingTime:
+    """Return the reading time of a code cell and of the figures below it."""
+    hidden = cell.metadata.get("jupyter", {}).get("source_hidden", False)
+    lines = 0 if hidden else sum(bool(line.strip()) for line in cell.source.splitlines())
+    return ReadingTime(lines=lines, figures=len(list(figures(cell))))
+
+
+def _built(source: Path) -> NotebookNode:
+    """Return the executed notebook of a source; the source itself while there is none."""
+    path = built_path(source)
+    return nbformat.read(path, as_version=4) if path.is_file() else read_percent(source)

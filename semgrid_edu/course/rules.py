@@ -1,0 +1,146 @@
+"""Rules on how a notebook treats its reader: honest minutes, no answer in sight, figures that all can read."""
+
+import ast
+import re
+from collections.abc import Callable, Iterator
+
+from nbformat import NotebookNode
+
+from semgrid_edu.course.figures import PNG, alternative_text, figures, moves, png_bytes, resolution
+from semgrid_edu.course.minutes import PREDICTION, reading_time, stated_minutes
+from semgrid_edu.plotting import FIGURE_DPI, MAX_ANIMATION_BYTES
+
+MAX_MINUTES = 75
+"""The longest that a lecture's main path may take."""
+
+MIN_ALT_WORDS = 4
+"""Fewer words than that don't describe a figure."""
+
+HEADING = re.compile(r"^#{1,6} ", re.MULTILINE)
+
+
+def dishonest_minutes(notebook: NotebookNode) -> list[str]:
+    """Refuse a header that states fewer minutes than `reading_time` computes."""
+    needed, stated = round(reading_time(notebook).minutes), stated_minutes(notebook)
+    if stated is None or stated >= needed:
+        return []
+    return [f"states {stated} minutes and takes {needed}; `semgrid-edu course minutes NAME` tells where they go"]
+
+
+def too_long(notebook: NotebookNode) -> list[str]:
+    """Refuse a lecture of more than `MAX_MINUTES` minutes."""
+    needed = round(reading_time(notebook).minutes)
+    if needed <= MAX_MINUTES:
+        return []
+    return [f"takes {needed} minutes, more than {MAX_MINUTES}; move what is beside the path to a companion"]
+
+
+def answers_in_sight(notebook: NotebookNode) -> list[str]:
+    """Refuse a cell that shows the answer to a prediction before the reader has asked for it.
+
+    It is the first code cell with output below a prediction, unless a heading comes between: then the folded answer is
+    the only one.
+    """
+    problems, open_question = [], False
+    for cell in notebook.cells:
+        if cell.cell_type == "markdown":
+            _, asked, after = cell.source.rpartition(PREDICTION)
+            open_question = (open_question or bool(asked)) and not HEADING.search(after)
+        elif open_question and cell.outputs:
+            open_question = False
+            if not _collapsed(cell, "outputs_hidden"):
+                remedy = 'give it jupyter={"outputs_hidden": true}'
+                problems.append(f"cell {_first_line(cell)} shows the answer to a prediction; {remedy}")
+    return problems
+
+
+def plot_code_in_sight(notebook: NotebookNode) -> list[str]:
+    """Refuse plot code that isn't collapsed: a cell with a figure that defines, asserts and prints nothing."""
+    return [
+        f'cell {_first_line(cell)} only plots; give it jupyter={{"source_hidden": true}}'
+        for cell in _cells_with_figures(notebook)
+        if _only_plots(cell.source) and not _collapsed(cell, "source_hidden")
+    ]
+
+
+def missing_alternative_texts(notebook: NotebookNode) -> list[str]:
+    """Refuse a figure that tells nothing to a reader who can't see it."""
+    problems = []
+    for cell in _cells_with_figures(notebook):
+        for figure in figures(cell):
+            words = len(alternative_text(cell, figure).split())
+            if words < MIN_ALT_WORDS:
+                found = f"one of {words} words" if words else "none"
+                problems.append(
+                    f'the figure of cell {_first_line(cell)} needs an alternative text, alt="...", has {found}'
+                )
+    return problems
+
+
+def coarse_figures(notebook: NotebookNode) -> list[str]:
+    """Refuse figures of fewer dots per inch than `FIGURE_DPI`."""
+    problems = []
+    for cell in _cells_with_figures(notebook):
+        for figure in figures(cell):
+            dpi = resolution(png_bytes(figure)) if PNG in figure.data else None
+            if dpi is not None and dpi < FIGURE_DPI:
+                problems.append(f"the figure of cell {_first_line(cell)} has {dpi} dots per inch, not {FIGURE_DPI}")
+    return problems
+
+
+def unfit_animations(notebook: NotebookNode) -> list[str]:
+    """Refuse animations of more than `MAX_ANIMATION_BYTES`, and kinds of images that only JupyterLab shows."""
+    problems = []
+    for cell in _cells_with_figures(notebook):
+        for figure in figures(cell):
+            for kind in {"image/gif", "image/webp"} & set(figure.data):
+                problems.append(
+                    f"cell {_first_line(cell)} shows {kind}, which nbconvert leaves out; use plotting.animate"
+                )
+            if PNG in figure.data and moves(png := png_bytes(figure)) and len(png) > MAX_ANIMATION_BYTES:
+                limit = f"{MAX_ANIMATION_BYTES // 1000} kB"
+                problems.append(
+                    f"the animation of cell {_first_line(cell)} has {len(png) // 1000} kB, more than {limit}"
+                )
+    return problems
+
+
+Rule = Callable[[NotebookNode], list[str]]
+"""Takes an executed notebook and returns what is wrong, one sentence each."""
+
+RULES: dict[str, Rule] = {
+    "minutes": dishonest_minutes,
+    "length": too_long,
+    "predictions": answers_in_sight,
+    "plot code": plot_code_in_sight,
+    "alternative texts": missing_alternative_texts,
+    "resolution": coarse_figures,
+    "animations": unfit_animations,
+}
+"""All rules, by the names that `exceptions.py` uses."""
+
+
+def _cells_with_figures(notebook: NotebookNode) -> Iterator[NotebookNode]:
+    """Yield the cells that show a figure."""
+    yield from (cell for cell in notebook.cells if next(figures(cell), None))
+
+
+def _collapsed(cell: NotebookNode, what: str) -> bool:
+    """Return whether JupyterLab hides a cell's source or its outputs."""
+    return cell.metadata.get("jupyter", {}).get(what, False)
+
+
+def _only_plots(source: str) -> bool:
+    """Return whether code neither defines nor asserts nor prints anything; magics are no Python and don't only plot."""
+    try:
+        nodes = list(ast.walk(ast.parse(source)))
+    except SyntaxError:
+        return False
+    calls = [ast.unparse(node.func) for node in nodes if isinstance(node, ast.Call)]
+    speaks = any(call == "print" or "assert" in call for call in calls)
+    return not speaks and not any(isinstance(n, ast.FunctionDef | ast.ClassDef | ast.Assert) for n in nodes)
+
+
+def _first_line(cell: NotebookNode) -> str:
+    """Name a cell by its first line."""
+    return f"'{cell.source.strip().splitlines()[0][:60]}'"

@@ -1,0 +1,111 @@
+"""Animations that play wherever a notebook is shown, without a kernel: animated PNGs, small enough to commit."""
+
+import io
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from PIL import Image
+
+from semgrid_edu.errors import ArgumentError
+
+MAX_ANIMATION_BYTES = 600_000
+"""The largest animation: readers download it with the notebook."""
+
+
+@dataclass(frozen=True)
+class Animation:
+    """An animation to be shown as the last value of a cell.
+
+    It is an animated PNG because a notebook's PNGs are shown everywhere. nbconvert leaves GIF and WebP out, and
+    JupyterLab removes `<img src="data:...">` from a notebook that hasn't run on this machine. A program that can't play
+    animations shows the first frame.
+
+    Parameters
+    ----------
+    png : bytes
+        The file; write it to disk as any PNG.
+    alt : str
+        What happens in it, for readers who can't see it.
+    """
+
+    png: bytes = field(repr=False)
+    alt: str
+
+    def _repr_png_(self) -> tuple[bytes, dict[str, str]]:
+        """Hand the file and its alternative text to the notebook."""
+        return self.png, {"alt": self.alt}
+
+
+def animate(frames: Iterable[Figure | NDArray[np.uint8]], period: float, alt: str) -> Animation:
+    """Make an animation that runs for ever.
+
+    Parameters
+    ----------
+    frames : iterable of Figure or (h, w, 3) uint8
+        All of one size. A generator may draw on one figure and yield it again and again; figures are closed.
+    period : float
+        Seconds from one frame to the next.
+    alt : str
+        What happens in it, for readers who can't see it.
+
+    Returns
+    -------
+    Animation
+        With at most 256 colours in all its frames together. The same frames give the same bytes.
+
+    Raises
+    ------
+    ArgumentError
+        When there are no frames, their sizes differ, or the file is larger than `MAX_ANIMATION_BYTES`.
+
+    Examples
+    --------
+    >>> frames = [np.full((20, 30, 3), grey, np.uint8) for grey in (0, 100, 200)]
+    >>> animate(frames, period=0.2, alt="a rectangle that turns from black to light grey")
+    Animation(alt='a rectangle that turns from black to light grey')
+    """
+    pictures = [_picture(frame) for frame in frames]
+    if not pictures or len(sizes := {picture.size for picture in pictures}) > 1:
+        found = f"sizes {sorted(sizes)}" if pictures else "no frames"
+        raise ArgumentError("frames", "at least one, all of one size", found)
+    if not 0 < period < np.inf:
+        raise ArgumentError("period", "seconds > 0", period)
+    png = _animated_png(_with_common_palette(pictures), round(1000 * period))
+    if len(png) > MAX_ANIMATION_BYTES:
+        width, height = pictures[0].size
+        found = f"{len(png) // 1000} kB for {len(pictures)} frames of {width} x {height} pixels"
+        limit = f"at most {MAX_ANIMATION_BYTES // 1000} kB: show fewer frames, a smaller figure or less that changes"
+        raise ArgumentError("frames", limit, found)
+    return Animation(png, alt)
+
+
+def _picture(frame: Figure | NDArray[np.uint8]) -> Image.Image:
+    """Return a frame as it looks now."""
+    if not isinstance(frame, Figure):
+        return Image.fromarray(np.asarray(frame)).convert("RGB")
+    drawn = io.BytesIO()
+    frame.savefig(drawn, format="png", dpi="figure", bbox_inches=None)
+    plt.close(frame)
+    return Image.open(drawn).convert("RGB")
+
+
+def _with_common_palette(pictures: list[Image.Image]) -> list[Image.Image]:
+    """Give all pictures the same 256 colours, so that what stands still keeps its colour and is stored once."""
+    width, height = pictures[0].size
+    together = Image.new("RGB", (width, height * len(pictures)))
+    for k, picture in enumerate(pictures):
+        together.paste(picture, (0, k * height))
+    reduced = together.quantize(256, dither=Image.Dither.NONE, kmeans=5)
+    return [reduced.crop((0, k * height, width, (k + 1) * height)) for k in range(len(pictures))]
+
+
+def _animated_png(pictures: list[Image.Image], milliseconds: int) -> bytes:
+    """Write the pictures into one file; each later one stores only the rectangle in which it differs."""
+    stored = io.BytesIO()
+    first, *others = pictures
+    first.save(stored, "PNG", save_all=True, append_images=others, duration=milliseconds, loop=0, optimize=True)
+    return stored.getvalue()

@@ -1,0 +1,48 @@
+"""The table of the stages' graphical models names only what exists."""
+
+import pytest
+
+from semgrid_edu.course import stages
+from semgrid_edu.course.links import find_code
+from semgrid_edu.course.notebooks import NOTEBOOKS, read_percent
+from semgrid_edu.course.stages import STAGES, StageModel, stage_table
+
+EXAMPLE = StageModel(
+    "bof",
+    "BOF: four cells",
+    model="semgrid_edu.occupancy.bof_predict_literal",
+    check="tests/occupancy/test_bof.py::test_exact",
+    lecture="03_bof#bof-predict",
+)
+
+
+def has_cell(place):
+    name, _, tag = place.partition("#")
+    cells = read_percent(NOTEBOOKS / "src" / f"{name}.py").cells
+    return any(tag in cell.metadata.get("tags", []) for cell in cells)
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.id)
+def test_what_a_stage_names_exists(stage):
+    assert callable(find_code(stage.model))
+    path, is_test, test = stage.check.partition("::")
+    if is_test:
+        assert f"def {test}(" in (NOTEBOOKS.parent / path).read_text(encoding="utf-8")
+    else:
+        assert has_cell(stage.check)
+    assert stage.lecture is None or has_cell(stage.lecture)
+
+
+def test_each_stage_is_there_once():
+    assert len({stage.id for stage in STAGES}) == len(STAGES)
+
+
+def test_a_row_links_model_check_and_lecture(monkeypatch):
+    in_a_cell = StageModel("tour", "All", model="semgrid_edu.grid.GridSpec", check="deeper/graphical_models#all")
+    monkeypatch.setattr(stages, "STAGES", (EXAMPLE, in_a_cell))
+    _, _, bof, tour = stage_table().splitlines()
+    assert bof == (
+        "| BOF: four cells | [`bof_predict_literal`](../semgrid_edu/occupancy/bof_literal.py) "
+        "| [`test_exact`](../tests/occupancy/test_bof.py) | [03](03_bof.ipynb), `bof-predict` |"
+    )
+    assert "| [graphical models](deeper/graphical_models.ipynb), `all` | to come |" in tour

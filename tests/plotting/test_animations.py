@@ -1,0 +1,102 @@
+"""Animations, decoded again by Pillow and by OpenCV."""
+
+import base64
+import io
+
+import cv2
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from IPython.core.formatters import DisplayFormatter
+from nbconvert import HTMLExporter
+from nbformat.v4 import new_code_cell, new_notebook, new_output
+from PIL import Image
+
+from semgrid_edu import plotting
+from semgrid_edu.errors import ArgumentError
+
+
+def squares(n=5):
+    """A red square that moves right by four pixels a frame, on grey."""
+    for k in range(n):
+        frame = np.full((20, 30, 3), 200, np.uint8)
+        frame[8:12, 4 * k : 4 * k + 4] = (220, 30, 30)
+        yield frame
+
+
+def drawings():
+    """One figure, drawn on again and again."""
+    fig, ax = plt.subplots(figsize=(3, 2), dpi=plotting.FIGURE_DPI)
+    (point,) = ax.plot([0], [0], "o")
+    ax.set_xlim(-1, 4)
+    for k in range(4):
+        point.set_xdata([k])
+        yield fig
+
+
+def decoded(png):
+    """All frames as OpenCV sees them, (n, h, w, 3), and their milliseconds."""
+    readable, animation = cv2.imdecodeanimation(np.frombuffer(png, np.uint8))
+    assert readable
+    return np.stack(animation.frames)[..., 2::-1], list(animation.durations)
+
+
+def test_all_frames_come_back_exactly_and_run_for_ever():
+    animation = plotting.animate(squares(), period=0.1, alt="a red square moves to the right")
+    frames, milliseconds = decoded(animation.png)
+    np.testing.assert_array_equal(frames, list(squares()))
+    assert milliseconds == [100] * 5
+    with Image.open(io.BytesIO(animation.png)) as image:
+        assert (image.format, image.n_frames, image.info["loop"]) == ("PNG", 5, 0)
+
+
+def test_a_figure_is_drawn_anew_for_each_frame_and_closed():
+    before = plt.get_fignums()
+    frames, _ = decoded(plotting.animate(drawings(), 0.2, "a point moves to the right").png)
+    assert frames.shape == (4, 220, 330, 3)
+    blue = [np.argwhere((frame[..., 2] > 150) & (frame[..., 0] < 60))[:, 1].mean() for frame in frames]
+    np.testing.assert_allclose(np.diff(blue), (0.9 - 0.125) * 330 / 5, atol=1)  # matplotlib's default margins
+    assert plt.get_fignums() == before
+
+
+def test_the_same_frames_give_the_same_bytes():
+    first, second = (plotting.animate(drawings(), 0.2, "a point moves to the right") for _ in range(2))
+    assert first.png == second.png
+
+
+def test_it_is_shown_as_a_png_with_its_alternative_text():
+    animation = plotting.animate(squares(), 0.1, "a red square moves to the right")
+    data, metadata = DisplayFormatter().format(animation)
+    assert data["image/png"] == animation.png
+    assert data["text/plain"] == "Animation(alt='a red square moves to the right')"
+    assert metadata["image/png"] == {"alt": "a red square moves to the right"}
+
+
+def test_it_survives_nbconvert():
+    animation = plotting.animate(squares(), 0.1, "a red square moves to the right")
+    stored = base64.b64encode(animation.png).decode()
+    output = new_output("display_data", {"image/png": stored})
+    page, _ = HTMLExporter().from_notebook_node(new_notebook(cells=[new_code_cell(outputs=[output])]))
+    assert stored in page
+
+
+def test_too_large_an_animation_says_how_to_shrink_it():
+    noise = np.random.default_rng(0).integers(0, 3, (20, 300, 300, 3)).astype(np.uint8) * 120
+    with pytest.raises(
+        ArgumentError, match=r"at most 600 kB: show fewer frames.*found \d+ kB for 20 frames of 300 x 300"
+    ):
+        plotting.animate(noise, 0.1, "noise")
+
+
+@pytest.mark.parametrize(
+    ("frames", "period", "name"),
+    [
+        ([], 0.1, "frames"),
+        ([np.zeros((4, 4, 3), np.uint8), np.zeros((4, 5, 3), np.uint8)], 0.1, "frames"),
+        (list(squares()), 0.0, "period"),
+        (list(squares()), np.nan, "period"),
+    ],
+)
+def test_wrong_input_is_named(frames, period, name):
+    with pytest.raises(ArgumentError, match=f"^{name}: expected"):
+        plotting.animate(frames, period, "a text")
