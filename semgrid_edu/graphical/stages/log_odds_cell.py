@@ -6,7 +6,8 @@ from numpy.typing import ArrayLike, NDArray
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.layout import in_rows
 from semgrid_edu.graphical.model import GraphicalModel
-from semgrid_edu.graphical.stages.cell import CUT, check_scans
+from semgrid_edu.graphical.stages.cell import CUT
+from semgrid_edu.graphical.stages.cell_scans import check_scans
 from semgrid_edu.graphical.stages.stage_graph import CutEdge, StageGraph
 from semgrid_edu.occupancy import Evidence, LogOddsParams, log_odds, probability, update_log_odds
 

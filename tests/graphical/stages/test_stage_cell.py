@@ -10,7 +10,8 @@ from oracle_of_stages import assert_oracle_agrees
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals
-from semgrid_edu.graphical.stages.cell import cell_given, exact_cell, one_cell, package_cell, read_scans
+from semgrid_edu.graphical.stages.cell import cell_given, exact_cell, one_cell, package_cell
+from semgrid_edu.graphical.stages.cell_scans import read_scans
 from semgrid_edu.graphical.stages.log_odds_cell import one_log_odds_cell, package_log_odds_cell
 from semgrid_edu.occupancy import CmcdotParams, LogOddsParams, State, transition_matrix
 
@@ -54,9 +55,7 @@ def test_a_scan_never_changes_the_ratio_of_static_to_dynamic():
     stage = exact_cell(read_scans("..##"), start=(0.4, 0.4, 0.2, 0.0))
     before, after = stage.predicted[-1], stage.updated[-1]
     revealed = before + before[State.UNKNOWN] * np.array([*CmcdotParams().first_sight, -1])
-    assert after[State.STATIC] / after[State.DYNAMIC] == pytest.approx(
-        revealed[State.STATIC] / revealed[State.DYNAMIC]
-    )
+    assert after[State.STATIC] / after[State.DYNAMIC] == pytest.approx(revealed[State.STATIC] / revealed[State.DYNAMIC])
 
 
 def test_unknown_survives_only_where_nobody_looks():

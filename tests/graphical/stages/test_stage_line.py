@@ -129,7 +129,7 @@ def test_a_sensor_that_says_nothing_gains_nothing():
 
 
 def test_pyagrum_agrees():
-    assert_oracle_agrees(bayes_on_a_line(6).model, dict(zip("z0 z1 z2 z3 z4 z5".split(), [1, 0, 0, 1, 1, 0])))
+    assert_oracle_agrees(bayes_on_a_line(6).model, {"z0": 1, "z1": 0, "z3": 1, "z4": 1})
 
 
 def test_a_kernel_longer_than_the_ring_goes_round_it():
