@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical.exact import eliminate
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.layout import in_rows
@@ -42,8 +43,17 @@ def scan_with_pose_error(world: BeamWorld | None = None, rings: int = 2) -> Stag
     -------
     StageGraph
         Variables m1 ... mK, r1, r2, ... and z1, z2, ... as in `beam_over_cells`, and e in tenths of a cell.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no ring, or no noise.
     """
     world = world or same_sensor(1.0)
+    if rings < 1:
+        raise ArgumentError("rings", "at least 1", rings)
+    if world.noise == 0:
+        raise ArgumentError("world", "a noise above 0: the pose error", world)
     names = [(f"r{b}", f"z{b}") for b in range(1, rings + 1)]
     factors = [Factor(cell, [1 - world.prior, world.prior]) for cell in world.cells]
     factors.append(Factor("e", _pose_error(world)))
@@ -51,13 +61,11 @@ def scan_with_pose_error(world: BeamWorld | None = None, rings: int = 2) -> Stag
         factors += [reflection(world, r), Factor((r, "e", z), _shifted(world))]
     parents = dict.fromkeys((r for r, _ in names), world.cells) | {z: (r, "e") for r, z in names}
     reflected, measured = zip(*names, strict=True)
-    places = in_rows(world.cells, (), reflected, measured)
-    right, low = max(x for x, _ in places.values()), places[measured[0]][1]
     return StageGraph(
         "One scan, one pose error",
         GraphicalModel(factors, parents),
         observed=measured,
-        positions=places | {"e": (right - 0.5, low)},
+        positions=in_rows(world.cells, (), reflected, measured, ["e"]),
         equations={"e": "pose error"},
         cut=CUT,
     )
