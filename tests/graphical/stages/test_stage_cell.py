@@ -77,6 +77,7 @@ def test_pyagrum_agrees():
     assert_oracle_agrees(one_cell(scans).model, cell_given(scans))
 
 
+@settings(deadline=None)
 @given(st.floats(0.1, 0.9), st.lists(st.tuples(*[st.floats(0.05, 1)] * 2), min_size=1, max_size=6))
 def test_log_odds_are_exact_within_their_bounds(prior, scans):
     package = package_log_odds_cell(scans, replace(FREELY, prior=prior))

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 from filterpy import discrete_bayes
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracle_of_stages import assert_oracle_agrees
 
@@ -40,6 +40,7 @@ def lecture_cell(tag):
     return re.search(rf'^# %% tags=\["{tag}"\]\n(.*?)^# %%', source, flags=re.MULTILINE | re.DOTALL)[1]
 
 
+@settings(deadline=None, max_examples=30)
 @given(READINGS)
 def test_forward_messages_are_filterpys_recursion(readings):
     expected = recursion(
@@ -64,6 +65,7 @@ def test_by_hand_pole_then_pole():
     assert second[3] == pytest.approx(0.55, abs=0.005)
 
 
+@settings(deadline=None, max_examples=30)
 @given(READINGS)
 def test_backward_messages_smooth(readings):
     stage = bayes_on_a_line(len(readings))
