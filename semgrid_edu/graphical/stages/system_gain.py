@@ -57,7 +57,7 @@ def system_gain(world: SystemWorld | None = None) -> SystemGain:
     """Measure what is lost on the way from the sensors to the semantic grid, by exact sums over all readings.
 
     By default the paper's chain, trained perfectly, has 0.743 nats for the near cell and 0.720 for the far one
-    (`cell_by_cell`; 69.9 and 72.6 % right); joint inference has 0.682 and 0.618 (71.3 and 76.0 %). Nearly all of the
+    (`cell_by_cell`; 69.9 and 72.6 % right); joint inference has 0.682 and 0.618 (71.3 and 76.0 %). Most of the
     gain comes from the earlier image: with one instant (`steps=1`) joint inference equals `neighbours`. o itself
     loses nothing here (`neighbours` equals `scans`), for its values tell all nine sequences of scans apart. Multiplying
     s and o as if they were independent costs 1.201 and 1.059 nats, more than s alone, 1.008 and 0.938.

@@ -127,8 +127,8 @@ def thick_walls(noise: float = 0.5, scans: int = 20, draws: int = 50, wall: int 
     Range and pose are off by half a cell, 10 cm, by default. After 20 scans exact inference believes 1.1 cells
     occupied and gives the cell behind the wall 0.12. The package's grid believes 2.5 and gives it 0.78.
     Of that, the cut between cells is the smaller part: with the right beam model, but cell by cell, it is 1.2 cells and
-    0.24. The larger part is that the package's evidence takes every range as exact, and one pass weighs less than one
-    return.
+    0.24. The rest comes from where the package's evidence differs from that model: it takes every range as exact, lets
+    a pass weigh less (0.3 / 0.7 instead of 0.2 / 0.95), and keeps its log-odds within bounds.
 
     Parameters
     ----------
