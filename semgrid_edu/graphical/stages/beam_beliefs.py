@@ -1,0 +1,86 @@
+"""What an occupancy grid loses of a beam's posterior: exact inference over maps against one number per cell."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from semgrid_edu.graphical.factor import Factor, product
+from semgrid_edu.graphical.stages.beam import BeamWorld, beam_likelihood
+
+
+class BeamBeliefs(NamedTuple):
+    """Exact inference beside an occupancy grid with the same sensor, after each of n ranges.
+
+    Parameters
+    ----------
+    exact, cell_by_cell : (n, K) float64
+        P(occupied): the marginals of the exact posterior; what is left when only marginals survive each beam.
+    coupling : (n,) float64
+        Total variation between the exact posterior over maps and the product of its own marginals.
+    loss : (n,) float64
+        Total variation between the exact posterior over maps and the product of the grid's marginals.
+    """
+
+    exact: NDArray[np.float64]
+    cell_by_cell: NDArray[np.float64]
+    coupling: NDArray[np.float64]
+    loss: NDArray[np.float64]
+
+
+def beam_beliefs(world: BeamWorld, ranges: Sequence[float | None]) -> BeamBeliefs:
+    """Take in ranges one after the other, exactly and cell by cell.
+
+    For ranges 4.0, 4.6, 3.6, 4.2 from a wall in the fifth of eight cells and the defaults of `BeamWorld`, `loss` is .26
+    after one and .40 after four ranges, and the cell behind the wall gets .57 cell by cell instead of .34. `coupling`
+    doesn't grow: .26, then .23.
+
+    Parameters
+    ----------
+    world : BeamWorld
+    ranges : (n,) float or None
+        In cells, 0 for the middle of the nearest; None when nothing came back.
+
+    Returns
+    -------
+    BeamBeliefs
+    """
+    posterior = independent(world, np.full(world.n_cells, world.prior))
+    kept, steps = posterior, []
+    for z in ranges:
+        seen = beam_likelihood(world, z)
+        posterior = (posterior * seen).normalised()
+        exact, grid = (occupied(belief) for belief in (posterior, (kept * seen).normalised()))
+        kept = independent(world, grid)
+        apart = total_variation(posterior, independent(world, exact)), total_variation(posterior, kept)
+        steps.append((exact, grid, *apart))
+    return BeamBeliefs(*map(np.array, zip(*steps, strict=True)))
+
+
+def independent(world: BeamWorld, p: ArrayLike) -> Factor:
+    """Return the distribution over maps in which cells are independent.
+
+    Parameters
+    ----------
+    world : BeamWorld
+    p : (K,) float
+        P(occupied) of each cell.
+
+    Returns
+    -------
+    Factor
+        Over `world.cells`.
+    """
+    return product(Factor(cell, [1 - one, one]) for cell, one in zip(world.cells, np.asarray(p), strict=True))
+
+
+def occupied(belief: Factor) -> NDArray[np.float64]:
+    """Return P(occupied) of each variable of a normalised distribution over maps."""
+    tables = [belief.sum(*(other for other in belief.names if other != cell)).normalised() for cell in belief.names]
+    return np.array([table.table[1] for table in tables])
+
+
+def total_variation(one: Factor, other: Factor) -> float:
+    """Return half the sum of absolute differences: the most by which two distributions can differ on any event."""
+    return float(abs(one.table - other.ordered(*one.names).table).sum() / 2)

@@ -1,0 +1,199 @@
+"""One cell of CMCDOT by itself: its four states as a chain (paper, section 3.2, steps 1 to 3).
+
+A scan enters as virtual evidence (Pearl 1988, section 2.2.2): z_t has two states, "this scan" and "any other", and
+P(z_t = this scan | state) is the pair of likelihoods that the package computes. Only their ratio matters.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from semgrid_edu.graphical.factor import Factor
+from semgrid_edu.graphical.layout import in_rows
+from semgrid_edu.graphical.messages import sum_product
+from semgrid_edu.graphical.model import GraphicalModel
+from semgrid_edu.graphical.stages.cell_scans import check_scans
+from semgrid_edu.graphical.stages.stage_graph import CutEdge, StageGraph
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import (
+    CmcdotParams,
+    Evidence,
+    FilterState,
+    Particles,
+    State,
+    predict,
+    transition_matrix,
+    update,
+)
+
+UNKNOWN = (0.0, 0.0, 0.0, 1.0)
+"""The belief of a cell that nobody has seen: FREE, STATIC, DYNAMIC, UNKNOWN."""
+
+CUT = (
+    CutEdge(
+        "x1 - x1 of the next cell",
+        "Cells are updated apart, and only particles carry anything from one to another, so a gap that no beam hits "
+        "stays a gap, however sure the filter is of the wall on both sides.",
+    ),
+    CutEdge(
+        "x1 of the cells in front -> v1",
+        "Whether a beam reaches this cell depends on what stands in front of it, but the filter takes v as given, so a "
+        "shadow tells it nothing about what casts it.",
+    ),
+    CutEdge(
+        "z1 - z2",
+        "Given the state, the filter takes scans as independent, so an error that lasts from scan to scan is counted "
+        "again with each.",
+    ),
+)
+"""What the filter leaves out when it treats a cell by itself."""
+
+
+def one_cell(
+    scans: ArrayLike, dt: float = 0.1, params: CmcdotParams | None = None, start: Sequence[float] = UNKNOWN
+) -> StageGraph:
+    """Build the chain of one cell of CMCDOT: predict, look, read the scan, and again.
+
+    Between two scans the state changes by `transition_matrix`. v_t says whether scan t sees the cell. If it does,
+    UNKNOWN turns into one of the other states as `first_sight` says, because UNKNOWN means that nobody has looked.
+    STATIC and DYNAMIC share P(z | occupied), FREE and UNKNOWN share P(z | free).
+
+    Parameters
+    ----------
+    scans : (T, 2) float
+        P(z | occupied) and P(z | free) of each scan, such as `read_scans` gives; equal where it says nothing.
+    dt : float
+        Seconds before each scan.
+    params : CmcdotParams, optional
+        Rates and first sight.
+    start : (4,) float
+        The belief at time 0.
+
+    Returns
+    -------
+    StageGraph
+        Variables x0; then, for t = 1 ... T, prior t (after prediction), v t, x t (after looking), z t.
+        `cell_given(scans)` holds what is observed.
+
+    Raises
+    ------
+    ArgumentError
+        When a scan is no pair of likelihoods, or leaves nothing possible.
+    """
+    params, scans = params or CmcdotParams(), check_scans(scans)
+    steps = range(1, len(scans) + 1)
+    M, look = transition_matrix(params, dt), looking(params)
+    factors = [Factor("x0", start)]
+    parents: dict[str, tuple[str, ...]] = {}
+    for t, (occupied, free) in zip(steps, scans, strict=True):
+        prior, v, x, z = names = f"prior{t}", f"v{t}", f"x{t}", f"z{t}"
+        this_scan = np.array([free, occupied, occupied, free]) / max(occupied, free)
+        factors += [
+            Factor((f"x{t - 1}", prior), M),
+            Factor(v, [0.5, 0.5]),
+            Factor((v, prior, x), look),
+            Factor((x, z), np.stack([1 - this_scan, this_scan], axis=1)),
+        ]
+        parents |= dict(zip(names, ((f"x{t - 1}",), (), (prior, v), (x,)), strict=True))
+    chain = [name for t in steps for name in (f"prior{t}", f"x{t}")]
+    above = [name for t in steps for name in (None, f"v{t}")]
+    below = [name for t in steps for name in (None, f"z{t}")]
+    return StageGraph(
+        "One cell, four states",
+        GraphicalModel(factors, parents),
+        observed=tuple(name for t in steps for name in (f"v{t}", f"z{t}")),
+        positions=in_rows([None, *above], ["x0", *chain], [None, *below]),
+        labels={f"prior{t}": f"$x_{{{t}}}^-$" for t in steps},
+        equations={f"v{len(scans)}": "seen?", f"x{len(scans)}": "state", f"z{len(scans)}": "scan"},
+        cut=CUT,
+    )
+
+
+def looking(params: CmcdotParams) -> NDArray[np.float64]:
+    """Return P(x | v, prior): unchanged when nobody looks; when somebody does, UNKNOWN turns out to be something.
+
+    Parameters
+    ----------
+    params : CmcdotParams
+        For `first_sight`.
+
+    Returns
+    -------
+    (2, 4, 4) float64
+        Axes: whether the scan sees the cell, the state before, the state after.
+    """
+    seen = np.eye(4)
+    seen[State.UNKNOWN] = [*params.first_sight, 0]
+    return np.stack([np.eye(4), seen / seen.sum(axis=1, keepdims=True)])
+
+
+def cell_given(scans: ArrayLike) -> dict[str, int]:
+    """Return what is observed of one cell: whether each scan sees it, and that the scans are these.
+
+    Parameters
+    ----------
+    scans : (T, 2) float
+        P(z | occupied) and P(z | free) of each.
+
+    Returns
+    -------
+    dict of str to int
+        A scan whose two likelihoods are equal doesn't see the cell.
+    """
+    seen = {f"v{t}": int(occupied != free) for t, (occupied, free) in enumerate(check_scans(scans), start=1)}
+    return seen | {f"z{t}": 1 for t in range(1, len(seen) + 1)}
+
+
+class CellBeliefs(NamedTuple):
+    """What is believed of one cell at each scan.
+
+    Parameters
+    ----------
+    predicted, updated : (T, 4) float
+        Before and after the scan; FREE, STATIC, DYNAMIC, UNKNOWN.
+    """
+
+    predicted: NDArray
+    updated: NDArray
+
+
+def exact_cell(
+    scans: ArrayLike, dt: float = 0.1, params: CmcdotParams | None = None, start: Sequence[float] = UNKNOWN
+) -> CellBeliefs:
+    """Filter one cell by the forward messages of sum-product on its chain; parameters as for `one_cell`.
+
+    Returns
+    -------
+    CellBeliefs
+        Messages from P(prior t | x t-1), and of x t to what follows it.
+    """
+    beliefs = sum_product(one_cell(scans, dt, params, start).model, cell_given(scans))
+    steps = range(1, len(check_scans(scans)) + 1)
+    predicted = [beliefs.messages[f"P(prior{t} | x{t - 1})", f"prior{t}"] for t in steps]
+    passed = [beliefs.messages[f"x{t}", f"P(prior{t + 1} | x{t})"] for t in steps[:-1]]
+    return CellBeliefs(np.array(predicted), np.array([*passed, beliefs.marginals[f"x{steps[-1]}"]]))
+
+
+def package_cell(
+    scans: ArrayLike, dt: float = 0.1, params: CmcdotParams | None = None, start: Sequence[float] = UNKNOWN
+) -> CellBeliefs:
+    """Filter one cell by the package's `predict` and `update`, nothing moving; parameters as for `one_cell`.
+
+    Its dynamic mass is all newborn, without particles: so none of it flies away, and none stops.
+
+    Returns
+    -------
+    CellBeliefs
+        In float32, as the package computes.
+    """
+    params, spec, rng = params or CmcdotParams(), GridSpec(0, 1, 0, 1, 1), np.random.default_rng(0)
+    first = np.reshape(np.asarray(start, np.float32), (4, 1, 1))
+    state = FilterState(first, Particles.none(), first[State.DYNAMIC])
+    history = []
+    for occupied, free in check_scans(scans):
+        predicted = predict(state, spec, params, dt, rng)
+        state = update(predicted, spec, Evidence(np.array([[occupied]]), np.array([[free]])), params)
+        history.append((predicted.probability[:, 0, 0], state.probability[:, 0, 0]))
+    return CellBeliefs(*map(np.array, zip(*history, strict=True)))

@@ -1,0 +1,189 @@
+"""The whole system as a graph: from the world to LIDAR and image, and from those to the semantic grid (paper, Fig. 2).
+
+Above the sensors stands the world, as it is; below them what the paper computes: l -> o, i -> s -> p, (p, o) -> g.
+Information flows down, never up, and from one instant to the next only inside o.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.graphical.exact import eliminate
+from semgrid_edu.graphical.factor import Factor
+from semgrid_edu.graphical.model import GraphicalModel
+from semgrid_edu.graphical.stages.stage_graph import CutEdge, StageGraph
+from semgrid_edu.graphical.stages.system_world import CLASS_OF, STREET, SystemWorld
+
+CUT = (
+    CutEdge(
+        "i1 -> o1",
+        "The occupancy filter never sees the image, so what the camera recognises can't help it to tell what stands "
+        "from what moves, or a grazing return from an obstacle.",
+    ),
+    CutEdge(
+        "l1 -> s1",
+        "The segmentation network gets the image alone, so measured depth can't help it where a picture is ambiguous.",
+    ),
+    CutEdge(
+        "s1 -> p1, the distance",
+        "A pixel's scores are sampled wherever its ray crosses a plane, so in several cells, whichever of them the "
+        "camera saw; the fusion has to find that out from o.",
+    ),
+    CutEdge(
+        "near1 - far1 in o1",
+        "o holds one distribution per cell, so it can't say that one of two cells explains a return.",
+    ),
+    CutEdge(
+        "g0 -> g1",
+        "Only o remembers: classes aren't carried from frame to frame, so a class that an earlier image showed is "
+        "forgotten once the cell is hidden.",
+    ),
+    CutEdge(
+        "g0 -> o1",
+        "Nothing goes back from the semantic grid to the filter, whose rates are the same for a building and for a "
+        "parked car.",
+    ),
+)
+"""What the paper's chain leaves out of the exact model."""
+
+
+def whole_system(world: SystemWorld | None = None) -> StageGraph:
+    """Build the directed model of the toy street, its sensors, and the paper's chain up to the semantic grid.
+
+    Parameters
+    ----------
+    world : SystemWorld, optional
+        Two instants when left out.
+
+    Returns
+    -------
+    StageGraph
+        For t = 0, 1, ...: near t, far t (5 contents), l t (near, far, passes), i t (4 classes); o t (one state per
+        sequence of scans, which stands for what the filter believes then), s t and p t (4, as i), and g t (16: the
+        labels of near and far, 4 near + far).
+    """
+    world = world or SystemWorld()
+    factors, parents = list(street(world).factors), dict(street(world).parents or {})
+    for t in range(world.steps):
+        o, s, p, g = f"o{t}", f"s{t}", f"p{t}", f"g{t}"
+        history, n = (f"o{t - 1}",) * (t > 0), 3 ** (t + 1)
+        remember = np.eye(n).reshape(*[n // 3] * (t > 0), 3, n)
+        factors += [
+            Factor((*history, f"l{t}", o), remember),
+            Factor((f"i{t}", s), np.eye(4)),
+            Factor((s, p), np.eye(4)),
+            Factor((o, p, g), _labels(world, t)),
+        ]
+        parents |= {o: (*history, f"l{t}"), s: (f"i{t}",), p: (s,), g: (o, p)}
+    return StageGraph(
+        "The whole system",
+        GraphicalModel(factors, parents),
+        observed=tuple(f"{sensor}{t}" for t in range(world.steps) for sensor in "li"),
+        positions=_positions(world.steps),
+        labels=_node_labels(world.steps),
+        equations=_words(world.steps),
+        cut=CUT,
+    )
+
+
+def street(world: SystemWorld) -> GraphicalModel:
+    """Build the generative part alone: the cells at each instant, and the scan and the image that they cause.
+
+    Parameters
+    ----------
+    world : SystemWorld
+
+    Returns
+    -------
+    GraphicalModel
+        Directed; variables near t, far t, l t, i t.
+    """
+    factors, parents = [], {}
+    for t in range(world.steps):
+        cells = f"near{t}", f"far{t}"
+        for cell, before in zip(cells, (f"near{t - 1}", f"far{t - 1}"), strict=True):
+            factors.append(Factor((before, cell), world.change()) if t else Factor(cell, STREET))
+            parents[cell] = (before,) if t else ()
+        factors += [Factor((*cells, f"l{t}"), world.scan()), Factor((*cells, f"i{t}"), world.image())]
+        parents |= {f"l{t}": cells, f"i{t}": cells}
+    return GraphicalModel(factors, parents)
+
+
+def class_and_sensors(world: SystemWorld, t: int) -> NDArray[np.float64]:
+    """Return the joint distribution of a cell's class now and of all readings up to now.
+
+    Parameters
+    ----------
+    world : SystemWorld
+    t : int
+        Now.
+
+    Returns
+    -------
+    (2, 4, 3^(t+1), 4^(t+1)) float64
+        Near and far; class; sequence of scans; sequence of images, the last of each changes fastest.
+    """
+    model, instants = street(world), range(t + 1)
+    readings = *(f"l{k}" for k in instants), *(f"i{k}" for k in instants)
+    tables = [eliminate(model, (f"{cell}{t}", *readings)).table for cell in ("near", "far")]
+    return np.array([CLASS_OF.T @ table.reshape(5, -1) for table in tables]).reshape(2, 4, 3 ** (t + 1), -1)
+
+
+def same_belief(o: NDArray) -> NDArray[np.int64]:
+    """Give each sequence of scans a number, the same to those after which the filter believes the same.
+
+    Parameters
+    ----------
+    o : (N, ...) float
+        What the filter believes after each.
+
+    Returns
+    -------
+    (N,) int
+    """
+    return np.unique(o.reshape(len(o), -1).round(6), axis=0, return_inverse=True)[1].reshape(-1)
+
+
+def _labels(world: SystemWorld, t: int) -> NDArray[np.float64]:
+    """Return P(g | o, p): the best label of each cell, given its own column of o and the class that the pixel names."""
+    joint, o = class_and_sensors(world, t), world.occupancy()[t]
+    now = joint.reshape(2, 4, len(o), -1, 4).sum(axis=3)
+    best = []
+    for cell in (0, 1):
+        group = same_belief(o[:, cell])
+        pooled = np.stack([now[cell][:, group == number].sum(axis=1) for number in group], axis=1)
+        best.append(pooled.argmax(axis=0))
+    return np.eye(16)[4 * best[0] + best[1]]
+
+
+def _positions(steps: int) -> dict[str, tuple[float, float]]:
+    slots = {
+        "near": (0.0, 1.0),
+        "far": (1.7, 0.0),
+        "i": (0.0, -1.2),
+        "l": (1.7, -1.2),
+        "s": (0.0, -2.2),
+        "p": (0.0, -3.2),
+        "o": (1.7, -2.7),
+        "g": (0.85, -4.2),
+    }
+    return {f"{name}{t}": (x + 3.4 * t, y) for t in range(steps) for name, (x, y) in slots.items()}
+
+
+def _node_labels(steps: int) -> dict[str, str]:
+    symbols = {"near": "m", "far": "m'"} | {name: name for name in "liospg"}
+    times = ["t" if t == steps - 1 else f"t-{steps - 1 - t}" for t in range(steps)]
+    return {f"{name}{t}": f"${symbol}_{{{times[t]}}}$" for t in range(steps) for name, symbol in symbols.items()}
+
+
+def _words(steps: int) -> dict[str, str]:
+    words = {
+        "near": "near cell",
+        "far": "far cell",
+        "l": "LIDAR",
+        "i": "image",
+        "o": "occupancy",
+        "s": "scores",
+        "p": "planes",
+        "g": "semantic grid",
+    }
+    return {f"{name}{steps - 1}": text for name, text in words.items()}
