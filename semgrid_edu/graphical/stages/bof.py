@@ -15,8 +15,8 @@ from semgrid_edu.occupancy import BofState, bof_predict_literal, bof_update
 AT_THE_EDGE = CellsInARow(({"left": 0.3, "right": 0.5}, {}, {}, {"static": 0.4}), (".x..", "..x.", "...x"))
 """Something in cell 1 either leaves the row at once or crosses it, towards something that may stand in cell 4.
 
-BOF is exact here at all three steps: cells are independent at first, whatever moves has one place to arrive at, and no
-cell learns anything about where a thing came from."""
+BOF is exact here at all three steps: cells are independent at first, what moves can arrive in one cell of the row only,
+and the cell that it leaves is free whether it was there or not."""
 
 STANDING_OR_DRIVING = CellsInARow(({"static": 0.5, "right": 0.5}, {}, {}, {}), (".x..", "..x.", "...x"))
 """One thing in cell 1, of which nobody knows whether it stands: after a step it is either in cell 1 or in cell 2.

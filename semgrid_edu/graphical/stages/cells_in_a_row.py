@@ -110,7 +110,7 @@ class CellsInARow:
 
     @cached_property
     def mixing(self) -> NDArray[np.float64]:
-        """(5, 5): the package's transition matrix of one step, [before, after]; what stays DYNAMIC keeps its velocity."""
+        """(5, 5): the package's transition matrix of one step; what stays DYNAMIC keeps its velocity."""
         M = transition_matrix(self.params.world, DT)[np.ix_(STATE_OF, STATE_OF)]
         M[[Cell.LEFT, Cell.RIGHT], [Cell.RIGHT, Cell.LEFT]] = 0
         return M

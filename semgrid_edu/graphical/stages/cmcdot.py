@@ -62,7 +62,7 @@ def sampling_error(world: CellsInARow, numbers: Sequence[int], seeds: Sequence[i
 
     Where BOF is exact, both errors are the same and fall like N^-1/2. Elsewhere only the error to BOF does, and the
     error to the exact answer tends to BOF's bias: the two add like independent errors, to_exact^2 = bias^2 + to_bof^2,
-    within two per cent in `LEFT_OR_RIGHT`.
+    within five per cent in `LEFT_OR_RIGHT`.
 
     Parameters
     ----------

@@ -68,7 +68,7 @@ def cmcdot_stage(world: CellsInARow = FROM_BOTH_SIDES, cell: int = 2) -> StageGr
     """
     evidence = ("one1",) if world.scans[0][cell - 1] == NOT_SEEN else ("one1", "z1")
     return StageGraph(
-        "CMCDOT: particles for what moves, four states for each cell",
+        "CMCDOT: particles and cells",
         _two_slices(world, cell),
         observed=evidence,
         positions={

@@ -18,7 +18,8 @@ def row_model(world: CellsInARow, steps: int | None = None) -> GraphicalModel:
     At each step a cell first changes by the transition matrix (m, left out where nothing changes). Then what
     moves flies: the next state c of a cell follows from its own m and that of its two neighbours, its antecedents. A
     binary variable, always observed to be 1, says that at most one thing claims the cell: so histories in which two
-    things share a cell are struck out. The scan z depends on the cell alone.
+    things share a cell are struck out. Two that swap cells are let pass, as BOF does. The scan z depends on the cell
+    alone.
 
     Parameters
     ----------
