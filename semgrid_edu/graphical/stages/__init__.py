@@ -2,8 +2,11 @@
 
 from semgrid_edu.graphical.stages.beam import BeamWorld, beam_over_cells
 from semgrid_edu.graphical.stages.beam_beliefs import beam_beliefs
+from semgrid_edu.graphical.stages.bof import bof_stage
 from semgrid_edu.graphical.stages.cell import exact_cell, one_cell, package_cell
 from semgrid_edu.graphical.stages.cell_scans import read_scans
+from semgrid_edu.graphical.stages.cmcdot_graph import cmcdot_stage
+from semgrid_edu.graphical.stages.crf import crf_stage
 from semgrid_edu.graphical.stages.line import bayes_on_a_line
 from semgrid_edu.graphical.stages.log_odds_cell import one_log_odds_cell, package_log_odds_cell
 from semgrid_edu.graphical.stages.shared_error import count_rings, scan_with_pose_error
@@ -21,7 +24,10 @@ __all__ = [
     "bayes_on_a_line",
     "beam_beliefs",
     "beam_over_cells",
+    "bof_stage",
+    "cmcdot_stage",
     "count_rings",
+    "crf_stage",
     "exact_cell",
     "one_cell",
     "one_log_odds_cell",

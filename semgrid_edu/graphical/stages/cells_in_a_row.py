@@ -1,0 +1,153 @@
+"""A few cells in a row in front of the sensor, seen by both filters: the world of the graphs of BOF and CMCDOT."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import BofParams, CmcdotParams, Evidence, State, VelocityLattice, transition_matrix
+
+SPEED = 5.0
+"""Of all that moves, m/s: exactly one cell a step."""
+
+CELL = 0.5
+"""Metres."""
+
+DT = 0.1
+"""Seconds from step to step."""
+
+NO_CHANGE = ((0.0,) * 4,) * 4
+"""Rates of a world in which what stands goes on standing and what moves goes on moving."""
+
+HIT, PASS, NOT_SEEN = "x.?"
+"""How a scan is written: a return from the cell, a beam through it, neither."""
+
+
+class Cell(IntEnum):
+    """The states of a cell: the package's four, with DYNAMIC split by its velocity."""
+
+    FREE = 0
+    STATIC = 1
+    LEFT = 2
+    RIGHT = 3
+    UNKNOWN = 4
+
+
+STATE_OF = (State.FREE, State.STATIC, State.DYNAMIC, State.DYNAMIC, State.UNKNOWN)
+"""The package's state for each state of `Cell`."""
+
+
+@dataclass(frozen=True, eq=False)
+class CellsInARow:
+    """What is believed of a row of cells at first, each independent of the others, and what is then seen of it.
+
+    The row is a grid of one row that lies across the view: cell 1 is the leftmost. What moves has one of two
+    velocities, one cell per step to the left or to the right; what stands has the third, zero. What leaves the row
+    is gone, and nothing comes in. Nothing is born moving: its velocity could point out of the row.
+
+    Parameters
+    ----------
+    cells : tuple of dict
+        For each cell the probabilities of "static", "left", "right" and "unknown"; the rest is free.
+    scans : tuple of str
+        One per step, one letter per cell: "x" for a return, "." for a beam that passes, "?" for an unseen cell.
+    rates : 4 x 4 floats
+        As `CmcdotParams` takes them; nothing becomes DYNAMIC.
+    first_sight : (float, float, float)
+        What UNKNOWN cells turn out to be when they are first seen: FREE, STATIC and DYNAMIC, the last 0.
+
+    Raises
+    ------
+    ArgumentError
+        When a cell's probabilities are none, a scan doesn't fit the row, or something would be born moving.
+    """
+
+    cells: tuple[Mapping[str, float], ...]
+    scans: tuple[str, ...]
+    rates: tuple[tuple[float, ...], ...] = NO_CHANGE
+    first_sight: tuple[float, float, float] = (0.85, 0.15, 0.0)
+
+    def __post_init__(self) -> None:
+        """Refuse a world that the joint model doesn't describe."""
+        for number, cell in enumerate(self.cells, start=1):
+            known = set(cell) <= {"static", "left", "right", "unknown"}
+            if not known or min(cell.values(), default=0) < 0 or sum(cell.values()) > 1:
+                expected = "probabilities of static, left, right and unknown with a sum of at most 1"
+                raise ArgumentError(f"cells, cell {number}", expected, dict(cell))
+        for number, scan in enumerate(self.scans, start=1):
+            if len(scan) != len(self.cells) or not set(scan) <= {HIT, PASS, NOT_SEEN}:
+                expected = f"{len(self.cells)} letters, each {HIT} or {PASS} or {NOT_SEEN}"
+                raise ArgumentError(f"scans, scan {number}", expected, scan)
+        if any(row[State.DYNAMIC] for row in self.rates) or self.first_sight[State.DYNAMIC]:
+            raise ArgumentError(
+                "rates, first_sight", "none that makes anything DYNAMIC", (self.rates, self.first_sight)
+            )
+
+    @property
+    def belief(self) -> NDArray[np.float64]:
+        """(K, 5): the first belief of each cell, states in the order of `Cell`."""
+        belief = np.array([[cell.get(state.name.lower(), 0.0) for state in Cell] for cell in self.cells])
+        belief[:, Cell.FREE] = 1 - belief.sum(axis=1)
+        return belief
+
+    @property
+    def params(self) -> BofParams:
+        """What both filters assume: a lattice of zero and four velocities, of which the row uses left and right."""
+        world = CmcdotParams(
+            rates=self.rates, first_sight=self.first_sight, max_acceleration=0.0, stop_rate=0.0, birth_share=1e-9
+        )
+        return BofParams(VelocityLattice(max_speed=SPEED, spacing=SPEED), world)
+
+    @property
+    def spec(self) -> GridSpec:
+        """A grid of shape (1, K)."""
+        return GridSpec(0, CELL, 0, len(self.cells) * CELL, CELL)
+
+    @cached_property
+    def mixing(self) -> NDArray[np.float64]:
+        """(5, 5): the package's transition matrix of one step; what stays DYNAMIC keeps its velocity."""
+        M = transition_matrix(self.params.world, DT)[np.ix_(STATE_OF, STATE_OF)]
+        M[[Cell.LEFT, Cell.RIGHT], [Cell.RIGHT, Cell.LEFT]] = 0
+        return M
+
+    def evidence(self, step: int) -> Evidence:
+        """Return a scan as the filters take it.
+
+        Parameters
+        ----------
+        step : int
+            From 1.
+
+        Returns
+        -------
+        Evidence
+            Over `spec`, in float64.
+        """
+        sensor = self.params.world.sensor
+        said = {
+            HIT: (sensor.p_hit_occupied, sensor.p_hit_free),
+            PASS: (sensor.p_pass_occupied, sensor.p_pass_free),
+            NOT_SEEN: (1.0, 1.0),
+        }
+        occupied, free = np.array([said[letter] for letter in self.scans[step - 1]]).T
+        return Evidence(occupied[None], free[None])
+
+
+def total_variation(p: NDArray, q: NDArray) -> NDArray[np.float64]:
+    """Return the distance of distributions, sum |p - q| / 2: the most by which they disagree about any event.
+
+    Parameters
+    ----------
+    p, q : (..., K) float
+        Distributions along the last axis.
+
+    Returns
+    -------
+    (...) float64
+    """
+    return np.abs(np.asarray(p) - q).sum(axis=-1) / 2

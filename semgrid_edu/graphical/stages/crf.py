@@ -1,0 +1,165 @@
+"""The dense CRF on a few cells as an undirected model, built from the package's pair weights (eq. (3), (4))."""
+
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from semgrid_edu.crf import CrfParams, pair_weights, unary_from_probability
+from semgrid_edu.graphical.exact import eliminate
+from semgrid_edu.graphical.factor import Factor
+from semgrid_edu.graphical.model import GraphicalModel
+from semgrid_edu.graphical.stages.stage_graph import CutEdge, StageGraph
+from semgrid_edu.occupancy import N_STATES, State
+
+UNDECIDED = np.array([[0.6, 0.4, 0.6], [0.4, 0.52, 0.4], [0.6, 0.4, 0.6]])
+"""The network's probability of class 0: four cells vote for it, four against it, and the centre leans towards it."""
+
+CUT = (
+    CutEdge(
+        "x1 - x2",
+        "Mean field lets each cell hear the mean of the others, not what they would do if it changed: beyond a "
+        "coupling of about 1.3 it picks a side, 0.998 for class 0 at the default weights, where 0.52 is right.",
+    ),
+)
+"""What the package's inference leaves out of the model; every pair has such an edge."""
+
+
+def coupled(coupling: float) -> CrfParams:
+    """Return the package's parameters with both pair weights scaled, in their default ratio of 4 to 3.
+
+    Parameters
+    ----------
+    coupling : float
+        w_bilateral: 0 for no pair term, 4 for the package's default.
+
+    Returns
+    -------
+    CrfParams
+    """
+    default = CrfParams()
+    return CrfParams(w_bilateral=coupling, w_spatial=coupling * default.w_spatial / default.w_bilateral)
+
+
+def two_classes(probability: ArrayLike) -> NDArray[np.float64]:
+    """Return the unary term of two classes.
+
+    Parameters
+    ----------
+    probability : (H, W) float
+        Of class 0.
+
+    Returns
+    -------
+    (2, H, W) float64
+        phi_u of eq. (3).
+    """
+    probability = np.asarray(probability, dtype=np.float64)
+    return unary_from_probability(np.stack([probability, 1 - probability]))
+
+
+def all_free(shape: tuple[int, int]) -> NDArray[np.float64]:
+    """Return occupancy values with which every pair of cells talks: all of them certainly free.
+
+    Parameters
+    ----------
+    shape : (int, int)
+        H, W.
+
+    Returns
+    -------
+    (4, H, W) float64
+    """
+    values = np.zeros((N_STATES, *shape))
+    values[State.FREE] = 1
+    return values
+
+
+def crf_model(unary: NDArray, values: NDArray, params: CrfParams) -> GraphicalModel:
+    """Build the CRF as a product of factors: P(x) = exp(-E(x)) / Z, with the energy of eq. (3) and (4).
+
+    Parameters
+    ----------
+    unary : (C, H, W) float
+        phi_u.
+    values : (4, H, W) float
+        o_i, the occupancy probabilities of each cell.
+    params : CrfParams
+        For the pair weights.
+
+    Returns
+    -------
+    GraphicalModel
+        Undirected, over x1, x2, ..., cells counted row by row: a factor exp(-phi_u) per cell, and one per pair that
+        is exp(-k_ij) where the two labels differ and 1 where they agree.
+    """
+    cells, weights = unary.reshape(len(unary), -1).T, pair_weights(values, params)
+    names, differ = _names(len(cells)), 1 - np.eye(len(unary))
+    own = [Factor(name, np.exp(-phi)) for name, phi in zip(names, cells, strict=True)]
+    pairs = combinations(range(len(cells)), 2)
+    return GraphicalModel([*own, *(Factor((names[i], names[j]), np.exp(-weights[i, j] * differ)) for i, j in pairs)])
+
+
+def exact_marginals(model: GraphicalModel) -> NDArray[np.float64]:
+    """Return the exact distribution of every cell of a CRF.
+
+    Parameters
+    ----------
+    model : GraphicalModel
+        Over N cells of C classes, from `crf_model`. Every cell is coupled to every other, so no order of elimination
+        avoids the table of all C^N labellings; it may have 10^7 entries.
+
+    Returns
+    -------
+    (C, N) float64
+    """
+    joint = eliminate(model, model.names).normalised().table
+    cells = range(joint.ndim)
+    return np.stack([joint.sum(axis=tuple(other for other in cells if other != cell)) for cell in cells], axis=1)
+
+
+def crf_stage(coupling: float = 4.0, unary: NDArray | None = None, values: NDArray | None = None) -> StageGraph:
+    """Return the graph of a fully connected CRF: a factor for each cell and one for each pair of cells.
+
+    Parameters
+    ----------
+    coupling : float
+        See `coupled`.
+    unary : (C, H, W) float, optional
+        phi_u; that of `UNDECIDED`, 3 x 3 cells, when left out.
+    values : (4, H, W) float, optional
+        Occupancy of each cell; all free when left out.
+
+    Returns
+    -------
+    StageGraph
+        Variables as in `crf_model`, drawn on a circle, so that every pair has a line of its own.
+    """
+    unary = two_classes(UNDECIDED) if unary is None else unary
+    values = all_free(unary.shape[1:]) if values is None else values
+    model = crf_model(unary, values, coupled(coupling))
+    return StageGraph(
+        "CRF: every cell with every other",
+        model,
+        positions=_circle(model),
+        equations={"f(x1)": r"$e^{-\phi_u(x_1)}$", "f(x1, x2)": r"$e^{-k_{12} [x_1 \neq x_2]}$"},
+        cut=CUT,
+    )
+
+
+def _names(count: int) -> list[str]:
+    return [f"x{number}" for number in range(1, count + 1)]
+
+
+def _circle(model: GraphicalModel) -> dict[str, tuple[float, float]]:
+    """Place cells on a circle, each one's own factor outside it, and factors of opposite cells clear of its centre."""
+    names = model.names
+    angles = np.pi / 2 - 2 * np.pi * np.arange(len(names)) / len(names)
+    directions = dict(zip(names, np.stack([np.cos(angles), np.sin(angles)], axis=1), strict=True))
+    radius = max(1.0, 0.29 * len(names))
+    places = {name: radius * direction for name, direction in directions.items()}
+    places |= {f"f({name})": (radius + 0.65) * direction for name, direction in directions.items()}
+    for one, other in zip(names, names[len(names) // 2 :], strict=False):
+        if len(names) % 2 == 0:
+            places[f"f({one}, {other})"] = 0.4 * places[one]
+    return {name: (float(x), float(y)) for name, (x, y) in places.items()}

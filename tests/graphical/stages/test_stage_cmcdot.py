@@ -1,0 +1,89 @@
+"""CMCDOT against joint inference and BOF: sampling error falls like N^-1/2, and what remains is BOF's bias."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from pyagrum_posteriors import posteriors
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.graphical import d_separated, eliminate, why_dependent
+from semgrid_edu.graphical.stages import cmcdot_stage
+from semgrid_edu.graphical.stages.bof import AT_THE_EDGE, STANDING_OR_DRIVING, bof_beliefs, bof_errors
+from semgrid_edu.graphical.stages.cells_in_a_row import Cell, CellsInARow
+from semgrid_edu.graphical.stages.cmcdot import FORGETTING, LEFT_OR_RIGHT, particle_beliefs, sampling_error
+from semgrid_edu.graphical.stages.cmcdot_graph import FROM_BOTH_SIDES
+
+NUMBERS = [100, 400, 1600, 6400]
+
+
+def test_where_bof_is_exact_particles_tend_to_the_exact_answer():
+    error = sampling_error(AT_THE_EDGE, NUMBERS, seeds=range(40))
+    assert error.bias < 1e-9
+    np.testing.assert_allclose(error.to_exact, error.to_bof, atol=1e-9)
+    assert -0.6 < error.slope < -0.4
+    assert error.to_exact[-1] < 0.001
+
+
+def test_elsewhere_they_tend_to_bof_and_its_bias_remains():
+    error = sampling_error(LEFT_OR_RIGHT, NUMBERS, seeds=range(40))
+    assert -0.6 < error.slope < -0.4
+    assert error.bias == pytest.approx(0.051, abs=5e-4)
+    np.testing.assert_allclose(error.to_bof[[0, -1]], [0.010, 0.001], rtol=0.25)
+    np.testing.assert_allclose(error.to_exact**2, error.bias**2 + error.to_bof**2, rtol=0.05)
+    assert error.to_exact[-1] == pytest.approx(error.bias, rel=0.01)
+
+
+def test_the_bias_is_that_of_two_cells_that_hold_the_same_thing():
+    errors = bof_errors(LEFT_OR_RIGHT)
+    assert errors[0].argmax() == 0
+    assert errors[0, 0] == pytest.approx(0.218, abs=5e-4)
+
+
+def test_particles_of_one_velocity_per_cell_have_nothing_to_sample():
+    np.testing.assert_allclose(
+        particle_beliefs(STANDING_OR_DRIVING, 100, seed=0), bof_beliefs(STANDING_OR_DRIVING), atol=1e-6
+    )
+
+
+def test_the_same_seed_gives_the_same_bits():
+    assert np.array_equal(particle_beliefs(LEFT_OR_RIGHT, 50, seed=1), particle_beliefs(LEFT_OR_RIGHT, 50, seed=1))
+    assert not np.array_equal(particle_beliefs(LEFT_OR_RIGHT, 50, seed=1), particle_beliefs(LEFT_OR_RIGHT, 50, seed=2))
+
+
+@pytest.mark.parametrize("scan", [".x.", "...", ".?."])
+@pytest.mark.parametrize("cells", [FROM_BOTH_SIDES.cells, ({}, {"static": 0.5}, {"left": 0.9}), ({}, {}, {})])
+def test_the_graph_computes_what_predict_and_update_do_in_one_cell(cells, scan):
+    world = CellsInARow(cells, (scan,), FORGETTING)
+    stage, bof = cmcdot_stage(world), bof_beliefs(world)[0, 1]
+    given = {"one1": 1} | ({"z1": int(scan[1] == "x")} if scan[1] != "?" else {})
+    found = eliminate(stage.model, "c1", given).normalised().table
+    moving = bof[[Cell.LEFT, Cell.RIGHT]].sum()
+    np.testing.assert_allclose(found, [*bof[[Cell.FREE, Cell.STATIC]], moving, bof[Cell.UNKNOWN]], atol=1e-12)
+
+
+def test_inference_in_the_graph_is_pyagrums():
+    world = CellsInARow(({"right": 0.3}, {"static": 0.3, "left": 0.2, "unknown": 0.1}, {}), (".x.",), FORGETTING)
+    stage = cmcdot_stage(world)
+    given = {"one1": 1, "z1": 1}
+    wanted, probability = posteriors(stage.model, given)
+    assert eliminate(stage.model, (), given).table == pytest.approx(probability, abs=1e-9)
+    for name in ("x0", "c0", "x1", "c1"):
+        np.testing.assert_allclose(eliminate(stage.model, name, given).normalised().table, wanted[name], atol=1e-9)
+
+
+def test_the_graph_separates_the_scan_from_the_past():
+    stage = cmcdot_stage()
+    assert d_separated(stage.model, "z1", ["c0", "x0", "x1"], given="c1")
+    assert d_separated(stage.model, "c0", "x1", given="x0")
+    assert why_dependent(stage.model, "c0", "x1", given=["x0", "one1"]) == ("c0", "one1", "x1")
+
+
+def test_the_drawing_has_a_plate_for_particles_and_one_for_cells():
+    stage = cmcdot_stage()
+    assert sorted(name for plate in stage.plates.values() for name in plate) == sorted(stage.model.names)
+    plt.close(stage.draw(highlight="x1").figure)
+
+
+def test_more_than_one_thing_on_the_move_is_refused():
+    with pytest.raises(ArgumentError, match="at most one moving thing"):
+        cmcdot_stage(CellsInARow(({"right": 0.8}, {}, {"left": 0.5}), ("...",)))

@@ -1,0 +1,139 @@
+"""The dense CRF on a few cells: its distribution, and how far approximations are from it as cells couple."""
+
+from itertools import product
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from pyagrum_posteriors import as_directed, posteriors
+
+from semgrid_edu.crf import CrfParams, energy, mean_field_naive, pair_weights, unary_from_probability
+from semgrid_edu.graphical import d_separated, eliminate, max_product, mean_field_graph
+from semgrid_edu.graphical.stages import crf_stage
+from semgrid_edu.graphical.stages.crf import UNDECIDED, all_free, coupled, crf_model, exact_marginals, two_classes
+from semgrid_edu.graphical.stages.crf_coupling import coupling_sweep, critical_coupling
+
+
+def random_cells(seed, classes, height, width):
+    """Networks' scores and occupancy at random."""
+    rng = np.random.default_rng(seed)
+    unary = unary_from_probability(np.moveaxis(rng.dirichlet(np.ones(classes), (height, width)), -1, 0))
+    return unary, np.moveaxis(rng.dirichlet(np.ones(4) / 2, (height, width)), -1, 0)
+
+
+@pytest.mark.parametrize(("classes", "height", "width"), [(2, 3, 3), (3, 2, 3)])
+def test_probabilities_are_those_of_the_packages_energy(classes, height, width):
+    unary, values = random_cells(0, classes, height, width)
+    params = CrfParams(sigma_beta=0.5)
+    model = crf_model(unary, values, params)
+    labellings = list(product(range(classes), repeat=height * width))
+    energies = [energy(np.reshape(x, (height, width)), unary, values, params) for x in labellings]
+    weights = [model.weight(dict(zip(model.names, x, strict=True))) for x in labellings]
+    np.testing.assert_allclose(weights, np.exp(-np.array(energies)), rtol=1e-10)
+    assert eliminate(model, ()).table == pytest.approx(np.exp(-np.array(energies)).sum(), rel=1e-10)
+    best = labellings[int(np.argmin(energies))]
+    assert tuple(max_product(model).values()) == best
+    marginals = exact_marginals(model)
+    first = [sum(w for w, x in zip(weights, labellings, strict=True) if x[0] == label) for label in range(classes)]
+    np.testing.assert_allclose(marginals[:, 0], np.array(first) / sum(weights), atol=1e-12)
+
+
+def test_marginals_are_pyagrums():
+    unary, values = random_cells(1, 3, 2, 3)
+    model = crf_model(unary, values, CrfParams())
+    wanted, _ = posteriors(*as_directed(model))
+    marginals = exact_marginals(model)
+    for k, name in enumerate(model.names):
+        np.testing.assert_allclose(marginals[:, k], wanted[name], atol=1e-9)
+        np.testing.assert_allclose(eliminate(model, name).normalised().table, wanted[name], atol=1e-9)
+
+
+def test_sixteen_cells_are_still_exact():
+    unary, values = random_cells(2, 2, 4, 4)
+    params = CrfParams()
+    x = np.array(list(product((0, 1), repeat=16)))
+    phi, k = unary.reshape(2, -1), pair_weights(values, params)
+    differ = x[:, :, None] != x[:, None]
+    energies = phi[x, np.arange(16)].sum(axis=1) + (differ * k).sum(axis=(1, 2)) / 2
+    weights = np.exp(-energies)
+    wanted = np.stack([1 - x.T @ weights / weights.sum(), x.T @ weights / weights.sum()])
+    np.testing.assert_allclose(exact_marginals(crf_model(unary, values, params)), wanted, atol=1e-10)
+
+
+@pytest.fixture(scope="module")
+def sweep():
+    return coupling_sweep([0.0, 1.0, 1.5, 4.0])
+
+
+def test_without_coupling_every_method_is_exact(sweep):
+    assert all(errors[0] < 1e-6 for errors in sweep.errors.values())
+    np.testing.assert_allclose(sweep.marginals["exact"][0, 0], UNDECIDED.ravel(), atol=1e-12)
+
+
+def test_below_the_transition_loopy_sum_product_errs_about_half_as_much_as_mean_field(sweep):
+    errors = {method: error[1] for method, error in sweep.errors.items()}
+    assert 0.010 < errors["mean field"] < 0.016
+    assert 0.4 < errors["loopy"] / errors["mean field"] < 0.6
+    assert errors["naive"] == pytest.approx(errors["mean field"], rel=0.1)
+
+
+def test_just_above_it_converged_mean_field_errs_most_and_ten_updates_least(sweep):
+    errors = {method: error[2] for method, error in sweep.errors.items()}
+    assert errors["mean field"] > 0.25
+    assert errors["naive"] < errors["loopy"] < errors["mean field"]
+    assert errors["naive"] == pytest.approx(0.055, abs=5e-4)
+
+
+def test_the_fast_filter_errs_like_the_naive_one(sweep):
+    np.testing.assert_allclose(sweep.marginals["fast"], sweep.marginals["naive"], atol=0.005)
+
+
+def test_at_the_default_weights_all_pick_a_side_while_the_exact_marginals_stay_undecided(sweep):
+    assert coupled(4.0) == CrfParams()
+    np.testing.assert_allclose(sweep.marginals["exact"][:, 0, 4], 0.52, atol=0.002)
+    np.testing.assert_allclose(sweep.marginals["exact"][3, 0], 0.52, atol=0.002)
+    for method in ("mean field", "naive", "fast", "loopy"):
+        assert sweep.marginals[method][3, 0, 4] == pytest.approx(0.998, abs=5e-4)
+        assert sweep.errors[method][3] == pytest.approx(0.478, abs=1e-3)
+    assert all(wrong[3] == 0 for wrong in sweep.wrong_labels.values())
+
+
+def test_between_the_two_the_most_probable_class_of_a_cell_is_not_that_of_the_best_labelling(sweep):
+    assert sweep.labelling[1].tolist() == [0] * 9
+    assert sweep.wrong_labels["exact"][1] == 4
+
+
+def test_strongly_coupled_cells_vote():
+    # All nine agree; four votes of 0.6 against four, and the centre's 0.52 decides.
+    marginals = exact_marginals(crf_model(two_classes(UNDECIDED), all_free((3, 3)), coupled(40.0)))
+    np.testing.assert_allclose(marginals[0], 0.52, atol=1e-9)
+
+
+@pytest.mark.parametrize(("share", "undecided"), [(0.9, True), (1.1, False)])
+def test_mean_field_leaves_the_uniform_distribution_at_the_critical_coupling(share, undecided):
+    values = all_free((3, 3))
+    critical = critical_coupling(2, values)
+    assert critical == pytest.approx(1.298, abs=5e-4)
+    model = crf_model(two_classes(np.full((3, 3), 0.5)), values, coupled(share * critical))
+    np.testing.assert_allclose(exact_marginals(model), 0.5, atol=1e-12)
+    largest = max(p.max() for p in mean_field_graph(model, iterations=300, seed=0).marginals.values())
+    assert (largest < 0.51) == undecided
+    assert undecided or largest > 0.7
+
+
+@pytest.mark.parametrize("coupling", [1.0, 3.0])
+def test_the_packages_mean_field_settles_where_updates_of_single_cells_do(coupling):
+    unary, values = two_classes(UNDECIDED), all_free((3, 3))
+    found = mean_field_graph(crf_model(unary, values, coupled(coupling)), iterations=200)
+    naive = mean_field_naive(unary, values, coupled(coupling), iterations=200).reshape(2, -1)
+    np.testing.assert_allclose(np.stack(list(found.marginals.values()), axis=1), naive, atol=1e-6)
+
+
+@pytest.mark.parametrize("shape", [(3, 3), (2, 2)])
+def test_every_pair_has_a_line_of_its_own(shape):
+    stage = crf_stage(unary=two_classes(np.full(shape, 0.6)))
+    cells = shape[0] * shape[1]
+    assert len(stage.model.factors) == cells + cells * (cells - 1) // 2
+    assert len({tuple(np.round(place, 6)) for place in stage.positions.values()}) == len(stage.positions)
+    assert not d_separated(stage.model, "x1", "x2", given=[f"x{k}" for k in range(3, cells + 1)])
+    plt.close(stage.draw().figure)
