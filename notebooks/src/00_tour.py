@@ -299,13 +299,14 @@ labels = np.where(seen, planes.argmax(dim=0), 255)
 plotting.label_maps(spec, {f"plane at {heights[d]:.1f} m": labels[d] for d in (0, 5, 10)}, KITTI_14)
 plt.show()
 for d in (0, 5, 10):
-    print(f"plane at {heights[d]:.0f} m: {100 * (labels[d] == road).sum() / seen[d].sum():2.0f} % of the cells read road")
+    share = (labels[d] == road).sum() / seen[d].sum()
+    print(f"plane at {heights[d]:.0f} m: {100 * share:2.0f} % of the cells read road")
 assert not (labels[10] == road).any()
 
 # %% [markdown]
-# White cells lie outside the picture: beside it, or, near the vehicle, below its lower edge. The road is in its place on
-# the first plane, drawn together on the second, and absent on the third. No single plane is right everywhere. Does one
-# of the twenty have the true class of a cell? Carry the true labels of the image to all planes, and count.
+# White cells lie outside the picture: beside it, or, near the vehicle, below its lower edge. The road is in its place
+# on the first plane, drawn together on the second, and absent on the third. No single plane is right everywhere. Does
+# one of the twenty have the true class of a cell? Carry the true labels of the image to all planes, and count.
 
 # %%
 image_labels = torch.from_numpy(resize_labels(frame.labels.image, now.scores.shape[1:]))

@@ -38,18 +38,8 @@ from semgrid_edu import plotting
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.occupancy import (
-    CmcdotParams,
-    Evidence,
-    FilterState,
-    Particles,
-    PlanarMotion,
-    SensorModel,
-    State,
-    scan_evidence,
-    track_drive,
-    transition_matrix,
-)
+from semgrid_edu.occupancy import CmcdotParams, Evidence, FilterState, Particles, PlanarMotion, SensorModel, State
+from semgrid_edu.occupancy import scan_evidence, track_drive, transition_matrix
 from semgrid_edu.occupancy import update as update_grid
 
 plt.rcParams["figure.dpi"] = 80
@@ -227,11 +217,11 @@ favourite = np.argmax(history, axis=1)
 print("the favourite after steps 2 to 8:", favourite[2:9], "  the truth:", places[2:9])
 
 # %% [markdown]
-# Above, the bluer the surer, and circles are the truth. Below, the entropy goes up with every prediction (circles)
-# and mostly down with every update (squares). At step 3 the sensor has said *pole* twice in a row. That fits the two
-# neighbouring poles, so the filter takes the vehicle to be in cell 3. But it hasn't moved and is still in cell 2, beside
-# the same pole. One step later it is in cell 3, and the filter is right. From then on it lives in the balance of the two
-# steps, and nothing is ever *settled*: at step 7 it has lost the vehicle again.
+# Above, the bluer the surer, and circles are the truth. Below, the entropy goes up with every prediction (circles) and
+# mostly down with every update (squares). At step 3 the sensor has said *pole* twice in a row. That fits the two
+# neighbouring poles, so the filter takes the vehicle to be in cell 3. But it hasn't moved and is still in cell 2,
+# beside the same pole. One step later it is in cell 3, and the filter is right. From then on it lives in the balance of
+# the two steps, and nothing is ever *settled*: at step 7 it has lost the vehicle again.
 #
 # Six readings are surprises: not what the favourite cell made one expect. At three of them the sensor says *nothing*
 # where a pole was expected, and these are the three updates that raise the entropy. At the other three it says *pole*
@@ -654,10 +644,10 @@ print("in the middle, steps 10 to 15: the vehicle is in", places[10:16], " the f
 # %% [markdown]
 # On the left the numbers of this page, in the middle a good sensor and good odometry: once the pair of poles has been
 # seen, at step 5, the place is known. The one slip, at step 12, is noticed two steps later, when the filter expects the
-# pole beside cell 2 and the sensor says *nothing*. On the right the same good
-# sensor with bad odometry: most cells have no pole, and between poles only the odometer speaks. Now try the opposite,
-# `hit` 0.5 and `slip` 0.02: where odometry is good, each reading helps for a long time. At `hit` 0.1 the sensor says
-# *pole* as often here as there: it carries no information, and no filter can invent any.
+# pole beside cell 2 and the sensor says *nothing*. On the right the same good sensor with bad odometry: most cells have
+# no pole, and between poles only the odometer speaks. Now try the opposite, `hit` 0.5 and `slip` 0.02: where odometry
+# is good, each reading helps for a long time. At `hit` 0.1 the sensor says *pole* as often here as there: it carries no
+# information, and no filter can invent any.
 #
 # ## Where this breaks
 #

@@ -591,9 +591,9 @@ assert ghosts[1] < 0.5 * ghosts[0]
 
 # %% [markdown]
 # Fewer by far, but not none. In the picture on the right you see nearly half of what is left: the dark stretch on the
-# left, from 16 to 22 m ahead. The rear of the first oncoming car was believed to stand, and what it left behind lay in its
-# shadow, where no beam takes it back. There the second car arrived: where something was believed to stand, so the rule
-# that keeps fences made it STATIC as well. A filter that is wrong of one thing is soon wrong of the next.
+# left, from 16 to 22 m ahead. The rear of the first oncoming car was believed to stand, and what it left behind lay in
+# its shadow, where no beam takes it back. There the second car arrived: where something was believed to stand, so the
+# rule that keeps fences made it STATIC as well. A filter that is wrong of one thing is soon wrong of the next.
 #
 # ## What it costs
 #
@@ -615,6 +615,7 @@ for fastest, spacing in ((8, 2), (16, 2), (16, 1), (25, 1), (25, 0.5)):
     n = len(VelocityLattice(fastest, spacing))
     print(f"{fastest:4d} m/s {spacing:5.1f} m/s {n:8d} {4e-6 * n * cells:15.0f} MB")
 
+
 # %% tags=["nbval-ignore-output"]
 def seconds(grid, lattice):
     """Return the shortest time of five predictions, seconds."""
@@ -631,7 +632,8 @@ print("velocities      cells      time of one prediction")
 for fastest, spacing, cell in ((8, 2, 0.5), (16, 2, 0.5), (16, 1, 0.5), (16, 2, 1.0), (16, 2, 0.25)):
     lattice, grid = VelocityLattice(fastest, spacing), GridSpec(0, 71, -15.5, 15.5, cell)
     V, (H, W), took = len(lattice), grid.shape, seconds(grid, lattice)
-    print(f"{V:10d}  {H:4d} x {W:3d}  {1000 * took:6.1f} ms, {1e9 * took / (V * H * W):4.1f} ns for each of V x H x W numbers")
+    each = 1e9 * took / (V * H * W)
+    print(f"{V:10d}  {H:4d} x {W:3d}  {1000 * took:6.1f} ms, {each:4.1f} ns for each of V x H x W numbers")
 
 # %% [markdown]
 # In the first three rows the grid stays and the lattice grows: four times as many velocities take about four times as
@@ -701,9 +703,8 @@ plt.show()
 # %% [markdown]
 # Left: what is slower than half a spacing just stands. From there P(DYNAMIC) rises until the speed is a whole spacing.
 # With a spacing of 4 m/s a pedestrian is furniture, and something at 3.5 m/s may as well stand as move. Right: the
-# beginnings of a stair. With a spacing of 4 m/s, what does 4 to 6 m/s is said to do
-# 4 to 5, and from there the line climbs steeply to the next velocity of the lattice. With 2 m/s it keeps to the truth,
-# within half a metre a second.
+# beginnings of a stair. With a spacing of 4 m/s, what does 4 to 6 m/s is said to do 4 to 5, and from there the line
+# climbs steeply to the next velocity of the lattice. With 2 m/s it keeps to the truth, within half a metre a second.
 #
 # ## Where this breaks
 #

@@ -592,8 +592,8 @@ np.testing.assert_allclose(update_cell([*known, 0], 0.8, 0.2, sight.first_sight)
 
 # %% [markdown]
 # Particles take part with their weights: each is multiplied by what its cell's DYNAMIC was multiplied by, so that the
-# weights still sum to it. On the drive: left what the scan says (black: hit; pink: seen
-# through; white: nothing), right the belief after it.
+# weights still sum to it. On the drive: left what the scan says (black: hit; pink: seen through; white: nothing), right
+# the belief after it.
 
 # %%
 fig, axes = plt.subplots(1, 2, figsize=(9, 4.6), layout="compressed")
@@ -725,11 +725,10 @@ for ax, state, title in zip(axes, (updated, resampled), ("before step 4", "after
 plt.show()
 
 # %% [markdown]
-# See blue ahead of us (driving our way) and yellow on the left (coming towards us). Before step 4 nearly all are
-# pale beside the heaviest, which carries about a hundred times as much as the middle one. After it the weight is shared
-# out, the cars are
-# solid, and there are a few sparks of newborn particles all over the free space: the filter's guesses of what might
-# start to move.
+# See blue ahead of us (driving our way) and yellow on the left (coming towards us). Before step 4 nearly all are pale
+# beside the heaviest, which carries about a hundred times as much as the middle one. After it the weight is shared out,
+# the cars are solid, and there are a few sparks of newborn particles all over the free space: the filter's guesses of
+# what might start to move.
 
 # %% [markdown]
 # ## Static against dynamic
@@ -925,8 +924,8 @@ Markdown(table(result, "HDL-64E", "paper"))
 #    pedestrians CMCDOT finds more. CMCDOT is right somewhat more often when it says DYNAMIC.
 # 3. **Time in view decides.** Of all observed cells that move, more than a third aren't called so by CMCDOT. Of those
 #    with returns, near and in view for 1.5 s, hardly any is missed. So nearly all that is missed is new in view, far
-#    away or without returns. What stands is hardly ever called DYNAMIC. Two in three of the cells that are so by mistake
-#    are FREE; among what is hit, banks are the worst.
+#    away or without returns. What stands is hardly ever called DYNAMIC. Two in three of the cells that are so by
+#    mistake are FREE; among what is hit, banks are the worst.
 
 # %%
 scores = result["scores"]["HDL-64E"]["paper"]
@@ -1011,10 +1010,11 @@ def crossing(t):
 
 def called_moving(run):
     """Return how much of the car and of the person was called DYNAMIC, over the last second, per cent."""
-    return [
-        100 * np.nanmean([dynamic_share(crossing(t)[thing], x, points, belief) for t, x, points, belief, _ in run[-10:]])
-        for thing in (2, 3)
+    shares = [
+        [dynamic_share(crossing(t)[thing], x, points, belief) for thing in (2, 3)]
+        for t, x, points, belief, _ in run[-10:]
     ]
+    return 100 * np.nanmean(shares, axis=0)
 
 
 def play(particles, stop_speed, time, ax):
@@ -1109,8 +1109,8 @@ plt.show()
 # you can't have one without the other. And its mirror image: as you drive, the end of what you see of a fence runs
 # along the fence. There, some 40 m ahead, lies the 1 % of the wall above that was called DYNAMIC.
 #
-# **Somebody starts to walk.** A person stands for two seconds, then walks at 1.4 m/s. A car is hidden by a van: a narrow
-# one, for less than a second, and a wide one, for more than two. How long until the filter knows again?
+# **Somebody starts to walk.** A person stands for two seconds, then walks at 1.4 m/s. A car is hidden by a van: a
+# narrow one, for less than a second, and a wide one, for more than two. How long until the filter knows again?
 #
 # **Predict before you run.** Would the filter notice sooner if the person had stood for 0.2 s only? And if they walked
 # twice as fast?
@@ -1157,6 +1157,7 @@ for ax in axes:
     ax.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.02, 1))
 plt.show()
 
+
 # %% tags=["nbval-ignore-output"]
 def time_to_notice(stood, speed):
     """Return after how many seconds of walking the mean P(DYNAMIC) of a person exceeds 1/2."""
@@ -1184,9 +1185,9 @@ for name, (times, means) in hidden.items():
 # makes it about twice as soon.</details>
 #
 # The person is called STATIC for about a second, and it isn't the time spent standing that must be worn down. What
-# counts is the way: at all three speeds the filter needs about 1.5 m, which are three cells. In the cell where a
-# person stood, particles can prove nothing; only in new cells, which were free, do those that go along with the person
-# predict the scans better than STATIC does. A vehicle that brakes for pedestrians only when they are DYNAMIC brakes late.
+# counts is the way: at all three speeds the filter needs about 1.5 m, which are three cells. In the cell where a person
+# stood, particles can prove nothing; only in new cells, which were free, do those that go along with the person predict
+# the scans better than STATIC does. A vehicle that brakes for pedestrians only when they are DYNAMIC brakes late.
 #
 # **What is hidden for long.** Behind the narrow van the car's particles fly on unseen, and when the car comes out it
 # is expected: mostly DYNAMIC at once, though not yet sure. Behind the wide van they fade as the third picture of step

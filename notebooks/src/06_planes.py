@@ -407,8 +407,10 @@ below = np.arange(96) > camera.K[1, 2]
 print(f"{100 * heard[below].mean():.0f} % of the pixels below the horizon have learnt, {heard[~below].sum()} above it")
 flat = [KITTI_14.index(name) for name in ("road", "sidewalk")]
 is_flat, is_right = np.isin(true_labels, flat), heard & (learnt == true_labels)
-print(f"road and sidewalk: {100 * heard[is_flat].mean():.0f} % of the pixels are read", end=", ")
-print(f"{100 * is_right[heard & is_flat].mean():.0f} % of these are right, {100 * is_right[is_flat].mean():.0f} % of all")
+shares = [100 * share.mean() for share in (heard[is_flat], is_right[heard & is_flat], is_right[is_flat])]
+print(
+    "road and sidewalk: {:.0f} % of the pixels are read, {:.0f} % of these are right, {:.0f} % of all".format(*shares)
+)
 wrong = heard & is_flat & ~is_right
 print(f"of the wrong ones {100 * (learnt == KITTI_14.index('car'))[wrong].mean():.0f} % have learnt car")
 print(f"everything else that is read: {100 * is_right[heard & ~is_flat].mean():.0f} % are right", end=", ")
@@ -425,13 +427,12 @@ plt.show()
 
 # %% [markdown]
 # Top: where the photograph shines through, nobody asked. On road and sidewalk the map reads a third of the pixels. Of
-# these nine in ten are right, and none of them was ever labelled: this is end-to-end training in miniature. (Half of the
-# wrong ones have learnt *car*: they lie at the foot of one.) The other two thirds have learnt nothing. Wrong is, above
-# all, what stands up. No pixel of the fence has learnt *fence*, nearly all say vegetation, and the foot of the sign's post
-# says sidewalk: from where the
-# camera stands, the lawn and the pavement *behind* them have the same pixels. With twenty planes, an occupancy grid and
-# a network that shares its weights over all pixels, the real training has a way out of both, dots and blame (lecture
-# 08).
+# these nine in ten are right, and none of them was ever labelled: this is end-to-end training in miniature. (Half of
+# the wrong ones have learnt *car*: they lie at the foot of one.) The other two thirds have learnt nothing. Wrong is,
+# above all, what stands up. No pixel of the fence has learnt *fence*, nearly all say vegetation, and the foot of the
+# sign's post says sidewalk: from where the camera stands, the lawn and the pavement *behind* them have the same pixels.
+# With twenty planes, an occupancy grid and a network that shares its weights over all pixels, the real training has a
+# way out of both, dots and blame (lecture 08).
 
 # %% [markdown]
 # ## If the point moves: the gradient in u and v
@@ -882,9 +883,9 @@ plt.show()
 # place, thrown away from the camera like a shadow: only the wheels are right. On the plane at 0.6 m what is lower falls
 # short, what is higher overshoots, and the bodywork at that height is right. At 1.2 m the smear is longest. At 2 m,
 # above the camera, rays rise, and only what towers over it is left: the roof of a van. Of all twenty planes the one at
-# 2.2 m is the purest: three in ten of its cells that read *car* are one. But it finds only a quarter of the cars' cells.
-# Of the planes below the camera, the one at 0.4 m does best: a quarter. No plane is right, each is right for something,
-# and it takes the LIDAR's occupancy to say where along the smear the car stands: lecture 08.
+# 2.2 m is the purest: three in ten of its cells that read *car* are one. But it finds only a quarter of the cars'
+# cells. Of the planes below the camera, the one at 0.4 m does best: a quarter. No plane is right, each is right for
+# something, and it takes the LIDAR's occupancy to say where along the smear the car stands: lecture 08.
 #
 # ## Play with it
 #
@@ -974,9 +975,9 @@ for start in (8.0, -8.0):
 
 # %% [markdown]
 # On the one side the ground reads trees, houses and sky, where there is no road in any direction. On the other it reads
-# the road just before the vehicle, where everything is road, or falls below the image. Either way the gradient is nearly
-# zero, or worse, points at something else. That is why registration starts with small, blurred images, where one pixel
-# is wide, and refines.
+# the road just before the vehicle, where everything is road, or falls below the image. Either way the gradient is
+# nearly zero, or worse, points at something else. That is why registration starts with small, blurred images, where one
+# pixel is wide, and refines.
 #
 # **Blame goes to whoever was read.** You have seen the fence learn the lawn behind it. A cell whose view is blocked
 # reads the thing in front, and teaches it its own class. Points outside the image and behind the camera read zero, and
