@@ -402,6 +402,8 @@ for _ in range(20):
         free_scores -= s_bar
 heard = (s_bar != 0).any(dim=1)[0].numpy()
 learnt = np.where(heard, free_scores.detach().argmax(dim=1)[0].numpy(), 255)
+
+# %%
 true_labels = resize_labels(frame.labels.image, camera.size)
 below = np.arange(96) > camera.K[1, 2]
 print(f"{100 * heard[below].mean():.0f} % of the pixels below the horizon have learnt, {heard[~below].sum()} above it")
