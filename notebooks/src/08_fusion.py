@@ -314,6 +314,8 @@ road, sidewalk, vegetation, car, building = (
 lost = {name: shares["image and o"] - shares[name] for name in ("without o", "without image")}
 assert min(lost["without o"][[car, building]]) > max(lost["without o"][[road, sidewalk]])
 assert max(shares["without image"][[sidewalk, vegetation, car]]) < 40
+
+# %% tags=["nbval-ignore-output"]
 for name, points in lost.items():
     order = sorted(present[present < KITTI_14.n_semantic], key=lambda c, points=points: -points[c])
     print(f"{name:<14} loses, points:", ", ".join(f"{KITTI_14.names[c]} {points[c]:.0f}" for c in order))
@@ -890,7 +892,7 @@ def heard(keep, planes=planes, net=net):
     return grid_of(torch.where(kept, planes, silent(planes, seen)), o, net)
 
 
-# %%
+# %% tags=["nbval-ignore-output"]
 tops = (0, 1, 2, 3, 5, 7, 10, 19)
 up_to = np.array([found(heard(np.arange(20) <= top), truth) for top in tops])
 for c in (car, KITTI_14.index("bicycle")):
