@@ -1160,19 +1160,19 @@ plt.show()
 
 # %% tags=["nbval-ignore-output"]
 def time_to_notice(stood, speed):
-    """Return after how many seconds of walking the mean P(DYNAMIC) of a person exceeds 1/2."""
+    """Return after how many seconds of walking the mean P(DYNAMIC) of a person exceeds 1/2; infinity if not in 3 s."""
 
     def person(t):
         return Box.around(15, -3 + speed * max(0, t - stood), 0.5, 0.5, 1.75)
 
-    times, means = dynamic_over_time(lambda t: [person(t)], person, stood + 2)
-    return times[np.argmax((means > 0.5) & (times >= stood))] - stood
+    times, means = dynamic_over_time(lambda t: [person(t)], person, stood + 3)
+    return np.min(times[(means > 0.5) & (times >= stood)], initial=np.inf) - stood
 
 
-for stood, speed in ((0.2, 1.4), (2, 1.4), (8, 1.4), (2, 2.8), (2, 5.0)):
+for stood, speed in ((0.2, 1.4), (2, 1.4), (8, 1.4), (2, 2.8), (2, 5.0), (2, 1.0), (2, 0.7)):
     late = time_to_notice(stood, speed)
     print(f"stood for {stood} s, walks at {speed} m/s: DYNAMIC after {late:.1f} s and {late * speed:.1f} m")
-    assert 1 < late * speed < 2.1
+    assert 1 < late * speed < 2.1 if speed > 1 else late > 2
 
 # %% tags=["nbval-ignore-output"]
 for name, (times, means) in hidden.items():
@@ -1185,9 +1185,10 @@ for name, (times, means) in hidden.items():
 # makes it about twice as soon.</details>
 #
 # The person is called STATIC for about a second, and it isn't the time spent standing that must be worn down. What
-# counts is the way: at all three speeds the filter needs about 1.5 m, which are three cells. In the cell where a person
-# stood, particles can prove nothing; only in new cells, which were free, do those that go along with the person predict
-# the scans better than STATIC does. A vehicle that brakes for pedestrians only when they are DYNAMIC brakes late.
+# counts is the way: at 1.4, 2.8 and 5 m/s alike the filter needs about 1.5 m, which are three cells. In the cell where
+# a person stood, particles can prove nothing; only in new cells, which were free, do those that go along with the
+# person predict the scans better than STATIC does. A stroller at 1 m/s is found after more than two seconds, one at 0.7
+# m/s not in three. A vehicle that brakes for pedestrians only when they are DYNAMIC brakes late.
 #
 # **What is hidden for long.** Behind the narrow van the car's particles fly on unseen, and when the car comes out it
 # is expected: mostly DYNAMIC at once, though not yet sure. Behind the wide van they fade as the third picture of step
