@@ -35,7 +35,7 @@ from scipy import ndimage
 from semgrid_edu import plotting
 from semgrid_edu.camera import Camera, project
 from semgrid_edu.course.equations import equation_table
-from semgrid_edu.datasets.resizing import resize_image
+from semgrid_edu.datasets.resizing import resize_image, resize_labels
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
 from semgrid_edu.datasets.truth import grid_truth
 from semgrid_edu.grid import GridSpec
@@ -242,8 +242,9 @@ plt.show()
 # bicycle and pedestrian, the pedestrian behind him has the head of a car, and red crumbs of pedestrian lie along the
 # hedge on the left, where nobody walks. The network learnt in two steps: first from labelled images, then end to end,
 # when only the map counted: the map's mistakes travel back through fusion, planes and equation (2) into these scores.
-# So don't expect clean outlines: the scores are whatever helps the map, and as labels of pixels they got worse by it
-# (lectures 07 and 08). Yellow tree tops, *signage*, do no harm: the map asks for nothing that stands higher than 4 m.
+# So don't expect clean outlines. The scores are whatever helps the map, and as labels of pixels they got worse by it
+# (lectures 07 and 08). Many tree tops are yellow, *signage*: the map holds only what stands less than 2.5 m above the
+# ground, so hardly anything on it asks what a tree top is.
 
 # %% [markdown]
 # ## Stage 3, $s \to p$: from pixels to places
@@ -280,25 +281,47 @@ for Z in (10, 20, 40, 80):
 # Now lay 20 horizontal planes over the grid, 20 cm apart. Each point of each plane has a pixel by equation (1), and
 # takes its scores from there by equation (2). No depth is needed, and none is used.
 #
-# **Predict before you run.** On the plane at height 0, what does a house look like? And on a plane at 2 m, what does
-# the road look like?
+# **Predict before you run.** The camera is 1.66 m above the ground. On the plane at height 0, what does a house look
+# like? What does the road look like on a plane at 1 m? And on a plane at 2 m?
 #
 # <details><summary>Answer</summary>Only what really lies at a plane's height comes out in its place. On the ground
 # plane the road is right, while a house is smeared away from the camera, like a shadow cast by a lamp in the camera's
-# place. On the higher plane everything that lies lower is pulled towards the vehicle.</details>
+# place. The plane at 1 m lies between the road and the camera, so the road is pulled towards the vehicle and becomes
+# narrower. The plane at 2 m lies above the camera: the rays to its points rise and never meet the road, so there is no
+# road on it.</details>
 
 # %%
 with torch.inference_mode():
     planes = net.sampler(torch.from_numpy(now.scores)[None])[0]  # (C, D, H, W)
-heights = plane_heights()
-seen = planes.abs().sum(dim=0) > 0
+heights, road = plane_heights(), KITTI_14.index("road")
+seen = (planes != 0).any(dim=0).numpy()
 labels = np.where(seen, planes.argmax(dim=0), 255)
 plotting.label_maps(spec, {f"plane at {heights[d]:.1f} m": labels[d] for d in (0, 5, 10)}, KITTI_14)
 plt.show()
+for d in (0, 5, 10):
+    share = (labels[d] == road).sum() / seen[d].sum()
+    print(f"plane at {heights[d]:.0f} m: {100 * share:2.0f} % of the cells read road")
+assert not (labels[10] == road).any()
 
 # %% [markdown]
-# White cells lie outside the picture: beside it, or, near the vehicle, below its lower edge. No single plane is right
-# everywhere. For each cell one of the twenty holds the truth; which one is for the network to learn.
+# White cells lie outside the picture: beside it, or, near the vehicle, below its lower edge. The road is in its place
+# on the first plane, drawn together on the second, and absent on the third. No single plane is right everywhere. Does
+# one of the twenty have the true class of a cell? Carry the true labels of the image to all planes, and count.
+
+# %%
+image_labels = torch.from_numpy(resize_labels(frame.labels.image, now.scores.shape[1:]))
+one_hot = torch.stack([image_labels == c for c in range(len(KITTI_14))]).float()
+read = net.sampler(one_hot[None])[0].argmax(dim=0).numpy()
+found = ((read == frame.labels.birdseye_on(spec)) & seen).any(axis=0)
+in_sight, in_image = frame.labels.visible_on(spec), seen.any(axis=0)
+for name, cells in (("cells that the camera sees", in_sight & in_image), ("hidden cells", ~in_sight & in_image)):
+    print(f"{name:<27} {cells.sum()}: on {100 * found[cells].mean():.0f} % of them some plane reads the true class")
+
+# %% [markdown]
+# For most cells that the camera sees, one of the twenty holds the truth, and which one is for the network to learn. (A
+# car counts as seen when some of it shows, so its far side is among the others.) Where something stands in the way, all
+# twenty show what stands in the way. If that has the class of what is hidden, the count calls it found; for more than
+# half of the hidden cells nothing in the image is right.
 
 # %% [markdown]
 # ## Stage 4, $(p, o) \to g$: one map

@@ -26,6 +26,8 @@
 # ```
 
 # %%
+from dataclasses import replace
+
 import matplotlib.pyplot as plt
 import numpy as np
 from filterpy import discrete_bayes
@@ -36,17 +38,8 @@ from semgrid_edu import plotting
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.occupancy import (
-    CmcdotParams,
-    Evidence,
-    FilterState,
-    Particles,
-    PlanarMotion,
-    SensorModel,
-    State,
-    scan_evidence,
-    transition_matrix,
-)
+from semgrid_edu.occupancy import CmcdotParams, Evidence, FilterState, Particles, PlanarMotion, SensorModel, State
+from semgrid_edu.occupancy import scan_evidence, track_drive, transition_matrix
 from semgrid_edu.occupancy import update as update_grid
 
 plt.rcParams["figure.dpi"] = 80
@@ -198,9 +191,11 @@ def entropy(belief):
 
 # %%
 places, says_pole = trip(25, np.random.default_rng(2))
-belief, history, bits = nothing_known, [], []
-for says in says_pole:
+belief, history, bits, surprises = nothing_known, [], [], []
+for k, says in enumerate(says_pole):
     prior = predict(belief, MOVED)
+    if says != (prior.argmax() in POLES):
+        surprises.append(k)
     belief = update(P_POLE if says else 1 - P_POLE, prior)
     history.append(belief)
     bits += [entropy(prior), entropy(belief)]
@@ -213,15 +208,27 @@ axes[1].plot(bits[1::2], "s", color="#d55e00", markersize=4, label="after update
 axes[1].set(xlabel="step", ylabel="entropy [bits]", ylim=(0, 3.4))
 axes[1].legend(fontsize="small", ncols=2, frameon=False)
 plt.show()
-print("an update raised the entropy at steps", [k for k in range(25) if bits[2 * k + 1] > bits[2 * k]])
+print("the favourite cell made one expect another reading at steps", surprises)
+print("    of these the sensor says 'pole' at", [k for k in surprises if says_pole[k]])
+raised = [k for k in range(25) if bits[2 * k + 1] > bits[2 * k]]
+print("the update raised the entropy at steps", raised)
+assert raised == [k for k in surprises if not says_pole[k]]
+favourite = np.argmax(history, axis=1)
+print("the favourite after steps 2 to 8:", favourite[2:9], "  the truth:", places[2:9])
 
 # %% [markdown]
-# Above, the bluer the surer, and circles are the truth. Below, the entropy goes up with every prediction (circles)
-# and mostly down with every update (squares). At step 3 the filter has seen both neighbouring poles and knows its
-# place, more or less. From then on it lives in the balance of the two steps, and nothing is ever *settled*. Three
-# readings are surprises: not what the favourite cell made one expect.
+# Above, the bluer the surer, and circles are the truth. Below, the entropy goes up with every prediction (circles) and
+# mostly down with every update (squares). At step 3 the sensor has said *pole* twice in a row. That fits the two
+# neighbouring poles, so the filter takes the vehicle to be in cell 3. But it hasn't moved and is still in cell 2,
+# beside the same pole. One step later it is in cell 3, and the filter is right. From then on it lives in the balance of
+# the two steps, and nothing is ever *settled*: at step 7 it has lost the vehicle again.
 #
-# *Mostly* down can be made exact. Two cells, one without a pole (belief 0.8), one with (0.2). *Pole* is a surprise:
+# Six readings are surprises: not what the favourite cell made one expect. At three of them the sensor says *nothing*
+# where a pole was expected, and these are the three updates that raise the entropy. At the other three it says *pole*
+# where none was expected. Poles are rare, so such a reading leaves few cells, and the entropy falls all the same.
+#
+# *Mostly* down can be made exact. Two cells, one without a pole (belief 0.8), one with (0.2). Here *pole* is a surprise
+# that raises the entropy:
 
 # %%
 prior, p_pole = np.array([0.8, 0.2]), np.array([0.1, 0.8])
@@ -481,27 +488,28 @@ for name, o, f in zip(SPOTS, occupied.T, free.T, strict=True):
     print(f"{name:<24}{''.join('#' if a > b else '.' if a < b else ' ' for a, b in zip(o, f, strict=True))}")
 
 # %% [markdown]
+# UNKNOWN needs one more rule. It means that nobody has looked, so a cell that a scan says anything of isn't UNKNOWN
+# any more: its share goes to the other three as cells are found at **first sight**. Above we assumed FREE 0.85, STATIC
+# 0.14, DYNAMIC 0.01.
+#
 # **Predict before you run.** For two seconds the house gives returns, the car for four scans. A return is as probable
 # from a parked car as from one that moves: STATIC and DYNAMIC share P(z | occupied). So can the filter of one cell
 # ever tell them apart? If so, what does it know that the likelihood doesn't say?
 #
-# <details><summary>Answer</summary>An update never changes the proportion of STATIC to DYNAMIC. All of it comes from
-# prediction: by the rates above, a cell that was free becomes dynamic ten times as often as static. So who turns up
-# in free space is called moving, and who was there from the first scan is not.</details>
-#
-# UNKNOWN needs one more rule. It means that nobody has looked, so a cell that a scan says anything of isn't UNKNOWN
-# any more: its share goes to the other three as cells are found at first sight.
+# <details><summary>Answer</summary>Bayes' rule multiplies STATIC and DYNAMIC by the same number, so it never changes
+# their proportion. That proportion comes from what we assume. By our rates, a free cell becomes DYNAMIC ten times as
+# often as STATIC, so what appears in a free cell is called DYNAMIC. At first sight STATIC is fourteen times as frequent
+# as DYNAMIC, so the house, which is there from the first scan, is called STATIC at once.</details>
 
 # %%
-FIRST_SIGHT = np.array([*params.first_sight, -1])  # what UNKNOWN turns out to be: FREE, STATIC, DYNAMIC
 ONE_CELL = GridSpec(x_min=0, x_max=1, y_min=0, y_max=1, cell=1)
 
 
-def step(belief, occupied, free, update=update):
+def step(belief, occupied, free, assumed=params, update=update):
     """Return the belief of one cell after a time step and a scan: predict, reveal, update."""
-    prior = predict_states(belief, M)
+    prior = predict_states(belief, transition_matrix(assumed, dt=0.1))
     if occupied != free:
-        prior = prior + prior[State.UNKNOWN] * FIRST_SIGHT
+        prior = prior + prior[State.UNKNOWN] * np.array([*assumed.first_sight, -1])
     return update([free, occupied, occupied, free], prior)
 
 
@@ -521,6 +529,7 @@ for k, spot in np.ndindex(history.shape[:2]):
     belief[spot] = history[k, spot] = step(before, *scan)
     np.testing.assert_allclose(belief[spot], step(before, *scan, update=discrete_bayes.update))
     np.testing.assert_allclose(belief[spot], step_of_package(before, *scan), atol=1e-6)
+assert min(history[0, 0, State.FREE], history[0, 1, State.STATIC]) > 0.9  # road and house, first scan
 
 times = [frame.time - frames[0].time for frame in frames]
 fig, axes = plt.subplots(2, 2, figsize=(9, 4.6), sharex=True, sharey=True, layout="constrained")
@@ -532,8 +541,9 @@ for ax, name, cell in zip(axes.ravel(), SPOTS, history.transpose(1, 2, 0), stric
 plt.show()
 
 # %% [markdown]
-# Each picture is one cell over two seconds, each band as high as its state is probable. The road becomes free within
-# two scans, the house static. Below on the left the car is there within one scan and mostly dynamic: the right
+# Each picture is one cell over two seconds, each band as high as its state is probable. At its first scan the road is
+# free and the house STATIC, both above 0.9. For the house that is the prior of first sight and no prediction: the rates
+# have had no time to act. Below on the left the car is there within one scan and mostly DYNAMIC: the right
 # answer, for the reason that you have predicted. It isn't ten to one, though. A little STATIC was left over from
 # before, and more has come in by way of UNKNOWN: what the prediction forgets of the free cell is shared out anew at
 # each scan, and at first sight standing things are more frequent than moving ones. When the car has left, the cell
@@ -542,6 +552,52 @@ plt.show()
 #
 # A few lines agree with `filterpy` and with the package to six digits. The package does this in thousands of cells at
 # once.
+#
+# ### How much of this rests on one rate?
+#
+# On this page a free cell turns DYNAMIC at a rate of 0.2 a second: that is the number behind the word *ten times*. The
+# package's default is 0.01. So change this one number, filter the car's cell again, and look at its last return. Then
+# take all of the package's defaults. Last, take the same cell from the package's whole filter, with the same defaults.
+
+# %%
+car = list(SPOTS).index("a car drives through")
+last = np.flatnonzero(occupied[:, car] > free[:, car])[-1]
+
+
+def at_the_last_return(assumed):
+    """Return P(STATIC) and P(DYNAMIC) of the car's cell at its last return."""
+    belief = np.array([0.0, 0.0, 0.0, 1.0])
+    for k in range(last + 1):
+        belief = step(belief, occupied[k, car], free[k, car], assumed)
+    return belief[[State.STATIC, State.DYNAMIC]]
+
+
+shares = {}
+for rate in (0.01, 0.05, 0.1, 0.2, 0.5):
+    rates = np.array(RATES)
+    rates[State.FREE, State.DYNAMIC] = rate
+    shares[f"FREE to DYNAMIC at {rate} /s"] = at_the_last_return(replace(params, rates=tuple(map(tuple, rates))))
+shares["the package's defaults"] = at_the_last_return(CmcdotParams())
+
+# %%
+moved = PlanarMotion.from_poses(start, frames[last].T_world_from_lidar)  # a straight road: hardly a turn
+x, y = SPOTS["a car drives through"]
+(row,), (col,), _ = spec.cells(np.array([[x - moved.dx, y - moved.dy]]))
+whole_filter = list(track_drive(frames[: last + 1], spec))[-1].probability[:, row, col]
+print(f"{'the car, at its last return':<34}STATIC  DYNAMIC")
+for name, (static, dynamic) in shares.items():
+    print(f"{name:<34}{static:6.2f}{dynamic:9.2f}")
+print("{:<34}{:5.1f}{:9.1f}".format("the whole filter, its defaults", *whole_filter[[State.STATIC, State.DYNAMIC]]))
+assert abs(moved.dyaw) < 0.01
+assert shares["the package's defaults"][0] > 0.7
+assert whole_filter[State.DYNAMIC] > 0.9
+
+# %% [markdown]
+# The verdict on the car rests on that rate. At 0.1 a second the two are level. With the package's defaults the same
+# returns say STATIC, 0.82 to 0.18. So prediction *can* tell moving from standing, but a single cell knows only what it
+# was told: how often something moving appears out of nowhere. Why does the package take so small a rate, and still
+# call this cell DYNAMIC (last row)? Because its cells aren't alone: the car comes from a neighbouring cell, which
+# predicts it. Lectures 03 and 04 show how.
 #
 # ## Play with it
 #
@@ -561,7 +617,7 @@ def localise(says_pole, sensor, moved=MOVED):
 
 
 def show(hit, slip, ax=None):
-    """Draw a trip of 40 steps with such a sensor and such odometry, and what a filter that knows both believes."""
+    """Draw a trip of 40 steps, and what a filter believes that knows sensor and odometry; return places, favourites."""
     moved = np.array([slip / 2, 1 - slip, slip / 2])
     places, says_pole = trip(40, np.random.default_rng(6), moved=moved, hit=hit)
     p_pole = np.where(np.isin(np.arange(N_CELLS), POLES), hit, 0.1)
@@ -569,6 +625,7 @@ def show(hit, slip, ax=None):
     right = 100 * np.mean(history.argmax(axis=1) == places)
     ax = plotting.belief_history(history, ax, truth=places)
     ax.set_title(f"P(pole | pole) {hit:.2f}, slip {slip:.2f}: right in {right:.0f} %", fontsize="medium")
+    return places, history.argmax(axis=1)
 
 
 sliders = {"hit": FloatSlider(value=0.8, min=0.1, max=0.99, step=0.01), "slip": FloatSlider(value=0.2, min=0, max=0.9)}
@@ -576,17 +633,21 @@ _ = interact(lambda hit, slip: (show(hit, slip), plt.show())[1], **sliders)
 
 # %%
 fig, axes = plt.subplots(1, 3, figsize=(12, 2.7), sharey=True, layout="constrained")
+trips = []
 for ax, (hit, slip) in zip(axes, ((0.8, 0.2), (0.99, 0.02), (0.99, 0.6)), strict=True):
-    show(hit, slip, ax)
+    trips.append(show(hit, slip, ax))
     ax.label_outer()
 plt.show()
+places, favourites = trips[1]
+print("in the middle, steps 10 to 15: the vehicle is in", places[10:16], " the favourite is", favourites[10:16])
 
 # %% [markdown]
 # On the left the numbers of this page, in the middle a good sensor and good odometry: once the pair of poles has been
-# seen, the place is known, and the one slip, at step 12, is noticed three steps later. On the right the same good
-# sensor with bad odometry: most cells have no pole, and between poles only the odometer speaks. Now try the opposite,
-# `hit` 0.5 and `slip` 0.02: where odometry is good, each reading helps for a long time. At `hit` 0.1 the sensor says
-# *pole* as often here as there: it carries no information, and no filter can invent any.
+# seen, at step 5, the place is known. The one slip, at step 12, is noticed two steps later, when the filter expects the
+# pole beside cell 2 and the sensor says *nothing*. On the right the same good sensor with bad odometry: most cells have
+# no pole, and between poles only the odometer speaks. Now try the opposite, `hit` 0.5 and `slip` 0.02: where odometry
+# is good, each reading helps for a long time. At `hit` 0.1 the sensor says *pole* as often here as there: it carries no
+# information, and no filter can invent any.
 #
 # ## Where this breaks
 #
@@ -663,8 +724,8 @@ for scan in (hits, *[passes] * 5):
 # 2. Predict spreads, update sharpens on average; a surprise may blur. Predict first: a reading speaks of now.
 # 3. Evidence of one instant may come in any order, but each piece once. Zeros can't be corrected.
 # 4. States change by a matrix $M = \exp(R\,\Delta t)$: rates belong to the world, the matrix to a time step.
-# 5. A grid cell is filtered like a place on a road. STATIC and DYNAMIC look alike to a scan: only prediction tells
-#    them apart.
+# 5. A grid cell is filtered like a place on a road. STATIC and DYNAMIC look alike to a scan: what tells them apart is
+#    what we assume, the rates and what is found at first sight.
 #
 # ## Further reading
 #

@@ -348,8 +348,9 @@ for column in (8, 9, 10, 11):
     print(f"column {column}: max {by_max[0, 0].numpy()}, mean {by_mean[0, 0].numpy()}, stride {row[0, 0, ::4].numpy()}")
 
 # %% [markdown]
-# Max-pooling is the one that keeps thin things alive, and it forgets one bit of *where* across and one down at each
-# halving: after four, 16 columns look alike. The question of this lecture is how to get those bits back.
+# Max-pooling is the one that keeps *bright* thin things alive. (All poles of these toys are bright before a dark
+# ground; the exercise has a dark one.) It forgets one bit of *where* across and one down at each halving: after four,
+# 16 columns look alike. The question of this lecture is how to get those bits back.
 #
 # ## SegNet: remember where the maximum was
 #
@@ -599,8 +600,9 @@ plt.show()
 # | strided | kernel (1 2 1)/4 across and down, stride 2, twice | interpolated |
 # | **atrous** | the same two kernels without stride, the second with rate 2 | |
 #
-# **Predict before you run.** A pole of 1, one pixel wide. Which ways say in which column it stands? Which keep it one
-# pixel wide? For each way: the brightest column, and the number of columns at least half as bright.
+# **Predict before you run.** A bright pole, 1 on a ground of 0, one pixel wide. Which ways say in which column it
+# stands? Which keep it one pixel wide? For each way: the brightest column, and the number of columns at least half as
+# bright.
 #
 # <details><summary>Answer</summary>Indices, skips and atrous find the column, all four times; nearest and bilinear
 # make one picture of the four; strided is right in column 8, and in column 10 only because its top is flat from 8 to
@@ -863,8 +865,9 @@ print(
 # a price: several times as many pixels are called pedestrian as there are (area).
 #
 # So where are the three mechanisms, if no network draws the post? Above, they decided how well a task was solved that
-# had nothing but poles. Here two pixels in a hundred are signage and three in a thousand pedestrian, in only 142
-# frames, and the networks have a dozen other things to learn. Keeping *where* is necessary; it isn't enough.
+# had nothing but poles. On this drive two pixels in a hundred are signage and three in a thousand pedestrian. The
+# networks have seen only 142 frames, and they have a dozen other things to learn. Keeping *where* is necessary; it
+# isn't enough.
 
 # %% [markdown]
 # ## Where this breaks

@@ -367,7 +367,7 @@ assert not complaint, complaint
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "braking", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # With the nose down, everything in the image moves up. The row where the cell at 30 m is looked up now shows road that is nearer, about 22 m: so what is at 22 m is drawn at
-# 30 m, labels move away from the car. 1/x' = 1/x + angle / z_cam: it is worst far ahead, where the error grows like the square of the distance, and small nearby. More planes in the same range
+# 30 m, labels move away from the car. 1/x' = 1/x + angle / z_cam: it is worst far ahead, where the error grows nearly like the square of the distance, and small nearby. More planes in the same range
 # don't help: the error isn't one of the height alone, it grows with the distance, so no single plane is right for the ground at all distances; the network would have to choose another plane
 # for each distance, and needs planes below zero for a nose that goes up. A pitch angle from an inertial sensor, or the horizon or the LIDAR's ground in the image, helps. One point for direction and place, one for a reasoned answer
 # on the planes.
