@@ -35,6 +35,7 @@ from scipy import ndimage
 from semgrid_edu import plotting
 from semgrid_edu.camera import Camera, project
 from semgrid_edu.course.equations import equation_table
+from semgrid_edu.course.stages import stage_table
 from semgrid_edu.datasets.resizing import resize_image, resize_labels
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
 from semgrid_edu.datasets.truth import grid_truth
@@ -548,6 +549,17 @@ for name in ("road", "car", "pedestrian", "bicycle", "signage"):
 
 # %%
 Markdown(equation_table())
+
+# %% [markdown]
+# ## Each stage as a graphical model
+#
+# Every stage is also a graphical model, and every approximation of the paper is an edge that the model should have and
+# the system leaves out. The table names, for each stage, the function that builds its model small enough for exact
+# inference, and the test that compares exact inference with what the package computes. If factors, graphs and messages
+# are new to you, read the companion [graphical models](deeper/graphical_models.ipynb) first.
+
+# %%
+Markdown(stage_table())
 
 # %% [markdown]
 # ## In five lines

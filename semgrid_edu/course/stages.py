@@ -31,7 +31,62 @@ class StageModel:
     lecture: str | None = None
 
 
-STAGES: tuple[StageModel, ...] = ()
+STAGES = (
+    StageModel(
+        "line",
+        "Bayes' rule on a line",
+        model="semgrid_edu.graphical.stages.bayes_on_a_line",
+        check="tests/graphical/stages/test_stage_line.py::test_forward_messages_are_lecture_01s_recursion",
+    ),
+    StageModel(
+        "log-odds",
+        "One cell of the log-odds grid",
+        model="semgrid_edu.graphical.stages.one_log_odds_cell",
+        check="tests/graphical/stages/test_stage_cell.py::test_log_odds_are_exact_within_their_bounds",
+    ),
+    StageModel(
+        "cell",
+        "One cell, four states",
+        model="semgrid_edu.graphical.stages.one_cell",
+        check="tests/graphical/stages/test_stage_cell.py::test_predict_and_update_are_the_forward_messages",
+    ),
+    StageModel(
+        "beam",
+        "A beam over several cells",
+        model="semgrid_edu.graphical.stages.beam_over_cells",
+        check="tests/graphical/stages/test_stage_beam.py::test_the_package_makes_walls_thick",
+    ),
+    StageModel(
+        "pose",
+        "Rings that share a pose error",
+        model="semgrid_edu.graphical.stages.scan_with_pose_error",
+        check="tests/graphical/stages/test_stage_beam.py::test_a_second_ring_adds_little_when_it_shares_the_pose_error",
+    ),
+    StageModel(
+        "bof",
+        "BOF: cells, velocities, antecedents",
+        model="semgrid_edu.graphical.stages.bof_stage",
+        check="tests/graphical/stages/test_stage_bof.py::test_bof_adds_what_two_antecedents_send",
+    ),
+    StageModel(
+        "cmcdot",
+        "CMCDOT: four states and particles",
+        model="semgrid_edu.graphical.stages.cmcdot_stage",
+        check="tests/graphical/stages/test_stage_cmcdot.py::test_elsewhere_they_tend_to_bof_and_its_bias_remains",
+    ),
+    StageModel(
+        "crf",
+        "The fully connected CRF on a few cells",
+        model="semgrid_edu.graphical.stages.crf_stage",
+        check="tests/graphical/stages/test_stage_crf.py::test_probabilities_are_those_of_the_packages_energy",
+    ),
+    StageModel(
+        "system",
+        "The whole system, from world to semantic grid",
+        model="semgrid_edu.graphical.stages.whole_system",
+        check="tests/graphical/stages/test_stage_system.py::test_who_knows_more_loses_less",
+    ),
+)
 """In the order of the pipeline, the whole system last."""
 
 
