@@ -54,10 +54,10 @@ def make(
     workers: Annotated[int, typer.Option(help="Processes that share the work.")] = 2,
 ) -> None:
     """Simulate a data set in KITTI's raw layout; when interrupted, the same command resumes."""
-    from semgrid_edu.simulation.datasets import DATA_SETS, make
+    from semgrid_edu.simulation.datasets import DATA_SETS, make_dataset
 
     for one in DATA_SETS if name == "all" else [name]:
-        typer.echo(f"{one} is in {make(one, folder, seed, workers)}")
+        typer.echo(f"{one} is in {make_dataset(one, folder, seed, workers)}")
 
 
 @data.command()
@@ -195,12 +195,12 @@ def occupancy(
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("occupancy.json"),
 ) -> None:
     """Score log-odds grid, BOF and CMCDOT on simulated drives (lecture 04)."""
-    from semgrid_edu.experiments.occupancy import GRIDS, compare, tables
+    from semgrid_edu.experiments.occupancy import GRIDS, compare_filters, occupancy_tables
     from semgrid_edu.storage.files import check_writable
 
     check_writable(out)
-    result = compare(seed, drives, (grid,) if grid else tuple(GRIDS))
-    _keep(result, tables(result), out)
+    result = compare_filters(seed, drives, (grid,) if grid else tuple(GRIDS))
+    _keep(result, occupancy_tables(result), out)
 
 
 @reproduce.command()
@@ -211,12 +211,12 @@ def two_stage(
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("two_stage.json"),
 ) -> None:
     """Train end to end and in two stages, and score both (lecture 08)."""
-    from semgrid_edu.experiments.two_stage import compare, table
+    from semgrid_edu.experiments.two_stage import compare_training, two_stage_table
     from semgrid_edu.storage.files import check_writable
 
     check_writable(out)
-    result = compare(data, runs, seeds)
-    _keep(result, table(result["scores"]), out)
+    result = compare_training(data, runs, seeds)
+    _keep(result, two_stage_table(result["scores"]), out)
 
 
 @reproduce.command()
@@ -225,12 +225,12 @@ def overfit(
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("overfit.json"),
 ) -> None:
     """Learn four frames by heart with each image network (lecture 08)."""
-    from semgrid_edu.experiments.overfit import overfit, table
+    from semgrid_edu.experiments.overfit import overfit, overfit_table
     from semgrid_edu.storage.files import check_writable
 
     check_writable(out)
     result = overfit(seed)
-    _keep(result, table(result["networks"]), out)
+    _keep(result, overfit_table(result["networks"]), out)
 
 
 def _keep(result: dict[str, object], shown: str, out: Path) -> None:

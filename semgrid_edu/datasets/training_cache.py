@@ -42,7 +42,7 @@ RAGGED = ("return_pixels", "return_cells")
 """Arrays of which each frame has its own length: they lie end to end, and `return_ends` says where each ends."""
 
 
-class Recipe(NamedTuple):
+class ArrayRecipe(NamedTuple):
     """What the arrays are made by: the grid, the image size (height, width) and the occupancy filter."""
 
     spec: GridSpec
@@ -50,7 +50,7 @@ class Recipe(NamedTuple):
     params: CmcdotParams
 
 
-def cached_arrays(index: DatasetIndex, split: str, recipe: Recipe) -> dict[str, NDArray]:
+def cached_arrays(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> dict[str, NDArray]:
     """Return the arrays of a split's labelled frames; make them on first use.
 
     They lie in `cache/` of the data set, in a folder named by a hash of all that decides them: the recipe, the
@@ -61,7 +61,7 @@ def cached_arrays(index: DatasetIndex, split: str, recipe: Recipe) -> dict[str, 
     ----------
     index : DatasetIndex
     split : str
-    recipe : Recipe
+    recipe : ArrayRecipe
 
     Returns
     -------
@@ -82,7 +82,7 @@ def cached_arrays(index: DatasetIndex, split: str, recipe: Recipe) -> dict[str, 
     return _map_arrays(folder)
 
 
-def _key(index: DatasetIndex, split: str, recipe: Recipe) -> str:
+def _key(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> str:
     """Hash what decides the arrays: the recipe, the code, and names and sizes of all files of the split's drives."""
     package = Path(semgrid_edu.__file__).parent
     code = [package / f"{name}.py" for name in CODE] + sorted((package / "occupancy").glob("*.py"))
@@ -95,7 +95,7 @@ def _key(index: DatasetIndex, split: str, recipe: Recipe) -> str:
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 
-def _process(index: DatasetIndex, split: str, recipe: Recipe) -> list[dict[str, NDArray]]:
+def _process(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> list[dict[str, NDArray]]:
     """Make the arrays of every labelled frame of a split."""
     jobs = [(index.root, *name, labelled, recipe) for name, labelled in index.frames_by_drive(split).items()]
     with worker_pool(WORKERS) as pool:
@@ -104,7 +104,7 @@ def _process(index: DatasetIndex, split: str, recipe: Recipe) -> list[dict[str, 
         return [frame for drive in progress for frame in drive]
 
 
-def _write_arrays(arrays: dict[str, NDArray], recipe: Recipe, folder: Path) -> None:
+def _write_arrays(arrays: dict[str, NDArray], recipe: ArrayRecipe, folder: Path) -> None:
     """Write the arrays and their manifest to a folder that appears whole or not at all."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     unfinished = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}-"))
@@ -122,7 +122,9 @@ def _write_arrays(arrays: dict[str, NDArray], recipe: Recipe, folder: Path) -> N
         shutil.rmtree(unfinished, ignore_errors=True)
 
 
-def _process_drive(root: Path, date: str, drive: str, labelled: list[int], recipe: Recipe) -> list[dict[str, NDArray]]:
+def _process_drive(
+    root: Path, date: str, drive: str, labelled: list[int], recipe: ArrayRecipe
+) -> list[dict[str, NDArray]]:
     """Run the filter over a drive and make the arrays of its labelled frames, in the order of `labelled`."""
     scans = islice(KittiRawDrive(root, date, drive, images=False), max(labelled) + 1)
     beliefs = enumerate(track_drive(scans, recipe.spec, recipe.params, SEED))
@@ -133,7 +135,7 @@ def _process_drive(root: Path, date: str, drive: str, labelled: list[int], recip
     return [_process_frame(frames, k, occupancy[k], recipe) for k in labelled]
 
 
-def _process_frame(drive: KittiRawDrive, k: int, occupancy: NDArray, recipe: Recipe) -> dict[str, NDArray]:
+def _process_frame(drive: KittiRawDrive, k: int, occupancy: NDArray, recipe: ArrayRecipe) -> dict[str, NDArray]:
     """Make the arrays of one frame."""
     frame = drive[k]
     if frame.labels is None or frame.image is None:

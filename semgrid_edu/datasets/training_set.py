@@ -12,7 +12,7 @@ from torch.utils.data import Dataset
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.calibration import read_camera
 from semgrid_edu.datasets.index import DatasetIndex, load_index
-from semgrid_edu.datasets.training_cache import Recipe, cached_arrays
+from semgrid_edu.datasets.training_cache import ArrayRecipe, cached_arrays
 from semgrid_edu.errors import DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture
@@ -90,7 +90,7 @@ class TrainingSet(Dataset[Sample]):
         params: CmcdotParams | None = None,
     ) -> None:
         index = load_index(dataset_dir)
-        recipe = Recipe(spec or GridSpec.compact(), tuple(image_size), params or CmcdotParams())
+        recipe = ArrayRecipe(spec or GridSpec.compact(), tuple(image_size), params or CmcdotParams())
         self.spec, self.label_set = recipe.spec, index.label_set
         self.camera = _shared_camera(index, split).resized(recipe.image_size)
         self.arrays = cached_arrays(index, split, recipe)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.experiments.scenes import Scene
+from semgrid_edu.experiments.scenes import KnownScene
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.occupancy import N_STATES, Belief, State
@@ -67,7 +67,7 @@ class Estimate:
 
 
 @dataclass(eq=False)
-class Scores:
+class CellScores:
     """What adds up over the frames of all drives, of one method.
 
     Parameters
@@ -77,7 +77,7 @@ class Scores:
     confusion : (4, 4) int64
         Cells by true state and by what they are called; UNKNOWN is true of cells never seen.
     hits : dict of str to [int, int, int]
-        By group of `groups`: hit cells, those called moving, those held occupied.
+        By group of `hit_cell_groups`: hit cells, those called moving, those held occupied.
     errors : dict of str to list of float
         Velocity errors of cells by kind of thing, m/s.
     smear : [int, int]
@@ -90,12 +90,12 @@ class Scores:
     errors: dict[str, list[float]] = field(default_factory=dict)
     smear: list[int] = field(default_factory=lambda: [0, 0])
 
-    def add(self, scene: Scene, estimate: Estimate) -> None:
+    def add(self, scene: KnownScene, estimate: Estimate) -> None:
         """Score one frame.
 
         Parameters
         ----------
-        scene : Scene
+        scene : KnownScene
             What is true.
         estimate : Estimate
             What the method says.
@@ -103,7 +103,7 @@ class Scores:
         truth = np.where(scene.never_seen, State.UNKNOWN, scene.truth.state)
         scored = scene.never_seen | scene.observed
         self.confusion += confusion_matrix(truth[scored], estimate.state[scored], N_STATES)
-        for name, cells in groups(scene, self.spec):
+        for name, cells in hit_cell_groups(scene, self.spec):
             count = self.hits.setdefault(name, [0, 0, 0])
             for k, counted in enumerate((cells, cells & estimate.moves, cells & (estimate.occupied > 0.5))):
                 count[k] += int(counted.sum())
@@ -111,7 +111,7 @@ class Scores:
         self.smear[0] += int(scene.left.sum())
         self.smear[1] += int((estimate.occupied > 0.5)[scene.left].sum())
 
-    def _add_errors(self, scene: Scene, estimate: Estimate) -> None:
+    def _add_errors(self, scene: KnownScene, estimate: Estimate) -> None:
         """Score the velocity of observed cells that move and are said to."""
         found = scene.observed & (scene.truth.state == State.DYNAMIC) & (estimate.state == State.DYNAMIC)
         found &= np.isfinite(estimate.velocity[0])
@@ -140,7 +140,7 @@ class Scores:
         }
 
 
-def groups(scene: Scene, spec: GridSpec) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+def hit_cell_groups(scene: KnownScene, spec: GridSpec) -> Iterator[tuple[str, NDArray[np.bool_]]]:
     """Divide the hit cells of a frame by what is in them.
 
     What moves counts by its range, and once it has been in view for `FOUND_AFTER`; what stands, from
@@ -148,7 +148,7 @@ def groups(scene: Scene, spec: GridSpec) -> Iterator[tuple[str, NDArray[np.bool_
 
     Parameters
     ----------
-    scene : Scene
+    scene : KnownScene
     spec : GridSpec
 
     Yields

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.cell_scores import BANKS, Estimate, Scores, share
-from semgrid_edu.experiments.scenes import scenes
+from semgrid_edu.experiments.cell_scores import BANKS, CellScores, Estimate, share
+from semgrid_edu.experiments.scenes import known_scenes
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Bof, Cmcdot, LogOddsGrid, PlanarMotion, SensorModel, State
 from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive
@@ -28,7 +28,7 @@ HELD_OUT = 100
 METHODS = ("log-odds", "BOF", "CMCDOT")
 
 
-def compare(
+def compare_filters(
     seed: int = 0, drives: int = 20, grids: tuple[str, ...] = tuple(GRIDS), frames: int = FRAMES
 ) -> dict[str, object]:
     """Run the three methods with their defaults over simulated drives, and score them.
@@ -52,7 +52,7 @@ def compare(
     Returns
     -------
     dict
-        "scores" by LIDAR, grid and method (see `Scores.summary`), with all that made them: it can be
+        "scores" by LIDAR, grid and method (see `CellScores.summary`), with all that made them: it can be
         written as JSON.
 
     Raises
@@ -82,7 +82,7 @@ def compare(
     }
 
 
-def methods(spec: GridSpec, seed: int) -> dict[str, Callable[[NDArray, PlanarMotion, float], Estimate]]:
+def occupancy_filters(spec: GridSpec, seed: int) -> dict[str, Callable[[NDArray, PlanarMotion, float], Estimate]]:
     """Return the three methods with their defaults, by name.
 
     Parameters
@@ -106,35 +106,35 @@ def methods(spec: GridSpec, seed: int) -> dict[str, Callable[[NDArray, PlanarMot
 
 def _score(seed: int, drives: int, frames: int, lidar: str, grid: str) -> dict[str, object]:
     """Score the methods on all drives of one LIDAR and grid."""
-    spec, scores = GRIDS[grid], {name: Scores(GRIDS[grid]) for name in METHODS}
+    spec, scores = GRIDS[grid], {name: CellScores(GRIDS[grid]) for name in METHODS}
     for number in HELD_OUT + 1000 * seed + np.arange(drives):
-        drive, running = SimulatedDrive(number, frames, rig=Rig(lidar=LIDARS[lidar])), methods(spec, seed)
-        for scene in scenes(drive, spec, SensorModel(), f"{lidar}, {grid} grid, drive {number}"):
+        drive, running = SimulatedDrive(number, frames, rig=Rig(lidar=LIDARS[lidar])), occupancy_filters(spec, seed)
+        for scene in known_scenes(drive, spec, SensorModel(), f"{lidar}, {grid} grid, drive {number}"):
             for name, step in running.items():
                 scores[name].add(scene, step(scene.frame.points_grid, scene.motion, PERIOD))
     return {name: one.summary() for name, one in scores.items()}
 
 
-def tables(result: dict) -> str:
+def occupancy_tables(result: dict) -> str:
     """Return the tables of all LIDARs and grids of a result, each under its title.
 
     Parameters
     ----------
     result : dict
-        As for `table`.
+        As for `occupancy_table`.
 
     Returns
     -------
     str
     """
     return "\n\n".join(
-        f"{lidar} LIDAR, {grid} grid\n\n{table(result, lidar, grid)}"
+        f"{lidar} LIDAR, {grid} grid\n\n{occupancy_table(result, lidar, grid)}"
         for lidar, grids in result["scores"].items()
         for grid in grids
     )
 
 
-def table(result: dict, lidar: str = "HDL-64E", grid: str = "paper") -> str:
+def occupancy_table(result: dict, lidar: str = "HDL-64E", grid: str = "paper") -> str:
     """Return the scores of one LIDAR and grid as a Markdown table.
 
     Its parts: of the observed cells in each true state the share that is called so; of all that is called DYNAMIC the
@@ -144,7 +144,7 @@ def table(result: dict, lidar: str = "HDL-64E", grid: str = "paper") -> str:
     Parameters
     ----------
     result : dict
-        From `compare`, or from the JSON file that it was written to.
+        From `compare_filters`, or from the JSON file that it was written to.
     lidar, grid : str
         Of those in it.
 

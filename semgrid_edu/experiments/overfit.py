@@ -34,10 +34,10 @@ six times the usual one does no harm where all steps pull the same way."""
 LOSS_EVERY = 50
 """Iterations between the losses that the result keeps."""
 
-Result = dict[str, object]
+OverfitResult = dict[str, object]
 
 
-def overfit(seed: int = 0, params: TrainingParams | None = None) -> Result:
+def overfit(seed: int = 0, params: TrainingParams | None = None) -> OverfitResult:
     """Train compact networks, image to grid, on four shipped frames, and score them on the same four.
 
     A network that can't learn four frames by heart is too small, or its gradients are wrong, or a step is too large.
@@ -72,7 +72,7 @@ def overfit(seed: int = 0, params: TrainingParams | None = None) -> Result:
     }
 
 
-def learn_by_heart(net: SemanticGridNet, frames: Sequence[Sample], params: TrainingParams, seed: int) -> Result:
+def learn_by_heart(net: SemanticGridNet, frames: Sequence[Sample], params: TrainingParams, seed: int) -> OverfitResult:
     """Train a network on frames and score it on the same.
 
     Parameters
@@ -98,14 +98,14 @@ def learn_by_heart(net: SemanticGridNet, frames: Sequence[Sample], params: Train
         "iterations": len(loss),
         "losses": [*loss[:-1:LOSS_EVERY].tolist(), float(loss[-1])],
         "pixel accuracy": {
-            mode: accuracy(net, frames, training=mode == "training") for mode in ("evaluation", "training")
+            mode: network_accuracy(net, frames, training=mode == "training") for mode in ("evaluation", "training")
         },
         "minutes": round((perf_counter() - began) / 60, 1),
     }
 
 
 @torch.no_grad()
-def accuracy(net: SemanticGridNet, frames: Sequence[Sample], training: bool) -> float:
+def network_accuracy(net: SemanticGridNet, frames: Sequence[Sample], training: bool) -> float:
     """Return the share of labelled cells that a network calls right, 0..1; the network stays as it is.
 
     Parameters
@@ -125,7 +125,7 @@ def accuracy(net: SemanticGridNet, frames: Sequence[Sample], training: bool) -> 
     return pixel_accuracy(confusion_matrix(truth, logits.argmax(1).numpy(), net.n_classes))
 
 
-def table(networks: dict[str, Result]) -> str:
+def overfit_table(networks: dict[str, OverfitResult]) -> str:
     """Return the accuracies as a table to print, in per cent."""
     lines = [f"{'':8} {'evaluation':>12} {'training mode':>14} {'last loss':>10} {'minutes':>8}"]
     for name, result in networks.items():

@@ -21,7 +21,7 @@ OUT_OF_VIEW = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class KnownScene:
     """One frame of a drive and what is true of its cells.
 
     Parameters
@@ -78,7 +78,9 @@ def hit_cells(
     return count >= least
 
 
-def scenes(drive: SimulatedDrive, spec: GridSpec, sensor: SensorModel, name: str = "drive") -> Iterator[Scene]:
+def known_scenes(
+    drive: SimulatedDrive, spec: GridSpec, sensor: SensorModel, name: str = "drive"
+) -> Iterator[KnownScene]:
     """Take the scans of a drive, one after the other, with their truth.
 
     Parameters
@@ -93,14 +95,14 @@ def scenes(drive: SimulatedDrive, spec: GridSpec, sensor: SensorModel, name: str
 
     Yields
     ------
-    Scene
+    KnownScene
     """
-    past = Past(spec, sensor)
+    past = SceneHistory(spec, sensor)
     for k in tqdm(range(drive.n_frames), desc=name, unit="frame", leave=False):
         yield past.add(drive.scan(k), true_cells(drive, k * PERIOD, spec))
 
 
-class Past:
+class SceneHistory:
     """What a drive has seen so far, and what moved in it.
 
     Parameters
@@ -120,7 +122,7 @@ class Past:
         self._first_hit: dict[int, int] = {}
         self._last_hit: dict[int, int] = {}
 
-    def add(self, frame: Frame, truth: CellTruth) -> Scene:
+    def add(self, frame: Frame, truth: CellTruth) -> KnownScene:
         """Make a scene of the next frame, and remember it.
 
         Parameters
@@ -131,7 +133,7 @@ class Past:
 
         Returns
         -------
-        Scene
+        KnownScene
         """
         evidence = scan_evidence(frame.points_grid, self._around, self.sensor)
         pose = frame.T_world_from_lidar
@@ -143,7 +145,7 @@ class Past:
         left = self._any_of(self._dynamic[-LEFT_SINCE:], self.spec, skip=1) & seen & (truth.state == State.FREE)
         self._dynamic.append(truth.state == State.DYNAMIC)
         hit = hit_cells(frame.points_grid, self.spec)
-        return Scene(frame, motion, truth, hit, observed, ~seen, left, self._in_view(truth.instance[hit]))
+        return KnownScene(frame, motion, truth, hit, observed, ~seen, left, self._in_view(truth.instance[hit]))
 
     def _any_of(self, masks: list[NDArray], source: GridSpec, skip: int = 0) -> NDArray[np.bool_]:
         """Return the present cells that lie in any of these of the last frames, the `skip` last left aside."""

@@ -19,7 +19,7 @@ from semgrid_edu.training.run import train_network
 METHODS = ("end-to-end", "two-stage")
 
 
-def compare(
+def compare_training(
     dataset_dir: str | Path, runs: str | Path, n_seeds: int = 3, params: TrainingParams | None = None
 ) -> dict[str, object]:
     """Train both ways, seed by seed, and score both on frames that none has seen.
@@ -53,7 +53,7 @@ def compare(
                 chosen = replace(params, end_to_end=method == "end-to-end")
                 resume = (folder / CHECKPOINT).exists()
                 train_network(dataset_dir, folder, "segnet", chosen, seed, resume)
-            result[method].append(score(load_net(folder / WEIGHTS, test.camera), test))
+            result[method].append(score_grid_and_image(load_net(folder / WEIGHTS, test.camera), test))
     trained = [Path(runs) / f"{method}-{seed}" for seed in range(n_seeds) for method in METHODS]
     return {
         "scores": result,
@@ -67,7 +67,7 @@ def compare(
     }
 
 
-def score(net: SemanticGridNet, test: TrainingSet) -> Scores:
+def score_grid_and_image(net: SemanticGridNet, test: TrainingSet) -> Scores:
     """Score a network's grids, and the labels that its image network gives the pixels.
 
     Parameters
@@ -92,7 +92,7 @@ def score(net: SemanticGridNet, test: TrainingSet) -> Scores:
     return scores(confusions, test.label_set)
 
 
-def table(result: dict[str, list[Scores]]) -> str:
+def two_stage_table(result: dict[str, list[Scores]]) -> str:
     """Return mean and range over the seeds as a table to print, in per cent."""
     lines = [f"{'':12} {'cells':9}" + "".join(f"{name:>24}" for name in METRICS)]
     for method, runs in result.items():

@@ -55,7 +55,7 @@ def winding_road(steps: int = 50, turn: float = 0.013) -> list[PlanarMotion]:
     return [PlanarMotion(float(dx), 0.0, turn) for dx in np.linspace(0.2, 0.5, steps)]
 
 
-def blur_of(
+def measure_blur(
     scheme: str, motions: Sequence[PlanarMotion], spec: GridSpec = WORLD, drops: int = 20, seed: int = 0
 ) -> Blur:
     """Carry a map of a world that stands still along with a vehicle, and measure what becomes of it.

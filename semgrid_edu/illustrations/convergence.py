@@ -69,7 +69,7 @@ class Convergence(NamedTuple):
         return tuple(float(np.polyfit(np.log(self.numbers), np.log(e), 1)[0]) for e in (self.dynamic, self.velocity))
 
 
-def convergence(numbers: Sequence[int], seeds: Sequence[int]) -> Convergence:
+def measure_convergence(numbers: Sequence[int], seeds: Sequence[int]) -> Convergence:
     """Compare CMCDOT with the exact filter for several numbers of particles.
 
     Two cars pass each other, believed at first to move anyhow. Particles start anywhere in their cells with velocities
@@ -90,7 +90,7 @@ def convergence(numbers: Sequence[int], seeds: Sequence[int]) -> Convergence:
 
     Examples
     --------
-    >>> few, many = convergence([1000, 100_000], seeds=[0]).dynamic
+    >>> few, many = measure_convergence([1000, 100_000], seeds=[0]).dynamic
     >>> bool(many < 0.2 * few)
     True
     """
@@ -102,7 +102,7 @@ def convergence(numbers: Sequence[int], seeds: Sequence[int]) -> Convergence:
     return Convergence(np.array(numbers), *errors.T)
 
 
-def cars(step: int) -> list[Box]:
+def passing_cars(step: int) -> list[Box]:
     """Return where two cars are, one that drives ahead at 8 m/s and one that comes towards us at 8 m/s.
 
     Parameters
@@ -139,7 +139,7 @@ def evidence_of(boxes: list[Box]) -> Evidence:
 
 def first_belief() -> NDArray[np.float32]:
     """Return the belief to start from, (4, H, W): where the cars are something probably moves, else space is free."""
-    hit = np.any([cells_in(box, SPEC) for box in cars(0)], axis=0)
+    hit = np.any([cells_in(box, SPEC) for box in passing_cars(0)], axis=0)
     return np.where(hit, np.array([0.1, 0.2, 0.6, 0.1])[:, None, None], np.array([0.8, 0.1, 0, 0.1])[:, None, None])
 
 
@@ -159,7 +159,7 @@ def run_bof() -> Iterator[tuple[NDArray, NDArray]]:
     remainder = np.zeros((len(lattice), 2))
     state = BofState(belief[State.FREE], belief[State.UNKNOWN], occupied, lattice.velocities, remainder)
     for step in range(1, STEPS + 1):
-        state = bof_update(bof_predict(state, SPEC, PARAMS, DT), SPEC, evidence_of(cars(step)), PARAMS)
+        state = bof_update(bof_predict(state, SPEC, PARAMS, DT), SPEC, evidence_of(passing_cars(step)), PARAMS)
         yield state.probability[State.DYNAMIC], bof_velocity(state)[0]
 
 
@@ -177,7 +177,7 @@ def run_cmcdot(number: int, seed: int) -> Iterator[tuple[NDArray, NDArray]]:
     state = _first_particles(number, rng)
     for step in range(1, STEPS + 1):
         predicted = predict(state, SPEC, params, DT, rng)
-        state = resample(update(predicted, SPEC, evidence_of(cars(step)), params), SPEC, params, rng)
+        state = resample(update(predicted, SPEC, evidence_of(passing_cars(step)), params), SPEC, params, rng)
         cells = cells_of(state.particles.position, SPEC)
         yield state.probability[State.DYNAMIC], velocity_moments(state.particles, cells, SPEC.shape)[0]
 

@@ -129,7 +129,7 @@ def _layer(n_in: int, n_out: int, stride: int, rate: int) -> nn.Sequential:
     return nn.Sequential(conv, nn.BatchNorm2d(n_out), nn.ReLU(inplace=True))
 
 
-def learn(mechanism: str, steps: int = 150, seed: int = 0) -> PoleNet:
+def train_pole_net(mechanism: str, steps: int = 150, seed: int = 0) -> PoleNet:
     """Train a network on images of poles, each seen once: a second or two.
 
     Parameters
@@ -179,7 +179,7 @@ class PoleScores(NamedTuple):
     offset: float
 
 
-def score(predicted: ArrayLike, truth: ArrayLike) -> PoleScores:
+def score_poles(predicted: ArrayLike, truth: ArrayLike) -> PoleScores:
     """Compare the pixels called pole with the poles.
 
     Parameters

@@ -16,7 +16,7 @@ unpooling by its indices (SegNet), or adding finer maps (FCN); strides, then int
 (DeepLab)."""
 
 
-def carry(image: ArrayLike, mechanism: str) -> NDArray[np.float64]:
+def apply_mechanism(image: ArrayLike, mechanism: str) -> NDArray[np.float64]:
     """Halve an image twice and bring it back to its size, with nothing learnt.
 
     Parameters
@@ -43,9 +43,9 @@ def carry(image: ArrayLike, mechanism: str) -> NDArray[np.float64]:
     --------
     >>> pole = np.zeros((4, 4))
     >>> pole[0, 2] = 1
-    >>> carry(pole, "nearest")[0]
+    >>> apply_mechanism(pole, "nearest")[0]
     array([1., 1., 1., 1.])
-    >>> carry(pole, "indices")[0]
+    >>> apply_mechanism(pole, "indices")[0]
     array([0., 0., 1., 0.])
     """
     check_mechanism(mechanism)

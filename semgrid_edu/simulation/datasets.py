@@ -15,9 +15,9 @@ from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.simulation.drive import SimulatedDrive
-from semgrid_edu.simulation.sample_cast import SAMPLE_WISHES
 from semgrid_edu.simulation.sensors.rig import Rig
 from semgrid_edu.simulation.street.plan import ANY, Wishes
+from semgrid_edu.simulation.street.sample_cast import SAMPLE_WISHES
 from semgrid_edu.simulation.writer import (
     DATE,
     depth_as_points,
@@ -58,7 +58,7 @@ class Route:
 
 
 @dataclass(frozen=True)
-class Recipe:
+class DatasetRecipe:
     """What a data set consists of; drives are numbered from 0001 in this order.
 
     Parameters
@@ -84,8 +84,8 @@ def _long(split: str, n_frames: int, speed: float, layout: str) -> Route:
 RECIPES = {
     recipe.name: recipe
     for recipe in (
-        Recipe("minikitti", "KITTI-14", (Route("train", 10, False),) * 142 + (Route("test", 10, False),) * 110),
-        Recipe(
+        DatasetRecipe("minikitti", "KITTI-14", (Route("train", 10, False),) * 142 + (Route("test", 10, False),) * 110),
+        DatasetRecipe(
             "minichroma",
             "KITTI-14",
             (
@@ -96,13 +96,13 @@ RECIPES = {
                 _long("test", 65, 9.0, "bend"),
             ),
         ),
-        Recipe(
+        DatasetRecipe(
             "minisynthia",
             "SYNTHIA-10",
             (_long("train", 60, 10.0, "junction"), _long("test", 60, 10.0, "junction")),
             dense=True,
         ),
-        Recipe("sample", "KITTI-14", (Route("drive", 20, True, SAMPLE_WISHES),)),
+        DatasetRecipe("sample", "KITTI-14", (Route("drive", 20, True, SAMPLE_WISHES),)),
     )
 }
 """Frames and splits as in the paper: KITTI 142 + 110 labelled frames, INRIA-Chroma 146 + 130 in 3 + 2 routes."""
@@ -114,7 +114,7 @@ PACKAGES = ("numpy", "numba", "embreex", "trimesh", "pillow")
 """The packages whose versions can change what a seed gives."""
 
 
-def make(name: str, folder: Path, seed: int = 0, workers: int = 2) -> Path:
+def make_dataset(name: str, folder: Path, seed: int = 0, workers: int = 2) -> Path:
     """Make a data set, or finish one that was interrupted.
 
     The same name and seed give the same bytes, whatever the number of workers and of interruptions.
@@ -144,11 +144,11 @@ def make(name: str, folder: Path, seed: int = 0, workers: int = 2) -> Path:
     """
     if name not in RECIPES:
         raise ArgumentError("name", f"one of {', '.join(RECIPES)}", repr(name))
-    return make_recipe(RECIPES[name], folder, seed, workers)
+    return make_from_recipe(RECIPES[name], folder, seed, workers)
 
 
-def make_recipe(recipe: Recipe, folder: Path, seed: int, workers: int) -> Path:
-    """Make a data set of your own; see `make`."""
+def make_from_recipe(recipe: DatasetRecipe, folder: Path, seed: int, workers: int) -> Path:
+    """Make a data set of your own; see `make_dataset`."""
     if seed < 0:
         raise ArgumentError("seed", "a whole number from 0 up", seed)
     if workers < 1:
@@ -197,7 +197,7 @@ def _run(work: partial, items: list[int], workers: int) -> Iterator[int]:
             yield jobs[future]
 
 
-def _make_drive(recipe: Recipe, root: Path, seed: int, index: int) -> None:
+def _make_drive(recipe: DatasetRecipe, root: Path, seed: int, index: int) -> None:
     """Simulate and write one drive; its random numbers depend on data set, seed and index alone."""
     route = recipe.routes[index]
     own_seed = np.random.SeedSequence([seed, FORMAT, *recipe.name.encode()], spawn_key=(index,))
@@ -206,7 +206,7 @@ def _make_drive(recipe: Recipe, root: Path, seed: int, index: int) -> None:
     write_drive(root, f"{index + 1:04d}", simulated, route.labelled, LABEL_SETS[recipe.label_set], points)
 
 
-def _index(recipe: Recipe, drives: list[str], seed: int) -> dict:
+def _index(recipe: DatasetRecipe, drives: list[str], seed: int) -> dict:
     """Return what dataset.json holds."""
     splits: dict[str, list] = {}
     for drive, route in zip(drives, recipe.routes, strict=True):

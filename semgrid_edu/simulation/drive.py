@@ -11,15 +11,15 @@ from semgrid_edu.frame import LABEL_GRID, Frame
 from semgrid_edu.simulation.sensors.camera import Picture, take_picture
 from semgrid_edu.simulation.sensors.gps import Geodesy
 from semgrid_edu.simulation.sensors.lidar import scan
-from semgrid_edu.simulation.sensors.raycast import Instant, Scene
+from semgrid_edu.simulation.sensors.raycast import Instant, RayMesh
 from semgrid_edu.simulation.sensors.rig import Rig
 from semgrid_edu.simulation.sensors.truth import birdseye_kinds, visible_cells, world_cells
-from semgrid_edu.simulation.street.footprints import table
-from semgrid_edu.simulation.street.paths import Ego, Pace, Path
+from semgrid_edu.simulation.street.footprints import footprint_table
 from semgrid_edu.simulation.street.plan import ANY, Plan, Wishes, draw_plan
 from semgrid_edu.simulation.street.road_users import fill_street
 from semgrid_edu.simulation.street.scenery import build_scenery
 from semgrid_edu.simulation.street.traffic import Actor, Traffic
+from semgrid_edu.simulation.street.trajectories import Ego, Pace, Trajectory
 
 PERIOD = 0.1
 """Seconds between frames: KITTI's LIDAR turns ten times a second."""
@@ -27,7 +27,7 @@ _VIEW = 110.0
 
 
 @dataclass(frozen=True, eq=False)
-class Truth:
+class BirdseyeTruth:
     """The bird's-eye truth of a frame: `kinds` (710, 310) uint8, members of `Kind`, and `visible` (710, 310) bool."""
 
     kinds: NDArray[np.uint8]
@@ -46,7 +46,7 @@ class SimulatedFrame:
     picture : Picture
     points : (N, 4) float32
         As in `Frame`.
-    truth : Truth or None
+    truth : BirdseyeTruth or None
         None where nobody asked for it.
     objects : list of dict
         Cars, pedestrians and bicycles in the bird's-eye grid, in the grid frame.
@@ -56,7 +56,7 @@ class SimulatedFrame:
     T_world_from_lidar: NDArray[np.float64]
     picture: Picture
     points: NDArray[np.float32]
-    truth: Truth | None
+    truth: BirdseyeTruth | None
     objects: list[dict]
 
 
@@ -89,12 +89,12 @@ class SimulatedDrive:
             float(self.rng.uniform(-3.1, 3.1)),
         )
         builder = build_scenery(self.plan, self.rng)
-        traffic = Traffic(builder, self.plan, self.ego.path, duration)
+        traffic = Traffic(builder, self.plan, self.ego.trajectory, duration)
         (wishes.cast or fill_street)(traffic)
         self.moving: list[Actor] = traffic.moving
         self.parked: list[Actor] = traffic.parked
-        self.static = Scene.of(builder.shapes, builder.instances)
-        self.static_footprints = table(builder.footprints)
+        self.static = RayMesh.of(builder.shapes, builder.instances)
+        self.static_footprints = footprint_table(builder.footprints)
         self.sensor_seed = self.rng.bit_generator.seed_seq.spawn(1)[0]
 
     def pose(self, t: float) -> NDArray[np.float64]:
@@ -108,14 +108,14 @@ class SimulatedDrive:
     def instant(self, t: float) -> Instant:
         """Return the world at t seconds, ready for rays."""
         road, eye = self.plan.road, self.pose(t)[:2, 3]
-        near = [a for a in self.moving if np.hypot(*(a.path.pose(road, t)[0][:2] - eye)) < _VIEW]
+        near = [a for a in self.moving if np.hypot(*(a.trajectory.pose(road, t)[0][:2] - eye)) < _VIEW]
         if not near:
             return Instant(self.static, None, np.empty((0, 4)))
         shapes = [a.shape(road, t) for a in near]
         boxes = np.array([[shape.vertices.min(axis=0), shape.vertices.max(axis=0)] for shape in shapes], np.float64)
         radii = np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) / 2
         spheres = np.column_stack([boxes.mean(axis=1), radii])
-        return Instant(self.static, Scene.of(shapes, [a.instance for a in near]), spheres)
+        return Instant(self.static, RayMesh.of(shapes, [a.instance for a in near]), spheres)
 
     def T_grid_from_world(self, t: float) -> NDArray[np.float64]:
         """Return the pose (4, 4) of the world in the grid frame at t seconds."""
@@ -135,19 +135,19 @@ class SimulatedDrive:
             m/s in grid axes.
         """
         rotation, road = self.T_grid_from_world(t)[:2, :2], self.plan.road
-        return {actor.instance: rotation @ actor.path.velocity(road, t) for actor in self.moving}
+        return {actor.instance: rotation @ actor.trajectory.velocity(road, t) for actor in self.moving}
 
     def objects(self, t: float) -> list[dict]:
         """Return cars, pedestrians and bicycles that stand in the bird's-eye grid at t seconds."""
         T_grid_from_world = self.T_grid_from_world(t)
         road, found = self.plan.road, []
         for actor in self.parked + self.moving:
-            position, yaw = actor.path.pose(road, t)
+            position, yaw = actor.trajectory.pose(road, t)
             middle = np.add(position, (0, 0, actor.size[2] / 2))
             centre = transform_points(T_grid_from_world, middle)
             if not LABEL_GRID.cells(centre[None])[2][0]:
                 continue
-            velocity = T_grid_from_world[:3, :2] @ actor.path.velocity(road, t)
+            velocity = T_grid_from_world[:3, :2] @ actor.trajectory.velocity(road, t)
             heading = T_grid_from_world[:3, :2] @ [np.cos(yaw), np.sin(yaw)]
             found.append(
                 {
@@ -163,8 +163,10 @@ class SimulatedDrive:
         return found
 
     def footprints(self, t: float) -> NDArray[np.float64]:
-        """Return the footprints of all that stands or moves at t seconds, a `table`."""
-        return np.concatenate([self.static_footprints, table([a.footprint(self.plan.road, t) for a in self.moving])])
+        """Return the footprints of all that stands or moves at t seconds, a `footprint_table`."""
+        return np.concatenate(
+            [self.static_footprints, footprint_table([a.footprint(self.plan.road, t) for a in self.moving])]
+        )
 
     def birdseye(self, t: float) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
         """Return what the cells of `LABEL_GRID` hold, seen by anybody or not.
@@ -185,12 +187,14 @@ class SimulatedDrive:
         kinds, which = birdseye_kinds(world_cells(self.pose(t), self.rig), footprints, self.plan.road)
         return kinds, np.where(which >= 0, footprints[which, 7], 0).astype(np.int32)
 
-    def truth(self, t: float, picture: Picture) -> Truth:
+    def truth(self, t: float, picture: Picture) -> BirdseyeTruth:
         """Return the bird's-eye truth at t seconds, of which `picture` was taken."""
         road, pose = self.plan.road, self.pose(t)
         cells, footprints = world_cells(pose, self.rig), self.footprints(t)
         kinds, which = birdseye_kinds(cells, footprints, road)
-        return Truth(kinds, visible_cells(cells, kinds, which, footprints, road, picture, pose, self.rig.camera))
+        return BirdseyeTruth(
+            kinds, visible_cells(cells, kinds, which, footprints, road, picture, pose, self.rig.camera)
+        )
 
     def frame(self, index: int, labelled: bool) -> SimulatedFrame:
         """Take one frame; every frame has its own noise, whichever frames were taken before."""
@@ -244,4 +248,4 @@ def _draw_ego(rng: np.random.Generator, plan: Plan, pace: Pace, lane: int | None
     d = -(lane + 0.5) * road.lane + float(rng.normal(0, 0.1))
     sway, phase = float(rng.uniform(0.02, 0.1)), float(rng.uniform(0, 6.28))
     roll, pitch = (float(x) for x in np.radians(rng.uniform(0.05, 0.2, 2)))
-    return Ego(road, Path(0.0, d, 1.0, 0.0, pace), sway, roll, pitch, phase)
+    return Ego(road, Trajectory(0.0, d, 1.0, 0.0, pace), sway, roll, pitch, phase)

@@ -15,7 +15,7 @@ from semgrid_edu.datasets.kitti_labels import DEPTH_UNIT
 from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.labels import KITTI_14, LabelSet
 from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive, SimulatedFrame
-from semgrid_edu.simulation.sensors.gps import DATAFORMAT, packet
+from semgrid_edu.simulation.sensors.gps import DATAFORMAT, oxts_packet
 from semgrid_edu.simulation.sensors.rig import Rig
 from semgrid_edu.simulation.things.materials import class_of_kind
 from semgrid_edu.storage.files import write_text
@@ -157,7 +157,7 @@ def write_drive(
         name = f"{k:010d}"
         _save_png(partial / "image_02" / "data" / f"{name}.png", frame.picture.image)
         (partial / "velodyne_points" / "data" / f"{name}.bin").write_bytes(points(frame, simulated.rig).tobytes())
-        oxts = packet(simulated.T_world_from_imu, frame.time, simulated.geodesy)
+        oxts = oxts_packet(simulated.T_world_from_imu, frame.time, simulated.geodesy)
         (partial / "oxts" / "data" / f"{name}.txt").write_text(oxts)
         objects[name] = frame.objects
         if k in labelled:

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from semgrid_edu.simulation.things.bicycles import bicycle
-from semgrid_edu.simulation.things.buildings import House, build
+from semgrid_edu.simulation.things.buildings import House, build_house
 from semgrid_edu.simulation.things.cars import BODIES, car, car_size
 from semgrid_edu.simulation.things.furniture import FENCES, SIGNS, fence, sign
 from semgrid_edu.simulation.things.materials import Kind, Material
@@ -63,7 +63,7 @@ def test_a_stride_repeats():
 
 def test_a_house_covers_its_plan_up_to_its_eaves():
     house = House(10.0, 8.0, 2, "flat", False, 3)
-    shape = build(house)
+    shape = build_house(house)
     walls = trimesh.Trimesh(shape.vertices, shape.faces)
     assert walls.bounds[:, 2] == pytest.approx([-2.5, house.eaves + 1.8], abs=0.01)
     assert set(shape.kind) == {Kind.BUILDING}

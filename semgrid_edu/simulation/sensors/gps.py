@@ -47,7 +47,7 @@ class Geodesy:
         return float(np.degrees(2 * np.arctan(np.exp(mercator))) - 90), float(longitude)
 
 
-def packet(pose: Callable[[float], NDArray], t: float, geodesy: Geodesy) -> str:
+def oxts_packet(pose: Callable[[float], NDArray], t: float, geodesy: Geodesy) -> str:
     """Return the thirty numbers of an oxts packet.
 
     Parameters

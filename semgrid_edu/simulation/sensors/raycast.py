@@ -16,7 +16,7 @@ MISS = np.float32(1e30)
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class RayMesh:
     """Shapes ready for rays; `instance` (F,) int32 numbers the object that each triangle belongs to."""
 
     shape: Shape
@@ -24,7 +24,7 @@ class Scene:
     embree: EmbreeScene
 
     @classmethod
-    def of(cls, shapes: Sequence[Shape], instances: Sequence[int]) -> "Scene":
+    def of(cls, shapes: Sequence[Shape], instances: Sequence[int]) -> "RayMesh":
         """Build the search tree of several shapes, each with the number of its object."""
         whole = merge(shapes)
         sizes = [len(s.faces) for s in shapes]
@@ -93,14 +93,14 @@ class Instant:
 
     Parameters
     ----------
-    static : Scene
-    moving : Scene or None
+    static : RayMesh
+    moving : RayMesh or None
     spheres : (M, 4) float64
         Centre and radius around everything that moves: only rays through one of them are tried against `moving`.
     """
 
-    static: Scene
-    moving: Scene | None
+    static: RayMesh
+    moving: RayMesh | None
     spheres: NDArray[np.float64]
 
     def __post_init__(self) -> None:

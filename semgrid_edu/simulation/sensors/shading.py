@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.simulation.sensors.raycast import Hits, Instant
 from semgrid_edu.simulation.street.layout import Road, lane_mark, outside_asphalt, to_road
-from semgrid_edu.simulation.street.light import Light, noise_tile, sky, texture
+from semgrid_edu.simulation.street.light import Light, noise_tile, sky_radiance, texture
 from semgrid_edu.simulation.things.materials import Kind, Material
 
 _GROUND, _PLASTER, _BRICK, _TILES, _WOOD = (
@@ -146,7 +146,7 @@ def _mirror(tile, ray, n, sun, sun_colour, zenith, horizon, clouds, phase, gloss
     fresnel = strength + (1.0 - strength) * (1.0 - max(cos, 0.0)) ** 5
     seen = np.empty(3, np.float32)
     if rz > 0.12:
-        sky(tile, rx, ry, rz, sun, sun_colour, zenith, horizon, clouds, phase, seen)
+        sky_radiance(tile, rx, ry, rz, sun, sun_colour, zenith, horizon, clouds, phase, seen)
     else:
         skyline = 0.10 + 0.5 * max(rz + 0.02, 0.0) + 0.12 * (texture(tile, 60.0 * np.arctan2(ry, rx), 20.0 * rz) - 0.3)
         for c in range(3):
@@ -168,7 +168,7 @@ def _shade(
         out = radiance[i]
         if tri[i] < 0:
             kinds[i] = _SKY
-            sky(tile, ray[0], ray[1], ray[2], sun, sun_colour, zenith, horizon, clouds, phase, out)
+            sky_radiance(tile, ray[0], ray[1], ray[2], sun, sun_colour, zenith, horizon, clouds, phase, out)
             continue
         k, p, m = tri[i], pos[i], material[tri[i]]
         facing = normals[k, 0] * ray[0] + normals[k, 1] * ray[1] + normals[k, 2] * ray[2]

@@ -37,7 +37,7 @@ def birdseye_kinds(cells: NDArray, footprints: NDArray, road: Road) -> tuple[NDA
     cells : (H, W, 2) float
         From `world_cells`.
     footprints : (K, 9) float
-        A `table`; where two overlap the last one wins.
+        A `footprint_table`; where two overlap the last one wins.
     road : Road
 
     Returns

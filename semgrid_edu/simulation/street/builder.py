@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from semgrid_edu.simulation.street.footprints import ROUND, SQUARE, Footprint, collides, table
+from semgrid_edu.simulation.street.footprints import ROUND, SQUARE, Footprint, collides, footprint_table
 from semgrid_edu.simulation.street.layout import Road, ground_height, outside_asphalt, to_world
 from semgrid_edu.simulation.things.materials import Kind
 from semgrid_edu.simulation.things.shapes import Shape
@@ -55,7 +55,7 @@ class Builder:
 
     def free(self, footprint: Footprint, margin: float = 0.1) -> bool:
         """Return whether nothing stands within `margin` metres of a footprint."""
-        return not collides(footprint, table(self.footprints), margin)
+        return not collides(footprint, footprint_table(self.footprints), margin)
 
     def add(self, shape: Shape, s: float, d: float, yaw: float, scale=1.0, footprints=(), instance: int = 0) -> None:
         """Put a shape at (s, d), with what it covers."""

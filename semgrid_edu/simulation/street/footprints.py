@@ -76,7 +76,7 @@ def stamp(footprints: NDArray, xy: NDArray, cell: float, which: NDArray) -> None
                     which[r, c] = k
 
 
-def table(footprints: list[Footprint]) -> NDArray[np.float64]:
+def footprint_table(footprints: list[Footprint]) -> NDArray[np.float64]:
     """Return footprints as rows of numbers, for `stamp`."""
     return np.array(footprints, dtype=np.float64).reshape(-1, len(Footprint._fields))
 
@@ -92,12 +92,12 @@ def outline(f: Footprint, margin: float = 0.0) -> NDArray[np.float64]:
 
 
 def collides(f: Footprint, others: NDArray, margin: float = 0.0) -> bool:
-    """Return whether a footprint, widened by `margin` metres, meets one of a `table` of others."""
+    """Return whether a footprint, widened by `margin` metres, meets one of a `footprint_table` of others."""
     if len(others) == 0:
         return False
     reach = np.hypot(others[:, 2], others[:, 3]) + np.hypot(f.half_length, f.half_width) + margin
     near = others[np.hypot(others[:, 0] - f.x, others[:, 1] - f.y) < reach]
-    mine = table([f._replace(half_length=f.half_length + margin, half_width=f.half_width + margin)])[0]
+    mine = footprint_table([f._replace(half_length=f.half_length + margin, half_width=f.half_width + margin)])[0]
     points = outline(f, margin)
     return any(_any_inside(other, points) or _any_inside(mine, outline(Footprint(*other))) for other in near)
 

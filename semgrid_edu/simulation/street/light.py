@@ -99,7 +99,7 @@ def texture(tile, u, v):
 
 
 @njit(cache=True, fastmath=True)
-def sky(tile, x, y, z, sun, sun_colour, zenith, horizon, clouds, phase, out):
+def sky_radiance(tile, x, y, z, sun, sun_colour, zenith, horizon, clouds, phase, out):
     """Write into `out` the radiance that comes from direction (x, y, z): gradient, glow of the sun, clouds."""
     up = max(z, 0.0)
     mix = (1.0 - up) ** 5

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from semgrid_edu.simulation.street.paths import STAND, Pace, Path
 from semgrid_edu.simulation.street.traffic import Traffic
+from semgrid_edu.simulation.street.trajectories import STAND, Pace, Trajectory
 from semgrid_edu.simulation.things.cars import car_size
 from semgrid_edu.simulation.things.materials import Kind
 
@@ -37,10 +37,10 @@ def _park_cars(traffic: Traffic) -> None:
             if rng.random() > share or near:
                 continue
             body, away = traffic.body(), (sign > 0) != (rng.random() < 0.12)
-            path = Path(
+            trajectory = Trajectory(
                 s, sign * (side.edge - 1.06 + rng.normal(0, 0.05)), 1, 0, STAND, rng.normal(0, 0.02) + np.pi * away
             )
-            traffic.park(Kind.CAR, car_size(body), path, (body, traffic.paint()))
+            traffic.park(Kind.CAR, car_size(body), trajectory, (body, traffic.paint()))
 
 
 def _park_bicycles(traffic: Traffic) -> None:
@@ -52,7 +52,7 @@ def _park_bicycles(traffic: Traffic) -> None:
         for _ in range(rng.integers(0, 5)):
             s, n = rng.uniform(4, 70), rng.integers(1, 4)
             for k in range(n):
-                path = Path(
+                trajectory = Trajectory(
                     s + 0.75 * k,
                     sign * (side.edge + side.strip + rng.choice([0.5, side.walk - 0.35])),
                     1,
@@ -60,7 +60,7 @@ def _park_bicycles(traffic: Traffic) -> None:
                     STAND,
                     rng.normal(0, 0.15) + (1.3 if n > 1 else 0),
                 )
-                traffic.park(Kind.BICYCLE, (1.78, 0.4, 1.05), path, ("bicycle", traffic.paint()))
+                traffic.park(Kind.BICYCLE, (1.78, 0.4, 1.05), trajectory, ("bicycle", traffic.paint()))
 
 
 def _lanes(traffic: Traffic) -> None:

@@ -9,7 +9,7 @@ from semgrid_edu.simulation.street.plan import Plan
 from semgrid_edu.simulation.street.roadside import side_of, stand_lamps, stand_signals, stand_signs
 from semgrid_edu.simulation.street.terrain import ground_mesh
 from semgrid_edu.simulation.things import furniture, plants
-from semgrid_edu.simulation.things.buildings import House, build
+from semgrid_edu.simulation.things.buildings import House, build_house
 from semgrid_edu.simulation.things.materials import Kind, Material
 
 _TREE_RADIUS = 0.22
@@ -97,7 +97,7 @@ def _house(builder: Builder, house: House, s: float, d: float, yaw: float, acros
     if not across_road and min(builder.edge_distance(*corner) for corner in corners) < 0.1:
         return
     if builder.free(foot, 0.05):
-        builder.add(build(house), s, d, yaw, 1.0, [foot])
+        builder.add(build_house(house), s, d, yaw, 1.0, [foot])
 
 
 def _random_house(style: str, rng: np.random.Generator) -> House:

@@ -204,7 +204,7 @@ def _balconies(house: House, rng: np.random.Generator) -> list[Shape]:
     return parts
 
 
-def build(house: House) -> Shape:
+def build_house(house: House) -> Shape:
     """Build a house, its walls reaching 2.5 m into the ground so that slopes can't lift it.
 
     Parameters

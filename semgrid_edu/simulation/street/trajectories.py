@@ -32,7 +32,7 @@ STAND = Pace(0.0)
 
 
 @dataclass(frozen=True)
-class Path:
+class Trajectory:
     """A straight line in road coordinates, run at a pace.
 
     Parameters
@@ -43,7 +43,7 @@ class Path:
         Direction in (s, d): (1, 0) with our traffic, (-1, 0) against it, (0, 1) across the road to the left.
     pace : Pace
     turn : float
-        Added to the direction that the path gives, rad: how something that stands is turned.
+        Added to the direction that the trajectory gives, rad: how something that stands is turned.
     """
 
     s: float
@@ -77,7 +77,7 @@ class Ego:
     Parameters
     ----------
     road : Road
-    path : Path
+    trajectory : Trajectory
     sway : float
         Amplitude of its sideways drift, metres.
     roll, pitch : float
@@ -87,7 +87,7 @@ class Ego:
     """
 
     road: Road
-    path: Path
+    trajectory: Trajectory
     sway: float
     roll: float
     pitch: float
@@ -95,8 +95,8 @@ class Ego:
 
     def T_world_from_lidar(self, t: float) -> NDArray[np.float64]:
         """Return the LIDAR's pose at t seconds, (4, 4); it tilts about the point on the ground below it."""
-        s, d = self.path.at(t)
-        speed = self.path.pace.speed(t)
+        s, d = self.trajectory.at(t)
+        speed = self.trajectory.pace.speed(t)
         swing = 0.45 * s / 10.0 + self.phase
         d += self.sway * np.sin(swing)
         x, y, heading = to_world(self.road, s, d)
@@ -104,11 +104,11 @@ class Ego:
         yaw = heading + np.arctan(drift)
         roll = self.roll * np.sin(5.1 * t + 2 * self.phase)
         pitch = self.pitch * np.sin(6.7 * t + 3 * self.phase)
-        R = rotation(roll, pitch, yaw)
+        R = rotation_matrix(roll, pitch, yaw)
         return rigid_transform(R, np.array([x, y, 0.0]) + KITTI_LIDAR_HEIGHT * R[:, 2])
 
 
-def rotation(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:
+def rotation_matrix(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:
     """Return Rz(yaw) Ry(pitch) Rx(roll), the order of KITTI's oxts angles."""
     cr, sr, cp, sp, cy, sy = (f(a) for a in (roll, pitch, yaw) for f in (np.cos, np.sin))
     return np.array(

@@ -3,10 +3,10 @@
 import numpy as np
 
 from semgrid_edu.simulation.street.light import Light
-from semgrid_edu.simulation.street.paths import STAND, Pace
 from semgrid_edu.simulation.street.plan import Wishes
 from semgrid_edu.simulation.street.road_users import fill_street
 from semgrid_edu.simulation.street.traffic import Traffic
+from semgrid_edu.simulation.street.trajectories import STAND, Pace
 
 
 def _cast(traffic: Traffic) -> None:
