@@ -9,10 +9,9 @@ from semgrid_edu.frame import blocks
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import State
 from semgrid_edu.simulation.drive import SimulatedDrive
+from semgrid_edu.simulation.street.actors import MOVING_SPEED
 from semgrid_edu.simulation.things.materials import Kind
 
-MOVES = 0.05
-"""m/s: what is faster moves."""
 FLAT = (Kind.ROAD, Kind.LANE, Kind.SIDEWALK, Kind.GRASS)
 """The kinds of bare ground."""
 
@@ -91,7 +90,7 @@ def pool_truth(kinds: NDArray, instances: NDArray, velocities: dict[int, NDArray
         if number < len(speeds):
             speeds[number] = velocity
     velocity = np.moveaxis(speeds[instance], -1, 0)
-    standing = np.where(np.hypot(*velocity) > MOVES, State.DYNAMIC, State.STATIC)
+    standing = np.where(np.hypot(*velocity) > MOVING_SPEED, State.DYNAMIC, State.STATIC)
     state = np.where(np.isin(kind, FLAT), State.FREE, standing)
     return CellTruth(state.astype(np.uint8), kind.astype(np.uint8), instance.astype(np.int32), velocity)
 

@@ -37,7 +37,7 @@ LOSS_EVERY = 50
 OverfitResult = dict[str, object]
 
 
-def overfit(seed: int = 0, params: TrainingParams | None = None) -> OverfitResult:
+def overfit(seed: int = 0) -> OverfitResult:
     """Train compact networks, image to grid, on four shipped frames, and score them on the same four.
 
     A network that can't learn four frames by heart is too small, or its gradients are wrong, or a step is too large.
@@ -47,8 +47,6 @@ def overfit(seed: int = 0, params: TrainingParams | None = None) -> OverfitResul
     ----------
     seed : int
         Of the initial weights.
-    params : TrainingParams, optional
-        `PARAMS` by default.
 
     Returns
     -------
@@ -56,15 +54,15 @@ def overfit(seed: int = 0, params: TrainingParams | None = None) -> OverfitResul
         "networks": for each image network what `learn_by_heart` returns. With all that made them: it can be written as
         JSON.
     """
-    params, began = params or PARAMS, datetime.now(UTC)
+    began = datetime.now(UTC)
     frames, camera = sample_frames()[:FRAMES], sample_drive().camera
     return {
         "networks": {
-            name: learn_by_heart(build_net(Architecture(name), camera, seed), frames, params, seed)
+            name: learn_by_heart(build_net(Architecture(name), camera, seed), frames, PARAMS, seed)
             for name in SEGMENTERS
         },
         "frames": len(frames),
-        "params": asdict(params),
+        "params": asdict(PARAMS),
         "command": f"semgrid-edu reproduce overfit --seed {seed}",
         "seed": seed,
         "date": f"{began:%Y-%m-%d}",

@@ -18,6 +18,8 @@ WORLD = GridSpec(-5, 24, -9, 14, 0.2)
 """A map that holds what is around the start during all of `winding_road`."""
 SQUARE = 1.0
 """Side of the squares of the chequerboard, metres."""
+MARGIN = 1.5
+"""Metres that drops keep from the map's borders, so that no spilled ink is lost over them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,14 +109,14 @@ def measure_blur(
     return Blur(*np.array(measured).T)
 
 
-def _always_held(spec: GridSpec, motions: Sequence[PlanarMotion], margin: float = 1.5) -> NDArray[np.bool_]:
-    """Return which cells of the first map stay in the map, `margin` metres from its borders, (H, W)."""
+def _always_held(spec: GridSpec, motions: Sequence[PlanarMotion]) -> NDArray[np.bool_]:
+    """Return which cells of the first map stay in the map, `MARGIN` metres or more from its borders, (H, W)."""
     held, pose = np.ones(spec.shape, bool), PlanarMotion()
     for motion in [PlanarMotion(), *motions]:
         pose = pose.then(motion)
         x, y = np.moveaxis(pose.to_now(spec.centers()), -1, 0)
-        held &= (x > spec.x_min + margin) & (x < spec.x_max - margin)
-        held &= (y > spec.y_min + margin) & (y < spec.y_max - margin)
+        held &= (x > spec.x_min + MARGIN) & (x < spec.x_max - MARGIN)
+        held &= (y > spec.y_min + MARGIN) & (y < spec.y_max - MARGIN)
     if not held.any():
         raise ArgumentError("motions", "a way that leaves some of the map in it", f"{pose} in {spec}")
     return held

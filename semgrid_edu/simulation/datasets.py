@@ -1,4 +1,4 @@
-"""The data sets of section 4 in simulated form, and a sample drive: made in parallel, resumed when interrupted."""
+"""Simulated data sets in place of those of section 4, and the sample drive: made in parallel, resumed after a stop."""
 
 import json
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.simulation.drive import SimulatedDrive
 from semgrid_edu.simulation.sensors.rig import Rig
 from semgrid_edu.simulation.street.plan import ANY, Wishes
-from semgrid_edu.simulation.street.sample_cast import SAMPLE_WISHES
+from semgrid_edu.simulation.street.sample_street import SAMPLE_WISHES
 from semgrid_edu.simulation.writer import (
     DATE,
     depth_as_points,
@@ -30,7 +30,7 @@ from semgrid_edu.storage.provenance import versions, write_provenance
 from semgrid_edu.storage.workers import worker_pool
 
 FORMAT = 1
-"""Goes up when the simulator changes what a seed gives, so that old and new drives don't mix in one folder."""
+"""Raised whenever the simulator changes what a seed gives, so that old and new drives don't mix in one folder."""
 
 
 @dataclass(frozen=True)
@@ -40,10 +40,13 @@ class Route:
     Parameters
     ----------
     split : str
+        The split that it belongs to, such as "train".
     n_frames : int
+        Number of frames, ten a second.
     all_labelled : bool
         Whether all frames have labels; else the last one alone.
     wishes : Wishes
+        What isn't left to chance.
     """
 
     split: str
@@ -53,7 +56,7 @@ class Route:
 
     @property
     def labelled(self) -> range:
-        """The frames that have labels."""
+        """The numbers of the frames that have labels."""
         return range(0 if self.all_labelled else self.n_frames - 1, self.n_frames)
 
 
@@ -64,8 +67,11 @@ class DatasetRecipe:
     Parameters
     ----------
     name : str
+        What the data set is called.
     label_set : str
+        Name of its label set, a key of `LABEL_SETS`.
     routes : tuple of Route
+        Its drives.
     dense : bool
         Whether points come from the depth image, thinned, instead of the LIDAR.
     """
@@ -105,7 +111,7 @@ RECIPES = {
         DatasetRecipe("sample", "KITTI-14", (Route("drive", 20, True, SAMPLE_WISHES),)),
     )
 }
-"""Frames and splits as in the paper: KITTI 142 + 110 labelled frames, INRIA-Chroma 146 + 130 in 3 + 2 routes."""
+"""Numbers of frames as in the paper: KITTI 142 + 110 labelled frames, INRIA-Chroma 146 + 130 in 3 + 2 routes."""
 
 DATA_SETS = ("minikitti", "minichroma", "minisynthia")
 """What `semgrid-edu data make all` makes."""
@@ -124,11 +130,11 @@ def make_dataset(name: str, folder: Path, seed: int = 0, workers: int = 2) -> Pa
     name : str
         One of `RECIPES`.
     folder : path-like
-        Where the data set's own folder, `folder`/`name`, goes.
+        Takes the data set's own folder, `folder`/`name`.
     seed : int
-        Not negative.
+        Seed for all drives; not negative.
     workers : int
-        Processes that share the work.
+        Number of processes that share the work, at least one.
 
     Returns
     -------
@@ -138,7 +144,7 @@ def make_dataset(name: str, folder: Path, seed: int = 0, workers: int = 2) -> Pa
     Raises
     ------
     ArgumentError
-        When there is no such data set.
+        When there is no such data set, the seed is negative or there is no worker.
     DataError
         When the folder holds something else, or the same with another seed or an older version.
     """
@@ -148,7 +154,31 @@ def make_dataset(name: str, folder: Path, seed: int = 0, workers: int = 2) -> Pa
 
 
 def make_from_recipe(recipe: DatasetRecipe, folder: Path, seed: int, workers: int) -> Path:
-    """Make a data set of your own; see `make_dataset`."""
+    """Make a data set of your own, or finish one that was interrupted.
+
+    Parameters
+    ----------
+    recipe : DatasetRecipe
+        What it consists of.
+    folder : path-like
+        Takes the data set's own folder, which is named like the recipe.
+    seed : int
+        Seed for all drives; not negative.
+    workers : int
+        Number of processes that share the work, at least one.
+
+    Returns
+    -------
+    Path
+        The data set's folder.
+
+    Raises
+    ------
+    ArgumentError
+        When the seed is negative or there is no worker.
+    DataError
+        When the folder holds something else, or the same with another seed or an older version.
+    """
     if seed < 0:
         raise ArgumentError("seed", "a whole number from 0 up", seed)
     if workers < 1:
@@ -185,7 +215,7 @@ def _claim(root: Path, marker: dict) -> None:
 
 
 def _run(work: partial, items: list[int], workers: int) -> Iterator[int]:
-    """Do the work in processes (in this one when one is enough), and tell of each item done."""
+    """Do the work in processes (in this one when one is enough), and yield each item when it is done."""
     if workers == 1 or len(items) < 2:
         for item in items:
             work(item)

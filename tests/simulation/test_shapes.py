@@ -11,7 +11,8 @@ from semgrid_edu.simulation.things.furniture import FENCES, SIGNS, fence, sign
 from semgrid_edu.simulation.things.materials import Kind, Material
 from semgrid_edu.simulation.things.people import Person, rider, walker
 from semgrid_edu.simulation.things.plants import TREES, bush, hedge, tree
-from semgrid_edu.simulation.things.shapes import ball, box, merge, quads, tube
+from semgrid_edu.simulation.things.primitives import ball, box, quads, tube
+from semgrid_edu.simulation.things.shapes import merge
 
 STYLE = {"colour": (0.5, 0.5, 0.5), "material": Material.MATTE, "kind": Kind.POLE}
 

@@ -15,7 +15,9 @@ from semgrid_edu.simulation.street.layout import Road
 from semgrid_edu.simulation.street.light import Light
 
 _SKY_STEP = 3
+"""Every third pixel of every third row sends a ray to the sky: how much of it is open changes slowly."""
 _SUBPIXELS = ((-0.33, 0.33), (0.33, -0.33))
+"""Where pixels at an edge send two more rays, so that outlines aren't jagged: shift to the right and down, pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,13 +27,13 @@ class Picture:
     Parameters
     ----------
     image : (h, w, 3) uint8
-        RGB.
+        What the camera takes, RGB.
     kind : (h, w) uint8
-        Members of `Kind`.
+        What each pixel shows, a `Kind`.
     depth : (h, w) float32
-        Metres along the optical axis; NaN for sky.
+        Depth along the optical axis, metres; NaN for sky.
     instance : (h, w) int32
-        Number of the object; 0 for none.
+        Number of the car, pedestrian or bicycle that each pixel shows; 0 for all else.
     """
 
     image: NDArray[np.uint8]
@@ -185,12 +187,21 @@ def take_picture(
     Parameters
     ----------
     instant : Instant
+        The world.
     T_world_from_lidar : (4, 4) float
+        Pose of the LIDAR, metres.
     rig : Rig
+        Where the camera stands, and its noise.
     road : Road
+        The street, for what the ground is.
     light : Light
+        Sun, sky and exposure.
     rng : numpy.random.Generator
-        Sensor noise and soft shadows.
+        Source of the sensor's noise and of the scattered rays that make shadows soft.
+
+    Returns
+    -------
+    Picture
     """
     shape = rig.image_size
     rotation = T_world_from_lidar[:3, :3].astype(np.float32)

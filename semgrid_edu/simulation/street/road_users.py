@@ -1,4 +1,4 @@
-"""Who uses the street: parked cars, traffic in every lane, cyclists and pedestrians, as many as a plan asks for."""
+"""The road users of a street: parked cars, traffic in every lane, cyclists and pedestrians, as many as planned."""
 
 import numpy as np
 
@@ -9,11 +9,12 @@ from semgrid_edu.simulation.things.materials import Kind
 
 
 def fill_street(traffic: Traffic) -> None:
-    """Put on the street what the plan's density asks for.
+    """Put road users on the street, as many as the plan's density asks for.
 
     Parameters
     ----------
     traffic : Traffic
+        Takes them; it knows the street and the plan.
     """
     _park_cars(traffic)
     _park_bicycles(traffic)
@@ -44,7 +45,7 @@ def _park_cars(traffic: Traffic) -> None:
 
 
 def _park_bicycles(traffic: Traffic) -> None:
-    """Stand a few bicycles on the sidewalks."""
+    """Park a few bicycles on the sidewalks."""
     road, rng = traffic.road, traffic.rng
     for sign, side in ((1, road.left), (-1, road.right)):
         if side.walk < 1.5:
@@ -64,7 +65,7 @@ def _park_bicycles(traffic: Traffic) -> None:
 
 
 def _lanes(traffic: Traffic) -> None:
-    """Fill every lane with cars of one pace, so that none catches up with the next."""
+    """Fill every lane with cars that drive alike, so that none catches up with the next."""
     road, rng, ego = traffic.road, traffic.rng, traffic.ego
     stands = ego.pace.mean == 0
     ego_lane = round(-ego.d / road.lane - 0.5)
@@ -84,14 +85,14 @@ def _lanes(traffic: Traffic) -> None:
 
 
 def _fill_lane(traffic: Traffic, d: float, along: int, pace: Pace) -> None:
-    """Put cars of one pace into a lane, so that they are around the recording car when the drive ends."""
+    """Put cars that drive alike into a lane, so that they are around the recording car when the drive ends."""
     road, rng = traffic.road, traffic.rng
-    way = pace.distance(traffic.duration)
+    travelled = pace.distance(traffic.duration)
     gap = 6.5 + (0.8 * pace.mean if pace.mean else 0.0)
     middle = traffic.ego.at(traffic.duration)[0]
     s = middle - 30 + rng.uniform(0, 15)
     while s < middle + 110:
-        start, ahead = s - along * way, (s - road.junction) * along
+        start, ahead = s - along * travelled, (s - road.junction) * along
         blocked = (
             road.side_half and pace.mean == 0 and -(road.side_half + road.corner + 8) < ahead < road.side_half + 12
         )

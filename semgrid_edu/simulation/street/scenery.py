@@ -1,4 +1,4 @@
-"""Lines a planned street with houses, fences, trees, lamps and signs."""
+"""The scenery of a planned street: its ground, houses, fences, trees, lamps and signs."""
 
 import numpy as np
 
@@ -17,12 +17,19 @@ _HEDGE_HALF, _FENCE_HALF = 0.42, 0.08
 
 
 def build_scenery(plan: Plan, rng: np.random.Generator) -> Builder:
-    """Build all that never moves, parked cars excepted.
+    """Build all that never moves, but for parked cars and bicycles.
 
     Parameters
     ----------
     plan : Plan
+        What the street is to be like.
     rng : numpy.random.Generator
+        Source of all that is drawn.
+
+    Returns
+    -------
+    Builder
+        The world, ready to take road users.
     """
     builder = Builder(plan.road, rng)
     ground = ground_mesh(plan.road, plan.extent)
@@ -141,13 +148,8 @@ def _second_row(builder: Builder, plan: Plan, sign: int, offset: float) -> None:
     rng = builder.rng
     for s in np.arange(plan.extent.start, plan.extent.end, 34.0):
         if rng.random() < 0.7:
-            _house(
-                builder,
-                _random_house("town", rng),
-                s + rng.uniform(0, 10),
-                sign * (offset + rng.uniform(0, 10)),
-                _facing(sign),
-            )
+            house = _random_house("town", rng)
+            _house(builder, house, s + rng.uniform(0, 10), sign * (offset + rng.uniform(0, 10)), _facing(sign))
 
 
 def _border(builder: Builder, s0: float, s1: float, sign: int, offset: float, style: str) -> None:
@@ -193,13 +195,8 @@ def _park(builder: Builder, plan: Plan, sign: int) -> None:
             (_tree if rng.random() < 0.62 else _bush)(builder, plan, s + rng.uniform(0, 5), sign * offset)
     for s in np.arange(plan.extent.start, plan.extent.end, 60.0):
         if rng.random() < 0.5:
-            _house(
-                builder,
-                _random_house("town", rng),
-                s + rng.uniform(0, 30),
-                sign * (line + rng.uniform(30, 40)),
-                _facing(sign),
-            )
+            house = _random_house("town", rng)
+            _house(builder, house, s + rng.uniform(0, 30), sign * (line + rng.uniform(30, 40)), _facing(sign))
 
 
 def _street_trees(builder: Builder, plan: Plan, sign: int) -> None:
