@@ -1,5 +1,6 @@
 """The command line, `semgrid-edu`: parses and calls, nothing else."""
 
+import os
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -251,6 +252,9 @@ def _report(problems: list[str], sound: str) -> None:
 
 def run() -> None:
     """Run the command line; a mistake in the input, or a disk that refuses, ends in one line, not in a traceback."""
+    # Idle OpenMP threads spin, which keeps busy cores from the threads that have work: on two busy cores a frame took
+    # 1.2 s instead of 0.07 s. OpenMP reads this once, when a command loads torch or numba, so it must be set before.
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     try:
         app()
     except (ArgumentError, DataError) as error:
