@@ -1,4 +1,4 @@
-"""Arrays of a split's labelled frames, kept beside the data and mapped from disk (section 4.1)."""
+"""The arrays that a network learns from, made once per data set, kept beside it and mapped from disk (section 4.1)."""
 
 import hashlib
 import json
@@ -26,24 +26,34 @@ from semgrid_edu.storage.reading import read_text
 from semgrid_edu.storage.workers import worker_pool
 
 SEED = 0
-"""Of the occupancy filter's particles, in each drive."""
+"""Seed for the particles of the occupancy filter, in each drive."""
 
 CODE = (
     *("camera", "frame", "grid", "labels", "storage/reading"),
     *(f"datasets/{name}" for name in ("calibration", "kitti_labels", "kitti_raw", "oxts", "resizing")),
     *(f"datasets/{name}" for name in ("returns", "timestamps", "training_cache", "truth")),
 )
-"""The modules that decide what comes out, beside all of occupancy/."""
+"""The modules that decide the arrays, beside all of occupancy/."""
 
 WORKERS = 2
-"""Processes that make the arrays, a drive at a time."""
+"""Number of processes that make the arrays, each one drive at a time."""
 
 RAGGED = ("return_pixels", "return_cells")
-"""Arrays of which each frame has its own length: they lie end to end, and `return_ends` says where each ends."""
+"""Arrays whose length differs from frame to frame: they lie end to end, and `return_ends` says where each ends."""
 
 
 class ArrayRecipe(NamedTuple):
-    """What the arrays are made by: the grid, the image size (height, width) and the occupancy filter."""
+    """How the arrays are made.
+
+    Parameters
+    ----------
+    spec : GridSpec
+        The grid of occupancy and truth.
+    image_size : (int, int)
+        Height and width of the resized images, pixels.
+    params : CmcdotParams
+        Parameters of the occupancy filter.
+    """
 
     spec: GridSpec
     image_size: tuple[int, int]
@@ -51,23 +61,28 @@ class ArrayRecipe(NamedTuple):
 
 
 def cached_arrays(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> dict[str, NDArray]:
-    """Return the arrays of a split's labelled frames; make them on first use.
+    """Return the arrays of a split's labelled frames, which are made on first use.
 
-    They lie in `cache/` of the data set, in a folder named by a hash of all that decides them: the recipe, the
-    code that makes them, dataset.json, and the drives' files by name and size (hashing a gigabyte at every start
-    would take longer than reading what is kept). When one of these changes, they are made anew.
+    They are kept in `cache/` of the data set, in a folder that is named by a hash of all that decides them: the recipe,
+    the code that makes them, dataset.json, and the drives' files by name and size. (Hashing the contents of these
+    files, about a gigabyte, at every start would take longer than reading the arrays.) When one of these changes, the
+    arrays are made anew.
 
     Parameters
     ----------
     index : DatasetIndex
+        The data set.
     split : str
+        One of its splits, such as "train".
     recipe : ArrayRecipe
+        Grid, image size and occupancy filter.
 
     Returns
     -------
-    dict of str to (frames, ...) arrays mapped from disk, read-only
-        image (3, h, w) uint8, labels (h, w) uint8, occupancy (4, H, W) float32 and truth (H, W) uint8 of each
-        frame; return_pixels and return_cells (`seen_returns`), those of frame k from return_ends[k] to [k + 1].
+    dict of str to arrays mapped from disk, read-only
+        For N frames "image" (N, 3, h, w) uint8, "labels" (N, h, w) uint8, "occupancy" (N, 4, H, W) float32 and "truth"
+        (N, H, W) uint8. From `seen_returns` "return_pixels" and "return_cells", whose entries from return_ends[k] to
+        return_ends[k + 1] belong to frame k, and "return_ends" (N + 1,).
 
     Raises
     ------

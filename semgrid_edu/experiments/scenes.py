@@ -1,4 +1,4 @@
-"""Simulated drives, frame by frame, with all that is true of their cells (section 3.2)."""
+"""Simulated drives, frame by frame, with all that is needed to score an occupancy filter (section 3.2)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,32 +15,33 @@ from semgrid_edu.occupancy.moving_map import MAX_YAW, look_up, map_around
 from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive
 
 LEFT_SINCE = 10
-"""Frames, 1 s: what a moving thing has left within them should be free by now."""
+"""Number of frames, 1 s. Cells that something moving has left within them should be free now."""
 OUT_OF_VIEW = 3
-"""Frames without a hit after which something comes into view anew: shorter gaps are a post in between."""
+"""Number of frames without a hit after which something comes into view anew: in shorter gaps a post hid it."""
 
 
 @dataclass(frozen=True, eq=False)
 class KnownScene:
-    """One frame of a drive and what is true of its cells.
+    """One frame of a drive, what is true of its cells, and what its scans have told about them.
 
     Parameters
     ----------
     frame : Frame
         With its scan, without image.
     motion : PlanarMotion
-        Of the vehicle since the last frame.
+        Motion of the vehicle since the last frame.
     truth : CellTruth
+        What is true of the cells.
     hit : (H, W) bool
         Cells that the scan hits, from `hit_cells`.
     observed : (H, W) bool
-        Cells of which this scan says something: P(z | occupied) and P(z | free) differ.
+        Cells about which this scan says something: P(z | occupied) and P(z | free) differ.
     never_seen : (H, W) bool
-        Cells of which no scan of the drive has said anything: nobody can know them.
+        Cells about which no scan of the drive has said anything so far, so that no filter can know them.
     left : (H, W) bool
-        Free cells, seen at some time, that something covered as it moved within the last second.
+        Free cells, seen at some time, that something moving covered within the last second.
     in_view : dict of int to int
-        For how many frames each car, pedestrian and bicycle that is hit now has been in view, by number.
+        By number of each car, pedestrian and bicycle that is hit now: for how many frames it has been in view.
     """
 
     frame: Frame
@@ -56,17 +57,18 @@ class KnownScene:
 def hit_cells(
     points: NDArray, spec: GridSpec, least: int = 2, low: float = 0.3, high: float = 1.6
 ) -> NDArray[np.bool_]:
-    """Return which cells hold enough returns of what stands on the ground to be scored.
+    """Return which cells hold enough returns from above the ground to be scored.
 
     Parameters
     ----------
     points : (N, 3+) float
         Returns in the grid frame, metres.
     spec : GridSpec
+        The grid.
     least : int
-        Returns that a cell needs.
+        Number of returns that a cell needs.
     low, high : float
-        The heights above flat ground between which they count, metres.
+        Heights above flat ground between which returns count, metres.
 
     Returns
     -------
@@ -86,10 +88,11 @@ def known_scenes(
     Parameters
     ----------
     drive : SimulatedDrive
+        The drive.
     spec : GridSpec
-        A coarsening of `LABEL_GRID`.
+        The grid: the extent of `LABEL_GRID`, a multiple of its cell.
     sensor : SensorModel
-        Decides what a scan says anything of.
+        Decides about which cells a scan says something.
     name : str
         What the progress bar calls it.
 
@@ -103,14 +106,14 @@ def known_scenes(
 
 
 class SceneHistory:
-    """What a drive has seen so far, and what moved in it.
+    """What the scans of a drive have seen so far, and what moved in it.
 
     Parameters
     ----------
     spec : GridSpec
-        Of the scenes that it makes.
+        The grid of the scenes.
     sensor : SensorModel
-        Decides what a scan says anything of.
+        Decides about which cells a scan says something.
     """
 
     def __init__(self, spec: GridSpec, sensor: SensorModel) -> None:
@@ -128,8 +131,9 @@ class SceneHistory:
         Parameters
         ----------
         frame : Frame
+            With its scan.
         truth : CellTruth
-            Of that instant.
+            What is true at that instant.
 
         Returns
         -------
