@@ -39,9 +39,9 @@ def drive_folder(root: str | Path, date: str, drive: str) -> Path:
     root : path-like
         The folder that holds the folders of the dates.
     date : str
-        Such as "2011_09_26".
+        Date of the drive, such as "2011_09_26".
     drive : str
-        Such as "0013".
+        Number of the drive, such as "0013".
 
     Returns
     -------
@@ -65,9 +65,9 @@ class KittiRawDrive(Sequence[Frame]):
     root : path-like
         The folder that holds the folders of the dates.
     date : str
-        Such as "2011_09_26".
+        Date of the drive, such as "2011_09_26".
     drive : str
-        Such as "0013".
+        Number of the drive, such as "0013".
     images : bool
         Whether to read the images. Without them, as if the drive had none, reading is quicker.
 

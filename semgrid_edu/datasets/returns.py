@@ -20,7 +20,7 @@ def seen_returns(
     Parameters
     ----------
     frame : Frame
-        With points and calibration; the image isn't needed.
+        The frame; its points and its calibration are used, its image isn't.
     spec : GridSpec
         The grid, (H, W) cells.
     image_size : (int, int)

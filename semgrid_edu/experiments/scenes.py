@@ -27,7 +27,7 @@ class KnownScene:
     Parameters
     ----------
     frame : Frame
-        With its scan, without image.
+        The frame, with its scan and without image.
     motion : PlanarMotion
         Motion of the vehicle since the last frame.
     truth : CellTruth
@@ -131,7 +131,7 @@ class SceneHistory:
         Parameters
         ----------
         frame : Frame
-            With its scan.
+            The frame, with its scan.
         truth : CellTruth
             What is true at that instant.
 

@@ -22,7 +22,7 @@ def points_on_image(frame: Frame, ax: Axes | None = None, size: float = 3.0, col
     Parameters
     ----------
     frame : Frame
-        With image, points and calibration.
+        A frame with image, points and calibration.
     ax : Axes, optional
         Axes to draw into.
     size : float
@@ -56,7 +56,7 @@ def plane_on_image(
     height : float
         Height of the plane above the ground, delta_d, metres.
     frame : Frame
-        With image and calibration.
+        A frame with image and calibration.
     ax : Axes, optional
         Axes to draw into.
     size : float
@@ -97,7 +97,7 @@ def visible_points(frame: Frame) -> tuple[NDArray[np.float32], NDArray[np.float3
     Parameters
     ----------
     frame : Frame
-        With points and calibration.
+        A frame with points and calibration.
 
     Returns
     -------

@@ -199,7 +199,7 @@ def make_from_recipe(recipe: DatasetRecipe, folder: Path, seed: int, workers: in
 
 
 def _claim(root: Path, marker: dict) -> None:
-    """Make the folder ours, or refuse it when it is somebody else's."""
+    """Mark the folder as that of this data set, or refuse it when it holds something else."""
     path = root / "simulation.json"
     if path.exists():
         try:

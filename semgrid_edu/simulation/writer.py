@@ -112,7 +112,7 @@ def depth_as_points(frame: SimulatedFrame, rig: Rig) -> NDArray[np.float32]:
     Parameters
     ----------
     frame : SimulatedFrame
-        With its picture.
+        The frame, with its picture.
     rig : Rig
         Where the camera stands.
 
@@ -136,7 +136,7 @@ def lidar_points(frame: SimulatedFrame, rig: Rig) -> NDArray[np.float32]:
     Parameters
     ----------
     frame : SimulatedFrame
-        With its points.
+        The frame, with its points.
     rig : Rig
         Not used: `write_drive` calls this as it calls `depth_as_points`.
 

@@ -19,7 +19,7 @@ _FLAGS = (0.05, 0.02, 4, 9, 4, 4, 6)
 
 @dataclass(frozen=True)
 class Geodesy:
-    """Where on Earth a drive starts, and which way its world is turned.
+    """Where on Earth a drive starts, and in which direction its world points.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The plan of a street: what a world is to be like, drawn at random where nobody asks for anything."""
+"""The plan of a street: what a world is to be like, drawn at random except for what is asked for."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ LAYOUTS = ("straight", "bend", "junction")
 
 @dataclass(frozen=True)
 class Wishes:
-    """What somebody asks of a drive; what is None is drawn at random.
+    """What is asked of a drive; whatever is None is drawn at random.
 
     Parameters
     ----------

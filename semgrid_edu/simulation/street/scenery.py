@@ -200,7 +200,7 @@ def _park(builder: Builder, plan: Plan, sign: int) -> None:
 
 
 def _street_trees(builder: Builder, plan: Plan, sign: int) -> None:
-    """Plant a row of like trees in the strip beside the kerb."""
+    """Plant a row of trees of one species in the strip beside the kerb."""
     rng, side = builder.rng, side_of(builder, sign)
     if side.strip < 1.2:
         return
