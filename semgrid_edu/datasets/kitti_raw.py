@@ -249,7 +249,7 @@ def _last_frame(folder: Path) -> int:
 
 
 def _error_of(read: Callable[[], object]) -> str:
-    """Return what a reader complains of, or nothing."""
+    """Return the error that a reader raises as text, or an empty text."""
     try:
         read()
     except DataError as error:

@@ -136,7 +136,7 @@ class CellScores:
         self.smear[1] += int((estimate.occupied > 0.5)[scene.left].sum())
 
     def _add_errors(self, scene: KnownScene, estimate: Estimate) -> None:
-        """Score the velocity of observed cells that move and are said to."""
+        """Score the velocity of observed cells that are DYNAMIC and are called so."""
         found = scene.observed & (scene.truth.state == State.DYNAMIC) & (estimate.state == State.DYNAMIC)
         found &= np.isfinite(estimate.velocity[0])
         error = np.hypot(*(estimate.velocity - scene.truth.velocity))

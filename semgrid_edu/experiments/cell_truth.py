@@ -97,7 +97,10 @@ def pool_truth(kinds: NDArray, instances: NDArray, velocities: dict[int, NDArray
 
 
 def _most_frequent(numbers: NDArray, flat: NDArray) -> NDArray[np.int64]:
-    """Return the most frequent number of each block, (H, W, K); a flat one only where all are. Ties: the larger."""
+    """Return the most frequent number in each block, (H, W, K) -> (H, W); a flat one only where all are flat.
+
+    Between two equally frequent numbers the larger one wins.
+    """
     ranked = np.where(flat & ~flat.all(axis=-1, keepdims=True), -1, numbers)
     count = (ranked[..., :, None] == ranked[..., None, :]).sum(axis=-1)
     best = np.where(ranked < 0, -1, count * (ranked.max() + 1) + ranked).argmax(axis=-1)

@@ -62,7 +62,7 @@ def _stamp(start: datetime, seconds: float) -> str:
 
 
 def _write_times(folder: Path, n_frames: int, start: datetime) -> None:
-    """Write timestamps. Camera, LIDAR and IMU read at one instant, the middle of the LIDAR's turn."""
+    """Write timestamps: camera, LIDAR and IMU all take a frame at the middle of the LIDAR's turn."""
     offsets = {"image_02/timestamps": 0.0, "oxts/timestamps": 0.0, "velodyne_points/timestamps": 0.0}
     offsets |= {"velodyne_points/timestamps_start": -PERIOD / 2, "velodyne_points/timestamps_end": PERIOD / 2}
     for name, offset in offsets.items():

@@ -79,7 +79,7 @@ def _discontinuities(triangle, distance, kind, material):
 
 @njit(cache=True)
 def _smooth(values, distance, step, radius, out):
-    """Average sparse `values` (every `step`-th pixel, -1 for none) over pixels at a like distance."""
+    """Average sparse `values` (one every `step` pixels, -1 for none) over pixels at a similar distance."""
     height, width = distance.shape
     for r in range(height):
         for c in range(width):
@@ -119,7 +119,7 @@ def _open(
     spread: float,
     rng: np.random.Generator,
 ) -> NDArray[np.float32]:
-    """Return for every pixel 1 where its hit sees the light, 0 where something stands between, -1 unless chosen."""
+    """Return for every pixel 1 where its hit sees the light, 0 where something is in between, -1 if not chosen."""
     luck = rng.random((len(chosen), 3), dtype=np.float32)
     starts, rays = _rays_to(
         np.float32(axis), along_normal, spread, luck, chosen,
@@ -133,7 +133,7 @@ def _open(
 def _sun_and_sky(
     hits: Hits, instant: Instant, light: Light, shape: tuple[int, int], rng: np.random.Generator
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the shares of sun and sky that each pixel's hit sees, by one ray to each and a smoothing."""
+    """Return how much of sun and sky each pixel's hit sees, 0..1, from one ray to each, smoothed."""
     distance, met = hits.distance.reshape(shape), hits.triangle >= 0
     sunlit, open_sky = np.empty(shape, np.float32), np.empty(shape, np.float32)
     sun = _open(hits, instant, np.flatnonzero(met), light.sun, 0.0, 3.5 * light.softness, rng)
@@ -147,7 +147,7 @@ def _sun_and_sky(
 
 @njit(cache=True)
 def _lens(radiance, centre):
-    """Return the picture as a lens spreads it: along each axis `centre` stays, the rest goes to the next pixels."""
+    """Blur the picture as a lens does: along each axis the share `centre` stays, the rest goes to the next pixels."""
     height, width, _ = radiance.shape
     side = np.float32((1.0 - centre) / 2)
     middle = np.float32(centre)

@@ -91,7 +91,7 @@ def birdseye_kinds(cells: NDArray, footprints: NDArray, road: Road) -> tuple[NDA
 
 @njit(cache=True)
 def _pixel(T, K, x, y, z):
-    """Return u, v and the depth of a point of the world; depth 0 behind the camera."""
+    """Return u, v and depth of a point of the world, and its X and Y in the camera frame; depth 0 behind the camera."""
     X = T[0, 0] * x + T[0, 1] * y + T[0, 2] * z + T[0, 3]
     Y = T[1, 0] * x + T[1, 1] * y + T[1, 2] * z + T[1, 3]
     Z = T[2, 0] * x + T[2, 1] * y + T[2, 2] * z + T[2, 3]
@@ -102,7 +102,7 @@ def _pixel(T, K, x, y, z):
 
 @njit(cache=True)
 def _agrees(u, v, z, tolerance, reach, kind, kinds, depth):
-    """Whether a pixel within `reach` of (u, v) shows this kind at this depth."""
+    """Return whether a pixel within `reach` of (u, v) shows this kind at this depth."""
     height, width = depth.shape
     row, col = round(v), round(u)
     if row < 0 or col < 0 or row >= height or col >= width:
@@ -116,7 +116,10 @@ def _agrees(u, v, z, tolerance, reach, kind, kinds, depth):
 
 @njit(cache=True)
 def _visible(cells, kinds, which, footprints, road, T, K, pixel_kinds, depth, seen, solid, out):
-    """Write whether the camera sees each cell. A pixel is one depth for a whole patch: the tolerance grows with it."""
+    """Write whether the camera sees each cell.
+
+    A pixel has one depth for the whole patch of surface that it shows. So the tolerance grows with the patch.
+    """
     f = K[0, 0]
     for r in range(cells.shape[0]):
         for c in range(cells.shape[1]):

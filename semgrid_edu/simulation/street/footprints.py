@@ -44,7 +44,7 @@ class Footprint(NamedTuple):
 
 @njit(cache=True)
 def _inside(f, x, y):
-    """Whether the point (x, y) lies in the footprint f (a row of numbers)."""
+    """Return whether the point (x, y) lies in the footprint f, a row of numbers."""
     c, s = np.cos(f[4]), np.sin(f[4])
     u = abs(c * (x - f[0]) + s * (y - f[1])) / f[2]
     v = abs(c * (y - f[1]) - s * (x - f[0])) / f[3]
@@ -153,7 +153,7 @@ def collides(footprint: Footprint, others: NDArray, margin: float = 0.0) -> bool
 
 @njit(cache=True)
 def _any_inside(f, points):
-    """Whether any of the points lies in the footprint."""
+    """Return whether any of the points lies in the footprint."""
     for i in range(len(points)):  # noqa: SIM110 (numba compiles no generator)
         if _inside(f, points[i, 0], points[i, 1]):
             return True

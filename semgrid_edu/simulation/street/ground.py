@@ -72,7 +72,7 @@ def ground_height(road: Road, s: float, d: float) -> float:
 
 @njit(cache=True)
 def _stripe(distance: float, half: float, blur: float) -> float:
-    """Return how much of a blurred point, `distance` from a stripe's middle, the stripe covers."""
+    """Return the share of a patch, `blur` wide and `distance` from the middle of a stripe, that the stripe covers."""
     return min(max((half - abs(distance)) / blur + 0.5, 0.0), 1.0)
 
 

@@ -97,7 +97,7 @@ def _bush(builder: Builder, plan: Plan, s: float, d: float) -> None:
 
 
 def _house(builder: Builder, house: House, s: float, d: float, yaw: float, across_road: bool = False) -> None:
-    """Put a house with the middle of its front at (s, d), where nothing stands; on a road only when it may."""
+    """Put a house with the middle of its front at (s, d) if the place is free; on asphalt only if it may."""
     half = (house.width / 2, house.depth / 2)
     foot = builder.footprint(s, d, yaw, Kind.BUILDING, half, offset=(0.0, house.depth / 2))
     corners = [to_road(builder.road, x, y) for x, y in outline(foot)]

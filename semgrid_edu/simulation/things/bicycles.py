@@ -12,7 +12,7 @@ from semgrid_edu.simulation.things.shapes import Shape, merge
 
 
 def _wheel(x: float) -> list[Shape]:
-    """Make a bicycle wheel: a ring of tubes, a hub and spokes."""
+    """Make a bicycle wheel: a ring of tubes, and spokes."""
     angle = np.linspace(0, 2 * np.pi, 17)
     rim = np.stack([x + 0.33 * np.cos(angle), 0 * angle, 0.35 + 0.33 * np.sin(angle)], axis=1)
     tyre = [
