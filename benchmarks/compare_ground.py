@@ -17,7 +17,7 @@ from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
 from semgrid_edu.simulation.drive import SimulatedDrive
-from semgrid_edu.simulation.sensors.raycast import Scene
+from semgrid_edu.simulation.sensors.raycast import RayMesh
 from semgrid_edu.simulation.sensors.rig import Lidar, Rig
 from semgrid_edu.simulation.street.plan import Wishes
 from semgrid_edu.simulation.street.terrain import ground_mesh
@@ -73,7 +73,7 @@ def simulated(rig: Rig, seeds: Iterable[int]) -> list[Scan]:
     scans = []
     for seed in seeds:
         drive = SimulatedDrive(seed, 20, Wishes(styles=SIDES[seed % len(SIDES)]), rig=rig)
-        ground = Scene.of([ground_mesh(drive.plan.road, drive.plan.extent)], [0])
+        ground = RayMesh.of([ground_mesh(drive.plan.road, drive.plan.extent)], [0])
         for k in (3, 15):
             frame = drive.scan(k)
             world = transform_points(frame.T_world_from_lidar, frame.points[:, :3].astype(np.float64))

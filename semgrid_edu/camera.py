@@ -1,4 +1,4 @@
-"""The pinhole camera and rigid transforms, equation (1) of the paper (section 3.3)."""
+"""The pinhole camera and rigid transforms: equation (1) of the paper (section 3.3)."""
 
 from dataclasses import dataclass, replace
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError
 
 KITTI_LIDAR_HEIGHT = 1.73
-"""Metres from the ground to the LIDAR of KITTI's car (Geiger et al., 2013, figure 1)."""
+"""Height of the LIDAR on KITTI's car above the ground, metres (Geiger et al., 2013, figure 1)."""
 
 
 def rigid_transform(rotation: NDArray, translation: NDArray) -> NDArray[np.float64]:
@@ -17,12 +17,14 @@ def rigid_transform(rotation: NDArray, translation: NDArray) -> NDArray[np.float
     Parameters
     ----------
     rotation : (3, 3) float
-    translation : (3,) float, metres
+        Rotation matrix.
+    translation : (3,) float
+        Shift, metres.
 
     Returns
     -------
     (4, 4) float64
-        Maps homogeneous column vectors.
+        For homogeneous column vectors.
     """
     T = np.eye(4)
     T[:3, :3] = rotation
@@ -36,10 +38,12 @@ def invert_rigid(T: NDArray) -> NDArray[np.float64]:
     Parameters
     ----------
     T : (4, 4) float
+        Rigid transform, metres.
 
     Returns
     -------
     (4, 4) float64
+        If `T` is T_target_from_source, this is T_source_from_target.
     """
     rotation = T[:3, :3].T
     return rigid_transform(rotation, -rotation @ T[:3, 3])
@@ -51,37 +55,49 @@ def transform_points(T_target_from_source: NDArray, points: NDArray) -> NDArray:
     Parameters
     ----------
     T_target_from_source : (4, 4) float
+        Rigid transform, metres.
     points : (..., 3) float
-        In the source frame, metres.
+        Points in the source frame, metres.
 
     Returns
     -------
     (..., 3) float
-        In the target frame, metres; the type of `points`.
+        The points in the target frame, metres, in the type of `points`.
     """
     T = T_target_from_source.astype(points.dtype)
     return points @ T[:3, :3].T + T[:3, 3]
 
 
 def lidar_from_grid(lidar_height: float) -> NDArray[np.float64]:
-    """Return T_lidar_from_grid: the same axes, the LIDAR `lidar_height` metres above the ground."""
+    """Return the transform from the grid frame, on the ground below the LIDAR, to the LIDAR frame.
+
+    Parameters
+    ----------
+    lidar_height : float
+        Height of the LIDAR above the ground, metres.
+
+    Returns
+    -------
+    (4, 4) float64
+        T_lidar_from_grid: a shift, because both frames have the same axes.
+    """
     return rigid_transform(np.eye(3), np.array([0.0, 0.0, -lidar_height]))
 
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A rectified pinhole camera and where it sits: z looks ahead, x right, y down.
+    """A rectified pinhole camera and where it stands. In its frame x points right, y down and z ahead.
 
     Parameters
     ----------
     K : (3, 3) float64
         Intrinsic matrix, pixels. The centre of the first pixel is (0, 0); u runs right, v down.
     T_camera_from_lidar : (4, 4) float64
-        Rigid transform.
+        Rigid transform from the LIDAR frame to the camera frame, metres.
     size : (int, int)
         Height and width of the image, pixels.
     lidar_height : float
-        Metres from the ground to the LIDAR.
+        Height of the LIDAR above the ground, metres.
     """
 
     K: NDArray[np.float64]
@@ -104,13 +120,17 @@ class Camera:
     def resized(self, size: tuple[int, int]) -> "Camera":
         """Return the camera that would have taken the same picture with another number of pixels.
 
-        Pixel centres are integers, so the image spans -1/2 .. w - 1/2 and the principal point moves as
-        c' = (c + 1/2) s - 1/2: leaving out the halves shifts every lookup by up to half a pixel.
+        Pixel centres are integers, so the image spans -1/2 .. w - 1/2, and scaling it by s moves the principal point to
+        c' = (c + 1/2) s - 1/2. Without the halves every look-up would be off by up to half a pixel.
 
         Parameters
         ----------
         size : (int, int)
             The new height and width, pixels.
+
+        Returns
+        -------
+        Camera
         """
         scale_v, scale_u = size[0] / self.size[0], size[1] / self.size[1]
         S = np.array([[scale_u, 0, (scale_u - 1) / 2], [0, scale_v, (scale_v - 1) / 2], [0, 0, 1]])
@@ -123,13 +143,14 @@ def project(points: NDArray, camera: Camera) -> tuple[NDArray, NDArray[np.bool_]
     Parameters
     ----------
     points : (..., 3) float
-        X right, Y down, Z ahead, in the camera frame, metres.
+        X right, Y down, Z ahead in the camera frame, metres.
     camera : Camera
+        Its intrinsic matrix and the size of its images are used.
 
     Returns
     -------
     pixels : (..., 2) float
-        u, v; NaN for a point that isn't in front of the camera.
+        u to the right and v down, pixels; NaN for a point that isn't in front of the camera.
     visible : (...) bool
         Whether the point is in front of the camera and its pixel lies among the centres of the image's
         pixels, 0 <= u <= w - 1, 0 <= v <= h - 1, where equation (2) can interpolate.

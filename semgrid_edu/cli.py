@@ -1,5 +1,6 @@
 """The command line, `semgrid-edu`: parses and calls, nothing else."""
 
+import os
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -49,15 +50,15 @@ def make(
     name: Annotated[
         str, typer.Argument(help="minikitti, minichroma, minisynthia, sample, or all for the first three.")
     ],
-    folder: Annotated[Path, typer.Argument(help="Where the data set's own folder goes.")],
-    seed: Annotated[int, typer.Option(help="The same seed gives the same bytes.")] = 0,
-    workers: Annotated[int, typer.Option(help="Processes that share the work.")] = 2,
+    folder: Annotated[Path, typer.Argument(help="Takes the data set's own folder.")],
+    seed: Annotated[int, typer.Option(help="Seed for the drives; the same seed gives the same bytes.")] = 0,
+    workers: Annotated[int, typer.Option(help="Number of processes that share the work.")] = 2,
 ) -> None:
-    """Simulate a data set in KITTI's raw layout; when interrupted, the same command resumes."""
-    from semgrid_edu.simulation.datasets import DATA_SETS, make
+    """Simulate a data set in KITTI's raw layout; the same command finishes one that was interrupted."""
+    from semgrid_edu.simulation.datasets import DATA_SETS, make_dataset
 
     for one in DATA_SETS if name == "all" else [name]:
-        typer.echo(f"{one} is in {make(one, folder, seed, workers)}")
+        typer.echo(f"{one} is in {make_dataset(one, folder, seed, workers)}")
 
 
 @data.command()
@@ -72,11 +73,11 @@ def verify(
 
 @data.command()
 def excerpt(
-    folder: Annotated[Path, typer.Argument(help="Takes the frames and their provenance.")],
+    folder: Annotated[Path, typer.Argument(help="The folder that takes the frames and their provenance.")],
     data: Annotated[Path, typer.Option(help="A data set with train frames, such as data/minikitti.")],
-    frames: Annotated[int, typer.Option(min=1, help="How many.")] = 6,
+    frames: Annotated[int, typer.Option(min=1, help="Number of frames.")] = 6,
 ) -> None:
-    """Keep a few labelled frames of a data set, as a network takes them."""
+    """Keep a few labelled frames of a data set, in the form in which a network takes them."""
     from semgrid_edu.datasets.samples import write_excerpt
 
     write_excerpt(data, frames, folder)
@@ -120,14 +121,14 @@ def minutes(
 
 @course.command()
 def check() -> None:
-    """Check that every notebook is in step with its source, has run, and is fit to be shown."""
+    """Check that every notebook agrees with its source, has run, and is fit to be shown."""
     from semgrid_edu.course.checks import course_problems
 
-    _report(course_problems(), "every notebook is in step with its source")
+    _report(course_problems(), "every notebook agrees with its source")
 
 
 @course.command()
-def build(folder: Annotated[Path, typer.Argument(help="Missing, empty, or a course built before.")]) -> None:
+def build(folder: Annotated[Path, typer.Argument(help="A missing or empty folder, or a course built before.")]) -> None:
     """Lay out a complete nbgrader course for an instructor."""
     from semgrid_edu.course.exercises import build_course
 
@@ -144,12 +145,14 @@ def train(
         str, typer.Option(help="compact, or paper: published size, whole images, 0.2 m cells.")
     ] = "compact",
     imagenet: Annotated[
-        Path | None, typer.Option(help="VGG16 or ResNet-101 as safetensors: first weights for --preset paper.")
+        Path | None, typer.Option(help="VGG16 or ResNet-101 as safetensors: initial weights for --preset paper.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the initial weights and of the order of the frames.")] = 0,
-    iterations: Annotated[int, typer.Option(min=1, help="Steps of each of the two stages.")] = 2000,
-    two_stage: Annotated[bool, typer.Option("--two-stage", help="The grid doesn't teach the image network.")] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue a training that was interrupted.")] = False,
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the initial weights and the order of the frames.")] = 0,
+    iterations: Annotated[int, typer.Option(min=1, help="Number of steps of each of the two stages.")] = 2000,
+    two_stage: Annotated[
+        bool, typer.Option("--two-stage", help="Keep the image network as it is in the second stage.")
+    ] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue a training run that was interrupted.")] = False,
     device: Annotated[str, typer.Option(help="auto (a GPU when there is one), cpu, cuda or cuda:N.")] = "auto",
 ) -> None:
     """Train a network: its image network first, then all of it on the grid. torchrun runs it in several processes."""
@@ -167,7 +170,7 @@ def curves(
     runs: Annotated[list[Path], typer.Argument(help="Folders that `semgrid-edu train` writes, finished or not.")],
     out: Annotated[Path, typer.Option(help="Where to write the picture.")] = Path("curves.png"),
 ) -> None:
-    """Draw the loss of one or several trainings over their steps."""
+    """Draw the loss of one or several training runs over their steps."""
     from semgrid_edu.plotting import training_curves
     from semgrid_edu.storage.files import atomic_path
     from semgrid_edu.training.log import LOG, read_log
@@ -203,52 +206,52 @@ def experiments() -> None:
 
 @reproduce.command()
 def occupancy(
-    seed: Annotated[int, typer.Option(min=0, help="Of the simulated drives and of the particles.")] = 0,
-    drives: Annotated[int, typer.Option(min=1, help="How many, of three seconds each.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives and the particles.")] = 0,
+    drives: Annotated[int, typer.Option(min=1, help="Number of drives, of three seconds each.")] = 20,
     grid: Annotated[str | None, typer.Option(help="paper or compact; both by default.")] = None,
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("occupancy.json"),
 ) -> None:
     """Score log-odds grid, BOF and CMCDOT on simulated drives (lecture 04)."""
-    from semgrid_edu.experiments.occupancy import GRIDS, compare, tables
+    from semgrid_edu.experiments.occupancy import GRIDS, compare_filters, occupancy_tables
     from semgrid_edu.storage.files import check_writable
 
     check_writable(out)
-    result = compare(seed, drives, (grid,) if grid else tuple(GRIDS))
-    _keep(result, tables(result), out)
+    result = compare_filters(seed, drives, (grid,) if grid else tuple(GRIDS))
+    _keep(result, occupancy_tables(result), out)
 
 
 @reproduce.command()
 def two_stage(
     data: Annotated[Path, typer.Option(help="A data set with train and test frames, such as data/minikitti.")],
-    runs: Annotated[Path, typer.Option(help="Takes a folder a training; those that have ended aren't run again.")],
-    seeds: Annotated[int, typer.Option(min=1, help="How many trainings of each kind.")] = 3,
+    runs: Annotated[Path, typer.Option(help="Takes one folder per training run; a run that has ended isn't repeated.")],
+    seeds: Annotated[int, typer.Option(min=1, help="Number of training runs of each kind.")] = 3,
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("two_stage.json"),
 ) -> None:
-    """Train end to end and in two stages, and score both (lecture 08)."""
-    from semgrid_edu.experiments.two_stage import compare, table
+    """Train end to end and in two stages, and score both kinds of networks (lecture 08)."""
+    from semgrid_edu.experiments.two_stage import compare_training, two_stage_table
     from semgrid_edu.storage.files import check_writable
 
     check_writable(out)
-    result = compare(data, runs, seeds)
-    _keep(result, table(result["scores"]), out)
+    result = compare_training(data, runs, seeds)
+    _keep(result, two_stage_table(result["scores"]), out)
 
 
 @reproduce.command()
 def overfit(
-    seed: Annotated[int, typer.Option(min=0, help="Of the initial weights.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the initial weights.")] = 0,
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("overfit.json"),
 ) -> None:
-    """Learn four frames by heart with each image network (lecture 08)."""
-    from semgrid_edu.experiments.overfit import overfit, table
+    """Overfit four frames with each image network: learn them by heart (lecture 08)."""
+    from semgrid_edu.experiments.overfit import overfit, overfit_table
     from semgrid_edu.storage.files import check_writable
 
     check_writable(out)
     result = overfit(seed)
-    _keep(result, table(result["networks"]), out)
+    _keep(result, overfit_table(result["networks"]), out)
 
 
 def _keep(result: dict[str, object], shown: str, out: Path) -> None:
-    """Write an experiment's result, and show what matters of it."""
+    """Write an experiment's result to a file, and print its table."""
     from semgrid_edu.storage.files import write_json
 
     write_json(out, result)
@@ -256,7 +259,7 @@ def _keep(result: dict[str, object], shown: str, out: Path) -> None:
 
 
 def _report(problems: list[str], sound: str) -> None:
-    """Say what is wrong, each problem on its line, and exit with 1; or that nothing is."""
+    """Print every problem on a line of its own and exit with 1, or print `sound` when there is none."""
     if problems:
         typer.echo("\n".join(problems), err=True)
         raise typer.Exit(1)
@@ -265,6 +268,9 @@ def _report(problems: list[str], sound: str) -> None:
 
 def run() -> None:
     """Run the command line; a mistake in the input, or a disk that refuses, ends in one line, not in a traceback."""
+    # Idle OpenMP threads spin, which keeps busy cores from the threads that have work: on two busy cores a frame took
+    # 1.2 s instead of 0.07 s. OpenMP reads this once, when a command loads torch or numba, so it must be set before.
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     try:
         app()
     except (ArgumentError, DataError) as error:

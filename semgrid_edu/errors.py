@@ -9,9 +9,9 @@ class ArgumentError(ValueError):
     Parameters
     ----------
     name : str
-        The argument at fault.
+        The argument that can't be used.
     expected, found : object
-        What the function takes, and what it got.
+        What the function takes, and what it got instead.
 
     Examples
     --------
@@ -24,7 +24,7 @@ class ArgumentError(ValueError):
         super().__init__(name, expected, found)
 
     def __str__(self) -> str:
-        """Say all three."""
+        """Return all three in one sentence."""
         return "{}: expected {}, found {}".format(*self.args)
 
 
@@ -34,9 +34,9 @@ class DataError(ValueError):
     Parameters
     ----------
     path : path-like
-        The file or folder at fault.
+        The file or folder.
     expected, found : object
-        What should be there, and what is.
+        What should be there, and what is there instead.
     """
 
     def __init__(self, path: str | Path, expected: object, found: object) -> None:
@@ -44,5 +44,5 @@ class DataError(ValueError):
         self.path = Path(path)
 
     def __str__(self) -> str:
-        """Say all three."""
+        """Return all three in one sentence."""
         return "{}: expected {}, found {}".format(*self.args)

@@ -1,4 +1,4 @@
-"""Frame: everything one instant of a drive gives."""
+"""A frame: what the sensors of a vehicle give at one instant of a drive, and what is true then."""
 
 from dataclasses import dataclass
 
@@ -16,16 +16,16 @@ LABEL_GRID = GridSpec(x_min=0.0, x_max=71.0, y_min=-15.5, y_max=15.5, cell=0.1)
 
 @dataclass(frozen=True, eq=False)
 class FrameLabels:
-    """What is true at one instant, where somebody (the simulator, an annotator) knows it.
+    """What is true at one instant, as a simulator or an annotator knows it.
 
     Parameters
     ----------
     label_set : LabelSet
-        What the numbers mean.
+        The classes that the numbers stand for.
     image : (h, w) uint8
         The class of each pixel; 255 where unlabelled.
     depth : (h, w) float32
-        Metres along the camera's z axis; NaN where there is none (sky).
+        Depth of each pixel along the camera's z axis, metres; NaN where there is none (sky).
     birdseye : (710, 310) uint8
         The class of each 0.1 m cell of `LABEL_GRID`, seen or not; 255 where unlabelled.
     visible : (710, 310) bool
@@ -41,8 +41,8 @@ class FrameLabels:
     def birdseye_on(self, spec: GridSpec) -> NDArray[np.uint8]:
         """Pool the bird's-eye labels to a coarser grid.
 
-        A cell takes the most frequent class of what stands in it, be it one fine cell of a thin pole; where
-        nothing stands, the most frequent class of the ground.
+        A cell takes the most frequent class of what stands in it, even if that is a thin pole in a single fine cell.
+        Where nothing stands, it takes the most frequent class of the ground.
 
         Parameters
         ----------
@@ -68,7 +68,22 @@ class FrameLabels:
         return np.where(counts.any(axis=0), best, IGNORE).astype(np.uint8)
 
     def visible_on(self, spec: GridSpec) -> NDArray[np.bool_]:
-        """Pool visibility to a coarser grid, (H, W) bool: a cell is seen when any part of it is."""
+        """Pool visibility to a coarser grid: a cell is visible when any part of it is.
+
+        Parameters
+        ----------
+        spec : GridSpec
+            The extent of `LABEL_GRID`, a multiple of its cell.
+
+        Returns
+        -------
+        (H, W) bool
+
+        Raises
+        ------
+        ArgumentError
+            When `spec` isn't a coarsening of `LABEL_GRID`.
+        """
         return blocks(self.visible, spec).any(axis=-1)
 
 
@@ -77,19 +92,20 @@ def blocks(fine: NDArray, spec: GridSpec) -> NDArray:
 
     Parameters
     ----------
-    fine : (710, 310)
-        Anything over `LABEL_GRID`.
+    fine : (710, 310) of any type
+        One value for each cell of `LABEL_GRID`.
     spec : GridSpec
-        A coarsening of `LABEL_GRID`.
+        The coarser grid: the extent of `LABEL_GRID`, a multiple of its cell.
 
     Returns
     -------
-    (H, W, factor^2)
+    (H, W, n) of the same type
+        The n fine values in each cell, row by row.
 
     Raises
     ------
     ArgumentError
-        When it isn't one.
+        When `spec` isn't a coarsening of `LABEL_GRID`.
     """
     factor = round(spec.cell / LABEL_GRID.cell)
     height, width = spec.shape
@@ -110,9 +126,9 @@ class Frame:
     points : (N, 4) float32
         LIDAR returns: x forward, y left, z up in the LIDAR frame (metres), and reflectance 0..1.
     camera : Camera
-        Calibration of the image.
+        Calibration of the image, known even where there is no image.
     T_world_from_lidar : (4, 4) float64
-        Where the LIDAR is. The world is the frame of the drive's first oxts packet.
+        Pose of the LIDAR, metres. The world is the frame of the IMU at the drive's first oxts packet.
     time : float
         Seconds since the first LIDAR scan of the drive.
     labels : FrameLabels or None
@@ -127,7 +143,12 @@ class Frame:
     labels: FrameLabels | None = None
 
     def need_image(self) -> NDArray[np.uint8]:
-        """Return the image, (h, w, 3) uint8, for those who can't do without.
+        """Return the image, for callers that need one.
+
+        Returns
+        -------
+        (h, w, 3) uint8
+            RGB.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""The bird's-eye grid: where its cells lie, in metres, and which cell a point falls into (section 4.1)."""
+"""The bird's-eye grid: where its cells lie, and which cell a point falls into (paper, section 4.1)."""
 
 from dataclasses import dataclass
 
@@ -18,9 +18,9 @@ class GridSpec:
     Parameters
     ----------
     x_min, x_max, y_min, y_max : float
-        The borders, in metres. Both sides must be whole numbers of cells.
+        The borders in the grid frame, metres. Both sides must be whole numbers of cells.
     cell : float
-        The side of a cell, in metres.
+        The side of a cell, metres.
 
     Raises
     ------
@@ -57,7 +57,8 @@ class GridSpec:
     def paper(cls) -> "GridSpec":
         """Return the paper's grid (section 4.1): 71 m ahead, 31 m wide, 0.2 m cells, (355, 155).
 
-        The paper gives the extent, not where it lies; the camera looks ahead, so ours starts at the LIDAR.
+        The paper gives the extent of the grid, not where it lies. Ours begins at the LIDAR, because the camera looks
+        ahead.
         """
         return cls(x_min=0.0, x_max=71.0, y_min=-15.5, y_max=15.5, cell=0.2)
 
@@ -90,12 +91,12 @@ class GridSpec:
         Parameters
         ----------
         xy : (N, 2+) float
-            Points in the grid frame, metres; further columns are ignored. NaN lies in no cell.
+            Points in the grid frame, metres; further columns are ignored. A point with a NaN lies in no cell.
 
         Returns
         -------
         rows, cols : (N,) int64
-            The cell of each point; 0 where the point lies outside, so index with them only under `inside`.
+            The cell of each point; 0 for a point outside, so use them only where `inside` holds.
         inside : (N,) bool
             Whether the point lies in the grid. The borders x_max and y_max belong to it, x_min and y_min don't.
 

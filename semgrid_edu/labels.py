@@ -1,4 +1,4 @@
-"""Label sets: the names, colours and numbers of classes (paper, sections 3.1 and 4)."""
+"""Label sets: the numbers, names and colours of classes (paper, sections 3.1 and 4)."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError
 
 IGNORE = 255
-"""Unlabelled: left out of the loss and of the metrics."""
+"""The class number of what is unlabelled: left out of the loss and of the metrics."""
 
 
 @dataclass(frozen=True)
@@ -20,13 +20,13 @@ class LabelSet:
     name : str
         What the set is called.
     names : tuple of str
-        One name a class; class c is `names[c]`.
+        The name of each class; class c is `names[c]`.
     rgb : tuple of (int, int, int)
-        One colour a class, 0..255.
+        The colour of each class: red, green and blue, 0..255.
     n_semantic : int
-        The first `n_semantic` classes say what stands in a cell; the others only say that nobody knows.
+        Number of semantic classes. They come first; the other classes say that it is unknown what a cell holds.
     flat : tuple of str
-        The classes that lie on the ground, so that something else can stand on them.
+        Names of the classes that lie on the ground, so that something else can stand on them.
 
     Examples
     --------
@@ -46,6 +46,11 @@ class LabelSet:
 
     def index(self, name: str) -> int:
         """Return the number of a class.
+
+        Parameters
+        ----------
+        name : str
+            The name of a class of this set.
 
         Raises
         ------
@@ -67,7 +72,7 @@ class LabelSet:
         Returns
         -------
         (..., 3) uint8
-            Its colours.
+            RGB.
         """
         palette = np.full((256, 3), 255, dtype=np.uint8)
         palette[: len(self)] = self.rgb

@@ -1,4 +1,4 @@
-"""Pixel accuracy, class accuracy and FmIoU on labelled cells (paper, section 4.2)."""
+"""The metrics: pixel accuracy, class accuracy and FmIoU over labelled cells (paper, section 4.2)."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,16 +10,16 @@ from semgrid_edu.labels import IGNORE, LabelSet
 def confusion_matrix(truth: ArrayLike, predicted: ArrayLike, n_classes: int, ignore: int = IGNORE) -> NDArray[np.int64]:
     """Count how often each true class is called each class.
 
-    Matrices of several frames add up: the metrics of a data set are those of the sum.
+    The matrices of several frames can be added. The metrics of a data set are those of the sum.
 
     Parameters
     ----------
     truth, predicted : (...) int
         The class of each cell (or pixel), 0 .. n_classes - 1.
     n_classes : int
-        C.
+        Number of classes, C.
     ignore : int
-        A cell whose truth is this number isn't labelled and counts nowhere, whatever is predicted there.
+        Class number of what is unlabelled. A cell with this truth counts nowhere, whatever is predicted there.
 
     Returns
     -------
@@ -60,13 +60,14 @@ def _classes(name: str, labels: NDArray, n_classes: int) -> NDArray[np.int64]:
 def semantic_cells(confusion: ArrayLike, label_set: LabelSet) -> NDArray[np.int64]:
     """Keep only the cells whose truth is a semantic class.
 
-    Unknown cells are the most and the easiest, since the occupancy grid names them; without them a metric
-    says how well the semantics are known. A semantic cell called unknown still counts as wrong.
+    Most cells are unknown, and they are the easiest to get right, because the occupancy grid tells which they are.
+    Without them a metric says how well the semantic classes are known. A semantic cell that is called unknown still
+    counts as wrong.
 
     Parameters
     ----------
     confusion : (C, C) int
-        Row: truth.
+        How often each true class (row) is called each class (column).
     label_set : LabelSet
         Its first `n_semantic` classes are the semantic ones.
 
@@ -95,7 +96,7 @@ def pixel_accuracy(confusion: ArrayLike) -> float:
     Parameters
     ----------
     confusion : (C, C) int
-        Row: truth.
+        How often each true class (row) is called each class (column).
 
     Returns
     -------
@@ -112,7 +113,7 @@ def class_accuracy(confusion: ArrayLike) -> float:
     Parameters
     ----------
     confusion : (C, C) int
-        Row: truth.
+        How often each true class (row) is called each class (column).
 
     Returns
     -------
@@ -126,18 +127,18 @@ def class_accuracy(confusion: ArrayLike) -> float:
 
 
 def frequency_weighted_iou(confusion: ArrayLike) -> float:
-    """Return FmIoU: the classes' intersections over unions, each weighed by its share of the true cells, 0..1.
+    """Return FmIoU: the mean over classes of intersection over union, weighted by frequency, 0..1.
 
     Parameters
     ----------
     confusion : (C, C) int
-        Row: truth.
+        How often each true class (row) is called each class (column).
 
     Returns
     -------
     float
-        sum_c n_c / N * TP_c / (n_c + m_c - TP_c), n_c true and m_c predicted cells of class c; NaN when no
-        cell is labelled.
+        sum_c n_c / N * TP_c / (n_c + m_c - TP_c) for n_c true, m_c predicted and TP_c rightly predicted cells of
+        class c, and N labelled cells; NaN when no cell is labelled.
     """
     matrix = _matrix(confusion)
     cells, hits = matrix.sum(axis=1), np.diag(matrix)

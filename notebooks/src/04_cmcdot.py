@@ -37,9 +37,9 @@ from semgrid_edu import plotting
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.datasets.samples import sample_drive
-from semgrid_edu.illustrations.blur import SCHEMES, blur_of, winding_road
-from semgrid_edu.illustrations.convergence import convergence
-from semgrid_edu.experiments.occupancy import table
+from semgrid_edu.illustrations.blur import SCHEMES, measure_blur, winding_road
+from semgrid_edu.illustrations.convergence import measure_convergence
+from semgrid_edu.experiments.occupancy import occupancy_table
 from semgrid_edu.experiments.scenes import hit_cells
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import confusion_matrix
@@ -272,7 +272,7 @@ plt.show()
 # %%
 fig, axes = plt.subplots(1, 2, figsize=(10, 2.5), layout="constrained")
 for scheme, style in zip(SCHEMES, ("-", ":", "--"), strict=True):
-    blur = blur_of(scheme, winding_road())
+    blur = measure_blur(scheme, winding_road())
     axes[0].plot(np.arange(1, 51) / 10, blur.displacement, style, label=scheme)
     axes[1].plot(np.arange(1, 51) / 10, blur.entropy, style, label=scheme)
 axes[0].set(xlabel="time [s]", ylabel="ink off its place [m]")
@@ -861,7 +861,7 @@ for n in (4, 16, 64):
 # must tend to the BOF's.
 
 # %%
-result = convergence([2000, 8000, 32_000, 128_000], seeds=range(4))
+result = measure_convergence([2000, 8000, 32_000, 128_000], seeds=range(4))
 slopes = result.slopes
 fig, axes = plt.subplots(1, 2, figsize=(9, 2.8), layout="constrained")
 for ax, error, name in zip(axes, (result.dynamic, result.velocity), ("P(DYNAMIC)", "velocity [m/s]"), strict=True):
@@ -906,7 +906,7 @@ print(f"recall {both / np.sum(truth == DYNAMIC):.2f}, precision {both / np.sum(c
 
 # %%
 result = json.loads(Path("../docs/results/occupancy.json").read_text(encoding="utf-8"))
-Markdown(table(result, "HDL-64E", "paper"))
+Markdown(occupancy_table(result, "HDL-64E", "paper"))
 
 # %% [markdown]
 # The first five rows are about cells; so is "left, still occupied": of the cells that something moving has left, how

@@ -37,8 +37,8 @@ from ipywidgets import IntSlider, interact
 from semgrid_edu import plotting
 from semgrid_edu.datasets.resizing import resize_image, resize_labels
 from semgrid_edu.datasets.samples import sample_drive, sample_image_stage
-from semgrid_edu.illustrations.pole_nets import draw_poles, learn, score
-from semgrid_edu.illustrations.thin_pole import MECHANISMS, carry, place_and_width
+from semgrid_edu.illustrations.pole_nets import draw_poles, score_poles, train_pole_net
+from semgrid_edu.illustrations.thin_pole import MECHANISMS, apply_mechanism, place_and_width
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 
@@ -619,7 +619,7 @@ def poles(column, width=1, height=16):
 
 print("pole in column  ", *(f"{way:>10}" for way in MECHANISMS))
 for column in (8, 9, 10, 11):
-    found = [place_and_width(carry(poles(column), way).max(axis=0)) for way in MECHANISMS]
+    found = [place_and_width(apply_mechanism(poles(column), way).max(axis=0)) for way in MECHANISMS]
     print(f"{column:14}  ", *(f"{place:5g} / {width:2d}" for place, width in found))
 
 # %% [markdown]
@@ -631,7 +631,7 @@ def draw_ways(column, width):
     """Draw a pole, and what each way makes of it."""
     image = poles(column, width)
     _, axes = plt.subplots(2, 7, figsize=(11, 2.6), layout="constrained", sharex=True, height_ratios=(1, 0.8))
-    pictures = {"the pole": image, **{way: carry(image, way) for way in MECHANISMS}}
+    pictures = {"the pole": image, **{way: apply_mechanism(image, way) for way in MECHANISMS}}
     for (above, below), (name, picture) in zip(axes.T, pictures.items(), strict=True):
         above.imshow(picture, cmap="magma", vmin=0, vmax=1)
         above.set(title=name, yticks=[])
@@ -674,8 +674,8 @@ unseen, poles_of = draw_poles(200, seed=12345)
 drawn = {"image": unseen[:, 0], "truth": poles_of}
 print("              IoU [%]   rows missed [%]   width (truth) [pixels]   beside by [pixels]")
 for way in MECHANISMS:
-    drawn[way] = learn(way)(unseen).detach().argmax(dim=1)
-    got = score(drawn[way], poles_of)
+    drawn[way] = train_pole_net(way)(unseen).detach().argmax(dim=1)
+    got = score_poles(drawn[way], poles_of)
     width = f"{got.width:.1f} ({got.true_width:.1f})"
     print(f"{way:<11} {100 * got.iou:8.0f} {100 * got.missed:15.0f} {width:>23} {got.offset:18.2f}")
 

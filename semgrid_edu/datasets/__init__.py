@@ -1,4 +1,4 @@
-"""Readers of drives, labels and data sets, and the cached training set (section 4)."""
+"""Readers of drives, labels and data sets, the cached training set, and the shipped samples (paper, section 4)."""
 
 from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame, load_index
 from semgrid_edu.datasets.kitti_raw import KittiRawDrive

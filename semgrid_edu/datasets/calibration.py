@@ -1,4 +1,4 @@
-"""KITTI's three calibration files: the rectified camera 2 of equation (1), and where the IMU sits."""
+"""KITTI's three calibration files: the rectified camera 2 of equation (1), and where the IMU stands."""
 
 from pathlib import Path
 
@@ -16,15 +16,15 @@ ROTATION_TOLERANCE = 1e-4
 def read_camera(folder: Path) -> Camera:
     """Read the calibration of the left colour camera, image_02.
 
-    A LIDAR point x lands on the rectified image at K (T_baseline R_rect_00 T_camera0_from_lidar x). Rectified cameras
-    look the same way and differ by a shift along their x axis, which P_rect_02 holds as fx times metres. Its last
-    column has a z term as well, 3 mm in KITTI; left out here, as in pykitti, it moves no pixel by more than 0.35 beyond
-    10 m.
+    A LIDAR point x appears on the rectified image at K (T_baseline R_rect_00 T_camera0_from_lidar x). Rectified cameras
+    look in one direction and differ by a shift along their x axis, which P_rect_02 holds as fx times metres. Its last
+    column has a z term as well, 3 mm in KITTI. It is left out here, as in pykitti: beyond 10 m it moves no pixel by
+    more than 0.35.
 
     Parameters
     ----------
     folder : Path
-        The folder of a date, with calib_cam_to_cam.txt and calib_velo_to_cam.txt.
+        The folder of a date, which holds calib_cam_to_cam.txt and calib_velo_to_cam.txt.
 
     Returns
     -------
@@ -41,14 +41,19 @@ def read_camera(folder: Path) -> Camera:
 
 
 def read_rectification(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[int, int]]:
-    """Read what calib_cam_to_cam.txt says of the rectified camera 2.
+    """Read what calib_cam_to_cam.txt says about the rectified camera 2.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
 
     Returns
     -------
     K : (3, 3) float64
         Intrinsic matrix, pixels.
     T_camera_from_camera0 : (4, 4) float64
-        From the unrectified camera 0.
+        Rigid transform from the unrectified camera 0, metres.
     size : (int, int)
         Height and width, pixels.
 
@@ -70,11 +75,17 @@ def read_rectification(path: Path) -> tuple[NDArray[np.float64], NDArray[np.floa
 
 
 def read_rigid(path: Path) -> NDArray[np.float64]:
-    """Read a rigid transform: calib_velo_to_cam.txt (camera 0 from LIDAR) or calib_imu_to_velo.txt (LIDAR from IMU).
+    """Read a rigid transform.
+
+    Parameters
+    ----------
+    path : Path
+        calib_velo_to_cam.txt (camera 0 from LIDAR) or calib_imu_to_velo.txt (LIDAR from IMU).
 
     Returns
     -------
     (4, 4) float64
+        Metres.
 
     Raises
     ------
@@ -87,6 +98,16 @@ def read_rigid(path: Path) -> NDArray[np.float64]:
 
 def read_calibration(path: Path) -> dict[str, str]:
     """Read a file of lines `key: values`.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    dict of str to str
+        The values of each key, not parsed yet.
 
     Raises
     ------

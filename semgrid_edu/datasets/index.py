@@ -1,4 +1,4 @@
-"""The table of contents of a data set: its labelled frames, to learn from or to test (section 4)."""
+"""The index of a data set: its labelled frames, split into those for training and those for testing (section 4)."""
 
 import json
 import re
@@ -14,7 +14,15 @@ INDEX_FILE = "dataset.json"
 
 
 class LabelledFrame(NamedTuple):
-    """Where a labelled frame is: frame number `frame` of `KittiRawDrive(root, date, drive)`."""
+    """Where a labelled frame is.
+
+    Parameters
+    ----------
+    date, drive : str
+        The drive `KittiRawDrive(root, date, drive)`.
+    frame : int
+        Number of the frame in that drive.
+    """
 
     date: str
     drive: str
@@ -28,11 +36,13 @@ class DatasetIndex:
     Parameters
     ----------
     root : Path
-        Its folder, which holds the dates.
+        Its folder, which holds the folders of the dates.
     name : str
+        What it is called, such as "minikitti".
     label_set : LabelSet
+        The classes of its labels.
     splits : dict of str to tuple of LabelledFrame
-        Such as "train" and "test"; no drive is in two of them.
+        Labelled frames by split, such as "train" and "test"; no drive is in two of them.
     """
 
     root: Path
@@ -41,7 +51,17 @@ class DatasetIndex:
     splits: dict[str, tuple[LabelledFrame, ...]]
 
     def frames_by_drive(self, split: str) -> dict[tuple[str, str], list[int]]:
-        """Return the numbers of the labelled frames by (date, drive), in the order of the index.
+        """Return the labelled frames of a split, drive by drive.
+
+        Parameters
+        ----------
+        split : str
+            A key of `splits`, such as "train".
+
+        Returns
+        -------
+        dict of (str, str) to list of int
+            The numbers of the labelled frames by (date, drive), in the order of the index.
 
         Raises
         ------
@@ -57,12 +77,12 @@ class DatasetIndex:
 
 
 def load_index(dataset_dir: str | Path) -> DatasetIndex:
-    """Read dataset.json of a data set.
+    """Read the index of a data set, dataset.json.
 
     Parameters
     ----------
     dataset_dir : path-like
-        Such as data/minikitti.
+        The folder of the data set, such as data/minikitti.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Labels that lie beside a KITTI raw drive, in its folder labels/: image, depth and bird's-eye truth (section 4)."""
+"""Labels in the folder labels/ of a KITTI raw drive: image, depth and bird's-eye truth (section 4)."""
 
 from pathlib import Path
 
@@ -11,10 +11,10 @@ from semgrid_edu.labels import IGNORE, LABEL_SETS, LabelSet
 from semgrid_edu.storage.reading import read_png, read_text
 
 KINDS = ("image", "depth", "birdseye", "visible")
-"""What there is to a labelled frame, a folder each."""
+"""The four files of a labelled frame, each in a folder of this name."""
 
 DEPTH_UNIT = 1 / 256
-"""Metres of one step in a depth PNG (KITTI's convention); 0 means none."""
+"""One step of a depth PNG, metres (KITTI's convention); 0 means none."""
 
 
 def read_labels(folder: Path, name: str, image_size: tuple[int, int]) -> FrameLabels | None:
@@ -23,16 +23,16 @@ def read_labels(folder: Path, name: str, image_size: tuple[int, int]) -> FrameLa
     Parameters
     ----------
     folder : Path
-        labels/ of a drive.
+        The folder labels/ of a drive.
     name : str
-        The frame's file name, such as 0000000009.png.
+        File name of the frame, such as 0000000009.png.
     image_size : (int, int)
-        Height and width of the camera's images.
+        Height and width of the camera's images, pixels.
 
     Returns
     -------
     FrameLabels or None
-        None when none of the four files is there.
+        None for a frame without labels.
 
     Raises
     ------
@@ -46,21 +46,36 @@ def read_labels(folder: Path, name: str, image_size: tuple[int, int]) -> FrameLa
 
 
 def is_labelled(folder: Path, name: str) -> bool:
-    """Say whether any of a frame's four label files is there."""
+    """Return whether any of a frame's four label files is there.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder labels/ of a drive.
+    name : str
+        File name of the frame, such as 0000000009.png.
+    """
     return any((folder / kind / name).exists() for kind in KINDS)
 
 
 def read_label(folder: Path, kind: str, name: str, image_size: tuple[int, int] | None) -> NDArray:
-    """Read one file of a labelled frame: the field of `FrameLabels` that `kind` names.
+    """Read one file of a labelled frame.
 
     Parameters
     ----------
-    folder, name
-        As for `read_labels`.
+    folder : Path
+        The folder labels/ of a drive.
     kind : str
         One of `KINDS`.
+    name : str
+        File name of the frame, such as 0000000009.png.
     image_size : (int, int) or None
-        Height and width of the camera's images; None where nobody knows.
+        Height and width that image and depth must have, pixels; None where any size will do.
+
+    Returns
+    -------
+    (h, w) or (710, 310), of the type that it has in `FrameLabels`
+        The field of `FrameLabels` that `kind` names.
 
     Raises
     ------
@@ -78,6 +93,11 @@ def read_label(folder: Path, kind: str, name: str, image_size: tuple[int, int] |
 
 def read_label_set(path: Path) -> LabelSet:
     """Return the label set that a file names.
+
+    Parameters
+    ----------
+    path : Path
+        label_set.txt of a drive.
 
     Raises
     ------

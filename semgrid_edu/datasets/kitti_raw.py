@@ -20,19 +20,32 @@ from semgrid_edu.frame import Frame, FrameLabels
 from semgrid_edu.storage.reading import read_bytes, read_png
 
 LIDAR_RANGE = 250.0
-"""Metres. The HDL-64E of KITTI sees 120; what lies beyond twice that is no measurement."""
+"""Largest coordinate of a return, metres. KITTI's HDL-64E sees 120 m, so what lies twice as far is no measurement."""
 
 SAME_INSTANT = np.timedelta64(500, "ms")
-"""How far apart the sensors' times of one frame may be; at 10 Hz they should lie within 0.1 s."""
+"""How much the sensors' times of one frame may differ; at 10 Hz they should lie within 0.1 s."""
 
 SHORT_SCAN = 0.6
-"""Of the bytes of a drive's median scan: scans of one drive differ far less, and one that lost its half falls below."""
+"""Share of the size of a drive's median scan below which a scan was probably cut short: sound ones differ less."""
 
 _FRAME_FILE = re.compile(r"(\d{10})\.(bin|png|txt)")
 
 
 def drive_folder(root: str | Path, date: str, drive: str) -> Path:
     """Return where KITTI's layout keeps a drive.
+
+    Parameters
+    ----------
+    root : path-like
+        The folder that holds the folders of the dates.
+    date : str
+        Date of the drive, such as "2011_09_26".
+    drive : str
+        Number of the drive, such as "0013".
+
+    Returns
+    -------
+    Path
 
     Examples
     --------
@@ -43,26 +56,25 @@ def drive_folder(root: str | Path, date: str, drive: str) -> Path:
 
 
 class KittiRawDrive(Sequence[Frame]):
-    """The frames of a drive, read when asked for.
+    """The frames of a drive. Each is read, and checked, when it is asked for.
 
-    `drive[k]` is frame k as KITTI numbers it, `drive[-1]` the last, `drive[2:5]` a list of three. Nothing but the
-    names of the files is read before; every frame that comes out has passed all checks.
+    `drive[k]` is frame k as KITTI numbers it, `drive[-1]` the last one, `drive[2:5]` a list of three.
 
     Parameters
     ----------
     root : path-like
-        The folder that holds the dates.
+        The folder that holds the folders of the dates.
     date : str
-        Such as "2011_09_26".
+        Date of the drive, such as "2011_09_26".
     drive : str
-        Such as "0013".
+        Number of the drive, such as "0013".
     images : bool
-        False leaves the images unread, as if the drive had none: quicker where only the LIDAR matters.
+        Whether to read the images. Without them, as if the drive had none, reading is quicker.
 
     Raises
     ------
     DataError
-        When there is no such drive (the error says which there are); from `drive[k]`, when a file that the frame
+        When there is no such drive; the error says which there are. `drive[k]` raises it when a file that the frame
         needs is missing or damaged.
 
     Examples
@@ -84,7 +96,7 @@ class KittiRawDrive(Sequence[Frame]):
             raise DataError(self.folder, "frames in velodyne_points/data", "none")
 
     def __len__(self) -> int:
-        """Return the number of frames, scans that were never recorded included."""
+        """Return the number of frames, including those whose scans were never recorded."""
         return self._length
 
     @overload
@@ -114,12 +126,12 @@ class KittiRawDrive(Sequence[Frame]):
         return read_camera(self.date_folder)
 
     def problems(self) -> list[str]:
-        """Read every file of the drive and say all that is wrong with it.
+        """Read every file of the drive and list all that is wrong with it.
 
         Returns
         -------
         list of str
-            One line a problem, which names the file; empty when the drive is sound.
+            One line for each problem, which names the file; empty when the drive is sound.
         """
         found = [*map(_error_of, self._readers()), *self._short_scans()]
         return [error for error in dict.fromkeys(found) if error]
@@ -158,7 +170,7 @@ class KittiRawDrive(Sequence[Frame]):
         return {sensor: read_timestamps(self.folder / sensor / "timestamps.txt", len(self)) for sensor in self._sensors}
 
     def _time(self, k: int) -> float:
-        """Return the seconds since the first scan, once the sensors agree that they mean the same instant."""
+        """Return the seconds since the first scan, after checking that the sensors' times agree."""
         lidar = self._times["velodyne_points"]
         for sensor, times in self._times.items():
             path = self.folder / sensor / "timestamps.txt"
@@ -237,7 +249,7 @@ def _last_frame(folder: Path) -> int:
 
 
 def _error_of(read: Callable[[], object]) -> str:
-    """Return what a reader complains of, or nothing."""
+    """Return the error that a reader raises as text, or an empty text."""
     try:
         read()
     except DataError as error:

@@ -11,23 +11,29 @@ from semgrid_edu.errors import DataError
 from semgrid_edu.storage.reading import parse_numbers, read_text
 
 EARTH_RADIUS = 6378137.0
-"""Metres, at the equator (WGS 84), as the KITTI development kit takes it."""
+"""Radius of the Earth at the equator, metres (WGS 84), as the KITTI development kit takes it."""
 
 PACKET_FIELDS = 30
-"""Numbers in a packet; dataformat.txt of a drive names them."""
+"""How many numbers a packet has; dataformat.txt of a drive names them."""
 
 
 def read_packet(path: Path) -> NDArray[np.float64]:
-    """Read a packet: latitude, longitude (degrees), altitude (m), roll, pitch, yaw (rad), and 24 numbers more.
+    """Read a packet.
+
+    Parameters
+    ----------
+    path : Path
+        The file of one frame.
 
     Returns
     -------
     (30,) float64
+        Latitude and longitude (degrees), altitude (m), roll, pitch and yaw (rad), and 24 numbers more.
 
     Raises
     ------
     DataError
-        When the file is missing or damaged, or the position or the attitude is none.
+        When the file is missing or damaged, or its numbers are no position or no attitude.
     """
     packet = parse_numbers(path, read_text(path), "an oxts packet")
     if packet.size != PACKET_FIELDS:
@@ -41,20 +47,27 @@ def read_packet(path: Path) -> NDArray[np.float64]:
 
 
 def mercator_scale(packet: NDArray) -> float:
-    """Return the cosine of the packet's latitude: it makes Mercator's metres true metres near there."""
+    """Return the cosine of a packet's latitude, by which Mercator's metres become true metres around there.
+
+    Parameters
+    ----------
+    packet : (30,) float
+        From `read_packet`.
+    """
     return float(np.cos(np.radians(packet[0])))
 
 
 def mercator_pose(packet: NDArray, scale: float) -> NDArray[np.float64]:
-    """Return where the IMU of a packet is: east, north and up of where Mercator's axes cross.
+    """Return the pose of the IMU in a packet. Mercator's axes point east, north and up.
 
     x = s r lon,  y = s r log tan(pi / 4 + lat / 2),  z = altitude;  R = Rz(yaw) Ry(pitch) Rx(roll).
 
     Parameters
     ----------
     packet : (30,) float
+        From `read_packet`.
     scale : float
-        s, the same for all packets of a drive: `mercator_scale` of the first.
+        s, the same for all packets of a drive: `mercator_scale` of the first one.
 
     Returns
     -------

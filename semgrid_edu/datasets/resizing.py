@@ -11,6 +11,7 @@ def resize_image(image: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.
     Parameters
     ----------
     image : (h, w, 3) uint8
+        RGB.
     size : (int, int)
         The new height and width, pixels.
 
@@ -22,12 +23,12 @@ def resize_image(image: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.
 
 
 def resize_labels(labels: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
-    """Give each larger pixel the class that covers most of it; of equal ones the first.
+    """Give each larger pixel the class that covers most of it; between two equal shares the smaller number wins.
 
     Parameters
     ----------
     labels : (h, w) uint8
-        A class each pixel; 255 (unlabelled) counts as one.
+        The class of each pixel; 255 (unlabelled) counts as a class.
     size : (int, int)
         The new height and width, pixels.
 

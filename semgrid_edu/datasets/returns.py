@@ -1,4 +1,4 @@
-"""Which LIDAR return a pixel sees, and in which cell it lies: how image labels reach the grid (section 4)."""
+"""The pixel and the cell of each LIDAR return that the camera sees: how image labels reach the grid (section 4)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,25 +11,27 @@ from semgrid_edu.grid import GridSpec
 def seen_returns(
     frame: Frame, spec: GridSpec, image_size: tuple[int, int]
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Find the returns that the camera sees: of several at one pixel, the closest.
+    """Find the returns that the camera sees: the closest one at each pixel.
 
-    The LIDAR stands above the camera and looks over things that hide what is behind from the camera; the
-    closest return hides most of those again. Pixels are compared at the camera's own resolution.
+    The LIDAR stands above the camera, so it looks over things that hide from the camera what is behind them. Such
+    hidden returns mostly share their pixels with returns of what hides them, which are closer. Pixels are compared at
+    the camera's own resolution.
 
     Parameters
     ----------
     frame : Frame
+        The frame; its points and its calibration are used, its image isn't.
     spec : GridSpec
         The grid, (H, W) cells.
     image_size : (int, int)
-        Height and width of the resized image whose labels are to be carried, pixels.
+        Height and width of the resized image whose labels are to be carried to the grid, pixels.
 
     Returns
     -------
     pixels : (N,) int32
-        For each return that is seen and lies in the grid, its pixel in the resized image, row * width + column.
+        Pixel in the resized image, row * width + column, of each return that is seen and lies in the grid.
     cells : (N,) int32
-        Its cell, row * W + column.
+        Cell of each of these returns, row * W + column.
     """
     in_camera = transform_points(frame.camera.T_camera_from_lidar, frame.points[:, :3])
     uv, visible = project(in_camera, frame.camera)

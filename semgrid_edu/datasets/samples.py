@@ -13,10 +13,10 @@ from semgrid_edu.storage.provenance import FILE_NAME, provenance_problems, write
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
 
 FRAMES = "frames.safetensors"
-"""The file of an excerpt."""
+"""Name of the file that holds an excerpt."""
 
 TRAINED = ("segnet", "fcn", "deeplab")
-"""The image networks of the shipped weights."""
+"""The image networks whose trained weights are shipped."""
 
 
 def samples_dir() -> Path:
@@ -44,12 +44,16 @@ def sample_drive() -> KittiRawDrive:
 
 
 def sample_weights(segmenter: str = "segnet") -> Path:
-    """Return the file of a trained compact network, image network and fusion.
+    """Return the file of a trained compact network, from image and occupancy grid to semantic grid.
 
     Parameters
     ----------
     segmenter : str
-        Its image network: "segnet", "fcn" or "deeplab".
+        Its image network, one of `TRAINED`.
+
+    Returns
+    -------
+    Path
 
     Raises
     ------
@@ -60,7 +64,22 @@ def sample_weights(segmenter: str = "segnet") -> Path:
 
 
 def sample_image_stage(segmenter: str = "segnet") -> Path:
-    """Return the file of the same network after its first stage: it has seen labels of images, none of grids."""
+    """Return the file of the same network after its first stage, which learns from labelled images but not from grids.
+
+    Parameters
+    ----------
+    segmenter : str
+        Its image network, one of `TRAINED`.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ArgumentError
+        When no such network is shipped.
+    """
     return _trained(segmenter) / IMAGE_STAGE
 
 
@@ -71,7 +90,7 @@ def _trained(segmenter: str) -> Path:
 
 
 def sample_frames() -> list[Sample]:
-    """Return the shipped labelled frames of minikitti's training split, for experiments of a minute."""
+    """Return the shipped labelled frames of minikitti's training split, for experiments that take a minute."""
     return read_excerpt(samples_dir() / "frames")
 
 
@@ -81,11 +100,11 @@ def write_excerpt(dataset_dir: str | Path, n_frames: int, folder: str | Path) ->
     Parameters
     ----------
     dataset_dir : path-like
-        Such as data/minikitti.
+        The data set, such as data/minikitti.
     n_frames : int
-        How many.
+        How many frames.
     folder : path-like
-        Takes `frames.safetensors` and `provenance.json`.
+        The folder that takes `frames.safetensors` and `provenance.json`.
 
     Raises
     ------
@@ -104,6 +123,15 @@ def write_excerpt(dataset_dir: str | Path, n_frames: int, folder: str | Path) ->
 
 def read_excerpt(folder: str | Path) -> list[Sample]:
     """Read the frames that `write_excerpt` kept.
+
+    Parameters
+    ----------
+    folder : path-like
+        The folder that it wrote to.
+
+    Returns
+    -------
+    list of Sample
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""KITTI's timestamps.txt: one line a frame, to the nanosecond (section 4)."""
+"""KITTI's timestamps.txt: one line per frame, to the nanosecond (section 4)."""
 
 import re
 from pathlib import Path
@@ -13,18 +13,19 @@ _STAMP = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{9}")
 
 
 def read_timestamps(path: Path, n_frames: int) -> NDArray[np.datetime64]:
-    """Read the times of a sensor.
+    """Read the times at which a sensor took each frame.
 
     Parameters
     ----------
     path : Path
+        timestamps.txt of the sensor.
     n_frames : int
-        How many lines there must be.
+        Number of frames, and so of lines.
 
     Returns
     -------
     (n_frames,) datetime64[ns]
-        NaT for an empty line: so KITTI marks a scan that was never recorded.
+        NaT for an empty line, by which KITTI marks a scan that was never recorded.
 
     Raises
     ------
@@ -34,7 +35,7 @@ def read_timestamps(path: Path, n_frames: int) -> NDArray[np.datetime64]:
     lines = read_text(path).splitlines()
     times = np.array([_parse(path, number, line) for number, line in enumerate(lines, 1)], dtype="datetime64[ns]")
     if len(times) != n_frames:
-        raise DataError(path, f"{n_frames} lines, one a frame", f"{len(times)}")
+        raise DataError(path, f"{n_frames} lines, one per frame", f"{len(times)}")
     known = np.flatnonzero(~np.isnat(times))
     backwards = np.flatnonzero(np.diff(times[known]) <= np.timedelta64(0))
     if backwards.size:

@@ -1,4 +1,4 @@
-"""Arrays of a split's labelled frames, kept beside the data and mapped from disk (section 4.1)."""
+"""The arrays that a network learns from, made once per data set, kept beside it and mapped from disk (section 4.1)."""
 
 import hashlib
 import json
@@ -26,48 +26,63 @@ from semgrid_edu.storage.reading import read_text
 from semgrid_edu.storage.workers import worker_pool
 
 SEED = 0
-"""Of the occupancy filter's particles, in each drive."""
+"""Seed for the particles of the occupancy filter, in each drive."""
 
 CODE = (
     *("camera", "frame", "grid", "labels", "storage/reading"),
     *(f"datasets/{name}" for name in ("calibration", "kitti_labels", "kitti_raw", "oxts", "resizing")),
     *(f"datasets/{name}" for name in ("returns", "timestamps", "training_cache", "truth")),
 )
-"""The modules that decide what comes out, beside all of occupancy/."""
+"""The modules that decide the arrays, beside all of occupancy/."""
 
 WORKERS = 2
-"""Processes that make the arrays, a drive at a time."""
+"""Number of processes that make the arrays, each one drive at a time."""
 
 RAGGED = ("return_pixels", "return_cells")
-"""Arrays of which each frame has its own length: they lie end to end, and `return_ends` says where each ends."""
+"""Arrays whose length differs from frame to frame: they lie end to end, and `return_ends` says where each ends."""
 
 
-class Recipe(NamedTuple):
-    """What the arrays are made by: the grid, the image size (height, width) and the occupancy filter."""
+class ArrayRecipe(NamedTuple):
+    """How the arrays are made.
+
+    Parameters
+    ----------
+    spec : GridSpec
+        The grid of occupancy and truth.
+    image_size : (int, int)
+        Height and width of the resized images, pixels.
+    params : CmcdotParams
+        Parameters of the occupancy filter.
+    """
 
     spec: GridSpec
     image_size: tuple[int, int]
     params: CmcdotParams
 
 
-def cached_arrays(index: DatasetIndex, split: str, recipe: Recipe) -> dict[str, NDArray]:
-    """Return the arrays of a split's labelled frames; make them on first use.
+def cached_arrays(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> dict[str, NDArray]:
+    """Return the arrays of a split's labelled frames, which are made on first use.
 
-    They lie in `cache/` of the data set, in a folder named by a hash of all that decides them: the recipe, the
-    code that makes them, dataset.json, and the drives' files by name and size (hashing a gigabyte at every start
-    would take longer than reading what is kept). When one of these changes, they are made anew.
+    They are kept in `cache/` of the data set, in a folder that is named by a hash of all that decides them: the recipe,
+    the code that makes them, dataset.json, and the drives' files by name and size. (Hashing the contents of these
+    files, about a gigabyte, at every start would take longer than reading the arrays.) When one of these changes, the
+    arrays are made anew.
 
     Parameters
     ----------
     index : DatasetIndex
+        The data set.
     split : str
-    recipe : Recipe
+        One of its splits, such as "train".
+    recipe : ArrayRecipe
+        Grid, image size and occupancy filter.
 
     Returns
     -------
-    dict of str to (frames, ...) arrays mapped from disk, read-only
-        image (3, h, w) uint8, labels (h, w) uint8, occupancy (4, H, W) float32 and truth (H, W) uint8 of each
-        frame; return_pixels and return_cells (`seen_returns`), those of frame k from return_ends[k] to [k + 1].
+    dict of str to arrays mapped from disk, read-only
+        For N frames "image" (N, 3, h, w) uint8, "labels" (N, h, w) uint8, "occupancy" (N, 4, H, W) float32 and "truth"
+        (N, H, W) uint8. From `seen_returns` "return_pixels" and "return_cells", whose entries from return_ends[k] to
+        return_ends[k + 1] belong to frame k, and "return_ends" (N + 1,).
 
     Raises
     ------
@@ -82,7 +97,7 @@ def cached_arrays(index: DatasetIndex, split: str, recipe: Recipe) -> dict[str, 
     return _map_arrays(folder)
 
 
-def _key(index: DatasetIndex, split: str, recipe: Recipe) -> str:
+def _key(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> str:
     """Hash what decides the arrays: the recipe, the code, and names and sizes of all files of the split's drives."""
     package = Path(semgrid_edu.__file__).parent
     code = [package / f"{name}.py" for name in CODE] + sorted((package / "occupancy").glob("*.py"))
@@ -95,7 +110,7 @@ def _key(index: DatasetIndex, split: str, recipe: Recipe) -> str:
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 
-def _process(index: DatasetIndex, split: str, recipe: Recipe) -> list[dict[str, NDArray]]:
+def _process(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> list[dict[str, NDArray]]:
     """Make the arrays of every labelled frame of a split."""
     jobs = [(index.root, *name, labelled, recipe) for name, labelled in index.frames_by_drive(split).items()]
     with worker_pool(WORKERS) as pool:
@@ -104,7 +119,7 @@ def _process(index: DatasetIndex, split: str, recipe: Recipe) -> list[dict[str, 
         return [frame for drive in progress for frame in drive]
 
 
-def _write_arrays(arrays: dict[str, NDArray], recipe: Recipe, folder: Path) -> None:
+def _write_arrays(arrays: dict[str, NDArray], recipe: ArrayRecipe, folder: Path) -> None:
     """Write the arrays and their manifest to a folder that appears whole or not at all."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     unfinished = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}-"))
@@ -122,7 +137,9 @@ def _write_arrays(arrays: dict[str, NDArray], recipe: Recipe, folder: Path) -> N
         shutil.rmtree(unfinished, ignore_errors=True)
 
 
-def _process_drive(root: Path, date: str, drive: str, labelled: list[int], recipe: Recipe) -> list[dict[str, NDArray]]:
+def _process_drive(
+    root: Path, date: str, drive: str, labelled: list[int], recipe: ArrayRecipe
+) -> list[dict[str, NDArray]]:
     """Run the filter over a drive and make the arrays of its labelled frames, in the order of `labelled`."""
     scans = islice(KittiRawDrive(root, date, drive, images=False), max(labelled) + 1)
     beliefs = enumerate(track_drive(scans, recipe.spec, recipe.params, SEED))
@@ -133,7 +150,7 @@ def _process_drive(root: Path, date: str, drive: str, labelled: list[int], recip
     return [_process_frame(frames, k, occupancy[k], recipe) for k in labelled]
 
 
-def _process_frame(drive: KittiRawDrive, k: int, occupancy: NDArray, recipe: Recipe) -> dict[str, NDArray]:
+def _process_frame(drive: KittiRawDrive, k: int, occupancy: NDArray, recipe: ArrayRecipe) -> dict[str, NDArray]:
     """Make the arrays of one frame."""
     frame = drive[k]
     if frame.labels is None or frame.image is None:

@@ -1,4 +1,4 @@
-"""The training set: image, occupancy and truth of each labelled frame of a split (section 4.1)."""
+"""The training set: image, occupancy grid and truth of each labelled frame of a split (section 4.1)."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from torch.utils.data import Dataset
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.calibration import read_camera
 from semgrid_edu.datasets.index import DatasetIndex, load_index
-from semgrid_edu.datasets.training_cache import Recipe, cached_arrays
+from semgrid_edu.datasets.training_cache import ArrayRecipe, cached_arrays
 from semgrid_edu.errors import DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture
@@ -29,7 +29,7 @@ class Sample(NamedTuple):
     labels : (h, w) uint8
         The class of each pixel; 255 where unlabelled.
     occupancy : (4, H, W) float32
-        Probability of free, static, dynamic and unknown.
+        Probability of FREE, STATIC, DYNAMIC and UNKNOWN.
     truth : (H, W) uint8
         The class of each cell.
     """
@@ -51,22 +51,24 @@ class TrainingSet(Dataset[Sample]):
     dataset_dir : path-like
         A data set with dataset.json, such as data/minikitti.
     split : str
-        Such as "train".
+        One of its splits, such as "train".
     spec : GridSpec, optional
-        The grid; the compact one by default.
+        The grid of occupancy and truth; the compact one when left out.
     image_size : (int, int)
-        Height and width of the images; those that the compact network sees by default.
+        Height and width to which the images are resized, pixels; those of the compact network when left out.
     params : CmcdotParams, optional
-        The occupancy filter.
+        Parameters of the occupancy filter; the package's own when left out.
 
     Attributes
     ----------
     camera : Camera
         The calibration of the resized images, the same for all frames.
     label_set : LabelSet
+        The classes of labels and truth.
     spec : GridSpec
-    arrays : dict of str to (frames, ...) arrays mapped from disk
-        All frames at once, by the names of `Sample`, and more: see `cached_arrays`.
+        The grid.
+    arrays : dict of str to arrays mapped from disk
+        All frames at once, as `cached_arrays` returns them.
 
     Raises
     ------
@@ -90,7 +92,7 @@ class TrainingSet(Dataset[Sample]):
         params: CmcdotParams | None = None,
     ) -> None:
         index = load_index(dataset_dir)
-        recipe = Recipe(spec or GridSpec.compact(), tuple(image_size), params or CmcdotParams())
+        recipe = ArrayRecipe(spec or GridSpec.compact(), tuple(image_size), params or CmcdotParams())
         self.spec, self.label_set = recipe.spec, index.label_set
         self.camera = _shared_camera(index, split).resized(recipe.image_size)
         self.arrays = cached_arrays(index, split, recipe)
@@ -104,13 +106,24 @@ class TrainingSet(Dataset[Sample]):
         return Sample(*(torch.from_numpy(np.array(self.arrays[name][k])) for name in Sample._fields))
 
     def returns(self, k: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Return the pixel and the cell of each LIDAR return that the camera sees in frame k: see `seen_returns`."""
+        """Return the pixel and the cell of each LIDAR return that the camera sees in a frame.
+
+        Parameters
+        ----------
+        k : int
+            Number of the frame in this set.
+
+        Returns
+        -------
+        pixels, cells : (N,) int32
+            As `seen_returns` counts them.
+        """
         first, last = self.arrays["return_ends"][[k, k + 1]]
         return self.arrays["return_pixels"][first:last], self.arrays["return_cells"][first:last]
 
 
 def _shared_camera(index: DatasetIndex, split: str) -> Camera:
-    """Return the camera of a split's drives, refusing two that differ: one sampler serves them all."""
+    """Return the camera of a split's drives, refusing two that differ, because one sampler serves them all."""
     first, *others = sorted({date for date, _ in index.frames_by_drive(split)})
     camera = read_camera(index.root / first)
     for date in others:

@@ -1,4 +1,4 @@
-"""The truth to learn from: what stands in the cells that the camera sees, unknown elsewhere (section 4)."""
+"""The truth to learn from: what stands in the cells that the camera sees, and which cells are unknown (section 4)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,17 +12,18 @@ from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
 def grid_truth(labels: FrameLabels, belief_probability: NDArray, spec: GridSpec) -> NDArray[np.uint8]:
     """Return the class that each cell should take.
 
-    A cell that the camera sees takes the class of what stands there. Nobody labelled the others, so, as in the
-    paper, they are unknown-free, -static, -dynamic or -unobserved, by their most probable occupancy state.
+    A cell that the camera sees takes the class of what stands there. The others have no label, so, as in the paper,
+    they are unknown-free, unknown-static, unknown-dynamic or unknown-unobserved: their most probable occupancy state
+    decides.
 
     Parameters
     ----------
     labels : FrameLabels
-        With KITTI-14's classes.
+        What is true of the frame, in classes of KITTI-14.
     belief_probability : (4, H, W) float
-        Probability of free, static, dynamic and unknown in each cell.
+        Probability of FREE, STATIC, DYNAMIC and UNKNOWN in each cell.
     spec : GridSpec
-        The grid; a coarsening of the labels' own.
+        The grid: the extent of `LABEL_GRID`, a multiple of its cell.
 
     Returns
     -------
@@ -49,11 +50,12 @@ def unknown_classes(belief_probability: NDArray) -> NDArray[np.uint8]:
     Parameters
     ----------
     belief_probability : (..., 4, H, W) float
-        Probability of free, static, dynamic and unknown.
+        Probability of FREE, STATIC, DYNAMIC and UNKNOWN.
 
     Returns
     -------
     (..., H, W) uint8
+        Classes of KITTI-14.
     """
     states = np.argmax(belief_probability, axis=-3)
     return np.array(UNKNOWN_OF_STATE, dtype=np.uint8)[states]

@@ -1,1 +1,1 @@
-"""The paper's experiments at reduced scale, each one a command (sections 4.3 and 4.4)."""
+"""Experiments, each one a command: networks and baselines scored, filters compared, training regimes compared."""

@@ -1,4 +1,4 @@
-"""How right an occupancy filter is, cell by cell, where truth is known (paper, section 3.2)."""
+"""Scores of an occupancy filter, cell by cell, on drives whose truth is known (paper, section 3.2)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.experiments.scenes import Scene
+from semgrid_edu.experiments.scenes import KnownScene
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.occupancy import N_STATES, Belief, State
@@ -14,35 +14,35 @@ from semgrid_edu.simulation.drive import PERIOD
 from semgrid_edu.simulation.things.materials import Kind
 
 UNDECIDED = 0.05
-"""A log-odds grid knows nothing of a cell while its P(occupied) is this near to the prior of one half."""
+"""A log-odds grid calls a cell UNKNOWN while P(occupied) differs from the prior, one half, by no more than this."""
 FOUND_AFTER = 1.5
-"""Seconds in view after which something that moves should have been found to move."""
+"""Time in view, seconds, after which a filter should have found that something moves."""
 SETTLED_AFTER = 1.0
-"""Seconds from a drive's beginning after which what stands is scored."""
+"""Time since a drive's beginning, seconds, after which what stands is scored."""
 NEAR, FAR = 25.0, 50.0
-"""Borders of the two ranges, metres."""
+"""Distances at which the two ranges end, metres."""
 MOVERS = {Kind.CAR: "moving cars", Kind.BICYCLE: "cyclists", Kind.PEDESTRIAN: "walking pedestrians"}
 STANDERS = {Kind.CAR: "standing cars", Kind.BICYCLE: "parked bicycles", Kind.PEDESTRIAN: "standing pedestrians"}
 SCENERY = {Kind.BUILDING: "walls", Kind.FENCE: "fences", Kind.PLANT: "foliage", Kind.POLE: "poles", Kind.SIGN: "signs"}
 
 BANKS = "banks"
-"""Free ground that is hit because it rises above the road."""
+"""Name of the group of cells with free ground that is hit because it rises above the road."""
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """What a method says of the cells.
+    """What a filter says about the cells.
 
     Parameters
     ----------
     state : (H, W) int
         The most likely of the four states.
     occupied : (H, W) float
-        Probability that the cell is occupied by whatever it be.
+        Probability that the cell is occupied, by something that moves or stands.
     moves : (H, W) bool
-        Whether it is more likely DYNAMIC than STATIC.
+        Whether the cell is more likely DYNAMIC than STATIC.
     velocity : (2, H, W) float
-        m/s, NaN where there is none.
+        Velocity over ground, along x and y of the grid frame, m/s; NaN where there is none.
     """
 
     state: NDArray[np.integer]
@@ -52,14 +52,34 @@ class Estimate:
 
     @classmethod
     def of_belief(cls, belief: Belief) -> "Estimate":
-        """Read the belief of a filter that knows the four states."""
+        """Read the belief of a filter that knows the four states.
+
+        Parameters
+        ----------
+        belief : Belief
+            Probabilities and velocities after a step.
+
+        Returns
+        -------
+        Estimate
+        """
         p = belief.probability
         moves = p[State.DYNAMIC] > p[State.STATIC]
         return cls(p.argmax(axis=0), p[State.STATIC] + p[State.DYNAMIC], moves, belief.velocity)
 
     @classmethod
     def of_log_odds(cls, p_occupied: NDArray) -> "Estimate":
-        """Read a log-odds grid: what is occupied stands, for it knows no motion."""
+        """Read a log-odds grid. It knows no motion, so whatever is occupied counts as STATIC.
+
+        Parameters
+        ----------
+        p_occupied : (H, W) float
+            P(occupied) after a step.
+
+        Returns
+        -------
+        Estimate
+        """
         state = np.where(p_occupied > 0.5, State.STATIC, State.FREE)
         state[np.abs(p_occupied - 0.5) <= UNDECIDED] = State.UNKNOWN
         nothing = np.full((2, *p_occupied.shape), np.nan)
@@ -67,43 +87,47 @@ class Estimate:
 
 
 @dataclass(eq=False)
-class Scores:
-    """What adds up over the frames of all drives, of one method.
+class CellScores:
+    """Counts over the frames of all drives, for one filter.
 
     Parameters
     ----------
     spec : GridSpec
-        Of the frames.
+        The grid of the frames.
+
+    Attributes
+    ----------
     confusion : (4, 4) int64
-        Cells by true state and by what they are called; UNKNOWN is true of cells never seen.
+        How often each true state (row) is called each state (column); the true state of cells never seen is UNKNOWN.
     hits : dict of str to [int, int, int]
-        By group of `groups`: hit cells, those called moving, those held occupied.
+        For each group of `hit_cell_groups` the numbers of hit cells, of those called moving, and of those called
+        occupied.
     errors : dict of str to list of float
-        Velocity errors of cells by kind of thing, m/s.
+        Errors of velocity in cells, by kind of thing, m/s.
     smear : [int, int]
-        Cells that something moving has left, those still held occupied.
+        Number of cells that something moving has left, and of those still called occupied.
     """
 
     spec: GridSpec
-    confusion: NDArray[np.int64] = field(default_factory=lambda: np.zeros((N_STATES, N_STATES), np.int64))
-    hits: dict[str, list[int]] = field(default_factory=dict)
-    errors: dict[str, list[float]] = field(default_factory=dict)
-    smear: list[int] = field(default_factory=lambda: [0, 0])
+    confusion: NDArray[np.int64] = field(default_factory=lambda: np.zeros((N_STATES, N_STATES), np.int64), init=False)
+    hits: dict[str, list[int]] = field(default_factory=dict, init=False)
+    errors: dict[str, list[float]] = field(default_factory=dict, init=False)
+    smear: list[int] = field(default_factory=lambda: [0, 0], init=False)
 
-    def add(self, scene: Scene, estimate: Estimate) -> None:
+    def add(self, scene: KnownScene, estimate: Estimate) -> None:
         """Score one frame.
 
         Parameters
         ----------
-        scene : Scene
+        scene : KnownScene
             What is true.
         estimate : Estimate
-            What the method says.
+            What the filter says.
         """
         truth = np.where(scene.never_seen, State.UNKNOWN, scene.truth.state)
         scored = scene.never_seen | scene.observed
         self.confusion += confusion_matrix(truth[scored], estimate.state[scored], N_STATES)
-        for name, cells in groups(scene, self.spec):
+        for name, cells in hit_cell_groups(scene, self.spec):
             count = self.hits.setdefault(name, [0, 0, 0])
             for k, counted in enumerate((cells, cells & estimate.moves, cells & (estimate.occupied > 0.5))):
                 count[k] += int(counted.sum())
@@ -111,8 +135,8 @@ class Scores:
         self.smear[0] += int(scene.left.sum())
         self.smear[1] += int((estimate.occupied > 0.5)[scene.left].sum())
 
-    def _add_errors(self, scene: Scene, estimate: Estimate) -> None:
-        """Score the velocity of observed cells that move and are said to."""
+    def _add_errors(self, scene: KnownScene, estimate: Estimate) -> None:
+        """Score the velocity of observed cells that are DYNAMIC and are called so."""
         found = scene.observed & (scene.truth.state == State.DYNAMIC) & (estimate.state == State.DYNAMIC)
         found &= np.isfinite(estimate.velocity[0])
         error = np.hypot(*(estimate.velocity - scene.truth.velocity))
@@ -120,10 +144,16 @@ class Scores:
             self.errors.setdefault(name, []).extend(error[found & (scene.truth.kind == kind)].tolist())
 
     def summary(self) -> dict[str, object]:
-        """Return all scores; it can be written as JSON. A share of nothing is None."""
+        """Return all scores.
+
+        Returns
+        -------
+        dict
+            JSON can hold it. A share of no cells is None.
+        """
         dynamic = self.confusion[:, State.DYNAMIC], self.confusion[State.DYNAMIC]
         right = int(self.confusion[State.DYNAMIC, State.DYNAMIC])
-        everybody = [error for errors in self.errors.values() for error in errors]
+        all_errors = [error for errors in self.errors.values() for error in errors]
         return {
             "confusion": self.confusion.tolist(),
             "accuracy": share(int(np.trace(self.confusion)), int(self.confusion.sum())),
@@ -131,7 +161,7 @@ class Scores:
                 "precision": share(right, int(dynamic[0].sum())),
                 "recall": share(right, int(dynamic[1].sum())),
             },
-            "velocity error": {name: _spread(errors) for name, errors in {"all": everybody, **self.errors}.items()},
+            "velocity error": {name: _spread(errors) for name, errors in {"all": all_errors, **self.errors}.items()},
             "smear": {"cells": self.smear[0], "occupied": share(self.smear[1], self.smear[0])},
             "hit cells": {
                 name: {"cells": cells, "dynamic": share(moving, cells), "occupied": share(occupied, cells)}
@@ -140,21 +170,25 @@ class Scores:
         }
 
 
-def groups(scene: Scene, spec: GridSpec) -> Iterator[tuple[str, NDArray[np.bool_]]]:
-    """Divide the hit cells of a frame by what is in them.
+def hit_cell_groups(scene: KnownScene, spec: GridSpec) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+    """Divide the hit cells of a frame into groups by what is in them.
 
-    What moves counts by its range, and once it has been in view for `FOUND_AFTER`; what stands, from
-    `SETTLED_AFTER` on.
+    Things that move are grouped by kind and range, and count once they have been in view for `FOUND_AFTER`. Things that
+    stand are grouped by kind, and count from `SETTLED_AFTER` on.
 
     Parameters
     ----------
-    scene : Scene
+    scene : KnownScene
+        The frame.
     spec : GridSpec
+        Its grid.
 
     Yields
     ------
     name : str
+        What the group is called.
     cells : (H, W) bool
+        Its cells.
     """
     truth, distance = scene.truth, np.hypot(*np.moveaxis(spec.centers(), -1, 0))
     found = [number for number, frames in scene.in_view.items() if frames * PERIOD >= FOUND_AFTER - 1e-6]
@@ -172,7 +206,13 @@ def groups(scene: Scene, spec: GridSpec) -> Iterator[tuple[str, NDArray[np.bool_
 
 
 def share(part: int, whole: int) -> float | None:
-    """Return part / whole, None where there is nothing to share."""
+    """Return a share, 0..1, or None for a share of nothing.
+
+    Parameters
+    ----------
+    part, whole : int
+        How many belong to the part, and how many there are.
+    """
     return part / whole if whole else None
 
 

@@ -1,4 +1,4 @@
-"""What is true of each cell of a simulated street: the states of section 3.2, known instead of estimated."""
+"""The truth of a simulated street, cell by cell: the states of section 3.2, known instead of estimated."""
 
 from dataclasses import dataclass
 
@@ -9,28 +9,27 @@ from semgrid_edu.frame import blocks
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import State
 from semgrid_edu.simulation.drive import SimulatedDrive
+from semgrid_edu.simulation.street.actors import MOVING_SPEED
 from semgrid_edu.simulation.things.materials import Kind
 
-MOVES = 0.05
-"""m/s: what is faster moves."""
 FLAT = (Kind.ROAD, Kind.LANE, Kind.SIDEWALK, Kind.GRASS)
 """The kinds of bare ground."""
 
 
 @dataclass(frozen=True, eq=False)
 class CellTruth:
-    """What is true at one instant.
+    """What is true of the cells of a grid at one instant.
 
     Parameters
     ----------
     state : (H, W) uint8
-        FREE, STATIC or DYNAMIC of `State`: truth is never UNKNOWN.
+        FREE, STATIC or DYNAMIC: the truth is never UNKNOWN.
     kind : (H, W) uint8
-        What stands in the cell, a `Kind`; the kind of the ground where nothing does.
+        What stands in each cell, a `Kind`; the kind of the ground where nothing does.
     instance : (H, W) int32
-        Number of the car, pedestrian or bicycle in it; 0 for all else.
+        Number of the car, pedestrian or bicycle in each cell; 0 for all else.
     velocity : (2, H, W) float32
-        Over ground, in grid axes, m/s; 0 where nothing moves.
+        Velocity over ground, along x and y of the grid frame, m/s; 0 where nothing moves.
     """
 
     state: NDArray[np.uint8]
@@ -40,15 +39,16 @@ class CellTruth:
 
 
 def true_cells(drive: SimulatedDrive, time: float, spec: GridSpec) -> CellTruth:
-    """Return the truth of a simulated drive at one instant, on a grid; see `pool_truth`.
+    """Return the truth of a simulated drive at one instant, pooled to a grid by `pool_truth`.
 
     Parameters
     ----------
     drive : SimulatedDrive
+        The drive.
     time : float
         Seconds since it began.
     spec : GridSpec
-        A coarsening of `LABEL_GRID`.
+        The grid: the extent of `LABEL_GRID`, a multiple of its cell.
 
     Returns
     -------
@@ -60,19 +60,19 @@ def true_cells(drive: SimulatedDrive, time: float, spec: GridSpec) -> CellTruth:
 def pool_truth(kinds: NDArray, instances: NDArray, velocities: dict[int, NDArray], spec: GridSpec) -> CellTruth:
     """Pool the truth of 0.1 m cells to a coarser grid.
 
-    A cell takes what covers most of it, bare ground left aside: be it one fine cell of a thin pole, a cell
-    in which anything stands isn't free.
+    A cell takes what covers most of it, bare ground left aside. So a cell in which anything stands isn't free, even if
+    that is a thin pole in a single fine cell.
 
     Parameters
     ----------
     kinds : (710, 310) uint8
-        Members of `Kind`, over `LABEL_GRID`.
+        What each cell of `LABEL_GRID` holds, members of `Kind`.
     instances : (710, 310) int
-        Number of the object in each fine cell, 0 for none.
+        Number of the object in each of these cells, 0 for none.
     velocities : dict of int to (2,) float
-        Of the objects that may move, by number, m/s.
+        Velocity over ground of each object that may move, by its number: along x and y of the grid frame, m/s.
     spec : GridSpec
-        A coarsening of `LABEL_GRID`.
+        The coarser grid: the extent of `LABEL_GRID`, a multiple of its cell.
 
     Returns
     -------
@@ -91,13 +91,16 @@ def pool_truth(kinds: NDArray, instances: NDArray, velocities: dict[int, NDArray
         if number < len(speeds):
             speeds[number] = velocity
     velocity = np.moveaxis(speeds[instance], -1, 0)
-    standing = np.where(np.hypot(*velocity) > MOVES, State.DYNAMIC, State.STATIC)
+    standing = np.where(np.hypot(*velocity) > MOVING_SPEED, State.DYNAMIC, State.STATIC)
     state = np.where(np.isin(kind, FLAT), State.FREE, standing)
     return CellTruth(state.astype(np.uint8), kind.astype(np.uint8), instance.astype(np.int32), velocity)
 
 
 def _most_frequent(numbers: NDArray, flat: NDArray) -> NDArray[np.int64]:
-    """Return the most frequent number of each block, (H, W, K); a flat one only where all are. Ties: the larger."""
+    """Return the most frequent number in each block, (H, W, K) -> (H, W); a flat one only where all are flat.
+
+    Between two equally frequent numbers the larger one wins.
+    """
     ranked = np.where(flat & ~flat.all(axis=-1, keepdims=True), -1, numbers)
     count = (ranked[..., :, None] == ranked[..., None, :]).sum(axis=-1)
     best = np.where(ranked < 0, -1, count * (ranked.max() + 1) + ranked).argmax(axis=-1)

@@ -1,4 +1,4 @@
-"""Log-odds grid, BOF and CMCDOT side by side on simulated drives, whose truth is known (paper, section 3.2)."""
+"""Log-odds grid, BOF and CMCDOT compared on simulated drives, whose truth is known (paper, section 3.2)."""
 
 from collections.abc import Callable
 from datetime import UTC, datetime
@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.cell_scores import BANKS, Estimate, Scores, share
-from semgrid_edu.experiments.scenes import scenes
+from semgrid_edu.experiments.cell_scores import BANKS, CellScores, Estimate, share
+from semgrid_edu.experiments.scenes import known_scenes
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Bof, Cmcdot, LogOddsGrid, PlanarMotion, SensorModel, State
 from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive
@@ -19,41 +19,40 @@ LIDARS = {
     "HDL-64E": Lidar(azimuth_min=-180.0, azimuth_max=180.0, azimuth_step=0.18),
     "coarse": Lidar(),
 }
-"""The real scanner at 10 Hz, and the one of the simulated data sets, with a fifth of its columns."""
+"""The real scanner at 10 Hz, and that of the simulated data sets, which looks ahead with a fifth of its columns."""
 GRIDS = {"paper": GridSpec.paper(), "compact": GridSpec.compact()}
 FRAMES = 30
-"""Frames of a drive, 3 s."""
+"""Number of frames of a drive, 3 s."""
 HELD_OUT = 100
-"""The first drive of seed 0, 1000 more that of each further seed: parameters were chosen on drives before it."""
+"""Seed of the first drive for seed 0; each further seed adds 1000. Parameters were chosen on drives before this one."""
 METHODS = ("log-odds", "BOF", "CMCDOT")
 
 
-def compare(
+def compare_filters(
     seed: int = 0, drives: int = 20, grids: tuple[str, ...] = tuple(GRIDS), frames: int = FRAMES
 ) -> dict[str, object]:
-    """Run the three methods with their defaults over simulated drives, and score them.
+    """Run the three filters with their default parameters over simulated drives, and score them.
 
-    Observed cells, of which the present scan says something, are to be called what they are: FREE, STATIC or
-    DYNAMIC. Cells that no scan of the drive has spoken of are to be called UNKNOWN. Of all others a filter can only
-    remember: they don't count. The log-odds grid calls STATIC whatever is occupied, and UNKNOWN what has
-    stayed at its prior.
+    Two sorts of cells count. Observed cells, about which the present scan says something, should be called what they
+    are: FREE, STATIC or DYNAMIC. Cells about which no scan of the drive has said anything should be called UNKNOWN.
+    All other cells a filter can only remember, so they don't count.
+    The log-odds grid calls STATIC whatever is occupied, and UNKNOWN what is still at its prior.
 
     Parameters
     ----------
     seed : int
-        Decides the drives and what the particles draw.
+        Seed for the drives and for the particles.
     drives : int
-        How many, at least one.
+        Number of drives, at least one.
     grids : tuple of str
-        Of "paper" and "compact", at least one.
+        "paper", "compact" or both.
     frames : int
-        Of each drive, ten a second, at least one.
+        Number of frames of each drive, ten a second, at least one.
 
     Returns
     -------
     dict
-        "scores" by LIDAR, grid and method (see `Scores.summary`), with all that made them: it can be
-        written as JSON.
+        "scores" by LIDAR, grid and filter (see `CellScores.summary`), and all that made them; JSON can hold it.
 
     Raises
     ------
@@ -82,19 +81,20 @@ def compare(
     }
 
 
-def methods(spec: GridSpec, seed: int) -> dict[str, Callable[[NDArray, PlanarMotion, float], Estimate]]:
-    """Return the three methods with their defaults, by name.
+def occupancy_filters(spec: GridSpec, seed: int) -> dict[str, Callable[[NDArray, PlanarMotion, float], Estimate]]:
+    """Return the three filters with their default parameters, by name.
 
     Parameters
     ----------
     spec : GridSpec
+        The grid.
     seed : int
-        Of CMCDOT's particles; the others draw nothing.
+        Seed for CMCDOT's particles; the other filters draw nothing.
 
     Returns
     -------
     dict of str to callable
-        Each takes a scan, the motion and the time since the last, as `Cmcdot.step` does.
+        Functions that take a scan, and the motion and the time since the last scan, as `Cmcdot.step` does.
     """
     log_odds, bof, cmcdot = LogOddsGrid(spec), Bof(spec), Cmcdot(spec, seed=seed)
     return {
@@ -105,48 +105,49 @@ def methods(spec: GridSpec, seed: int) -> dict[str, Callable[[NDArray, PlanarMot
 
 
 def _score(seed: int, drives: int, frames: int, lidar: str, grid: str) -> dict[str, object]:
-    """Score the methods on all drives of one LIDAR and grid."""
-    spec, scores = GRIDS[grid], {name: Scores(GRIDS[grid]) for name in METHODS}
+    """Score the filters on all drives of one LIDAR and grid."""
+    spec, scores = GRIDS[grid], {name: CellScores(GRIDS[grid]) for name in METHODS}
     for number in HELD_OUT + 1000 * seed + np.arange(drives):
-        drive, running = SimulatedDrive(number, frames, rig=Rig(lidar=LIDARS[lidar])), methods(spec, seed)
-        for scene in scenes(drive, spec, SensorModel(), f"{lidar}, {grid} grid, drive {number}"):
+        drive, running = SimulatedDrive(number, frames, rig=Rig(lidar=LIDARS[lidar])), occupancy_filters(spec, seed)
+        for scene in known_scenes(drive, spec, SensorModel(), f"{lidar}, {grid} grid, drive {number}"):
             for name, step in running.items():
                 scores[name].add(scene, step(scene.frame.points_grid, scene.motion, PERIOD))
     return {name: one.summary() for name, one in scores.items()}
 
 
-def tables(result: dict) -> str:
+def occupancy_tables(result: dict) -> str:
     """Return the tables of all LIDARs and grids of a result, each under its title.
 
     Parameters
     ----------
     result : dict
-        As for `table`.
+        From `compare_filters`, or from the JSON file that it was written to.
 
     Returns
     -------
     str
     """
     return "\n\n".join(
-        f"{lidar} LIDAR, {grid} grid\n\n{table(result, lidar, grid)}"
+        f"{lidar} LIDAR, {grid} grid\n\n{occupancy_table(result, lidar, grid)}"
         for lidar, grids in result["scores"].items()
         for grid in grids
     )
 
 
-def table(result: dict, lidar: str = "HDL-64E", grid: str = "paper") -> str:
+def occupancy_table(result: dict, lidar: str = "HDL-64E", grid: str = "paper") -> str:
     """Return the scores of one LIDAR and grid as a Markdown table.
 
-    Its parts: of the observed cells in each true state the share that is called so; of all that is called DYNAMIC the
-    share that is; of the cells that something moving has left the share still held occupied; of the hit
-    cells of each kind of thing the share that is more DYNAMIC than STATIC; errors of velocity.
+    Its rows are, from top to bottom: the share of the cells in each true state that is called so; the share of the
+    cells called DYNAMIC that is so; the share of the cells which something moving has left that is still called
+    occupied; the share of the hit cells of each kind of thing that is more DYNAMIC than STATIC; the share of the hit
+    cells with free ground that is called occupied; the errors of velocity.
 
     Parameters
     ----------
     result : dict
-        From `compare`, or from the JSON file that it was written to.
+        From `compare_filters`, or from the JSON file that it was written to.
     lidar, grid : str
-        Of those in it.
+        Keys of `LIDARS` and `GRIDS` that the result holds.
 
     Returns
     -------

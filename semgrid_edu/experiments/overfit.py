@@ -1,4 +1,4 @@
-"""Four frames learnt by heart: whether the whole network, with each image network, can learn at all (section 4.1)."""
+"""Overfitting on purpose: whether the whole network, with each image network, can learn four frames (section 4.1)."""
 
 from collections.abc import Sequence
 from copy import deepcopy
@@ -20,6 +20,7 @@ from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.training.log import LOG, read_log
 
 FRAMES = 4
+"""Number of frames."""
 PARAMS = TrainingParams(
     image_iterations=0,
     grid_iterations=400,
@@ -29,42 +30,39 @@ PARAMS = TrainingParams(
     jitter=0.0,
     mirror=False,
 )
-"""Every step sees the same four frames as they are, from random weights on; every cell counts alike. A learning rate
-six times the usual one does no harm where all steps pull the same way."""
+"""Every step sees the same four frames without augmentation, starting from random weights, and every class has the same
+weight. The learning rate is six times the usual one, because all steps follow the gradient of the same frames."""
 LOSS_EVERY = 50
-"""Iterations between the losses that the result keeps."""
+"""Number of iterations between two losses that the result keeps."""
 
-Result = dict[str, object]
+OverfitResult = dict[str, object]
 
 
-def overfit(seed: int = 0, params: TrainingParams | None = None) -> Result:
+def overfit(seed: int = 0) -> OverfitResult:
     """Train compact networks, image to grid, on four shipped frames, and score them on the same four.
 
-    A network that can't learn four frames by heart is too small, or its gradients are wrong, or a step is too large.
-    One that scores in training mode alone has running statistics that aren't those of its data.
+    A network that can't learn four frames by heart (overfit) is too small, or its gradients are wrong, or a step is too
+    large. A network that scores well in training mode alone has running statistics that aren't those of its data.
 
     Parameters
     ----------
     seed : int
-        Of the initial weights.
-    params : TrainingParams, optional
-        `PARAMS` by default.
+        Seed for the initial weights.
 
     Returns
     -------
     dict
-        "networks": for each image network what `learn_by_heart` returns. With all that made them: it can be written as
-        JSON.
+        "networks": for each image network what `learn_by_heart` returns; and all that made them. JSON can hold it.
     """
-    params, began = params or PARAMS, datetime.now(UTC)
+    began = datetime.now(UTC)
     frames, camera = sample_frames()[:FRAMES], sample_drive().camera
     return {
         "networks": {
-            name: learn_by_heart(build_net(Architecture(name), camera, seed), frames, params, seed)
+            name: learn_by_heart(build_net(Architecture(name), camera, seed), frames, PARAMS, seed)
             for name in SEGMENTERS
         },
         "frames": len(frames),
-        "params": asdict(params),
+        "params": asdict(PARAMS),
         "command": f"semgrid-edu reproduce overfit --seed {seed}",
         "seed": seed,
         "date": f"{began:%Y-%m-%d}",
@@ -72,22 +70,24 @@ def overfit(seed: int = 0, params: TrainingParams | None = None) -> Result:
     }
 
 
-def learn_by_heart(net: SemanticGridNet, frames: Sequence[Sample], params: TrainingParams, seed: int) -> Result:
-    """Train a network on frames and score it on the same.
+def learn_by_heart(net: SemanticGridNet, frames: Sequence[Sample], params: TrainingParams, seed: int) -> OverfitResult:
+    """Train a network on frames, and score it on the same frames.
 
     Parameters
     ----------
     net : SemanticGridNet
-        Of `build_net`; changed in place.
+        From `build_net`; its weights are changed in place.
     frames : sequence of Sample
+        The frames.
     params : TrainingParams
+        How to train.
     seed : int
-        Of the order of the frames.
+        Seed for the order of the frames.
 
     Returns
     -------
     dict
-        "iterations"; "losses", every fiftieth and the last; "pixel accuracy" of labelled cells, 0..1, in
+        "iterations"; "losses", every fiftieth and the last one; "pixel accuracy" over labelled cells, 0..1, in
         "evaluation" mode, in which the network is used, and in "training" mode; "minutes".
     """
     began = perf_counter()
@@ -98,26 +98,30 @@ def learn_by_heart(net: SemanticGridNet, frames: Sequence[Sample], params: Train
         "iterations": len(loss),
         "losses": [*loss[:-1:LOSS_EVERY].tolist(), float(loss[-1])],
         "pixel accuracy": {
-            mode: accuracy(net, frames, training=mode == "training") for mode in ("evaluation", "training")
+            mode: network_accuracy(net, frames, training=mode == "training") for mode in ("evaluation", "training")
         },
         "minutes": round((perf_counter() - began) / 60, 1),
     }
 
 
 @torch.no_grad()
-def accuracy(net: SemanticGridNet, frames: Sequence[Sample], training: bool) -> float:
-    """Return the share of labelled cells that a network calls right, 0..1; the network stays as it is.
+def network_accuracy(net: SemanticGridNet, frames: Sequence[Sample], training: bool) -> float:
+    """Return the pixel accuracy of a network's grids. The network stays as it is.
 
     Parameters
     ----------
     net : SemanticGridNet
+        The network.
     frames : sequence of Sample
+        The frames to score it on.
     training : bool
-        Whether batch normalisation takes its mean and variance from these frames, as in training.
+        Whether batch normalisation takes its mean and variance from these frames, as in training, instead of using its
+        running statistics.
 
     Returns
     -------
     float
+        Share of labelled cells that are called right, 0..1.
     """
     image, occupancy = (torch.stack(parts) for parts in zip(*((f.image, f.occupancy) for f in frames), strict=True))
     logits = deepcopy(net).train(training)(image / 255, occupancy)
@@ -125,8 +129,18 @@ def accuracy(net: SemanticGridNet, frames: Sequence[Sample], training: bool) -> 
     return pixel_accuracy(confusion_matrix(truth, logits.argmax(1).numpy(), net.n_classes))
 
 
-def table(networks: dict[str, Result]) -> str:
-    """Return the accuracies as a table to print, in per cent."""
+def overfit_table(networks: dict[str, OverfitResult]) -> str:
+    """Return the accuracies as a table to print, per cent.
+
+    Parameters
+    ----------
+    networks : dict of str to dict
+        The "networks" of a result of `overfit`.
+
+    Returns
+    -------
+    str
+    """
     lines = [f"{'':8} {'evaluation':>12} {'training mode':>14} {'last loss':>10} {'minutes':>8}"]
     for name, result in networks.items():
         evaluation, training = (100 * result["pixel accuracy"][mode] for mode in ("evaluation", "training"))

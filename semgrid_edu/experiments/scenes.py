@@ -1,4 +1,4 @@
-"""Simulated drives, frame by frame, with all that is true of their cells (section 3.2)."""
+"""Simulated drives, frame by frame, with all that is needed to score an occupancy filter (section 3.2)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,32 +15,33 @@ from semgrid_edu.occupancy.moving_map import MAX_YAW, look_up, map_around
 from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive
 
 LEFT_SINCE = 10
-"""Frames, 1 s: what a moving thing has left within them should be free by now."""
+"""Number of frames, 1 s. Cells that something moving has left within them should be free now."""
 OUT_OF_VIEW = 3
-"""Frames without a hit after which something comes into view anew: shorter gaps are a post in between."""
+"""Number of frames without a hit after which something comes into view anew: in shorter gaps a post hid it."""
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
-    """One frame of a drive and what is true of its cells.
+class KnownScene:
+    """One frame of a drive, what is true of its cells, and what its scans have told about them.
 
     Parameters
     ----------
     frame : Frame
-        With its scan, without image.
+        The frame, with its scan and without image.
     motion : PlanarMotion
-        Of the vehicle since the last frame.
+        Motion of the vehicle since the last frame.
     truth : CellTruth
+        What is true of the cells.
     hit : (H, W) bool
         Cells that the scan hits, from `hit_cells`.
     observed : (H, W) bool
-        Cells of which this scan says something: P(z | occupied) and P(z | free) differ.
+        Cells about which this scan says something: P(z | occupied) and P(z | free) differ.
     never_seen : (H, W) bool
-        Cells of which no scan of the drive has said anything: nobody can know them.
+        Cells about which no scan of the drive has said anything so far, so that no filter can know them.
     left : (H, W) bool
-        Free cells, seen at some time, that something covered as it moved within the last second.
+        Free cells, seen at some time, that something moving covered within the last second.
     in_view : dict of int to int
-        For how many frames each car, pedestrian and bicycle that is hit now has been in view, by number.
+        By number of each car, pedestrian and bicycle that is hit now: for how many frames it has been in view.
     """
 
     frame: Frame
@@ -56,17 +57,18 @@ class Scene:
 def hit_cells(
     points: NDArray, spec: GridSpec, least: int = 2, low: float = 0.3, high: float = 1.6
 ) -> NDArray[np.bool_]:
-    """Return which cells hold enough returns of what stands on the ground to be scored.
+    """Return which cells hold enough returns from above the ground to be scored.
 
     Parameters
     ----------
     points : (N, 3+) float
         Returns in the grid frame, metres.
     spec : GridSpec
+        The grid.
     least : int
-        Returns that a cell needs.
+        Number of returns that a cell needs.
     low, high : float
-        The heights above flat ground between which they count, metres.
+        Heights above flat ground between which returns count, metres.
 
     Returns
     -------
@@ -78,37 +80,40 @@ def hit_cells(
     return count >= least
 
 
-def scenes(drive: SimulatedDrive, spec: GridSpec, sensor: SensorModel, name: str = "drive") -> Iterator[Scene]:
+def known_scenes(
+    drive: SimulatedDrive, spec: GridSpec, sensor: SensorModel, name: str = "drive"
+) -> Iterator[KnownScene]:
     """Take the scans of a drive, one after the other, with their truth.
 
     Parameters
     ----------
     drive : SimulatedDrive
+        The drive.
     spec : GridSpec
-        A coarsening of `LABEL_GRID`.
+        The grid: the extent of `LABEL_GRID`, a multiple of its cell.
     sensor : SensorModel
-        Decides what a scan says anything of.
+        Decides about which cells a scan says something.
     name : str
         What the progress bar calls it.
 
     Yields
     ------
-    Scene
+    KnownScene
     """
-    past = Past(spec, sensor)
+    past = SceneHistory(spec, sensor)
     for k in tqdm(range(drive.n_frames), desc=name, unit="frame", leave=False):
         yield past.add(drive.scan(k), true_cells(drive, k * PERIOD, spec))
 
 
-class Past:
-    """What a drive has seen so far, and what moved in it.
+class SceneHistory:
+    """What the scans of a drive have seen so far, and what moved in it.
 
     Parameters
     ----------
     spec : GridSpec
-        Of the scenes that it makes.
+        The grid of the scenes.
     sensor : SensorModel
-        Decides what a scan says anything of.
+        Decides about which cells a scan says something.
     """
 
     def __init__(self, spec: GridSpec, sensor: SensorModel) -> None:
@@ -120,18 +125,19 @@ class Past:
         self._first_hit: dict[int, int] = {}
         self._last_hit: dict[int, int] = {}
 
-    def add(self, frame: Frame, truth: CellTruth) -> Scene:
+    def add(self, frame: Frame, truth: CellTruth) -> KnownScene:
         """Make a scene of the next frame, and remember it.
 
         Parameters
         ----------
         frame : Frame
+            The frame, with its scan.
         truth : CellTruth
-            Of that instant.
+            What is true at that instant.
 
         Returns
         -------
-        Scene
+        KnownScene
         """
         evidence = scan_evidence(frame.points_grid, self._around, self.sensor)
         pose = frame.T_world_from_lidar
@@ -143,10 +149,10 @@ class Past:
         left = self._any_of(self._dynamic[-LEFT_SINCE:], self.spec, skip=1) & seen & (truth.state == State.FREE)
         self._dynamic.append(truth.state == State.DYNAMIC)
         hit = hit_cells(frame.points_grid, self.spec)
-        return Scene(frame, motion, truth, hit, observed, ~seen, left, self._in_view(truth.instance[hit]))
+        return KnownScene(frame, motion, truth, hit, observed, ~seen, left, self._in_view(truth.instance[hit]))
 
     def _any_of(self, masks: list[NDArray], source: GridSpec, skip: int = 0) -> NDArray[np.bool_]:
-        """Return the present cells that lie in any of these of the last frames, the `skip` last left aside."""
+        """Return the present cells that lie in any of the masks, one per frame up to the `skip` last ones."""
         found, outside = np.zeros(self.spec.shape, bool), np.zeros(1, np.float32)
         poses = self._poses[len(self._poses) - skip - len(masks) : len(self._poses) - skip]
         for pose, mask in zip(poses, masks, strict=True):

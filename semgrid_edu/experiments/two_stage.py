@@ -1,4 +1,4 @@
-"""End to end against two stages: what the grid gains by teaching the image network too (paper, section 4.1)."""
+"""End-to-end training against training in two stages, in which the image network is frozen (paper, section 4.1)."""
 
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -17,32 +17,35 @@ from semgrid_edu.training import CHECKPOINT, TrainingParams
 from semgrid_edu.training.run import train_network
 
 METHODS = ("end-to-end", "two-stage")
+"""The two training regimes."""
 
 
-def compare(
+def compare_training(
     dataset_dir: str | Path, runs: str | Path, n_seeds: int = 3, params: TrainingParams | None = None
 ) -> dict[str, object]:
-    """Train both ways, seed by seed, and score both on frames that none has seen.
+    """Train in both regimes, seed by seed, and score the networks on frames that none of them has seen.
 
-    With the same seed, both have the same image network after the first stage, bit for bit, and then see the same
-    batches. In two stages it stays as it is; end to end, the loss on the grid goes on teaching it.
+    With the same seed, both networks have the same image network after the first stage, bit for bit, and then see the
+    same batches. In two stages the image network then stays as it is. End to end, the loss on the grid trains it
+    further.
 
     Parameters
     ----------
     dataset_dir : path-like
         A data set with the splits "train" and "test", such as data/minikitti.
     runs : path-like
-        Takes a folder a training, such as "end-to-end-0". One that has ended isn't run again, one that was interrupted
-        goes on.
+        Takes one folder per training run, such as "end-to-end-0". A run that has ended isn't repeated, and one that was
+        interrupted is resumed.
     n_seeds : int
-        Seeds 0, 1, ... of the initial weights and of the order of the frames.
+        Number of seeds, 0, 1, ..., for the initial weights and for the order of the frames.
     params : TrainingParams, optional
+        How to train; the defaults when left out.
 
     Returns
     -------
     dict
-        "scores": for each of `METHODS` a list with the `Scores` of "grid" and "image" labels, one a seed. With all that
-        made them: it can be written as JSON.
+        "scores": for each of `METHODS` a list of `Scores`, one per seed, of the "grid" and of the "image" labels; and
+        all that made them. JSON can hold it.
     """
     params, test = params or TrainingParams(), TrainingSet(dataset_dir, "test")
     result: dict[str, list[Scores]] = {method: [] for method in METHODS}
@@ -53,7 +56,7 @@ def compare(
                 chosen = replace(params, end_to_end=method == "end-to-end")
                 resume = (folder / CHECKPOINT).exists()
                 train_network(dataset_dir, folder, "segnet", chosen, seed, resume)
-            result[method].append(score(load_net(folder / WEIGHTS, test.camera), test))
+            result[method].append(score_grid_and_image(load_net(folder / WEIGHTS, test.camera), test))
     trained = [Path(runs) / f"{method}-{seed}" for seed in range(n_seeds) for method in METHODS]
     return {
         "scores": result,
@@ -67,19 +70,20 @@ def compare(
     }
 
 
-def score(net: SemanticGridNet, test: TrainingSet) -> Scores:
-    """Score a network's grids, and the labels that its image network gives the pixels.
+def score_grid_and_image(net: SemanticGridNet, test: TrainingSet) -> Scores:
+    """Score a network's grids, and the labels that its image network gives to pixels.
 
     Parameters
     ----------
     net : SemanticGridNet
-        In evaluation mode.
+        The network, in evaluation mode.
     test : TrainingSet
+        The frames to score it on.
 
     Returns
     -------
     Scores
-        Of "grid" and "image"; an image has no unknown classes, so its "all" and "semantic" are the same.
+        Scores of "grid" and of "image". An image has no unknown classes, so its "all" and "semantic" are the same.
     """
     confusions = {"grid": 0, "image": 0}
     for k in tqdm(range(len(test)), desc="score", unit="frame"):
@@ -92,8 +96,18 @@ def score(net: SemanticGridNet, test: TrainingSet) -> Scores:
     return scores(confusions, test.label_set)
 
 
-def table(result: dict[str, list[Scores]]) -> str:
-    """Return mean and range over the seeds as a table to print, in per cent."""
+def two_stage_table(result: dict[str, list[Scores]]) -> str:
+    """Return mean and range over the seeds as a table to print, per cent.
+
+    Parameters
+    ----------
+    result : dict of str to list of Scores
+        The "scores" of a result of `compare_training`.
+
+    Returns
+    -------
+    str
+    """
     lines = [f"{'':12} {'cells':9}" + "".join(f"{name:>24}" for name in METRICS)]
     for method, runs in result.items():
         for part, cells in (("grid", "all"), ("grid", "semantic"), ("image", "all")):

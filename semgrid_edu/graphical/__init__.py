@@ -6,6 +6,7 @@ independences off the graph, and `draw` shows it.
 """
 
 from semgrid_edu.graphical.beliefs import Beliefs
+from semgrid_edu.graphical.distance import total_variation
 from semgrid_edu.graphical.drawing import draw
 from semgrid_edu.graphical.exact import eliminate, enumerate_marginals, max_product, min_fill_order
 from semgrid_edu.graphical.factor import Factor, product
@@ -29,5 +30,6 @@ __all__ = [
     "min_fill_order",
     "product",
     "sum_product",
+    "total_variation",
     "why_dependent",
 ]

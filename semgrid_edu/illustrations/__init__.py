@@ -1,1 +1,1 @@
-"""Small worlds and measurements that the lectures show."""
+"""Small worlds, small networks and measurements that the lectures show."""

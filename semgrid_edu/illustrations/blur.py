@@ -1,4 +1,4 @@
-"""How a map blurs that moves with the vehicle: three ways to carry it, compared (paper, section 3.2, step 1)."""
+"""How much a map blurs when it moves with the vehicle: three schemes compared (paper, section 3.2, step 1)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,24 +14,27 @@ from semgrid_edu.occupancy.moving_map import MAX_YAW, look_up, scroll
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 
 SCHEMES = ("bilinear", "nearest", "scrolling")
+"""Ways to move a map by less than a cell, as `measure_blur` explains them."""
 WORLD = GridSpec(-5, 24, -9, 14, 0.2)
-"""A map that holds what is around the start during all of `winding_road`."""
+"""A map that still holds the surroundings of the start at the end of `winding_road`."""
 SQUARE = 1.0
 """Side of the squares of the chequerboard, metres."""
+MARGIN = 1.5
+"""Distance that drops keep from the map's borders, metres, so that hardly any ink crosses them."""
 
 
 @dataclass(frozen=True, eq=False)
 class Blur:
-    """What carrying a map did to it, after each step.
+    """How much a moving map has blurred, after each of T steps.
 
     Parameters
     ----------
     entropy : (T,) float
-        Of a chequerboard of certain cells, bits a cell: 0 as long as each is certain, 1 when all is grey.
+        Mean entropy of the cells of a chequerboard, bits: 0 while each is certain, 1 when all are grey.
     left : (T,) float
-        Of what cells held at the start, the share that no longer lies in the cell where its place is.
+        Share of the ink that no longer lies in the right cell, 0..1.
     displacement : (T,) float
-        How far it lies from its place, root mean square, metres.
+        Distance of the ink from its right place, root mean square, metres.
     """
 
     entropy: NDArray[np.float64]
@@ -40,48 +43,51 @@ class Blur:
 
 
 def winding_road(steps: int = 50, turn: float = 0.013) -> list[PlanarMotion]:
-    """Return the motions of a vehicle that gathers speed, 2 to 5 m/s at ten steps a second, and turns all the while.
+    """Return the motions of a vehicle that accelerates from 2 to 5 m/s, at ten steps per second, while it turns.
 
     Parameters
     ----------
     steps : int
+        Number of steps.
     turn : float
-        Radians a step, to the left.
+        Change of direction in each step, to the left, rad.
 
     Returns
     -------
     list of PlanarMotion
+        One per step.
     """
     return [PlanarMotion(float(dx), 0.0, turn) for dx in np.linspace(0.2, 0.5, steps)]
 
 
-def blur_of(
+def measure_blur(
     scheme: str, motions: Sequence[PlanarMotion], spec: GridSpec = WORLD, drops: int = 20, seed: int = 0
 ) -> Blur:
-    """Carry a map of a world that stands still along with a vehicle, and measure what becomes of it.
+    """Move a map of a world that stands still along with a vehicle, and measure how it blurs.
 
-    Nothing is forgotten and nothing is seen: all that changes the map is that its cells move. It holds a
-    chequerboard and, each in a map of its own, drops of ink: single cells that hold 1.
+    The map forgets nothing and sees nothing, so it changes only because its cells move. It holds a chequerboard and,
+    each in a map of its own, drops of ink: single cells that hold 1.
 
     Parameters
     ----------
     scheme : str
-        "bilinear": each step, every cell takes the mean of the four old cells around its centre, by their nearness.
-        "nearest": each step, every cell takes the old cell that its centre lies in. "scrolling": as `Cmcdot` does it.
+        One of `SCHEMES`. "bilinear": in each step, every cell takes the mean of the four old cells around its centre,
+        weighted by how near they are. "nearest": in each step, every cell takes the value of the old cell that its
+        centre lies in. "scrolling": as `Cmcdot` moves its maps, by whole cells, and turned once per `MAX_YAW`.
     motions : sequence of PlanarMotion
-        Of the vehicle, T steps.
+        Motions of the vehicle, T of them.
     spec : GridSpec
-        The cells of the map; it must hold the middle of the world at every step.
+        The cells of the map. Some of the cells at the start must stay in the map at every step.
     drops : int
-        How many.
+        Number of drops.
     seed : int
-        Where they fall.
+        Seed for the places where they fall.
 
     Returns
     -------
     Blur
-        In the map itself. Handing a scrolling map out in the vehicle's cells adds one look-up, a displacement
-        of cell / sqrt(6), once, whatever the number of steps.
+        That of the map itself. To hand a scrolling map out in the vehicle's cells takes one look-up more. It adds a
+        displacement of cell / sqrt(6) once, whatever the number of steps.
 
     Raises
     ------
@@ -107,16 +113,16 @@ def blur_of(
     return Blur(*np.array(measured).T)
 
 
-def _always_held(spec: GridSpec, motions: Sequence[PlanarMotion], margin: float = 1.5) -> NDArray[np.bool_]:
-    """Return which cells of the first map stay in the map, `margin` metres from its borders, (H, W)."""
+def _always_held(spec: GridSpec, motions: Sequence[PlanarMotion]) -> NDArray[np.bool_]:
+    """Return which cells of the first map stay in the map, `MARGIN` metres or more from its borders, (H, W)."""
     held, pose = np.ones(spec.shape, bool), PlanarMotion()
     for motion in [PlanarMotion(), *motions]:
         pose = pose.then(motion)
         x, y = np.moveaxis(pose.to_now(spec.centers()), -1, 0)
-        held &= (x > spec.x_min + margin) & (x < spec.x_max - margin)
-        held &= (y > spec.y_min + margin) & (y < spec.y_max - margin)
+        held &= (x > spec.x_min + MARGIN) & (x < spec.x_max - MARGIN)
+        held &= (y > spec.y_min + MARGIN) & (y < spec.y_max - MARGIN)
     if not held.any():
-        raise ArgumentError("motions", "a way that leaves some of the map in it", f"{pose} in {spec}")
+        raise ArgumentError("motions", "motions that leave some of the map in it", f"{pose} in {spec}")
     return held
 
 

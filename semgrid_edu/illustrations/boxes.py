@@ -1,4 +1,4 @@
-"""A toy world, upright boxes on flat ground, and a LIDAR that scans it: known to the last digit, in milliseconds."""
+"""A toy world, upright boxes on flat ground, and a LIDAR that scans it exactly, within milliseconds."""
 
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ class Box(NamedTuple):
     x_min, x_max, y_min, y_max : float
         Its borders in the world, metres.
     height : float
-        Metres.
+        Its height above the ground, metres.
     """
 
     x_min: float
@@ -29,7 +29,19 @@ class Box(NamedTuple):
 
     @classmethod
     def around(cls, x: float, y: float, length: float, width: float, height: float) -> "Box":
-        """Return the box with its centre at x, y, `length` along x and `width` along y, metres."""
+        """Return a box from its centre and its sides.
+
+        Parameters
+        ----------
+        x, y : float
+            Its centre in the world, metres.
+        length, width, height : float
+            Its sides along x, y and z, metres.
+
+        Returns
+        -------
+        Box
+        """
         return cls(x - length / 2, x + length / 2, y - width / 2, y + width / 2, height)
 
 
@@ -45,20 +57,23 @@ def scan_boxes(
     rng: np.random.Generator | None = None,
     farthest: float = 70.0,
 ) -> NDArray[np.float32]:
-    """Scan boxes on flat ground: each ray ends where it first hits.
+    """Scan boxes on flat ground: each ray ends where it first hits something.
 
     Parameters
     ----------
     boxes : list of Box
+        What stands in the world.
     x, y, yaw : float
-        Pose of the vehicle in the world, metres and radians; its LIDAR stands as high as KITTI's.
+        Pose of the vehicle in the world, metres and rad; its LIDAR stands as high as KITTI's.
     columns, rings : int
-        Directions of a scan: `columns` over `field` degrees, symmetric about forward, times `rings` from -24.8 to 2.
+        Numbers of directions: `columns` azimuths over `field` degrees, symmetric about forward, times `rings`
+        elevations from -24.8 to 2 degrees.
     field : float
-        Degrees.
+        Horizontal field of view, degrees.
     noise : float
         Standard deviation of a range, metres; needs `rng`.
     rng : numpy.random.Generator, optional
+        Source of the noise.
     farthest : float
         Longest range, metres.
 
@@ -70,7 +85,7 @@ def scan_boxes(
     Raises
     ------
     ArgumentError
-        When there is noise, but nothing to draw it from.
+        When there is noise, but no generator to draw it from.
 
     Examples
     --------
@@ -102,17 +117,18 @@ def scan_boxes(
 
 
 def cells_in(box: Box, spec: GridSpec, x: float = 0.0, y: float = 0.0, margin: float = 0.0) -> NDArray[np.bool_]:
-    """Return which cells lie in a box of the world.
+    """Return which cells have their centres in a box of the world.
 
     Parameters
     ----------
     box : Box
+        The box.
     spec : GridSpec
         The grid of a vehicle that looks along the world's x axis.
     x, y : float
         Where the vehicle is in the world, metres.
     margin : float
-        Metres by which the box is widened on every side.
+        By how much the box is widened on every side, metres.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""CMCDOT tends to the BOF as its particles grow in number: measured on two cars that pass (paper, section 3.2)."""
+"""How CMCDOT approaches the BOF as its particles grow in number, on two cars that pass (paper, section 3.2)."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -30,8 +30,10 @@ from semgrid_edu.occupancy.velocities import velocity_moments
 
 SPEC = GridSpec(0, 16, -4, 4, 0.5)
 DT = 0.125
-"""Seconds a step, in which 4 m/s are exactly one cell: so particles on the lattice do what its mass does."""
+"""Duration of a step, seconds. At 4 m/s a step covers exactly one cell, so particles whose velocities lie on the BOF's
+lattice move as its probability does."""
 STEPS = 6
+"""Number of steps."""
 PARAMS = BofParams(
     VelocityLattice(max_speed=8.0, spacing=4.0),
     CmcdotParams(
@@ -41,18 +43,18 @@ PARAMS = BofParams(
         birth_share=1e-9,
     ),
 )
-"""The default world, but nothing accelerates or is born: its velocity would lie between those of the lattice."""
+"""The default world, except that nothing accelerates or is born: such velocities wouldn't lie on the lattice."""
 WORTH_COMPARING = 0.1
-"""Cells count in which the BOF's dynamic probability is above this: elsewhere there is no velocity to speak of."""
+"""Cells are compared where the BOF's dynamic probability is above this; elsewhere a mean velocity says little."""
 
 
 class Convergence(NamedTuple):
-    """How far CMCDOT is from the BOF.
+    """How far CMCDOT is from the BOF, for K numbers of particles.
 
     Parameters
     ----------
     numbers : (K,) int64
-        Of particles.
+        Numbers of particles.
     dynamic : (K,) float64
         Root mean square difference of the dynamic probability.
     velocity : (K,) float64
@@ -65,32 +67,32 @@ class Convergence(NamedTuple):
 
     @property
     def slopes(self) -> tuple[float, float]:
-        """Exponents of N in both errors, fitted in log-log: -1/2 says that they fall like N^-1/2."""
+        """Slopes of both errors over N, fitted in log-log axes: -1/2 where an error falls like N^-1/2."""
         return tuple(float(np.polyfit(np.log(self.numbers), np.log(e), 1)[0]) for e in (self.dynamic, self.velocity))
 
 
-def convergence(numbers: Sequence[int], seeds: Sequence[int]) -> Convergence:
+def measure_convergence(numbers: Sequence[int], seeds: Sequence[int]) -> Convergence:
     """Compare CMCDOT with the exact filter for several numbers of particles.
 
-    Two cars pass each other, believed at first to move anyhow. Particles start anywhere in their cells with velocities
-    drawn from the lattice's prior, so the BOF is the very limit of `predict`, `update` and `resample`. By
-    the central limit theorem a mean over N particles errs like N^-1/2.
+    Two cars pass each other, and at first nothing is known about their velocities. Particles start anywhere in their
+    cells, with velocities drawn from the lattice's prior, so the BOF is the limit of `predict`, `update` and
+    `resample`. By the central limit theorem the error of a mean over N particles falls like N^-1/2.
 
     Parameters
     ----------
     numbers : sequence of int
-        Of particles.
+        Numbers of particles.
     seeds : sequence of int
-        The errors are taken over all of them.
+        Seeds for the particles; errors are averaged over all of them.
 
     Returns
     -------
     Convergence
-        Over all cells worth comparing, steps and seeds.
+        Errors over all cells worth comparing, all steps and all seeds.
 
     Examples
     --------
-    >>> few, many = convergence([1000, 100_000], seeds=[0]).dynamic
+    >>> few, many = measure_convergence([1000, 100_000], seeds=[0]).dynamic
     >>> bool(many < 0.2 * few)
     True
     """
@@ -102,33 +104,35 @@ def convergence(numbers: Sequence[int], seeds: Sequence[int]) -> Convergence:
     return Convergence(np.array(numbers), *errors.T)
 
 
-def cars(step: int) -> list[Box]:
-    """Return where two cars are, one that drives ahead at 8 m/s and one that comes towards us at 8 m/s.
+def passing_cars(step: int) -> list[Box]:
+    """Return where two cars are: one drives ahead at 8 m/s, the other comes towards us at 8 m/s.
 
     Parameters
     ----------
     step : int
-        Steps of `DT` since the start.
+        Number of steps of `DT` since the start.
 
     Returns
     -------
     list of Box
+        In the frame of the grid.
     """
     travelled = 8 * DT * step
     return [Box.around(3 + travelled, -1, 2, 1, 1.5), Box.around(13 - travelled, 1, 2, 1, 1.5)]
 
 
 def evidence_of(boxes: list[Box]) -> Evidence:
-    """Return the evidence of one hit in each cell of the boxes, and of a beam through each other cell.
+    """Return the evidence of a scan that hits each cell of the boxes once, and passes through every other cell.
 
     Parameters
     ----------
     boxes : list of Box
+        What stands in the grid.
 
     Returns
     -------
     Evidence
-        Over `SPEC`.
+        P(z | occupied) and P(z | free) over `SPEC`.
     """
     sensor = PARAMS.world.sensor
     hit = np.any([cells_in(box, SPEC) for box in boxes], axis=0)
@@ -137,9 +141,15 @@ def evidence_of(boxes: list[Box]) -> Evidence:
     return Evidence(occupied.astype(np.float32), free.astype(np.float32))
 
 
-def first_belief() -> NDArray[np.float32]:
-    """Return the belief to start from, (4, H, W): where the cars are something probably moves, else space is free."""
-    hit = np.any([cells_in(box, SPEC) for box in cars(0)], axis=0)
+def first_belief() -> NDArray[np.float64]:
+    """Return the belief to start from: something probably moves where the cars are, and all else is probably free.
+
+    Returns
+    -------
+    (4, H, W) float64
+        FREE, STATIC, DYNAMIC, UNKNOWN over `SPEC`.
+    """
+    hit = np.any([cells_in(box, SPEC) for box in passing_cars(0)], axis=0)
     return np.where(hit, np.array([0.1, 0.2, 0.6, 0.1])[:, None, None], np.array([0.8, 0.1, 0, 0.1])[:, None, None])
 
 
@@ -159,25 +169,32 @@ def run_bof() -> Iterator[tuple[NDArray, NDArray]]:
     remainder = np.zeros((len(lattice), 2))
     state = BofState(belief[State.FREE], belief[State.UNKNOWN], occupied, lattice.velocities, remainder)
     for step in range(1, STEPS + 1):
-        state = bof_update(bof_predict(state, SPEC, PARAMS, DT), SPEC, evidence_of(cars(step)), PARAMS)
+        state = bof_update(bof_predict(state, SPEC, PARAMS, DT), SPEC, evidence_of(passing_cars(step)), PARAMS)
         yield state.probability[State.DYNAMIC], bof_velocity(state)[0]
 
 
 def run_cmcdot(number: int, seed: int) -> Iterator[tuple[NDArray, NDArray]]:
-    """Run CMCDOT past the two cars; it yields what `run_bof` does.
+    """Run CMCDOT past the two cars.
 
     Parameters
     ----------
     number : int
-        Of particles.
+        Number of particles.
     seed : int
-        Decides everything that is drawn.
+        Seed for everything that is drawn.
+
+    Yields
+    ------
+    dynamic : (H, W) float
+        Dynamic probability after each step.
+    velocity : (2, H, W) float
+        Mean velocity, m/s; NaN without dynamic mass.
     """
     rng, params = np.random.default_rng(seed), replace(PARAMS.world, particles=number)
     state = _first_particles(number, rng)
     for step in range(1, STEPS + 1):
         predicted = predict(state, SPEC, params, DT, rng)
-        state = resample(update(predicted, SPEC, evidence_of(cars(step)), params), SPEC, params, rng)
+        state = resample(update(predicted, SPEC, evidence_of(passing_cars(step)), params), SPEC, params, rng)
         cells = cells_of(state.particles.position, SPEC)
         yield state.probability[State.DYNAMIC], velocity_moments(state.particles, cells, SPEC.shape)[0]
 

@@ -1,4 +1,4 @@
-"""Tiny networks that differ in one mechanism alone, and what a thin pole becomes in each (paper, section 3.1)."""
+"""Tiny networks that differ in one mechanism alone, and how well each finds thin poles (paper, section 3.1)."""
 
 from typing import NamedTuple
 
@@ -15,35 +15,39 @@ from semgrid_edu.networks.deeplab import interpolate
 from semgrid_edu.networks.fcn import enlarge
 
 SIDE = 32
-"""Of the images, pixels."""
+"""Side of the images, pixels."""
 NOISE = 0.1
-"""Standard deviation of each pixel; poles are three to five times as bright above the ground."""
+"""Standard deviation of the noise of each pixel; poles stand out from the ground by three to five times as much."""
 WIDTH = 8
 """Channels of every layer of a `PoleNet`."""
 STRIDES, RATES = (1, 2, 2, 1, 1, 1, 1), (1, 1, 2, 4, 4, 4, 4)
-"""Of the seven layers, "strided" and "atrous": the atrous algorithm turns the first into the second, see `ResNet`."""
+"""Strides of the seven layers of "strided", rates of those of "atrous". The atrous algorithm makes the second of the
+first, see `ResNet`."""
 BATCH_SIZE, LEARNING_RATE = 8, 0.02
-"""Of Adam: gradient descent with momentum, as in `train`, takes more steps than fit into seconds."""
+"""For Adam: gradient descent with momentum, as in `train`, takes more steps than fit into seconds."""
 POLE_WEIGHT = 4.0
-"""Of a pole's pixel in the loss, the limit of `TrainingParams`: three pixels in a hundred are of poles."""
+"""Weight of a pole's pixel in the loss, the limit of `TrainingParams`: three pixels in a hundred belong to poles."""
 
 
 def draw_poles(n: int, seed: int) -> tuple[Tensor, Tensor]:
     """Draw noisy images of a pole, one or two pixels wide, beside a wall of the same brightness.
 
-    Bright pixels alone don't tell a pole: one has to look as far as the wall is wide, 6 to 10 pixels.
+    A bright pixel alone doesn't tell pole from wall. For that, a network must see as far as the wall is wide, 6 to 10
+    pixels.
 
     Parameters
     ----------
     n : int
-        How many.
+        Number of images.
     seed : int
+        Seed for everything that is drawn.
 
     Returns
     -------
     images : (n, 1, 32, 32) float32
+        Brightness.
     truth : (n, 32, 32) int64
-        1 for the pole, else 0.
+        1 for a pixel of the pole, else 0.
     """
     rng = np.random.default_rng(seed)
     images = rng.normal(rng.uniform(0.3, 0.7, (n, 1, 1)), NOISE, (n, SIDE, SIDE))
@@ -62,19 +66,19 @@ def draw_poles(n: int, seed: int) -> tuple[Tensor, Tensor]:
 
 
 class PoleNet(nn.Module):
-    """Seven 3x3 convolutions that tell poles from the rest; networks differ in one mechanism alone.
+    """Seven 3x3 convolutions that find poles. Networks differ in one mechanism alone.
 
-    All six have the same layers in the same order, hence as many weights, and with one seed the same first ones. Three
-    lead down, one stays at a quarter of the resolution, two lead up, one scores. "strided" scores at a quarter and
-    interpolates, 0.4 million multiplications an image; "atrous" stays at full resolution all the way, 3.2 million; the
-    others take 1.2.
+    All six have the same layers in the same order, so they have equally many weights, and with one seed the same
+    initial ones. Three layers lead down, one stays at a quarter of the resolution, two lead up, one scores. "strided"
+    scores at a quarter of the resolution and interpolates, which takes 0.4 million multiplications per image. "atrous"
+    stays at full resolution and takes 3.2 million. The others take 1.2 million.
 
     Parameters
     ----------
     mechanism : str
-        Of `MECHANISMS`.
+        One of `MECHANISMS`.
     seed : int
-        Of the initial weights.
+        Seed for the initial weights.
 
     Raises
     ------
@@ -94,7 +98,18 @@ class PoleNet(nn.Module):
             self.layers[-1] = self.layers[-1][0]
 
     def forward(self, image: Tensor) -> Tensor:
-        """Return scores of ground and pole, (B, 1, h, w) -> (B, 2, h, w); 4 must divide the sides."""
+        """Score every pixel.
+
+        Parameters
+        ----------
+        image : (B, 1, h, w) float32
+            Images whose sides are multiples of 4.
+
+        Returns
+        -------
+        (B, 2, h, w) float32
+            Scores of ground and pole.
+        """
         x = image.contiguous(memory_format=torch.channels_last)
         if self.mechanism not in ("strided", "atrous"):
             return self._down_and_up(x)
@@ -129,16 +144,17 @@ def _layer(n_in: int, n_out: int, stride: int, rate: int) -> nn.Sequential:
     return nn.Sequential(conv, nn.BatchNorm2d(n_out), nn.ReLU(inplace=True))
 
 
-def learn(mechanism: str, steps: int = 150, seed: int = 0) -> PoleNet:
-    """Train a network on images of poles, each seen once: a second or two.
+def train_pole_net(mechanism: str, steps: int = 150, seed: int = 0) -> PoleNet:
+    """Train a network on images of poles, each seen once. It takes a second or two.
 
     Parameters
     ----------
     mechanism : str
-        Of `MECHANISMS`.
+        One of `MECHANISMS`.
     steps : int
+        Number of steps, each on 8 new images.
     seed : int
-        Of the initial weights and of the images.
+        Seed for the initial weights and for the images.
 
     Returns
     -------
@@ -165,11 +181,11 @@ class PoleScores(NamedTuple):
     iou : float
         Intersection over union of the poles' pixels, all images together, 0..1.
     missed : float
-        Of the rows that a pole stands in, the share without any pixel called pole, 0..1.
+        Share of the rows with a pole in which no pixel is called pole, 0..1.
     width, true_width : float
-        Pixels called pole, and of the pole, in a row of those not missed: means.
+        Mean number of pixels called pole, and of pixels of the pole, in a row that isn't missed; NaN where all are.
     offset : float
-        Between the middle of the one and of the other, pixels: mean. NaN, as the widths, where all are missed.
+        Mean distance between the middles of both, pixels; NaN where all rows are missed.
     """
 
     iou: float
@@ -179,13 +195,13 @@ class PoleScores(NamedTuple):
     offset: float
 
 
-def score(predicted: ArrayLike, truth: ArrayLike) -> PoleScores:
+def score_poles(predicted: ArrayLike, truth: ArrayLike) -> PoleScores:
     """Compare the pixels called pole with the poles.
 
     Parameters
     ----------
     predicted, truth : (n, H, W) bool or int
-        1 for a pole.
+        What is called pole, and what is: 1 for a pixel of a pole, else 0.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What pooling indices, skips and atrous convolutions each do to a thin pole, nothing learnt (paper, section 3.1)."""
+"""What pooling indices, skips and atrous convolutions each do to a thin pole, without learning (paper, section 3.1)."""
 
 import numpy as np
 import torch
@@ -11,28 +11,30 @@ from semgrid_edu.networks.deeplab import interpolate
 from semgrid_edu.networks.fcn import enlarge
 
 MECHANISMS = ("nearest", "bilinear", "indices", "skips", "strided", "atrous")
-"""Ways to look far and come back to full resolution: max-pooling, then enlarging what it left in one of two ways, or
-unpooling by its indices (SegNet), or adding finer maps (FCN); strides, then interpolation; holes instead of strides
+"""Ways to see far and to end at full resolution: max-pooling, then enlarging its result in one of two ways, unpooling
+it by its indices (SegNet), or adding finer maps to it (FCN); strides, then interpolation; holes instead of strides
 (DeepLab)."""
 
 
-def carry(image: ArrayLike, mechanism: str) -> NDArray[np.float64]:
-    """Halve an image twice and bring it back to its size, with nothing learnt.
+def apply_mechanism(image: ArrayLike, mechanism: str) -> NDArray[np.float64]:
+    """Send an image through one mechanism with fixed weights: down to a quarter of its size and up again.
 
     Parameters
     ----------
     image : (H, W) float
-        Sides that 4 divides.
+        Any image whose sides are multiples of 4.
     mechanism : str
-        "nearest", "bilinear": max-pooling, then each value spread over its 4 x 4 pixels, or interpolated between their
-        middles. "indices": unpooled to where the maxima were. "skips": as FCN, on the way up each map is added to
-        the one of its size on the way down; here the mean of the three. "strided": the binomial kernel (1, 2, 1)/4
-        in both directions, twice with stride 2, then interpolated. "atrous": the same without strides, the second
-        kernel with holes.
+        One of `MECHANISMS`. "nearest" and "bilinear": the image is max-pooled twice, then each value is spread over its
+        4 x 4 pixels, or interpolated between their middles. "indices": values go back to where the maxima were.
+        "skips": as in FCN, each map on the way up is added to the one of its size on the way down; here the result is
+        the mean of all three. "strided": the image is filtered twice with the binomial kernel (1, 2, 1)/4 in both
+        directions and stride 2, then interpolated. "atrous": the same without strides (the image stays at full size),
+        where the second kernel has holes.
 
     Returns
     -------
     (H, W) float64
+        What is left of the image.
 
     Raises
     ------
@@ -43,20 +45,20 @@ def carry(image: ArrayLike, mechanism: str) -> NDArray[np.float64]:
     --------
     >>> pole = np.zeros((4, 4))
     >>> pole[0, 2] = 1
-    >>> carry(pole, "nearest")[0]
+    >>> apply_mechanism(pole, "nearest")[0]
     array([1., 1., 1., 1.])
-    >>> carry(pole, "indices")[0]
+    >>> apply_mechanism(pole, "indices")[0]
     array([0., 0., 1., 0.])
     """
     check_mechanism(mechanism)
     x = torch.as_tensor(np.asarray(image, np.float64))
     if x.ndim != 2 or min(x.shape) < 4 or x.shape[0] % 4 or x.shape[1] % 4:
         raise ArgumentError("image", "shape (H, W) of multiples of 4", tuple(x.shape))
-    way = _carry_by_kernels if mechanism in ("strided", "atrous") else _carry_by_pooling
-    return way(x[None, None], mechanism)[0, 0].numpy()
+    apply = _apply_kernels if mechanism in ("strided", "atrous") else _apply_pooling
+    return apply(x[None, None], mechanism)[0, 0].numpy()
 
 
-def _carry_by_pooling(x: Tensor, mechanism: str) -> Tensor:
+def _apply_pooling(x: Tensor, mechanism: str) -> Tensor:
     half, where_half = F.max_pool2d(x, 2, return_indices=True)
     quarter, where_quarter = F.max_pool2d(half, 2, return_indices=True)
     if mechanism == "indices":
@@ -68,7 +70,7 @@ def _carry_by_pooling(x: Tensor, mechanism: str) -> Tensor:
     return (enlarge(enlarge(quarter, 2, half.shape[2:]) + half, 2, x.shape[2:]) + x) / 3
 
 
-def _carry_by_kernels(x: Tensor, mechanism: str) -> Tensor:
+def _apply_kernels(x: Tensor, mechanism: str) -> Tensor:
     binomial = torch.tensor([1, 2, 1], dtype=x.dtype) / 4
     kernel = torch.outer(binomial, binomial)[None, None]
     if mechanism == "strided":
@@ -83,14 +85,14 @@ def place_and_width(profile: ArrayLike) -> tuple[float, int]:
     Parameters
     ----------
     profile : (W,) float
-        At least one value above 0.
+        One row of an image, with at least one value above 0.
 
     Returns
     -------
     place : float
-        Column of the largest value, pixels; the mean of several.
+        Column of the largest value, pixels; the mean column of several equal ones.
     width : int
-        Full width at half maximum: pixels of at least half that value.
+        Full width at half maximum: number of pixels with at least half the largest value.
 
     Examples
     --------
@@ -105,6 +107,17 @@ def place_and_width(profile: ArrayLike) -> tuple[float, int]:
 
 
 def check_mechanism(mechanism: str) -> None:
-    """Refuse what is none of `MECHANISMS`."""
+    """Refuse an unknown mechanism.
+
+    Parameters
+    ----------
+    mechanism : str
+        One of `MECHANISMS`.
+
+    Raises
+    ------
+    ArgumentError
+        When it is none of them.
+    """
     if mechanism not in MECHANISMS:
         raise ArgumentError("mechanism", f"one of {', '.join(MECHANISMS)}", repr(mechanism))

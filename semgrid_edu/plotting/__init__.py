@@ -1,7 +1,8 @@
-"""One plotting vocabulary for lectures, demo and experiments; every function returns its Axes.
+"""The figures of lectures, demo and experiments, drawn with one vocabulary.
 
-Grids are drawn as maps with forward up, axes in metres: x upwards, y to the left, so that its axis
-decreases to the right. Arrays are never flipped: row 0 is the farthest ahead, column 0 the leftmost.
+Every function that takes `ax` draws into these Axes, or into a new figure when they are left out, and returns the Axes.
+Grids are drawn as maps seen from above with forward up, in metres: the x axis points up, the y axis to the left, so its
+numbers fall from left to right. Arrays are never flipped: row 0 is the farthest ahead, column 0 the leftmost.
 """
 
 from semgrid_edu.plotting.animations import MAX_ANIMATION_BYTES, Animation, animate
@@ -20,13 +21,8 @@ from semgrid_edu.plotting.grids import grid_labels, grid_values, label_maps, occ
 from semgrid_edu.plotting.images import image_labels, image_values, plane_on_image, points_on_image
 from semgrid_edu.plotting.legends import class_legend
 from semgrid_edu.plotting.lines import belief_history, probability_line, probability_lines, state_history
-from semgrid_edu.plotting.moving import (
-    animate_occupancy,
-    particles,
-    velocity_ellipse,
-    velocity_spread,
-    velocity_wheel,
-)
+from semgrid_edu.plotting.moving import animate_occupancy, particles, velocity_wheel
+from semgrid_edu.plotting.spread import velocity_ellipse, velocity_spread
 
 FIGURE_DPI = 110
 """Dots per inch of every figure in a notebook: `plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI`."""

@@ -1,4 +1,4 @@
-"""Charts of numbers: the confusion matrix (paper, Table 3) and the curves of a training (section 4.1)."""
+"""Charts of numbers: a confusion matrix (paper, Table 3), and the loss over a training run (section 4.1)."""
 
 from collections.abc import Mapping, Sequence
 
@@ -18,11 +18,11 @@ def confusion(matrix: NDArray, names: Sequence[str], ax: Axes | None = None) -> 
     Parameters
     ----------
     matrix : (n, n) int
-        Counts; a class without truth keeps an empty row.
+        How often each true class (row) is called each class (column); a class without truth has an empty row.
     names : sequence of str
-        Of the n classes.
+        Names of the n classes.
     ax : Axes, optional
-        Where to draw; a new figure when left out.
+        Axes to draw into.
 
     Returns
     -------
@@ -34,7 +34,7 @@ def confusion(matrix: NDArray, names: Sequence[str], ax: Axes | None = None) -> 
         When names and matrix differ in number.
     """
     if np.shape(matrix) != (len(names), len(names)):
-        raise ArgumentError("matrix", f"shape {(len(names),) * 2}, one row a name", f"shape {np.shape(matrix)}")
+        raise ArgumentError("matrix", f"shape {(len(names),) * 2}, one row per name", f"shape {np.shape(matrix)}")
     if ax is None:
         side = 2.2 + 0.42 * len(names)
         _, ax = plt.subplots(figsize=(side, side), layout="constrained")
@@ -52,21 +52,21 @@ def confusion(matrix: NDArray, names: Sequence[str], ax: Axes | None = None) -> 
 
 
 SMOOTHING = 50
-"""Steps that a running mean is taken over; a stage may be shorter."""
+"""Number of steps that a running mean is taken over; of all steps in a stage that has fewer."""
 
 
 def training_curves(logs: TrainingLog | Mapping[str, TrainingLog], ax: Axes | None = None) -> Axes:
-    """Draw the loss of trainings over their steps: a point a step, and a line that is their running mean.
+    """Draw the loss of training runs over their steps: one point per step, and a line for the running mean.
 
-    The loss of the image stage and that of the grid stage are of different things, so the line breaks between
-    them. The learning rate, which falls along half a cosine in each stage, isn't drawn.
+    The two stages have losses of different things, pixels and cells, so the line breaks between them. The learning
+    rate, which falls along half a cosine in each stage, isn't drawn.
 
     Parameters
     ----------
     logs : TrainingLog, or mapping of name to TrainingLog
-        See `read_log`. Names go to the legend.
+        Logs from `read_log`, by the names that the legend shows.
     ax : Axes, optional
-        Where to draw; a new figure when left out.
+        Axes to draw into.
 
     Returns
     -------
@@ -75,11 +75,11 @@ def training_curves(logs: TrainingLog | Mapping[str, TrainingLog], ax: Axes | No
     Raises
     ------
     ArgumentError
-        When there is no training, or one has no steps.
+        When there is no training run, or one has no steps.
     """
     logs = {"": logs} if isinstance(logs, TrainingLog) else logs
     if not logs or not all(len(log.loss) for log in logs.values()):
-        raise ArgumentError("logs", "a training or more, each with at least one step", list(logs) or "none")
+        raise ArgumentError("logs", "at least one training run, each with at least one step", list(logs) or "none")
     if ax is None:
         _, ax = plt.subplots(figsize=(8, 4), layout="constrained")
     for number, (name, log) in enumerate(logs.items()):
@@ -98,7 +98,7 @@ def training_curves(logs: TrainingLog | Mapping[str, TrainingLog], ax: Axes | No
 
 
 def _curve(ax: Axes, log: TrainingLog, name: str, colour: str) -> None:
-    """Draw one training, each stage for itself, with a dotted line where it begins."""
+    """Draw one training run, stage by stage, with a dotted line where a stage begins."""
     ax.scatter(log.iteration, log.loss, s=3, color=colour, alpha=0.2, linewidth=0)
     for stage, begin in _stages(log):
         here = log.stage == stage
@@ -108,5 +108,5 @@ def _curve(ax: Axes, log: TrainingLog, name: str, colour: str) -> None:
 
 
 def _stages(log: TrainingLog) -> list[tuple[str, int]]:
-    """Return the stages of a training and the step with which each begins."""
+    """Return the stages of a training run and the step with which each begins."""
     return [(stage, log.iteration[log.stage == stage][0]) for stage in dict.fromkeys(log.stage.tolist())]

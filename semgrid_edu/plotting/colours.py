@@ -1,4 +1,4 @@
-"""Colours of occupancy states, velocities and depth; those of classes stand in `labels` (paper, section 3.2)."""
+"""Colours of occupancy states, velocities and depths; `labels` holds those of classes (paper, section 3.2)."""
 
 from functools import cache
 
@@ -16,16 +16,16 @@ STATE_COLOURS = ((243, 243, 240), (38, 42, 52), (252, 114, 0), (160, 163, 168))
 """8-bit RGB of each state: free is light, static dark, dynamic a strong warm colour, unknown mid-grey."""
 
 HEADING_COLOURS = ((30, 110, 230), (90, 200, 120), (255, 200, 0), (190, 0, 120))
-"""8-bit RGB of velocity forward, to the left, backward, to the right; headings between them are mixed.
+"""8-bit RGB of motion forward, to the left, backward and to the right; colours of other headings are mixed from these.
 
-Forward and backward are blue and yellow, which the colour-blind tell apart too; left is lighter than right.
+Forward and backward are blue and yellow, which colour-blind readers can tell apart too; left is lighter than right.
 """
 
 WHEEL_SPEED = 16.0
-"""m/s (58 km/h): what moves as fast or faster has its heading's full colour."""
+"""Speed, m/s, from which on motion has the full colour of its heading (16 m/s are 58 km/h)."""
 
 DEPTH_RANGE = (4.0, 50.0)
-"""Metres: nearer points take the first colour, farther ones the last."""
+"""Depths of the first and the last colour, metres; nearer points take the first, farther ones the last."""
 
 
 def occupancy_colours(probability: NDArray) -> NDArray[np.uint8]:
@@ -34,11 +34,12 @@ def occupancy_colours(probability: NDArray) -> NDArray[np.uint8]:
     Parameters
     ----------
     probability : (4, H, W) float
-        FREE, STATIC, DYNAMIC, UNKNOWN; sums to 1 in each cell.
+        Probabilities of FREE, STATIC, DYNAMIC and UNKNOWN, which sum to 1 in each cell.
 
     Returns
     -------
     (H, W, 3) uint8
+        RGB.
 
     Raises
     ------
@@ -59,18 +60,19 @@ def occupancy_colours(probability: NDArray) -> NDArray[np.uint8]:
 
 
 def velocity_colours(velocity: NDArray) -> NDArray[np.uint8]:
-    """Colour velocities by a wheel: the hue is the heading, and the slower, the nearer to STATIC's dark.
+    """Colour velocities by a wheel: the heading decides the hue, and slow motion is darker, like STATIC.
 
-    The share of the heading's colour is sqrt(speed / `WHEEL_SPEED`), so that a pedestrian has a colour too.
+    The share of the heading's colour is sqrt(speed / `WHEEL_SPEED`), so that even a pedestrian has a visible colour.
 
     Parameters
     ----------
     velocity : (2, ...) float
-        Along x, forward, and y, to the left, m/s. Where it is NaN, the colour is that of DYNAMIC.
+        Velocity along x, forward, and along y, to the left, m/s. Where it is NaN, the colour is that of DYNAMIC.
 
     Returns
     -------
     (..., 3) uint8
+        RGB.
 
     Raises
     ------
@@ -102,18 +104,20 @@ def _depth_palette() -> NDArray[np.uint8]:
 
 
 def depth_colours(depth: NDArray) -> NDArray[np.uint8]:
-    """Colour points by depth, near to far from yellow over red to blue, evenly in log(depth).
+    """Colour points by depth, from near to far yellow, red and blue, evenly in log(depth).
 
-    Near things move most from one metre to the next in the image; the logarithm gives them more colours.
+    A metre more or less moves near points farther in the image than far ones. The logarithm gives near points more
+    colours.
 
     Parameters
     ----------
     depth : (...) float
-        Metres.
+        Depth along the camera's optical axis, metres.
 
     Returns
     -------
     (..., 3) uint8
+        RGB.
     """
     near, far = np.log(DEPTH_RANGE)
     share = (np.log(np.clip(depth, *DEPTH_RANGE)) - near) / (far - near)

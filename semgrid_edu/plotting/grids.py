@@ -1,4 +1,4 @@
-"""Bird's-eye grids as maps in metres, forward up: occupancy, velocities, classes, values (section 3.2, 3.4)."""
+"""Bird's-eye grids as maps in metres, forward up: occupancy, velocities, classes and numbers (sections 3.2, 3.4)."""
 
 from collections.abc import Mapping
 
@@ -16,10 +16,10 @@ from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, occupancy_c
 from semgrid_edu.plotting.legends import class_legend, colour_legend
 
 ARROW_SECONDS = 0.5
-"""An arrow ends where what it stands for will be after this time."""
+"""Time, seconds, after which what moves will be where its arrow ends."""
 
 ARROW_SPACING = 2.0
-"""Metres: one arrow for each square of this side, so that those of a car don't hide it."""
+"""Side of the squares that get one arrow each, metres, so that the arrows of a car don't hide it."""
 
 
 def occupancy(spec: GridSpec, probability: NDArray, ax: Axes | None = None, legend: bool = True) -> Axes:
@@ -28,10 +28,11 @@ def occupancy(spec: GridSpec, probability: NDArray, ax: Axes | None = None, lege
     Parameters
     ----------
     spec : GridSpec
+        The grid.
     probability : (4, H, W) float
-        FREE, STATIC, DYNAMIC, UNKNOWN; sums to 1 in each cell.
+        Probabilities of FREE, STATIC, DYNAMIC and UNKNOWN, which sum to 1 in each cell.
     ax : Axes, optional
-        Where to draw; a new figure when left out.
+        Axes to draw into.
     legend : bool
         Whether to name the states.
 
@@ -49,19 +50,20 @@ def occupancy(spec: GridSpec, probability: NDArray, ax: Axes | None = None, lege
 
 
 def velocity(spec: GridSpec, probability: NDArray, velocity: NDArray, ax: Axes) -> Axes:
-    """Add arrows to an occupancy grid, as `velocity_arrows` chooses them, long as the way in the next half second.
+    """Add the arrows of `velocity_arrows` to an occupancy grid, as long as the distance covered in half a second.
 
     A second line below the map says so.
 
     Parameters
     ----------
     spec : GridSpec
+        The grid.
     probability : (4, H, W) float
-        FREE, STATIC, DYNAMIC, UNKNOWN.
+        Probabilities of FREE, STATIC, DYNAMIC and UNKNOWN.
     velocity : (2, H, W) float
-        Metres a second over ground, along x and y of the grid frame; NaN where nothing moves.
+        Velocity over ground, along x and y of the grid frame, m/s; NaN where nothing moves.
     ax : Axes
-        With the grid drawn.
+        Axes in which the grid has been drawn.
 
     Returns
     -------
@@ -70,28 +72,30 @@ def velocity(spec: GridSpec, probability: NDArray, velocity: NDArray, ax: Axes) 
     start, speed = velocity_arrows(spec, probability, velocity)
     (x, y), (vx, vy) = start.T, speed.T * ARROW_SECONDS
     ax.quiver(y, x, vy, vx, angles="xy", scale_units="xy", scale=1.0, color="#6a1b9a", width=0.007, zorder=3)
-    ax.set_xlabel(f"{ax.get_xlabel()}\narrows: way in {ARROW_SECONDS} s")
+    ax.set_xlabel(f"{ax.get_xlabel()}\narrows: distance covered in {ARROW_SECONDS} s")
     return ax
 
 
 def velocity_arrows(
     spec: GridSpec, probability: NDArray, velocity: NDArray
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Summarise the velocities of cells that are more DYNAMIC than not, by squares of `ARROW_SPACING`.
+    """Average the velocities of cells that are probably DYNAMIC, over squares of side `ARROW_SPACING`.
 
     Parameters
     ----------
     spec : GridSpec
+        The grid.
     probability : (4, H, W) float
+        Probabilities of FREE, STATIC, DYNAMIC and UNKNOWN.
     velocity : (2, H, W) float
-        Metres a second; NaN where nothing moves.
+        Velocity over ground, along x and y of the grid frame, m/s; NaN where nothing moves.
 
     Returns
     -------
     start : (K, 2) float64
-        x and y of the mean of each square's moving cells, metres.
+        Mean place of the moving cells in each square that has any: x and y in the grid frame, metres.
     speed : (K, 2) float64
-        Their mean velocity, metres a second.
+        Their mean velocity, m/s.
     """
     moving = np.isfinite(velocity).all(axis=0) & (probability[State.DYNAMIC] > 0.5)
     xy = spec.centers()[moving]
@@ -105,16 +109,18 @@ def velocity_arrows(
 def grid_labels(
     spec: GridSpec, labels: NDArray, label_set: LabelSet, ax: Axes | None = None, legend: bool = True
 ) -> Axes:
-    """Draw a map of classes, with a legend of those that occur.
+    """Draw a map of classes, with a legend of the classes that occur.
 
     Parameters
     ----------
     spec : GridSpec
+        The grid.
     labels : (H, W) int
-        Class of each cell; 255, unlabelled, is white.
+        Class of each cell; 255 (unlabelled) is white.
     label_set : LabelSet
+        The classes, for colours and names.
     ax : Axes, optional
-        Where to draw; a new figure when left out.
+        Axes to draw into.
     legend : bool
         Whether to name the classes.
 
@@ -137,9 +143,11 @@ def label_maps(spec: GridSpec, maps: Mapping[str, NDArray], label_set: LabelSet)
     Parameters
     ----------
     spec : GridSpec
+        The grid.
     maps : mapping of str to (H, W) int
-        Titles and classes, from left to right; 255, unlabelled, is white.
+        The class of each cell, by the title of the map, from left to right; 255 (unlabelled) is white.
     label_set : LabelSet
+        The classes, for colours and names.
 
     Returns
     -------
@@ -158,17 +166,18 @@ def label_maps(spec: GridSpec, maps: Mapping[str, NDArray], label_set: LabelSet)
 
 
 def grid_values(spec: GridSpec, values: NDArray, name: str, ax: Axes | None = None, **style: object) -> Axes:
-    """Draw one number a cell, with a colour bar.
+    """Draw one number per cell, with a colour bar.
 
     Parameters
     ----------
     spec : GridSpec
+        The grid.
     values : (H, W) float
-        NaN is left blank.
+        The number of each cell; a cell with NaN is left blank.
     name : str
         What the numbers are, with their unit.
     ax : Axes, optional
-        Where to draw; a new figure when left out.
+        Axes to draw into.
     **style
         Passed on to `Axes.imshow` (`vmin`, `vmax`, `cmap`).
 
@@ -192,10 +201,11 @@ def draw_map(spec: GridSpec, raster: NDArray, ax: Axes | None = None, **style: o
     Parameters
     ----------
     spec : GridSpec
+        The grid.
     raster : (H, W) float or (H, W, 3) uint8
-        Numbers, or colours.
+        The number, or the colour, of each cell.
     ax : Axes, optional
-        Where to draw; a new figure when left out.
+        Axes to draw into.
     **style
         Passed on to `Axes.imshow`.
 

@@ -1,4 +1,4 @@
-"""What lives in the camera image: LIDAR points and planes by depth, labels, scores (eq. (1), section 3.1)."""
+"""Camera images, with LIDAR points and planes coloured by depth, labels or scores (eq. (1), section 3.1)."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -17,18 +17,18 @@ from semgrid_edu.plotting.legends import class_legend
 
 
 def points_on_image(frame: Frame, ax: Axes | None = None, size: float = 3.0, colour_bar: bool = True) -> Axes:
-    """Draw the camera image with the LIDAR returns it sees, coloured by depth.
+    """Draw the camera image with the LIDAR returns that the camera sees, coloured by depth.
 
     Parameters
     ----------
     frame : Frame
-        With an image.
+        A frame with image, points and calibration.
     ax : Axes, optional
-        Where to draw; a new figure when left out.
+        Axes to draw into.
     size : float
-        Of a point, points squared.
+        Area of a point in the figure, points squared.
     colour_bar : bool
-        Whether to explain the colours, in metres.
+        Whether to add a colour bar in metres.
 
     Returns
     -------
@@ -47,21 +47,22 @@ def points_on_image(frame: Frame, ax: Axes | None = None, size: float = 3.0, col
 def plane_on_image(
     spec: GridSpec, height: float, frame: Frame, ax: Axes | None = None, size: float = 3.0, colour_bar: bool = True
 ) -> Axes:
-    """Draw the camera image with the cells of the grid, lifted to a height, where equation (1) puts their centres.
+    """Draw the camera image with the centres of the grid's cells at one height, where equation (1) puts them.
 
     Parameters
     ----------
     spec : GridSpec
+        The grid.
     height : float
-        delta_d, metres above the ground.
+        Height of the plane above the ground, delta_d, metres.
     frame : Frame
-        With an image.
+        A frame with image and calibration.
     ax : Axes, optional
-        Where to draw; a new figure when left out.
+        Axes to draw into.
     size : float
-        Of a point, points squared.
+        Area of a point in the figure, points squared.
     colour_bar : bool
-        Whether to explain the colours, in metres; they are those of `points_on_image`.
+        Whether to add a colour bar in metres. The colours are those of `points_on_image`.
 
     Returns
     -------
@@ -91,7 +92,20 @@ def _draw_by_depth(pixels: NDArray, depth: NDArray, ax: Axes, size: float, colou
 
 
 def visible_points(frame: Frame) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return pixels, (N, 2), and depths, (N,) metres, of the returns the camera sees, the farthest first."""
+    """Find the LIDAR returns that the camera sees.
+
+    Parameters
+    ----------
+    frame : Frame
+        A frame with points and calibration.
+
+    Returns
+    -------
+    pixels : (N, 2) float32
+        u to the right and v down of each return, pixels; the farthest comes first, so that near points are drawn last.
+    depth : (N,) float32
+        Its depth along the optical axis, metres.
+    """
     points_camera = transform_points(frame.camera.T_camera_from_lidar, frame.points[:, :3])
     pixels, visible = project(points_camera, frame.camera)
     depth = points_camera[visible, 2]
@@ -102,18 +116,20 @@ def visible_points(frame: Frame) -> tuple[NDArray[np.float32], NDArray[np.float3
 def image_labels(
     image: NDArray, labels: NDArray, label_set: LabelSet, ax: Axes | None = None, opacity: float = 0.6
 ) -> Axes:
-    """Lay the classes of pixels over an image, with a legend of those that occur.
+    """Lay the classes of pixels over an image, with a legend of the classes that occur.
 
     Parameters
     ----------
     image : (h, w, 3) uint8
+        RGB.
     labels : (h, w) int
-        Class of each pixel; 255, unlabelled, leaves the image as it is.
+        Class of each pixel; 255 (unlabelled) leaves the image as it is.
     label_set : LabelSet
+        The classes, for colours and names.
     ax : Axes, optional
-        Where to draw; a new figure when left out.
+        Axes to draw into.
     opacity : float
-        0 shows the image alone, 1 the labels alone.
+        Weight of the labels' colours: 0 shows the image alone, 1 the labels alone.
 
     Returns
     -------
@@ -129,7 +145,28 @@ def image_labels(
 
 
 def blend_labels(image: NDArray, labels: NDArray, label_set: LabelSet, opacity: float) -> NDArray[np.uint8]:
-    """Mix an image, (h, w, 3), with the colours of its labels, (h, w); unlabelled pixels stay."""
+    """Mix an image with the colours of its labels; unlabelled pixels stay as they are.
+
+    Parameters
+    ----------
+    image : (h, w, 3) uint8
+        RGB.
+    labels : (h, w) int
+        Class of each pixel; 255 is unlabelled.
+    label_set : LabelSet
+        The classes, for their colours.
+    opacity : float
+        Weight of the labels' colours, 0..1.
+
+    Returns
+    -------
+    (h, w, 3) uint8
+
+    Raises
+    ------
+    ArgumentError
+        When image and labels differ in size.
+    """
     if image.shape[:2] != labels.shape:
         raise ArgumentError("labels", f"the image's size {image.shape[:2]}", f"shape {labels.shape}")
     weight = np.where(labels < len(label_set), opacity, 0.0)[..., None]
@@ -137,15 +174,16 @@ def blend_labels(image: NDArray, labels: NDArray, label_set: LabelSet, opacity: 
 
 
 def image_values(values: NDArray, name: str, ax: Axes | None = None, **style: object) -> Axes:
-    """Draw one number a pixel, such as the scores of a class, with a colour bar.
+    """Draw one number per pixel, such as the scores of a class, with a colour bar.
 
     Parameters
     ----------
     values : (h, w) float
+        The number of each pixel.
     name : str
         What the numbers are, with their unit.
     ax : Axes, optional
-        Where to draw; a new figure when left out.
+        Axes to draw into.
     **style
         Passed on to `Axes.imshow` (`vmin`, `vmax`, `cmap`).
 
@@ -159,7 +197,21 @@ def image_values(values: NDArray, name: str, ax: Axes | None = None, **style: ob
 
 
 def draw_image(image: NDArray, ax: Axes | None = None, **style: object) -> Axes:
-    """Draw an image without axes; pixel (u, v) has its centre at (u, v)."""
+    """Draw an image without ticks and frame; the centre of pixel (u, v) is at (u, v).
+
+    Parameters
+    ----------
+    image : (h, w, 3) uint8 or (h, w) float
+        Colours, or numbers.
+    ax : Axes, optional
+        Axes to draw into.
+    **style
+        Passed on to `Axes.imshow`.
+
+    Returns
+    -------
+    Axes
+    """
     if ax is None:
         _, ax = plt.subplots(figsize=(10, 3.2), layout="constrained")
     ax.imshow(image, **style)

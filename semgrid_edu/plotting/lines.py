@@ -1,4 +1,4 @@
-"""Probabilities as bars on a line of cells, and as bands over time (filtering by Bayes' rule, section 3.2)."""
+"""Probabilities as bars on a line of cells, and over time (filtering by Bayes' rule, section 3.2)."""
 
 from collections.abc import Mapping, Sequence
 
@@ -13,10 +13,10 @@ from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES
 from semgrid_edu.plotting.legends import colour_legend
 
 TOP = 1.25
-"""An axis ends this many times the largest number above zero: there is room for the number itself."""
+"""Upper end of an axis as a multiple of its largest number, so that there is room for the number itself."""
 
 MAX_NUMBERS = 12
-"""A line of more cells than these has no room for the number of each."""
+"""Largest number of cells for which numbers are written: longer lines have no room for them."""
 
 
 def probability_line(
@@ -26,20 +26,20 @@ def probability_line(
     names: Sequence[str] | None = None,
     truth: int | None = None,
 ) -> Axes:
-    """Draw one number a cell of a line, a belief or a likelihood, as bars from left to right.
+    """Draw one number per cell of a line, a belief or a likelihood, as bars from left to right.
 
     Parameters
     ----------
     values : (N,) float
-        Between 0 and 1.
+        The number of each cell, 0..1.
     ax : Axes, optional
-        Where to draw; a new figure when left out.
+        Axes to draw into.
     title : str
         What the numbers are.
     names : sequence of str, optional
-        Of the N cells; their numbers when left out.
+        Names of the N cells; 0, 1, ... when left out.
     truth : int, optional
-        The right cell: a triangle marks it.
+        The right cell, which a triangle marks.
 
     Returns
     -------
@@ -75,14 +75,16 @@ def probability_line(
 def probability_lines(
     lines: Mapping[str, NDArray], names: Sequence[str] | None = None, truth: int | None = None
 ) -> Figure:
-    """Draw lines of cells below each other to one scale, that of the largest number: prior, likelihood, posterior.
+    """Draw several lines of cells below each other, such as prior, likelihood and posterior, to one scale.
 
     Parameters
     ----------
     lines : mapping of str to (N,) float
-        Titles and numbers, from top to bottom.
-    names, truth
-        As for `probability_line`, for all lines.
+        The numbers of each line, 0..1, by its title, from top to bottom.
+    names : sequence of str, optional
+        Names of the N cells; 0, 1, ... when left out.
+    truth : int, optional
+        The right cell, which a triangle marks in every line.
 
     Returns
     -------
@@ -105,16 +107,16 @@ def probability_lines(
 
 
 def belief_history(belief: NDArray, ax: Axes | None = None, truth: NDArray | None = None) -> Axes:
-    """Draw a belief over a line of cells, step by step: one column a step, the darker the more probable.
+    """Draw a belief over a line of cells, step by step: one column per step, darker where more probable.
 
     Parameters
     ----------
     belief : (T, N) float
-        One belief a row; each sums to 1.
+        The belief at each step, one row per step; each row sums to 1.
     ax : Axes, optional
-        Where to draw; a new figure when left out.
+        Axes to draw into.
     truth : (T,) int, optional
-        The right cell at each step: a circle marks it.
+        The right cell at each step, which a circle marks.
 
     Returns
     -------
@@ -126,7 +128,7 @@ def belief_history(belief: NDArray, ax: Axes | None = None, truth: NDArray | Non
         When the belief isn't a table, or truth and belief differ in number of steps.
     """
     if np.ndim(belief) != 2:
-        raise ArgumentError("belief", "one row a step, shape (T, N)", f"shape {np.shape(belief)}")
+        raise ArgumentError("belief", "one row per step, shape (T, N)", f"shape {np.shape(belief)}")
     if truth is not None and np.shape(truth) != (len(belief),):
         raise ArgumentError("truth", f"one cell for each of {len(belief)} steps", f"shape {np.shape(truth)}")
     if ax is None:
@@ -144,11 +146,11 @@ def state_history(times: NDArray, probability: NDArray, ax: Axes | None = None) 
     Parameters
     ----------
     times : (T,) float
-        Seconds, ascending, at least two.
+        Times of the steps, seconds, ascending, at least two.
     probability : (4, T) float
-        FREE, STATIC, DYNAMIC, UNKNOWN; sums to 1 at each time.
+        Probabilities of FREE, STATIC, DYNAMIC and UNKNOWN, which sum to 1 at each time.
     ax : Axes, optional
-        Where to draw; a new figure when left out.
+        Axes to draw into.
 
     Returns
     -------

@@ -1,13 +1,11 @@
-"""What moves: velocity as a colour wheel, particles, spread of velocity, occupancy over a drive (section 3.2)."""
+"""Pictures of motion: velocities by a colour wheel, particles, an animated drive (section 3.2)."""
 
 from collections.abc import Iterable, Iterator
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.offsetbox import AnnotationBbox, HPacker, OffsetImage, TextArea, VPacker
-from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
@@ -25,7 +23,7 @@ from semgrid_edu.plotting.grids import draw_map
 from semgrid_edu.plotting.legends import colour_legend
 
 MAX_POINTS = 10_000
-"""The most particles in a picture: more would only hide each other."""
+"""Largest number of particles in a picture, because more would only hide each other."""
 
 
 def velocity_wheel(
@@ -33,18 +31,19 @@ def velocity_wheel(
 ) -> Axes:
     """Draw an occupancy grid in which what moves has the colour of its velocity.
 
-    FREE, STATIC and UNKNOWN keep their colours. A hue says which way, roughly: `velocity`, called on the same
-    axes, adds arrows, which readers who don't tell all hues apart need.
+    FREE, STATIC and UNKNOWN keep their colours. A hue shows the direction only roughly, and not every reader can tell
+    all hues apart: `velocity`, called with the same axes, adds arrows.
 
     Parameters
     ----------
     spec : GridSpec
+        The grid.
     probability : (4, H, W) float
-        FREE, STATIC, DYNAMIC, UNKNOWN; sums to 1 in each cell.
+        Probabilities of FREE, STATIC, DYNAMIC and UNKNOWN, which sum to 1 in each cell.
     velocity : (2, H, W) float
-        Metres a second over ground, along x and y of the grid frame; NaN where nothing moves.
+        Velocity over ground, along x and y of the grid frame, m/s; NaN where nothing moves.
     ax : Axes, optional
-        Where to draw; a new figure when left out.
+        Axes to draw into.
     legend : bool
         Whether to name the states and to show the wheel.
 
@@ -64,11 +63,24 @@ def velocity_wheel(
 def wheel_colours(spec: GridSpec, probability: NDArray, velocity: NDArray) -> NDArray[np.uint8]:
     """Paint an occupancy grid with the colours of `velocity_colours` in place of DYNAMIC's.
 
-    Parameters and errors are those of `velocity_wheel`.
+    Parameters
+    ----------
+    spec : GridSpec
+        The grid.
+    probability : (4, H, W) float
+        Probabilities of FREE, STATIC, DYNAMIC and UNKNOWN, which sum to 1 in each cell.
+    velocity : (2, H, W) float
+        Velocity over ground, along x and y of the grid frame, m/s; NaN where nothing moves.
 
     Returns
     -------
     (H, W, 3) uint8
+        RGB.
+
+    Raises
+    ------
+    ArgumentError
+        When an array doesn't fit `spec`.
     """
     if np.shape(velocity) != (2, *spec.shape):
         raise ArgumentError("velocity", f"shape {(2, *spec.shape)}", f"shape {np.shape(velocity)}")
@@ -80,17 +92,18 @@ def wheel_colours(spec: GridSpec, probability: NDArray, velocity: NDArray) -> ND
 
 
 def particles(spec: GridSpec, particles: Particles, ax: Axes | None = None) -> Axes:
-    """Add particles to a map: each a point with the colour of its velocity, the denser the more it carries.
+    """Add particles to a map: each is a point with the colour of its velocity, the more opaque the more weight it has.
 
-    Of more than `MAX_POINTS` every k-th is drawn. A second line below the map says how many are.
+    When there are more than `MAX_POINTS`, every k-th is drawn. A second line below the map says how many are drawn.
 
     Parameters
     ----------
     spec : GridSpec
+        The grid.
     particles : Particles
-        In the frame of the grid; those outside aren't drawn.
+        Particles in the frame of the grid; those outside aren't drawn.
     ax : Axes, optional
-        With the grid drawn; a new, empty map when left out.
+        Axes in which the grid has been drawn; a new, empty map when left out.
 
     Returns
     -------
@@ -107,83 +120,6 @@ def particles(spec: GridSpec, particles: Particles, ax: Axes | None = None) -> A
     return ax
 
 
-def velocity_spread(velocity: NDArray, weight: NDArray, ax: Axes | None = None) -> Axes:
-    """Draw a distribution over velocities, as of one cell's particles or lattice: points, mean, ellipse.
-
-    The area of a point is its weight. A cross marks the mean, and the ellipse is two standard deviations wide.
-
-    Parameters
-    ----------
-    velocity : (N, 2) float
-        Forward and to the left, m/s.
-    weight : (N,) float
-        Not negative, not all zero; they need not sum to 1.
-    ax : Axes, optional
-        Where to draw; a new figure when left out.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    ArgumentError
-        When the shapes don't match, a velocity isn't finite, or the weights can't be any.
-    """
-    velocity, weight = np.asarray(velocity, dtype=np.float64), np.asarray(weight, dtype=np.float64)
-    if velocity.shape != (*weight.shape, 2) or weight.ndim != 1:
-        raise ArgumentError("velocity", f"(N, 2) for weights of shape {weight.shape}", f"shape {velocity.shape}")
-    if not (weight >= 0).all() or not 0 < weight.sum() < np.inf:
-        raise ArgumentError("weight", "finite numbers >= 0, not all zero", weight)
-    if not np.isfinite(velocity).all():
-        raise ArgumentError("velocity", "finite numbers", velocity)
-    if ax is None:
-        _, ax = plt.subplots(figsize=(4, 4), layout="constrained")
-    share = weight / weight.sum()
-    area = 150 * min(1, 60 / len(share)) * share / share.max()
-    ax.scatter(*velocity[:, ::-1].T, s=area, c=velocity_colours(velocity.T) / 255, alpha=0.7, linewidths=0)
-    mean = share @ velocity
-    away = velocity - mean
-    velocity_ellipse(mean, np.einsum("n,ni,nj->ij", share, away, away), ax)
-    ax.set(xlabel="velocity to the left [m/s]", ylabel="velocity forward [m/s]", aspect="equal")
-    if not ax.xaxis_inverted():
-        ax.invert_xaxis()
-    return ax
-
-
-def velocity_ellipse(mean: NDArray, covariance: NDArray, ax: Axes) -> Axes:
-    """Mark a mean velocity with a cross, and its uncertainty with an ellipse of two standard deviations.
-
-    Parameters
-    ----------
-    mean : (2,) float
-        Forward and to the left, m/s.
-    covariance : (2, 2) float
-        m^2/s^2.
-    ax : Axes
-        Left across, forward upwards, as `velocity_spread` makes them.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    ArgumentError
-        When the covariance isn't one.
-    """
-    covariance = np.asarray(covariance, dtype=np.float64)
-    variance, axes = np.linalg.eigh(covariance) if covariance.shape == (2, 2) else ([np.nan], None)
-    rounding = 1e-5 * (np.sum(np.square(mean)) + np.max(variance))  # E[v v^T] - mean mean^T in single precision
-    if np.shape(mean) != (2,) or not np.all(np.array(variance) >= -rounding):
-        raise ArgumentError("covariance", "(2, 2), symmetric, not negative, beside a mean (2,)", covariance)
-    long, short = 4 * np.sqrt(np.maximum(variance[::-1], 0))
-    angle = np.degrees(np.arctan2(axes[0, 1], axes[1, 1]))
-    ax.add_patch(Ellipse((mean[1], mean[0]), long, short, angle=angle, fill=False, edgecolor="0.2", linewidth=1.2))
-    ax.plot(mean[1], mean[0], "+", color="0.2", markersize=9)
-    return ax
-
-
 def animate_occupancy(
     spec: GridSpec, beliefs: Iterable[Belief], times: Iterable[float], alt: str, ax: Axes | None = None
 ) -> Animation:
@@ -192,14 +128,15 @@ def animate_occupancy(
     Parameters
     ----------
     spec : GridSpec
+        The grid.
     beliefs : iterable of Belief
-        Such as what `track_drive` yields; only their pictures are kept.
+        Beliefs, such as `track_drive` yields; only their pictures are kept.
     times : iterable of float
-        One per belief, ascending, seconds; the title counts from the first.
+        Times of the beliefs, one each, seconds, ascending; the title counts from the first.
     alt : str
         What happens in it, for readers who can't see it.
     ax : Axes, optional
-        Where to draw; a new figure when left out. The whole figure becomes the animation.
+        Axes to draw into. The whole figure becomes the animation.
 
     Returns
     -------
@@ -228,7 +165,7 @@ def animate_occupancy(
 
 
 def _wheel_legend(ax: Axes) -> Axes:
-    """Name the states that stay, and show the wheel below them, with its speeds."""
+    """Name the states that keep their colours, and show the wheel below them, with its speeds."""
     still = [state for state in State if state != State.DYNAMIC]
     colour_legend(ax, [STATE_NAMES[s] for s in still], [STATE_COLOURS[s] for s in still])
     ahead, left, back, right, speeds = (
@@ -243,7 +180,13 @@ def _wheel_legend(ax: Axes) -> Axes:
 
 
 def wheel_picture() -> NDArray[np.uint8]:
-    """Paint the wheel, (101, 101, 4) with forward up: full speed on its rim, a quarter of it on the white ring."""
+    """Paint the colour wheel of velocities with forward up: full speed on its rim, a quarter of it on the white ring.
+
+    Returns
+    -------
+    (101, 101, 4) uint8
+        RGB and opacity, which is 0 outside the wheel.
+    """
     across = np.linspace(1, -1, 101)
     forward, left = np.meshgrid(across, across, indexing="ij")
     radius = np.hypot(forward, left)

@@ -1,4 +1,4 @@
-"""The data sets of section 4 in simulated form, and a sample drive: made in parallel, resumed when interrupted."""
+"""Simulated data sets in place of those of section 4, and the sample drive: made in parallel, resumed after a stop."""
 
 import json
 from collections.abc import Iterator
@@ -15,9 +15,9 @@ from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.simulation.drive import SimulatedDrive
-from semgrid_edu.simulation.sample_cast import SAMPLE_WISHES
 from semgrid_edu.simulation.sensors.rig import Rig
 from semgrid_edu.simulation.street.plan import ANY, Wishes
+from semgrid_edu.simulation.street.sample_street import SAMPLE_WISHES
 from semgrid_edu.simulation.writer import (
     DATE,
     depth_as_points,
@@ -30,7 +30,7 @@ from semgrid_edu.storage.provenance import versions, write_provenance
 from semgrid_edu.storage.workers import worker_pool
 
 FORMAT = 1
-"""Goes up when the simulator changes what a seed gives, so that old and new drives don't mix in one folder."""
+"""Raised whenever the simulator changes what a seed gives, so that old and new drives don't mix in one folder."""
 
 
 @dataclass(frozen=True)
@@ -40,10 +40,13 @@ class Route:
     Parameters
     ----------
     split : str
+        The split that it belongs to, such as "train".
     n_frames : int
+        Number of frames, ten a second.
     all_labelled : bool
         Whether all frames have labels; else the last one alone.
     wishes : Wishes
+        What isn't left to chance.
     """
 
     split: str
@@ -53,19 +56,22 @@ class Route:
 
     @property
     def labelled(self) -> range:
-        """The frames that have labels."""
+        """The numbers of the frames that have labels."""
         return range(0 if self.all_labelled else self.n_frames - 1, self.n_frames)
 
 
 @dataclass(frozen=True)
-class Recipe:
+class DatasetRecipe:
     """What a data set consists of; drives are numbered from 0001 in this order.
 
     Parameters
     ----------
     name : str
+        What the data set is called.
     label_set : str
+        Name of its label set, a key of `LABEL_SETS`.
     routes : tuple of Route
+        Its drives.
     dense : bool
         Whether points come from the depth image, thinned, instead of the LIDAR.
     """
@@ -84,8 +90,8 @@ def _long(split: str, n_frames: int, speed: float, layout: str) -> Route:
 RECIPES = {
     recipe.name: recipe
     for recipe in (
-        Recipe("minikitti", "KITTI-14", (Route("train", 10, False),) * 142 + (Route("test", 10, False),) * 110),
-        Recipe(
+        DatasetRecipe("minikitti", "KITTI-14", (Route("train", 10, False),) * 142 + (Route("test", 10, False),) * 110),
+        DatasetRecipe(
             "minichroma",
             "KITTI-14",
             (
@@ -96,16 +102,16 @@ RECIPES = {
                 _long("test", 65, 9.0, "bend"),
             ),
         ),
-        Recipe(
+        DatasetRecipe(
             "minisynthia",
             "SYNTHIA-10",
             (_long("train", 60, 10.0, "junction"), _long("test", 60, 10.0, "junction")),
             dense=True,
         ),
-        Recipe("sample", "KITTI-14", (Route("drive", 20, True, SAMPLE_WISHES),)),
+        DatasetRecipe("sample", "KITTI-14", (Route("drive", 20, True, SAMPLE_WISHES),)),
     )
 }
-"""Frames and splits as in the paper: KITTI 142 + 110 labelled frames, INRIA-Chroma 146 + 130 in 3 + 2 routes."""
+"""Numbers of frames as in the paper: KITTI 142 + 110 labelled frames, INRIA-Chroma 146 + 130 in 3 + 2 routes."""
 
 DATA_SETS = ("minikitti", "minichroma", "minisynthia")
 """What `semgrid-edu data make all` makes."""
@@ -114,7 +120,7 @@ PACKAGES = ("numpy", "numba", "embreex", "trimesh", "pillow")
 """The packages whose versions can change what a seed gives."""
 
 
-def make(name: str, folder: Path, seed: int = 0, workers: int = 2) -> Path:
+def make_dataset(name: str, folder: Path, seed: int = 0, workers: int = 2) -> Path:
     """Make a data set, or finish one that was interrupted.
 
     The same name and seed give the same bytes, whatever the number of workers and of interruptions.
@@ -124,11 +130,11 @@ def make(name: str, folder: Path, seed: int = 0, workers: int = 2) -> Path:
     name : str
         One of `RECIPES`.
     folder : path-like
-        Where the data set's own folder, `folder`/`name`, goes.
+        Takes the data set's own folder, `folder`/`name`.
     seed : int
-        Not negative.
+        Seed for all drives; not negative.
     workers : int
-        Processes that share the work.
+        Number of processes that share the work, at least one.
 
     Returns
     -------
@@ -138,17 +144,41 @@ def make(name: str, folder: Path, seed: int = 0, workers: int = 2) -> Path:
     Raises
     ------
     ArgumentError
-        When there is no such data set.
+        When there is no such data set, the seed is negative or there is no worker.
     DataError
         When the folder holds something else, or the same with another seed or an older version.
     """
     if name not in RECIPES:
         raise ArgumentError("name", f"one of {', '.join(RECIPES)}", repr(name))
-    return make_recipe(RECIPES[name], folder, seed, workers)
+    return make_from_recipe(RECIPES[name], folder, seed, workers)
 
 
-def make_recipe(recipe: Recipe, folder: Path, seed: int, workers: int) -> Path:
-    """Make a data set of your own; see `make`."""
+def make_from_recipe(recipe: DatasetRecipe, folder: Path, seed: int, workers: int) -> Path:
+    """Make a data set of your own, or finish one that was interrupted.
+
+    Parameters
+    ----------
+    recipe : DatasetRecipe
+        What it consists of.
+    folder : path-like
+        Takes the data set's own folder, which is named like the recipe.
+    seed : int
+        Seed for all drives; not negative.
+    workers : int
+        Number of processes that share the work, at least one.
+
+    Returns
+    -------
+    Path
+        The data set's folder.
+
+    Raises
+    ------
+    ArgumentError
+        When the seed is negative or there is no worker.
+    DataError
+        When the folder holds something else, or the same with another seed or an older version.
+    """
     if seed < 0:
         raise ArgumentError("seed", "a whole number from 0 up", seed)
     if workers < 1:
@@ -169,7 +199,7 @@ def make_recipe(recipe: Recipe, folder: Path, seed: int, workers: int) -> Path:
 
 
 def _claim(root: Path, marker: dict) -> None:
-    """Make the folder ours, or refuse it when it is somebody else's."""
+    """Mark the folder as that of this data set, or refuse it when it holds something else."""
     path = root / "simulation.json"
     if path.exists():
         try:
@@ -185,7 +215,7 @@ def _claim(root: Path, marker: dict) -> None:
 
 
 def _run(work: partial, items: list[int], workers: int) -> Iterator[int]:
-    """Do the work in processes (in this one when one is enough), and tell of each item done."""
+    """Do the work in processes (in this one when one is enough), and yield each item when it is done."""
     if workers == 1 or len(items) < 2:
         for item in items:
             work(item)
@@ -197,7 +227,7 @@ def _run(work: partial, items: list[int], workers: int) -> Iterator[int]:
             yield jobs[future]
 
 
-def _make_drive(recipe: Recipe, root: Path, seed: int, index: int) -> None:
+def _make_drive(recipe: DatasetRecipe, root: Path, seed: int, index: int) -> None:
     """Simulate and write one drive; its random numbers depend on data set, seed and index alone."""
     route = recipe.routes[index]
     own_seed = np.random.SeedSequence([seed, FORMAT, *recipe.name.encode()], spawn_key=(index,))
@@ -206,7 +236,7 @@ def _make_drive(recipe: Recipe, root: Path, seed: int, index: int) -> None:
     write_drive(root, f"{index + 1:04d}", simulated, route.labelled, LABEL_SETS[recipe.label_set], points)
 
 
-def _index(recipe: Recipe, drives: list[str], seed: int) -> dict:
+def _index(recipe: DatasetRecipe, drives: list[str], seed: int) -> dict:
     """Return what dataset.json holds."""
     splits: dict[str, list] = {}
     for drive, route in zip(drives, recipe.routes, strict=True):

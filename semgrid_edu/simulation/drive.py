@@ -1,63 +1,32 @@
-"""One simulated drive: a world, the recording car's way through it, and every frame that its sensors take."""
+"""One simulated drive: a world, the car that drives through it, and every frame that its sensors take."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import transform_points
 from semgrid_edu.frame import LABEL_GRID, Frame
+from semgrid_edu.simulation.frame import SimulatedFrame
 from semgrid_edu.simulation.sensors.camera import Picture, take_picture
 from semgrid_edu.simulation.sensors.gps import Geodesy
 from semgrid_edu.simulation.sensors.lidar import scan
-from semgrid_edu.simulation.sensors.raycast import Instant, Scene
+from semgrid_edu.simulation.sensors.raycast import Instant, RayMesh
 from semgrid_edu.simulation.sensors.rig import Rig
-from semgrid_edu.simulation.sensors.truth import birdseye_kinds, visible_cells, world_cells
-from semgrid_edu.simulation.street.footprints import table
-from semgrid_edu.simulation.street.paths import Ego, Pace, Path
-from semgrid_edu.simulation.street.plan import ANY, Plan, Wishes, draw_plan
+from semgrid_edu.simulation.sensors.truth import BirdseyeTruth, birdseye_kinds, visible_cells, world_cells
+from semgrid_edu.simulation.street.actors import Actor
+from semgrid_edu.simulation.street.ego import Ego
+from semgrid_edu.simulation.street.footprints import footprint_table
+from semgrid_edu.simulation.street.plan import ANY, Wishes, draw_plan
 from semgrid_edu.simulation.street.road_users import fill_street
 from semgrid_edu.simulation.street.scenery import build_scenery
-from semgrid_edu.simulation.street.traffic import Actor, Traffic
+from semgrid_edu.simulation.street.traffic import Traffic
+from semgrid_edu.simulation.street.trajectories import Pace
 
 PERIOD = 0.1
 """Seconds between frames: KITTI's LIDAR turns ten times a second."""
 _VIEW = 110.0
-
-
-@dataclass(frozen=True, eq=False)
-class Truth:
-    """The bird's-eye truth of a frame: `kinds` (710, 310) uint8, members of `Kind`, and `visible` (710, 310) bool."""
-
-    kinds: NDArray[np.uint8]
-    visible: NDArray[np.bool_]
-
-
-@dataclass(frozen=True, eq=False)
-class SimulatedFrame:
-    """One instant of a simulated drive.
-
-    Parameters
-    ----------
-    time : float
-        Seconds since the drive began.
-    T_world_from_lidar : (4, 4) float64
-    picture : Picture
-    points : (N, 4) float32
-        As in `Frame`.
-    truth : Truth or None
-        None where nobody asked for it.
-    objects : list of dict
-        Cars, pedestrians and bicycles in the bird's-eye grid, in the grid frame.
-    """
-
-    time: float
-    T_world_from_lidar: NDArray[np.float64]
-    picture: Picture
-    points: NDArray[np.float32]
-    truth: Truth | None
-    objects: list[dict]
+"""Distance from the recording car, metres, beyond which nothing that moves is seen."""
 
 
 class SimulatedDrive:
@@ -66,63 +35,112 @@ class SimulatedDrive:
     Parameters
     ----------
     seed : int or numpy.random.SeedSequence
+        Seed for everything that is drawn: the world, who is in it, and the noise of the sensors.
     n_frames : int
-        Frames, ten a second.
+        Number of frames, `PERIOD` apart.
     wishes : Wishes
-    rig : Rig
+        What isn't left to chance.
+    rig : Rig, optional
+        The sensors on the recording car; those of the simulated data sets when left out.
+
+    Attributes
+    ----------
+    plan : Plan
+        What the street is like.
+    ego : Ego
+        How the recording car moves.
+    moving, parked : list of Actor
+        The road users; a pedestrian who stands still is among those that move.
     """
 
     def __init__(
         self, seed: int | np.random.SeedSequence, n_frames: int, wishes: Wishes = ANY, rig: Rig | None = None
     ) -> None:
-        self.wishes = wishes
-        self.rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(seed)
         self.n_frames, self.rig = n_frames, rig or Rig()
         duration = (n_frames - 1) * PERIOD
-        pace = _draw_pace(self.rng, wishes.speed)
-        self.plan = draw_plan(self.rng, pace.distance(duration), wishes)
-        self.ego = _draw_ego(self.rng, self.plan, pace, wishes.ego_lane)
-        self.geodesy = Geodesy(
-            49.0 + float(self.rng.uniform(0, 0.05)),
-            8.4 + float(self.rng.uniform(0, 0.05)),
-            114.0,
-            float(self.rng.uniform(-3.1, 3.1)),
-        )
-        builder = build_scenery(self.plan, self.rng)
-        traffic = Traffic(builder, self.plan, self.ego.path, duration)
+        pace = Pace.random(rng, wishes.speed)
+        self.plan = draw_plan(rng, pace.distance(duration), wishes)
+        self.ego = Ego.random(rng, self.plan.road, pace, wishes.ego_lane)
+        self.geodesy = Geodesy.random(rng)
+        builder = build_scenery(self.plan, rng)
+        traffic = Traffic(builder, self.plan, self.ego.trajectory, duration)
         (wishes.cast or fill_street)(traffic)
         self.moving: list[Actor] = traffic.moving
         self.parked: list[Actor] = traffic.parked
-        self.static = Scene.of(builder.shapes, builder.instances)
-        self.static_footprints = table(builder.footprints)
-        self.sensor_seed = self.rng.bit_generator.seed_seq.spawn(1)[0]
+        self.static = RayMesh.of(builder.shapes, builder.instances)
+        self.static_footprints = footprint_table(builder.footprints)
+        self.sensor_seed = rng.bit_generator.seed_seq.spawn(1)[0]
 
     def pose(self, t: float) -> NDArray[np.float64]:
-        """Return T_world_from_lidar (4, 4) at t seconds."""
+        """Return the LIDAR's pose at one instant.
+
+        Parameters
+        ----------
+        t : float
+            Seconds since the drive began.
+
+        Returns
+        -------
+        (4, 4) float64
+            T_world_from_lidar, metres.
+        """
         return self.ego.T_world_from_lidar(t)
 
     def T_world_from_imu(self, t: float) -> NDArray[np.float64]:
-        """Return the IMU's pose (4, 4) at t seconds."""
+        """Return the IMU's pose at one instant.
+
+        Parameters
+        ----------
+        t : float
+            Seconds since the drive began.
+
+        Returns
+        -------
+        (4, 4) float64
+            Metres.
+        """
         return self.pose(t) @ self.rig.T_lidar_from_imu
 
     def instant(self, t: float) -> Instant:
-        """Return the world at t seconds, ready for rays."""
+        """Return the world at one instant, ready for rays.
+
+        Parameters
+        ----------
+        t : float
+            Seconds since the drive began.
+
+        Returns
+        -------
+        Instant
+        """
         road, eye = self.plan.road, self.pose(t)[:2, 3]
-        near = [a for a in self.moving if np.hypot(*(a.path.pose(road, t)[0][:2] - eye)) < _VIEW]
+        near = [a for a in self.moving if np.hypot(*(a.trajectory.pose(road, t)[0][:2] - eye)) < _VIEW]
         if not near:
             return Instant(self.static, None, np.empty((0, 4)))
         shapes = [a.shape(road, t) for a in near]
         boxes = np.array([[shape.vertices.min(axis=0), shape.vertices.max(axis=0)] for shape in shapes], np.float64)
         radii = np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) / 2
         spheres = np.column_stack([boxes.mean(axis=1), radii])
-        return Instant(self.static, Scene.of(shapes, [a.instance for a in near]), spheres)
+        return Instant(self.static, RayMesh.of(shapes, [a.instance for a in near]), spheres)
 
     def T_grid_from_world(self, t: float) -> NDArray[np.float64]:
-        """Return the pose (4, 4) of the world in the grid frame at t seconds."""
+        """Return the transform from the world to the grid frame of one instant.
+
+        Parameters
+        ----------
+        t : float
+            Seconds since the drive began.
+
+        Returns
+        -------
+        (4, 4) float64
+            Metres.
+        """
         return self.rig.T_grid_from_lidar @ np.linalg.inv(self.pose(t))
 
     def velocities(self, t: float) -> dict[int, NDArray[np.float64]]:
-        """Return the velocity over ground of everybody in traffic, by number.
+        """Return the velocity over ground of each road user that isn't parked, by its number.
 
         Parameters
         ----------
@@ -132,42 +150,48 @@ class SimulatedDrive:
         Returns
         -------
         dict of int to (2,) float64
-            m/s in grid axes.
+            Along x and y of the grid frame at that instant, m/s.
         """
         rotation, road = self.T_grid_from_world(t)[:2, :2], self.plan.road
-        return {actor.instance: rotation @ actor.path.velocity(road, t) for actor in self.moving}
+        return {actor.instance: rotation @ actor.trajectory.velocity(road, t) for actor in self.moving}
 
     def objects(self, t: float) -> list[dict]:
-        """Return cars, pedestrians and bicycles that stand in the bird's-eye grid at t seconds."""
-        T_grid_from_world = self.T_grid_from_world(t)
-        road, found = self.plan.road, []
-        for actor in self.parked + self.moving:
-            position, yaw = actor.path.pose(road, t)
-            middle = np.add(position, (0, 0, actor.size[2] / 2))
-            centre = transform_points(T_grid_from_world, middle)
-            if not LABEL_GRID.cells(centre[None])[2][0]:
-                continue
-            velocity = T_grid_from_world[:3, :2] @ actor.path.velocity(road, t)
-            heading = T_grid_from_world[:3, :2] @ [np.cos(yaw), np.sin(yaw)]
-            found.append(
-                {
-                    "id": actor.instance,
-                    "class": actor.kind.name.lower(),
-                    "centre": [round(float(x), 3) for x in centre],
-                    "size": [round(float(x), 3) for x in actor.size],
-                    "yaw": round(float(np.arctan2(heading[1], heading[0])), 4),
-                    "velocity": [round(float(x), 3) for x in velocity[:2]],
-                    "moving": bool(np.hypot(*velocity[:2]) > 0.05),
-                }
-            )
-        return found
+        """Return the cars, pedestrians and bicycles whose centres lie in `LABEL_GRID` at one instant.
+
+        Parameters
+        ----------
+        t : float
+            Seconds since the drive began.
+
+        Returns
+        -------
+        list of dict
+            From `Actor.described`.
+        """
+        road, T, actors = self.plan.road, self.T_grid_from_world(t), self.parked + self.moving
+        centres = [transform_points(T, actor.middle(road, t)) for actor in actors]
+        inside = LABEL_GRID.cells(np.reshape(centres, (-1, 3)))[2]
+        return [actor.described(road, t, T) for actor, held in zip(actors, inside, strict=True) if held]
 
     def footprints(self, t: float) -> NDArray[np.float64]:
-        """Return the footprints of all that stands or moves at t seconds, a `table`."""
-        return np.concatenate([self.static_footprints, table([a.footprint(self.plan.road, t) for a in self.moving])])
+        """Return the footprints of all that stands or moves at one instant.
+
+        Parameters
+        ----------
+        t : float
+            Seconds since the drive began.
+
+        Returns
+        -------
+        (K, 9) float64
+            One row per thing, as from `footprint_table`.
+        """
+        return np.concatenate(
+            [self.static_footprints, footprint_table([a.footprint(self.plan.road, t) for a in self.moving])]
+        )
 
     def birdseye(self, t: float) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
-        """Return what the cells of `LABEL_GRID` hold, seen by anybody or not.
+        """Return what the cells of `LABEL_GRID` hold, whether a sensor sees it or not.
 
         Parameters
         ----------
@@ -185,15 +209,41 @@ class SimulatedDrive:
         kinds, which = birdseye_kinds(world_cells(self.pose(t), self.rig), footprints, self.plan.road)
         return kinds, np.where(which >= 0, footprints[which, 7], 0).astype(np.int32)
 
-    def truth(self, t: float, picture: Picture) -> Truth:
-        """Return the bird's-eye truth at t seconds, of which `picture` was taken."""
+    def truth(self, t: float, picture: Picture) -> BirdseyeTruth:
+        """Return what every cell holds and whether the camera sees it.
+
+        Parameters
+        ----------
+        t : float
+            Seconds since the drive began.
+        picture : Picture
+            What the camera took at that instant.
+
+        Returns
+        -------
+        BirdseyeTruth
+        """
         road, pose = self.plan.road, self.pose(t)
         cells, footprints = world_cells(pose, self.rig), self.footprints(t)
         kinds, which = birdseye_kinds(cells, footprints, road)
-        return Truth(kinds, visible_cells(cells, kinds, which, footprints, road, picture, pose, self.rig.camera))
+        return BirdseyeTruth(
+            kinds, visible_cells(cells, kinds, which, footprints, road, picture, pose, self.rig.camera)
+        )
 
     def frame(self, index: int, labelled: bool) -> SimulatedFrame:
-        """Take one frame; every frame has its own noise, whichever frames were taken before."""
+        """Take one frame. Its noise depends on its number alone, not on which frames were taken before.
+
+        Parameters
+        ----------
+        index : int
+            Number of the frame.
+        labelled : bool
+            Whether to find the bird's-eye truth too.
+
+        Returns
+        -------
+        SimulatedFrame
+        """
         rng = self._noise(index)
         t, road = index * PERIOD, self.plan.road
         instant, pose = self.instant(t), self.pose(t)
@@ -203,45 +253,37 @@ class SimulatedDrive:
         return SimulatedFrame(t, pose, picture, points, truth, self.objects(t))
 
     def scan(self, index: int) -> Frame:
-        """Take one frame without image and labels, fast; the noise of its returns is another than `frame`'s.
+        """Take the LIDAR scan of one frame alone, which is fast. Its noise differs from that of `frame`.
 
         Parameters
         ----------
         index : int
-            Number of the frame, `PERIOD` apart.
+            Number of the frame.
 
         Returns
         -------
         Frame
+            Without image and labels.
         """
         t = index * PERIOD
         points = scan(self.instant(t), self.pose(t), self.rig.lidar, self.plan.road, self._noise(index, 1))
         return Frame(None, points, self.rig.camera, self.pose(t), t)
 
     def _noise(self, *key: int) -> np.random.Generator:
-        """Return a generator of the drive's own for each key."""
+        """Return the drive's own generator for a key, such as the number of a frame."""
         seed = np.random.SeedSequence(self.sensor_seed.entropy, spawn_key=(*self.sensor_seed.spawn_key, *key))
         return np.random.default_rng(seed)
 
     def frames(self, labelled: set[int]) -> Iterator[SimulatedFrame]:
-        """Take all frames, with bird's-eye truth for those in `labelled`."""
-        return (self.frame(k, k in labelled) for k in range(self.n_frames))
+        """Take all frames, one after the other.
 
+        Parameters
+        ----------
+        labelled : set of int
+            Numbers of the frames whose bird's-eye truth is wanted.
 
-def _draw_pace(rng: np.random.Generator, speed: float | None) -> Pace:
-    """Draw how fast the recording car drives: 5 to 14 m/s, now and then 0."""
-    drawn = 0.0 if rng.random() < 0.1 else float(rng.uniform(5, 14))
-    mean = drawn if speed is None else speed
-    swing, phase = float(rng.uniform(0.0, 0.12)) * mean, float(rng.uniform(0, 6.28))
-    return Pace(mean, swing, 0.8, phase)
-
-
-def _draw_ego(rng: np.random.Generator, plan: Plan, pace: Pace, lane: int | None) -> Ego:
-    """Draw the recording car's lane (0: beside the centre line), the outer one more often, and how it sways."""
-    road = plan.road
-    drawn = road.lanes_right - 1 if rng.random() < 0.65 else 0
-    lane = drawn if lane is None else lane
-    d = -(lane + 0.5) * road.lane + float(rng.normal(0, 0.1))
-    sway, phase = float(rng.uniform(0.02, 0.1)), float(rng.uniform(0, 6.28))
-    roll, pitch = (float(x) for x in np.radians(rng.uniform(0.05, 0.2, 2)))
-    return Ego(road, Path(0.0, d, 1.0, 0.0, pace), sway, roll, pitch, phase)
+        Yields
+        ------
+        SimulatedFrame
+        """
+        yield from (self.frame(k, k in labelled) for k in range(self.n_frames))

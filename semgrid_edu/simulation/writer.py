@@ -1,4 +1,4 @@
-"""Writes a simulated drive in KITTI's raw layout, whole or not at all."""
+"""Simulated drives on disk: KITTI's raw layout, each drive written whole or not at all."""
 
 import io
 import json
@@ -14,31 +14,32 @@ from PIL import Image
 from semgrid_edu.datasets.kitti_labels import DEPTH_UNIT
 from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.labels import KITTI_14, LabelSet
-from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive, SimulatedFrame
-from semgrid_edu.simulation.sensors.gps import DATAFORMAT, packet
+from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive
+from semgrid_edu.simulation.frame import SimulatedFrame
+from semgrid_edu.simulation.sensors.gps import DATAFORMAT, oxts_packet
 from semgrid_edu.simulation.sensors.rig import Rig
 from semgrid_edu.simulation.things.materials import class_of_kind
 from semgrid_edu.storage.files import write_text
 
 DATE = "2026_01_01"
-"""The day of all simulated drives."""
+"""The day on which all simulated drives take place."""
 
 
 def _row(name: str, numbers: NDArray | tuple) -> str:
     return f"{name}: " + " ".join(f"{x:.12e}" for x in np.ravel(numbers)) + "\n"
 
 
-def write_calibration(root: Path, rig: Rig, date: str = DATE) -> None:
-    """Write KITTI's three calibration files. The cameras are ideal: no distortion, rotated alike.
+def write_calibration(root: Path, rig: Rig) -> None:
+    """Write KITTI's three calibration files. The cameras are ideal: they have no distortion and look in one direction.
 
     Parameters
     ----------
     root : path-like
-        The folder that holds the day's folder.
+        The folder that takes the day's folder.
     rig : Rig
-    date : str
+        Where camera, LIDAR and IMU stand.
     """
-    day, time = Path(root) / date, "calib_time: 01-Jan-2026 09:00:00\n"
+    day, time = Path(root) / DATE, "calib_time: 01-Jan-2026 09:00:00\n"
     height, width = rig.image_size
     text = time + _row("corner_dist", (0.0995,))
     for index in range(4):
@@ -61,7 +62,7 @@ def _stamp(start: datetime, seconds: float) -> str:
 
 
 def _write_times(folder: Path, n_frames: int, start: datetime) -> None:
-    """Write timestamps. Camera, LIDAR and IMU read at one instant, the middle of the LIDAR's turn."""
+    """Write timestamps: camera, LIDAR and IMU all take a frame at the middle of the LIDAR's turn."""
     offsets = {"image_02/timestamps": 0.0, "oxts/timestamps": 0.0, "velodyne_points/timestamps": 0.0}
     offsets |= {"velodyne_points/timestamps_start": -PERIOD / 2, "velodyne_points/timestamps_end": PERIOD / 2}
     for name, offset in offsets.items():
@@ -70,7 +71,7 @@ def _write_times(folder: Path, n_frames: int, start: datetime) -> None:
 
 
 def _save_png(path: Path, pixels: NDArray) -> None:
-    """Write a PNG at the level of compression where size hardly gains on time."""
+    """Write a PNG, at a level of compression above which files hardly get smaller but take longer."""
     buffer = io.BytesIO()
     Image.fromarray(pixels).save(buffer, format="png", compress_level=4)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -78,24 +79,42 @@ def _save_png(path: Path, pixels: NDArray) -> None:
 
 
 def depth_to_png(depth: NDArray) -> NDArray[np.uint16]:
-    """Return metres as KITTI's depth maps hold them: times 256, 0 for none, nothing beyond 255 m."""
+    """Return depths as KITTI's depth maps hold them: times 256, 0 for none and for what lies 256 m away or farther.
+
+    Parameters
+    ----------
+    depth : (h, w) float
+        Metres along the optical axis; NaN for none.
+
+    Returns
+    -------
+    (h, w) uint16
+        In steps of `DEPTH_UNIT`.
+    """
     scaled = np.round(np.nan_to_num(depth, nan=0.0) / DEPTH_UNIT)
     return np.where(scaled < 65536, scaled, 0).astype(np.uint16)
 
 
 def _write_labels(folder: Path, name: str, frame: SimulatedFrame, label_set: LabelSet) -> None:
     """Write what is true of one frame."""
-    table = class_of_kind(label_set)
-    _save_png(folder / "image" / f"{name}.png", table[frame.picture.kind])
+    classes = class_of_kind(label_set)
+    _save_png(folder / "image" / f"{name}.png", classes[frame.picture.kind])
     _save_png(folder / "depth" / f"{name}.png", depth_to_png(frame.picture.depth))
-    _save_png(folder / "birdseye" / f"{name}.png", table[frame.truth.kinds])
+    _save_png(folder / "birdseye" / f"{name}.png", classes[frame.truth.kinds])
     _save_png(folder / "visible" / f"{name}.png", frame.truth.visible.astype(np.uint8) * 255)
 
 
 def depth_as_points(frame: SimulatedFrame, rig: Rig) -> NDArray[np.float32]:
     """Return the depth image thinned to a LIDAR's sparsity and carried back to 3-D (section 4: SYNTHIA).
 
-    Every fourth row and second column within 80 m; reflectance 0, for a depth image has none.
+    Every fourth row and every second column is kept, up to 80 m. The reflectance is 0, because a depth image has none.
+
+    Parameters
+    ----------
+    frame : SimulatedFrame
+        The frame, with its picture.
+    rig : Rig
+        Where the camera stands.
 
     Returns
     -------
@@ -112,7 +131,20 @@ def depth_as_points(frame: SimulatedFrame, rig: Rig) -> NDArray[np.float32]:
 
 
 def lidar_points(frame: SimulatedFrame, rig: Rig) -> NDArray[np.float32]:
-    """Return the LIDAR's points, (N, 4) float32."""
+    """Return the points of the LIDAR.
+
+    Parameters
+    ----------
+    frame : SimulatedFrame
+        The frame, with its points.
+    rig : Rig
+        Not used: `write_drive` calls this as it calls `depth_as_points`.
+
+    Returns
+    -------
+    (N, 4) float32
+        x, y, z in the LIDAR frame, metres, and reflectance 0..1.
+    """
     return frame.points
 
 
@@ -126,21 +158,22 @@ def write_drive(
 ) -> Path:
     """Write a drive: images, points, oxts, timestamps, and labels of some frames.
 
-    It grows in a hidden folder and gets its name when it is whole, so a killed process leaves no half drive.
+    It grows in a hidden folder, which gets its name when the drive is whole. So a killed process leaves no half drive.
 
     Parameters
     ----------
     root : path-like
-        The folder that holds the day's folder; `write_calibration` belongs to it.
+        The folder that holds the day's folder, into which `write_calibration` writes too.
     drive : str
-        Four digits.
+        Number of the drive, four digits.
     simulated : SimulatedDrive
+        The drive.
     labelled : collection of int
-        Frames that get labels.
+        Numbers of the frames that get labels.
     label_set : LabelSet
-        What the label numbers mean.
+        The classes of the labels.
     points : callable
-        What to write as LIDAR points: `lidar_points` or `depth_as_points`.
+        What is written as LIDAR points: `lidar_points` or `depth_as_points`.
 
     Returns
     -------
@@ -157,7 +190,7 @@ def write_drive(
         name = f"{k:010d}"
         _save_png(partial / "image_02" / "data" / f"{name}.png", frame.picture.image)
         (partial / "velodyne_points" / "data" / f"{name}.bin").write_bytes(points(frame, simulated.rig).tobytes())
-        oxts = packet(simulated.T_world_from_imu, frame.time, simulated.geodesy)
+        oxts = oxts_packet(simulated.T_world_from_imu, frame.time, simulated.geodesy)
         (partial / "oxts" / "data" / f"{name}.txt").write_text(oxts)
         objects[name] = frame.objects
         if k in labelled:

@@ -1,4 +1,4 @@
-"""Files written whole or not at all, and their checksums."""
+"""Files that are written whole or not at all, and their checksums."""
 
 import hashlib
 import json
@@ -13,10 +13,10 @@ from semgrid_edu.errors import DataError
 
 @contextmanager
 def atomic_path(path: str | Path) -> Iterator[Path]:
-    """Give a temporary path beside `path`; rename it to `path` when the block ends well.
+    """Yield a temporary path beside `path`, which is renamed to `path` when the block ends well.
 
-    Readers see the old file or the new one, never half of one; a block that raises, or is killed, leaves
-    the old file as it was.
+    So readers see the old file or the new one, never half of one. When the block raises, or the process is killed, the
+    old file stays as it was.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     Yields
     ------
     Path
-        Where to write. It keeps the suffix of `path`, so writers that choose a format by suffix work.
+        Where to write. It has the suffix of `path`, for writers that choose a format by the suffix.
 
     Examples
     --------
@@ -53,12 +53,12 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def named_errors(path: str | Path) -> Iterator[None]:
-    """Let the system's errors that name no file name this one: a full disk doesn't say what it has no space for.
+    """Add the name of a file to errors of the system that come without one, such as that of a full disk.
 
     Parameters
     ----------
     path : path-like
-        The file that is written inside.
+        The file that the block writes.
     """
     try:
         yield
@@ -68,7 +68,7 @@ def named_errors(path: str | Path) -> Iterator[None]:
 
 
 def check_writable(path: str | Path) -> None:
-    """Refuse a file that can't be written before long work is done whose result would be lost.
+    """Check that a file can be written, before long work starts whose result would be lost otherwise.
 
     Parameters
     ----------
@@ -90,22 +90,52 @@ def check_writable(path: str | Path) -> None:
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:
-    """Write `content` to `path` atomically."""
+    """Write bytes to a file, atomically.
+
+    Parameters
+    ----------
+    path : path-like
+        The file to write; its folder is made when missing.
+    content : bytes
+        All that the file is to hold.
+    """
     with atomic_path(path) as temporary:
         temporary.write_bytes(content)
 
 
 def write_text(path: str | Path, content: str) -> None:
-    """Write `content` to `path` atomically, as UTF-8 with unix line ends."""
+    """Write text to a file, atomically, as UTF-8 with unix line ends.
+
+    Parameters
+    ----------
+    path : path-like
+        The file to write; its folder is made when missing.
+    content : str
+        All that the file is to hold.
+    """
     write_bytes(path, content.encode())
 
 
 def write_json(path: str | Path, content: object) -> None:
-    """Write `content` to `path` atomically, as JSON that a person can read and git can compare."""
+    """Write an object to a file, atomically, as JSON that a person can read and git can compare.
+
+    Parameters
+    ----------
+    path : path-like
+        The file to write; its folder is made when missing.
+    content : object
+        Whatever JSON can hold.
+    """
     write_text(path, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
 
 
 def sha256(path: str | Path) -> str:
-    """Return the SHA-256 of a file's bytes, in hexadecimal."""
+    """Return the SHA-256 of a file's bytes, in hexadecimal.
+
+    Parameters
+    ----------
+    path : path-like
+        The file to read.
+    """
     with Path(path).open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,4 +1,4 @@
-"""Provenance: which command, seed and versions made a result, and the checksums that prove it unchanged."""
+"""Provenance: the command, seed and versions that made a result, and checksums that show whether it was changed."""
 
 import json
 import platform
@@ -12,7 +12,17 @@ FILE_NAME = "provenance.json"
 
 
 def versions(*packages: str) -> dict[str, str]:
-    """Return the versions of Python, semgrid_edu and the named packages.
+    """Return the versions of Python, semgrid_edu and other packages.
+
+    Parameters
+    ----------
+    *packages : str
+        Names of the other packages.
+
+    Returns
+    -------
+    dict of str to str
+        The version of each by its name.
 
     Examples
     --------
@@ -28,16 +38,16 @@ def write_provenance(folder: str | Path, command: str, seed: int, packages: tupl
     Parameters
     ----------
     folder : path-like
-        The folder; all files below it are recorded with their SHA-256, but for `cache/`, which is made of them, and
-        hidden ones, such as an atomic write leaves that was killed.
+        The folder. All files below it are recorded with their SHA-256, except those in `cache/`, which can be made
+        anew, and hidden ones, which an atomic write leaves when it is killed.
     command : str
-        The command that made them.
+        The command that made the files.
     seed : int
-        The seed it ran with.
+        The seed that the command ran with.
     packages : tuple of str
-        The packages whose versions matter to the result.
+        Names of the packages whose versions can change the result.
     **details
-        What else a reader should know: a date, a duration, scores. Anything that JSON can hold.
+        What else a reader should know, such as a date, a duration or scores: whatever JSON can hold.
     """
     folder = Path(folder)
     write_json(
@@ -52,6 +62,7 @@ def provenance_problems(folder: str | Path) -> list[str]:
     Parameters
     ----------
     folder : path-like
+        A folder with a `provenance.json`.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Files read whole and checked: bytes, text and PNG images, with errors that name the file."""
+"""Files that are read whole and checked: bytes, text and PNG images, with errors that name the file."""
 
 import io
 from pathlib import Path
@@ -10,11 +10,16 @@ from PIL import Image
 from semgrid_edu.errors import DataError
 
 PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
-"""The chunk that ends every PNG; decoders are content without it."""
+"""The chunk that ends every PNG; decoders don't miss it in a file that was cut short."""
 
 
 def read_bytes(path: Path) -> bytes:
     """Return a file's bytes.
+
+    Parameters
+    ----------
+    path : Path
+        The file to read.
 
     Raises
     ------
@@ -35,10 +40,15 @@ def read_bytes(path: Path) -> bytes:
 def read_text(path: Path) -> str:
     """Return a file's text.
 
+    Parameters
+    ----------
+    path : Path
+        The file to read: ASCII, as all of KITTI's text files are.
+
     Raises
     ------
     DataError
-        As `read_bytes`, and when the bytes aren't ASCII, as everything that KITTI writes is.
+        When the file is missing, can't be opened, is empty or isn't ASCII.
     """
     try:
         return read_bytes(path).decode("ascii")
@@ -54,9 +64,9 @@ def parse_numbers(path: Path, text: str, what: str) -> NDArray[np.float64]:
     path : Path
         Where the text comes from, for the error.
     text : str
-        Numbers with spaces between.
+        Numbers with spaces between them.
     what : str
-        What they are, for the error.
+        What the numbers are, for the error.
 
     Returns
     -------
@@ -79,15 +89,16 @@ def parse_numbers(path: Path, text: str, what: str) -> NDArray[np.float64]:
 def read_png(path: Path, mode: str, size: tuple[int, int] | None) -> NDArray:
     """Return the pixels of a PNG.
 
-    Every chunk's checksum is verified: a decoder alone may return half a picture without a word.
+    The checksum of every chunk is verified, because a decoder alone may return half a picture without an error.
 
     Parameters
     ----------
     path : Path
+        The file to read.
     mode : str
         Pillow's name of the pixel format: "RGB", "L" (8 bits) or "I;16".
     size : (int, int) or None
-        Height and width that the image must have, pixels; None where nobody knows.
+        Height and width that the image must have, pixels; None where any size will do.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Named tensors on disk: safetensors files with a header of strings, written whole or not at all."""
+"""Named tensors on disk: safetensors files with a header of strings, which are written whole or not at all."""
 
 from pathlib import Path
 
@@ -11,21 +11,23 @@ from semgrid_edu.storage.files import write_bytes
 
 
 def write_tensors(path: str | Path, tensors: dict[str, Tensor], header: dict[str, str] | None = None) -> None:
-    """Write tensors, and what a reader should know of them, to one file, atomically.
+    """Write tensors, and what a reader should know about them, to one file, atomically.
 
     Parameters
     ----------
     path : path-like
-        A safetensors file.
+        The safetensors file to write; its folder is made when missing.
     tensors : dict of str to Tensor
-        Contiguous, on the CPU.
+        Tensors by name, contiguous and on the CPU.
     header : dict of str to str, optional
-        The order of several entries isn't fixed: with one at most, the same tensors give the same bytes.
+        What a reader should know. With more than one entry, the same tensors may give other bytes, because safetensors
+        doesn't fix the order of the entries.
 
     Raises
     ------
     OSError
-        Names the file, as when the disk is full; `path` is then as it was.
+        When the file can't be written, for example because the disk is full. The error names the file, which stays as
+        it was.
     """
     write_bytes(path, save(tensors, metadata=header))
 
@@ -36,12 +38,14 @@ def read_tensors(path: str | Path) -> tuple[dict[str, str], dict[str, Tensor]]:
     Parameters
     ----------
     path : path-like
+        The safetensors file to read.
 
     Returns
     -------
     header : dict of str to str
         Empty when the file has none.
     tensors : dict of str to Tensor
+        Tensors by name, on the CPU.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Worker processes that share the work on the drives of a data set and leave nothing behind (section 4)."""
+"""Worker processes that share the work on the drives of a data set, and end with the process that started them."""
 
 import os
 import threading
@@ -10,19 +10,19 @@ from multiprocessing import get_context, parent_process
 
 @contextmanager
 def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Give a pool of processes; what waits in it is dropped when the block raises.
+    """Yield a pool of processes. When the block raises, work that hasn't begun is dropped.
 
-    The processes are spawned: forked ones would inherit the threads' locks of torch and numba, and hang.
+    The processes are spawned. Forked ones would inherit the locks of torch's and numba's threads, and hang.
 
     Parameters
     ----------
     workers : int
-        How many processes.
+        Number of processes.
 
     Yields
     ------
     concurrent.futures.ProcessPoolExecutor
-        Its processes end with the block, and with this process when that is killed.
+        Its processes end with the block, or when this process is killed.
     """
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_end_with_parent) as pool:
         try:

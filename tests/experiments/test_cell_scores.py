@@ -1,12 +1,12 @@
-"""Scores of occupancy filters, on truths made by hand."""
+"""CellScores of occupancy filters, on truths made by hand."""
 
 import numpy as np
 import pytest
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.experiments.cell_scores import Estimate, Scores, groups
+from semgrid_edu.experiments.cell_scores import CellScores, Estimate, hit_cell_groups
 from semgrid_edu.experiments.cell_truth import CellTruth, pool_truth
-from semgrid_edu.experiments.scenes import Past, Scene
+from semgrid_edu.experiments.scenes import KnownScene, SceneHistory
 from semgrid_edu.frame import LABEL_GRID, Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.illustrations.boxes import Box, cells_in, scan_boxes
@@ -23,7 +23,7 @@ def row(*values) -> np.ndarray:
     return np.array([values])
 
 
-def scene(**changes) -> Scene:
+def scene(**changes) -> KnownScene:
     velocity = np.zeros((2, 1, 5), np.float32)
     velocity[0, 0, 2:] = 10.0
     truth = CellTruth(
@@ -40,7 +40,7 @@ def scene(**changes) -> Scene:
         "left": row(1, 0, 0, 0, 0) > 0,
         "in_view": {7: 15},
     }
-    return Scene(frame, PlanarMotion(), truth, **(parts | changes))
+    return KnownScene(frame, PlanarMotion(), truth, **(parts | changes))
 
 
 def belief() -> Belief:
@@ -55,7 +55,7 @@ def belief() -> Belief:
 
 @pytest.fixture
 def summary() -> dict:
-    scores = Scores(ROW)
+    scores = CellScores(ROW)
     scores.add(scene(), Estimate.of_belief(belief()))
     return scores.summary()
 
@@ -67,7 +67,7 @@ def test_the_confusion_counts_observed_cells_and_cells_never_seen(summary):
 
 
 def test_a_cell_that_was_seen_once_and_is_hidden_now_counts_nowhere():
-    scores = Scores(ROW)
+    scores = CellScores(ROW)
     scores.add(scene(never_seen=np.zeros((1, 5), bool)), Estimate.of_belief(belief()))
     assert scores.confusion.sum() == 4
 
@@ -86,13 +86,13 @@ def test_hit_cells_are_divided_by_what_is_in_them(summary):
 
 @pytest.mark.parametrize(("frames", "cells"), [(14, 0), (15, 2)])
 def test_what_moves_counts_from_1_5_seconds_in_view_on(frames, cells):
-    found = dict(groups(scene(in_view={7: frames}), ROW))
+    found = dict(hit_cell_groups(scene(in_view={7: frames}), ROW))
     assert found["moving cars, to 25 m"].sum() == cells
 
 
 def test_smear_is_what_is_held_occupied_where_something_has_left(summary):
     assert summary["smear"] == {"cells": 1, "occupied": 0.0}
-    scores = Scores(ROW)
+    scores = CellScores(ROW)
     scores.add(scene(), Estimate.of_log_odds(np.full((1, 5), 0.97)))
     assert scores.summary()["smear"]["occupied"] == 1.0
 
@@ -105,7 +105,7 @@ def test_a_log_odds_grid_calls_static_what_is_occupied_and_unknown_what_is_undec
 
 
 def test_scores_of_nothing_are_none():
-    summary = Scores(ROW).summary()
+    summary = CellScores(ROW).summary()
     assert summary["accuracy"] is summary["dynamic"]["precision"] is summary["smear"]["occupied"] is None
 
 
@@ -130,9 +130,9 @@ def test_a_cell_takes_what_covers_most_of_it_ground_left_aside():
 CELLS = GridSpec(0, 20, -5, 5, 0.5)
 
 
-def crossing(steps: int) -> list[Scene]:
+def crossing(steps: int) -> list[KnownScene]:
     """Return the scenes of a box that crosses 10 m ahead to the left at 5 m/s, and hides what is behind it."""
-    past, seen = Past(CELLS, SensorModel()), []
+    past, seen = SceneHistory(CELLS, SensorModel()), []
     for k in range(steps):
         box = Box.around(10.0, -4.0 + 0.5 * k, 1.0, 1.0, 1.6)
         points = scan_boxes([box, Box(16, 17, -5, 5, 2.0)], columns=720)

@@ -9,17 +9,16 @@ import pytest
 import semgrid_edu
 from semgrid_edu.cli import run
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.cell_scores import Estimate, Scores
-from semgrid_edu.experiments.occupancy import GRIDS, LIDARS, METHODS, compare, table
-from semgrid_edu.experiments.scenes import scenes
+from semgrid_edu.experiments.cell_scores import CellScores, Estimate
+from semgrid_edu.experiments.occupancy import GRIDS, LIDARS, METHODS, compare_filters, occupancy_table
+from semgrid_edu.experiments.scenes import known_scenes
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Cmcdot, SensorModel
 from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.simulation.sensors.rig import Rig
-from semgrid_edu.simulation.street.paths import STAND, Pace
-from semgrid_edu.simulation.street.paths import Path as Way
 from semgrid_edu.simulation.street.plan import Wishes
 from semgrid_edu.simulation.street.traffic import Traffic
+from semgrid_edu.simulation.street.trajectories import STAND, Pace, Trajectory
 from semgrid_edu.simulation.things.cars import car_size
 from semgrid_edu.simulation.things.materials import Kind
 
@@ -32,7 +31,7 @@ def people_and_parked_cars(traffic: Traffic) -> None:
     road = traffic.road
     for side, sign in ((road.left, 1), (road.right, -1)):
         for s in (8.0, 14.0, 20.0, 26.0):
-            way = Way(s, sign * (side.edge - 1.06), 1, 0, STAND)
+            way = Trajectory(s, sign * (side.edge - 1.06), 1, 0, STAND)
             traffic.park(Kind.CAR, car_size("estate"), way, ("estate", (0.3, 0.3, 0.3)))
         for s, along in ((10.0, 1), (16.0, -1), (21.0, 1), (24.0, -1)):
             traffic.walk(s, sign * (side.edge + side.strip + side.walk / 2), along, 0, Pace(1.4))
@@ -45,8 +44,8 @@ def hits() -> dict:
     styles, borders = ("town", "town"), ("hedge", "hedge")
     wishes = Wishes("straight", (1, 1), styles, borders, (True, True), speed=3.0, cast=people_and_parked_cars)
     drive = SimulatedDrive(0, 20, wishes, Rig(lidar=LIDARS["HDL-64E"]))
-    tracker, scores = Cmcdot(GridSpec.paper(), seed=0), Scores(GridSpec.paper())
-    for scene in scenes(drive, GridSpec.paper(), SensorModel()):
+    tracker, scores = Cmcdot(GridSpec.paper(), seed=0), CellScores(GridSpec.paper())
+    for scene in known_scenes(drive, GridSpec.paper(), SensorModel()):
         belief = tracker.step(scene.frame.points_grid, scene.motion, PERIOD)
         scores.add(scene, Estimate.of_belief(belief))
     return scores.summary()["hit cells"]
@@ -74,24 +73,24 @@ def test_the_committed_comparison_says_the_same_of_all_its_drives(lidar, grid):
 
 def test_the_command_writes_what_compare_returns_and_prints_it_as_a_table(tmp_path, monkeypatch, capsys):
     out = tmp_path / "occupancy.json"
-    monkeypatch.setattr("semgrid_edu.experiments.occupancy.compare", partial(compare, frames=2))
+    monkeypatch.setattr("semgrid_edu.experiments.occupancy.compare_filters", partial(compare_filters, frames=2))
     arguments = ["reproduce", "occupancy", "--seed", "1", "--drives", "2", "--grid", "compact", "--out", str(out)]
     monkeypatch.setattr("sys.argv", ["semgrid-edu", *arguments])
     with pytest.raises(SystemExit, match="0"):
         run()
     written = json.loads(out.read_text())
-    again = compare(seed=1, drives=2, grids=("compact",), frames=2)
+    again = compare_filters(seed=1, drives=2, grids=("compact",), frames=2)
     assert written["scores"] == again["scores"]
     assert (
         written["command"] == again["command"] == "semgrid-edu reproduce occupancy --seed 1 --drives 2 --grid compact"
     )
     printed = capsys.readouterr().out
-    assert table(written, "HDL-64E", "compact") in printed
-    assert table(written, "coarse", "compact") in printed
+    assert occupancy_table(written, "HDL-64E", "compact") in printed
+    assert occupancy_table(written, "coarse", "compact") in printed
 
 
 def test_a_table_has_one_column_a_method():
-    lines = table(json.loads(COMMITTED.read_text())).splitlines()
+    lines = occupancy_table(json.loads(COMMITTED.read_text())).splitlines()
     assert [cell.strip() for cell in lines[0].split("|")[2:-1]] == list(METHODS)
     assert {line.count("|") for line in lines} == {2 + len(METHODS)}
     assert len({len(line) for line in lines}) == 1
@@ -109,4 +108,4 @@ def test_an_unknown_grid_is_refused(monkeypatch):
 )
 def test_nothing_to_do_is_refused_by_name(bad, name):
     with pytest.raises(ArgumentError, match=name):
-        compare(**bad)
+        compare_filters(**bad)

@@ -46,7 +46,7 @@ def test_accuracy_is_of_labelled_cells_in_either_mode(streets):
     streets[0].truth[:3] = IGNORE
     before = {name: tensor.clone() for name, tensor in net.state_dict().items()}
     image, occupancy, truth = (torch.stack([getattr(s, n) for s in streets]) for n in ("image", "occupancy", "truth"))
-    found = [overfit.accuracy(net, streets, training) for training in (False, True)]
+    found = [overfit.network_accuracy(net, streets, training) for training in (False, True)]
     assert not net.training
     assert all(torch.equal(before[name], tensor) for name, tensor in net.state_dict().items())
     labelled = truth != IGNORE

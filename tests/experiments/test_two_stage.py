@@ -14,7 +14,7 @@ QUICK = TrainingParams(image_iterations=1, grid_iterations=1, batch_size=2)
 @pytest.fixture(scope="module")
 def compared(tmp_path_factory):
     root = write_tiny_dataset(tmp_path_factory.mktemp("tiny"))
-    return root, two_stage.compare(root, root / "runs", 1, QUICK)
+    return root, two_stage.compare_training(root, root / "runs", 1, QUICK)
 
 
 def test_both_start_from_the_same_image_network_and_one_keeps_it(compared):
@@ -41,7 +41,7 @@ def test_what_has_ended_is_not_trained_again(compared, monkeypatch):
         raise AssertionError("trained again")
 
     monkeypatch.setattr(two_stage, "train_network", fail)
-    assert two_stage.compare(root, root / "runs", 1, QUICK)["scores"] == result["scores"]
+    assert two_stage.compare_training(root, root / "runs", 1, QUICK)["scores"] == result["scores"]
 
 
 def test_what_was_interrupted_goes_on(compared, monkeypatch):
@@ -57,7 +57,7 @@ def test_what_was_interrupted_goes_on(compared, monkeypatch):
         (folder / CHECKPOINT).unlink(missing_ok=True)
 
     monkeypatch.setattr(two_stage, "train_network", ended)
-    two_stage.compare(root, root / "runs", 1, QUICK)
+    two_stage.compare_training(root, root / "runs", 1, QUICK)
     assert resumed == {"end-to-end-0": (True, False), "two-stage-0": (False, True)}
 
 
@@ -79,6 +79,6 @@ def test_the_table_gives_mean_and_range_in_per_cent():
         metrics = dict.fromkeys(two_stage.METRICS, accuracy)
         return {"grid": {"all": metrics, "semantic": metrics}, "image": {"all": metrics}}
 
-    lines = two_stage.table({"end-to-end": [run(0.5), run(0.7)]}).splitlines()
+    lines = two_stage.two_stage_table({"end-to-end": [run(0.5), run(0.7)]}).splitlines()
     assert len(lines) == 4
     assert all(line.count("60.0 (50.0-70.0)") == 3 for line in lines[1:])

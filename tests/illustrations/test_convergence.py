@@ -3,11 +3,18 @@
 import numpy as np
 
 from semgrid_edu.illustrations.boxes import cells_in
-from semgrid_edu.illustrations.convergence import SPEC, cars, convergence, evidence_of, run_bof, run_cmcdot
+from semgrid_edu.illustrations.convergence import (
+    SPEC,
+    evidence_of,
+    measure_convergence,
+    passing_cars,
+    run_bof,
+    run_cmcdot,
+)
 
 
 def test_errors_fall_like_one_over_the_root_of_the_number_of_particles():
-    found = convergence([4_000, 16_000, 64_000], seeds=range(20))
+    found = measure_convergence([4_000, 16_000, 64_000], seeds=range(20))
     assert found.dynamic[-1] < 0.02
     assert found.velocity[-1] < 0.1
     assert all(-0.65 < slope < -0.35 for slope in found.slopes)
@@ -15,7 +22,7 @@ def test_errors_fall_like_one_over_the_root_of_the_number_of_particles():
 
 def test_the_exact_filter_finds_both_cars():
     *_, (dynamic, velocity) = run_bof()
-    for car, expected in zip(cars(6), (8, -8), strict=True):
+    for car, expected in zip(passing_cars(6), (8, -8), strict=True):
         inside = cells_in(car, SPEC)
         assert (dynamic[inside] > 0.9).all()
         assert np.abs(velocity[:, inside] - np.array([[expected], [0]])).max() < 0.5
@@ -28,7 +35,7 @@ def test_the_same_seed_gives_the_same_bits():
 
 
 def test_evidence_is_of_the_cars_alone():
-    evidence = evidence_of(cars(2))
+    evidence = evidence_of(passing_cars(2))
     hit = evidence.occupied > evidence.free
-    assert np.array_equal(hit, cells_in(cars(2)[0], SPEC) | cells_in(cars(2)[1], SPEC))
+    assert np.array_equal(hit, cells_in(passing_cars(2)[0], SPEC) | cells_in(passing_cars(2)[1], SPEC))
     assert hit.sum() == 2 * 4 * 2

@@ -8,8 +8,8 @@ import torch
 from torch import nn
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.illustrations.pole_nets import PoleNet, draw_poles, learn, score
-from semgrid_edu.illustrations.thin_pole import MECHANISMS, carry, place_and_width
+from semgrid_edu.illustrations.pole_nets import PoleNet, draw_poles, score_poles, train_pole_net
+from semgrid_edu.illustrations.thin_pole import MECHANISMS, apply_mechanism, place_and_width
 
 
 @pytest.fixture(autouse=True)
@@ -40,7 +40,7 @@ def _pole(column, shape=(16, 24)):
     ],
 )
 def test_where_the_pole_ends_up_and_how_wide(mechanism, offsets, widths, column):
-    row = carry(_pole(column), mechanism)[8]
+    row = apply_mechanism(_pole(column), mechanism)[8]
     assert place_and_width(row) == (column + offsets[column % 4], widths[column % 4])
 
 
@@ -48,28 +48,28 @@ def test_two_kernels_make_a_pyramid():
     """(1, 2, 1)/4 and, with holes, (1, 0, 2, 0, 1)/4 one after the other."""
     expected = np.zeros(24)
     expected[6:13] = np.array([1, 2, 3, 4, 3, 2, 1]) / 16
-    np.testing.assert_allclose(carry(_pole(9), "atrous")[8], expected)
+    np.testing.assert_allclose(apply_mechanism(_pole(9), "atrous")[8], expected)
 
 
 def test_holes_keep_what_strides_would_have_given():
     image = np.random.default_rng(0).random((16, 24))
-    np.testing.assert_allclose(carry(image, "strided")[::4, ::4], carry(image, "atrous")[::4, ::4])
+    np.testing.assert_allclose(apply_mechanism(image, "strided")[::4, ::4], apply_mechanism(image, "atrous")[::4, ::4])
 
 
 def test_indices_leave_fifteen_pixels_of_sixteen_empty():
     """Each window's maximum is where it was, and nothing else is: a pole becomes a dotted line."""
     image = np.random.default_rng(0).random((16, 24))
-    unpooled = carry(image, "indices")
+    unpooled = apply_mechanism(image, "indices")
     windows = unpooled.reshape(4, 4, 6, 4)
     assert ((windows > 0).sum(axis=(1, 3)) == 1).all()
     np.testing.assert_array_equal(unpooled[unpooled > 0], image[unpooled > 0])
     np.testing.assert_array_equal(windows.max(axis=(1, 3)), image.reshape(4, 4, 6, 4).max(axis=(1, 3)))
-    assert carry(_pole(9), "indices")[:, 9].tolist() == [1, 0, 0, 0] * 4
+    assert apply_mechanism(_pole(9), "indices")[:, 9].tolist() == [1, 0, 0, 0] * 4
 
 
 def test_of_two_poles_in_a_window_indices_keep_one():
     both = _pole(9) + 0.5 * _pole(10)
-    assert np.flatnonzero(carry(both, "indices").any(axis=0)).tolist() == [9]
+    assert np.flatnonzero(apply_mechanism(both, "indices").any(axis=0)).tolist() == [9]
 
 
 def test_half_a_maximum_is_still_within():
@@ -114,35 +114,35 @@ def test_poles_are_thin_and_walls_wide():
 def test_scores_by_hand():
     truth = [[[0, 1, 0, 0], [0, 1, 0, 0], [0, 0, 0, 0]], [[0, 0, 1, 1], [0, 0, 0, 0], [0, 0, 0, 0]]]
     called = [[[0, 1, 1, 0], [0, 0, 0, 0], [1, 0, 0, 0]], [[0, 0, 1, 1], [0, 0, 0, 0], [0, 0, 0, 0]]]
-    assert score(called, truth) == pytest.approx((3 / 6, 1 / 3, 2, 1.5, 0.25))
-    assert score(truth, truth) == (1, 0, 4 / 3, 4 / 3, 0)
-    missed = score(np.zeros_like(truth), truth)
+    assert score_poles(called, truth) == pytest.approx((3 / 6, 1 / 3, 2, 1.5, 0.25))
+    assert score_poles(truth, truth) == (1, 0, 4 / 3, 4 / 3, 0)
+    missed = score_poles(np.zeros_like(truth), truth)
     assert missed[:2] == (0, 1)
     assert all(math.isnan(value) for value in missed[2:])
 
 
 def test_learning_finds_poles_and_is_the_same_each_time():
     images, truth = draw_poles(50, seed=99)
-    net, again = (learn("skips", steps=60, seed=1) for _ in range(2))
+    net, again = (train_pole_net("skips", steps=60, seed=1) for _ in range(2))
     with torch.no_grad():
         scores = net(images)
         assert torch.equal(again(images), scores)
     assert not net.training
-    assert score(scores.argmax(1), truth).iou > 0.5
+    assert score_poles(scores.argmax(1), truth).iou > 0.5
 
 
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: carry(np.zeros((4, 4)), "cubic"), "mechanism: expected one of nearest, .* found 'cubic'"),
+        (lambda: apply_mechanism(np.zeros((4, 4)), "cubic"), "mechanism: expected one of nearest, .* found 'cubic'"),
         (lambda: PoleNet("cubic"), "mechanism"),
-        (lambda: carry(np.zeros((4, 6)), "nearest"), r"image: expected shape \(H, W\) of multiples of 4"),
-        (lambda: carry(np.zeros((0, 4)), "nearest"), "image"),
-        (lambda: carry(np.zeros(4), "nearest"), "image"),
+        (lambda: apply_mechanism(np.zeros((4, 6)), "nearest"), r"image: expected shape \(H, W\) of multiples of 4"),
+        (lambda: apply_mechanism(np.zeros((0, 4)), "nearest"), "image"),
+        (lambda: apply_mechanism(np.zeros(4), "nearest"), "image"),
         (lambda: place_and_width([0, 0]), "profile"),
         (lambda: place_and_width([[0, 1]]), "profile"),
-        (lambda: score(np.ones((1, 2, 2)), np.ones((1, 2, 3))), "predicted, truth"),
-        (lambda: score(np.ones((1, 2, 2)), np.zeros((1, 2, 2))), "predicted, truth"),
+        (lambda: score_poles(np.ones((1, 2, 2)), np.ones((1, 2, 3))), "predicted, truth"),
+        (lambda: score_poles(np.ones((1, 2, 2)), np.zeros((1, 2, 2))), "predicted, truth"),
     ],
 )
 def test_nonsense_is_refused(call, message):

@@ -44,7 +44,7 @@ def test_each_run_has_its_colour_and_its_name():
 
 
 def test_nothing_to_draw_is_refused():
-    with pytest.raises(ArgumentError, match="logs: expected a training or more"):
+    with pytest.raises(ArgumentError, match="logs: expected at least one training run"):
         training_curves({})
-    with pytest.raises(ArgumentError, match="logs: expected a training or more"):
+    with pytest.raises(ArgumentError, match="logs: expected at least one training run"):
         training_curves({"empty": _log(0, 0)})

@@ -14,6 +14,12 @@ def junction_drive() -> SimulatedDrive:
     return SimulatedDrive(5, 10, BUSY)
 
 
+@pytest.fixture
+def junction_drive_again() -> SimulatedDrive:
+    """The same drive, made anew from the same seed."""
+    return SimulatedDrive(5, 10, BUSY)
+
+
 @pytest.fixture(scope="session")
 def last_frame(junction_drive):
     """Its last frame, with bird's-eye truth."""

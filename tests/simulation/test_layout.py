@@ -5,17 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from semgrid_edu.simulation.street.layout import (
-    KERB_HEIGHT,
-    Road,
-    Side,
-    ground_height,
-    ground_kind,
-    ground_kinds,
-    lane_mark,
-    to_road,
-    to_world,
-)
+from semgrid_edu.simulation.street.ground import KERB_HEIGHT, ground_height, ground_kind, ground_kinds, lane_mark
+from semgrid_edu.simulation.street.layout import Road, Side, to_road, to_world
 from semgrid_edu.simulation.street.terrain import Extent, ground_mesh
 from semgrid_edu.simulation.things.materials import Kind
 

@@ -8,12 +8,12 @@ import pytest
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, project, rigid_transform, transform_points
 from semgrid_edu.simulation.sensors.camera import take_picture
 from semgrid_edu.simulation.sensors.lidar import scan
-from semgrid_edu.simulation.sensors.raycast import Instant, Scene
+from semgrid_edu.simulation.sensors.raycast import Instant, RayMesh
 from semgrid_edu.simulation.sensors.rig import Lidar, Rig
 from semgrid_edu.simulation.street.layout import Road, Side
 from semgrid_edu.simulation.street.light import Light
 from semgrid_edu.simulation.things.materials import Kind, Material
-from semgrid_edu.simulation.things.shapes import box, quads
+from semgrid_edu.simulation.things.primitives import box, quads
 
 SIDE = Side(5.0, 0.0, 2.0, 0.0, 3.0)
 ROAD = Road(0.0, 0.0, 0.0, 3.5, 1, 1, SIDE, SIDE, 0.0, 0.0, False, False, 4.0, False, True)
@@ -23,7 +23,7 @@ EXACT = Lidar(range_sigma=0.0, drop=0.0)
 
 def scene(*things) -> Instant:
     ground = quads([-50, -50, 0], [200, 0, 0], [0, 100, 0], (0.2,) * 3, Material.GROUND, Kind.ROAD)
-    return Instant(Scene.of([ground, *things], range(1 + len(things))), None, np.empty((0, 4)))
+    return Instant(RayMesh.of([ground, *things], range(1 + len(things))), None, np.empty((0, 4)))
 
 
 def wall(x: float):

@@ -5,13 +5,14 @@ import pytest
 import trimesh
 
 from semgrid_edu.simulation.things.bicycles import bicycle
-from semgrid_edu.simulation.things.buildings import House, build
+from semgrid_edu.simulation.things.buildings import House, build_house
 from semgrid_edu.simulation.things.cars import BODIES, car, car_size
 from semgrid_edu.simulation.things.furniture import FENCES, SIGNS, fence, sign
 from semgrid_edu.simulation.things.materials import Kind, Material
 from semgrid_edu.simulation.things.people import Person, rider, walker
 from semgrid_edu.simulation.things.plants import TREES, bush, hedge, tree
-from semgrid_edu.simulation.things.shapes import ball, box, merge, quads, tube
+from semgrid_edu.simulation.things.primitives import ball, box, quads, tube
+from semgrid_edu.simulation.things.shapes import merge
 
 STYLE = {"colour": (0.5, 0.5, 0.5), "material": Material.MATTE, "kind": Kind.POLE}
 
@@ -63,7 +64,7 @@ def test_a_stride_repeats():
 
 def test_a_house_covers_its_plan_up_to_its_eaves():
     house = House(10.0, 8.0, 2, "flat", False, 3)
-    shape = build(house)
+    shape = build_house(house)
     walls = trimesh.Trimesh(shape.vertices, shape.faces)
     assert walls.bounds[:, 2] == pytest.approx([-2.5, house.eaves + 1.8], abs=0.01)
     assert set(shape.kind) == {Kind.BUILDING}

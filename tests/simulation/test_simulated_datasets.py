@@ -15,14 +15,14 @@ from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.simulation import datasets
-from semgrid_edu.simulation.datasets import RECIPES, Recipe, Route, make, make_recipe
+from semgrid_edu.simulation.datasets import RECIPES, DatasetRecipe, Route, make_dataset, make_from_recipe
 from semgrid_edu.simulation.street.plan import Wishes
 from semgrid_edu.simulation.writer import DATE
 from semgrid_edu.storage.files import sha256
 
 QUIET = Wishes(density=0.2, layout="straight", styles=("park", "park"))
-TINY = Recipe("tiny", "KITTI-14", (Route("train", 2, False, QUIET), Route("test", 1, True, QUIET)))
-DENSE = Recipe("dense", "SYNTHIA-10", (Route("train", 1, True, QUIET),), dense=True)
+TINY = DatasetRecipe("tiny", "KITTI-14", (Route("train", 2, False, QUIET), Route("test", 1, True, QUIET)))
+DENSE = DatasetRecipe("dense", "SYNTHIA-10", (Route("train", 1, True, QUIET),), dense=True)
 
 
 def contents(root: Path) -> dict[str, str]:
@@ -31,15 +31,15 @@ def contents(root: Path) -> dict[str, str]:
 
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory):
-    return make_recipe(TINY, tmp_path_factory.mktemp("alone"), seed=3, workers=1)
+    return make_from_recipe(TINY, tmp_path_factory.mktemp("alone"), seed=3, workers=1)
 
 
 def test_two_workers_write_the_same_bytes_as_one(alone, tmp_path):
-    assert contents(make_recipe(TINY, tmp_path, seed=3, workers=2)) == contents(alone)
+    assert contents(make_from_recipe(TINY, tmp_path, seed=3, workers=2)) == contents(alone)
 
 
 def test_another_seed_gives_another_world(alone, tmp_path):
-    other = contents(make_recipe(Recipe("tiny", "KITTI-14", TINY.routes[:1]), tmp_path, seed=4, workers=1))
+    other = contents(make_from_recipe(DatasetRecipe("tiny", "KITTI-14", TINY.routes[:1]), tmp_path, seed=4, workers=1))
     image = f"{DATE}/{DATE}_drive_0001_sync/image_02/data/0000000000.png"
     assert other[image] != contents(alone)[image]
 
@@ -59,17 +59,20 @@ def test_killed_in_the_middle_it_resumes_to_the_same_bytes(alone, tmp_path, monk
     with monkeypatch.context() as patch:
         patch.setattr(datasets, "write_drive", killed_in_the_second)
         with pytest.raises(KeyboardInterrupt):
-            make_recipe(TINY, tmp_path, seed=3, workers=1)
+            make_from_recipe(TINY, tmp_path, seed=3, workers=1)
     assert not (tmp_path / "tiny" / "dataset.json").exists()
     first = drive_folder(tmp_path / "tiny", DATE, "0001") / "oxts" / "data" / "0000000000.txt"
     written = first.stat().st_mtime_ns
-    resumed = make_recipe(TINY, tmp_path, seed=3, workers=1)
+    resumed = make_from_recipe(TINY, tmp_path, seed=3, workers=1)
     assert contents(resumed) == contents(alone)
     assert first.stat().st_mtime_ns == written
 
 
 def test_workers_end_when_their_parent_is_killed(tmp_path):
-    code = "from semgrid_edu.simulation.datasets import make\nif __name__ == '__main__':\n    make('minikitti', {!r})"
+    code = (
+        "from semgrid_edu.simulation.datasets import make_dataset\n"
+        "if __name__ == '__main__':\n    make_dataset('minikitti', {!r})"
+    )
     script = tmp_path / "run.py"
     script.write_text(code.format(str(tmp_path)))
     process = subprocess.Popen([sys.executable, script], stderr=subprocess.DEVNULL, start_new_session=True)
@@ -107,7 +110,7 @@ def test_the_index_lists_the_labelled_frames(alone):
 
 
 def test_dense_points_lie_on_the_depth_image(tmp_path):
-    root = make_recipe(DENSE, tmp_path, seed=0, workers=1)
+    root = make_from_recipe(DENSE, tmp_path, seed=0, workers=1)
     frame = KittiRawDrive(root, DATE, "0001")[0]
     assert 3000 < len(frame.points) < 20_000
     T = frame.camera.T_camera_from_lidar
@@ -120,24 +123,24 @@ def test_dense_points_lie_on_the_depth_image(tmp_path):
 
 def test_somebody_elses_folder_is_refused(alone, tmp_path):
     with pytest.raises(DataError, match=r"simulation\.json.*'seed': 5.*'seed': 3"):
-        make_recipe(TINY, alone.parent, seed=5, workers=1)
+        make_from_recipe(TINY, alone.parent, seed=5, workers=1)
     (tmp_path / "tiny").mkdir()
     (tmp_path / "tiny" / "thesis.txt").write_text("precious")
     with pytest.raises(DataError, match="other files"):
-        make_recipe(TINY, tmp_path, seed=5, workers=1)
+        make_from_recipe(TINY, tmp_path, seed=5, workers=1)
     assert (tmp_path / "tiny" / "thesis.txt").read_text() == "precious"
     (tmp_path / "tiny" / "simulation.json").write_text("{")
     with pytest.raises(DataError, match=r"simulation\.json: expected data made with .+, found no JSON"):
-        make_recipe(TINY, tmp_path, seed=5, workers=1)
+        make_from_recipe(TINY, tmp_path, seed=5, workers=1)
 
 
 def test_bad_arguments_are_named(tmp_path):
     with pytest.raises(ArgumentError, match="name: expected one of minikitti"):
-        make("maxikitti", tmp_path)
+        make_dataset("maxikitti", tmp_path)
     with pytest.raises(ArgumentError, match="seed"):
-        make("minikitti", tmp_path, seed=-1)
+        make_dataset("minikitti", tmp_path, seed=-1)
     with pytest.raises(ArgumentError, match="workers"):
-        make("minikitti", tmp_path, workers=0)
+        make_dataset("minikitti", tmp_path, workers=0)
 
 
 def test_the_recipes_have_the_papers_numbers_of_frames():

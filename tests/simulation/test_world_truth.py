@@ -9,7 +9,7 @@ from semgrid_edu.camera import transform_points
 from semgrid_edu.frame import LABEL_GRID
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.simulation.drive import SimulatedDrive
-from semgrid_edu.simulation.street.footprints import ROUND, SQUARE, Footprint, collides, outline, stamp, table
+from semgrid_edu.simulation.street.footprints import ROUND, SQUARE, Footprint, collides, footprint_table, outline, stamp
 from semgrid_edu.simulation.street.layout import outside_asphalt, to_road
 from semgrid_edu.simulation.street.plan import Wishes
 from semgrid_edu.simulation.things.materials import Kind, class_of_kind
@@ -34,7 +34,7 @@ def test_stamp_equals_the_literal_test_of_every_cell():
         with np.errstate(over="ignore"):
             expected[u**f.exponent + v**f.exponent <= 1] = k
     which = np.full((60, 50), -1, np.int32)
-    stamp(table(feet), cells, 0.1, which)
+    stamp(footprint_table(feet), cells, 0.1, which)
     assert np.array_equal(which, expected)
     assert len(np.unique(which)) == 4
 
@@ -42,19 +42,19 @@ def test_stamp_equals_the_literal_test_of_every_cell():
 def test_collision_of_rectangles():
     car = Footprint(0, 0, 2.2, 0.9, 0.0, SQUARE, Kind.CAR, 1, 1.5)
     beside, into = car._replace(y=2.0), car._replace(x=3.0, y=1.0, yaw=0.7)
-    assert not collides(car, table([beside]))
-    assert collides(car, table([beside]), margin=0.3)
-    assert collides(car, table([into]))
+    assert not collides(car, footprint_table([beside]))
+    assert collides(car, footprint_table([beside]), margin=0.3)
+    assert collides(car, footprint_table([into]))
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_nobody_runs_into_anybody(seed):
     drive = SimulatedDrive(seed, 10)
-    road, still = drive.plan.road, table([Footprint(*f) for f in drive.static_footprints])
+    road, still = drive.plan.road, footprint_table([Footprint(*f) for f in drive.static_footprints])
     for t in (0.0, 0.45, 0.9):
         feet = [a.footprint(road, t) for a in drive.moving]
         for k, foot in enumerate(feet):
-            assert not collides(foot, table(feet[:k] + feet[k + 1 :]))
+            assert not collides(foot, footprint_table(feet[:k] + feet[k + 1 :]))
             assert not collides(foot, still)
 
 
@@ -62,7 +62,7 @@ def test_cars_keep_to_the_asphalt_and_houses_off_it(junction_drive):
     road = junction_drive.plan.road
     for actor in junction_drive.moving + junction_drive.parked:
         if actor.kind == Kind.CAR:
-            assert outside_asphalt(road, *actor.path.at(0.0)) < 0
+            assert outside_asphalt(road, *actor.trajectory.at(0.0)) < 0
     end_of_the_world = junction_drive.plan.extent.end - 25
     for f in junction_drive.static_footprints:
         if f[6] in (Kind.BUILDING, Kind.FENCE, Kind.PLANT, Kind.SIGN, Kind.POLE) and f[0] < end_of_the_world:
@@ -72,10 +72,10 @@ def test_cars_keep_to_the_asphalt_and_houses_off_it(junction_drive):
 
 def test_people_walk_at_1_4_metres_a_second():
     speeds = [
-        np.hypot(*actor.path.velocity(drive.plan.road, 0.5))
+        np.hypot(*actor.trajectory.velocity(drive.plan.road, 0.5))
         for drive in (SimulatedDrive(seed, 10, Wishes(density=1.0, styles=("town", "town"))) for seed in range(3))
         for actor in drive.moving
-        if actor.kind == Kind.PEDESTRIAN and actor.path.pace.mean > 0
+        if actor.kind == Kind.PEDESTRIAN and actor.trajectory.pace.mean > 0
     ]
     assert len(speeds) > 10
     assert np.mean(speeds) == pytest.approx(1.4, abs=0.15)
@@ -88,7 +88,7 @@ def test_velocity_of_objects_is_the_change_of_their_place(junction_drive):
     moving = [a for a in junction_drive.moving if a.instance in before and before[a.instance]["moving"]]
     assert len(moving) >= 3
     for actor in moving:
-        change = (actor.path.pose(road, 0.5)[0] - actor.path.pose(road, 0.4)[0]) / 0.1
+        change = (actor.trajectory.pose(road, 0.5)[0] - actor.trajectory.pose(road, 0.4)[0]) / 0.1
         expected = (pose[:3, :3] @ change)[:2]
         assert before[actor.instance]["velocity"] == pytest.approx(expected, abs=0.15)
     assert all(o["velocity"] == [0, 0] for o in before.values() if not o["moving"])
@@ -183,8 +183,8 @@ def test_every_kind_has_its_class_in_both_label_sets():
     assert kitti[255] == synthia[255] == 255
 
 
-def test_the_same_seed_gives_the_same_frame(junction_drive, last_frame):
-    again = SimulatedDrive(5, 10, junction_drive.wishes).frame(9, True)
+def test_the_same_seed_gives_the_same_frame(junction_drive_again, last_frame):
+    again = junction_drive_again.frame(9, True)
     assert np.array_equal(again.picture.image, last_frame.picture.image)
     assert np.array_equal(again.points, last_frame.points)
     assert np.array_equal(again.truth.visible, last_frame.truth.visible)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from semgrid_edu.graphical.distance import total_variation
 from semgrid_edu.graphical.factor import Factor, product
 from semgrid_edu.graphical.stages.beam import BeamWorld, beam_likelihood
 
@@ -53,7 +54,7 @@ def beam_beliefs(world: BeamWorld, ranges: Sequence[float | None]) -> BeamBelief
         posterior = (posterior * seen).normalised()
         exact, grid = (occupied(belief) for belief in (posterior, (kept * seen).normalised()))
         kept = independent(world, grid)
-        apart = total_variation(posterior, independent(world, exact)), total_variation(posterior, kept)
+        apart = _apart(posterior, independent(world, exact)), _apart(posterior, kept)
         steps.append((exact, grid, *apart))
     return BeamBeliefs(*map(np.array, zip(*steps, strict=True)))
 
@@ -81,6 +82,6 @@ def occupied(belief: Factor) -> NDArray[np.float64]:
     return np.array([table.table[1] for table in tables])
 
 
-def total_variation(one: Factor, other: Factor) -> float:
-    """Return half the sum of absolute differences: the most by which two distributions can differ on any event."""
-    return float(abs(one.table - other.ordered(*one.names).table).sum() / 2)
+def _apart(one: Factor, other: Factor) -> float:
+    """Return the total variation of two distributions over the same variables."""
+    return float(total_variation(one.table.ravel(), other.ordered(*one.names).table.ravel()))

@@ -7,7 +7,8 @@ add up, as if at most one of them could happen; and what arrives is independent 
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.graphical.stages.cells_in_a_row import DT, SPEED, Cell, CellsInARow, total_variation
+from semgrid_edu.graphical.distance import total_variation
+from semgrid_edu.graphical.stages.cells_in_a_row import DT, SPEED, Cell, CellsInARow
 from semgrid_edu.graphical.stages.joint_row import exact_beliefs, row_evidence, row_model
 from semgrid_edu.graphical.stages.stage_graph import CutEdge, StageGraph
 from semgrid_edu.occupancy import BofState, bof_predict_literal, bof_update

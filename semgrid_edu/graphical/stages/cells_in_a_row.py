@@ -136,18 +136,3 @@ class CellsInARow:
         }
         occupied, free = np.array([said[letter] for letter in self.scans[step - 1]]).T
         return Evidence(occupied[None], free[None])
-
-
-def total_variation(p: NDArray, q: NDArray) -> NDArray[np.float64]:
-    """Return the distance of distributions, sum |p - q| / 2: the most by which they disagree about any event.
-
-    Parameters
-    ----------
-    p, q : (..., K) float
-        Distributions along the last axis.
-
-    Returns
-    -------
-    (...) float64
-    """
-    return np.abs(np.asarray(p) - q).sum(axis=-1) / 2

@@ -1,1 +1,1 @@
-"""What takes in the street: camera, LIDAR, GPS, and the truth that only a simulation knows."""
+"""The sensors: rays, camera, LIDAR and GPS, and what is true of what they see."""

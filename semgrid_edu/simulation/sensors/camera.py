@@ -15,7 +15,9 @@ from semgrid_edu.simulation.street.layout import Road
 from semgrid_edu.simulation.street.light import Light
 
 _SKY_STEP = 3
+"""Every third pixel of every third row sends a ray to the sky: how much of it is open changes slowly."""
 _SUBPIXELS = ((-0.33, 0.33), (0.33, -0.33))
+"""Where pixels at an edge send two more rays, so that outlines aren't jagged: shift to the right and down, pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,13 +27,13 @@ class Picture:
     Parameters
     ----------
     image : (h, w, 3) uint8
-        RGB.
+        What the camera takes, RGB.
     kind : (h, w) uint8
-        Members of `Kind`.
+        What each pixel shows, a `Kind`.
     depth : (h, w) float32
-        Metres along the optical axis; NaN for sky.
+        Depth along the optical axis, metres; NaN for sky.
     instance : (h, w) int32
-        Number of the object; 0 for none.
+        Number of the car, pedestrian or bicycle that each pixel shows; 0 for all else.
     """
 
     image: NDArray[np.uint8]
@@ -77,7 +79,7 @@ def _discontinuities(triangle, distance, kind, material):
 
 @njit(cache=True)
 def _smooth(values, distance, step, radius, out):
-    """Average sparse `values` (every `step`-th pixel, -1 for none) over pixels at a like distance."""
+    """Average sparse `values` (one every `step` pixels, -1 for none) over pixels at a similar distance."""
     height, width = distance.shape
     for r in range(height):
         for c in range(width):
@@ -117,7 +119,7 @@ def _open(
     spread: float,
     rng: np.random.Generator,
 ) -> NDArray[np.float32]:
-    """Return for every pixel 1 where its hit sees the light, 0 where something stands between, -1 unless chosen."""
+    """Return for every pixel 1 where its hit sees the light, 0 where something is in between, -1 if not chosen."""
     luck = rng.random((len(chosen), 3), dtype=np.float32)
     starts, rays = _rays_to(
         np.float32(axis), along_normal, spread, luck, chosen,
@@ -131,7 +133,7 @@ def _open(
 def _sun_and_sky(
     hits: Hits, instant: Instant, light: Light, shape: tuple[int, int], rng: np.random.Generator
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the shares of sun and sky that each pixel's hit sees, by one ray to each and a smoothing."""
+    """Return how much of sun and sky each pixel's hit sees, 0..1, from one ray to each, smoothed."""
     distance, met = hits.distance.reshape(shape), hits.triangle >= 0
     sunlit, open_sky = np.empty(shape, np.float32), np.empty(shape, np.float32)
     sun = _open(hits, instant, np.flatnonzero(met), light.sun, 0.0, 3.5 * light.softness, rng)
@@ -145,7 +147,7 @@ def _sun_and_sky(
 
 @njit(cache=True)
 def _lens(radiance, centre):
-    """Return the picture as a lens spreads it: along each axis `centre` stays, the rest goes to the next pixels."""
+    """Blur the picture as a lens does: along each axis the share `centre` stays, the rest goes to the next pixels."""
     height, width, _ = radiance.shape
     side = np.float32((1.0 - centre) / 2)
     middle = np.float32(centre)
@@ -185,12 +187,21 @@ def take_picture(
     Parameters
     ----------
     instant : Instant
+        The world.
     T_world_from_lidar : (4, 4) float
+        Pose of the LIDAR, metres.
     rig : Rig
+        Where the camera stands, and its noise.
     road : Road
+        The street, for what the ground is.
     light : Light
+        Sun, sky and exposure.
     rng : numpy.random.Generator
-        Sensor noise and soft shadows.
+        Source of the sensor's noise and of the scattered rays that make shadows soft.
+
+    Returns
+    -------
+    Picture
     """
     shape = rig.image_size
     rotation = T_world_from_lidar[:3, :3].astype(np.float32)

@@ -1,4 +1,4 @@
-"""GPS and IMU packets as KITTI's development kit defines them: a Mercator projection of the pose, and its rates."""
+"""GPS and IMU: packets as KITTI's development kit defines them, a Mercator projection of the pose and its rates."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,23 +10,25 @@ from scipy.spatial.transform import Rotation
 from semgrid_edu.datasets.oxts import EARTH_RADIUS
 
 GRAVITY = 9.81
-"""m/s^2: an accelerometer at rest reads it upwards."""
+"""What an accelerometer at rest reads upwards, m/s^2."""
 _STEP = 1e-3
+"""Seconds between the poses of which velocities and accelerations are central differences."""
 _FLAGS = (0.05, 0.02, 4, 9, 4, 4, 6)
+"""Accuracies and modes, the last numbers of each packet: those of a receiver with a good fix."""
 
 
 @dataclass(frozen=True)
 class Geodesy:
-    """Where on Earth a drive starts, and which way its world is turned.
+    """Where on Earth a drive starts, and in which direction its world points.
 
     Parameters
     ----------
     latitude, longitude : float
-        Of the IMU at the first packet, degrees.
+        Place of the IMU at the first packet, degrees.
     altitude : float
-        Metres.
+        Its height above sea level, metres.
     heading : float
-        Of the world's x axis, rad from east, counter-clockwise.
+        Direction of the world's x axis, rad from east, counter-clockwise.
     """
 
     latitude: float
@@ -34,29 +36,62 @@ class Geodesy:
     altitude: float
     heading: float
 
+    @classmethod
+    def random(cls, rng: np.random.Generator) -> "Geodesy":
+        """Draw a place near Karlsruhe, where KITTI was recorded, and a direction.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Source of all that is drawn.
+
+        Returns
+        -------
+        Geodesy
+        """
+        north, east = float(rng.uniform(0, 0.05)), float(rng.uniform(0, 0.05))
+        return cls(49.0 + north, 8.4 + east, 114.0, float(rng.uniform(-3.1, 3.1)))
+
     @property
     def rotation(self) -> NDArray[np.float64]:
         """(3, 3): from the simulator's world to east, north, up."""
         return Rotation.from_euler("z", self.heading).as_matrix()
 
     def degrees(self, offset: NDArray) -> tuple[float, float]:
-        """Return latitude and longitude of a point `offset` (3,) m east, north and up of the first packet."""
+        """Return where on Earth a point is: the inverse of the Mercator projection near the first packet.
+
+        Parameters
+        ----------
+        offset : (3,) float
+            How far the point lies east, north and up of the first packet, metres.
+
+        Returns
+        -------
+        latitude, longitude : float
+            Degrees.
+        """
         scale = np.cos(np.radians(self.latitude))
         longitude = self.longitude + np.degrees(offset[0] / (scale * EARTH_RADIUS))
         mercator = np.log(np.tan(np.radians(90 + self.latitude) / 2)) + offset[1] / (scale * EARTH_RADIUS)
         return float(np.degrees(2 * np.arctan(np.exp(mercator))) - 90), float(longitude)
 
 
-def packet(pose: Callable[[float], NDArray], t: float, geodesy: Geodesy) -> str:
-    """Return the thirty numbers of an oxts packet.
+def oxts_packet(pose: Callable[[float], NDArray], t: float, geodesy: Geodesy) -> str:
+    """Return the thirty numbers of an oxts packet, which `DATAFORMAT` names.
 
     Parameters
     ----------
     pose : callable
-        T_world_from_imu (4, 4) at a time in seconds.
+        Function of the time in seconds that returns T_world_from_imu, (4, 4), metres.
     t : float
-        Seconds.
+        Time of the packet, seconds since the drive began.
     geodesy : Geodesy
+        Where on Earth the drive begins.
+
+    Returns
+    -------
+    str
+        One line of numbers with spaces between.
     """
     before, now, after = (pose(t + h) for h in (-_STEP, 0.0, _STEP))
     turn = geodesy.rotation

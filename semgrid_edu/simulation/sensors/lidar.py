@@ -1,11 +1,12 @@
-"""The LIDAR: returns with range noise, losses and reflectance."""
+"""The LIDAR: a scan of returns with noisy ranges and reflectance, some of them lost."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.simulation.sensors.raycast import MISS, Hits, Instant, turned
 from semgrid_edu.simulation.sensors.rig import Lidar
-from semgrid_edu.simulation.street.layout import Road, ground_kinds
+from semgrid_edu.simulation.street.ground import ground_kinds
+from semgrid_edu.simulation.street.layout import Road
 from semgrid_edu.simulation.things.materials import REFLECTANCE, Kind, Material
 
 
@@ -14,16 +15,21 @@ def scan(
 ) -> NDArray[np.float32]:
     """Take one LIDAR scan, all of it at this instant (as if the ego-motion within a turn had been undone).
 
-    A return is lost when too little light comes back: the more, the darker, the farther and the more grazing the
-    surface is. Glass reflects away from the sensor and car paint scatters little.
+    A return is lost when too little light comes back. So dark, far and grazed surfaces lose more of their returns than
+    others. Glass reflects the light away from the sensor, and car paint scatters little of it.
 
     Parameters
     ----------
     instant : Instant
+        The world.
     T_world_from_lidar : (4, 4) float
+        Pose of the LIDAR, metres.
     lidar : Lidar
+        Directions and noise.
     road : Road
+        The street, for what the ground reflects.
     rng : numpy.random.Generator
+        Source of noise and losses.
 
     Returns
     -------

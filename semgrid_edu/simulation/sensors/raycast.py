@@ -1,7 +1,8 @@
-"""Rays against triangles: `embreex` finds the hits, tables say what was hit."""
+"""Rays against triangles: `embreex` finds what each ray hits, and tables say what that is."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
@@ -12,20 +13,42 @@ from numpy.typing import NDArray
 from semgrid_edu.simulation.things.shapes import Shape, merge
 
 MISS = np.float32(1e30)
-"""Distance of a ray that meets nothing."""
+"""Distance that a ray which meets nothing is given, metres."""
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
-    """Shapes ready for rays; `instance` (F,) int32 numbers the object that each triangle belongs to."""
+class RayMesh:
+    """Shapes that rays can be tried against.
+
+    Parameters
+    ----------
+    shape : Shape
+        All F triangles, in the world.
+    instance : (F,) int32
+        Number of the object that each triangle belongs to; 0 for scenery.
+    embree : EmbreeScene
+        The search tree over the triangles.
+    """
 
     shape: Shape
     instance: NDArray[np.int32]
     embree: EmbreeScene
 
     @classmethod
-    def of(cls, shapes: Sequence[Shape], instances: Sequence[int]) -> "Scene":
-        """Build the search tree of several shapes, each with the number of its object."""
+    def of(cls, shapes: Sequence[Shape], instances: Sequence[int]) -> "RayMesh":
+        """Build the search tree of several shapes.
+
+        Parameters
+        ----------
+        shapes : sequence of Shape
+            In the world; at least one.
+        instances : sequence of int
+            For each shape the number of its object; 0 for scenery.
+
+        Returns
+        -------
+        RayMesh
+        """
         whole = merge(shapes)
         sizes = [len(s.faces) for s in shapes]
         embree = EmbreeScene()
@@ -35,7 +58,20 @@ class Scene:
 
 @njit(cache=True)
 def turned(rays: NDArray, rotation: NDArray) -> NDArray:
-    """Return every ray (N, 3) turned by a rotation (3, 3): the same bits on any number of cores, unlike a BLAS call."""
+    """Turn rays, with the same bits on any number of cores, which a call of BLAS doesn't promise.
+
+    Parameters
+    ----------
+    rays : (N, 3) float
+        Directions.
+    rotation : (3, 3) float
+        Rotation matrix.
+
+    Returns
+    -------
+    (N, 3) float
+        The turned directions, in the type of `rays`.
+    """
     out = np.empty_like(rays)
     for i in range(len(rays)):
         for c in range(3):
@@ -72,13 +108,13 @@ class Hits:
     Parameters
     ----------
     directions : (N, 3) float32
-        Unit vectors.
+        Unit vectors of the rays, in the world.
     distance : (N,) float32
-        Metres; `MISS` for none.
+        Length of each ray, metres; `MISS` where it meets nothing.
     triangle : (N,) int32
-        Row of the `Surfaces` table; -1 for none.
+        What it meets: a row in the tables of the `Instant`; -1 for nothing.
     position : (N, 3) float32
-        In the world, metres.
+        Where it ends, in the world, metres; 10 km away where it meets nothing.
     """
 
     directions: NDArray[np.float32]
@@ -89,26 +125,51 @@ class Hits:
 
 @dataclass(frozen=True, eq=False)
 class Instant:
-    """The world at one instant: the static scene, the moving one (None when nothing moves), and their joint tables.
+    """The world at one instant: what stands still, what moves, and tables of the F triangles of both.
 
     Parameters
     ----------
-    static : Scene
-    moving : Scene or None
+    static : RayMesh
+        What stands still; its triangles come first in the tables.
+    moving : RayMesh or None
+        What moves, where it is at this instant; None when nothing moves.
     spheres : (M, 4) float64
-        Centre and radius around everything that moves: only rays through one of them are tried against `moving`.
+        Centre in the world and radius, metres, of a sphere around each thing that moves: only rays through one of the
+        spheres are tried against `moving`.
     """
 
-    static: Scene
-    moving: Scene | None
+    static: RayMesh
+    moving: RayMesh | None
     spheres: NDArray[np.float64]
 
-    def __post_init__(self) -> None:
-        """Join the tables."""
-        scenes = [self.static] + ([self.moving] if self.moving else [])
-        for name in ("normals", "colour", "material", "kind"):
-            object.__setattr__(self, name, np.concatenate([getattr(s.shape, name) for s in scenes]))
-        object.__setattr__(self, "instance", np.concatenate([s.instance for s in scenes]))
+    @cached_property
+    def normals(self) -> NDArray[np.float32]:
+        """(F, 3) float32: the unit normal of each triangle, for shading."""
+        return np.concatenate([mesh.shape.normals for mesh in self._meshes])
+
+    @cached_property
+    def colour(self) -> NDArray[np.float32]:
+        """(F, 3) float32: the linear albedo of each triangle, 0..1."""
+        return np.concatenate([mesh.shape.colour for mesh in self._meshes])
+
+    @cached_property
+    def material(self) -> NDArray[np.uint8]:
+        """(F,) uint8: the `Material` of each triangle."""
+        return np.concatenate([mesh.shape.material for mesh in self._meshes])
+
+    @cached_property
+    def kind(self) -> NDArray[np.uint8]:
+        """(F,) uint8: the `Kind` of each triangle."""
+        return np.concatenate([mesh.shape.kind for mesh in self._meshes])
+
+    @cached_property
+    def instance(self) -> NDArray[np.int32]:
+        """(F,) int32: the number of the object that each triangle belongs to; 0 for scenery."""
+        return np.concatenate([mesh.instance for mesh in self._meshes])
+
+    @property
+    def _meshes(self) -> list[RayMesh]:
+        return [self.static, self.moving] if self.moving else [self.static]
 
     def cast(self, origin: NDArray, directions: NDArray) -> Hits:
         """Follow rays from one point to what they meet first.
@@ -116,8 +177,13 @@ class Instant:
         Parameters
         ----------
         origin : (3,) float
+            Where the rays start, in the world, metres.
         directions : (N, 3) float32
-            Unit vectors.
+            Unit vectors, in the world.
+
+        Returns
+        -------
+        Hits
         """
         origins = np.empty_like(directions)
         origins[:] = origin
@@ -134,7 +200,19 @@ class Instant:
         return Hits(directions, distance, triangle, position)
 
     def blocked(self, origins: NDArray, directions: NDArray) -> NDArray[np.bool_]:
-        """Return whether anything stands in each ray's way, (N,) bool."""
+        """Find the rays that meet anything.
+
+        Parameters
+        ----------
+        origins : (N, 3) float
+            Where each ray starts, in the world, metres.
+        directions : (N, 3) float
+            Unit vectors, in the world.
+
+        Returns
+        -------
+        (N,) bool
+        """
         origins = np.ascontiguousarray(origins, dtype=np.float32)
         directions = np.ascontiguousarray(directions, dtype=np.float32)
         blocked = self.static.embree.run(origins, directions, query="OCCLUDED") >= 0

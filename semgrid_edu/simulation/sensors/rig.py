@@ -24,16 +24,16 @@ class Lidar:
     Parameters
     ----------
     elevations : tuple of float
-        One a laser, degrees: the HDL-64E's.
+        Elevation of each laser, degrees: those of the HDL-64E.
     azimuth_min, azimuth_max, azimuth_step : float
-        Directions of a scan, degrees, left positive. The default covers the half-plane ahead at 0.9 degrees so that
-        data sets stay small; the HDL-64E at 10 Hz has -180, 180 and 0.18.
+        Directions of a scan, degrees, positive to the left. The default covers the half-plane ahead in steps of 0.9
+        degrees, so that data sets stay small; the HDL-64E at 10 Hz has -180, 180 and 0.18.
     range_max : float
-        Metres; 80 m for the HDL-64E on dark surfaces, 120 m on bright ones.
+        Longest range, metres. The HDL-64E sees dark surfaces up to 80 m and bright ones up to 120 m.
     range_sigma : float
-        Standard deviation of a range, metres: the manual's 2 cm.
+        Standard deviation of a range, metres: 2 cm according to the manual.
     drop : float
-        Share of returns lost whatever the surface.
+        Share of returns that are lost whatever the surface, 0..1.
     """
 
     elevations: tuple[float, ...] = HDL64E_ELEVATIONS
@@ -55,17 +55,18 @@ class Lidar:
 
 @dataclass(frozen=True)
 class Rig:
-    """What stands where on the recording car.
+    """The sensors of the recording car, and where they stand on it.
 
     Parameters
     ----------
     image_size : (int, int)
         Height and width of camera 2's image: half of KITTI's, (188, 621).
     lidar : Lidar
+        Directions and noise of the LIDAR.
     camera_noise : float
-        Standard deviation of pixel noise at mid grey, 8-bit counts.
+        Standard deviation of the noise of a pixel at mid grey, in steps of 1/255.
     bits : int
-        Bits a colour channel that the camera resolves; 6 keep the PNG files small.
+        Bits that the camera resolves in each colour channel; 6 keep the PNG files small.
     """
 
     image_size: tuple[int, int] = (188, 621)
@@ -91,7 +92,18 @@ class Rig:
         return rigid_transform(turn, np.array([-0.81, 0.32, -0.80]))
 
     def P_rect(self, index: int) -> NDArray[np.float64]:
-        """Return (3, 4): the projection of camera 0..3, whose baselines are KITTI's."""
+        """Return the projection matrix of a rectified camera, with the baselines of KITTI's cameras.
+
+        Parameters
+        ----------
+        index : int
+            Number of the camera, 0..3.
+
+        Returns
+        -------
+        (3, 4) float64
+            From the rectified frame of camera 0, metres, to pixels.
+        """
         K = Camera(_KITTI_K, np.eye(4), _KITTI_SIZE).resized(self.image_size).K
         baseline = (0.0, -0.5372, 0.0622, -0.4706)[index]
         return np.column_stack([K, [K[0, 0] * baseline, 0.0, 0.0]])
@@ -115,7 +127,18 @@ class Rig:
         return invert_rigid(lidar_from_grid(KITTI_LIDAR_HEIGHT))
 
     def pixel_directions(self, du: float = 0.0, dv: float = 0.0) -> NDArray[np.float32]:
-        """Return (h w, 3) float32: the unit vector of every pixel in the LIDAR frame, shifted by (du, dv) pixels."""
+        """Return the direction in which every pixel of camera 2 looks.
+
+        Parameters
+        ----------
+        du, dv : float
+            Shift to the right and down from the pixels' centres, pixels.
+
+        Returns
+        -------
+        (h w, 3) float32
+            Unit vectors in the LIDAR frame, row by row.
+        """
         height, width = self.image_size
         v, u = np.mgrid[:height, :width]
         pixels = np.stack([u + du, v + dv, np.ones_like(u)], axis=-1).reshape(-1, 3)

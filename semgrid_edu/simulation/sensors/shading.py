@@ -1,12 +1,13 @@
-"""The colour of every hit: texture by material, sun, sky, gloss and haze, in one numba kernel."""
+"""Shading: the light that comes from what a ray hits, by material, sun, sky, gloss and haze, in one numba kernel."""
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.simulation.sensors.raycast import Hits, Instant
-from semgrid_edu.simulation.street.layout import Road, lane_mark, outside_asphalt, to_road
-from semgrid_edu.simulation.street.light import Light, noise_tile, sky, texture
+from semgrid_edu.simulation.street.ground import KERB_WIDTH, lane_mark
+from semgrid_edu.simulation.street.layout import Road, outside_asphalt, to_road
+from semgrid_edu.simulation.street.light import Light, noise_tile, sky_radiance, texture
 from semgrid_edu.simulation.things.materials import Kind, Material
 
 _GROUND, _PLASTER, _BRICK, _TILES, _WOOD = (
@@ -51,20 +52,20 @@ def _asphalt(tile, road, s, d, blur, out):
     mark = lane_mark(road, s, d, blur)
     worn = mark * (0.72 + 0.45 * (texture(tile, 9.0 * s, 9.0 * d) - 0.35))
     out[0] = grey * (1 - worn) + 0.62 * worn
-    out[1] = grey * 1.0 * (1 - worn) + 0.62 * worn
+    out[1] = grey * (1 - worn) + 0.62 * worn
     out[2] = grey * 1.03 * (1 - worn) + 0.6 * worn
     return mark > 0.5
 
 
 @njit(cache=True, fastmath=True)
 def _paving(tile, s, e, stone, blur, out):
-    """Write the albedo of kerb (e < 0.18 m) or sidewalk slabs."""
+    """Write the albedo of a kerb of stone, or of sidewalk slabs."""
     fade = 1.0 / (1.0 + 4.0 * blur)
     grain = texture(tile, 30.0 * s, 30.0 * e) - 0.5
     broad = texture(tile, 2.0 * s, 2.0 * e + 40.0) - 0.5
     grey = (0.30 if stone else 0.25) + 0.05 * grain * fade + 0.05 * broad
     along, across = (s % 1.0, 1.0) if stone else (s % 0.5, e % 0.5)
-    if min(along, across) < 0.025 + 0.0 * blur:
+    if min(along, across) < 0.025:
         grey *= 1.0 - 0.35 * fade
     if not stone:
         slab = texture(tile, 7.3 * np.floor(s / 0.5), 5.1 * np.floor(e / 0.5))
@@ -97,8 +98,8 @@ def _ground(tile, road, x, y, blur, out):
             out[c] *= 1.0 - 0.3 * gutter
         return _LANE if mark else _ROAD
     side = road.left if d > 0 else road.right
-    if e < 0.18 or side.strip <= e < side.strip + side.walk:
-        _paving(tile, s if abs(d) < 40.0 else d, e, e < 0.18, blur, out)
+    if e < KERB_WIDTH or side.strip <= e < side.strip + side.walk:
+        _paving(tile, s if abs(d) < 40.0 else d, e, e < KERB_WIDTH, blur, out)
         return _SIDEWALK
     _grass(tile, x, y, blur, out)
     return _GRASS
@@ -146,7 +147,7 @@ def _mirror(tile, ray, n, sun, sun_colour, zenith, horizon, clouds, phase, gloss
     fresnel = strength + (1.0 - strength) * (1.0 - max(cos, 0.0)) ** 5
     seen = np.empty(3, np.float32)
     if rz > 0.12:
-        sky(tile, rx, ry, rz, sun, sun_colour, zenith, horizon, clouds, phase, seen)
+        sky_radiance(tile, rx, ry, rz, sun, sun_colour, zenith, horizon, clouds, phase, seen)
     else:
         skyline = 0.10 + 0.5 * max(rz + 0.02, 0.0) + 0.12 * (texture(tile, 60.0 * np.arctan2(ry, rx), 20.0 * rz) - 0.3)
         for c in range(3):
@@ -162,13 +163,13 @@ def _shade(
 ):
     """Write the radiance (N, 3) and the kind (N,) of every hit."""
     sun, sun_colour, zenith, horizon, clouds, haze, phase = light
-    n, albedo, _air = np.empty(3, np.float32), np.empty(3, np.float32), np.empty(3, np.float32)
+    n, albedo = np.empty(3, np.float32), np.empty(3, np.float32)
     for i in range(len(t)):
         ray = rays[i]
         out = radiance[i]
         if tri[i] < 0:
             kinds[i] = _SKY
-            sky(tile, ray[0], ray[1], ray[2], sun, sun_colour, zenith, horizon, clouds, phase, out)
+            sky_radiance(tile, ray[0], ray[1], ray[2], sun, sun_colour, zenith, horizon, clouds, phase, out)
             continue
         k, p, m = tri[i], pos[i], material[tri[i]]
         facing = normals[k, 0] * ray[0] + normals[k, 1] * ray[1] + normals[k, 2] * ray[2]
@@ -213,12 +214,15 @@ def shade(
     Parameters
     ----------
     hits : Hits
-        N rays.
+        Where N rays ended.
     instant : Instant
+        The world that they were sent into.
     road : Road
+        The street, for the texture of the ground.
     light : Light
+        Sun, sky and haze.
     sunlit, open_sky : (N,) float32
-        Shares, 0..1, of the sun and of the sky that each hit sees.
+        How much of the sun and of the sky each hit sees, 0..1.
     pixel : float
         Angle between neighbouring rays, rad: textures finer than it are faded out.
 

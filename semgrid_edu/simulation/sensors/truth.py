@@ -1,5 +1,7 @@
 """What is true from above: the class of every 0.1 m cell, and whether the camera sees what stands in it."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -9,7 +11,8 @@ from semgrid_edu.frame import LABEL_GRID
 from semgrid_edu.simulation.sensors.camera import Picture
 from semgrid_edu.simulation.sensors.rig import Rig
 from semgrid_edu.simulation.street.footprints import stamp
-from semgrid_edu.simulation.street.layout import Road, ground_height, ground_kinds, to_road
+from semgrid_edu.simulation.street.ground import ground_height, ground_kinds
+from semgrid_edu.simulation.street.layout import Road, to_road
 from semgrid_edu.simulation.things.materials import Kind
 
 _SEEN_PIXELS = 12
@@ -18,12 +21,42 @@ _SOLID_DEPTH = 0.35
 """Metres of facade or foliage behind its visible surface that count as seen."""
 
 _LOOKS_LIKE = np.arange(256, dtype=np.uint8)
+"""The kind that each kind is compared as: lane marks as road, signs as the poles that they hang on."""
 _LOOKS_LIKE[Kind.LANE] = Kind.ROAD
 _LOOKS_LIKE[Kind.SIGN] = Kind.POLE
 
 
+@dataclass(frozen=True, eq=False)
+class BirdseyeTruth:
+    """What is true of a frame, seen from above, over `LABEL_GRID`.
+
+    Parameters
+    ----------
+    kinds : (710, 310) uint8
+        What each cell holds, a `Kind`.
+    visible : (710, 310) bool
+        Whether the camera sees it.
+    """
+
+    kinds: NDArray[np.uint8]
+    visible: NDArray[np.bool_]
+
+
 def world_cells(T_world_from_lidar: NDArray, rig: Rig) -> NDArray[np.float64]:
-    """Return the centre of every cell of `LABEL_GRID` in the world's x and y, (710, 310, 2) m."""
+    """Return where in the world the cells of `LABEL_GRID` are.
+
+    Parameters
+    ----------
+    T_world_from_lidar : (4, 4) float
+        Pose of the LIDAR, metres.
+    rig : Rig
+        Where the grid lies below the LIDAR.
+
+    Returns
+    -------
+    (710, 310, 2) float64
+        x and y of the centre of each cell, metres.
+    """
     T = T_world_from_lidar @ np.linalg.inv(rig.T_grid_from_lidar)
     centers = LABEL_GRID.centers()
     return transform_points(T, np.concatenate([centers, np.zeros((*LABEL_GRID.shape, 1))], axis=-1))[..., :2]
@@ -35,10 +68,11 @@ def birdseye_kinds(cells: NDArray, footprints: NDArray, road: Road) -> tuple[NDA
     Parameters
     ----------
     cells : (H, W, 2) float
-        From `world_cells`.
+        Cell centres in the world, metres, from `world_cells`.
     footprints : (K, 9) float
-        A `table`; where two overlap the last one wins.
+        From `footprint_table`; where several overlap, the last one wins.
     road : Road
+        The street, for the ground.
 
     Returns
     -------
@@ -57,7 +91,7 @@ def birdseye_kinds(cells: NDArray, footprints: NDArray, road: Road) -> tuple[NDA
 
 @njit(cache=True)
 def _pixel(T, K, x, y, z):
-    """Return u, v and the depth of a point of the world; depth 0 behind the camera."""
+    """Return u, v and depth of a point of the world, and its X and Y in the camera frame; depth 0 behind the camera."""
     X = T[0, 0] * x + T[0, 1] * y + T[0, 2] * z + T[0, 3]
     Y = T[1, 0] * x + T[1, 1] * y + T[1, 2] * z + T[1, 3]
     Z = T[2, 0] * x + T[2, 1] * y + T[2, 2] * z + T[2, 3]
@@ -68,7 +102,7 @@ def _pixel(T, K, x, y, z):
 
 @njit(cache=True)
 def _agrees(u, v, z, tolerance, reach, kind, kinds, depth):
-    """Whether a pixel within `reach` of (u, v) shows this kind at this depth."""
+    """Return whether a pixel within `reach` of (u, v) shows this kind at this depth."""
     height, width = depth.shape
     row, col = round(v), round(u)
     if row < 0 or col < 0 or row >= height or col >= width:
@@ -82,7 +116,10 @@ def _agrees(u, v, z, tolerance, reach, kind, kinds, depth):
 
 @njit(cache=True)
 def _visible(cells, kinds, which, footprints, road, T, K, pixel_kinds, depth, seen, solid, out):
-    """Write whether the camera sees each cell. A pixel is one depth for a whole patch: the tolerance grows with it."""
+    """Write whether the camera sees each cell.
+
+    A pixel has one depth for the whole patch of surface that it shows. So the tolerance grows with the patch.
+    """
     f = K[0, 0]
     for r in range(cells.shape[0]):
         for c in range(cells.shape[1]):
@@ -119,12 +156,22 @@ def visible_cells(
 
     Parameters
     ----------
-    cells, kinds, which, footprints
-        From and for `birdseye_kinds`.
+    cells : (H, W, 2) float
+        Cell centres in the world, metres.
+    kinds : (H, W) uint8
+        What each cell holds, from `birdseye_kinds`.
+    which : (H, W) int32
+        Row of the footprint in each cell, -1 for none, from `birdseye_kinds`.
+    footprints : (K, 9) float
+        From `footprint_table`.
     road : Road
+        The street, for the height of the ground.
     picture : Picture
+        What the camera took.
     T_world_from_lidar : (4, 4) float
+        Pose of the LIDAR at that instant, metres.
     camera : Camera
+        Calibration of the picture.
 
     Returns
     -------

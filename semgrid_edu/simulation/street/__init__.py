@@ -1,1 +1,1 @@
-"""The street: ground, plan and scenery, and who moves along it."""
+"""The street: its ground, its plan, its scenery, and the road users that move along it."""

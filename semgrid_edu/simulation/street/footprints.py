@@ -1,4 +1,4 @@
-"""What stands where, seen from above: convex outlines, and their stamp on the bird's-eye grid."""
+"""Footprints: which ground each thing covers, seen from above, as outlines and as cells of a grid."""
 
 from typing import NamedTuple
 
@@ -18,17 +18,17 @@ class Footprint(NamedTuple):
     x, y : float
         Its centre in the world, metres.
     half_length, half_width : float
-        a and b, metres.
+        Half its sides, a and b, metres.
     yaw : float
-        Direction of its length in the world, rad.
+        Direction of its length in the world, rad from the x axis, counter-clockwise.
     exponent : float
-        p: `ROUND`, `ROUNDED` or `SQUARE`.
+        Shape of its outline, p: `ROUND`, `ROUNDED` or `SQUARE`.
     kind : int
-        A `Kind`.
+        What covers the ground, a `Kind`.
     instance : int
-        Number of the object; 0 for what has none.
+        Number of the car, pedestrian or bicycle; 0 for all else.
     top : float
-        How high it stands, metres, at most 2.5.
+        Height above the ground, metres, at most 2.5.
     """
 
     x: float
@@ -44,7 +44,7 @@ class Footprint(NamedTuple):
 
 @njit(cache=True)
 def _inside(f, x, y):
-    """Whether the point (x, y) lies in the footprint f (a row of numbers)."""
+    """Return whether the point (x, y) lies in the footprint f, a row of numbers."""
     c, s = np.cos(f[4]), np.sin(f[4])
     u = abs(c * (x - f[0]) + s * (y - f[1])) / f[2]
     v = abs(c * (y - f[1]) - s * (x - f[0])) / f[3]
@@ -55,10 +55,19 @@ def _inside(f, x, y):
 
 @njit(cache=True)
 def stamp(footprints: NDArray, xy: NDArray, cell: float, which: NDArray) -> None:
-    """Write into `which` (H, W) int32 the index of the footprint that covers each cell centre `xy` (H, W, 2).
+    """Find the footprint that covers the centre of each cell.
 
-    Cells that nothing covers keep their value; of several footprints the last one wins. `xy` is a rigidly moved
-    regular grid with sides of `cell` metres: rows go against its first axis, columns against its second one.
+    Parameters
+    ----------
+    footprints : (K, 9) float
+        From `footprint_table`. Where several overlap, the last one wins.
+    xy : (H, W, 2) float
+        Cell centres in the world, metres, of a regular grid that may be turned and shifted. The x axis of the grid runs
+        from high rows to low ones, its y axis from high columns to low ones.
+    cell : float
+        Side of a cell, metres.
+    which : (H, W) int32
+        Written in place: row of the footprint that covers the cell; unchanged where none does.
     """
     height, width = which.shape
     ex = (xy[0, 0] - xy[1, 0]) / cell
@@ -76,13 +85,38 @@ def stamp(footprints: NDArray, xy: NDArray, cell: float, which: NDArray) -> None
                     which[r, c] = k
 
 
-def table(footprints: list[Footprint]) -> NDArray[np.float64]:
-    """Return footprints as rows of numbers, for `stamp`."""
+def footprint_table(footprints: list[Footprint]) -> NDArray[np.float64]:
+    """Return footprints as rows of numbers.
+
+    Parameters
+    ----------
+    footprints : list of Footprint
+        K of them, or none.
+
+    Returns
+    -------
+    (K, 9) float64
+        One row per footprint, one column per field of `Footprint`.
+    """
     return np.array(footprints, dtype=np.float64).reshape(-1, len(Footprint._fields))
 
 
-def outline(f: Footprint, margin: float = 0.0) -> NDArray[np.float64]:
-    """Return points on the outline of a footprint and its centre, widened by `margin` metres; (25, 2)."""
+def outline(footprint: Footprint, margin: float = 0.0) -> NDArray[np.float64]:
+    """Return points on the outline of a footprint.
+
+    Parameters
+    ----------
+    footprint : Footprint
+        What covers the ground.
+    margin : float
+        By how much it is widened on every side, metres.
+
+    Returns
+    -------
+    (25, 2) float64
+        24 points of the outline and, last, the centre: x and y in the world, metres.
+    """
+    f = footprint
     angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     c, s = np.cos(angle), np.sin(angle)
     radius = (np.abs(c) ** f.exponent + np.abs(s) ** f.exponent) ** (-1 / f.exponent)
@@ -91,20 +125,35 @@ def outline(f: Footprint, margin: float = 0.0) -> NDArray[np.float64]:
     return np.concatenate([local, [[0, 0]]]) @ turn + [f.x, f.y]
 
 
-def collides(f: Footprint, others: NDArray, margin: float = 0.0) -> bool:
-    """Return whether a footprint, widened by `margin` metres, meets one of a `table` of others."""
+def collides(footprint: Footprint, others: NDArray, margin: float = 0.0) -> bool:
+    """Return whether a footprint overlaps any of several others.
+
+    Parameters
+    ----------
+    footprint : Footprint
+        What covers the ground.
+    others : (K, 9) float
+        From `footprint_table`.
+    margin : float
+        By how much `footprint` is widened on every side, metres.
+
+    Returns
+    -------
+    bool
+    """
     if len(others) == 0:
         return False
+    f = footprint
     reach = np.hypot(others[:, 2], others[:, 3]) + np.hypot(f.half_length, f.half_width) + margin
     near = others[np.hypot(others[:, 0] - f.x, others[:, 1] - f.y) < reach]
-    mine = table([f._replace(half_length=f.half_length + margin, half_width=f.half_width + margin)])[0]
+    mine = footprint_table([f._replace(half_length=f.half_length + margin, half_width=f.half_width + margin)])[0]
     points = outline(f, margin)
     return any(_any_inside(other, points) or _any_inside(mine, outline(Footprint(*other))) for other in near)
 
 
 @njit(cache=True)
 def _any_inside(f, points):
-    """Whether any of the points lies in the footprint."""
+    """Return whether any of the points lies in the footprint."""
     for i in range(len(points)):  # noqa: SIM110 (numba compiles no generator)
         if _inside(f, points[i, 0], points[i, 1]):
             return True

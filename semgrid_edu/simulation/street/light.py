@@ -1,4 +1,4 @@
-"""Weather and light of a drive, and the textures that make surfaces look like what they are."""
+"""Light and weather of a drive, and the noise from which textures and clouds are made."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -18,7 +18,7 @@ class Light:
     Parameters
     ----------
     sun : (float, float, float)
-        Unit vector to the sun.
+        Unit vector towards the sun, in the world.
     sun_colour, sky_colour, horizon_colour : (float, float, float)
         Linear radiance of the sun's light on a surface that faces it, of the zenith and of the horizon.
     softness : float
@@ -30,9 +30,9 @@ class Light:
     exposure : float
         Gain of the camera.
     balance : (float, float, float)
-        White balance error of the camera.
+        Gains of red, green and blue: the error of the camera's white balance.
     phase : float
-        Shifts the clouds, so that every drive has others.
+        Shift of the clouds, so that every drive has others.
     """
 
     sun: tuple[float, float, float]
@@ -48,7 +48,17 @@ class Light:
 
     @classmethod
     def random(cls, rng: np.random.Generator) -> "Light":
-        """Draw a day: clear, hazy, low sun or overcast."""
+        """Draw a day: clear, hazy, with a low sun, or overcast.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Source of all that is drawn.
+
+        Returns
+        -------
+        Light
+        """
         overcast = rng.random() < 0.3
         elevation, azimuth = np.radians(rng.uniform(18, 62)), rng.uniform(0, 2 * np.pi)
         low = float(np.clip((np.radians(35) - elevation) / np.radians(20), 0, 1))
@@ -75,7 +85,13 @@ class Light:
 
 @cache
 def noise_tile() -> NDArray[np.float32]:
-    """Return a repeating texture of fractal noise, (TILE, TILE) float32 in 0..1, uniformly distributed."""
+    """Return a texture of fractal noise that can be repeated without a seam.
+
+    Returns
+    -------
+    (TILE, TILE) float32
+        0..1, uniformly distributed.
+    """
     rng = np.random.default_rng(81)
     frequency = np.fft.fftfreq(TILE)
     radius = np.hypot(frequency[:, None], frequency[None, :])
@@ -88,7 +104,20 @@ def noise_tile() -> NDArray[np.float32]:
 
 @njit(cache=True, fastmath=True, inline="always")
 def texture(tile, u, v):
-    """Return the noise at (u, v), in texels, bilinear and repeating."""
+    """Return the noise at one place, bilinear between texels.
+
+    Parameters
+    ----------
+    tile : (TILE, TILE) float32
+        From `noise_tile`; it repeats in both directions.
+    u, v : float
+        The place, texels.
+
+    Returns
+    -------
+    float
+        0..1.
+    """
     i, j = np.floor(u), np.floor(v)
     a, b = np.float32(u - i), np.float32(v - j)
     i0, j0 = int(i) & 511, int(j) & 511
@@ -99,8 +128,26 @@ def texture(tile, u, v):
 
 
 @njit(cache=True, fastmath=True)
-def sky(tile, x, y, z, sun, sun_colour, zenith, horizon, clouds, phase, out):
-    """Write into `out` the radiance that comes from direction (x, y, z): gradient, glow of the sun, clouds."""
+def sky_radiance(tile, x, y, z, sun, sun_colour, zenith, horizon, clouds, phase, out):
+    """Find the radiance that comes from one direction of the sky: gradient, glow of the sun, clouds.
+
+    Parameters
+    ----------
+    tile : (TILE, TILE) float32
+        From `noise_tile`, for the clouds.
+    x, y, z : float
+        Unit vector of the direction, in the world.
+    sun : (3,) float32
+        Unit vector towards the sun.
+    sun_colour, zenith, horizon : (3,) float32
+        Linear radiance of the sun's light, of the sky overhead and of the sky at the horizon.
+    clouds : float
+        Share of the sky that clouds cover.
+    phase : float
+        Shift of the clouds.
+    out : (3,) float32
+        Written in place: linear radiance, red, green and blue.
+    """
     up = max(z, 0.0)
     mix = (1.0 - up) ** 5
     glow = max(x * sun[0] + y * sun[1] + z * sun[2], 0.0)

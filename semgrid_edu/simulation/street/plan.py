@@ -1,4 +1,4 @@
-"""What a street is to be like: drawn at random, the same for the same seed."""
+"""The plan of a street: what a world is to be like, drawn at random except for what is asked for."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,15 +14,13 @@ BORDERS = (*FENCES, "hedge", "none")
 """What may run along the gardens of a suburb."""
 STYLES = ("town", "suburb", "park")
 """What lines a side of the road: facades at the sidewalk; houses in gardens; grass banks and trees."""
-
-
 LAYOUTS = ("straight", "bend", "junction")
 """What a road may do."""
 
 
 @dataclass(frozen=True)
 class Wishes:
-    """What a drive shall be like; whatever is None is drawn.
+    """What is asked of a drive; whatever is None is drawn at random.
 
     Parameters
     ----------
@@ -35,14 +33,15 @@ class Wishes:
     parking : (bool, bool) or None
         Parking bays left and right.
     light : Light or None
+        Sun, sky and exposure.
     density : float or None
-        0..1: how much traffic and how many people.
+        How much traffic and how many people there are, 0..1.
     speed : float or None
         Mean speed of the recording car, m/s.
     ego_lane : int or None
-        Its lane; 0 is beside the centre line.
+        Lane of the recording car; 0 is beside the centre line.
     cast : callable or None
-        Puts road users on the street, given the drive's `Traffic`, in place of `fill_street`.
+        Function that takes the drive's `Traffic` and puts road users on the street, in place of `fill_street`.
     """
 
     layout: str | None = None
@@ -68,7 +67,9 @@ class Plan:
     Parameters
     ----------
     road : Road
+        Its street.
     extent : Extent
+        How far the world reaches along the street.
     styles : (str, str)
         Left and right side, members of `STYLES`.
     borders : (str, str)
@@ -76,10 +77,11 @@ class Plan:
     parking : (bool, bool)
         Whether there are parking bays left and right.
     light : Light
+        Sun, sky and exposure.
     density : float
-        0..1: how much traffic and how many people.
+        How much traffic and how many people there are, 0..1.
     foliage : (float, float, float)
-        Tint of all leaves: the season.
+        Factor for red, green and blue of all leaves: the season.
     """
 
     road: Road
@@ -104,7 +106,7 @@ def _side(style: str, lanes: int, lane: float, parking: bool, rng: np.random.Gen
 
 
 def _road(rng: np.random.Generator, length: float, layout: str, lanes: tuple, styles: tuple, parking: tuple) -> Road:
-    """Draw the geometry of a street on which the ego vehicle drives `length` metres."""
+    """Draw the geometry of a street on which the recording car drives `length` metres."""
     lane = rng.uniform(3.1, 3.6)
     start, curvature, arc = 0.0, 0.0, 0.0
     if layout == "bend":
@@ -129,9 +131,15 @@ def draw_plan(rng: np.random.Generator, length: float, wishes: Wishes) -> Plan:
     Parameters
     ----------
     rng : numpy.random.Generator
+        Source of all that is drawn.
     length : float
-        Metres that the ego vehicle drives.
+        Distance that the recording car drives, metres.
     wishes : Wishes
+        What isn't left to chance.
+
+    Returns
+    -------
+    Plan
     """
     layout = wishes.layout or str(rng.choice(LAYOUTS, p=[0.3, 0.3, 0.4]))
     lanes = wishes.lanes or [(1, 1), (1, 1), (1, 2), (2, 2)][rng.integers(4)]

@@ -1,19 +1,20 @@
-"""Who uses the street: parked cars, traffic in every lane, cyclists and pedestrians, as many as a plan asks for."""
+"""The road users of a street: parked cars, traffic in every lane, cyclists and pedestrians, as many as planned."""
 
 import numpy as np
 
-from semgrid_edu.simulation.street.paths import STAND, Pace, Path
 from semgrid_edu.simulation.street.traffic import Traffic
+from semgrid_edu.simulation.street.trajectories import STAND, Pace, Trajectory
 from semgrid_edu.simulation.things.cars import car_size
 from semgrid_edu.simulation.things.materials import Kind
 
 
 def fill_street(traffic: Traffic) -> None:
-    """Put on the street what the plan's density asks for.
+    """Put road users on the street, as many as the plan's density asks for.
 
     Parameters
     ----------
     traffic : Traffic
+        Takes them; it knows the street and the plan.
     """
     _park_cars(traffic)
     _park_bicycles(traffic)
@@ -37,14 +38,14 @@ def _park_cars(traffic: Traffic) -> None:
             if rng.random() > share or near:
                 continue
             body, away = traffic.body(), (sign > 0) != (rng.random() < 0.12)
-            path = Path(
+            trajectory = Trajectory(
                 s, sign * (side.edge - 1.06 + rng.normal(0, 0.05)), 1, 0, STAND, rng.normal(0, 0.02) + np.pi * away
             )
-            traffic.park(Kind.CAR, car_size(body), path, (body, traffic.paint()))
+            traffic.park(Kind.CAR, car_size(body), trajectory, (body, traffic.paint()))
 
 
 def _park_bicycles(traffic: Traffic) -> None:
-    """Stand a few bicycles on the sidewalks."""
+    """Park a few bicycles on the sidewalks."""
     road, rng = traffic.road, traffic.rng
     for sign, side in ((1, road.left), (-1, road.right)):
         if side.walk < 1.5:
@@ -52,7 +53,7 @@ def _park_bicycles(traffic: Traffic) -> None:
         for _ in range(rng.integers(0, 5)):
             s, n = rng.uniform(4, 70), rng.integers(1, 4)
             for k in range(n):
-                path = Path(
+                trajectory = Trajectory(
                     s + 0.75 * k,
                     sign * (side.edge + side.strip + rng.choice([0.5, side.walk - 0.35])),
                     1,
@@ -60,11 +61,11 @@ def _park_bicycles(traffic: Traffic) -> None:
                     STAND,
                     rng.normal(0, 0.15) + (1.3 if n > 1 else 0),
                 )
-                traffic.park(Kind.BICYCLE, (1.78, 0.4, 1.05), path, ("bicycle", traffic.paint()))
+                traffic.park(Kind.BICYCLE, (1.78, 0.4, 1.05), trajectory, ("bicycle", traffic.paint()))
 
 
 def _lanes(traffic: Traffic) -> None:
-    """Fill every lane with cars of one pace, so that none catches up with the next."""
+    """Fill every lane with cars that drive alike, so that none catches up with the next."""
     road, rng, ego = traffic.road, traffic.rng, traffic.ego
     stands = ego.pace.mean == 0
     ego_lane = round(-ego.d / road.lane - 0.5)
@@ -84,14 +85,14 @@ def _lanes(traffic: Traffic) -> None:
 
 
 def _fill_lane(traffic: Traffic, d: float, along: int, pace: Pace) -> None:
-    """Put cars of one pace into a lane, so that they are around the recording car when the drive ends."""
+    """Put cars that drive alike into a lane, so that they are around the recording car when the drive ends."""
     road, rng = traffic.road, traffic.rng
-    way = pace.distance(traffic.duration)
+    travelled = pace.distance(traffic.duration)
     gap = 6.5 + (0.8 * pace.mean if pace.mean else 0.0)
     middle = traffic.ego.at(traffic.duration)[0]
     s = middle - 30 + rng.uniform(0, 15)
     while s < middle + 110:
-        start, ahead = s - along * way, (s - road.junction) * along
+        start, ahead = s - along * travelled, (s - road.junction) * along
         blocked = (
             road.side_half and pace.mean == 0 and -(road.side_half + road.corner + 8) < ahead < road.side_half + 12
         )

@@ -10,12 +10,34 @@ from semgrid_edu.simulation.things.materials import Kind
 
 
 def side_of(builder: Builder, sign: int) -> Side:
-    """Return the left side of the road for a sign of 1, the right one for -1."""
+    """Return one side of the road.
+
+    Parameters
+    ----------
+    builder : Builder
+        The world that the road belongs to.
+    sign : int
+        1 for the left side, -1 for the right one.
+
+    Returns
+    -------
+    Side
+    """
     return builder.road.left if sign > 0 else builder.road.right
 
 
 def stand_lamps(builder: Builder, plan: Plan, sign: int) -> None:
-    """Stand street lamps at the kerb."""
+    """Put a row of street lamps at the kerb; one side in four, drawn by chance, has none.
+
+    Parameters
+    ----------
+    builder : Builder
+        The world that takes them.
+    plan : Plan
+        How far it reaches.
+    sign : int
+        1 for the left side, -1 for the right one.
+    """
     if builder.rng.random() < 0.25:
         return
     side, step = side_of(builder, sign), builder.rng.uniform(22, 34)
@@ -25,7 +47,17 @@ def stand_lamps(builder: Builder, plan: Plan, sign: int) -> None:
 
 
 def stand_signs(builder: Builder, plan: Plan, sign: int) -> None:
-    """Stand traffic signs at the kerb, facing the traffic on their side."""
+    """Put traffic signs at the kerb, facing the traffic on their side.
+
+    Parameters
+    ----------
+    builder : Builder
+        The world that takes them.
+    plan : Plan
+        How far it reaches.
+    sign : int
+        1 for the left side, -1 for the right one.
+    """
     rng, side = builder.rng, side_of(builder, sign)
     yaw = 0.0 if sign < 0 else np.pi
     for s in np.arange(plan.extent.start, plan.extent.end, 16.0):
@@ -44,7 +76,13 @@ def stand_signs(builder: Builder, plan: Plan, sign: int) -> None:
 
 
 def stand_signals(builder: Builder) -> None:
-    """Stand lights or priority signs at the junction's corners."""
+    """Put traffic lights, or signs of priority, at the corners of the junction if there is one.
+
+    Parameters
+    ----------
+    builder : Builder
+        The world that takes them.
+    """
     road, rng = builder.road, builder.rng
     if not road.side_half:
         return

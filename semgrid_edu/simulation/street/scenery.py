@@ -1,4 +1,4 @@
-"""Lines a planned street with houses, fences, trees, lamps and signs."""
+"""The scenery of a planned street: its ground, houses, fences, trees, lamps and signs."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from semgrid_edu.simulation.street.plan import Plan
 from semgrid_edu.simulation.street.roadside import side_of, stand_lamps, stand_signals, stand_signs
 from semgrid_edu.simulation.street.terrain import ground_mesh
 from semgrid_edu.simulation.things import furniture, plants
-from semgrid_edu.simulation.things.buildings import House, build
+from semgrid_edu.simulation.things.buildings import House, build_house
 from semgrid_edu.simulation.things.materials import Kind, Material
 
 _TREE_RADIUS = 0.22
@@ -17,12 +17,19 @@ _HEDGE_HALF, _FENCE_HALF = 0.42, 0.08
 
 
 def build_scenery(plan: Plan, rng: np.random.Generator) -> Builder:
-    """Build all that never moves, parked cars excepted.
+    """Build all that never moves, but for parked cars and bicycles.
 
     Parameters
     ----------
     plan : Plan
+        What the street is to be like.
     rng : numpy.random.Generator
+        Source of all that is drawn.
+
+    Returns
+    -------
+    Builder
+        The world, ready to take road users.
     """
     builder = Builder(plan.road, rng)
     ground = ground_mesh(plan.road, plan.extent)
@@ -90,14 +97,14 @@ def _bush(builder: Builder, plan: Plan, s: float, d: float) -> None:
 
 
 def _house(builder: Builder, house: House, s: float, d: float, yaw: float, across_road: bool = False) -> None:
-    """Put a house with the middle of its front at (s, d), where nothing stands; on a road only when it may."""
+    """Put a house with the middle of its front at (s, d) if the place is free; on asphalt only if it may."""
     half = (house.width / 2, house.depth / 2)
     foot = builder.footprint(s, d, yaw, Kind.BUILDING, half, offset=(0.0, house.depth / 2))
     corners = [to_road(builder.road, x, y) for x, y in outline(foot)]
     if not across_road and min(builder.edge_distance(*corner) for corner in corners) < 0.1:
         return
     if builder.free(foot, 0.05):
-        builder.add(build(house), s, d, yaw, 1.0, [foot])
+        builder.add(build_house(house), s, d, yaw, 1.0, [foot])
 
 
 def _random_house(style: str, rng: np.random.Generator) -> House:
@@ -141,13 +148,8 @@ def _second_row(builder: Builder, plan: Plan, sign: int, offset: float) -> None:
     rng = builder.rng
     for s in np.arange(plan.extent.start, plan.extent.end, 34.0):
         if rng.random() < 0.7:
-            _house(
-                builder,
-                _random_house("town", rng),
-                s + rng.uniform(0, 10),
-                sign * (offset + rng.uniform(0, 10)),
-                _facing(sign),
-            )
+            house = _random_house("town", rng)
+            _house(builder, house, s + rng.uniform(0, 10), sign * (offset + rng.uniform(0, 10)), _facing(sign))
 
 
 def _border(builder: Builder, s0: float, s1: float, sign: int, offset: float, style: str) -> None:
@@ -193,17 +195,12 @@ def _park(builder: Builder, plan: Plan, sign: int) -> None:
             (_tree if rng.random() < 0.62 else _bush)(builder, plan, s + rng.uniform(0, 5), sign * offset)
     for s in np.arange(plan.extent.start, plan.extent.end, 60.0):
         if rng.random() < 0.5:
-            _house(
-                builder,
-                _random_house("town", rng),
-                s + rng.uniform(0, 30),
-                sign * (line + rng.uniform(30, 40)),
-                _facing(sign),
-            )
+            house = _random_house("town", rng)
+            _house(builder, house, s + rng.uniform(0, 30), sign * (line + rng.uniform(30, 40)), _facing(sign))
 
 
 def _street_trees(builder: Builder, plan: Plan, sign: int) -> None:
-    """Plant a row of like trees in the strip beside the kerb."""
+    """Plant a row of trees of one species in the strip beside the kerb."""
     rng, side = builder.rng, side_of(builder, sign)
     if side.strip < 1.2:
         return

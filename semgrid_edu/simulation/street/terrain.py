@@ -1,4 +1,4 @@
-"""The ground as a mesh: fine where kerbs are, coarse elsewhere."""
+"""The ground as a mesh of triangles: fine where kerbs are, coarse elsewhere."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.simulation.street.layout import Road, Side, ground_height, to_world
+from semgrid_edu.simulation.street.ground import ground_height
+from semgrid_edu.simulation.street.layout import Road, Side, to_world
 from semgrid_edu.simulation.things.materials import Kind, Material
 from semgrid_edu.simulation.things.shapes import Shape, shape
 
@@ -32,12 +33,18 @@ _OUTWARD = (
     130.0,
     250.0,
 )
-"""Metres outside the asphalt's edge at which the mesh has vertices."""
+"""Distances outside the asphalt's edge at which the mesh has vertices, metres."""
 
 
 @dataclass(frozen=True)
 class Extent:
-    """How far the world reaches along the road, s in metres."""
+    """How far a world reaches along its road.
+
+    Parameters
+    ----------
+    start, end : float
+        The first and the last place: s, metres.
+    """
 
     start: float
     end: float
@@ -72,12 +79,21 @@ def _vertices(road: Road, s: NDArray, d: NDArray) -> NDArray:
 
 
 def ground_mesh(road: Road, extent: Extent) -> Shape:
-    """Make the ground; its kind and colour are decided where a ray meets it.
+    """Make the ground of a street, in the world.
+
+    All of it has one colour and one kind here: `shade` decides what the ground is where a ray meets it, so that lane
+    marks need no triangles of their own.
 
     Parameters
     ----------
     road : Road
+        The street.
     extent : Extent
+        How far the ground reaches along the street.
+
+    Returns
+    -------
+    Shape
     """
     corner = road.corner if road.side_half else 0.0
     d = np.concatenate([-_across(road.right, corner), [0.0], _across(road.left, corner)])

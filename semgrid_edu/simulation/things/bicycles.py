@@ -1,4 +1,4 @@
-"""Bicycles of tubes; they stand on z = 0 and look along x."""
+"""Shapes of bicycles, made of tubes; they stand on z = 0 and point along x."""
 
 import itertools
 from functools import cache
@@ -7,11 +7,12 @@ import numpy as np
 
 from semgrid_edu.simulation.things.cars import PAINTS
 from semgrid_edu.simulation.things.materials import Kind, Material
-from semgrid_edu.simulation.things.shapes import Shape, ball, merge, quads, tube
+from semgrid_edu.simulation.things.primitives import ball, quads, tube
+from semgrid_edu.simulation.things.shapes import Shape, merge
 
 
 def _wheel(x: float) -> list[Shape]:
-    """Make a bicycle wheel: a ring of tubes, a hub and spokes."""
+    """Make a bicycle wheel: a ring of tubes, and spokes."""
     angle = np.linspace(0, 2 * np.pi, 17)
     rim = np.stack([x + 0.33 * np.cos(angle), 0 * angle, 0.35 + 0.33 * np.sin(angle)], axis=1)
     tyre = [
@@ -25,7 +26,12 @@ def _wheel(x: float) -> list[Shape]:
 
 @cache
 def bicycle() -> Shape:
-    """Make a bicycle, 1.75 m long; its frame is `Material.PAINT`."""
+    """Make a bicycle, 1.75 m long; its frame is of `Material.PAINT`, so that it can be recoloured.
+
+    Returns
+    -------
+    Shape
+    """
     paint = {"colour": PAINTS[5], "material": Material.PAINT, "kind": Kind.BICYCLE, "sides": 5}
     metal = {"colour": (0.25,) * 3, "material": Material.METAL, "kind": Kind.BICYCLE, "sides": 5}
     crank, saddle, head, rear, front = (

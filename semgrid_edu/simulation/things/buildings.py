@@ -1,4 +1,4 @@
-"""Houses: walls with windows and doors under a gable, hip or flat roof."""
+"""Shapes of houses: walls with windows and doors under a gable, hip or flat roof."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.simulation.things.materials import Kind, Material
-from semgrid_edu.simulation.things.shapes import Shape, box, merge, quads, shape
+from semgrid_edu.simulation.things.primitives import box, quads
+from semgrid_edu.simulation.things.shapes import Shape, merge, shape
 
 _PLASTER = (
     (0.70, 0.64, 0.50),
@@ -40,7 +41,7 @@ class House:
     shop : bool
         Whether the ground floor is a shop window.
     seed : int
-        Decides colours, windows and the door.
+        Seed for colours, windows and the door.
     """
 
     width: float
@@ -204,12 +205,20 @@ def _balconies(house: House, rng: np.random.Generator) -> list[Shape]:
     return parts
 
 
-def build(house: House) -> Shape:
-    """Build a house, its walls reaching 2.5 m into the ground so that slopes can't lift it.
+def build_house(house: House) -> Shape:
+    """Build a house.
+
+    Its walls reach 2.5 m into the ground, so that no gap opens below them on a slope.
 
     Parameters
     ----------
     house : House
+        Its plan; x along the front, y away from the street.
+
+    Returns
+    -------
+    Shape
+        In the frame of the plan.
     """
     rng = np.random.default_rng([house.seed, 80])
     brick = rng.random() < 0.3

@@ -1,4 +1,4 @@
-"""Cars lofted from cross-sections; they stand on z = 0 and look along x."""
+"""Shapes of cars, spanned between cross-sections; they stand on z = 0 and point along x."""
 
 import itertools
 from functools import cache
@@ -6,11 +6,12 @@ from functools import cache
 import numpy as np
 
 from semgrid_edu.simulation.things.materials import Kind, Material
-from semgrid_edu.simulation.things.shapes import Shape, box, merge, shape, tube
+from semgrid_edu.simulation.things.primitives import box, tube
+from semgrid_edu.simulation.things.shapes import Shape, merge, shape
 
-# A body is a row of cross-sections from rear to front: x / length, z of the sill, of the shoulder line and of
-# the top (m), then half-widths of body and top over the half-width of the car. "glass" marks the spans, by the
-# index of their rear section, whose upper sides are windows; "screen" those whose top is a window.
+# A body has a length and a width (m), and cross-sections from rear to front. A cross-section is x / length, the heights
+# of the sill, of the shoulder line and of the top (m), then the half-widths of body and top over half the car's width.
+# Then come the numbers of the spans between two cross-sections whose sides are windows, and of those whose top is one.
 _BODIES = {
     "hatchback": (
         (4.0, 1.74),
@@ -113,7 +114,13 @@ _GLASS, _DARK = (0.025, 0.03, 0.035), (0.02, 0.02, 0.022)
 
 
 def car_size(body: str) -> tuple[float, float, float]:
-    """Return length, width and height of a car body, metres."""
+    """Return length, width and height of a car body, metres.
+
+    Parameters
+    ----------
+    body : str
+        One of `BODIES`.
+    """
     (length, width), sections, _, _ = _BODIES[body]
     return length, width, max(section[3] for section in sections)
 
@@ -214,12 +221,16 @@ def _trim(body: str, side: int) -> list[Shape]:
 
 @cache
 def car(body: str) -> Shape:
-    """Make a car; its paint is recoloured with `Shape.recoloured(Material.PAINT, colour)`.
+    """Make a car; `Shape.recoloured(Material.PAINT, colour)` gives it another paint.
 
     Parameters
     ----------
     body : str
         One of `BODIES`.
+
+    Returns
+    -------
+    Shape
     """
     length, width, _ = car_size(body)
     half = width / 2

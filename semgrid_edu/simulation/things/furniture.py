@@ -1,16 +1,15 @@
-"""What stands beside a street: fences, garden walls, traffic signs, lamps and traffic lights."""
+"""Shapes of what stands beside a street: fences, garden walls, traffic signs, lamps and traffic lights."""
 
 from functools import cache
 
 import numpy as np
 
 from semgrid_edu.simulation.things.materials import Kind, Material
-from semgrid_edu.simulation.things.shapes import Shape, ball, box, merge, quads, shape, tube
+from semgrid_edu.simulation.things.primitives import ball, box, quads, tube
+from semgrid_edu.simulation.things.shapes import Shape, merge, shape
 
 FENCES = ("planks", "bars", "mesh", "wall")
 """The fences that `fence` knows."""
-SIGNS = ("limit", "no-entry", "priority", "warning", "parking", "direction", "stop")
-"""The traffic signs that `sign` knows."""
 _WOOD, _STEEL, _STONE = (0.26, 0.16, 0.09), (0.05, 0.09, 0.06), (0.36, 0.34, 0.31)
 
 
@@ -30,7 +29,11 @@ def fence(style: str, length: float) -> Shape:
     style : str
         One of `FENCES`; "wall" is a low garden wall of stone, a fence to both label sets.
     length : float
-        Metres.
+        Length of the piece, metres.
+
+    Returns
+    -------
+    Shape
     """
     if style == "wall":
         cap = box((length / 2, 0, 1.0), (length, 0.34, 0.1), (0.45, 0.43, 0.4), Material.PLASTER, Kind.FENCE)
@@ -83,11 +86,24 @@ _FACES = {
         (np.array([[-0.5, -0.06], [-0.5, 0.06], [0.3, 0.06], [0.3, -0.06]]), (0.03,) * 3),
     ],
 }
+SIGNS = tuple(_FACES)
+"""The traffic signs that `sign` knows."""
 
 
 @cache
 def sign(name: str) -> Shape:
-    """Make a traffic sign on its pole; its face looks along -x, towards who drives along x."""
+    """Make a traffic sign on its pole; it faces -x, so that a driver who goes along x sees it.
+
+    Parameters
+    ----------
+    name : str
+        One of `SIGNS`.
+
+    Returns
+    -------
+    Shape
+        The pole stands on the origin.
+    """
     pole = tube((0, 0, -0.5), (0, 0, 2.75), (0.035, 0.035), (0.42, 0.43, 0.44), Material.METAL, Kind.POLE)
     plates = [_plate(np.add(c, (0, 2.4)), colour, -0.05 - 0.008 * i) for i, (c, colour) in enumerate(_FACES[name])]
     back = _plate(np.add(_FACES[name][0][0][::-1], (0, 2.4)), (0.3, 0.3, 0.3), -0.04, Material.METAL)
@@ -96,7 +112,17 @@ def sign(name: str) -> Shape:
 
 @cache
 def lamp(height: float) -> Shape:
-    """Make a street lamp whose arm reaches 1.6 m along y."""
+    """Make a street lamp on the origin, whose arm reaches 1.5 m along y.
+
+    Parameters
+    ----------
+    height : float
+        Height of the lamp above the ground, metres.
+
+    Returns
+    -------
+    Shape
+    """
     grey = {"colour": (0.24, 0.25, 0.25), "material": Material.METAL, "kind": Kind.POLE}
     head = box((0, 1.7, height), (0.22, 0.7, 0.12), (0.3, 0.3, 0.29), Material.METAL, Kind.POLE)
     return merge(
@@ -111,7 +137,17 @@ def lamp(height: float) -> Shape:
 
 @cache
 def traffic_light(green: bool) -> Shape:
-    """Make a traffic light that faces -x."""
+    """Make a traffic light on its pole at the origin; it faces -x.
+
+    Parameters
+    ----------
+    green : bool
+        Whether it shows green; else red.
+
+    Returns
+    -------
+    Shape
+    """
     dark = (0.025, 0.03, 0.028)
     colours = [(0.7, 0.02, 0.02), (0.5, 0.3, 0.02), (0.02, 0.6, 0.25)]
     lit = 2 if green else 0

@@ -1,4 +1,4 @@
-"""What things are and what they are made of, and how the label sets of section 4 call them."""
+"""What things are and what they are made of, and the class that each label set of section 4 gives them."""
 
 from enum import IntEnum
 
@@ -70,14 +70,15 @@ _KITTI_NAMES = {"lane": "road", "sign": "signage", "pole": "signage"}
 
 
 def class_of_kind(label_set: LabelSet) -> NDArray[np.uint8]:
-    """Return the class number of every `Kind` in a label set.
+    """Return the class of every `Kind` in a label set.
 
-    KITTI-14 calls poles signage and lane marks road. SYNTHIA-10 calls void what it has no class for:
-    pedestrians, bicycles and sky. A cyclist is one road user: rider and bicycle are both `Kind.BICYCLE`.
+    In KITTI-14, poles are signage and lane marks are road. SYNTHIA-10 has no class for pedestrians, bicycles and sky:
+    they are void. A cyclist is one road user, so rider and bicycle are both `Kind.BICYCLE`.
 
     Parameters
     ----------
     label_set : LabelSet
+        The classes to translate to.
 
     Returns
     -------

@@ -1,7 +1,7 @@
-"""People of capsules: walking ones whose legs and arms swing with the distance walked, and riders.
+"""Shapes of people: walkers, whose legs and arms swing with the distance that they have walked, and riders.
 
-Bodies are built once a phase of the stride, with the number of a garment in place of each colour; dressing them is a
-look-up.
+A body is built once for each phase of the stride, with the number of a garment in place of each colour. So dressing a
+person is a look-up.
 """
 
 from dataclasses import dataclass, replace
@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from semgrid_edu.simulation.things.bicycles import bicycle
 from semgrid_edu.simulation.things.cars import PAINTS
 from semgrid_edu.simulation.things.materials import Kind, Material
-from semgrid_edu.simulation.things.shapes import Shape, ball, merge, tube
+from semgrid_edu.simulation.things.primitives import ball, tube
+from semgrid_edu.simulation.things.shapes import Shape, merge
 
 _PHASES = 16
 _TOP, _TROUSERS, _SKIN_SLOT, _HAIR_SLOT, _SHOES = 0, 1, 2, 3, 4
@@ -39,11 +40,11 @@ class Person:
     Parameters
     ----------
     height : float
-        Metres; adults are 1.5 to 1.95 m.
+        Body height, metres; adults are 1.5 to 1.95 m.
     top, trousers, skin, hair : (float, float, float)
-        Linear colours.
+        Linear albedo, red, green and blue, 0..1.
     frame : (float, float, float)
-        Paint of the bicycle, when the person rides one.
+        Linear albedo of the bicycle's paint, for a person who rides one.
     """
 
     height: float
@@ -55,7 +56,17 @@ class Person:
 
     @classmethod
     def random(cls, rng: np.random.Generator) -> "Person":
-        """Draw somebody."""
+        """Draw a person.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Decides height, clothes, skin, hair and the paint of the bicycle.
+
+        Returns
+        -------
+        Person
+        """
         pick = lambda colours: colours[rng.integers(len(colours))]  # noqa: E731
         top, trousers = pick(_CLOTHES), pick(_CLOTHES[:4] + _CLOTHES[7:])
         return cls(rng.uniform(1.55, 1.92), top, trousers, pick(_SKIN), pick(_HAIR), pick(PAINTS))
@@ -132,26 +143,36 @@ def _dressed(body: Shape, person: Person) -> Shape:
 
 
 def walker(person: Person, distance: float) -> Shape:
-    """Make a person in mid-stride, standing on z = 0 and looking along x.
+    """Make a person in mid-stride, who stands on z = 0 and looks along x.
 
     Parameters
     ----------
     person : Person
+        How tall the person is, and what colours they wear.
     distance : float
-        Metres walked so far; a double stride is 1.45 m. Someone who stands keeps one distance.
+        Distance walked so far, metres; the legs repeat their motion every 1.45 m.
+
+    Returns
+    -------
+    Shape
     """
     phase = round(distance / 1.45 * _PHASES) % _PHASES
     return _dressed(_walking(phase), person).placed((0, 0, 0), scale=person.height / 1.78)
 
 
 def rider(person: Person, distance: float) -> Shape:
-    """Make a cyclist on a bicycle, wheels on z = 0, looking along x.
+    """Make a cyclist on a bicycle, whose wheels stand on z = 0 and who looks along x.
 
     Parameters
     ----------
     person : Person
+        The colours of clothes and bicycle; all riders are of one height.
     distance : float
-        Metres ridden so far; the pedals turn once every 5 m.
+        Distance ridden so far, metres; the pedals turn once every 5 m.
+
+    Returns
+    -------
+    Shape
     """
     phase = round(distance / 5.0 * _PHASES) % _PHASES
     return merge([bicycle().recoloured(Material.PAINT, person.frame), _dressed(_riding(phase), person)])

@@ -1,4 +1,4 @@
-"""Trees, bushes and hedges: a trunk, and foliage of many small triangles lit like the crown they form."""
+"""Shapes of trees, bushes and hedges: trunks, and leaves that are lit as parts of the crown that they form."""
 
 from dataclasses import replace
 from functools import cache
@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.simulation.things.materials import Kind, Material
-from semgrid_edu.simulation.things.shapes import Shape, ball, box, merge, shape, tube
+from semgrid_edu.simulation.things.primitives import ball, box, tube
+from semgrid_edu.simulation.things.shapes import Shape, merge, shape
 
 TREES = ("broad", "tall", "birch", "conifer")
 """The species that `tree` knows."""
@@ -67,9 +68,13 @@ def tree(species: str, variant: int, n_leaves: int = 1500) -> Shape:
     species : str
         One of `TREES`.
     variant : int
-        Trees of one species and variant are the same.
+        Number of the variant: trees of one species and variant are the same.
     n_leaves : int
-        Triangles of foliage; fewer for trees far away.
+        Triangles of foliage; trees far away need fewer.
+
+    Returns
+    -------
+    Shape
     """
     rng = np.random.default_rng([TREES.index(species), variant, 77])
     leaf = 0.24 * (1500 / n_leaves) ** 0.5
@@ -106,7 +111,17 @@ def tree(species: str, variant: int, n_leaves: int = 1500) -> Shape:
 
 @cache
 def bush(variant: int) -> Shape:
-    """Make a bush about 2 m wide and 1.4 m high."""
+    """Make a bush about 2 m wide and 1.4 m high, its foot at the origin.
+
+    Parameters
+    ----------
+    variant : int
+        Number of the variant: bushes of one variant are the same.
+
+    Returns
+    -------
+    Shape
+    """
     rng = np.random.default_rng([variant, 78])
     centre = rng.uniform(-1, 1, (4, 3)) * [0.5, 0.5, 0.2] + [0, 0, 0.55]
     radii = rng.uniform(0.45, 0.7, (4, 1)) * [1, 1, 1]
@@ -115,7 +130,17 @@ def bush(variant: int) -> Shape:
 
 @cache
 def hedge(variant: int) -> Shape:
-    """Make one metre of hedge along x, 0.8 m thick and 1.3 m high."""
+    """Make one metre of hedge along x, 0.8 m thick and 1.3 m high, with the origin in its middle.
+
+    Parameters
+    ----------
+    variant : int
+        Number of the variant: hedges of one variant are the same.
+
+    Returns
+    -------
+    Shape
+    """
     rng = np.random.default_rng([variant, 79])
     n = 260
     points = rng.uniform(-1, 1, (n, 3)) * [0.5, 0.4, 0.65]

@@ -1,11 +1,9 @@
-"""Shapes: triangles that know their colour, material and kind; `trimesh` makes the primitives."""
+"""Shapes of triangles, each with a colour, a material and a kind: what all things on a street are built from."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.simulation.things.materials import Kind, Material
@@ -13,19 +11,20 @@ from semgrid_edu.simulation.things.materials import Kind, Material
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A soup of triangles, F of them, over V vertices.
+    """F triangles over V vertices.
 
     Parameters
     ----------
     vertices : (V, 3) float32
-        Metres; z up.
+        Corners of the triangles, metres, z up: in the thing's own frame, or in the world once it is `placed`.
     faces : (F, 3) int32
+        The rows of `vertices` that are the corners of each triangle, counter-clockwise as seen from outside.
     normals : (F, 3) float32
-        Unit normals for shading, one a face (foliage takes those of its crown, not of its leaves).
+        Unit normal of each triangle, for shading. (Leaves take the normal of the crown that they are part of.)
     colour : (F, 3) float32
-        Linear albedo, 0..1.
+        Linear albedo of each triangle, red, green and blue, 0..1.
     material, kind : (F,) uint8
-        Members of `Material` and `Kind`.
+        The `Material` and the `Kind` of each triangle.
     """
 
     vertices: NDArray[np.float32]
@@ -36,25 +35,79 @@ class Shape:
     kind: NDArray[np.uint8]
 
     def placed(self, position: ArrayLike, yaw: float = 0.0, scale: ArrayLike = 1.0) -> "Shape":
-        """Return the shape scaled, turned about z by `yaw` (rad), then moved to `position` (m)."""
+        """Return the shape scaled, then turned about the z axis, then moved.
+
+        Parameters
+        ----------
+        position : (3,) float
+            Where its origin goes, metres.
+        yaw : float
+            Angle about the z axis, counter-clockwise, rad.
+        scale : float or (3,) float
+            Factor for all sides, or one for each of x, y and z.
+
+        Returns
+        -------
+        Shape
+        """
         c, s = np.cos(yaw), np.sin(yaw)
         rotation = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], dtype=np.float32)
         vertices = (self.vertices * np.asarray(scale, np.float32)) @ rotation.T + np.asarray(position, np.float32)
         return replace(self, vertices=vertices, normals=self.normals @ rotation.T)
 
     def recoloured(self, material: Material, colour: ArrayLike) -> "Shape":
-        """Return the shape with the colour of all faces of one material replaced."""
+        """Return the shape with another colour on all triangles of one material.
+
+        Parameters
+        ----------
+        material : Material
+            Which triangles change.
+        colour : (3,) float
+            Their new linear albedo, 0..1.
+
+        Returns
+        -------
+        Shape
+        """
         colours = self.colour.copy()
         colours[self.material == material] = colour
         return replace(self, colour=colours)
 
     def tinted(self, factor: ArrayLike) -> "Shape":
-        """Return the shape with every colour multiplied."""
+        """Return the shape with its colours multiplied.
+
+        Parameters
+        ----------
+        factor : float, (3,) float or (F, 3) float
+            Factor for all, for each of red, green and blue, or for each triangle; products above 1 become 1.
+
+        Returns
+        -------
+        Shape
+        """
         return replace(self, colour=(self.colour * np.asarray(factor, np.float32)).clip(0, 1))
 
 
 def shape(vertices: ArrayLike, faces: ArrayLike, colour: ArrayLike, material: Material, kind: Kind) -> Shape:
-    """Make a shape of one colour (or one a face), with the faces' own normals."""
+    """Make a shape of one material, each triangle with its own normal.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float
+        Corners, metres.
+    faces : (F, 3) int
+        The rows of `vertices` that are the corners of each triangle, counter-clockwise as seen from outside.
+    colour : (3,) or (F, 3) float
+        Linear albedo, 0..1: one for all triangles, or one for each.
+    material : Material
+        What it is made of.
+    kind : Kind
+        What it belongs to.
+
+    Returns
+    -------
+    Shape
+    """
     vertices = np.asarray(vertices, dtype=np.float32)
     faces = np.asarray(faces, dtype=np.int32)
     corners = vertices[faces]
@@ -66,7 +119,18 @@ def shape(vertices: ArrayLike, faces: ArrayLike, colour: ArrayLike, material: Ma
 
 
 def merge(shapes: Iterable[Shape]) -> Shape:
-    """Return one shape of all triangles of several."""
+    """Join several shapes to one.
+
+    Parameters
+    ----------
+    shapes : iterable of Shape
+        At least one.
+
+    Returns
+    -------
+    Shape
+        All triangles, those of the first shape first.
+    """
     shapes = list(shapes)
     offsets = np.cumsum([0] + [len(s.vertices) for s in shapes[:-1]])
     faces = np.concatenate([s.faces + o for s, o in zip(shapes, offsets, strict=True)]).astype(np.int32)
@@ -75,60 +139,3 @@ def merge(shapes: Iterable[Shape]) -> Shape:
         for name in ("vertices", "normals", "colour", "material", "kind")
     }
     return Shape(faces=faces, **rest)
-
-
-@cache
-def _primitive(name: str, detail: int) -> tuple[NDArray, NDArray]:
-    """Return vertices and faces of a unit primitive."""
-    if name == "sphere":
-        mesh = trimesh.creation.icosphere(subdivisions=detail, radius=1.0)
-    elif name == "cylinder":
-        mesh = trimesh.creation.cylinder(radius=1.0, height=1.0, sections=detail)
-    else:
-        mesh = trimesh.creation.box((1.0, 1.0, 1.0))
-    return mesh.vertices.astype(np.float32), mesh.faces.astype(np.int32)
-
-
-def box(centre: ArrayLike, size: ArrayLike, colour: ArrayLike, material: Material, kind: Kind) -> Shape:
-    """Make a box from its centre and its three sides (m)."""
-    vertices, faces = _primitive("box", 0)
-    return shape(vertices * np.asarray(size, np.float32) + np.asarray(centre), faces, colour, material, kind)
-
-
-def ball(centre: ArrayLike, radii: ArrayLike, colour: ArrayLike, material: Material, kind: Kind, detail=1) -> Shape:
-    """Make an ellipsoid from its centre and its radii (m)."""
-    vertices, faces = _primitive("sphere", detail)
-    return shape(vertices * np.asarray(radii, np.float32) + np.asarray(centre), faces, colour, material, kind)
-
-
-def tube(
-    start: ArrayLike,
-    end: ArrayLike,
-    radii: tuple[float, float],
-    colour: ArrayLike,
-    material: Material,
-    kind: Kind,
-    sides: int = 7,
-) -> Shape:
-    """Make a cylinder (or a frustum) between two points, `radii` at start and end (m)."""
-    start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
-    vertices, faces = _primitive("cylinder", sides)
-    axis = (end - start) / np.linalg.norm(end - start)
-    side = np.cross(axis, [0, 0, 1] if abs(axis[2]) < 0.9 else [1, 0, 0])
-    side /= np.linalg.norm(side)
-    along = vertices[:, 2:] + 0.5
-    radius = radii[0] + (radii[1] - radii[0]) * along
-    ring = (vertices[:, :1] * side + vertices[:, 1:2] * np.cross(axis, side)) * radius
-    return shape(start + along * (end - start) + ring, faces, colour, material, kind)
-
-
-def quads(
-    corner: ArrayLike, right: ArrayLike, up: ArrayLike, colour: ArrayLike, material: Material, kind: Kind
-) -> Shape:
-    """Make N parallelograms from a corner and two edges each, (N, 3) or broadcast; they face right x up."""
-    corner, right, up = np.broadcast_arrays(*(np.atleast_2d(np.asarray(a, np.float32)) for a in (corner, right, up)))
-    n = len(corner)
-    vertices = np.stack([corner, corner + right, corner + right + up, corner + up], axis=1).reshape(-1, 3)
-    faces = (np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(n)[:, None, None]).reshape(-1, 3)
-    colours = np.repeat(np.broadcast_to(np.asarray(colour, np.float32), (n, 3)), 2, axis=0)
-    return shape(vertices, faces, colours, material, kind)

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from oracle_of_stages import assert_oracle_agrees
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals, why_dependent
+from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals, total_variation, why_dependent
 from semgrid_edu.graphical.stages.beam import BeamWorld, beam_likelihood, beam_over_cells, range_state, reflection
-from semgrid_edu.graphical.stages.beam_beliefs import beam_beliefs, independent, occupied, total_variation
+from semgrid_edu.graphical.stages.beam_beliefs import beam_beliefs, independent, occupied
 from semgrid_edu.graphical.stages.shared_error import count_rings, scan_with_pose_error
 from semgrid_edu.graphical.stages.thick_walls import PARAMS, draw_ranges, package_row, same_sensor, thick_walls
 
@@ -189,7 +189,8 @@ def test_draws_come_from_the_forward_model():
 
 def test_total_variation_by_hand():
     world = BeamWorld(n_cells=1)
-    assert total_variation(independent(world, [0.2]), independent(world, [0.5])) == pytest.approx(0.3)
+    one, other = (independent(world, [p]).table for p in (0.2, 0.5))
+    assert total_variation(one, other) == pytest.approx(0.3)
 
 
 @pytest.mark.parametrize(

@@ -1,37 +1,22 @@
-"""The cast of the sample drive: one of everything that the course speaks of."""
+"""What the shipped sample drive shows: a street with one of everything that the course speaks of."""
 
 import numpy as np
 
 from semgrid_edu.simulation.street.light import Light
-from semgrid_edu.simulation.street.paths import STAND, Pace
 from semgrid_edu.simulation.street.plan import Wishes
 from semgrid_edu.simulation.street.road_users import fill_street
 from semgrid_edu.simulation.street.traffic import Traffic
+from semgrid_edu.simulation.street.trajectories import STAND, Pace
 
 
 def _cast(traffic: Traffic) -> None:
-    """Put an overtaking and an oncoming car, a cyclist and pedestrians where the camera sees them, then the rest."""
+    """Put an overtaking and an oncoming car, a cyclist and pedestrians where the camera sees them, then others."""
     road, ego, end = traffic.road, traffic.ego, traffic.duration
     here = ego.at(end)[0]
     overtaking, oncoming = Pace(ego.pace.mean + 6.0), Pace(9.0)
-    traffic.drive_car(
-        here + 9.0 - overtaking.distance(end),
-        -0.5 * road.lane,
-        1,
-        0,
-        overtaking,
-        body="estate",
-        paint=(0.35, 0.02, 0.02),
-    )
-    traffic.drive_car(
-        here + 14.0 + oncoming.distance(end),
-        0.5 * road.lane,
-        -1,
-        0,
-        oncoming,
-        body="hatchback",
-        paint=(0.05, 0.12, 0.35),
-    )
+    red, blue = ("estate", (0.35, 0.02, 0.02)), ("hatchback", (0.05, 0.12, 0.35))
+    traffic.drive_car(here + 9.0 - overtaking.distance(end), -0.5 * road.lane, 1, 0, overtaking, red)
+    traffic.drive_car(here + 14.0 + oncoming.distance(end), 0.5 * road.lane, -1, 0, oncoming, blue)
     cyclist = Pace(5.0)
     traffic.ride(here + 9.0 - cyclist.distance(end), -(road.lanes_right * road.lane - 0.45), 1, cyclist)
     for sign, side, ahead in ((-1, road.right, 12.0), (1, road.left, 17.0)):

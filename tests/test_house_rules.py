@@ -1,0 +1,155 @@
+"""The rules of CONTRIBUTING that a program can check: lengths, described parameters, and names used once."""
+
+import ast
+import inspect
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import semgrid_edu
+
+PACKAGE = Path(semgrid_edu.__file__).parent
+SOURCES = {
+    path.relative_to(PACKAGE).as_posix(): path.read_text(encoding="utf-8") for path in sorted(PACKAGE.rglob("*.py"))
+}
+TREES = {module: ast.parse(source) for module, source in SOURCES.items()}
+
+DESCRIBED = (
+    *("__init__.py", "errors.py", "grid.py", "labels.py", "camera.py", "frame.py", "metrics.py", "cli.py"),
+    *("storage", "datasets", "simulation", "illustrations", "plotting"),
+    *(
+        f"experiments/{name}.py"
+        for name in ("cell_scores", "cell_truth", "occupancy", "overfit", "scenes", "two_stage")
+    ),
+)
+"""The rooms and modules in which every parameter of a public function or class must have a description."""
+
+SHARED_NAMES = {
+    "check_points": {"occupancy/points.py", "planes/pixels.py"},
+    "image_labels": {"experiments/evaluate.py", "plotting/images.py"},
+}
+"""Names that several modules give to public functions or classes, and these modules: the exceptions to the rule."""
+
+ENTRY = re.compile(r"(?P<names>\*{0,2}\w+(?:, \*{0,2}\w+)*)( : \S.*)?")
+"""The first line of an entry in a numpydoc section, such as `low, high : float`."""
+
+
+def definitions(body: list[ast.stmt], *kinds: type) -> list:
+    """The public functions, classes or both that a module or a class defines."""
+    nodes = [node for node in body if isinstance(node, kinds or (ast.FunctionDef, ast.ClassDef))]
+    return [node for node in nodes if not node.name.startswith("_") and "overload" not in decorators(node)]
+
+
+def decorators(node: ast.FunctionDef | ast.ClassDef) -> str:
+    return " ".join(map(ast.unparse, node.decorator_list))
+
+
+def documented(module: str) -> Iterator[tuple[str, str, list[str]]]:
+    """Every public function, class and method of a module: its name, its docstring and the parameters it takes."""
+    for node in definitions(TREES[module].body):
+        takes = arguments(node) if isinstance(node, ast.FunctionDef) else constructor_arguments(node)
+        yield node.name, ast.get_docstring(node) or "", takes
+        for method in definitions(node.body, ast.FunctionDef) if isinstance(node, ast.ClassDef) else ():
+            first = 0 if "staticmethod" in decorators(method) else 1
+            yield f"{node.name}.{method.name}", ast.get_docstring(method) or "", arguments(method)[first:]
+
+
+def arguments(function: ast.FunctionDef) -> list[str]:
+    """The names of a function's arguments, without those that declare a help text for the command line."""
+    a = function.args
+    every = [*a.posonlyargs, *a.args, *filter(None, [a.vararg]), *a.kwonlyargs, *filter(None, [a.kwarg])]
+    return [one.arg for one in every if not (one.annotation and "typer." in ast.unparse(one.annotation))]
+
+
+def constructor_arguments(node: ast.ClassDef) -> list[str]:
+    """What a class is made from: the arguments of `__init__`, or the fields of a dataclass or named tuple."""
+    for method in node.body:
+        if isinstance(method, ast.FunctionDef) and method.name == "__init__":
+            return arguments(method)[1:]
+    if "dataclass" not in decorators(node) and "NamedTuple" not in map(ast.unparse, node.bases):
+        return []
+    fields = [field for field in node.body if isinstance(field, ast.AnnAssign)]
+    return [field.target.id for field in fields if not re.search("init=False|ClassVar", ast.unparse(field))]
+
+
+def described(docstring: str) -> set[str]:
+    """The parameters about which a numpydoc docstring says more than name and type."""
+    section = re.search(r"^Parameters\n-{10}\n(.*?)(?=^\w[\w ]*\n-{3}|\Z)", inspect.cleandoc(docstring), re.M | re.S)
+    names: set[str] = set()
+    entry: list[str] = []
+    for line in section[1].splitlines() if section else ():
+        if opens := ENTRY.fullmatch(line):
+            entry = re.findall(r"\w+", opens["names"])
+        elif line.strip():
+            names.update(entry)
+    return names
+
+
+def undescribed(module: str) -> list[str]:
+    """What the docstrings of a module leave out, one line per function, class or method."""
+    found = [] if ast.get_docstring(TREES[module]) else [f"{module} has no docstring"]
+    for name, docstring, takes in documented(module):
+        missing = [argument for argument in takes if argument not in described(docstring)]
+        if missing or not docstring:
+            found.append(f"{module}: {name} doesn't describe {', '.join(missing) or 'itself'}")
+    return found
+
+
+def body_lengths(module: str) -> list[int]:
+    """Lines of the body of each function of a module, without docstring and blank lines."""
+    lengths, lines = [], SOURCES[module].splitlines()
+    for node in ast.walk(TREES[module]):
+        if isinstance(node, ast.FunctionDef):
+            body = node.body[bool(ast.get_docstring(node)) :]
+            spanned = lines[body[0].lineno - 1 : body[-1].end_lineno] if body else []
+            lengths.append(sum(bool(line.strip()) for line in spanned))
+    return lengths
+
+
+@pytest.mark.parametrize("module", SOURCES)
+def test_no_module_has_more_than_300_lines(module):
+    assert len(SOURCES[module].splitlines()) <= 300
+
+
+def test_functions_have_about_a_dozen_lines():
+    lengths = [length for module in SOURCES for length in body_lengths(module)]
+    assert np.median(lengths) <= 12
+    assert np.quantile(lengths, 0.9) <= 40
+
+
+@pytest.mark.parametrize("room", DESCRIBED)
+def test_every_parameter_has_a_description(room):
+    modules = [module for module in SOURCES if module == room or module.startswith(f"{room}/")]
+    assert modules
+    assert [problem for module in modules for problem in undescribed(module)] == []
+
+
+def test_no_two_public_things_share_a_name():
+    places = defaultdict(set)
+    for module in TREES.keys() - {"cli.py"}:  # a command has the name of what it runs
+        for node in definitions(TREES[module].body):
+            places[node.name].add(module)
+    assert {name: modules for name, modules in places.items() if len(modules) > 1} == SHARED_NAMES
+
+
+def test_the_docstring_reader_knows_a_parameter_without_words():
+    docstring = """Add.
+
+    Parameters
+    ----------
+    a, b : int
+        Summands.
+    c : int
+    **rest
+        What else.
+
+    Returns
+    -------
+    d : int
+        Sum.
+    """
+    assert described(docstring) == {"a", "b", "rest"}
