@@ -173,7 +173,7 @@ def run_cmcdot(number: int, seed: int) -> Iterator[tuple[NDArray, NDArray]]:
     seed : int
         Decides everything that is drawn.
     """
-    rng, params = np.random.default_rng(seed), replace(PARAMS.world, particles=number)
+    rng, params = np.random.default_rng(seed), replace(PARAMS.world, n_particles=number)
     state = _first_particles(number, rng)
     for step in range(1, STEPS + 1):
         predicted = predict(state, SPEC, params, DT, rng)

@@ -20,7 +20,7 @@ class CmcdotParams:
 
     Parameters
     ----------
-    particles : int
+    n_particles : int
         How many samples the dynamic mass has.
     rates : 4 x 4 floats
         How often a cell turns from the state of the row into that of the column, 1/s; the diagonal is
@@ -51,7 +51,7 @@ class CmcdotParams:
         When a parameter can't be one.
     """
 
-    particles: int = 200_000
+    n_particles: int = 200_000
     rates: Rates = (
         # to FREE, STATIC, DYNAMIC, UNKNOWN
         (0.0, 0.02, 0.01, 0.3),
@@ -69,8 +69,8 @@ class CmcdotParams:
 
     def __post_init__(self) -> None:
         """Refuse parameters that describe no filter."""
-        if not isinstance(self.particles, int | np.integer) or self.particles < 1:
-            raise ArgumentError("particles", "a whole number of at least 1", self.particles)
+        if not isinstance(self.n_particles, int | np.integer) or self.n_particles < 1:
+            raise ArgumentError("n_particles", "a whole number of at least 1", self.n_particles)
         rates = np.asarray(self.rates, dtype=float)
         if rates.shape != (4, 4) or not np.isfinite(rates).all() or (rates < 0).any():
             raise ArgumentError("rates", "4 x 4 finite rates, none negative", self.rates)

@@ -204,9 +204,9 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
         When the state is over other cells than those of `spec`.
     """
     check_shape("state", state.newborn, spec.shape)
-    births = round(params.birth_share * params.particles)
+    births = round(params.birth_share * params.n_particles)
     drawn = (
-        draw_again(state.particles, params.particles - births, rng),
+        draw_again(state.particles, params.n_particles - births, rng),
         draw_newborn(state.newborn, spec, births, params.max_speed, rng),
     )
     position, velocity, weight = (
