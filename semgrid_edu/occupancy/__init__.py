@@ -20,13 +20,14 @@ from semgrid_edu.occupancy.log_odds import (
     smear_area,
     update_log_odds,
 )
-from semgrid_edu.occupancy.params import CmcdotParams, transition_matrix
+from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.sensor import SensorModel
 from semgrid_edu.occupancy.state import N_STATES, Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import move, predict, resample, update
 from semgrid_edu.occupancy.tracking import track_drive
 from semgrid_edu.occupancy.velocity_lattice import VelocityLattice
+from semgrid_edu.occupancy.world import WorldModel, transition_matrix
 
 __all__ = [
     "N_STATES",
@@ -46,6 +47,7 @@ __all__ = [
     "SensorModel",
     "State",
     "VelocityLattice",
+    "WorldModel",
     "bof_move",
     "bof_predict",
     "bof_predict_literal",

@@ -7,8 +7,8 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
 from semgrid_edu.occupancy.bof_steps import going_on, whole_cells
 from semgrid_edu.occupancy.cellwise import CERTAIN
-from semgrid_edu.occupancy.params import transition_matrix
 from semgrid_edu.occupancy.state import State
+from semgrid_edu.occupancy.world import transition_matrix
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.velocity_lattice import VelocityLattice
+from semgrid_edu.occupancy.world import WorldModel
 
 MOST_BYTES = 2e9
 """Memory that the occupied mass may take; a step needs three times as much."""
@@ -16,19 +16,18 @@ MOST_BYTES = 2e9
 
 @dataclass(frozen=True)
 class BofParams:
-    """What the BOF assumes: the model of CMCDOT, with a lattice of velocities in place of particles.
+    """The parameters of the BOF: the same model of the world as CMCDOT's, and a lattice of velocities.
 
     Parameters
     ----------
     lattice : VelocityLattice
-        The velocities it tells apart.
-    world : CmcdotParams
-        Sensor and world. The number of particles and what is spent on births don't matter here, nor does
-        `max_speed`, for the lattice has its own.
+        The velocities that the filter tells apart.
+    world : WorldModel
+        What the filter assumes of the world and of its sensor.
     """
 
     lattice: VelocityLattice = field(default_factory=VelocityLattice)
-    world: CmcdotParams = field(default_factory=CmcdotParams)
+    world: WorldModel = field(default_factory=WorldModel)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,11 +6,11 @@ from numpy.typing import NDArray
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.moving_map import look_up
-from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN, update
 from semgrid_edu.occupancy.velocities import turn_moments
+from semgrid_edu.occupancy.world import WorldModel
 
 
 def local_belief(
@@ -20,7 +20,7 @@ def local_belief(
     map_spec: GridSpec,
     spec: GridSpec,
     pose: PlanarMotion,
-    params: CmcdotParams,
+    world: WorldModel,
 ) -> Belief:
     """Look the map up in the vehicle's cells, and update those with the scan once more; nothing of it goes back.
 
@@ -38,8 +38,8 @@ def local_belief(
         The map's cells and the vehicle's.
     pose : PlanarMotion
         Of the vehicle in the map.
-    params : CmcdotParams
-        For `update`.
+    world : WorldModel
+        What `update` assumes.
 
     Returns
     -------
@@ -48,7 +48,7 @@ def local_belief(
     """
     here = look_up(predicted, NOTHING_KNOWN, map_spec, spec, pose)
     prior = FilterState(here, Particles.none(), np.zeros(spec.shape, np.float32))
-    probability = update(prior, spec, evidence, params).probability
+    probability = update(prior, spec, evidence, world).probability
     mean, covariance = velocity
     moments = np.concatenate([mean, covariance.reshape(4, *map_spec.shape)])
     here = look_up(moments, np.full(6, np.nan, np.float32), map_spec, spec, pose)

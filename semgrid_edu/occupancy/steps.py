@@ -9,7 +9,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.cellwise import bayes, make_room, meet, mix, represent
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.moving_map import look_up
-from semgrid_edu.occupancy.params import CmcdotParams, transition_matrix
+from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.particles import (
     by_origin,
     cells_of,
@@ -22,6 +22,7 @@ from semgrid_edu.occupancy.particles import (
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.resampling import draw_again, draw_newborn
 from semgrid_edu.occupancy.state import FilterState, Particles, State, check_shape
+from semgrid_edu.occupancy.world import WorldModel, transition_matrix
 
 DYNAMIC, UNKNOWN = State.DYNAMIC, State.UNKNOWN
 NOTHING_KNOWN = np.array([0, 0, 0, 1], dtype=np.float32)
@@ -61,9 +62,7 @@ def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterStat
     return FilterState(probability, replace(particles, weight=weight), state.newborn)
 
 
-def predict(
-    state: FilterState, spec: GridSpec, params: CmcdotParams, dt: float, rng: np.random.Generator
-) -> FilterState:
+def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rng: np.random.Generator) -> FilterState:
     """Step 2: what becomes of the belief while `dt` seconds pass and nobody looks.
 
     First each cell mixes by the transition matrix, and particles near zero speed become STATIC. Then dynamic
@@ -82,8 +81,8 @@ def predict(
         At the previous instant.
     spec : GridSpec
         The cells.
-    params : CmcdotParams
-        Rates and noise.
+    world : WorldModel
+        Rates of change, how things stop, and how they accelerate.
     dt : float
         Seconds, not negative.
     rng : numpy.random.Generator
@@ -100,14 +99,14 @@ def predict(
         When the state is over other cells than those of `spec`, or `dt` is negative or not finite.
     """
     check_shape("state", state.newborn, spec.shape)
-    M = transition_matrix(params, dt)
+    M = transition_matrix(world, dt)
     before = cells_of(state.particles.position, spec)
-    particles = slow_down(state.particles, params.stop_rate, params.stop_speed, dt)
+    particles = slow_down(state.particles, world.stop_rate, world.stop_speed, dt)
     particles = replace(particles, weight=particles.weight * np.float32(M[DYNAMIC, DYNAMIC]))
     going = weight_in_cells(particles.weight, before, spec.shape)
     mixed, newborn = mix(state.probability, state.newborn, going, M)
 
-    particles = fly(particles, params.max_acceleration, dt, rng)
+    particles = fly(particles, world.max_acceleration, dt, rng)
     origin = by_origin(before, cells_of(particles.position, spec), going.size)
     stays, arrives = weight_in_cells(particles.weight, origin, (2, *spec.shape))
     probability, newborn, factor = meet(mixed, newborn, going, stays, arrives)
@@ -115,7 +114,7 @@ def predict(
     return FilterState(probability, replace(particles, weight=weight), newborn)
 
 
-def update(state: FilterState, spec: GridSpec, evidence: Evidence, params: CmcdotParams) -> FilterState:
+def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldModel) -> FilterState:
     """Step 3: Bayes' rule in each cell, P(state | z) = P(z | state) P(state) / P(z).
 
     STATIC and DYNAMIC share P(z | occupied): one scan can't tell them apart. UNKNOWN means unobserved, so
@@ -130,8 +129,8 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, params: Cmcdo
     evidence : Evidence
         Of the scan; any numbers >= 0, for each cell is scaled by its best explanation first. Where nothing
         that was held possible explains the scan, nothing is known any more: UNKNOWN.
-    params : CmcdotParams
-        For `first_sight`.
+    world : WorldModel
+        What UNKNOWN cells turn out to be, `first_sight`.
 
     Returns
     -------
@@ -145,14 +144,14 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, params: Cmcdo
     """
     check_shape("state", state.newborn, spec.shape)
     check_shape("evidence", evidence.free, spec.shape)
-    prior = reveal(state, evidence.occupied != evidence.free, params)
+    prior = reveal(state, evidence.occupied != evidence.free, world)
     posterior, factor = bayes(prior.probability, evidence.occupied, evidence.free)
     particles = prior.particles
     weight = scale_in_cells(particles.weight, cells_of(particles.position, spec), factor)
     return FilterState(posterior, replace(particles, weight=weight), (prior.newborn * factor).astype(np.float32))
 
 
-def reveal(state: FilterState, seen: NDArray, params: CmcdotParams) -> FilterState:
+def reveal(state: FilterState, seen: NDArray, world: WorldModel) -> FilterState:
     """Share the UNKNOWN mass of cells that are seen among the other states, as they are found at first sight.
 
     Parameters
@@ -161,8 +160,8 @@ def reveal(state: FilterState, seen: NDArray, params: CmcdotParams) -> FilterSta
         Predicted.
     seen : (H, W) bool
         Of which cells the scan says anything.
-    params : CmcdotParams
-        For `first_sight`; its dynamic part is newborn.
+    world : WorldModel
+        What UNKNOWN cells turn out to be, `first_sight`; the dynamic part is newborn.
 
     Returns
     -------
@@ -170,7 +169,7 @@ def reveal(state: FilterState, seen: NDArray, params: CmcdotParams) -> FilterSta
         UNKNOWN only where nobody looks.
     """
     revealed = np.where(seen, state.probability[UNKNOWN], 0)
-    shares = np.array([*params.first_sight, -1], dtype=revealed.dtype)
+    shares = np.array([*world.first_sight, -1], dtype=revealed.dtype)
     probability = state.probability + shares[:, None, None] * revealed
     return FilterState(probability, state.particles, state.newborn + shares[DYNAMIC] * revealed)
 
