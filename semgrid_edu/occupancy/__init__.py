@@ -10,7 +10,8 @@ from semgrid_edu.occupancy.bof_literal import bof_predict_literal
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
 from semgrid_edu.occupancy.bof_steps import bof_move, bof_predict, bof_update, bof_velocity
 from semgrid_edu.occupancy.cmcdot import Cmcdot
-from semgrid_edu.occupancy.evidence import Evidence, scan_evidence, scan_evidence_literal
+from semgrid_edu.occupancy.evidence import Evidence, Measurement, Sensor, scan_evidence
+from semgrid_edu.occupancy.evidence_literal import scan_evidence_literal
 from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
 from semgrid_edu.occupancy.log_odds import (
     LogOddsGrid,
@@ -22,7 +23,7 @@ from semgrid_edu.occupancy.log_odds import (
 )
 from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.sensor import SensorModel
+from semgrid_edu.occupancy.sensor import Scan, SensorModel
 from semgrid_edu.occupancy.state import N_STATES, Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import move, predict, resample, update
 from semgrid_edu.occupancy.tracking import track_drive
@@ -42,8 +43,11 @@ __all__ = [
     "GroundParams",
     "LogOddsGrid",
     "LogOddsParams",
+    "Measurement",
     "Particles",
     "PlanarMotion",
+    "Scan",
+    "Sensor",
     "SensorModel",
     "State",
     "VelocityLattice",

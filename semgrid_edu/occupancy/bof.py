@@ -5,11 +5,10 @@ from numpy.typing import NDArray
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
 from semgrid_edu.occupancy.bof_steps import bof_move, bof_predict, bof_update, bof_velocity
-from semgrid_edu.occupancy.evidence import beam_reach, evidence_in_cells
 from semgrid_edu.occupancy.local_belief import local_belief
-from semgrid_edu.occupancy.moving_map import MAX_YAW, map_around, scroll
+from semgrid_edu.occupancy.moving_map import MAX_YAW, map_around
+from semgrid_edu.occupancy.observation import observe
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.sensor import prepare_scan
 from semgrid_edu.occupancy.state import Belief
 
 
@@ -72,13 +71,10 @@ class Bof:
             When the points aren't a table of finite coordinates, or the time is negative or not finite. The
             tracker is then as it was.
         """
-        shift, pose = scroll(self._pose.then(motion), self.spec.cell, MAX_YAW)
-        sensor = self.params.world.sensor
-        points = prepare_scan(points_grid, sensor)
-        free_to = beam_reach(points, sensor)
-        evidence = evidence_in_cells(points, free_to, self.map_spec, sensor, pose)
-        predicted = bof_predict(bof_move(self._state, self.map_spec, shift), self.map_spec, self.params, dt)
-        self._state, self._pose = bof_update(predicted, self.map_spec, evidence, self.params), pose
-        here = evidence_in_cells(points, free_to, self.spec, sensor, PlanarMotion())
+        world = self.params.world
+        seen = observe(world.sensor, points_grid, self._pose.then(motion), self.map_spec, self.spec)
+        moved = bof_move(self._state, self.map_spec, seen.shift)
+        predicted = bof_predict(moved, self.map_spec, self.params, dt)
+        self._state, self._pose = bof_update(predicted, self.map_spec, seen.on_map, self.params), seen.pose
         velocity = bof_velocity(self._state)
-        return local_belief(predicted.probability, velocity, here, self.map_spec, self.spec, pose, self.params.world)
+        return local_belief(predicted.probability, velocity, seen, self.map_spec, self.spec, world)

@@ -4,13 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence import beam_reach, evidence_in_cells
 from semgrid_edu.occupancy.local_belief import local_belief
-from semgrid_edu.occupancy.moving_map import MAX_YAW, map_around, scroll
+from semgrid_edu.occupancy.moving_map import MAX_YAW, map_around
+from semgrid_edu.occupancy.observation import observe
 from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.particles import cells_of, transform
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.sensor import prepare_scan
 from semgrid_edu.occupancy.state import Belief, FilterState, Particles
 from semgrid_edu.occupancy.steps import move, predict, resample, update
 from semgrid_edu.occupancy.velocities import velocity_moments
@@ -77,19 +76,12 @@ class Cmcdot:
             When the points aren't a table of finite coordinates, or the time is negative or not finite. The
             tracker is then as it was.
         """
-        shift, pose = scroll(self._pose.then(motion), self.spec.cell, MAX_YAW)
-        sensor = self.params.sensor
-        points = prepare_scan(points_grid, sensor)
-        free_to = beam_reach(points, sensor)
-        evidence = evidence_in_cells(points, free_to, self.map_spec, sensor, pose)
-        moved = move(self._state, self.map_spec, shift)
+        seen = observe(self.params.sensor, points_grid, self._pose.then(motion), self.map_spec, self.spec)
+        moved = move(self._state, self.map_spec, seen.shift)
         predicted = predict(moved, self.map_spec, self.params, dt, self._rng)
-        updated = update(predicted, self.map_spec, evidence, self.params)
-        self._state, self._pose = resample(updated, self.map_spec, self.params, self._rng), pose
-        here = evidence_in_cells(points, free_to, self.spec, sensor, PlanarMotion())
-        return local_belief(
-            predicted.probability, self._velocities(), here, self.map_spec, self.spec, pose, self.params
-        )
+        updated = update(predicted, self.map_spec, seen.on_map, self.params)
+        self._state, self._pose = resample(updated, self.map_spec, self.params, self._rng), seen.pose
+        return local_belief(predicted.probability, self._velocities(), seen, self.map_spec, self.spec, self.params)
 
     def _velocities(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return mean and covariance of the particles' velocities in each cell of the map."""

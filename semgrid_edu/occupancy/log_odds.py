@@ -7,10 +7,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence import Evidence, beam_reach, evidence_in_cells
-from semgrid_edu.occupancy.moving_map import MAX_YAW, look_up, map_around, scroll
+from semgrid_edu.occupancy.evidence import Evidence, Sensor, check_sensor
+from semgrid_edu.occupancy.moving_map import MAX_YAW, look_up, map_around
+from semgrid_edu.occupancy.observation import observe
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.sensor import SensorModel, prepare_scan
+from semgrid_edu.occupancy.sensor import SensorModel
 
 TINY = np.float32(1e-30)
 """Stands for a likelihood of 0, whose logarithm is no number; the clamp hides the difference."""
@@ -27,8 +28,8 @@ class LogOddsParams:
     lowest, highest : float
         P(occupied) never leaves these bounds, so that a cell can change its mind: the more often it was
         seen, the longer that would take otherwise. OctoMap's 0.12 and 0.97 (Hornung et al., Autonomous Robots 2013).
-    sensor : SensorModel
-        How the scanner errs.
+    sensor : Sensor
+        Turns each scan into evidence; by default a `SensorModel`.
 
     Raises
     ------
@@ -39,7 +40,7 @@ class LogOddsParams:
     prior: float = 0.5
     lowest: float = 0.12
     highest: float = 0.97
-    sensor: SensorModel = field(default_factory=SensorModel)
+    sensor: Sensor = field(default_factory=SensorModel)
 
     def __post_init__(self) -> None:
         """Refuse certainty, and bounds that leave the prior out."""
@@ -47,6 +48,7 @@ class LogOddsParams:
             raise ArgumentError("lowest, highest", "0 < lowest < highest < 1", (self.lowest, self.highest))
         if not self.lowest <= self.prior <= self.highest:
             raise ArgumentError("prior", f"a probability from {self.lowest} to {self.highest}", self.prior)
+        check_sensor(self.sensor)
 
 
 def log_odds(p: ArrayLike) -> NDArray[np.floating]:
@@ -116,7 +118,8 @@ def update_log_odds(L: NDArray, evidence: Evidence, params: LogOddsParams) -> ND
         Log-odds given the scan, within the bounds.
     """
     ratio = np.log(np.maximum(evidence.occupied, TINY)) - np.log(np.maximum(evidence.free, TINY))
-    return np.clip(L + ratio, *log_odds([params.lowest, params.highest]).astype(L.dtype))
+    bounds = log_odds([params.lowest, params.highest]).astype(L.dtype)
+    return np.clip(L + ratio.astype(L.dtype, copy=False), *bounds)
 
 
 def smear_area(p_occupied: NDArray, left: NDArray[np.bool_], spec: GridSpec) -> float:
@@ -194,13 +197,8 @@ class LogOddsGrid:
         """
         if not (np.isfinite(dt) and dt >= 0):
             raise ArgumentError("dt", "seconds, not negative", dt)
-        shift, pose = scroll(self._pose.then(motion), self.spec.cell, MAX_YAW)
-        sensor = self.params.sensor
-        points = prepare_scan(points_grid, sensor)
-        free_to = beam_reach(points, sensor)
-        moved = look_up(self._log_odds[None], self._prior, self.map_spec, self.map_spec, shift)[0]
-        evidence = evidence_in_cells(points, free_to, self.map_spec, sensor, pose)
-        self._log_odds, self._pose = update_log_odds(moved, evidence, self.params), pose
-        before = look_up(moved[None], self._prior, self.map_spec, self.spec, pose)[0]
-        here = evidence_in_cells(points, free_to, self.spec, sensor, PlanarMotion())
-        return probability(update_log_odds(before, here, self.params))
+        seen = observe(self.params.sensor, points_grid, self._pose.then(motion), self.map_spec, self.spec)
+        moved = look_up(self._log_odds[None], self._prior, self.map_spec, self.map_spec, seen.shift)[0]
+        before = look_up(moved[None], self._prior, self.map_spec, self.spec, seen.pose)[0]
+        self._log_odds, self._pose = update_log_odds(moved, seen.on_map, self.params), seen.pose
+        return probability(update_log_odds(before, seen.in_grid, self.params))

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.occupancy.evidence import Sensor, check_sensor
 from semgrid_edu.occupancy.sensor import SensorModel
 
 Rates = tuple[tuple[float, ...], ...]
@@ -37,8 +38,9 @@ class WorldModel:
         static share also counts against particles that fly into cells nobody has seen yet. This is a compromise:
         somebody who walks away from the sensor enters only such cells, so a large static share makes that person look
         STATIC, and a small one makes the end of a wall that comes into view look DYNAMIC.
-    sensor : SensorModel
-        Turns each scan into evidence.
+    sensor : Sensor
+        Turns each scan into evidence. By default a `SensorModel`; any object will do whose `scan(points)` returns
+        something with `evidence(spec, pose)`.
 
     Raises
     ------
@@ -57,7 +59,7 @@ class WorldModel:
     stop_speed: float = 0.4
     max_acceleration: float = 4.0
     first_sight: tuple[float, float, float] = (0.93, 0.067, 0.003)
-    sensor: SensorModel = field(default_factory=SensorModel)
+    sensor: Sensor = field(default_factory=SensorModel)
 
     def __post_init__(self) -> None:
         """Refuse a world that is impossible."""
@@ -71,6 +73,7 @@ class WorldModel:
             raise ArgumentError("stop_speed", "a positive speed in m/s", self.stop_speed)
         if len(self.first_sight) != 3 or min(self.first_sight) < 0 or not np.isclose(sum(self.first_sight), 1):
             raise ArgumentError("first_sight", "three probabilities that sum to 1", self.first_sight)
+        check_sensor(self.sensor)
 
 
 def transition_matrix(world: WorldModel, dt: float) -> NDArray[np.float64]:

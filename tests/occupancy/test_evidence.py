@@ -13,7 +13,7 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.illustrations.boxes import Box, scan_boxes
 from semgrid_edu.occupancy import Evidence, PlanarMotion, SensorModel, scan_evidence, scan_evidence_literal
-from semgrid_edu.occupancy.evidence import walk_ray
+from semgrid_edu.occupancy.evidence_literal import walk_ray
 from semgrid_edu.occupancy.polar import fill_gaps
 from semgrid_edu.simulation.sensors.rig import HDL64E_ELEVATIONS
 
