@@ -7,6 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.cells import cell_of
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 
 MAX_YAW = np.radians(2)
@@ -93,15 +94,12 @@ def look_up(values: NDArray, outside: NDArray, source: GridSpec, target: GridSpe
 def _look_up(values, outside, source_x, source_y, source_cell, x_max, y_max, cell, shape, dx, dy, dyaw):
     found = np.empty((len(values), *shape), np.float32)
     flat, place = values.reshape(len(values), -1), np.empty(shape[1], np.int32)
-    cos, sin, height, width = np.cos(dyaw), np.sin(dyaw), values.shape[1], values.shape[2]
+    cos, sin, size = np.cos(dyaw), np.sin(dyaw), values.shape[1:]
     for r in range(shape[0]):
         for c in range(shape[1]):
             x, y = x_max - (r + 0.5) * cell, y_max - (c + 0.5) * cell
-            row = np.floor((source_x - (cos * x - sin * y + dx)) / source_cell)
-            col = np.floor((source_y - (sin * x + cos * y + dy)) / source_cell)
-            inside = (row >= 0) & (row < height) & (col >= 0) & (col < width)
-            place[c] = np.int32(row * width + col if inside else -1)
+            place[c] = cell_of(cos * x - sin * y + dx, sin * x + cos * y + dy, size, source_x, source_y, source_cell)
         for k in range(len(values)):
             for c in range(shape[1]):
-                found[k, r, c] = flat[k, place[c]] if place[c] >= 0 else outside[k]
+                found[k, r, c] = flat[k, place[c]] if place[c] >= 0 else outside[k]  # faster than != OUTSIDE
     return found

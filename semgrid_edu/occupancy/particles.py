@@ -7,11 +7,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.cells import OUTSIDE, cell_of
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import Particles
 
-OUTSIDE = -1
-"""The cell of a particle that has left the map."""
 SLOW = np.float32(16)
 """exp(-16) is nothing in single precision beside 1: exponentials beyond needn't be computed."""
 
@@ -38,9 +37,7 @@ def cells_of(position: NDArray, spec: GridSpec) -> NDArray[np.int32]:
 def _cells_of(position, shape, x_max, y_max, cell):
     cells = np.empty(len(position), np.int32)
     for i in range(len(position)):
-        row, col = np.floor((x_max - position[i, 0]) / cell), np.floor((y_max - position[i, 1]) / cell)
-        inside = (row >= 0) & (row < shape[0]) & (col >= 0) & (col < shape[1])  # `and` would branch, and be slower
-        cells[i] = np.int32(row * shape[1] + col if inside else OUTSIDE)
+        cells[i] = cell_of(position[i, 0], position[i, 1], shape, x_max, y_max, cell)
     return cells
 
 

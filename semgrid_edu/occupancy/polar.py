@@ -4,6 +4,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from semgrid_edu.occupancy.cells import OUTSIDE, cell_of
+
 
 @njit(cache=True)
 def polar_profile(points, low, high, beams):
@@ -121,11 +123,10 @@ def count_returns(points, low, high, shape, x_max, y_max, cell, dx, dy, dyaw):
     cos, sin = np.cos(dyaw), np.sin(dyaw)
     for i in range(len(points)):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        row = np.floor((x_max - (cos * x - sin * y + dx)) / cell)
-        col = np.floor((y_max - (sin * x + cos * y + dy)) / cell)
-        if z <= high and 0 <= row < shape[0] and 0 <= col < shape[1]:
+        place = cell_of(cos * x - sin * y + dx, sin * x + cos * y + dy, shape, x_max, y_max, cell)
+        if z <= high and place != OUTSIDE:
             counted = obstacles if z >= low else ground
-            counted[int(row), int(col)] += 1
+            counted.flat[place] += 1
     return obstacles, ground
 
 

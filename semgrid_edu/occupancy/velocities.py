@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.occupancy.particles import OUTSIDE
+from semgrid_edu.occupancy.cells import OUTSIDE
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import Particles
 
