@@ -6,10 +6,11 @@ before it: the binary grid, and the exact filter on a lattice of velocities.
 """
 
 from semgrid_edu.occupancy.bof import Bof
-from semgrid_edu.occupancy.bof_literal import bof_predict_literal
+from semgrid_edu.occupancy.bof_literal import bof_predict_literal, bof_update_literal
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
 from semgrid_edu.occupancy.bof_steps import bof_move, bof_predict, bof_update, bof_velocity
 from semgrid_edu.occupancy.cmcdot import Cmcdot
+from semgrid_edu.occupancy.cmcdot_literal import move_literal, predict_literal, resample_literal, update_literal
 from semgrid_edu.occupancy.evidence import Evidence, Measurement, Sensor, scan_evidence
 from semgrid_edu.occupancy.evidence_literal import scan_evidence_literal
 from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
@@ -56,18 +57,23 @@ __all__ = [
     "bof_predict",
     "bof_predict_literal",
     "bof_update",
+    "bof_update_literal",
     "bof_velocity",
     "height_above_ground",
     "log_odds",
     "move",
+    "move_literal",
     "predict",
+    "predict_literal",
     "probability",
     "resample",
+    "resample_literal",
     "scan_evidence",
     "scan_evidence_literal",
     "smear_area",
     "track_drive",
     "transition_matrix",
     "update",
+    "update_literal",
     "update_log_odds",
 ]

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
-from semgrid_edu.occupancy.cellwise import meet, mix
+from semgrid_edu.occupancy.cellwise import meet, mix, ratio
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.moving_map import look_up
 from semgrid_edu.occupancy.particles import slow_down
@@ -188,7 +188,7 @@ def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofP
     check_shape("state", state.occupied, (len(params.lattice), *spec.shape))
     before = state.probability
     given = update(FilterState(before, Particles.none(), np.zeros_like(before[0])), spec, evidence, params.world)
-    factor = _ratio(np.maximum(given.probability[DYNAMIC] - given.newborn, 0), before[DYNAMIC])
+    factor = ratio(np.maximum(given.probability[DYNAMIC] - given.newborn, 0), before[DYNAMIC])
     occupied = np.empty_like(state.occupied)
     occupied[0] = given.probability[STATIC]
     for k in range(1, len(occupied)):
@@ -230,8 +230,3 @@ def _shift(plane: NDArray, cells: NDArray[np.int64], out: NDArray) -> None:
     out[...] = 0
     source = plane[max(up, 0) : height + min(up, 0), max(left, 0) : width + min(left, 0)]
     out[max(-up, 0) : height - max(up, 0), max(-left, 0) : width - max(left, 0)] = source
-
-
-def _ratio(part: NDArray, whole: NDArray) -> NDArray:
-    """Divide, with 0 where the whole is 0."""
-    return np.divide(part, whole, out=np.zeros_like(whole), where=whole > 0)

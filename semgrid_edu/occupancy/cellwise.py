@@ -5,6 +5,7 @@ In the loops stand numbers alone, and choices without branches: so the compiler 
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from semgrid_edu.occupancy.state import State
 
@@ -187,3 +188,20 @@ def represent(probability, carried):
             represented[UNKNOWN, r, c] += 0.0 if carried[r, c] > 0 else dynamic
             factor[r, c] = dynamic / carried[r, c] if carried[r, c] > 0 else 0.0
     return represented, factor
+
+
+def ratio(part: NDArray, whole: NDArray) -> NDArray[np.floating]:
+    """Divide cell by cell, and give 0 where the divisor is 0.
+
+    Parameters
+    ----------
+    part, whole : (..., H, W) float
+        Dividend and divisor, not negative.
+
+    Returns
+    -------
+    (..., H, W) float
+        part / whole.
+    """
+    out = np.zeros(np.broadcast_shapes(np.shape(part), np.shape(whole)), np.result_type(part, whole))
+    return np.divide(part, whole, out=out, where=whole > 0)
