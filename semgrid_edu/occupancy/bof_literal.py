@@ -16,10 +16,11 @@ FREE, STATIC, DYNAMIC, UNKNOWN = State
 
 
 def bof_predict_literal(state: BofState, spec: GridSpec, params: BofParams, dt: float) -> BofState:
-    """Predict by loops over cells and velocities, in double precision: the literal twin of `bof_predict`.
+    """Predict by loops over cells and velocities: the literal twin of `bof_predict`.
 
-    Parameters and result are those of `bof_predict`.
+    Parameters, result and errors are those of `bof_predict`; the arrays of the result are float64.
     """
+    check_shape("state", state.occupied, (len(params.lattice), *spec.shape))
     M = transition_matrix(params.world, dt)
     of_each = Particles(np.zeros_like(state.velocity), state.velocity, np.ones(len(state.velocity)))
     kept = slow_down_literal(of_each, params.world.stop_rate, params.world.stop_speed, dt).weight
@@ -50,20 +51,22 @@ def bof_predict_literal(state: BofState, spec: GridSpec, params: BofParams, dt: 
 
 
 def accelerate(state: BofState, params: BofParams, dt: float) -> NDArray[np.float64]:
-    """Return the mass of each velocity after some has changed to neighbouring velocities.
+    """Return the mass of each velocity after some of it has changed to neighbouring velocities.
 
     Parameters
     ----------
     state : BofState
-        Before.
+        The belief before, with mass (V, H, W).
     params : BofParams
-        Lattice and acceleration.
+        The lattice, and how much things accelerate.
     dt : float
-        Seconds.
+        The time step, seconds.
 
     Returns
     -------
     (V, H, W) float64
+        The mass of each velocity in each cell. Mass at the first velocity, zero, stays there: what stands doesn't set
+        off by accelerating a little.
     """
     change = params.lattice.change_probability(params.world.max_acceleration, dt)
     changed = np.zeros(state.occupied.shape)
@@ -75,20 +78,21 @@ def accelerate(state: BofState, params: BofParams, dt: float) -> NDArray[np.floa
 
 
 def meet_in_cell(own: NDArray, stays: NDArray, arrives: NDArray) -> tuple[NDArray, NDArray]:
-    """Let mass that arrives in a cell meet what the cell holds, as `predict` says.
+    """Let the mass that arrives in one cell meet what the cell holds, as `predict` says.
 
     Parameters
     ----------
     own : (4,) float
-        The cell's own FREE, STATIC and UNKNOWN; its DYNAMIC is in `stays`.
+        P(FREE), P(STATIC) and P(UNKNOWN) of the cell; its dynamic mass is in `stays`.
     stays, arrives : (V,) float
-        Moving mass that is in the cell already, and that comes in.
+        Moving mass of each velocity that is in the cell already, and that comes into it.
 
     Returns
     -------
     own : (4,) float
+        P(FREE), P(STATIC) and P(UNKNOWN) of the cell now.
     occupied : (V,) float
-        Its first entry is STATIC.
+        P(occupied, velocity) of the cell now; the first velocity is zero, and its entry is P(STATIC).
     """
     arrival = arrives.sum()
     factor, arrived = strike_out(own[STATIC], arrival)

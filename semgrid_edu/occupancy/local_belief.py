@@ -1,4 +1,4 @@
-"""From the map to the vehicle's own cells: the belief that a tracker hands out (paper, section 3.2)."""
+"""From the map to the vehicle's own cells: the belief that a filter hands out (paper, section 3.2)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,7 @@ def local_belief(
     Returns
     -------
     Belief
-        In the grid frame of the vehicle, (H', W') cells.
+        What is handed out: the belief in the vehicle's cells, (H', W'), in its grid frame.
     """
     here = look_up(predicted, NOTHING_KNOWN, map_spec, spec, seen.pose)
     prior = FilterState(here, Particles.none(), np.zeros(spec.shape, np.float32))

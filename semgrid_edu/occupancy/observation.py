@@ -50,6 +50,7 @@ def observe(
     Returns
     -------
     Observation
+        How the map scrolls, where the vehicle then is in it, and the evidence in both grids.
 
     Raises
     ------

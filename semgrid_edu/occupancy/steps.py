@@ -31,22 +31,22 @@ NOTHING_KNOWN = np.array([0, 0, 0, 1], dtype=np.float32)
 def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterState:
     """Step 1: express the belief in a new frame.
 
-    Each new cell takes the belief of the old cell that its centre lies in, so a shift by whole cells is
-    exact; what enters the map is UNKNOWN. Particles are moved exactly, and dynamic mass goes where they go.
+    Each new cell takes the belief of the old cell that its centre lies in, so a shift by whole cells is exact. What
+    enters the map is UNKNOWN. Particles are moved exactly, and dynamic mass goes where they go.
 
     Parameters
     ----------
     state : FilterState
-        In the old frame, without newborn mass.
+        The belief in the old frame, without newborn mass.
     spec : GridSpec
-        The cells, the same in both frames.
+        The cells, (H, W), the same in both frames.
     motion : PlanarMotion
-        The new frame, in the old one.
+        Pose of the new frame in the old one, metres and radians.
 
     Returns
     -------
     FilterState
-        In the new frame.
+        The belief in the new frame.
 
     Raises
     ------
@@ -63,35 +63,36 @@ def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterStat
 
 
 def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rng: np.random.Generator) -> FilterState:
-    """Step 2: what becomes of the belief while `dt` seconds pass and nobody looks.
+    """Step 2: predict what becomes of the belief while `dt` seconds pass without a scan.
 
-    First each cell mixes by the transition matrix, and particles near zero speed become STATIC. Then dynamic
-    mass flies. What it leaves behind is FREE: nothing stood where something moved. Where it arrives with
-    probability a, two opinions meet: "something arrives" (a) and the cell's own. They can't both be right where
-    the cell is STATIC, so of the joint distribution that combination is struck out:
+    First each cell mixes by the transition matrix, and particles near zero speed become STATIC. Then the particles fly,
+    and dynamic mass with them. Where it leaves, it leaves FREE behind, because nothing stands where something has moved
+    away. Where it arrives with probability a, two statements meet: "something arrives", and what the cell itself holds.
+    They can't both be true where the cell is STATIC, because two solid things can't share a cell. So that combination
+    is struck out of the joint distribution:
 
         P(DYNAMIC) = [a (1 - s) + (1 - a) d] / (1 - a s),   others = (1 - a) others / (1 - a s)
 
-    with s and d the cell's own static and dynamic probability. So what arrives in free space is dynamic, and
-    a standing fence isn't talked out of it by particles that cross it.
+    with s and d the cell's own static and dynamic probability. So what arrives in free space is DYNAMIC, while a fence
+    that is known to stand stays STATIC although particles cross it.
 
     Parameters
     ----------
     state : FilterState
-        At the previous instant.
+        The belief at the previous instant.
     spec : GridSpec
-        The cells.
+        The cells, (H, W).
     world : WorldModel
         Rates of change, how things stop, and how they accelerate.
     dt : float
-        Seconds, not negative.
+        Time since the previous instant, seconds, not negative.
     rng : numpy.random.Generator
-        For the noise of the particles.
+        Source of the particles' accelerations.
 
     Returns
     -------
     FilterState
-        At the present instant, before its scan.
+        The belief at the present instant, before its scan.
 
     Raises
     ------
@@ -115,27 +116,27 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
 
 
 def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldModel) -> FilterState:
-    """Step 3: Bayes' rule in each cell, P(state | z) = P(z | state) P(state) / P(z).
+    """Step 3: update each cell by Bayes' rule, P(state | z) = P(z | state) P(state) / P(z).
 
-    STATIC and DYNAMIC share P(z | occupied): one scan can't tell them apart. UNKNOWN means unobserved, so
-    a cell of which the scan says anything isn't that any more: `reveal` goes first.
+    STATIC and DYNAMIC share P(z | occupied), because one scan can't tell them apart. UNKNOWN means that no scan has
+    said anything of the cell; as soon as one does, `reveal` first shares its UNKNOWN mass among the other states.
 
     Parameters
     ----------
     state : FilterState
-        Predicted.
+        The belief before the scan.
     spec : GridSpec
-        The cells.
+        The cells, (H, W).
     evidence : Evidence
-        Of the scan; any numbers >= 0, for each cell is scaled by its best explanation first. Where nothing
-        that was held possible explains the scan, nothing is known any more: UNKNOWN.
+        What the scan says of each cell. However small the two likelihoods are, only their ratio counts. Where nothing
+        that was held possible explains the scan, the cell becomes UNKNOWN.
     world : WorldModel
         What UNKNOWN cells turn out to be, `first_sight`.
 
     Returns
     -------
     FilterState
-        Given the scan.
+        The belief given the scan.
 
     Raises
     ------
@@ -152,21 +153,21 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
 
 
 def reveal(state: FilterState, seen: NDArray, world: WorldModel) -> FilterState:
-    """Share the UNKNOWN mass of cells that are seen among the other states, as they are found at first sight.
+    """Share the UNKNOWN mass of cells that are seen among the other states, by the probabilities of first sight.
 
     Parameters
     ----------
     state : FilterState
-        Predicted.
+        The belief before the scan.
     seen : (H, W) bool
-        Of which cells the scan says anything.
+        Whether the scan says anything of the cell.
     world : WorldModel
         What UNKNOWN cells turn out to be, `first_sight`; the dynamic part is newborn.
 
     Returns
     -------
     FilterState
-        UNKNOWN only where nobody looks.
+        The belief with UNKNOWN mass only in cells of which the scan says nothing.
     """
     revealed = np.where(seen, state.probability[UNKNOWN], 0)
     shares = np.array([*world.first_sight, -1], dtype=revealed.dtype)
@@ -175,27 +176,28 @@ def reveal(state: FilterState, seen: NDArray, world: WorldModel) -> FilterState:
 
 
 def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.random.Generator) -> FilterState:
-    """Step 4: spend the particles where dynamic mass is, and on what is newborn.
+    """Step 4: resample, which spends the particles where dynamic mass is, and on newborn mass.
 
-    Two systematic draws of fixed size: particles in proportion to their weight, and cells in proportion to their
-    newborn mass, each of which gets a particle anywhere in it with a velocity from the wide prior. Weights
-    are then made to add up to each cell's dynamic probability again; where mass too small for a
-    particle got none, it becomes UNKNOWN.
+    There are two systematic draws of fixed size. The first draws particles in proportion to their weights. The second
+    draws cells in proportion to their newborn mass, and puts a particle anywhere in each cell that it draws, with a
+    velocity from the wide prior. Then the weights in each cell are scaled to its dynamic probability again. Dynamic
+    mass so small that no particle was drawn for it becomes UNKNOWN.
 
     Parameters
     ----------
     state : FilterState
-        Given the scan.
+        The belief given the scan.
     spec : GridSpec
-        The cells.
+        The cells, (H, W).
     params : CmcdotParams
-        Number of particles, share of births, their velocity prior.
+        Number of particles, share of births, and their velocity prior.
     rng : numpy.random.Generator
+        Source of the draws, and of the newborn particles' places and velocities.
 
     Returns
     -------
     FilterState
-        The same belief, carried by new particles; no newborn mass.
+        The same belief, carried by new particles, without newborn mass.
 
     Raises
     ------

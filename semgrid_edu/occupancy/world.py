@@ -23,7 +23,7 @@ class WorldModel:
     ----------
     rates : 4 x 4 floats
         How often a cell changes from the state of the row to the state of the column, 1/s; the diagonal is ignored.
-        By default a cell that nobody sees is forgotten: a moving thing after about 2 s, free space after 3 s, a
+        By default a cell that no scan sees is forgotten: a moving thing after about 2 s, free space after 3 s, a
         standing thing after 10 s. In a free cell something appears without having arrived there about once in 30 s,
         mostly because of errors of the sensor. UNKNOWN stays UNKNOWN until a scan says something (`first_sight`).
     stop_rate, stop_speed : float
