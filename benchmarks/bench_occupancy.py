@@ -24,28 +24,30 @@ from semgrid_edu.occupancy import (
     Cmcdot,
     CmcdotParams,
     PlanarMotion,
+    Scan,
     SensorModel,
     VelocityLattice,
     cmcdot,
     scan_evidence,
     scan_evidence_literal,
+    sensor,
 )
 from semgrid_edu.occupancy.tracking import LIDAR_PERIOD
 
 Drive = list[tuple[NDArray, PlanarMotion]]
 WHOLE = "whole step"
 PARTS = {
-    "prepare_scan": "ground",
-    "beam_reach": "evidence",
-    "evidence_in_cells": "evidence",
-    "move": "move",
-    "predict": "predict",
-    "update": "update",
-    "resample": "resample",
-    "velocity_moments": "belief",
-    "local_belief": "belief",
+    (sensor, "prepare_scan"): "ground",
+    (sensor, "polar_profile"): "evidence",
+    (Scan, "evidence"): "evidence",
+    (cmcdot, "move"): "move",
+    (cmcdot, "predict"): "predict",
+    (cmcdot, "update"): "update",
+    (cmcdot, "resample"): "resample",
+    (cmcdot, "velocity_moments"): "belief",
+    (cmcdot, "local_belief"): "belief",
 }
-"""The functions that a step calls, and what each belongs to; of the belief, the scan's evidence counts as evidence."""
+"""The functions that a step calls, each by the module or class that it is looked up in, and the part it counts to."""
 
 
 def real_drive(root: str) -> Drive:
@@ -70,7 +72,7 @@ def made_up_drive(scans: int = 20, points: int = 120_000) -> Drive:
 
 def step_times(drive: Drive, spec: GridSpec, particles: int, passes: int = 9) -> dict[str, float]:
     """Return the milliseconds of a whole step and of its parts, medians over the drive after a pass to warm up."""
-    tracker = Cmcdot(spec, replace(CmcdotParams(), particles=particles))
+    tracker = Cmcdot(spec, replace(CmcdotParams(), n_particles=particles))
     spent, rows = defaultdict(float), []
     with stopwatches(spent, time.process_time):
         for points, motion in drive * passes:
@@ -84,14 +86,14 @@ def step_times(drive: Drive, spec: GridSpec, particles: int, passes: int = 9) ->
 @contextmanager
 def stopwatches(spent: dict[str, float], clock: Callable[[], float]) -> Iterator[None]:
     """Time the parts of every step that is made inside, adding up the seconds of each."""
-    originals = {name: getattr(cmcdot, name) for name in PARTS}
-    for name, part in PARTS.items():
-        setattr(cmcdot, name, stopwatch(originals[name], part, spent, clock))
+    originals = {place: getattr(*place) for place in PARTS}
+    for place, part in PARTS.items():
+        setattr(*place, stopwatch(originals[place], part, spent, clock))
     try:
         yield
     finally:
-        for name, original in originals.items():
-            setattr(cmcdot, name, original)
+        for place, original in originals.items():
+            setattr(*place, original)
 
 
 def stopwatch(function: Callable, part: str, spent: dict[str, float], clock: Callable[[], float]) -> Callable:
@@ -121,7 +123,7 @@ def print_parts(times: dict[str, float]) -> None:
 
 def print_growth(drive: Drive, base: float) -> None:
     """Print how long a step takes with more and fewer points, cells and particles, beside the same at full size."""
-    rng, paper, usual = np.random.default_rng(0), GridSpec.paper(), CmcdotParams().particles
+    rng, paper, usual = np.random.default_rng(0), GridSpec.paper(), CmcdotParams().n_particles
     twice = [(np.concatenate([p, p + rng.normal(0, 0.02, p.shape).astype(p.dtype)]), m) for p, m in drive]
     finer = GridSpec(paper.x_min, paper.x_max, paper.y_min, paper.y_max, paper.cell / 2)
     coarser = replace(finer, y_min=-15.6, y_max=15.6, x_max=71.2, cell=2 * paper.cell)
@@ -155,13 +157,13 @@ def print_lattices(drive: Drive, base: float) -> None:
 
 def main() -> None:
     drive = real_drive(sys.argv[1]) if len(sys.argv) > 1 else made_up_drive()
-    points, paper, sensor = drive[len(drive) // 2][0], GridSpec.paper(), SensorModel()
-    size = f"grid {paper.shape}, {CmcdotParams().particles:,} particles"
+    points, paper, model = drive[len(drive) // 2][0], GridSpec.paper(), SensorModel()
+    size = f"grid {paper.shape}, {CmcdotParams().n_particles:,} particles"
     print(f"{len(drive)} scans of about {len(points):,} points; {size}")
-    literal = best_of(lambda: scan_evidence_literal(points, paper, sensor), 1)
-    fast = best_of(lambda: scan_evidence(points, paper, sensor), 20)
+    literal = best_of(lambda: scan_evidence_literal(points, paper, model), 1)
+    fast = best_of(lambda: scan_evidence(points, paper, model), 20)
     print(f"evidence, literal / fast: {literal:.0f} ms / {fast:.1f} ms = {literal / fast:.0f}")
-    times = step_times(drive, paper, CmcdotParams().particles)
+    times = step_times(drive, paper, CmcdotParams().n_particles)
     print("one step in its parts:")
     print_parts(times)
     print("as one thing grows and the others stay:")

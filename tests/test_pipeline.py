@@ -13,7 +13,7 @@ from semgrid_edu.networks import Architecture, build_net
 from semgrid_edu.occupancy import CmcdotParams, track_drive
 from semgrid_edu.pipeline import STAGES, network_image, run_pipeline
 
-FEW = CmcdotParams(particles=2000)
+FEW = CmcdotParams(n_particles=2000)
 
 
 @pytest.fixture(scope="module")

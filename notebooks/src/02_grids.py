@@ -51,7 +51,8 @@ from semgrid_edu.occupancy import (
 )
 
 # %%
-from semgrid_edu.occupancy.evidence import Evidence, beam_reach, walk_ray
+from semgrid_edu.occupancy.evidence import Evidence
+from semgrid_edu.occupancy.evidence_literal import walk_ray
 from semgrid_edu.occupancy.ground_literal import walk_sector
 from semgrid_edu.occupancy.polar import beyond_reach
 from semgrid_edu.illustrations.boxes import Box, cells_in, scan_boxes
@@ -250,7 +251,7 @@ def look_up(reach, spec):
 street = [Box.around(14.2, 3.2, 4, 2, 1.5), Box(24.2, 24.7, -7, 7, 2.0)]  # a car, 14 m ahead on the left, and a wall
 block = GridSpec(x_min=0, x_max=30, y_min=-10, y_max=10, cell=0.5)
 points = scan_boxes(street, columns=600)
-reach = beam_reach(points, sensor)
+reach = sensor.scan(points).reach
 passed = look_up(reach, block)
 beyond = beyond_reach(reach, block.shape, block.x_max, block.y_max, block.cell, 0.0, 0.0, 0.0)
 np.testing.assert_array_equal(passed, beyond <= -block.cell / 2)

@@ -29,9 +29,9 @@ from semgrid_edu import plotting
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.occupancy import Bof, BofParams, BofState, CmcdotParams, Evidence, LogOddsGrid, PlanarMotion, State
-from semgrid_edu.occupancy import VelocityLattice, bof_predict, bof_predict_literal, bof_update, bof_velocity
-from semgrid_edu.occupancy import scan_evidence, smear_area, transition_matrix
+from semgrid_edu.occupancy import Bof, BofParams, BofState, Evidence, LogOddsGrid, PlanarMotion, State
+from semgrid_edu.occupancy import VelocityLattice, WorldModel, bof_predict, bof_predict_literal, bof_update
+from semgrid_edu.occupancy import bof_velocity, scan_evidence, smear_area, transition_matrix
 from semgrid_edu.illustrations.boxes import Box, cells_in, scan_boxes
 
 plt.rcParams["figure.dpi"] = 80
@@ -119,7 +119,7 @@ for when in ("a second later", "cell 3 is hit"):
 line = GridSpec(x_min=0, x_max=6, y_min=0, y_max=1, cell=1)
 lattice = VelocityLattice(max_speed=1, spacing=1)
 on_line = [lattice.velocities.tolist().index([v, 0]) for v in V]
-steady = CmcdotParams(rates=((0.0,) * 4,) * 4, stop_rate=0, max_acceleration=0)  # things move, and that is all
+steady = WorldModel(rates=((0.0,) * 4,) * 4, stop_rate=0, max_acceleration=0)  # things move, and that is all
 nothing_else = BofParams(lattice, steady)
 
 
@@ -284,7 +284,7 @@ for cell, (mean, variance) in enumerate(zip(*what_moves(joint), strict=True)):
 one_cell = GridSpec(x_min=0, x_max=1, y_min=0, y_max=1, cell=1)
 rates = np.zeros((4, 4))
 rates[FREE, STATIC], rates[STATIC, FREE] = 0.2, 0.5  # a second; nothing ever moves
-params = BofParams(lattice, CmcdotParams(rates=tuple(map(tuple, rates))))
+params = BofParams(lattice, WorldModel(rates=tuple(map(tuple, rates))))
 M = transition_matrix(params.world, dt=0.1)[:2, :2]
 b = np.array([0.6, 0.4])
 occupied = np.zeros((len(lattice), 1, 1), np.float32)
@@ -340,7 +340,7 @@ square = GridSpec(x_min=0, x_max=11, y_min=0, y_max=11, cell=1)
 occupied = np.zeros((len(coarse), 11, 11), np.float32)
 occupied[:, 5, 5] = joint
 middle = BofState(1 - occupied.sum(axis=0), 0 * occupied[0], occupied, coarse.velocities, np.zeros((len(coarse), 2)))
-hurried = CmcdotParams(rates=((0.0,) * 4,) * 4, stop_rate=0, max_acceleration=6)
+hurried = WorldModel(rates=((0.0,) * 4,) * 4, stop_rate=0, max_acceleration=6)
 package = bof_predict(middle, square, BofParams(coarse, hurried), dt=0.1)
 np.testing.assert_allclose(package.occupied.sum(axis=(1, 2)), changed, atol=1e-6)
 for v in ([4, 0], [6, 0], [2, 0], [4, 2], [4, -2]):

@@ -65,7 +65,7 @@ FREE, STATIC, DYNAMIC, UNKNOWN = State
 # | $b_F, b_S, b_D, b_U$ | belief of one cell: FREE, STATIC, DYNAMIC, UNKNOWN; they sum to 1 | `probability[:, r, c]` |
 # | $R$ | how often a cell changes from one state into another, 1/s | `params.rates` |
 # | $M$ | transition matrix of one time step $\Delta t$ | `transition_matrix(params, dt)` |
-# | $N_p$ | number of particles | `params.particles` |
+# | $N_p$ | number of particles | `params.n_particles` |
 # | $\omega_n$ | weight of particle $n$: the probability that it carries | `particles.weight` |
 # | $a$ | probability that something arrives in a cell | `arrives` |
 
@@ -87,8 +87,8 @@ FREE, STATIC, DYNAMIC, UNKNOWN = State
 cells = np.prod(GridSpec.paper().shape)
 velocities = len(VelocityLattice(max_speed=25, spacing=1))
 print(f"BOF:    {cells:,} cells x {velocities:,} velocities          = {cells * velocities / 1e6:6.1f} million numbers")
-numbers = 4 * cells + 5 * CmcdotParams().particles
-print(f"CMCDOT: {cells:,} cells x 4, and {CmcdotParams().particles:,} particles x 5 = {numbers / 1e6:6.1f} million")
+numbers = 4 * cells + 5 * CmcdotParams().n_particles
+print(f"CMCDOT: {cells:,} cells x 4, and {CmcdotParams().n_particles:,} particles x 5 = {numbers / 1e6:6.1f} million")
 
 # %% [markdown]
 # The way out is to look at what a cell can be, and to ask of each: where is it a tenth of a second later?
@@ -420,7 +420,7 @@ for state in (FREE, STATIC, DYNAMIC):
 
 # %%
 NO_RATES = ((0.0,) * 4,) * 4
-calm = CmcdotParams(rates=NO_RATES, stop_rate=0.0, max_acceleration=0.0, particles=4)
+calm = CmcdotParams(rates=NO_RATES, stop_rate=0.0, max_acceleration=0.0, n_particles=4)
 
 
 def along(x, v, weight):
@@ -485,7 +485,7 @@ hit = Evidence(occupied=np.full((1, 1), 0.8, np.float32), free=np.full((1, 1), 0
 
 def after_ten_scans(stop_rate):
     """P(DYNAMIC) of a cell that is hit ten times and holds one particle at rest."""
-    settings = CmcdotParams(rates=NO_RATES, stop_rate=stop_rate, max_acceleration=0.0, particles=1)
+    settings = CmcdotParams(rates=NO_RATES, stop_rate=stop_rate, max_acceleration=0.0, n_particles=1)
     particles = along(np.array([0.5]), np.array([0.0]), np.array([0.5]))
     half = np.array([0, 0.5, 0.5, 0], np.float32).reshape(4, 1, 1)
     state = FilterState(half, particles, np.zeros((1, 1), np.float32))
@@ -703,7 +703,7 @@ b = np.array([[0.4, 1.0, 0.7], [0.3, 0, 0.1], [0.3, 0, 0.2], [0, 0, 0]], np.floa
 newborn = np.array([0.1, 0, 0.2], np.float32)
 old = along(np.array([0.2, 0.4, 0.6]), np.array([5.0, 5, 0]), np.array([0.1, 0.09, 0.01]))
 state = FilterState(b[:, ::-1, None].copy(), old, newborn[::-1, None].copy())
-new = resample(state, small, CmcdotParams(particles=20), np.random.default_rng(0))
+new = resample(state, small, CmcdotParams(n_particles=20), np.random.default_rng(0))
 np.testing.assert_allclose(new.probability, state.probability)
 in_cell = np.floor(new.particles.position[:, 0]).astype(int)
 carried = np.bincount(in_cell, new.particles.weight, minlength=3)
@@ -1019,7 +1019,7 @@ def called_moving(run):
 
 def play(particles, stop_speed, time, ax):
     """Draw the street after some time of filtering, and say what the last second was like."""
-    settings = replace(params, particles=particles, stop_speed=stop_speed)
+    settings = replace(params, n_particles=particles, stop_speed=stop_speed)
     run = list(watch(crossing, time, params=settings))
     last = run[-1][3]
     plotting.velocity(
@@ -1060,7 +1060,8 @@ plt.show()
 # %% tags=["nbval-ignore-output"]
 print("particles   car, person: called DYNAMIC [%], seeds 1 to 4")
 for particles in (100, 1000, 100_000):
-    runs = [list(watch(crossing, 3.0, params=replace(params, particles=particles), seed=seed)) for seed in range(1, 5)]
+    tried = replace(params, n_particles=particles)
+    runs = [list(watch(crossing, 3.0, params=tried, seed=seed)) for seed in range(1, 5)]
     print(f"{particles:9,}   " + "   ".join("{:3.0f}, {:3.0f}".format(*called_moving(run)) for run in runs))
     assert particles < 100_000 or min(min(called_moving(run)) for run in runs) > 80
 

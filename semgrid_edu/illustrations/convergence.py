@@ -1,7 +1,6 @@
 """How CMCDOT approaches the BOF as its particles grow in number, on two cars that pass (paper, section 3.2)."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,8 +15,10 @@ from semgrid_edu.occupancy import (
     Evidence,
     FilterState,
     Particles,
+    SensorModel,
     State,
     VelocityLattice,
+    WorldModel,
     bof_predict,
     bof_update,
     bof_velocity,
@@ -36,14 +37,15 @@ STEPS = 6
 """Number of steps."""
 PARAMS = BofParams(
     VelocityLattice(max_speed=8.0, spacing=4.0),
-    CmcdotParams(
+    WorldModel(
         rates=((0.0, 0.02, 0.0, 0.3), (0.02, 0.0, 0.0, 0.1), (0.1, 0.1, 0.0, 0.5), (0.0, 0.0, 0.0, 0.0)),
         first_sight=(0.85, 0.15, 0.0),
         max_acceleration=0.0,
-        birth_share=1e-9,
     ),
 )
 """The default world, except that nothing accelerates or is born: such velocities wouldn't lie on the lattice."""
+NO_BIRTHS = 1e-9
+"""Share of the particles that is kept for births: in this world there are none."""
 WORTH_COMPARING = 0.1
 """Cells are compared where the BOF's dynamic probability is above this; elsewhere a mean velocity says little."""
 
@@ -134,7 +136,7 @@ def evidence_of(boxes: list[Box]) -> Evidence:
     Evidence
         P(z | occupied) and P(z | free) over `SPEC`.
     """
-    sensor = PARAMS.world.sensor
+    sensor = SensorModel()
     hit = np.any([cells_in(box, SPEC) for box in boxes], axis=0)
     occupied = np.where(hit, sensor.p_hit_occupied, sensor.p_pass_occupied)
     free = np.where(hit, sensor.p_hit_free, sensor.p_pass_free)
@@ -190,11 +192,11 @@ def run_cmcdot(number: int, seed: int) -> Iterator[tuple[NDArray, NDArray]]:
     velocity : (2, H, W) float
         Mean velocity, m/s; NaN without dynamic mass.
     """
-    rng, params = np.random.default_rng(seed), replace(PARAMS.world, particles=number)
+    rng, spending = np.random.default_rng(seed), CmcdotParams(n_particles=number, birth_share=NO_BIRTHS)
     state = _first_particles(number, rng)
     for step in range(1, STEPS + 1):
-        predicted = predict(state, SPEC, params, DT, rng)
-        state = resample(update(predicted, SPEC, evidence_of(passing_cars(step)), params), SPEC, params, rng)
+        predicted = predict(state, SPEC, PARAMS.world, DT, rng)
+        state = resample(update(predicted, SPEC, evidence_of(passing_cars(step)), PARAMS.world), SPEC, spending, rng)
         cells = cells_of(state.particles.position, SPEC)
         yield state.probability[State.DYNAMIC], velocity_moments(state.particles, cells, SPEC.shape)[0]
 

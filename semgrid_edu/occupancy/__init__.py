@@ -1,16 +1,19 @@
 """From LIDAR scans to a grid of free, static, dynamic and unknown cells: l -> o (paper, section 3.2).
 
-`evidence` says what one scan tells; `steps` holds the four steps of the filter, each a pure function on a
-`FilterState`; `Cmcdot` runs them, and `track_drive` runs it over a drive. `LogOddsGrid` and `Bof` are what came
+A `Sensor` turns each scan into `Evidence`; the package's own is `SensorModel`. `steps` holds the four steps of the
+filter, each a pure function on a `FilterState`, and `cmcdot_literal` the same steps as a textbook would write them.
+`Cmcdot` runs the steps, and `track_drive` runs it over a drive. `LogOddsGrid` and `Bof` are the filters that came
 before it: the binary grid, and the exact filter on a lattice of velocities.
 """
 
 from semgrid_edu.occupancy.bof import Bof
-from semgrid_edu.occupancy.bof_literal import bof_predict_literal
+from semgrid_edu.occupancy.bof_literal import bof_predict_literal, bof_update_literal
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
 from semgrid_edu.occupancy.bof_steps import bof_move, bof_predict, bof_update, bof_velocity
 from semgrid_edu.occupancy.cmcdot import Cmcdot
-from semgrid_edu.occupancy.evidence import Evidence, scan_evidence, scan_evidence_literal
+from semgrid_edu.occupancy.cmcdot_literal import move_literal, predict_literal, resample_literal, update_literal
+from semgrid_edu.occupancy.evidence import Evidence, Measurement, Sensor, scan_evidence
+from semgrid_edu.occupancy.evidence_literal import scan_evidence_literal
 from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
 from semgrid_edu.occupancy.log_odds import (
     LogOddsGrid,
@@ -20,13 +23,14 @@ from semgrid_edu.occupancy.log_odds import (
     smear_area,
     update_log_odds,
 )
-from semgrid_edu.occupancy.params import CmcdotParams, transition_matrix
+from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.sensor import SensorModel
+from semgrid_edu.occupancy.sensor import Scan, SensorModel
 from semgrid_edu.occupancy.state import N_STATES, Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import move, predict, resample, update
 from semgrid_edu.occupancy.tracking import track_drive
 from semgrid_edu.occupancy.velocity_lattice import VelocityLattice
+from semgrid_edu.occupancy.world import WorldModel, transition_matrix
 
 __all__ = [
     "N_STATES",
@@ -41,27 +45,36 @@ __all__ = [
     "GroundParams",
     "LogOddsGrid",
     "LogOddsParams",
+    "Measurement",
     "Particles",
     "PlanarMotion",
+    "Scan",
+    "Sensor",
     "SensorModel",
     "State",
     "VelocityLattice",
+    "WorldModel",
     "bof_move",
     "bof_predict",
     "bof_predict_literal",
     "bof_update",
+    "bof_update_literal",
     "bof_velocity",
     "height_above_ground",
     "log_odds",
     "move",
+    "move_literal",
     "predict",
+    "predict_literal",
     "probability",
     "resample",
+    "resample_literal",
     "scan_evidence",
     "scan_evidence_literal",
     "smear_area",
     "track_drive",
     "transition_matrix",
     "update",
+    "update_literal",
     "update_log_odds",
 ]

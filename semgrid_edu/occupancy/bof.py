@@ -5,32 +5,30 @@ from numpy.typing import NDArray
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
 from semgrid_edu.occupancy.bof_steps import bof_move, bof_predict, bof_update, bof_velocity
-from semgrid_edu.occupancy.evidence import beam_reach, evidence_in_cells
 from semgrid_edu.occupancy.local_belief import local_belief
-from semgrid_edu.occupancy.moving_map import MAX_YAW, map_around, scroll
+from semgrid_edu.occupancy.moving_map import MAX_YAW, map_around
+from semgrid_edu.occupancy.observation import observe
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.sensor import prepare_scan
 from semgrid_edu.occupancy.state import Belief
 
 
 class Bof:
     """The exact filter on a lattice of velocities: what `Cmcdot` tends to as its particles grow in number.
 
-    It has no randomness and no sampling error, and pays for them with time and memory that grow with the
-    number of velocities in every cell, whether anything moves there or not. In the map's frame it scrolls as
-    `Cmcdot` does.
+    It has no randomness and no sampling error. The price is time and memory that grow with the number of velocities,
+    in every cell, whether anything moves there or not. Its map scrolls under the vehicle as that of `Cmcdot` does.
 
     Parameters
     ----------
     spec : GridSpec
-        The grid of its beliefs.
+        The grid in which the filter hands out its beliefs, (H, W) cells.
     params : BofParams, optional
-        What it assumes.
+        The lattice of velocities, and what the filter assumes of the world and of its sensor.
 
     Raises
     ------
     ArgumentError
-        When lattice times grid is too much for memory.
+        When the lattice has so many velocities that those of all cells don't fit into memory.
 
     Examples
     --------
@@ -50,35 +48,35 @@ class Bof:
         self._state = BofState.nothing_known(self.map_spec, self.params.lattice)
 
     def step(self, points_grid: NDArray, motion: PlanarMotion, dt: float) -> Belief:
-        """Take in one scan.
+        """Take in one scan: move, predict, update.
 
         Parameters
         ----------
         points_grid : (N, 3+) float
-            Returns: x forward, y left, z above the ground (m), in the grid frame of the vehicle now.
+            The scan's returns: x forward, y left, z above the ground on which the vehicle stands (m), in the grid
+            frame of the vehicle now.
         motion : PlanarMotion
-            Of the vehicle since the last step; at the first step it doesn't matter.
+            Motion of the vehicle since the last step, metres and radians. At the first step nothing has been seen yet
+            that it could move.
         dt : float
-            Seconds since the last step; at the first step any time of the sensor's order.
+            Time since the last step, seconds. At the first step nothing is known yet that could change in that time:
+            the time between two scans will do.
 
         Returns
         -------
         Belief
-            In the grid frame of the vehicle now.
+            What is believed of the cells of `spec`, in the grid frame of the vehicle now.
 
         Raises
         ------
         ArgumentError
-            When the points aren't a table of finite coordinates, or the time is negative or not finite. The
-            tracker is then as it was.
+            When the points aren't a table of finite coordinates, the time is negative or not finite, or the sensor
+            doesn't turn the scan into evidence. The tracker then stays as it was.
         """
-        shift, pose = scroll(self._pose.then(motion), self.spec.cell, MAX_YAW)
-        sensor = self.params.world.sensor
-        points = prepare_scan(points_grid, sensor)
-        free_to = beam_reach(points, sensor)
-        evidence = evidence_in_cells(points, free_to, self.map_spec, sensor, pose)
-        predicted = bof_predict(bof_move(self._state, self.map_spec, shift), self.map_spec, self.params, dt)
-        self._state, self._pose = bof_update(predicted, self.map_spec, evidence, self.params), pose
-        here = evidence_in_cells(points, free_to, self.spec, sensor, PlanarMotion())
+        world = self.params.world
+        seen = observe(world.sensor, points_grid, self._pose.then(motion), self.map_spec, self.spec)
+        moved = bof_move(self._state, self.map_spec, seen.shift)
+        predicted = bof_predict(moved, self.map_spec, self.params, dt)
+        self._state, self._pose = bof_update(predicted, self.map_spec, seen.on_map, self.params), seen.pose
         velocity = bof_velocity(self._state)
-        return local_belief(predicted.probability, velocity, here, self.map_spec, self.spec, pose, self.params.world)
+        return local_belief(predicted.probability, velocity, seen, self.map_spec, self.spec, world)

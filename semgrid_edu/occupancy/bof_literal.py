@@ -1,24 +1,29 @@
-"""The BOF's prediction cell by cell, velocity by velocity (Coue et al., IJRR 2006; paper, section 3.2)."""
+"""The BOF's prediction and update in plain numpy, velocity by velocity (Coue et al., IJRR 2006; section 3.2)."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
-from semgrid_edu.occupancy.bof_steps import going_on, whole_cells
-from semgrid_edu.occupancy.cellwise import CERTAIN
-from semgrid_edu.occupancy.params import transition_matrix
-from semgrid_edu.occupancy.state import State
+from semgrid_edu.occupancy.bof_steps import whole_cells
+from semgrid_edu.occupancy.cellwise import CERTAIN, ratio
+from semgrid_edu.occupancy.evidence import Evidence
+from semgrid_edu.occupancy.particles_literal import slow_down_literal
+from semgrid_edu.occupancy.state import Particles, State, check_shape
+from semgrid_edu.occupancy.world import transition_matrix
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
 
 def bof_predict_literal(state: BofState, spec: GridSpec, params: BofParams, dt: float) -> BofState:
-    """Predict by loops over cells and velocities, in double precision: the literal twin of `bof_predict`.
+    """Predict by loops over cells and velocities: the literal twin of `bof_predict`.
 
-    Parameters and result are those of `bof_predict`.
+    Parameters, result and errors are those of `bof_predict`; the arrays of the result are float64.
     """
-    M, kept = transition_matrix(params.world, dt), going_on(state, params, dt).astype(np.float64)
+    check_shape("state", state.occupied, (len(params.lattice), *spec.shape))
+    M = transition_matrix(params.world, dt)
+    of_each = Particles(np.zeros_like(state.velocity), state.velocity, np.ones(len(state.velocity)))
+    kept = slow_down_literal(of_each, params.world.stop_rate, params.world.stop_speed, dt).weight
     changed = accelerate(state, params, dt)
     cells, remainder = whole_cells(state, spec, dt)
     own, newborn = np.zeros((4, *spec.shape)), np.zeros(spec.shape)
@@ -40,26 +45,28 @@ def bof_predict_literal(state: BofState, spec: GridSpec, params: BofParams, dt: 
     stays += params.lattice.prior[:, None, None] * newborn
     occupied = np.zeros(state.occupied.shape)
     for row, col in np.ndindex(spec.shape):
-        here = meet_literal(own[:, row, col], stays[:, row, col], arrives[:, row, col])
+        here = meet_in_cell(own[:, row, col], stays[:, row, col], arrives[:, row, col])
         own[:, row, col], occupied[:, row, col] = here
     return BofState(own[FREE], own[UNKNOWN], occupied, state.velocity, remainder)
 
 
 def accelerate(state: BofState, params: BofParams, dt: float) -> NDArray[np.float64]:
-    """Return the mass of each velocity after some has changed to neighbouring velocities.
+    """Return the mass of each velocity after some of it has changed to neighbouring velocities.
 
     Parameters
     ----------
     state : BofState
-        Before.
+        The belief before, with mass (V, H, W).
     params : BofParams
-        Lattice and acceleration.
+        The lattice, and how much things accelerate.
     dt : float
-        Seconds.
+        The time step, seconds.
 
     Returns
     -------
     (V, H, W) float64
+        The mass of each velocity in each cell. Mass at the first velocity, zero, stays there: what stands doesn't set
+        off by accelerating a little.
     """
     change = params.lattice.change_probability(params.world.max_acceleration, dt)
     changed = np.zeros(state.occupied.shape)
@@ -70,28 +77,91 @@ def accelerate(state: BofState, params: BofParams, dt: float) -> NDArray[np.floa
     return changed
 
 
-def meet_literal(own: NDArray, stays: NDArray, arrives: NDArray) -> tuple[NDArray, NDArray]:
-    """Let mass that arrives in a cell meet what the cell holds, as `predict` says.
+def meet_in_cell(own: NDArray, stays: NDArray, arrives: NDArray) -> tuple[NDArray, NDArray]:
+    """Let the mass that arrives in one cell meet what the cell holds, as `predict` says.
 
     Parameters
     ----------
     own : (4,) float
-        The cell's own FREE, STATIC and UNKNOWN; its DYNAMIC is in `stays`.
+        P(FREE), P(STATIC) and P(UNKNOWN) of the cell; its dynamic mass is in `stays`.
     stays, arrives : (V,) float
-        Moving mass that is in the cell already, and that comes in.
+        Moving mass of each velocity that is in the cell already, and that comes into it.
 
     Returns
     -------
     own : (4,) float
+        P(FREE), P(STATIC) and P(UNKNOWN) of the cell now.
     occupied : (V,) float
-        Its first entry is STATIC.
+        P(occupied, velocity) of the cell now; the first velocity is zero, and its entry is P(STATIC).
     """
     arrival = arrives.sum()
-    claim = min(arrival, CERTAIN)
-    consistent = 1 - claim * own[STATIC]
-    occupied = stays * (1 - claim) / consistent
+    factor, arrived = strike_out(own[STATIC], arrival)
+    own, occupied = own * factor, stays * factor
     if arrival > 0:
-        occupied += arrives / arrival * claim * (1 - own[STATIC]) / consistent
-    own = own * (1 - claim) / consistent
+        occupied += arrives / arrival * arrived
     occupied[0] = own[STATIC]
     return own, occupied
+
+
+def bof_update_literal(state: BofState, spec: GridSpec, evidence: Evidence, params: BofParams) -> BofState:
+    """Update by Bayes' rule over all that a cell can be: FREE, UNKNOWN, or occupied at one of the velocities.
+
+        P(occupied, v | z) = P(z | occupied) P(occupied, v) / P(z),   P(free | z) = P(z | free) P(free) / P(z)
+
+    All velocities share P(z | occupied), so a scan picks cells, and says nothing of velocities. First the UNKNOWN mass
+    of cells that are seen is shared out, as in `update`; what becomes DYNAMIC takes the lattice's prior velocities. The
+    literal twin of `bof_update`, with its parameters, result and errors.
+    """
+    check_shape("state", state.occupied, (len(params.lattice), *spec.shape))
+    check_shape("evidence", evidence.free, spec.shape)
+    if_free, if_static, if_dynamic = params.world.first_sight
+    revealed = np.where(evidence.occupied != evidence.free, state.unknown, 0).astype(np.float64)
+    free, unknown = state.free + if_free * revealed, state.unknown - revealed
+    occupied = state.occupied + if_dynamic * params.lattice.prior[:, None, None] * revealed
+    occupied[0] += if_static * revealed
+    of_occupied, of_free = relative_likelihoods(evidence)
+    p_z = of_free * (free + unknown) + of_occupied * occupied.sum(axis=0)
+    free, unknown = ratio(of_free * free, p_z), ratio(of_free * unknown, p_z)
+    unknown += p_z == 0  # nothing that was held possible explains the scan
+    return BofState(free, unknown, ratio(of_occupied * occupied, p_z), state.velocity, state.remainder)
+
+
+def relative_likelihoods(evidence: Evidence) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Scale the two likelihoods of each cell so that the larger is 1, because products of tiny numbers would vanish.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The likelihoods of a scan, (H, W).
+
+    Returns
+    -------
+    occupied, free : (H, W) float64
+        Numbers from 0 to 1 in the ratio of P(z | occupied) to P(z | free): Bayes' rule needs no more.
+    """
+    best = np.maximum(evidence.occupied, evidence.free).astype(np.float64)
+    return ratio(evidence.occupied, best), ratio(evidence.free, best)
+
+
+def strike_out(static: NDArray, arrival: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Combine "something arrives" with what a cell holds, and strike out the one combination that is impossible.
+
+    With probability a something arrives, and with probability s the cell is STATIC. Both at once, a s, is impossible,
+    because two solid things can't share a cell. The rest, 1 - a s, is scaled to 1.
+
+    Parameters
+    ----------
+    static : (...) float
+        P(STATIC) of the cell, s.
+    arrival : (...) float
+        Dynamic mass that arrives in it; a is at most `CERTAIN`, so that no arrival is ever beyond doubt.
+
+    Returns
+    -------
+    own : (...) float
+        Factor of everything that the cell held, (1 - a) / (1 - a s).
+    arrived : (...) float
+        P(DYNAMIC) that has arrived, a (1 - s) / (1 - a s).
+    """
+    a = np.minimum(arrival, CERTAIN)
+    return (1 - a) / (1 - a * static), a * (1 - static) / (1 - a * static)

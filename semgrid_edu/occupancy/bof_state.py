@@ -1,4 +1,4 @@
-"""What the BOF believes of each cell, and what it assumes (Coue et al., IJRR 2006; paper, section 3.2)."""
+"""What the BOF believes of each cell, and its parameters (Coue et al., IJRR 2006; paper, section 3.2)."""
 
 from dataclasses import dataclass, field
 
@@ -7,48 +7,48 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.velocity_lattice import VelocityLattice
+from semgrid_edu.occupancy.world import WorldModel
 
 MOST_BYTES = 2e9
-"""Memory that the occupied mass may take; a step needs three times as much."""
+"""Memory that the mass of all velocities may take, in bytes; a step needs three times as much."""
 
 
 @dataclass(frozen=True)
 class BofParams:
-    """What the BOF assumes: the model of CMCDOT, with a lattice of velocities in place of particles.
+    """The parameters of the BOF: the same model of the world as CMCDOT's, and a lattice of velocities.
 
     Parameters
     ----------
     lattice : VelocityLattice
-        The velocities it tells apart.
-    world : CmcdotParams
-        Sensor and world. The number of particles and what is spent on births don't matter here, nor does
-        `max_speed`, for the lattice has its own.
+        The velocities that the filter tells apart.
+    world : WorldModel
+        What the filter assumes of the world and of its sensor.
     """
 
     lattice: VelocityLattice = field(default_factory=VelocityLattice)
-    world: CmcdotParams = field(default_factory=CmcdotParams)
+    world: WorldModel = field(default_factory=WorldModel)
 
 
 @dataclass(frozen=True, eq=False)
 class BofState:
     """What the BOF carries from step to step: a distribution over free, unknown and V velocities in each cell.
 
-    Each velocity's mass is shifted by whole cells, and the rest of its displacement is kept beside: so no
-    mass is ever spread by interpolation, and slow things move too, a cell every few steps. Nor does
-    the lattice turn with the map; its velocities are expressed in the map's axes.
+    Each velocity shifts its mass by whole cells, and remembers the rest of its displacement. So no mass is ever spread
+    by interpolation, and slow things move too, by a cell every few steps. When the map turns, the lattice doesn't turn
+    with it: its velocities are expressed in the new axes of the map.
 
     Parameters
     ----------
     free, unknown : (H, W) float32
         P(FREE) and P(UNKNOWN).
     occupied : (V, H, W) float32
-        P(occupied, velocity). The first velocity is zero: its mass is STATIC, that of all others DYNAMIC.
+        P(occupied, velocity). The first velocity is zero: its mass is STATIC, that of all other velocities DYNAMIC.
     velocity : (V, 2) float64
-        The lattice in the axes of the map, m/s.
+        The velocities of the lattice over ground, along the axes of the map, m/s.
     remainder : (V, 2) float64
-        How far, beyond whole cells, each velocity has moved its mass, metres along the axes of the map.
+        How far each velocity has displaced its mass beyond the whole cells by which it was shifted, along the axes of
+        the map, metres.
     """
 
     free: NDArray[np.float32]
@@ -59,23 +59,24 @@ class BofState:
 
     @classmethod
     def nothing_known(cls, spec: GridSpec, lattice: VelocityLattice) -> "BofState":
-        """Return the state of one who has seen nothing: UNKNOWN everywhere.
+        """Return the state before the first scan: UNKNOWN everywhere.
 
         Parameters
         ----------
         spec : GridSpec
-            The cells.
+            The cells, (H, W).
         lattice : VelocityLattice
-            The velocities.
+            The V velocities that are told apart.
 
         Returns
         -------
         BofState
+            P(UNKNOWN) = 1 in each cell.
 
         Raises
         ------
         ArgumentError
-            When lattice times grid is too much for memory.
+            When V x H x W numbers don't fit into memory.
         """
         shape = (len(lattice), *spec.shape)
         if (size := 4 * float(np.prod(shape, dtype=float))) > MOST_BYTES:

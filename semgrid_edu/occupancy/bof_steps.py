@@ -5,34 +5,34 @@ from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
-from semgrid_edu.occupancy.cellwise import meet, mix
+from semgrid_edu.occupancy.cellwise import meet, mix, ratio
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.moving_map import look_up
-from semgrid_edu.occupancy.params import transition_matrix
 from semgrid_edu.occupancy.particles import slow_down
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import FilterState, Particles, State, check_shape
 from semgrid_edu.occupancy.steps import update
+from semgrid_edu.occupancy.world import transition_matrix
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
 
 def bof_move(state: BofState, spec: GridSpec, motion: PlanarMotion) -> BofState:
-    """Express the belief in a new frame, as `move` does for CMCDOT: what enters is UNKNOWN.
+    """Express the belief in a new frame, as `move` does for CMCDOT: what enters the map is UNKNOWN.
 
     Parameters
     ----------
     state : BofState
-        In the old frame.
+        The belief in the old frame.
     spec : GridSpec
-        The cells, the same in both frames.
+        The cells, (H, W), the same in both frames.
     motion : PlanarMotion
-        The new frame, in the old one.
+        Pose of the new frame in the old one, metres and radians.
 
     Returns
     -------
     BofState
-        In the new frame.
+        The belief in the new frame, with velocities along the new axes.
 
     Raises
     ------
@@ -57,27 +57,27 @@ def bof_move(state: BofState, spec: GridSpec, motion: PlanarMotion) -> BofState:
 
 
 def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -> BofState:
-    """Predict: every velocity shifts its mass by its own displacement; the rest is the model of `predict`.
+    """Predict: every velocity shifts its mass by its own displacement; all else is as in CMCDOT's `predict`.
 
-    Some mass changes to neighbouring velocities, slow mass becomes STATIC, and all mixes by the transition matrix. What
-    leaves a cell leaves FREE behind. Where mass arrives, "something arrives" and "a standing thing is here"
-    can't both be right. What becomes DYNAMIC takes the lattice's prior velocities, and flies from the next step on.
+    Some mass changes to neighbouring velocities, slow mass becomes STATIC, and the states mix by the transition matrix.
+    Mass that leaves a cell leaves FREE behind. Where mass arrives, "something arrives" and "a standing thing is here"
+    can't both be right. What becomes DYNAMIC takes the lattice's prior velocities, and moves from the next step on.
 
     Parameters
     ----------
     state : BofState
-        At the previous instant.
+        The belief at the previous instant.
     spec : GridSpec
-        The cells.
+        The cells, (H, W).
     params : BofParams
-        Lattice, rates, stopping.
+        The lattice, and how the world changes.
     dt : float
-        Seconds, not negative.
+        Time since the previous instant, seconds, not negative.
 
     Returns
     -------
     BofState
-        At the present instant, before its scan.
+        The belief at the present instant, before its scan.
 
     Raises
     ------
@@ -112,20 +112,21 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -
 
 
 def going_on(state: BofState, params: BofParams, dt: float) -> NDArray[np.float32]:
-    """Return what part of each velocity's mass goes on moving: to `slow_down` each is a particle of weight 1.
+    """Return which share of each velocity's mass doesn't stop, by `slow_down` of one particle per velocity.
 
     Parameters
     ----------
     state : BofState
-        For its velocities.
+        The belief, of which only the velocities count.
     params : BofParams
-        For rate and speed of stopping.
+        How things stop.
     dt : float
-        Seconds.
+        The time step, seconds.
 
     Returns
     -------
     (V,) float32
+        Shares from 0 to 1.
     """
     velocity = state.velocity.astype(np.float32)
     particles = Particles(np.zeros_like(velocity), velocity, np.ones(len(velocity), np.float32))
@@ -138,47 +139,47 @@ def whole_cells(state: BofState, spec: GridSpec, dt: float) -> tuple[NDArray[np.
     Parameters
     ----------
     state : BofState
-        For its velocities and remainders.
+        The belief, of which only the velocities and their remainders count.
     spec : GridSpec
         The cells.
     dt : float
-        Seconds.
+        The time step, seconds.
 
     Returns
     -------
     cells : (V, 2) int64
-        Along x and y.
+        Number of cells along the x and y axes of the map.
     remainder : (V, 2) float64
-        Metres, at most half a cell.
+        What remains along the same axes, metres, at most half a cell.
     """
     displacement = state.remainder + state.velocity * dt
     remainder = (displacement + spec.cell / 2) % spec.cell - spec.cell / 2
     cells = np.rint((displacement - remainder) / spec.cell)
-    farthest = max(spec.shape)  # beyond the grid all is lost anyway, however long nobody looked
+    farthest = max(spec.shape)  # all that leaves the grid is lost, however far it goes
     return np.clip(cells, -farthest, farthest).astype(np.int64), remainder
 
 
 def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofParams) -> BofState:
-    """Update by Bayes' rule: that of `update`, for a scan knows nothing of velocities.
+    """Update by Bayes' rule: that of CMCDOT's `update`, because a scan says nothing of velocities.
 
-    All moving mass of a cell shares P(z | occupied), so it is scaled by one factor; of UNKNOWN cells that are seen for
-    the first time, the dynamic part takes the lattice's prior velocities.
+    All moving mass of a cell shares P(z | occupied), so it is scaled by one factor. The dynamic part of UNKNOWN cells
+    that are seen for the first time takes the lattice's prior velocities.
 
     Parameters
     ----------
     state : BofState
-        Predicted.
+        The belief before the scan.
     spec : GridSpec
-        The cells.
+        The cells, (H, W).
     evidence : Evidence
-        Of the scan.
+        What the scan says of each cell.
     params : BofParams
-        The lattice's prior velocities; for `first_sight`.
+        The lattice, and what UNKNOWN cells turn out to be at first sight.
 
     Returns
     -------
     BofState
-        Given the scan.
+        The belief given the scan.
 
     Raises
     ------
@@ -188,7 +189,7 @@ def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofP
     check_shape("state", state.occupied, (len(params.lattice), *spec.shape))
     before = state.probability
     given = update(FilterState(before, Particles.none(), np.zeros_like(before[0])), spec, evidence, params.world)
-    factor = _ratio(np.maximum(given.probability[DYNAMIC] - given.newborn, 0), before[DYNAMIC])
+    factor = ratio(np.maximum(given.probability[DYNAMIC] - given.newborn, 0), before[DYNAMIC])
     occupied = np.empty_like(state.occupied)
     occupied[0] = given.probability[STATIC]
     for k in range(1, len(occupied)):
@@ -204,13 +205,14 @@ def bof_velocity(state: BofState) -> tuple[NDArray[np.float32], NDArray[np.float
     Parameters
     ----------
     state : BofState
+        The belief, with mass of V velocities in each cell.
 
     Returns
     -------
     mean : (2, H, W) float32
-        Along the axes of the map, m/s; NaN where nothing moves.
+        Mean velocity along the axes of the map, m/s; NaN where nothing moves.
     covariance : (2, 2, H, W) float32
-        m^2/s^2; NaN likewise.
+        Its covariance, m^2/s^2; NaN where nothing moves.
     """
     vx, vy = state.velocity[1:].T
     powers = np.stack([np.ones_like(vx), vx, vy, vx * vx, vx * vy, vy * vy]).astype(np.float32)
@@ -230,8 +232,3 @@ def _shift(plane: NDArray, cells: NDArray[np.int64], out: NDArray) -> None:
     out[...] = 0
     source = plane[max(up, 0) : height + min(up, 0), max(left, 0) : width + min(left, 0)]
     out[max(-up, 0) : height - max(up, 0), max(-left, 0) : width - max(left, 0)] = source
-
-
-def _ratio(part: NDArray, whole: NDArray) -> NDArray:
-    """Divide, with 0 where the whole is 0."""
-    return np.divide(part, whole, out=np.zeros_like(whole), where=whole > 0)

@@ -1,35 +1,37 @@
-"""What becomes of each cell by itself in the filter's steps: a rule is a loop over cells (paper, section 3.2).
+"""What the filter's steps do in each cell by itself: each rule is a compiled loop over cells (paper, section 3.2).
 
-In the loops stand numbers alone, and choices without branches: so the compiler does several cells at a time.
+The loops compute with plain numbers, and choose between values without branching, so that the compiler can do several
+cells at a time.
 """
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from semgrid_edu.occupancy.state import State
 
 FREE, STATIC, DYNAMIC, UNKNOWN = (int(state) for state in State)
 CERTAIN = 1 - 1e-3
-"""The most that arriving particles may claim of a cell: who is never quite certain can be contradicted."""
+"""The most that arriving particles may claim of a cell. It is below 1, so that a scan can still contradict them."""
 
 
 @njit(cache=True, error_model="numpy")
 def make_room(probability, claimed):
-    """Let its particles decide how much of a cell is dynamic; the other states share the rest as before.
+    """Let its particles decide how much of a cell is DYNAMIC; the other states share the rest in their old proportions.
 
     Parameters
     ----------
     probability : (4, H, W) float32
-        The four states; what is DYNAMIC here is ignored.
+        The four states; P(DYNAMIC) is ignored.
     claimed : (H, W) float32
-        Sum of the weights in each cell; above 1 where particles crowd.
+        Sum of the weights of the particles in each cell; it may be above 1 where particles crowd.
 
     Returns
     -------
     probability : (4, H, W) float32
-        With P(DYNAMIC) = min(claimed, 1). Where nothing else was possible, the rest is UNKNOWN.
+        The four states, with P(DYNAMIC) = min(claimed, 1). Where no other state was possible, the rest is UNKNOWN.
     factor : (H, W) float32
-        By which the weights change.
+        Factor of the weights of the cell's particles.
     """
     shared, factor = np.empty_like(probability), np.empty_like(claimed)
     for r in range(claimed.shape[0]):
@@ -56,16 +58,16 @@ def mix(probability, newborn, going, M):
     newborn : (H, W) float32
         The part of P(DYNAMIC) that no particle carries.
     going : (H, W) float32
-        Sum of the weights after the matrix and after some have stopped: what stopped is STATIC.
+        Sum of the weights in each cell after the matrix and after some of them have stopped. What stopped is STATIC.
     M : (4, 4) float
-        M[i, j] = P(state j now | state i before).
+        Transition matrix, M[i, j] = P(state j now | state i before).
 
     Returns
     -------
     probability : (4, H, W) float32
-        Now, with all particles still in their cells.
+        The four states now, with all particles still in their cells.
     newborn : (H, W) float32
-        Grown by what became DYNAMIC of the other states.
+        The part of P(DYNAMIC) that no particle carries, with what has become DYNAMIC of the other states.
     """
     mixed, born = np.empty_like(probability), np.empty_like(newborn)
     for j in range(4):
@@ -86,7 +88,7 @@ def mix(probability, newborn, going, M):
 
 @njit(cache=True, error_model="numpy")
 def meet(mixed, newborn, going, stays, arrives):
-    """Let the dynamic mass that arrives in a cell meet what the cell holds: what can't both be is struck out.
+    """Let the dynamic mass that arrives in a cell meet what the cell holds, and strike out what can't both be true.
 
     Parameters
     ----------
@@ -95,17 +97,18 @@ def meet(mixed, newborn, going, stays, arrives):
     newborn : (H, W) float32
         The part of P(DYNAMIC) that no particle carries.
     going, stays, arrives : (H, W) float32
-        Sum of the weights in each cell before they flew; of those that are still there; of those that came in.
+        Sums of weights in each cell: of the particles that were there before they flew, of those that are still there,
+        and of those that have come in.
 
     Returns
     -------
     probability : (4, H, W) float32
-        With a = min(arrives, CERTAIN) and s = P(STATIC): P(DYNAMIC) = [a (1 - s) + (1 - a) d] / (1 - a s) and, of
-        the others, (1 - a) P / (1 - a s), where d is what is newborn or stays. What left is FREE.
+        With a = min(arrives, CERTAIN), s = P(STATIC) and d the mass that is newborn or stays, P(DYNAMIC) is
+        [a (1 - s) + (1 - a) d] / (1 - a s), and every other state (1 - a) P / (1 - a s). What has left is FREE.
     newborn : (H, W) float32
         Scaled like everything that was in the cell.
     factor : (2, H, W) float32
-        By which the weights of particles change that stay, and that arrive.
+        Factors of the weights of the particles that stay, and of those that arrive.
     """
     probability, born = np.empty_like(mixed), np.empty_like(newborn)
     factor = np.empty((2, *newborn.shape), np.float32)
@@ -131,16 +134,16 @@ def bayes(prior, occupied, free):
     Parameters
     ----------
     prior : (4, H, W) float32
-        The four states.
+        The four states before the scan.
     occupied, free : (H, W) float
         P(z | occupied) and P(z | free), not negative; UNKNOWN is as likely as free.
 
     Returns
     -------
     posterior : (4, H, W) float32
-        Where nothing that was held possible explains the scan, UNKNOWN.
+        The four states given the scan. Where nothing that was held possible explains the scan, all is UNKNOWN.
     factor : (H, W) float64
-        P(DYNAMIC | z) / P(DYNAMIC): by which the weights change.
+        P(DYNAMIC | z) / P(DYNAMIC), the factor of the weights of the cell's particles.
     """
     posterior, factor = np.empty_like(prior), np.empty(prior.shape[1:])
     for r in range(prior.shape[1]):
@@ -163,21 +166,21 @@ def bayes(prior, occupied, free):
 
 @njit(cache=True, error_model="numpy")
 def represent(probability, carried):
-    """Make particles carry each cell's dynamic probability; without particles it turns UNKNOWN.
+    """Make the particles of each cell carry its dynamic probability; without particles it turns UNKNOWN.
 
     Parameters
     ----------
     probability : (4, H, W) float32
         The four states.
     carried : (H, W) float32
-        Sum of the weights in each cell.
+        Sum of the weights of the particles in each cell.
 
     Returns
     -------
     probability : (4, H, W) float32
-        DYNAMIC only where particles are.
+        The four states, with P(DYNAMIC) = 0 where no particle is.
     factor : (H, W) float64
-        By which the weights change.
+        Factor of the weights of the cell's particles.
     """
     represented, factor = probability.copy(), np.empty(carried.shape)
     for r in range(carried.shape[0]):
@@ -187,3 +190,20 @@ def represent(probability, carried):
             represented[UNKNOWN, r, c] += 0.0 if carried[r, c] > 0 else dynamic
             factor[r, c] = dynamic / carried[r, c] if carried[r, c] > 0 else 0.0
     return represented, factor
+
+
+def ratio(part: NDArray, whole: NDArray) -> NDArray[np.floating]:
+    """Divide cell by cell, and give 0 where the divisor is 0.
+
+    Parameters
+    ----------
+    part, whole : (..., H, W) float
+        Dividend and divisor, not negative.
+
+    Returns
+    -------
+    (..., H, W) float
+        part / whole.
+    """
+    out = np.zeros(np.broadcast_shapes(np.shape(part), np.shape(whole)), np.result_type(part, whole))
+    return np.divide(part, whole, out=out, where=whole > 0)

@@ -4,13 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence import beam_reach, evidence_in_cells
 from semgrid_edu.occupancy.local_belief import local_belief
-from semgrid_edu.occupancy.moving_map import MAX_YAW, map_around, scroll
+from semgrid_edu.occupancy.moving_map import MAX_YAW, map_around
+from semgrid_edu.occupancy.observation import observe
 from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.particles import cells_of, transform
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.sensor import prepare_scan
 from semgrid_edu.occupancy.state import Belief, FilterState, Particles
 from semgrid_edu.occupancy.steps import move, predict, resample, update
 from semgrid_edu.occupancy.velocities import velocity_moments
@@ -19,18 +18,18 @@ from semgrid_edu.occupancy.velocities import velocity_moments
 class Cmcdot:
     """The filter: give it scan after scan, and it tells free, static, dynamic and unknown cells apart.
 
-    Inside, it keeps a map somewhat larger than the grid that stays aligned with the world and scrolls under
-    the vehicle by whole cells (`moving_map`). What the map predicts is looked up in the vehicle's cells and
-    updated there with the scan once more, for the belief that is handed out; nothing of that goes back.
+    Inside, it keeps a map that is somewhat larger than the grid, stays aligned with the world, and scrolls under the
+    vehicle by whole cells (`moving_map`). For the belief that it hands out, it looks up in the vehicle's own cells what
+    the map predicts, and updates those cells with the scan (`local_belief`). Nothing of that goes back to the map.
 
     Parameters
     ----------
     spec : GridSpec
-        The grid of its beliefs.
+        The grid in which the filter hands out its beliefs, (H, W) cells.
     params : CmcdotParams, optional
-        What it assumes of sensor and world.
+        What the filter assumes of the world and of its sensor, and how it spends its particles.
     seed : int or numpy.random.Generator
-        Decides everything that is drawn: the same seed gives the same bits.
+        Seed or source of all random numbers that the filter draws: the same seed gives the same bits.
 
     Examples
     --------
@@ -51,45 +50,41 @@ class Cmcdot:
 
     @property
     def particles(self) -> Particles:
-        """The particles in the grid frame of the vehicle; some lie outside the grid, in the margin of the map."""
+        """The particles in the grid frame of the vehicle. Some lie outside the grid, in the margin of the map."""
         return transform(self._state.particles, self._pose)
 
     def step(self, points_grid: NDArray, motion: PlanarMotion, dt: float) -> Belief:
-        """Take in one scan.
+        """Take in one scan: move, predict, update, resample.
 
         Parameters
         ----------
         points_grid : (N, 3+) float
-            Returns: x forward, y left, z above the ground (m), in the grid frame of the vehicle now.
+            The scan's returns: x forward, y left, z above the ground on which the vehicle stands (m), in the grid
+            frame of the vehicle now.
         motion : PlanarMotion
-            Of the vehicle since the last step; at the first step it doesn't matter.
+            Motion of the vehicle since the last step, metres and radians. At the first step nothing has been seen yet
+            that it could move.
         dt : float
-            Seconds since the last step; at the first step any time of the sensor's order.
+            Time since the last step, seconds. At the first step nothing is known yet that could change in that time:
+            the time between two scans will do.
 
         Returns
         -------
         Belief
-            In the grid frame of the vehicle now.
+            What is believed of the cells of `spec`, in the grid frame of the vehicle now.
 
         Raises
         ------
         ArgumentError
-            When the points aren't a table of finite coordinates, or the time is negative or not finite. The
-            tracker is then as it was.
+            When the points aren't a table of finite coordinates, the time is negative or not finite, or the sensor
+            doesn't turn the scan into evidence. The tracker then stays as it was.
         """
-        shift, pose = scroll(self._pose.then(motion), self.spec.cell, MAX_YAW)
-        sensor = self.params.sensor
-        points = prepare_scan(points_grid, sensor)
-        free_to = beam_reach(points, sensor)
-        evidence = evidence_in_cells(points, free_to, self.map_spec, sensor, pose)
-        moved = move(self._state, self.map_spec, shift)
+        seen = observe(self.params.sensor, points_grid, self._pose.then(motion), self.map_spec, self.spec)
+        moved = move(self._state, self.map_spec, seen.shift)
         predicted = predict(moved, self.map_spec, self.params, dt, self._rng)
-        updated = update(predicted, self.map_spec, evidence, self.params)
-        self._state, self._pose = resample(updated, self.map_spec, self.params, self._rng), pose
-        here = evidence_in_cells(points, free_to, self.spec, sensor, PlanarMotion())
-        return local_belief(
-            predicted.probability, self._velocities(), here, self.map_spec, self.spec, pose, self.params
-        )
+        updated = update(predicted, self.map_spec, seen.on_map, self.params)
+        self._state, self._pose = resample(updated, self.map_spec, self.params, self._rng), seen.pose
+        return local_belief(predicted.probability, self._velocities(), seen, self.map_spec, self.spec, self.params)
 
     def _velocities(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return mean and covariance of the particles' velocities in each cell of the map."""

@@ -1,6 +1,11 @@
-"""What one LIDAR scan says of each cell: P(z | occupied) and P(z | free) (paper, section 3.2, step 2)."""
+"""What one scan says of each cell, P(z | occupied) and P(z | free), and what a sensor must offer (paper, section 3.2).
+
+A filter needs two things of a sensor: that it takes a scan in, `Sensor.scan`, and that the result can say what the
+scan tells of the cells of any grid, `Measurement.evidence`. Any two classes with these methods will do.
+"""
 
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,222 +13,206 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.polar import beyond_reach, count_returns, fill_gaps, polar_profile, reach
-from semgrid_edu.occupancy.sensor import SensorModel, prepare_scan
+from semgrid_edu.occupancy.points import check_points
 from semgrid_edu.occupancy.state import check_shape
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """The likelihood of a scan in each cell; the two are equal where it says nothing.
+    """The two likelihoods of a scan in each cell. Where they are equal, the scan says nothing.
 
     Parameters
     ----------
     occupied, free : (H, W) float32
-        P(z | occupied) and P(z | free), not negative.
+        P(z | occupied) and P(z | free), not negative. Only their ratio matters, so neither has to be at most 1.
 
     Raises
     ------
     ArgumentError
-        When they don't fit each other, or hold what is no likelihood.
+        When the two have different shapes, or an entry is negative or NaN.
     """
 
     occupied: NDArray[np.float32]
     free: NDArray[np.float32]
 
     def __post_init__(self) -> None:
-        """Refuse what would make nonsense of Bayes' rule in silence."""
+        """Refuse what would make nonsense of Bayes' rule without a warning."""
         check_shape("free", self.free, np.shape(self.occupied))
         for name in ("occupied", "free"):
             if not (least := np.min(getattr(self, name), initial=0)) >= 0:  # NaN isn't either
                 raise ArgumentError(name, "likelihoods, not negative", least)
 
 
-def scan_evidence(points: NDArray, spec: GridSpec, sensor: SensorModel, pose: PlanarMotion | None = None) -> Evidence:
-    """Turn a scan into evidence by way of a polar grid: no loop over rays.
+@runtime_checkable
+class Measurement(Protocol):
+    """What a sensor has made of one scan. The package's own is `Scan`."""
 
-    A beam is a narrow sector of azimuth. Along it nothing stands before its first obstacle or, when it has
-    none, before its farthest ground return: so the whole polar grid is one range a beam, in which each
-    cell is looked up. A cell with obstacle returns is occupied; one that its beam passes from end to end, or
-    that holds a ground return, is free; of the others, behind obstacles or out of range, the scan says nothing.
+    def evidence(self, spec: GridSpec, pose: PlanarMotion) -> Evidence:
+        """Say what the scan tells of each cell of a grid.
 
-    What it assumes:
+        A filter asks twice in each step: for the cells of its own map, in which the vehicle moves, and for the cells
+        of the grid in which it hands out its beliefs, whose frame is that of the vehicle.
 
-    - *Heights.* Obstacles stand on the ground that `prepare_scan` finds; what hangs higher than `obstacle_max` (crowns,
-      bridges) hides nothing below it.
-    - *Occlusion.* A beam ends at its first obstacle, however low, though higher rings may look over it. What they hit
-      behind it still counts: obstacle returns always, ground returns from `under` metres on; nearer ones may come
-      through below it.
-    - *Thin objects.* One return stops its whole beam, which is 16 cm wide at 30 m; a cell that beams share belongs to
-      the one through its centre. What is thinner than the distance between two columns of returns may stand
-      between them unseen, and is passed for free.
-    - *Several rings.* What a beam passes over between two rings isn't there. Where rings differ by an angle a, they
-      miss things lower than a times the distance: for KITTI's scanner 0.3 m at 50 m. Below its lowest ring, nearer
-      than 4 m, nothing is checked; nor are rays that don't come back.
-    - Returns are independent, up to `max_returns` a cell; an obstacle return overrules what else a cell holds.
+        Parameters
+        ----------
+        spec : GridSpec
+            The cells, (H, W).
+        pose : PlanarMotion
+            Pose of the vehicle in the frame of `spec`, metres and radians. So `pose.to_previous(points[:, :2])` gives
+            the x and y of the scan's points in the frame of `spec`, and `spec.cells` tells their cells.
+
+        Returns
+        -------
+        Evidence
+            P(z | occupied) and P(z | free), each (H, W); equal in cells of which the scan says nothing.
+        """
+        ...
+
+
+@runtime_checkable
+class Sensor(Protocol):
+    """A model of the sensor: it takes a scan in, and makes a measurement of it. The package's own is `SensorModel`.
+
+    Examples
+    --------
+    A sensor that never says anything. With it, a filter believes UNKNOWN for ever:
+
+    >>> class Blind:
+    ...     def scan(self, points):
+    ...         return self
+    ...     def evidence(self, spec, pose):
+    ...         return Evidence(np.ones(spec.shape), np.ones(spec.shape))
+    >>> isinstance(Blind(), Sensor)
+    True
+    """
+
+    def scan(self, points: NDArray) -> Measurement:
+        """Take one scan in.
+
+        Parameters
+        ----------
+        points : (N, 3+) float32 or float64
+            Returns: x forward, y left, z above the ground on which the vehicle stands (m), in the grid frame of the
+            vehicle now. The filters have checked that all are finite. N may be 0.
+
+        Returns
+        -------
+        Measurement
+            Can be asked for the evidence in the cells of any grid.
+        """
+        ...
+
+
+def scan_evidence(points: NDArray, spec: GridSpec, sensor: Sensor, pose: PlanarMotion | None = None) -> Evidence:
+    """Turn a scan into evidence: `sensor.scan(points).evidence(spec, pose)`, with its input and output checked.
 
     Parameters
     ----------
     points : (N, 3+) float
-        Returns: x forward, y left, z above the ground (m), in the grid frame of the vehicle.
+        Returns: x forward, y left, z above the ground on which the vehicle stands (m), in the grid frame of the
+        vehicle; N may be 0.
     spec : GridSpec
-        The cells.
-    sensor : SensorModel
-        How the scanner errs.
+        The cells, (H, W).
+    sensor : Sensor
+        How the scanner errs: usually a `SensorModel`.
     pose : PlanarMotion, optional
-        Where the vehicle is in the frame of `spec`; at its origin when not given.
+        Pose of the vehicle in the frame of `spec`; by default it stands at the origin of that frame.
 
     Returns
     -------
     Evidence
-        That of `scan_evidence_literal`, except for cells that several beams share, of which only some get through:
-        thin lines where what is seen begins or ends, and far out, among foliage, whole patches.
+        P(z | occupied) and P(z | free), each (H, W). For a `SensorModel` that of `scan_evidence_literal`, except for
+        cells that several beams share and only some of them pass. These are thin lines where the seen area begins or
+        ends and, far away among foliage, whole patches.
 
     Raises
     ------
     ArgumentError
-        When `points` isn't a table of finite coordinates.
+        When `points` isn't a table of finite coordinates, or the sensor returns anything but evidence over `spec`.
     """
-    points = prepare_scan(points, sensor)
-    return evidence_in_cells(points, beam_reach(points, sensor), spec, sensor, pose or PlanarMotion())
+    return evidence_of(take_scan(sensor, points), spec, pose or PlanarMotion())
 
 
-def beam_reach(points: NDArray, sensor: SensorModel) -> NDArray[np.float32]:
-    """Return how far each beam of a scan sees: the scan in polar coordinates.
+def check_sensor(sensor: Sensor) -> None:
+    """Refuse what can't take a scan in.
 
     Parameters
     ----------
+    sensor : Sensor
+        The model of a sensor, an object with a method `scan`.
+
+    Raises
+    ------
+    ArgumentError
+        When it has no such method, or is a class, of which an object has to be made first.
+    """
+    expected = "an object with a method .scan(points), such as SensorModel()"
+    if isinstance(sensor, type):
+        raise ArgumentError("sensor", expected, f"the class {sensor.__name__} itself: write {sensor.__name__}()")
+    if not isinstance(sensor, Sensor):
+        raise ArgumentError("sensor", expected, type(sensor).__name__)
+
+
+def take_scan(sensor: Sensor, points: NDArray) -> Measurement:
+    """Check a scan, hand it to a sensor, and check what the sensor makes of it.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        The model of the sensor.
     points : (N, 3+) float
-        Returns from `prepare_scan`, in the grid frame of the vehicle, metres.
-    sensor : SensorModel
-        Its beams, and the heights of obstacles.
+        Returns in the grid frame of the vehicle, as for `scan_evidence`.
 
     Returns
     -------
-    (B,) float32
-        Metres; zero for beams in which nothing came back.
+    Measurement
+        What `sensor.scan` returned.
+
+    Raises
+    ------
+    ArgumentError
+        When `points` isn't a table of finite coordinates, or the sensor returns something without `evidence`.
     """
-    profile = polar_profile(points, sensor.obstacle_min, sensor.obstacle_max, sensor.beams)
-    return fill_gaps(reach(*profile), sensor.gap)
+    measurement = sensor.scan(check_points(points))
+    if not isinstance(measurement, Measurement):
+        expected = ".scan(points) to return an object with a method .evidence(spec, pose)"
+        raise ArgumentError(_name(sensor), expected, type(measurement).__name__)
+    return measurement
 
 
-def evidence_in_cells(
-    points: NDArray, free_to: NDArray, spec: GridSpec, sensor: SensorModel, pose: PlanarMotion
-) -> Evidence:
-    """Look each cell up in the polar scan: the second half of `scan_evidence`, for any grid and pose.
+def evidence_of(measurement: Measurement, spec: GridSpec, pose: PlanarMotion) -> Evidence:
+    """Ask a measurement for its evidence over a grid, and check the answer.
 
     Parameters
     ----------
-    points : (N, 3+) float
-        Returns in the grid frame of the vehicle.
-    free_to : (B,) float
-        How far each beam sees, metres, from `beam_reach`.
-    spec, sensor, pose
-        As for `scan_evidence`.
-
-    Returns
-    -------
-    Evidence
-    """
-    grid = (spec.shape, spec.x_max, spec.y_max, spec.cell, pose.dx, pose.dy, pose.dyaw)
-    obstacles, ground = count_returns(points, sensor.obstacle_min, sensor.obstacle_max, *grid)
-    beyond = beyond_reach(free_to, *grid)
-    passed, under = beyond <= -spec.cell / 2, (beyond > spec.cell / 2) & (beyond < sensor.under)
-    return likelihoods(obstacles, passed | ((ground > 0) & ~under), sensor)
-
-
-def scan_evidence_literal(
-    points: NDArray, spec: GridSpec, sensor: SensorModel, pose: PlanarMotion | None = None
-) -> Evidence:
-    """Turn a scan into evidence by walking every ray cell by cell: the literal twin of `scan_evidence`.
-
-    Parameters, result and errors are those of `scan_evidence`; one ray walks along the middle of each beam.
-    """
-    points, pose = prepare_scan(points, sensor).astype(np.float64), pose or PlanarMotion()
-    obstacles, free = np.zeros(spec.shape, np.int64), np.zeros(spec.shape, bool)
-    first_obstacle, last_ground = np.full(sensor.beams, np.inf), np.zeros(sensor.beams)
-    ground_returns = []
-    cells = zip(*spec.cells(pose.to_previous(points[:, :2])), strict=True)
-    for (x, y, z), (row, col, inside) in zip(points, cells, strict=True):
-        beam = int((np.arctan2(y, x) + np.pi) / (2 * np.pi) * sensor.beams) % sensor.beams
-        if sensor.obstacle_min <= z <= sensor.obstacle_max:
-            obstacles[row, col] += inside
-            first_obstacle[beam] = min(first_obstacle[beam], np.hypot(x, y))
-        elif z < sensor.obstacle_min:
-            last_ground[beam] = max(last_ground[beam], np.hypot(x, y))
-            ground_returns.append((row, col, inside, beam, np.hypot(x, y)))
-    for row, col, inside, beam, distance in ground_returns:
-        under = first_obstacle[beam] < distance < first_obstacle[beam] + sensor.under
-        free[row, col] |= inside and not under
-    free_to = fill_gaps(reach(first_obstacle, last_ground), sensor.gap)
-    for beam in np.flatnonzero(free_to):
-        azimuth = (beam + 0.5) / sensor.beams * 2 * np.pi - np.pi + pose.dyaw
-        rows, cols, leaves_at = walk_ray(spec, (pose.dx, pose.dy), azimuth, free_to[beam])
-        free[rows, cols] |= leaves_at <= free_to[beam]
-    return likelihoods(obstacles, free, sensor)
-
-
-def walk_ray(
-    spec: GridSpec, start: tuple[float, float], azimuth: float, length: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """List the cells along a ray: it changes cell wherever it crosses a line of the grid.
-
-    Parameters
-    ----------
+    measurement : Measurement
+        What a sensor made of a scan.
     spec : GridSpec
-        The cells.
-    start : (float, float)
-        x, y where the ray begins, metres; it may lie outside the grid.
-    azimuth : float
-        Direction, radians from the x axis to the left.
-    length : float
-        How far to walk, metres; the cell where the ray ends is the last.
-
-    Returns
-    -------
-    rows, cols : (K,) int64
-        The cells, nearest first.
-    leaves_at : (K,) float64
-        Distance from the start at which the ray leaves each, metres; beyond `length` for the last.
-    """
-    direction = np.array([np.cos(azimuth), np.sin(azimuth)])
-    height, width = spec.shape
-    lines = (spec.x_max - np.arange(height + 1) * spec.cell, spec.y_max - np.arange(width + 1) * spec.cell)
-    crossings = [
-        (line - at) / along for line, at, along in zip(lines, start, direction, strict=True) if abs(along) > 1e-12
-    ]
-    distance = np.unique(np.concatenate([[0.0], *crossings]).round(9))  # a corner is crossed once
-    distance = distance[distance >= 0]
-    entered = distance[:-1][distance[:-1] < length]
-    leaves_at = distance[1 : len(entered) + 1]
-    rows, cols, inside = spec.cells(start + (entered + leaves_at)[:, None] / 2 * direction)
-    return rows[inside], cols[inside], leaves_at[inside]
-
-
-def likelihoods(obstacles: NDArray, free: NDArray, sensor: SensorModel) -> Evidence:
-    """Turn what fell into each cell into P(z | occupied) and P(z | free).
-
-    Parameters
-    ----------
-    obstacles : (H, W) int
-        Number of obstacle returns, n: P(z | .) = p_hit^min(n, max_returns).
-    free : (H, W) bool
-        Whether the cell was seen to be free; obstacle returns overrule it, for an object fills a cell in part.
-    sensor : SensorModel
-        How the scanner errs.
+        The cells, (H, W).
+    pose : PlanarMotion
+        Pose of the vehicle in the frame of `spec`, metres and radians.
 
     Returns
     -------
     Evidence
-        Both are 1 where neither holds.
+        What `measurement.evidence` returned.
 
-    Examples
-    --------
-    >>> likelihoods(np.array([[1, 0, 0]]), np.array([[True, True, False]]), SensorModel()).free.round(2)
-    array([[0.05, 0.7 , 1.  ]], dtype=float32)
+    Raises
+    ------
+    ArgumentError
+        When it isn't an `Evidence`, or is one over other cells than those of `spec`.
     """
-    hits = np.arange(sensor.max_returns + 1)
-    outcome = np.where(free & (obstacles == 0), len(hits), np.minimum(obstacles, sensor.max_returns))
-    occupied = np.append(sensor.p_hit_occupied**hits, sensor.p_pass_occupied).astype(np.float32)
-    empty = np.append(sensor.p_hit_free**hits, sensor.p_pass_free).astype(np.float32)
-    return Evidence(occupied[outcome], empty[outcome])
+    evidence = measurement.evidence(spec, pose)
+    if not isinstance(evidence, Evidence):
+        expected = ".evidence(spec, pose) to return Evidence(occupied, free)"
+        raise ArgumentError(_name(measurement), expected, type(evidence).__name__)
+    if np.shape(evidence.free) != spec.shape:
+        expected = f".evidence(spec, pose) to cover the spec that it is given, shape {spec.shape}"
+        reason = "a filter asks for its own map, which is larger, and for the grid of its beliefs"
+        raise ArgumentError(_name(measurement), expected, f"shape {np.shape(evidence.free)} ({reason})")
+    return evidence
+
+
+def _name(thing: object) -> str:
+    """Name the class of a sensor or measurement, for an error that says which one is at fault."""
+    return type(thing).__name__

@@ -1,8 +1,8 @@
 """Where the ground lies under each return: walked outward from the vehicle (after Himmelsbach et al., IV 2010).
 
-What counts as an obstacle is decided by height above the ground, and no street is flat: a car's body pitches, roads
-rise, verges slope. `ground_literal` says how the ground is found, sector by sector;
-`height_above_ground` is the same, fast.
+A return counts as an obstacle by its height above the ground, but no street is flat: a car's body pitches, roads rise,
+verges slope. So the ground has to be found first. `ground_literal` reads like the method, sector by sector;
+`height_above_ground` does the same fast.
 """
 
 from dataclasses import dataclass
@@ -19,38 +19,42 @@ from semgrid_edu.occupancy.points import check_points
 class GroundParams:
     """How ground can look to a LIDAR on a road vehicle.
 
-    From the last ground found along a sector, what lies d metres farther out is ground as well when it is no more than
-    min(step + slope d, rise + grade d) higher or lower: steep for a short way, gentle over a long one. Where ground
-    was hidden for more than `gap` metres, d = gap.
+    The ground is followed outward along each sector of azimuth. A return d metres beyond the last ground is ground as
+    well when it is at most min(step + slope d, rise + grade d) higher or lower. So ground may be steep over a short
+    distance, and has to be gentle over a long one. Where the ground was hidden for more than `gap` metres, d = gap.
 
     Parameters
     ----------
     sectors : int
-        Sectors of azimuth in a turn, each walked by itself: 1 degree, which holds a column of returns of any
-        scanner of this project.
+        Number of sectors of azimuth in a turn, each of which is walked by itself. The default sectors of 1 degree hold
+        at least one column of returns of any scanner of this project.
     bin : float
-        Length of a bin along a sector, metres: shorter than a car's bonnet, so that its front is seen to stand.
+        Length of a bin along a sector, metres. It has to be shorter than a car's bonnet, so that the front of a car
+        still shows as something upright.
     farthest : float
-        Where the walk ends, metres: KITTI's scanner has no ground returns beyond; ground farther out is level.
+        Where the walk ends, metres; farther out the ground is taken as level. KITTI's scanner has no ground returns
+        beyond the default.
     step : float
-        A height that ground may jump, metres: most of a kerb.
+        Largest sudden change of the ground's height, metres. The default allows for most of a kerb.
     slope : float
-        The steepest short slope: 1:3, that of the steepest embankments that a car can cross (AASHTO, Roadside
-        Design Guide).
+        The steepest slope over a short distance. The default 1:3 is that of the steepest embankments that a car can
+        cross (AASHTO, Roadside Design Guide).
     rise : float
-        Heights that differ by more, metres, aren't both ground, however far apart on level ground; nor is what lies
-        in a bin where returns differ by more: something stands there.
+        Largest difference of height, metres, over any distance on level ground. Where the returns of one bin differ by
+        more, something stands there, and the bin says nothing of the ground.
     grade : float
-        What is added to `rise` for each metre: roads in towns rise up to about 5 in 100.
+        Added to `rise` for each metre of distance, because roads in towns rise by up to about 5 in 100.
     gap : float
-        The widest gap between two rings on level ground that counts, metres: that of KITTI's scanner at 50 m.
+        The widest gap between two rings on level ground that counts, metres. The default is that of KITTI's scanner at
+        50 m.
     neighbours : int
-        The ground of a sector is the median of its own and so many on each side: cars and houses hide it in some.
+        The ground of a sector is the median of its own profile and of those of this many sectors on each side, because
+        cars and houses hide the ground in some of them.
 
     Raises
     ------
     ArgumentError
-        When a parameter can't be one.
+        When a parameter has a value that is impossible.
     """
 
     sectors: int = 360
@@ -64,7 +68,7 @@ class GroundParams:
     neighbours: int = 3
 
     def __post_init__(self) -> None:
-        """Refuse a walk that goes nowhere."""
+        """Refuse parameters with which no ground can be found."""
         for name in ("sectors", "neighbours"):
             if not isinstance(getattr(self, name), int | np.integer) or getattr(self, name) < (name == "sectors"):
                 raise ArgumentError(name, "a whole number, at least 1 sector and 0 neighbours", getattr(self, name))
@@ -96,7 +100,8 @@ def height_above_ground(points: NDArray, params: GroundParams) -> NDArray:
     Returns
     -------
     (N,) float32 or float64
-        Metres, in the type of `points`; z where no ground is found. That of `height_above_ground_literal`.
+        Heights in metres, in the type of `points`; z itself where no ground is found. They equal those of
+        `height_above_ground_literal`.
 
     Raises
     ------
@@ -113,7 +118,7 @@ def height_above_ground(points: NDArray, params: GroundParams) -> NDArray:
 
 @njit(cache=True)
 def _places(points, sectors, bin_, bins):
-    """Find the place of each return, sector times bins plus bin; what is farther away counts to the last bin."""
+    """Find the place of each return, sector * bins + bin; returns beyond the last bin count to it."""
     place = np.empty(len(points), np.int32)
     for i in range(len(points)):
         x, y = np.float64(points[i, 0]), np.float64(points[i, 1])
@@ -162,7 +167,7 @@ def _walk_all(points, lowest, low, high, sectors, bin_, step, slope, rise, grade
 
 @njit(cache=True)
 def _median_of_neighbours(profile, seen, neighbours):
-    """Take the median of each sector and its neighbours, of those that hold returns."""
+    """Take the median over each sector and its neighbours, leaving out sectors without returns."""
     sectors, bins = profile.shape
     ground = np.zeros_like(profile)
     for s in range(sectors):

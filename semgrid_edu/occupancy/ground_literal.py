@@ -1,4 +1,4 @@
-"""Where the ground lies under each return, sector by sector: the literal twin of `ground` (before section 3.2)."""
+"""Where the ground lies under each return, sector by sector: the literal twin of `ground` (for section 3.2)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,8 @@ def height_above_ground_literal(points: NDArray, params: GroundParams) -> NDArra
     """Return how high each return is above the ground: the literal twin of `height_above_ground`.
 
     1. Walk outward along each sector of azimuth, and note where the ground lies (`walk_sector`).
-    2. The ground of a sector is the median of its own profile and its neighbours', of those that hold returns.
-    3. Subtract it.
+    2. Take as the ground of a sector the median of its own profile and those of its neighbours that hold returns.
+    3. Subtract it from the height of each return.
 
     Parameters, result and errors are those of `height_above_ground`.
     """
@@ -30,11 +30,11 @@ def height_above_ground_literal(points: NDArray, params: GroundParams) -> NDArra
 
 
 def walk_sector(distance: NDArray, z: NDArray, params: GroundParams) -> NDArray[np.float64]:
-    """Walk outward along one sector, from the ground on which the vehicle stands: the height of the ground in each bin.
+    """Walk outward along one sector, and return the height of the ground in each bin.
 
-    Of each bin the lowest return is asked whether it can be ground, given the last ground before it. Bins with returns
-    that differ by more than `rise` aren't asked: something stands there. Between ground and ground it runs straight,
-    beyond the last it is level.
+    The walk starts on the ground on which the vehicle stands. In each bin, the lowest return is taken as ground when it
+    can be, given the last ground before it. Bins whose returns differ by more than `rise` are passed over, because
+    something stands there. Between two places of ground the profile is straight, beyond the last it is level.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def walk_sector(distance: NDArray, z: NDArray, params: GroundParams) -> NDArray[
 
 
 def _polar_cells(points: NDArray, params: GroundParams) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return sector and bin of each point; what is farther away than the last bin counts to it."""
+    """Return sector and bin of each point; points beyond the last bin count to it."""
     x, y = points[:, 0], points[:, 1]
     sector = ((np.arctan2(y, x) + np.pi) * (params.sectors / (2 * np.pi))).astype(int)
     bin_ = np.minimum(np.hypot(x, y) / params.bin, params.bins - 1).astype(int)

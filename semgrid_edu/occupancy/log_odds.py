@@ -7,46 +7,49 @@ from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence import Evidence, beam_reach, evidence_in_cells
-from semgrid_edu.occupancy.moving_map import MAX_YAW, look_up, map_around, scroll
+from semgrid_edu.occupancy.evidence import Evidence, Sensor, check_sensor
+from semgrid_edu.occupancy.moving_map import MAX_YAW, look_up, map_around
+from semgrid_edu.occupancy.observation import observe
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.sensor import SensorModel, prepare_scan
+from semgrid_edu.occupancy.sensor import SensorModel
 
 TINY = np.float32(1e-30)
-"""Stands for a likelihood of 0, whose logarithm is no number; the clamp hides the difference."""
+"""Stands for a likelihood of 0, whose logarithm is infinite. The bounds on P(occupied) hide the difference."""
 
 
 @dataclass(frozen=True)
 class LogOddsParams:
-    """What the log-odds grid assumes.
+    """The parameters of the log-odds grid.
 
     Parameters
     ----------
     prior : float
-        P(occupied) of a cell that nobody has seen: one half says nothing (Moravec and Elfes).
+        P(occupied) of a cell that no scan has said anything of. One half favours neither state (Moravec and Elfes).
     lowest, highest : float
-        P(occupied) never leaves these bounds, so that a cell can change its mind: the more often it was
-        seen, the longer that would take otherwise. OctoMap's 0.12 and 0.97 (Hornung et al., Autonomous Robots 2013).
-    sensor : SensorModel
-        How the scanner errs.
+        Bounds that P(occupied) never leaves, so that a cell can soon change its mind: without bounds, a cell that was
+        seen a hundred times would need about as many scans to the contrary. The defaults are OctoMap's (Hornung et
+        al., Autonomous Robots 2013).
+    sensor : Sensor
+        Turns each scan into evidence; by default a `SensorModel`.
 
     Raises
     ------
     ArgumentError
-        When a parameter can't be one.
+        When a parameter has a value that is impossible.
     """
 
     prior: float = 0.5
     lowest: float = 0.12
     highest: float = 0.97
-    sensor: SensorModel = field(default_factory=SensorModel)
+    sensor: Sensor = field(default_factory=SensorModel)
 
     def __post_init__(self) -> None:
-        """Refuse certainty, and bounds that leave the prior out."""
+        """Refuse bounds that allow for certainty, and a prior outside the bounds."""
         if not 0 < self.lowest < self.highest < 1:
             raise ArgumentError("lowest, highest", "0 < lowest < highest < 1", (self.lowest, self.highest))
         if not self.lowest <= self.prior <= self.highest:
             raise ArgumentError("prior", f"a probability from {self.lowest} to {self.highest}", self.prior)
+        check_sensor(self.sensor)
 
 
 def log_odds(p: ArrayLike) -> NDArray[np.floating]:
@@ -55,12 +58,12 @@ def log_odds(p: ArrayLike) -> NDArray[np.floating]:
     Parameters
     ----------
     p : (...) float
-        Between 0 and 1, which themselves have no log-odds.
+        Probabilities between 0 and 1, but neither 0 nor 1, whose log-odds are infinite.
 
     Returns
     -------
     (...) float
-        Any number; 0 for one half.
+        Their log-odds: 0 for one half, positive above.
 
     Raises
     ------
@@ -84,10 +87,12 @@ def probability(L: ArrayLike) -> NDArray[np.floating]:
     Parameters
     ----------
     L : (...) float
+        Log-odds, any numbers.
 
     Returns
     -------
     (...) float
+        Probabilities from 0 to 1.
     """
     return 1 / (1 + np.exp(-np.asarray(L)))
 
@@ -97,44 +102,45 @@ def update_log_odds(L: NDArray, evidence: Evidence, params: LogOddsParams) -> ND
 
         L(o | z) = L(o) + log( P(z | occupied) / P(z | free) )
 
-    P(z), the same for both states, has dropped out of the ratio. Nothing is subtracted, for the evidence
-    is a likelihood. With an inverse sensor model, P(o | z), whose log-odds hold the prior already, the prior's
-    log-odds have to be subtracted once a scan, or else it would be counted again with each.
+    P(z) is the same for both states, so it has dropped out of the ratio. Nothing is subtracted, because the evidence is
+    a likelihood. The log-odds of an inverse sensor model, P(o | z), already hold the prior: with such a model, the log-
+    odds of the prior have to be subtracted at each scan, or else every scan would count the prior again.
 
     Parameters
     ----------
     L : (H, W) float
-        Log-odds before the scan.
+        Log-odds of P(occupied) before the scan.
     evidence : Evidence
-        Of the scan, likelihoods >= 0.
+        The likelihoods of the scan, (H, W).
     params : LogOddsParams
-        For the bounds.
+        The bounds of P(occupied).
 
     Returns
     -------
     (H, W) float
-        Log-odds given the scan, within the bounds.
+        Log-odds given the scan, within the bounds, in the type of `L`.
     """
     ratio = np.log(np.maximum(evidence.occupied, TINY)) - np.log(np.maximum(evidence.free, TINY))
-    return np.clip(L + ratio, *log_odds([params.lowest, params.highest]).astype(L.dtype))
+    bounds = log_odds([params.lowest, params.highest]).astype(L.dtype)
+    return np.clip(L + ratio.astype(L.dtype, copy=False), *bounds)
 
 
 def smear_area(p_occupied: NDArray, left: NDArray[np.bool_], spec: GridSpec) -> float:
-    """Measure the smear of something that has moved: the area it has left and is still believed to occupy.
+    """Measure the smear of something that has moved: the area that it has left and is still believed to occupy.
 
     Parameters
     ----------
     p_occupied : (H, W) float
-        P(occupied): of a log-odds grid, or P(STATIC) + P(DYNAMIC) of a `Belief`.
+        P(occupied) of a log-odds grid, or P(STATIC) + P(DYNAMIC) of a `Belief`.
     left : (H, W) bool
-        The cells in which it was once and isn't any more.
+        The cells in which the thing was once, and isn't any more.
     spec : GridSpec
-        Their grid.
+        The grid of these cells.
 
     Returns
     -------
     float
-        Square metres of those cells with P(occupied) > 1/2.
+        Area of those of the cells with P(occupied) > 1/2, square metres.
     """
     return float(np.count_nonzero((p_occupied > 0.5) & left) * spec.cell**2)
 
@@ -142,15 +148,15 @@ def smear_area(p_occupied: NDArray, left: NDArray[np.bool_], spec: GridSpec) -> 
 class LogOddsGrid:
     """The binary baseline: each cell is occupied or free, for ever.
 
-    It has no notion of motion, so what moves leaves a smear: cells that it has left stay occupied until as much
-    has been seen to the contrary. In the map's frame it scrolls as `Cmcdot` does.
+    It knows nothing of motion, so moving things leave a smear: the cells that they have left stay occupied until enough
+    scans have said the contrary. Its map scrolls under the vehicle as that of `Cmcdot` does.
 
     Parameters
     ----------
     spec : GridSpec
-        The grid of what it returns.
+        The grid in which the filter hands out its probabilities, (H, W) cells.
     params : LogOddsParams, optional
-        What it assumes.
+        The prior, the bounds and the sensor.
 
     Examples
     --------
@@ -175,32 +181,29 @@ class LogOddsGrid:
         Parameters
         ----------
         points_grid : (N, 3+) float
-            Returns: x forward, y left, z above the ground (m), in the grid frame of the vehicle now.
+            The scan's returns: x forward, y left, z above the ground on which the vehicle stands (m), in the grid
+            frame of the vehicle now.
         motion : PlanarMotion
-            Of the vehicle since the last step; at the first step it doesn't matter.
+            Motion of the vehicle since the last step, metres and radians. At the first step nothing has been seen yet
+            that it could move.
         dt : float
-            Seconds since the last step: all the same to a world that stands still.
+            Time since the last step, seconds. It is only checked, because this grid believes that nothing changes.
 
         Returns
         -------
         (H, W) float32
-            P(occupied) in the grid frame of the vehicle now.
+            P(occupied) of each cell of `spec`, in the grid frame of the vehicle now.
 
         Raises
         ------
         ArgumentError
-            When the points aren't a table of finite coordinates, or the time is negative or not finite. The
-            grid is then as it was.
+            When the points aren't a table of finite coordinates, the time is negative or not finite, or the sensor
+            doesn't turn the scan into evidence. The grid then stays as it was.
         """
         if not (np.isfinite(dt) and dt >= 0):
             raise ArgumentError("dt", "seconds, not negative", dt)
-        shift, pose = scroll(self._pose.then(motion), self.spec.cell, MAX_YAW)
-        sensor = self.params.sensor
-        points = prepare_scan(points_grid, sensor)
-        free_to = beam_reach(points, sensor)
-        moved = look_up(self._log_odds[None], self._prior, self.map_spec, self.map_spec, shift)[0]
-        evidence = evidence_in_cells(points, free_to, self.map_spec, sensor, pose)
-        self._log_odds, self._pose = update_log_odds(moved, evidence, self.params), pose
-        before = look_up(moved[None], self._prior, self.map_spec, self.spec, pose)[0]
-        here = evidence_in_cells(points, free_to, self.spec, sensor, PlanarMotion())
-        return probability(update_log_odds(before, here, self.params))
+        seen = observe(self.params.sensor, points_grid, self._pose.then(motion), self.map_spec, self.spec)
+        moved = look_up(self._log_odds[None], self._prior, self.map_spec, self.map_spec, seen.shift)[0]
+        before = look_up(moved[None], self._prior, self.map_spec, self.spec, seen.pose)[0]
+        self._log_odds, self._pose = update_log_odds(moved, seen.on_map, self.params), seen.pose
+        return probability(update_log_odds(before, seen.in_grid, self.params))

@@ -7,26 +7,27 @@ from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.cells import cell_of
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 
 MAX_YAW = np.radians(2)
-"""The map turns with the vehicle only when that has turned this far (a compromise: its margin grows with the angle)."""
+"""The map turns with the vehicle when the vehicle has turned by this angle: a wider one would need a wider margin."""
 
 
 def map_around(spec: GridSpec, max_yaw: float) -> GridSpec:
-    """Return the map that covers a grid however the vehicle turns and shifts in it before it scrolls.
+    """Return a map that covers the grid around the vehicle, however the vehicle moves before the map scrolls.
 
     Parameters
     ----------
     spec : GridSpec
         The grid around the vehicle.
     max_yaw : float
-        The farthest that it turns, radians; it shifts by a cell at most.
+        The largest angle between vehicle and map, radians; the vehicle shifts by at most one cell.
 
     Returns
     -------
     GridSpec
-        Of the same cells, with a margin on every side.
+        The map: cells of the same size, with a margin on every side of the grid.
     """
     farthest = np.hypot(max(abs(spec.x_min), abs(spec.x_max)), max(abs(spec.y_min), abs(spec.y_max)))
     margin = (np.ceil(farthest * np.sin(max_yaw) / spec.cell) + 1) * spec.cell
@@ -36,25 +37,25 @@ def map_around(spec: GridSpec, max_yaw: float) -> GridSpec:
 def scroll(pose: PlanarMotion, cell: float, max_yaw: float) -> tuple[PlanarMotion, PlanarMotion]:
     """Decide how the map follows the vehicle.
 
-    It shifts by whole cells, which is exact, and the rest of the vehicle's pose stays in the pose: nothing
-    is interpolated. Only when the vehicle has turned by more than `max_yaw` does the map turn with it,
-    and each cell is looked up once.
+    The map shifts by whole cells, which is exact, and the rest of the vehicle's displacement stays in the pose: nothing
+    is interpolated. Only when the vehicle has turned by more than `max_yaw` does the map turn with it. Then each new
+    cell is looked up once in the old map.
 
     Parameters
     ----------
     pose : PlanarMotion
-        Of the vehicle in the map's frame.
+        Pose of the vehicle in the frame of the map, metres and radians.
     cell : float
-        Metres.
+        Side of a cell, metres.
     max_yaw : float
-        Radians.
+        The largest angle between vehicle and map, radians.
 
     Returns
     -------
     shift : PlanarMotion
-        The map's new frame in its old one.
+        Pose of the map's new frame in its old one.
     pose : PlanarMotion
-        The vehicle in the new frame: what remains.
+        Pose of the vehicle in the map's new frame.
 
     Examples
     --------
@@ -73,17 +74,18 @@ def look_up(values: NDArray, outside: NDArray, source: GridSpec, target: GridSpe
     Parameters
     ----------
     values : (K, H, W) float32
-        Over the cells of `source`.
+        K values of each cell of `source`.
     outside : (K,) float32
-        What a cell gets whose centre lies outside `source`.
+        The values of a cell whose centre lies outside `source`.
     source, target : GridSpec
-        The grids, (H, W) and (H', W') cells.
+        The two grids, (H, W) and (H', W') cells.
     pose : PlanarMotion
-        The frame of `target` in that of `source`.
+        Pose of the frame of `target` in that of `source`, metres and radians.
 
     Returns
     -------
     (K, H', W') float32
+        K values of each cell of `target`.
     """
     corners = (source.x_max, source.y_max, source.cell, target.x_max, target.y_max, target.cell)
     return _look_up(np.ascontiguousarray(values), outside, *corners, target.shape, pose.dx, pose.dy, pose.dyaw)
@@ -93,15 +95,12 @@ def look_up(values: NDArray, outside: NDArray, source: GridSpec, target: GridSpe
 def _look_up(values, outside, source_x, source_y, source_cell, x_max, y_max, cell, shape, dx, dy, dyaw):
     found = np.empty((len(values), *shape), np.float32)
     flat, place = values.reshape(len(values), -1), np.empty(shape[1], np.int32)
-    cos, sin, height, width = np.cos(dyaw), np.sin(dyaw), values.shape[1], values.shape[2]
+    cos, sin, size = np.cos(dyaw), np.sin(dyaw), values.shape[1:]
     for r in range(shape[0]):
         for c in range(shape[1]):
             x, y = x_max - (r + 0.5) * cell, y_max - (c + 0.5) * cell
-            row = np.floor((source_x - (cos * x - sin * y + dx)) / source_cell)
-            col = np.floor((source_y - (sin * x + cos * y + dy)) / source_cell)
-            inside = (row >= 0) & (row < height) & (col >= 0) & (col < width)
-            place[c] = np.int32(row * width + col if inside else -1)
+            place[c] = cell_of(cos * x - sin * y + dx, sin * x + cos * y + dy, size, source_x, source_y, source_cell)
         for k in range(len(values)):
             for c in range(shape[1]):
-                found[k, r, c] = flat[k, place[c]] if place[c] >= 0 else outside[k]
+                found[k, r, c] = flat[k, place[c]] if place[c] >= 0 else outside[k]  # faster than != OUTSIDE
     return found

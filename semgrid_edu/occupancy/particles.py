@@ -1,4 +1,4 @@
-"""What many particles do at once: turn with the map, slow down, fly, add up in cells (paper, section 3.2, step 1)."""
+"""What many particles do at once: turn with the map, slow down, fly, add up in cells (section 3.2, steps 1 and 2)."""
 
 import math
 
@@ -7,13 +7,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.cells import OUTSIDE, cell_of
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import Particles
 
-OUTSIDE = -1
-"""The cell of a particle that has left the map."""
 SLOW = np.float32(16)
-"""exp(-16) is nothing in single precision beside 1: exponentials beyond needn't be computed."""
+"""Beside 1, exp(-16) hardly counts in single precision, so exponentials beyond it needn't be computed."""
 
 
 def cells_of(position: NDArray, spec: GridSpec) -> NDArray[np.int32]:
@@ -22,14 +21,14 @@ def cells_of(position: NDArray, spec: GridSpec) -> NDArray[np.int32]:
     Parameters
     ----------
     position : (N, 2) float
-        Metres, in the frame of `spec`.
+        x and y of each particle in the frame of `spec`, metres.
     spec : GridSpec
-        The cells.
+        The cells, (H, W).
 
     Returns
     -------
     (N,) int32
-        row * W + column; `OUTSIDE` for a particle that has left.
+        row * W + column; `OUTSIDE` for a particle that lies in no cell.
     """
     return _cells_of(position, spec.shape, spec.x_max, spec.y_max, spec.cell)
 
@@ -38,9 +37,7 @@ def cells_of(position: NDArray, spec: GridSpec) -> NDArray[np.int32]:
 def _cells_of(position, shape, x_max, y_max, cell):
     cells = np.empty(len(position), np.int32)
     for i in range(len(position)):
-        row, col = np.floor((x_max - position[i, 0]) / cell), np.floor((y_max - position[i, 1]) / cell)
-        inside = (row >= 0) & (row < shape[0]) & (col >= 0) & (col < shape[1])  # `and` would branch, and be slower
-        cells[i] = np.int32(row * shape[1] + col if inside else OUTSIDE)
+        cells[i] = cell_of(position[i, 0], position[i, 1], shape, x_max, y_max, cell)
     return cells
 
 
@@ -50,16 +47,16 @@ def weight_in_cells(weight: NDArray, cells: NDArray, shape: tuple[int, ...]) -> 
     Parameters
     ----------
     weight : (N,) float
-        What each particle carries.
+        The weight of each particle.
     cells : (N,) int
-        Where it is, from `cells_of`.
-    shape : (int, int)
-        H, W.
+        The cell of each particle, from `cells_of`; or from `by_origin`, for sums of shape (2, H, W).
+    shape : (int, int) or (int, int, int)
+        Shape of the result: H, W, or 2, H, W.
 
     Returns
     -------
-    (H, W) float32
-        Summed in the order of the particles, in double precision.
+    (H, W) or (2, H, W) float32
+        The sums, added up in the order of the particles in double precision.
     """
     return _sum_in_cells(weight, cells, math.prod(shape)).reshape(shape).astype(np.float32)
 
@@ -79,15 +76,16 @@ def scale_in_cells(weight: NDArray, cells: NDArray, factor: NDArray) -> NDArray[
     Parameters
     ----------
     weight : (N,) float
-        What each particle carries.
+        The weight of each particle.
     cells : (N,) int
-        Where it is, from `cells_of`, or from `by_origin` for factors (2, H, W).
+        The cell of each particle, from `cells_of`; or from `by_origin`, for factors of shape (2, H, W).
     factor : (H, W) or (2, H, W) float
+        The factor of each cell.
 
     Returns
     -------
     (N,) float32
-        Zero for what is outside.
+        The new weights; zero for particles outside.
     """
     return _scale_in_cells(weight, cells, factor.ravel())
 
@@ -102,19 +100,20 @@ def _scale_in_cells(weight, cells, factor):
 
 
 def by_origin(before: NDArray, after: NDArray, n_cells: int) -> NDArray[np.int32]:
-    """Tell particles that stayed in their cell from those that came in: the latter's cells are counted on by `n_cells`.
+    """Tell particles that have stayed in their cell from those that have come in: to the latter's cell add `n_cells`.
 
     Parameters
     ----------
     before, after : (N,) int32
-        Where each was and is, from `cells_of`.
+        The cells in which each particle was and is, from `cells_of`.
     n_cells : int
-        H W.
+        Number of cells, H W.
 
     Returns
     -------
     (N,) int32
-        Indices into (2, H, W), flattened: what stayed, what arrived; `OUTSIDE` for a particle that has left.
+        Indices into a flattened array (2, H, W), whose first plane is for particles that have stayed and whose second
+        is for those that have arrived; `OUTSIDE` for particles that have left the map.
     """
     return _by_origin(before, after, np.int32(n_cells))
 
@@ -134,17 +133,19 @@ def fly(particles: Particles, max_acceleration: float, dt: float, rng: np.random
     Parameters
     ----------
     particles : Particles
+        N particles at the start of their flight.
     max_acceleration : float
-        Largest acceleration along each axis, m/s^2: uniform up to it, constant during the flight.
+        Largest acceleration along each axis, m/s^2. Each particle draws its own uniformly, up to this in either
+        direction, and keeps it during the flight.
     dt : float
-        Seconds.
+        How long they fly, seconds.
     rng : numpy.random.Generator
-        Where the accelerations come from.
+        Source of the accelerations.
 
     Returns
     -------
     Particles
-        v' = v + a dt, x' = x + v dt + a dt^2 / 2.
+        The same particles at the end of their flight: v' = v + a dt, x' = x + v dt + a dt^2 / 2.
     """
     noise = rng.random((len(particles), 2), np.float32)
     change = np.float32(max_acceleration * dt)
@@ -170,15 +171,16 @@ def slow_down(particles: Particles, stop_rate: float, stop_speed: float, dt: flo
     Parameters
     ----------
     particles : Particles
+        N particles at the start of the time step.
     stop_rate, stop_speed : float
-        Rate of stopping at v = 0, 1/s, and the speed (m/s) above which it falls.
+        Rate of stopping at v = 0, 1/s, and the speed above which it falls, m/s.
     dt : float
-        Seconds.
+        The time step, seconds.
 
     Returns
     -------
     Particles
-        Weights times exp(-stop_rate dt exp(-v^2 / (2 stop_speed^2))).
+        The same particles with weights times exp(-stop_rate dt exp(-v^2 / (2 stop_speed^2))).
     """
     stops, scale = np.float32(stop_rate * dt), np.float32(0.5 / stop_speed**2)
     weight = _slow_down(particles.velocity, particles.weight, stops, scale)
@@ -203,14 +205,14 @@ def transform(particles: Particles, motion: PlanarMotion) -> Particles:
     Parameters
     ----------
     particles : Particles
-        In the old frame.
+        N particles in the old frame.
     motion : PlanarMotion
-        The new frame, in the old one.
+        Pose of the new frame in the old one, metres and radians.
 
     Returns
     -------
     Particles
-        In the new frame: positions and velocities turned, weights as they were.
+        The same particles in the new frame: positions and velocities turned, weights as they were.
     """
     T = (motion.dx, motion.dy, np.cos(motion.dyaw), np.sin(motion.dyaw))
     return Particles(*_transform(particles.position, particles.velocity, *T), particles.weight)

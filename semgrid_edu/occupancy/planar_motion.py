@@ -16,9 +16,9 @@ class PlanarMotion:
     Parameters
     ----------
     dx, dy : float
-        Metres forward and to the left.
+        Displacement forward and to the left, metres.
     dyaw : float
-        Radians to the left.
+        Turn to the left, radians.
 
     Raises
     ------
@@ -36,7 +36,7 @@ class PlanarMotion:
     dyaw: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse a motion to nowhere."""
+        """Refuse a motion that isn't finite."""
         if not np.isfinite([self.dx, self.dy, self.dyaw]).all():
             raise ArgumentError("motion", "finite metres and radians", self)
 
@@ -47,7 +47,12 @@ class PlanarMotion:
         Parameters
         ----------
         T_world_from_before, T_world_from_now : (4, 4) float
-            Rigid transforms.
+            Poses of the vehicle in the world, at the previous instant and now: rigid transforms, metres.
+
+        Returns
+        -------
+        PlanarMotion
+            Displacement and turn in the plane of the previous instant's x and y axes; height, pitch and roll are lost.
 
         Raises
         ------
@@ -63,19 +68,19 @@ class PlanarMotion:
 
     @property
     def rotation(self) -> NDArray[np.float64]:
-        """(2, 2): turns vectors in the axes of now into those of the previous instant."""
+        """(2, 2): turns vectors along the axes of now into vectors along the axes of the previous instant."""
         cos, sin = np.cos(self.dyaw), np.sin(self.dyaw)
         return np.array([[cos, -sin], [sin, cos]])
 
     def to_previous(self, xy: NDArray) -> NDArray:
-        """Give points of now, (..., 2) metres, their coordinates in the previous frame."""
+        """Return the coordinates in the previous frame, (..., 2) metres, of points given in the frame of now."""
         return xy @ self.rotation.T + (self.dx, self.dy)
 
     def to_now(self, xy: NDArray) -> NDArray:
-        """Give points of the previous frame, (..., 2) metres, their coordinates now."""
+        """Return the coordinates in the frame of now, (..., 2) metres, of points given in the previous frame."""
         return (xy - (self.dx, self.dy)) @ self.rotation
 
     def then(self, motion: "PlanarMotion") -> "PlanarMotion":
-        """Return this motion followed by another."""
+        """Return this motion followed by another one, as a single motion."""
         dx, dy = self.to_previous(np.array([motion.dx, motion.dy]))
         return PlanarMotion(float(dx), float(dy), self.dyaw + motion.dyaw)

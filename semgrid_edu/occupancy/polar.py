@@ -4,19 +4,21 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from semgrid_edu.occupancy.cells import OUTSIDE, cell_of
+
 
 @njit(cache=True)
 def polar_profile(points, low, high, beams):
-    """Find what the returns of each beam say.
+    """Find the nearest obstacle and the farthest ground in each beam.
 
     Parameters
     ----------
     points : (N, 3+) float
         Returns in the grid frame of the vehicle, metres.
     low, high : float
-        The heights between which a return is an obstacle; a lower one is ground, a higher one nothing.
+        Heights between which a return is an obstacle, metres. A lower return is ground, a higher one says nothing.
     beams : int
-        B, the number of beams in a turn; beam 0 begins straight behind the vehicle, and they go counter-clockwise.
+        Number of beams in a turn, B. Beam 0 begins straight behind the vehicle, and the beams go counter-clockwise.
 
     Returns
     -------
@@ -41,7 +43,7 @@ def polar_profile(points, low, high, beams):
 
 @njit(cache=True, inline="always")
 def beam_of(x, y, beams):
-    """Return the beam, 0..beams-1, that looks towards x, y."""
+    """Return the beam, from 0 to beams - 1, in whose sector x, y lies."""
     return min(int((np.arctan2(y, x) + np.pi) * (beams / (2 * np.pi))), beams - 1)
 
 
@@ -56,7 +58,7 @@ def reach(first_obstacle: NDArray, last_ground: NDArray) -> NDArray[np.float32]:
     Returns
     -------
     (B,) float32
-        Metres; zero where nothing came back.
+        How far each beam sees, metres; zero where nothing came back.
     """
     return np.where(np.isfinite(first_obstacle), first_obstacle, last_ground)
 
@@ -65,20 +67,20 @@ def reach(first_obstacle: NDArray, last_ground: NDArray) -> NDArray[np.float32]:
 def fill_gaps(reach, gap):
     """Give beams between two columns of returns the shorter reach of the two.
 
-    A scanner with columns wider apart than a beam leaves beams empty: they are no holes in what it
-    sees, nor do they see farther than their neighbours. Wider gaps (nothing came back) stay blind.
+    A scanner whose columns are wider apart than a beam leaves some beams empty. These are no holes in what it sees, but
+    they don't see farther than their neighbours either. Wider gaps, in which nothing came back, stay blind.
 
     Parameters
     ----------
     reach : (B,) float
         How far each beam sees, metres; zero where nothing came back.
     gap : int
-        The most empty beams that two neighbouring columns can leave between them.
+        Largest number of empty beams between two neighbouring columns of returns.
 
     Returns
     -------
     (B,) float
-        The same, with the gaps filled.
+        How far each beam sees, metres, with the gaps filled.
 
     Examples
     --------
@@ -106,26 +108,25 @@ def count_returns(points, low, high, shape, x_max, y_max, cell, dx, dy, dyaw):
     points : (N, 3+) float
         Returns in the grid frame of the vehicle, metres.
     low, high : float
-        The heights between which a return is an obstacle.
+        Heights between which a return is an obstacle, metres; a lower return is ground.
     shape, x_max, y_max, cell : (int, int), float, float, float
-        The grid.
+        The grid: H and W, its far and left border, and the side of a cell, metres.
     dx, dy, dyaw : float
         Pose of the vehicle in the frame of the grid, metres and radians.
 
     Returns
     -------
     obstacles, ground : (H, W) int32
-        Number of obstacle and of ground returns.
+        Number of obstacle and of ground returns in each cell.
     """
     obstacles, ground = np.zeros(shape, np.int32), np.zeros(shape, np.int32)
     cos, sin = np.cos(dyaw), np.sin(dyaw)
     for i in range(len(points)):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        row = np.floor((x_max - (cos * x - sin * y + dx)) / cell)
-        col = np.floor((y_max - (sin * x + cos * y + dy)) / cell)
-        if z <= high and 0 <= row < shape[0] and 0 <= col < shape[1]:
+        place = cell_of(cos * x - sin * y + dx, sin * x + cos * y + dy, shape, x_max, y_max, cell)
+        if z <= high and place != OUTSIDE:
             counted = obstacles if z >= low else ground
-            counted[int(row), int(col)] += 1
+            counted.flat[place] += 1
     return obstacles, ground
 
 
@@ -143,7 +144,7 @@ def beyond_reach(reach, shape, x_max, y_max, cell, dx, dy, dyaw):
     Returns
     -------
     (H, W) float32
-        Metres; negative for cells that the beam passes.
+        Metres; negative for cells whose centre the beam passes.
     """
     beyond = np.empty(shape, np.float32)
     cos, sin = np.cos(dyaw), np.sin(dyaw)

@@ -1,4 +1,4 @@
-"""Particles drawn anew: where dynamic mass is, and where it has just come into being (paper, section 3.2, step 4)."""
+"""Particles drawn anew: where dynamic mass is, and where it has just come into being (section 3.2, step 4)."""
 
 import numpy as np
 from numba import njit
@@ -12,24 +12,24 @@ from semgrid_edu.occupancy.state import Particles
 def systematic_resample(weight, count, offset):
     """Draw `count` indices in proportion to the weights, by systematic resampling.
 
-    The weights are laid end to end and cut at `count` points, equally spaced, that one random offset
-    places: index i is drawn floor or ceil of count w_i / sum(w) times. For count = N this is
-    `filterpy.monte_carlo.systematic_resample`, which takes its offset from numpy's global generator;
-    here it is an argument, so that a seed decides it.
+    The weights are laid end to end, and `count` equally spaced points are put on them, shifted by one random offset. So
+    index i is drawn as often as points lie on its weight: floor or ceil of count w_i / sum(w) times. For count = N this
+    is `filterpy.monte_carlo.systematic_resample`. That function takes its offset from numpy's global generator; here it
+    is an argument, so that a seed decides it.
 
     Parameters
     ----------
     weight : (N,) float
-        Not negative, not all zero; they need not sum to 1.
+        The weights, not negative and not all zero; they need not sum to 1.
     count : int
-        How many to draw, M.
+        How many indices to draw, M.
     offset : float
-        In [0, 1).
+        Position of the first point within the first of `count` equal intervals, from 0 to below 1.
 
     Returns
     -------
     (M,) int64
-        Ascending.
+        The indices drawn, in ascending order.
 
     Examples
     --------
@@ -51,19 +51,21 @@ def systematic_resample(weight, count, offset):
 
 
 def draw_again(particles: Particles, count: int, rng: np.random.Generator) -> Particles:
-    """Draw particles by weight, each then carrying the same share.
+    """Draw particles in proportion to their weights; all that are drawn get the same weight.
 
     Parameters
     ----------
     particles : Particles
+        The N particles to draw from.
     count : int
-        How many to draw.
+        How many to draw, M.
     rng : numpy.random.Generator
+        Source of the one random offset.
 
     Returns
     -------
     Particles
-        With the same sum of weights; none when that is zero.
+        M particles with the same sum of weights; none when that sum is zero.
     """
     total = particles.weight.sum(dtype=np.float64)
     if total == 0 or count == 0:
@@ -82,24 +84,25 @@ def _take(position, velocity, chosen):
 
 
 def draw_newborn(newborn: NDArray, spec: GridSpec, count: int, max_speed: float, rng: np.random.Generator) -> Particles:
-    """Draw new particles in cells by newborn mass, each carrying the same share.
+    """Draw new particles in proportion to each cell's newborn mass; all of them get the same weight.
 
     Parameters
     ----------
     newborn : (H, W) float32
-        Dynamic mass that has no particles yet.
+        Dynamic mass that no particle carries yet.
     spec : GridSpec
         The cells.
     count : int
-        How many to draw.
+        How many to draw, M.
     max_speed : float
-        Of the velocity prior, m/s.
+        Largest speed of the velocity prior, m/s.
     rng : numpy.random.Generator
+        Source of all random numbers.
 
     Returns
     -------
     Particles
-        Anywhere in their cells, with velocities from the prior; none when nothing is newborn.
+        M particles anywhere in their cells, with velocities from the prior; none when there is no newborn mass.
     """
     total = newborn.sum(dtype=np.float64)
     if total == 0 or count == 0:
@@ -122,21 +125,23 @@ def _anywhere(cells, part, width, x_max, y_max, cell):
 def draw_velocities(count: int, max_speed: float, rng: np.random.Generator) -> NDArray[np.float32]:
     """Draw velocities of things of which nothing is known but that they move.
 
-    Any heading; the speed is the square of a uniform number, so that slow is more frequent than fast and
-    one in four is no faster than a pedestrian (uniform in the plane, it would be one in two hundred).
+    The heading is uniform. The speed is `max_speed` times the square of a uniform number, so that slow things are more
+    frequent than fast ones: of speeds up to 25 m/s, about one in four is no faster than a pedestrian's 1.4 m/s. If
+    velocities were uniform in the plane, it would be one in three hundred.
 
     Parameters
     ----------
     count : int
-        M.
+        How many to draw, M.
     max_speed : float
-        m/s.
+        The largest speed, m/s.
     rng : numpy.random.Generator
+        Source of speeds and headings.
 
     Returns
     -------
     (M, 2) float32
-        m/s.
+        Velocities along the x and y axes, m/s.
     """
     speed = max_speed * rng.random(count, np.float32) ** 2
     heading = np.float32(2 * np.pi) * rng.random(count, np.float32)

@@ -1,51 +1,57 @@
-"""The LIDAR as the filter knows it: how it errs, and which of its returns count (paper, section 3.2)."""
+"""The LIDAR as the filter knows it: which of its returns count, how far beams see, how it errs (paper, section 3.2)."""
 
 import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
-from semgrid_edu.occupancy.points import check_points
+from semgrid_edu.occupancy.planar_motion import PlanarMotion
+from semgrid_edu.occupancy.points import check_points, without_own_returns
+from semgrid_edu.occupancy.polar import beyond_reach, count_returns, fill_gaps, polar_profile, reach
 
 
 @dataclass(frozen=True)
 class SensorModel:
-    """How a LIDAR scan speaks of cells.
+    """Which returns of a LIDAR count, and how it errs: the package's own `Sensor`.
 
     Parameters
     ----------
     obstacle_min, obstacle_max : float
-        Returns between these heights above the ground (m) are obstacles: above a kerb, below what a car
-        drives under. Lower ones come from the ground, higher ones say nothing.
+        Returns between these heights above the ground (m) are obstacles: higher than a kerb, and lower than what a car
+        can drive under. Lower returns come from the ground, higher ones say nothing.
     azimuth_step : float
-        Width of a beam, degrees: every beam of KITTI's scanner (a column of returns each 0.18 degrees) holds one
-        column or two.
+        Width of a beam, degrees. KITTI's scanner has a column of returns each 0.18 degrees, so that a beam of the
+        default width holds one column or two.
     column_spacing : float
-        The widest gap between columns of returns that still is no hole, degrees. Our simulated scanner's is 0.9.
+        The widest gap between two neighbouring columns of returns, degrees, that isn't a hole in what the scanner
+        sees. The default is the spacing of our simulated scanner's columns.
     p_hit_occupied, p_hit_free : float
-        Probability of an obstacle return from a cell that is occupied, or free (a grazing ray, a mixed pixel).
+        Probability of an obstacle return from a cell that is occupied, and from one that is free (because of a ray that
+        grazes an edge, or of a pixel that mixes two ranges).
     max_returns : int
-        Returns beyond this number in one cell add nothing: they aren't independent.
+        Further returns in the same cell add nothing, because they aren't independent.
     p_pass_occupied, p_pass_free : float
-        Probability that a beam passes a cell that is occupied (foliage is porous, objects fill a cell in
-        part), or free.
+        Probability that a beam passes a cell that is occupied (because foliage is porous and objects fill cells only in
+        part), and one that is free.
     under : float
-        A ground return up to so far behind its beam's first obstacle may come from under it, from between a car's
-        wheels, and says nothing: the length of a car, metres.
+        A ground return up to this far behind the first obstacle of its beam may come from below that obstacle, from
+        between a car's wheels, so it says nothing, metres. The default is the length of a car.
     vehicle : (float, float, float, float)
-        Outline of the vehicle itself, x_min, x_max, y_min, y_max in the grid frame, metres: an obstacle in it is the
-        vehicle's own bonnet or mirror. That of KITTI's estate car, whose LIDAR sees the end of its bonnet 2.5 m ahead.
+        Outline of the vehicle itself, x_min, x_max, y_min, y_max in the grid frame, metres. An obstacle inside it is
+        the vehicle's own bonnet or mirror. The default is the outline of KITTI's estate car, whose LIDAR sees the end
+        of its bonnet 2.5 m ahead.
     ground : GroundParams or None
         How the ground is found from which heights count; None for flat ground at z = 0.
 
     Raises
     ------
     ArgumentError
-        When a parameter can't be one.
+        When a parameter has a value that is impossible.
     """
 
     obstacle_min: float = 0.3
@@ -62,7 +68,7 @@ class SensorModel:
     ground: GroundParams | None = field(default_factory=GroundParams)
 
     def __post_init__(self) -> None:
-        """Refuse a sensor that is impossible, or never errs: certainty can't be corrected."""
+        """Refuse a sensor that is impossible, or that never errs: no scan could ever correct a cell that is certain."""
         if not (math.isfinite(self.under) and self.under >= 0):
             raise ArgumentError("under", "metres, not negative", self.under)
         if not 0 < self.azimuth_step <= 360:
@@ -86,61 +92,147 @@ class SensorModel:
 
     @property
     def gap(self) -> int:
-        """The most empty beams that neighbouring columns leave between them."""
+        """The largest number of empty beams between two neighbouring columns of returns."""
         return math.ceil(self.column_spacing / self.azimuth_step - 1e-9)
+
+    def scan(self, points: NDArray) -> "Scan":
+        """Take one scan in: find the ground, leave out the vehicle's own returns, and measure how far each beam sees.
+
+        Parameters
+        ----------
+        points : (N, 3+) float
+            Returns: x forward, y left, z above the ground on which the vehicle stands (m), in the grid frame of the
+            vehicle; N may be 0.
+
+        Returns
+        -------
+        Scan
+            Can be asked for the evidence in the cells of any grid.
+
+        Raises
+        ------
+        ArgumentError
+            When `points` isn't a table of finite coordinates.
+        """
+        prepared = prepare_scan(points, self)
+        profile = polar_profile(prepared, self.obstacle_min, self.obstacle_max, self.beams)
+        return Scan(prepared, fill_gaps(reach(*profile), self.gap), self)
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """A scan that is ready to be asked for evidence, made by `SensorModel.scan`.
+
+    A beam is a narrow sector of azimuth. Along it nothing stands before its first obstacle or, when it has none, before
+    its farthest ground return. So all that beams say about free space is one range per beam, its reach, in which each
+    cell is looked up. A cell with obstacle returns is occupied. A cell that its beam passes from end to end, or that
+    holds a ground return, is free. Of all other cells, behind obstacles or out of range, the scan says nothing.
+
+    What this assumes:
+
+    - *Heights.* Obstacles stand on the ground that `height_above_ground` finds. What hangs higher than `obstacle_max`,
+      such as crowns of trees and bridges, hides nothing below it.
+    - *Occlusion.* A beam ends at its first obstacle, however low that is, although higher rings may look over it. What
+      those rings hit behind it still counts: obstacle returns always do, ground returns from `under` metres on, because
+      nearer ones may come through below the obstacle.
+    - *Thin objects.* One return stops its whole beam, which is 16 cm wide at 30 m. A cell shared by several beams
+      belongs to the beam through its centre. Something thinner than the distance between two columns of returns may
+      stand between them unseen, and its cell counts as passed.
+    - *Several rings.* The scan assumes that nothing stands between the ground returns of two rings. Where the rings
+      differ by an angle a, they miss things lower than a times the distance: for KITTI's scanner 0.3 m at 50 m. Nothing
+      checks the space below the lowest ring, nearer than 4 m, nor along rays that don't come back.
+    - *Independence.* Returns are independent, up to `max_returns` in each cell. An obstacle return overrules everything
+      else that a cell holds.
+
+    Parameters
+    ----------
+    points : (M, 3) float32 or float64
+        Returns that don't come from the vehicle itself: x and y in the grid frame of the vehicle, and the height above
+        the ground at that place, metres.
+    reach : (B,) float32
+        How far each beam sees, metres; zero for beams in which nothing came back. Beam 0 begins straight behind the
+        vehicle, and the beams go counter-clockwise.
+    sensor : SensorModel
+        The sensor that took the scan.
+    """
+
+    points: NDArray[np.floating]
+    reach: NDArray[np.float32]
+    sensor: SensorModel
+
+    def evidence(self, spec: GridSpec, pose: PlanarMotion) -> Evidence:
+        """Say what the scan tells of each cell of a grid: look each cell up in its beam.
+
+        Parameters
+        ----------
+        spec : GridSpec
+            The cells, (H, W).
+        pose : PlanarMotion
+            Pose of the vehicle in the frame of `spec`, metres and radians.
+
+        Returns
+        -------
+        Evidence
+            P(z | occupied) and P(z | free), each (H, W).
+        """
+        grid = (spec.shape, spec.x_max, spec.y_max, spec.cell, pose.dx, pose.dy, pose.dyaw)
+        obstacles, ground = count_returns(self.points, self.sensor.obstacle_min, self.sensor.obstacle_max, *grid)
+        beyond = beyond_reach(self.reach, *grid)
+        passed, under = beyond <= -spec.cell / 2, (beyond > spec.cell / 2) & (beyond < self.sensor.under)
+        return likelihoods(obstacles, passed | ((ground > 0) & ~under), self.sensor)
 
 
 def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray:
-    """Make a scan fit for evidence: check it, leave out what the vehicle itself sends back, and find the ground.
+    """Make a scan fit for evidence: check it, leave out the vehicle's own returns, and measure heights from the ground.
 
     Parameters
     ----------
     points : (N, 3+) float
         Returns: x forward, y left, z above the ground on which the vehicle stands (m), in its grid frame; N may be 0.
     sensor : SensorModel
-        For the vehicle's outline, and how the ground is found.
+        Its vehicle's outline, and how the ground is found.
 
     Returns
     -------
     (M, 3) float
-        The others, in their order: x, y, and the height above the ground at that place (m).
+        The other returns, in their order: x, y, and the height above the ground at that place (m).
 
     Raises
     ------
     ArgumentError
         When `points` isn't a table of finite coordinates.
     """
-    points = without_own_returns(check_points(points), sensor)
+    points = without_own_returns(check_points(points), sensor.vehicle, sensor.obstacle_min)
     if sensor.ground is not None:
         points[:, 2] = height_above_ground(points, sensor.ground)
     return points
 
 
-def without_own_returns(points: NDArray, sensor: SensorModel) -> NDArray:
-    """Leave out what the vehicle itself sends back: it would move along for ever, and hide what is behind it.
+def likelihoods(obstacles: NDArray, free: NDArray, sensor: SensorModel) -> Evidence:
+    """Turn what a scan has found in each cell into P(z | occupied) and P(z | free).
 
     Parameters
     ----------
-    points : (N, 3+) float
-        Returns in the grid frame of the vehicle, metres.
+    obstacles : (H, W) int
+        Number of obstacle returns in each cell, n: then P(z | .) = p_hit^min(n, max_returns).
+    free : (H, W) bool
+        Whether the cell was seen to be free: then P(z | .) = p_pass. Obstacle returns overrule it, because an object
+        may fill a cell only in part.
     sensor : SensorModel
-        For the vehicle's outline, and the height from which a return is an obstacle.
+        Its probabilities of errors.
 
     Returns
     -------
-    (M, 3) float
-        x, y and z of the others, in their order.
+    Evidence
+        P(z | occupied) and P(z | free), each (H, W); both are 1 where neither holds.
+
+    Examples
+    --------
+    >>> likelihoods(np.array([[1, 0, 0]]), np.array([[True, True, False]]), SensorModel()).free.round(2)
+    array([[0.05, 0.7 , 1.  ]], dtype=float32)
     """
-    return _outside(points, *sensor.vehicle, sensor.obstacle_min)
-
-
-@njit(cache=True)
-def _outside(points, x_min, x_max, y_min, y_max, low):
-    """Copy the points that don't lie in a box without a lid."""
-    others, n = np.empty((len(points), 3), points.dtype), 0
-    for i in range(len(points)):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        if not (x_min < x < x_max and y_min < y < y_max and z >= low):
-            others[n, 0], others[n, 1], others[n, 2] = x, y, z
-            n += 1
-    return others[:n]
+    hits = np.arange(sensor.max_returns + 1)
+    outcome = np.where(free & (obstacles == 0), len(hits), np.minimum(obstacles, sensor.max_returns))
+    occupied = np.append(sensor.p_hit_occupied**hits, sensor.p_pass_occupied).astype(np.float32)
+    empty = np.append(sensor.p_hit_free**hits, sensor.p_pass_free).astype(np.float32)
+    return Evidence(occupied[outcome], empty[outcome])

@@ -1,4 +1,4 @@
-"""What is believed of each cell: four states and a velocity (paper, section 3.2)."""
+"""What the filter believes of each cell: four states and a velocity (paper, section 3.2)."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -20,29 +20,44 @@ class State(IntEnum):
 
 
 N_STATES = len(State)
-"""Planes of an occupancy grid."""
+"""Number of states, and of planes of an occupancy grid."""
 
 
 def check_shape(name: str, values: NDArray, shape: tuple[int, ...]) -> None:
-    """Refuse an array of another shape, by its name."""
+    """Refuse an array that doesn't have the shape it should have.
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument, for the error.
+    values : array
+        The array.
+    shape : tuple of int
+        The shape it should have.
+
+    Raises
+    ------
+    ArgumentError
+        When the array has another shape.
+    """
     if np.shape(values) != shape:
         raise ArgumentError(name, f"shape {shape}", f"shape {np.shape(values)}")
 
 
 @dataclass(frozen=True, eq=False)
 class Belief:
-    """What is believed of the cells in front of the vehicle, in the grid frame of the current instant.
+    """What a filter believes of the cells in front of the vehicle, in the grid frame of the current instant.
 
     Parameters
     ----------
     probability : (4, H, W) float32
         P(FREE), P(STATIC), P(DYNAMIC), P(UNKNOWN) of each cell; they sum to 1.
     velocity : (2, H, W) float32
-        Mean velocity over ground of what moves in the cell, along the grid's x and y axes, m/s; NaN
-        without dynamic mass, or where it is too small to have got a particle.
+        Mean velocity over ground of what moves in the cell, along the grid's x and y axes, m/s. NaN in cells without
+        dynamic mass, or with so little that no particle represents it.
     velocity_covariance : (2, 2, H, W) float32
-        How much that velocity varies, and is in doubt, m^2/s^2: symmetric, positive semi-definite, in the same
-        axes; NaN where the velocity is.
+        Covariance of that velocity along the same axes, m^2/s^2: how much it varies within the cell, and how uncertain
+        it is. Symmetric and positive semi-definite; NaN where the velocity is NaN.
     """
 
     probability: NDArray[np.float32]
@@ -57,16 +72,16 @@ class Particles:
     Parameters
     ----------
     position : (N, 2) float32
-        x, y in the frame of the map, metres.
+        x, y in the frame of the map, metres. All three arrays are float64 in literal twins.
     velocity : (N, 2) float32
-        Velocity over ground in the axes of the map, m/s.
+        Velocity over ground along the axes of the map, m/s.
     weight : (N,) float32
-        Probability that each carries; the dynamic probability of a cell is the sum of the weights in it.
+        Probability that each particle carries. The dynamic probability of a cell is the sum of the weights in it.
 
     Raises
     ------
     ArgumentError
-        When the three don't fit each other.
+        When the three arrays have different lengths.
     """
 
     position: NDArray[np.float32]
@@ -74,13 +89,13 @@ class Particles:
     weight: NDArray[np.float32]
 
     def __post_init__(self) -> None:
-        """Refuse particles of which something is missing: compiled loops would read what isn't there."""
+        """Refuse arrays of different lengths: compiled loops would read beyond the end of the shorter ones."""
         for name in ("position", "velocity"):
             check_shape(name, getattr(self, name), (*np.shape(self.weight), 2))
 
     @classmethod
     def none(cls) -> "Particles":
-        """Return no particles at all."""
+        """Return an empty set of particles."""
         return cls(np.empty((0, 2), np.float32), np.empty((0, 2), np.float32), np.empty(0, np.float32))
 
     def __len__(self) -> int:
@@ -98,16 +113,17 @@ class FilterState:
     Parameters
     ----------
     probability : (4, H, W) float32
-        The four states of each cell of the map; they sum to 1.
+        P(FREE), P(STATIC), P(DYNAMIC), P(UNKNOWN) of each cell of the map; they sum to 1. Both arrays are float64 in
+        literal twins.
     particles : Particles
-        The dynamic mass whose velocity is known, more or less.
+        The dynamic mass of which velocities are known, more or less.
     newborn : (H, W) float32
-        Dynamic mass that has just come into being and has no particles yet: they are drawn at resampling.
+        Dynamic mass that has just come into being and isn't carried by particles yet. `resample` draws them.
 
     Raises
     ------
     ArgumentError
-        When the two arrays don't fit each other.
+        When the two arrays are over different numbers of cells.
     """
 
     probability: NDArray[np.float32]
@@ -115,12 +131,23 @@ class FilterState:
     newborn: NDArray[np.float32]
 
     def __post_init__(self) -> None:
-        """Refuse planes of different sizes: compiled loops would read what isn't there."""
+        """Refuse planes of different sizes: compiled loops would read beyond the end of the smaller ones."""
         check_shape("probability", self.probability, (N_STATES, *np.shape(self.newborn)))
 
     @classmethod
     def unknown(cls, spec: GridSpec) -> "FilterState":
-        """Return the state of one who has seen nothing: UNKNOWN everywhere, no particles."""
+        """Return the state before the first scan: UNKNOWN everywhere, and no particles.
+
+        Parameters
+        ----------
+        spec : GridSpec
+            The cells of the map, (H, W).
+
+        Returns
+        -------
+        FilterState
+            P(UNKNOWN) = 1 in each cell.
+        """
         probability = np.zeros((4, *spec.shape), np.float32)
         probability[State.UNKNOWN] = 1
         return cls(probability, Particles.none(), np.zeros(spec.shape, np.float32))

@@ -9,7 +9,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.cellwise import bayes, make_room, meet, mix, represent
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.moving_map import look_up
-from semgrid_edu.occupancy.params import CmcdotParams, transition_matrix
+from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.particles import (
     by_origin,
     cells_of,
@@ -22,6 +22,7 @@ from semgrid_edu.occupancy.particles import (
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.resampling import draw_again, draw_newborn
 from semgrid_edu.occupancy.state import FilterState, Particles, State, check_shape
+from semgrid_edu.occupancy.world import WorldModel, transition_matrix
 
 DYNAMIC, UNKNOWN = State.DYNAMIC, State.UNKNOWN
 NOTHING_KNOWN = np.array([0, 0, 0, 1], dtype=np.float32)
@@ -30,22 +31,22 @@ NOTHING_KNOWN = np.array([0, 0, 0, 1], dtype=np.float32)
 def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterState:
     """Step 1: express the belief in a new frame.
 
-    Each new cell takes the belief of the old cell that its centre lies in, so a shift by whole cells is
-    exact; what enters the map is UNKNOWN. Particles are moved exactly, and dynamic mass goes where they go.
+    Each new cell takes the belief of the old cell that its centre lies in, so a shift by whole cells is exact. What
+    enters the map is UNKNOWN. Particles are moved exactly, and dynamic mass goes where they go.
 
     Parameters
     ----------
     state : FilterState
-        In the old frame, without newborn mass.
+        The belief in the old frame, without newborn mass.
     spec : GridSpec
-        The cells, the same in both frames.
+        The cells, (H, W), the same in both frames.
     motion : PlanarMotion
-        The new frame, in the old one.
+        Pose of the new frame in the old one, metres and radians.
 
     Returns
     -------
     FilterState
-        In the new frame.
+        The belief in the new frame.
 
     Raises
     ------
@@ -61,38 +62,37 @@ def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterStat
     return FilterState(probability, replace(particles, weight=weight), state.newborn)
 
 
-def predict(
-    state: FilterState, spec: GridSpec, params: CmcdotParams, dt: float, rng: np.random.Generator
-) -> FilterState:
-    """Step 2: what becomes of the belief while `dt` seconds pass and nobody looks.
+def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rng: np.random.Generator) -> FilterState:
+    """Step 2: predict what becomes of the belief while `dt` seconds pass without a scan.
 
-    First each cell mixes by the transition matrix, and particles near zero speed become STATIC. Then dynamic
-    mass flies. What it leaves behind is FREE: nothing stood where something moved. Where it arrives with
-    probability a, two opinions meet: "something arrives" (a) and the cell's own. They can't both be right where
-    the cell is STATIC, so of the joint distribution that combination is struck out:
+    First each cell mixes by the transition matrix, and particles near zero speed become STATIC. Then the particles fly,
+    and dynamic mass with them. Where it leaves, it leaves FREE behind, because nothing stands where something has moved
+    away. Where it arrives with probability a, two statements meet: "something arrives", and what the cell itself holds.
+    They can't both be true where the cell is STATIC, because two solid things can't share a cell. So that combination
+    is struck out of the joint distribution:
 
         P(DYNAMIC) = [a (1 - s) + (1 - a) d] / (1 - a s),   others = (1 - a) others / (1 - a s)
 
-    with s and d the cell's own static and dynamic probability. So what arrives in free space is dynamic, and
-    a standing fence isn't talked out of it by particles that cross it.
+    with s and d the cell's own static and dynamic probability. So what arrives in free space is DYNAMIC, while a fence
+    that is known to stand stays STATIC although particles cross it.
 
     Parameters
     ----------
     state : FilterState
-        At the previous instant.
+        The belief at the previous instant.
     spec : GridSpec
-        The cells.
-    params : CmcdotParams
-        Rates and noise.
+        The cells, (H, W).
+    world : WorldModel
+        Rates of change, how things stop, and how they accelerate.
     dt : float
-        Seconds, not negative.
+        Time since the previous instant, seconds, not negative.
     rng : numpy.random.Generator
-        For the noise of the particles.
+        Source of the particles' accelerations.
 
     Returns
     -------
     FilterState
-        At the present instant, before its scan.
+        The belief at the present instant, before its scan.
 
     Raises
     ------
@@ -100,14 +100,14 @@ def predict(
         When the state is over other cells than those of `spec`, or `dt` is negative or not finite.
     """
     check_shape("state", state.newborn, spec.shape)
-    M = transition_matrix(params, dt)
+    M = transition_matrix(world, dt)
     before = cells_of(state.particles.position, spec)
-    particles = slow_down(state.particles, params.stop_rate, params.stop_speed, dt)
+    particles = slow_down(state.particles, world.stop_rate, world.stop_speed, dt)
     particles = replace(particles, weight=particles.weight * np.float32(M[DYNAMIC, DYNAMIC]))
     going = weight_in_cells(particles.weight, before, spec.shape)
     mixed, newborn = mix(state.probability, state.newborn, going, M)
 
-    particles = fly(particles, params.max_acceleration, dt, rng)
+    particles = fly(particles, world.max_acceleration, dt, rng)
     origin = by_origin(before, cells_of(particles.position, spec), going.size)
     stays, arrives = weight_in_cells(particles.weight, origin, (2, *spec.shape))
     probability, newborn, factor = meet(mixed, newborn, going, stays, arrives)
@@ -115,28 +115,28 @@ def predict(
     return FilterState(probability, replace(particles, weight=weight), newborn)
 
 
-def update(state: FilterState, spec: GridSpec, evidence: Evidence, params: CmcdotParams) -> FilterState:
-    """Step 3: Bayes' rule in each cell, P(state | z) = P(z | state) P(state) / P(z).
+def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldModel) -> FilterState:
+    """Step 3: update each cell by Bayes' rule, P(state | z) = P(z | state) P(state) / P(z).
 
-    STATIC and DYNAMIC share P(z | occupied): one scan can't tell them apart. UNKNOWN means unobserved, so
-    a cell of which the scan says anything isn't that any more: `reveal` goes first.
+    STATIC and DYNAMIC share P(z | occupied), because one scan can't tell them apart. UNKNOWN means that no scan has
+    said anything of the cell; as soon as one does, `reveal` first shares its UNKNOWN mass among the other states.
 
     Parameters
     ----------
     state : FilterState
-        Predicted.
+        The belief before the scan.
     spec : GridSpec
-        The cells.
+        The cells, (H, W).
     evidence : Evidence
-        Of the scan; any numbers >= 0, for each cell is scaled by its best explanation first. Where nothing
-        that was held possible explains the scan, nothing is known any more: UNKNOWN.
-    params : CmcdotParams
-        For `first_sight`.
+        What the scan says of each cell. However small the two likelihoods are, only their ratio counts. Where nothing
+        that was held possible explains the scan, the cell becomes UNKNOWN.
+    world : WorldModel
+        What UNKNOWN cells turn out to be, `first_sight`.
 
     Returns
     -------
     FilterState
-        Given the scan.
+        The belief given the scan.
 
     Raises
     ------
@@ -145,58 +145,59 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, params: Cmcdo
     """
     check_shape("state", state.newborn, spec.shape)
     check_shape("evidence", evidence.free, spec.shape)
-    prior = reveal(state, evidence.occupied != evidence.free, params)
+    prior = reveal(state, evidence.occupied != evidence.free, world)
     posterior, factor = bayes(prior.probability, evidence.occupied, evidence.free)
     particles = prior.particles
     weight = scale_in_cells(particles.weight, cells_of(particles.position, spec), factor)
     return FilterState(posterior, replace(particles, weight=weight), (prior.newborn * factor).astype(np.float32))
 
 
-def reveal(state: FilterState, seen: NDArray, params: CmcdotParams) -> FilterState:
-    """Share the UNKNOWN mass of cells that are seen among the other states, as they are found at first sight.
+def reveal(state: FilterState, seen: NDArray, world: WorldModel) -> FilterState:
+    """Share the UNKNOWN mass of cells that are seen among the other states, by the probabilities of first sight.
 
     Parameters
     ----------
     state : FilterState
-        Predicted.
+        The belief before the scan.
     seen : (H, W) bool
-        Of which cells the scan says anything.
-    params : CmcdotParams
-        For `first_sight`; its dynamic part is newborn.
+        Whether the scan says anything of the cell.
+    world : WorldModel
+        What UNKNOWN cells turn out to be, `first_sight`; the dynamic part is newborn.
 
     Returns
     -------
     FilterState
-        UNKNOWN only where nobody looks.
+        The belief with UNKNOWN mass only in cells of which the scan says nothing.
     """
     revealed = np.where(seen, state.probability[UNKNOWN], 0)
-    shares = np.array([*params.first_sight, -1], dtype=revealed.dtype)
+    shares = np.array([*world.first_sight, -1], dtype=revealed.dtype)
     probability = state.probability + shares[:, None, None] * revealed
     return FilterState(probability, state.particles, state.newborn + shares[DYNAMIC] * revealed)
 
 
 def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.random.Generator) -> FilterState:
-    """Step 4: spend the particles where dynamic mass is, and on what is newborn.
+    """Step 4: resample, which spends the particles where dynamic mass is, and on newborn mass.
 
-    Two systematic draws of fixed size: particles in proportion to their weight, and cells in proportion to their
-    newborn mass, each of which gets a particle anywhere in it with a velocity from the wide prior. Weights
-    are then made to add up to each cell's dynamic probability again; where mass too small for a
-    particle got none, it becomes UNKNOWN.
+    There are two systematic draws of fixed size. The first draws particles in proportion to their weights. The second
+    draws cells in proportion to their newborn mass, and puts a particle anywhere in each cell that it draws, with a
+    velocity from the wide prior. Then the weights in each cell are scaled to its dynamic probability again. Dynamic
+    mass so small that no particle was drawn for it becomes UNKNOWN.
 
     Parameters
     ----------
     state : FilterState
-        Given the scan.
+        The belief given the scan.
     spec : GridSpec
-        The cells.
+        The cells, (H, W).
     params : CmcdotParams
-        Number of particles, share of births, their velocity prior.
+        Number of particles, share of births, and their velocity prior.
     rng : numpy.random.Generator
+        Source of the draws, and of the newborn particles' places and velocities.
 
     Returns
     -------
     FilterState
-        The same belief, carried by new particles; no newborn mass.
+        The same belief, carried by new particles, without newborn mass.
 
     Raises
     ------
@@ -204,9 +205,9 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
         When the state is over other cells than those of `spec`.
     """
     check_shape("state", state.newborn, spec.shape)
-    births = round(params.birth_share * params.particles)
+    births = round(params.birth_share * params.n_particles)
     drawn = (
-        draw_again(state.particles, params.particles - births, rng),
+        draw_again(state.particles, params.n_particles - births, rng),
         draw_newborn(state.newborn, spec, births, params.max_speed, rng),
     )
     position, velocity, weight = (

@@ -12,7 +12,7 @@ from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import Belief
 
 LIDAR_PERIOD = 0.1
-"""Seconds between scans of a scanner that turns at 10 Hz, as KITTI's does: the time given to the first frame."""
+"""Seconds between two scans of a scanner that turns at 10 Hz, as KITTI's does: the time step of the first frame."""
 
 
 def track_drive(
@@ -26,18 +26,18 @@ def track_drive(
     Parameters
     ----------
     frames : iterable of Frame
-        In the order of time.
+        The frames of the drive in the order of time.
     spec : GridSpec
-        The grid of the beliefs.
+        The grid in which the filter hands out its beliefs, (H, W) cells.
     params : CmcdotParams, optional
-        What the filter assumes.
+        What the filter assumes of the world and of its sensor, and how it spends its particles.
     seed : int or numpy.random.Generator
-        Decides everything that is drawn.
+        Seed or source of all random numbers that the filter draws.
 
     Yields
     ------
     Belief
-        One a frame, in the grid frame of that instant.
+        The belief after each frame, in the grid frame of that instant.
 
     Raises
     ------

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.occupancy.particles import OUTSIDE
+from semgrid_edu.occupancy.cells import OUTSIDE
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import Particles
 
@@ -14,22 +14,23 @@ from semgrid_edu.occupancy.state import Particles
 def velocity_moments(
     particles: Particles, cells: NDArray, shape: tuple[int, int]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return mean and covariance of the velocities in each cell, weighed by what each particle carries.
+    """Return mean and covariance of the velocities in each cell, weighted by the weights of the particles.
 
     Parameters
     ----------
     particles : Particles
+        N particles on the map.
     cells : (N,) int
-        The cell of each, from `cells_of`.
+        The cell of each particle, from `cells_of`.
     shape : (int, int)
         H, W of the map.
 
     Returns
     -------
     mean : (2, H, W) float32
-        sum(w v) / sum(w), along the axes of the map, m/s; NaN where no particle is.
+        sum(w v) / sum(w), along the axes of the map, m/s; NaN in cells without particles.
     covariance : (2, 2, H, W) float32
-        sum(w (v - mean) (v - mean)^T) / sum(w), m^2/s^2; zero for a single particle, NaN where none is.
+        sum(w (v - mean) (v - mean)^T) / sum(w), m^2/s^2; zero for a single particle, NaN in cells without particles.
     """
     mean, covariance = _moments(particles.velocity, particles.weight, cells, math.prod(shape))
     return mean.reshape(2, *shape), covariance.reshape(2, 2, *shape)
@@ -69,16 +70,18 @@ def turn_moments(mean: NDArray, covariance: NDArray, motion: PlanarMotion) -> tu
     Parameters
     ----------
     mean : (2, H, W) float32
-        m/s.
+        Mean velocity along the axes of one frame, m/s.
     covariance : (2, 2, H, W) float32
-        m^2/s^2.
+        Covariance of the velocity along the same axes, m^2/s^2.
     motion : PlanarMotion
-        Pose of the other frame, of which R is the rotation.
+        Pose of the other frame in that one; R is its rotation.
 
     Returns
     -------
-    mean, covariance
-        In the other axes, of the same shapes; the covariance is symmetric to the last bit.
+    mean : (2, H, W) float32
+        Mean velocity along the axes of the other frame, m/s.
+    covariance : (2, 2, H, W) float32
+        Covariance along the same axes, m^2/s^2, symmetric to the last bit.
     """
     R = motion.rotation.astype(mean.dtype)
     turned = np.einsum("jkhw,kl->jlhw", np.einsum("ij,ikhw->jkhw", R, covariance), R)

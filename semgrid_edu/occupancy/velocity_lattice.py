@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError
 
 FINEST = 100
-"""Most spacings up to the top speed: beyond that, at 30,000 velocities, no grid fits into memory."""
+"""Largest ratio of top speed to spacing: it makes some 30,000 velocities, for which only tiny grids fit into memory."""
 
 
 @dataclass(frozen=True)
@@ -19,15 +19,15 @@ class VelocityLattice:
     Parameters
     ----------
     max_speed : float
-        The fastest velocities, m/s; by default 16 m/s, somewhat above what is allowed in a town.
+        The top speed, m/s. The default, 16 m/s, is somewhat above what is allowed in a town.
     spacing : float
-        Between neighbours along an axis, m/s; by default 1 m/s, so that the slowest of them is slower than a
-        pedestrian, who walks at 1.4 m/s.
+        Spacing of neighbouring velocities along an axis, m/s. By default 1 m/s, so that a pedestrian, who walks at
+        1.4 m/s, is faster than the slowest moving velocities.
 
     Raises
     ------
     ArgumentError
-        When there is no velocity but zero, or more than a computer can hold.
+        When zero would be the only velocity, or there would be more than a computer can hold.
 
     Examples
     --------
@@ -39,7 +39,7 @@ class VelocityLattice:
     spacing: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse a lattice that is no such thing."""
+        """Refuse a lattice of no velocity but zero, or of too many."""
         if not (np.isfinite(self.spacing) and self.spacing > 0):
             raise ArgumentError("spacing", "a positive speed in m/s", self.spacing)
         if not self.spacing <= self.max_speed <= FINEST * self.spacing:
@@ -48,7 +48,7 @@ class VelocityLattice:
 
     @cached_property
     def velocities(self) -> NDArray[np.float64]:
-        """(V, 2): its velocities, m/s, slow before fast; the first is zero."""
+        """(V, 2): the velocities of the lattice, m/s, from slow to fast; the first is zero."""
         steps = int(self.max_speed / self.spacing + 1e-9)
         x, y = (axis.ravel() for axis in np.mgrid[-steps : steps + 1, -steps : steps + 1])
         order = np.lexsort((y, x, x**2 + y**2))
@@ -57,7 +57,7 @@ class VelocityLattice:
 
     @cached_property
     def prior(self) -> NDArray[np.float64]:
-        """(V,): how probable each is of something of which nothing is known but that it moves; sums to 1.
+        """(V,): the prior over velocities of something of which nothing is known but that it moves; sums to 1.
 
         The density of `particles.draw_velocities`, any heading and a speed that is the square of a uniform
         number, is proportional to |v|^(-3/2) in the plane of velocities.
@@ -68,9 +68,10 @@ class VelocityLattice:
 
     @cached_property
     def neighbours(self) -> NDArray[np.int64]:
-        """(V, 4): the velocities one spacing ahead, behind, to the left and right; itself where there is none.
+        """(V, 4): indices of the velocities one spacing ahead, behind, to the left and to the right of each.
 
-        Zero has no neighbours and is nobody's: what stands doesn't move by accelerating a little.
+        Where there is none, the velocity's own index stands in its place. Zero has no neighbours and is no neighbour of
+        any other velocity, because what stands doesn't set off by accelerating a little.
         """
         steps = np.rint(self.velocities / self.spacing).astype(int)
         index = {tuple(step): k for k, step in enumerate(steps) if k > 0}
@@ -79,7 +80,7 @@ class VelocityLattice:
         return np.array([[0, 0, 0, 0], *moving])
 
     def change_probability(self, max_acceleration: float, dt: float) -> float:
-        """Return the probability that mass changes to one given neighbour within `dt`.
+        """Return the probability that mass changes to one given neighbouring velocity within `dt`.
 
         A particle of CMCDOT changes each component of its velocity by a uniform number up to a dt, of variance
         (a dt)^2 / 3. A step to either neighbour, with probability p each, has variance 2 p spacing^2.
@@ -89,12 +90,12 @@ class VelocityLattice:
         max_acceleration : float
             Largest acceleration along each axis, a, m/s^2.
         dt : float
-            Seconds.
+            The time step, seconds.
 
         Returns
         -------
         float
-            p = (a dt)^2 / (6 spacing^2), but at most 1/5: then it and its neighbours are equally likely.
+            p = (a dt)^2 / (6 spacing^2), but at most 1/5: then the velocity and its four neighbours are equally likely.
         """
         return min(max_acceleration * dt / self.spacing, 1.2**0.5) ** 2 / 6
 

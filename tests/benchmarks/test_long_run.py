@@ -8,7 +8,7 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams
 
-SPEC, PARAMS = GridSpec(0, 40, -10, 10, 0.5), CmcdotParams(particles=20_000)
+SPEC, PARAMS = GridSpec(0, 40, -10, 10, 0.5), CmcdotParams(n_particles=20_000)
 
 
 def test_the_circle_closes_and_has_the_vehicles_speed():

@@ -84,7 +84,7 @@ class TestBuilt:
 
     @pytest.mark.parametrize(
         "change",
-        [{"image_size": SIZE}, {"spec": GridSpec(0, 71, -15.5, 15.5, 1.0)}, {"params": CmcdotParams(particles=999)}],
+        [{"image_size": SIZE}, {"spec": GridSpec(0, 71, -15.5, 15.5, 1.0)}, {"params": CmcdotParams(n_particles=999)}],
     )
     def test_another_recipe_is_not_in_the_cache(self, built, change):
         with pytest.raises(AssertionError, match="made anew"):

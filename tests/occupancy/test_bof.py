@@ -16,13 +16,13 @@ from semgrid_edu.occupancy import (
     Bof,
     BofParams,
     BofState,
-    CmcdotParams,
     Evidence,
     FilterState,
     Particles,
     PlanarMotion,
     State,
     VelocityLattice,
+    WorldModel,
     bof_move,
     bof_predict,
     bof_predict_literal,
@@ -40,7 +40,7 @@ GRID = GridSpec(0, 3, -1, 1, 0.5)
 LINE = GridSpec(0, 5, 0, 0.5, 0.5)
 LATTICE = VelocityLattice(max_speed=8.0, spacing=4.0)
 PARAMS = BofParams(LATTICE)
-STILL = CmcdotParams(rates=((0.0,) * 4,) * 4, stop_rate=0.0, max_acceleration=0.0, first_sight=(0.85, 0.15, 0.0))
+STILL = WorldModel(rates=((0.0,) * 4,) * 4, stop_rate=0.0, max_acceleration=0.0, first_sight=(0.85, 0.15, 0.0))
 ONLY_FLIGHT = BofParams(LATTICE, STILL)
 EXACT = 0.125
 """Seconds in which 4 m/s are exactly one cell of half a metre."""
@@ -96,7 +96,7 @@ def test_fast_and_literal_prediction_agree(seed, dt, shifted):
 @given(st.integers(0, 1000))
 def test_prediction_is_that_of_cmcdot_when_its_particles_lie_on_the_lattice(seed):
     """One particle a cell and velocity, anywhere in its cell: in whole cells both do the same, mass by mass."""
-    rng, world = np.random.default_rng(seed), replace(CmcdotParams(), max_acceleration=0.0, stop_speed=3.0)
+    rng, world = np.random.default_rng(seed), replace(WorldModel(), max_acceleration=0.0, stop_speed=3.0)
     state = replace(random_state(seed), remainder=np.zeros((len(LATTICE), 2)))
     velocity, row, col = (index.ravel() for index in np.indices(state.occupied[1:].shape))
     corner = np.stack([row, col], axis=1) + rng.uniform(0.05, 0.95, (len(row), 2))
@@ -118,7 +118,7 @@ def test_prediction_is_that_of_cmcdot_when_its_particles_lie_on_the_lattice(seed
 @given(st.integers(0, 1000), st.sampled_from([(0.8, 0.05), (0.3, 0.7), (1.0, 1.0), (0.0, 1.0)]))
 def test_one_cell_without_motion_is_filterpys_discrete_bayes(seed, scan):
     spec = GridSpec(0, 1, 0, 1, 1)
-    params = BofParams(LATTICE, replace(CmcdotParams(), stop_rate=0.0, max_acceleration=0.0))
+    params = BofParams(LATTICE, replace(WorldModel(), stop_rate=0.0, max_acceleration=0.0))
     nowhere = np.zeros((len(LATTICE), 2))
     state = replace(random_state(seed, spec), velocity=nowhere, remainder=nowhere)
     expected = state.probability[:, 0, 0].astype(np.float64)

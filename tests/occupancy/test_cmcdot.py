@@ -14,7 +14,7 @@ from semgrid_edu.illustrations.boxes import Box, cells_in, scan_boxes
 from semgrid_edu.occupancy import Cmcdot, CmcdotParams, PlanarMotion, State, track_drive
 
 SMALL = GridSpec(0, 40, -10, 10, 0.5)
-PARAMS = CmcdotParams(particles=50_000)
+PARAMS = CmcdotParams(n_particles=50_000)
 STILL = PlanarMotion()
 WALL, PARKED = Box(5, 60, 7.2, 7.7, 2.5), Box.around(22, -6, 4, 1.8, 1.5)
 
@@ -159,7 +159,7 @@ def test_without_scans_what_was_seen_is_forgotten():
 )
 def test_any_scans_keep_every_cell_a_distribution(seed, count, spread, dt, shift, yaw):
     rng = np.random.default_rng(seed)
-    tracker = Cmcdot(SMALL, CmcdotParams(particles=2000), seed)
+    tracker = Cmcdot(SMALL, CmcdotParams(n_particles=2000), seed)
     for _ in range(3):
         points = rng.normal(0, 1, (count, 4)) * [spread, spread, 1, 1] + [10, 0, 0.5, 0]
         belief = tracker.step(points, PlanarMotion(shift, 0, yaw), dt)
@@ -169,7 +169,7 @@ def test_any_scans_keep_every_cell_a_distribution(seed, count, spread, dt, shift
 
 @pytest.mark.parametrize("particles", [1, 2, 3])
 def test_hardly_any_particles_still_keep_every_cell_a_distribution(particles):
-    tracker, points = Cmcdot(SMALL, CmcdotParams(particles=particles)), scan_boxes(street(0))
+    tracker, points = Cmcdot(SMALL, CmcdotParams(n_particles=particles)), scan_boxes(street(0))
     for _ in range(4):
         belief = tracker.step(points, STILL, 0.1)
         assert np.abs(belief.probability.sum(axis=0) - 1).max() < 1e-5

@@ -5,7 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from semgrid_edu.occupancy import Particles, PlanarMotion
-from semgrid_edu.occupancy.particles import OUTSIDE, transform
+from semgrid_edu.occupancy.cells import OUTSIDE
+from semgrid_edu.occupancy.particles import transform
 from semgrid_edu.occupancy.velocities import turn_moments, velocity_moments
 
 SHAPE = (2, 3)

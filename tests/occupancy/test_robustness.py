@@ -9,7 +9,7 @@ from semgrid_edu.illustrations.boxes import Box, scan_boxes
 from semgrid_edu.occupancy import Belief, Cmcdot, CmcdotParams, PlanarMotion, State
 
 SPEC = GridSpec(0, 40, -10, 10, 0.5)
-PARAMS = CmcdotParams(particles=10_000)
+PARAMS = CmcdotParams(n_particles=10_000)
 STILL, NO_POINTS = PlanarMotion(), np.empty((0, 3), np.float32)
 STREET = [Box(5, 60, 7.2, 7.7, 2.5), Box.around(15, -2, 4, 1.8, 1.5)]
 

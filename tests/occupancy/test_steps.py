@@ -29,7 +29,7 @@ from semgrid_edu.occupancy.particles import cells_of, weight_in_cells
 from semgrid_edu.occupancy.resampling import systematic_resample
 
 GRID = GridSpec(0, 6, -2, 2, 1)
-PARAMS = CmcdotParams(particles=2000)
+PARAMS = CmcdotParams(n_particles=2000)
 BELIEFS = st.lists(st.floats(0.01, 1), min_size=4, max_size=4).map(lambda p: np.array(p) / sum(p))
 
 
@@ -209,7 +209,7 @@ def test_resampling_spends_particles_where_dynamic_mass_is():
     probability[State.FREE] += 1 - probability.sum(axis=0)
     again = resample(state_of(probability, GRID), GRID, PARAMS, np.random.default_rng(0))
     count = np.bincount(cells_of(again.particles.position, GRID), minlength=24).reshape(GRID.shape)
-    drawn = (1 - PARAMS.birth_share) * PARAMS.particles
+    drawn = (1 - PARAMS.birth_share) * PARAMS.n_particles
     expected = drawn * probability[State.DYNAMIC] / probability[State.DYNAMIC].sum()
     assert np.abs(count - expected).max() <= 5  # four particles a cell, each drawn floor or ceil times
     assert_sound(again, GRID)
@@ -251,8 +251,8 @@ def test_time_that_runs_backwards_is_refused(dt):
 @pytest.mark.parametrize(
     "bad",
     [
-        {"particles": 0},
-        {"particles": 1.5},
+        {"n_particles": 0},
+        {"n_particles": 1.5},
         {"rates": ((1, 2), (3, 4))},
         {"stop_speed": 0.0},
         {"max_speed": -1.0},

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.special import expit, logit
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence import walk_ray
+from semgrid_edu.occupancy.evidence_literal import walk_ray
 from semgrid_instructor import hidden
 
 CLIPPED = 0.05

@@ -18,11 +18,11 @@ from semgrid_edu.graphical.stages.cell_scans import check_scans
 from semgrid_edu.graphical.stages.stage_graph import CutEdge, StageGraph
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
-    CmcdotParams,
     Evidence,
     FilterState,
     Particles,
     State,
+    WorldModel,
     predict,
     transition_matrix,
     update,
@@ -52,7 +52,7 @@ CUT = (
 
 
 def one_cell(
-    scans: ArrayLike, dt: float = 0.1, params: CmcdotParams | None = None, start: Sequence[float] = UNKNOWN
+    scans: ArrayLike, dt: float = 0.1, world: WorldModel | None = None, start: Sequence[float] = UNKNOWN
 ) -> StageGraph:
     """Build the chain of one cell of CMCDOT: predict, look, read the scan, and again.
 
@@ -66,7 +66,7 @@ def one_cell(
         P(z | occupied) and P(z | free) of each scan, such as `read_scans` gives; equal where it says nothing.
     dt : float
         Seconds before each scan.
-    params : CmcdotParams, optional
+    world : WorldModel, optional
         Rates and first sight.
     start : (4,) float
         The belief at time 0.
@@ -82,9 +82,9 @@ def one_cell(
     ArgumentError
         When a scan is no pair of likelihoods, or leaves nothing possible.
     """
-    params, scans = params or CmcdotParams(), check_scans(scans)
+    world, scans = world or WorldModel(), check_scans(scans)
     steps = range(1, len(scans) + 1)
-    M, look = transition_matrix(params, dt), looking(params)
+    M, look = transition_matrix(world, dt), looking(world)
     factors = [Factor("x0", start)]
     parents: dict[str, tuple[str, ...]] = {}
     for t, (occupied, free) in zip(steps, scans, strict=True):
@@ -111,12 +111,12 @@ def one_cell(
     )
 
 
-def looking(params: CmcdotParams) -> NDArray[np.float64]:
+def looking(world: WorldModel) -> NDArray[np.float64]:
     """Return P(x | v, prior): unchanged when nobody looks; when somebody does, UNKNOWN turns out to be something.
 
     Parameters
     ----------
-    params : CmcdotParams
+    world : WorldModel
         For `first_sight`.
 
     Returns
@@ -125,7 +125,7 @@ def looking(params: CmcdotParams) -> NDArray[np.float64]:
         Axes: whether the scan sees the cell, the state before, the state after.
     """
     seen = np.eye(4)
-    seen[State.UNKNOWN] = [*params.first_sight, 0]
+    seen[State.UNKNOWN] = [*world.first_sight, 0]
     return np.stack([np.eye(4), seen / seen.sum(axis=1, keepdims=True)])
 
 
@@ -160,7 +160,7 @@ class CellBeliefs(NamedTuple):
 
 
 def exact_cell(
-    scans: ArrayLike, dt: float = 0.1, params: CmcdotParams | None = None, start: Sequence[float] = UNKNOWN
+    scans: ArrayLike, dt: float = 0.1, world: WorldModel | None = None, start: Sequence[float] = UNKNOWN
 ) -> CellBeliefs:
     """Filter one cell by the forward messages of sum-product on its chain; parameters as for `one_cell`.
 
@@ -169,7 +169,7 @@ def exact_cell(
     CellBeliefs
         Messages from P(prior t | x t-1), and of x t to what follows it.
     """
-    beliefs = sum_product(one_cell(scans, dt, params, start).model, cell_given(scans))
+    beliefs = sum_product(one_cell(scans, dt, world, start).model, cell_given(scans))
     steps = range(1, len(check_scans(scans)) + 1)
     predicted = [beliefs.messages[f"P(prior{t} | x{t - 1})", f"prior{t}"] for t in steps]
     passed = [beliefs.messages[f"x{t}", f"P(prior{t + 1} | x{t})"] for t in steps[:-1]]
@@ -177,7 +177,7 @@ def exact_cell(
 
 
 def package_cell(
-    scans: ArrayLike, dt: float = 0.1, params: CmcdotParams | None = None, start: Sequence[float] = UNKNOWN
+    scans: ArrayLike, dt: float = 0.1, world: WorldModel | None = None, start: Sequence[float] = UNKNOWN
 ) -> CellBeliefs:
     """Filter one cell by the package's `predict` and `update`, nothing moving; parameters as for `one_cell`.
 
@@ -188,12 +188,12 @@ def package_cell(
     CellBeliefs
         In float32, as the package computes.
     """
-    params, spec, rng = params or CmcdotParams(), GridSpec(0, 1, 0, 1, 1), np.random.default_rng(0)
+    world, spec, rng = world or WorldModel(), GridSpec(0, 1, 0, 1, 1), np.random.default_rng(0)
     first = np.reshape(np.asarray(start, np.float32), (4, 1, 1))
     state = FilterState(first, Particles.none(), first[State.DYNAMIC])
     history = []
     for occupied, free in check_scans(scans):
-        predicted = predict(state, spec, params, dt, rng)
-        state = update(predicted, spec, Evidence(np.array([[occupied]]), np.array([[free]])), params)
+        predicted = predict(state, spec, world, dt, rng)
+        state = update(predicted, spec, Evidence(np.array([[occupied]]), np.array([[free]])), world)
         history.append((predicted.probability[:, 0, 0], state.probability[:, 0, 0]))
     return CellBeliefs(*map(np.array, zip(*history, strict=True)))

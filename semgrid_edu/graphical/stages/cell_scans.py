@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.occupancy import SensorModel
-from semgrid_edu.occupancy.evidence import likelihoods
+from semgrid_edu.occupancy.sensor import likelihoods
 
 
 def read_scans(says: str, sensor: SensorModel | None = None) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import BofParams, CmcdotParams, Evidence, State, VelocityLattice, transition_matrix
+from semgrid_edu.occupancy import BofParams, Evidence, State, VelocityLattice, WorldModel, transition_matrix
 
 SPEED = 5.0
 """Of all that moves, m/s: exactly one cell a step."""
@@ -57,7 +57,7 @@ class CellsInARow:
     scans : tuple of str
         One per step, one letter per cell: "x" for a return, "." for a beam that passes, "?" for an unseen cell.
     rates : 4 x 4 floats
-        As `CmcdotParams` takes them; nothing becomes DYNAMIC.
+        As `WorldModel` takes them; nothing becomes DYNAMIC.
     first_sight : (float, float, float)
         What UNKNOWN cells turn out to be when they are first seen: FREE, STATIC and DYNAMIC, the last 0.
 
@@ -98,9 +98,7 @@ class CellsInARow:
     @property
     def params(self) -> BofParams:
         """What both filters assume: a lattice of zero and four velocities, of which the row uses left and right."""
-        world = CmcdotParams(
-            rates=self.rates, first_sight=self.first_sight, max_acceleration=0.0, stop_rate=0.0, birth_share=1e-9
-        )
+        world = WorldModel(rates=self.rates, first_sight=self.first_sight, max_acceleration=0.0, stop_rate=0.0)
         return BofParams(VelocityLattice(max_speed=SPEED, spacing=SPEED), world)
 
     @property

@@ -5,7 +5,6 @@ Monte Carlo" in the filter's name, and its sampling error falls like N^-1/2. Wha
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,14 +13,17 @@ from numpy.typing import NDArray
 from semgrid_edu.graphical.stages.bof import bof_beliefs
 from semgrid_edu.graphical.stages.cells_in_a_row import CELL, DT, SPEED, Cell, CellsInARow
 from semgrid_edu.graphical.stages.joint_row import exact_beliefs
-from semgrid_edu.occupancy import CmcdotParams, FilterState, Particles, State, predict, resample, update
+from semgrid_edu.occupancy import CmcdotParams, FilterState, Particles, State, WorldModel, predict, resample, update
 from semgrid_edu.occupancy.particles import cells_of, weight_in_cells
 
 FORGETTING = tuple(
     tuple(0.0 if state == State.DYNAMIC else rate for state, rate in zip(State, row, strict=True))
-    for row in CmcdotParams().rates
+    for row in WorldModel().rates
 )
 """The filter's default rates, but nothing is born moving."""
+
+NO_BIRTHS = 1e-9
+"""Share of the particles that is kept for births: in these worlds there are none."""
 
 LEFT_OR_RIGHT = CellsInARow(
     ({}, {"left": 0.5, "right": 0.5}, {"unknown": 0.5}, {"unknown": 1.0}), ("..x.", "...x"), FORGETTING
@@ -107,12 +109,13 @@ def particle_beliefs(world: CellsInARow, number: int, seed: int) -> NDArray[np.f
     (T, K, 5) float64
         Each cell's distribution given the scans up to each step; states in the order of `Cell`.
     """
-    rng, params = np.random.default_rng(seed), replace(world.params.world, particles=number)
+    rng, spending = np.random.default_rng(seed), CmcdotParams(n_particles=number, birth_share=NO_BIRTHS)
     state = _first_state(world, number, rng)
     beliefs = []
     for step in range(1, len(world.scans) + 1):
-        predicted = predict(state, world.spec, params, DT, rng)
-        state = resample(update(predicted, world.spec, world.evidence(step), params), world.spec, params, rng)
+        predicted = predict(state, world.spec, world.params.world, DT, rng)
+        updated = update(predicted, world.spec, world.evidence(step), world.params.world)
+        state = resample(updated, world.spec, spending, rng)
         beliefs.append(_by_cell(state, world))
     return np.array(beliefs)
 

@@ -13,14 +13,14 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical.stages.beam import BeamWorld, reflection
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
-    CmcdotParams,
     FilterState,
     State,
+    WorldModel,
     predict,
     transition_matrix,
     update,
 )
-from semgrid_edu.occupancy.evidence import likelihoods
+from semgrid_edu.occupancy.sensor import likelihoods
 
 CLASSES = ("road", "sidewalk", "car", "building")
 """What the semantic grid can say of a cell."""
@@ -45,7 +45,7 @@ RATES = (
     (0.0, 0.0, 0.0, 0.0),
 )
 
-PARAMS = CmcdotParams(rates=RATES, first_sight=(0.7, 0.2, 0.1))
+PARAMS = WorldModel(rates=RATES, first_sight=(0.7, 0.2, 0.1))
 """The filter knows the street: its rates, and how frequent the states are."""
 
 
@@ -63,7 +63,7 @@ class SystemWorld:
         P(a return from one of the cells is measured in the other).
     pixel_right : float
         P(the segmentation network names the class that the pixel sees); its errors are spread evenly.
-    params : CmcdotParams
+    params : WorldModel
         Rates of the street and of the filter, first sight, and p_hit of the scanner.
 
     Raises
@@ -76,7 +76,7 @@ class SystemWorld:
     dt: float = 0.5
     range_error: float = 0.05
     pixel_right: float = 0.8
-    params: CmcdotParams = PARAMS
+    params: WorldModel = PARAMS
 
     def __post_init__(self) -> None:
         """Refuse what can't be."""
@@ -140,7 +140,7 @@ class SystemWorld:
         return histories
 
 
-def _after(state: FilterState, scan: int, spec: GridSpec, params: CmcdotParams, dt: float) -> FilterState:
+def _after(state: FilterState, scan: int, spec: GridSpec, params: WorldModel, dt: float) -> FilterState:
     """Predict, then update each cell with what the scan says of it: a return, passed, or nothing behind a return."""
     obstacles = np.array([[scan == 0, scan == 1]]).astype(int)
     passed = np.array([[scan != 0, scan == 2]])

@@ -13,7 +13,7 @@ from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals
 from semgrid_edu.graphical.stages.cell import cell_given, exact_cell, one_cell, package_cell
 from semgrid_edu.graphical.stages.cell_scans import read_scans
 from semgrid_edu.graphical.stages.log_odds_cell import one_log_odds_cell, package_log_odds_cell
-from semgrid_edu.occupancy import CmcdotParams, LogOddsParams, State, transition_matrix
+from semgrid_edu.occupancy import LogOddsParams, State, WorldModel, transition_matrix
 
 PAIRS = st.tuples(*[st.floats(0.01, 1)] * 2) | st.just((1.0, 1.0))
 SCANS = st.lists(PAIRS, min_size=1, max_size=6)
@@ -31,7 +31,7 @@ def test_predict_and_update_are_the_forward_messages(scans, dt, start):
 
 def test_two_scans_by_hand():
     """Nobody has looked; a beam passes, then a return: first sight, evidence, transition, evidence."""
-    params = CmcdotParams()
+    params = WorldModel()
     first = np.array([*params.first_sight, 0]) * [0.7, 0.3, 0.3, 0.7]
     second = first / first.sum() @ transition_matrix(params, 0.1)
     second = (second + second[State.UNKNOWN] * np.array([*params.first_sight, -1])) * [0.05, 0.8, 0.8, 0.05]
@@ -54,7 +54,7 @@ def test_the_last_filtered_belief_is_the_posterior():
 def test_a_scan_never_changes_the_ratio_of_static_to_dynamic():
     stage = exact_cell(read_scans("..##"), start=(0.4, 0.4, 0.2, 0.0))
     before, after = stage.predicted[-1], stage.updated[-1]
-    revealed = before + before[State.UNKNOWN] * np.array([*CmcdotParams().first_sight, -1])
+    revealed = before + before[State.UNKNOWN] * np.array([*WorldModel().first_sight, -1])
     assert after[State.STATIC] / after[State.DYNAMIC] == pytest.approx(revealed[State.STATIC] / revealed[State.DYNAMIC])
 
 
