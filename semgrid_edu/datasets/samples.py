@@ -8,15 +8,12 @@ from semgrid_edu.datasets.kitti_raw import KittiRawDrive
 from semgrid_edu.datasets.training_cache import SEED
 from semgrid_edu.datasets.training_set import Sample, TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS
+from semgrid_edu.networks import IMAGE_STAGE, SEGMENTERS, WEIGHTS
 from semgrid_edu.storage.provenance import FILE_NAME, provenance_problems, write_provenance
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
 
 FRAMES = "frames.safetensors"
 """The file of an excerpt."""
-
-TRAINED = ("segnet", "fcn", "deeplab")
-"""The image networks of the shipped weights."""
 
 
 def samples_dir() -> Path:
@@ -43,13 +40,18 @@ def sample_drive() -> KittiRawDrive:
     return KittiRawDrive(samples_dir() / "sample", "2026_01_01", "0001")
 
 
+def trained_segmenters() -> list[str]:
+    """Return the names of the image networks in `SEGMENTERS` whose trained compact networks are shipped."""
+    return [name for name in SEGMENTERS if _trained_folder(name).is_dir()]
+
+
 def sample_weights(segmenter: str = "segnet") -> Path:
     """Return the file of a trained compact network, image network and fusion.
 
     Parameters
     ----------
     segmenter : str
-        Its image network: "segnet", "fcn" or "deeplab".
+        Name of its image network, one of `trained_segmenters`.
 
     Raises
     ------
@@ -65,8 +67,14 @@ def sample_image_stage(segmenter: str = "segnet") -> Path:
 
 
 def _trained(segmenter: str) -> Path:
-    if segmenter not in TRAINED:
-        raise ArgumentError("segmenter", f"one of {', '.join(TRAINED)}", repr(segmenter))
+    """Return the folder of a trained compact network, or refuse a name that has none."""
+    if segmenter not in (trained := trained_segmenters()):
+        raise ArgumentError("segmenter", f"one of {', '.join(trained)}", repr(segmenter))
+    return _trained_folder(segmenter)
+
+
+def _trained_folder(segmenter: str) -> Path:
+    """Return where the trained compact network with this image network is or would be shipped."""
     return samples_dir() / f"{segmenter}_compact"
 
 
