@@ -188,7 +188,7 @@ EQUATIONS = (
         "4.1",
         "Cross-entropy, weighted by class",
         literal="semgrid_edu.training.weighted_cross_entropy",
-        fast="semgrid_edu.training.Objective",
+        fast="semgrid_edu.training.loss.cross_entropy_sums",
         lecture="08_fusion#loss",
         exercise="08_fusion#weighted-loss",
     ),

@@ -14,7 +14,7 @@ class ResNet(nn.Module):
 
     A stage with stride 2 halves the map. The atrous algorithm leaves the stride out and instead dilates every later
     kernel by the stride that was left out. The values that the strided network would have given are still there,
-    unchanged, and so are the values between them. Parameters are named as in torchvision's `resnet101`, whose
+    unchanged, together with the values between them. Parameters are named as in torchvision's `resnet101`, whose
     strides are in the 3x3 convolutions.
 
     Parameters

@@ -131,9 +131,9 @@ def class_weights(dataset: Sequence[Sample], stage: str, n_classes: int, limit: 
 def weighted_cross_entropy(scores: ArrayLike, truth: ArrayLike, alpha: ArrayLike) -> float:
     """Compute the loss of section 4.1 literally: cross-entropy, weighted by class, of the labelled pixels or cells.
 
-    L = sum_j alpha_c(j) (-log g_c(j),j) / sum_j alpha_c(j), where j runs over the labelled cells, c(j) is the true
-    class of cell j, and g_c,j the probability that the soft-max over the scores of cell j gives to class c. It is the
-    mean of -log g, in which cells of a rare class have more weight.
+    L = sum_j alpha[c_j] (-log g_j[c_j]) / sum_j alpha[c_j], where j runs over the labelled cells, c_j is the true class
+    of cell j, and g_j the soft-max of its scores. It is a weighted mean of -log g, in which the cells of a rare class
+    have more weight.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def weighted_cross_entropy(scores: ArrayLike, truth: ArrayLike, alpha: ArrayLike
     Raises
     ------
     ArgumentError
-        When the shapes don't agree, or a number in `truth` is neither a class nor 255.
+        When the shapes don't agree, or `truth` holds something else than classes and 255.
 
     Examples
     --------
@@ -161,14 +161,15 @@ def weighted_cross_entropy(scores: ArrayLike, truth: ArrayLike, alpha: ArrayLike
     >>> round(weighted_cross_entropy(np.zeros((1, 2, 2)), [[0, 1]], alpha=[1, 3]), 3)
     0.693
     """
-    scores, truth, alpha = np.asarray(scores, dtype=np.float64), np.asarray(truth), np.asarray(alpha)
+    scores, alpha = (np.asarray(part, dtype=np.float64) for part in (scores, alpha))
+    truth = np.asarray(truth)
     _check_loss_inputs(scores, truth, alpha)
-    log_g = np.moveaxis(log_softmax(scores, axis=1), 1, -1)
     labelled = truth != IGNORE
-    c = truth[labelled].astype(np.int64)
-    minus_log_g = -np.take_along_axis(log_g[labelled], c[:, None], axis=1)[:, 0]
-    weight = alpha[c]
-    return float((weight * minus_log_g).sum() / weight.sum()) if weight.any() else 0.0
+    c = truth[labelled]
+    log_g = log_softmax(np.moveaxis(scores, 1, -1)[labelled], axis=1)  # one row per labelled cell, one column per class
+    weights = alpha[c]
+    losses = -log_g[np.arange(len(c)), c]
+    return float((weights * losses).sum() / weights.sum()) if weights.any() else 0.0
 
 
 def _check_loss_inputs(scores: NDArray, truth: NDArray, alpha: NDArray) -> None:
@@ -179,6 +180,8 @@ def _check_loss_inputs(scores: NDArray, truth: NDArray, alpha: NDArray) -> None:
     n_classes = scores.shape[1]
     if alpha.shape != (n_classes,):
         raise ArgumentError("alpha", f"shape ({n_classes},), one weight per class", f"shape {alpha.shape}")
+    if truth.dtype.kind not in "iu":
+        raise ArgumentError("truth", "integers, the numbers of classes", truth.dtype)
     wrong = truth[(truth != IGNORE) & ((truth < 0) | (truth >= n_classes))]
     if wrong.size:
         raise ArgumentError("truth", f"classes 0..{n_classes - 1} or {IGNORE}", wrong[0])
@@ -202,9 +205,9 @@ def cross_entropy_sums(scores: Tensor, truth: Tensor, alpha: Tensor) -> tuple[Te
     Returns
     -------
     losses : () float
-        sum_j alpha_c(j) (-log g_c(j),j), nats; with the gradient.
+        sum_j alpha[c_j] (-log g_j[c_j]), nats.
     weights : () float
-        sum_j alpha_c(j).
+        sum_j alpha[c_j]; it has no gradient.
     """
     scores = scores.to(torch.promote_types(scores.dtype, torch.float32))  # mixed precision sums in float32
     alpha, truth = alpha.to(scores), truth.long()
@@ -213,7 +216,7 @@ def cross_entropy_sums(scores: Tensor, truth: Tensor, alpha: Tensor) -> tuple[Te
 
 
 class Objective(nn.Module):
-    """What a stage of training makes small: the weighted cross-entropy of a batch, as its two sums.
+    """The objective of one stage of training: the weighted cross-entropy of a batch, as its two sums.
 
     It is a module because `DistributedDataParallel` works through the forward pass of a module.
 

@@ -113,6 +113,8 @@ def test_a_loss_of_what_does_not_fit_is_refused():
         weighted_cross_entropy(scores, np.zeros((2, 4), int), np.ones(3))
     with pytest.raises(ArgumentError, match=r"alpha: expected shape \(3,\), one weight per class, found shape \(4,\)"):
         weighted_cross_entropy(scores, np.zeros((2, 4, 5), int), np.ones(4))
+    with pytest.raises(ArgumentError, match=r"truth: expected integers, .*found float64"):
+        weighted_cross_entropy(scores, np.zeros((2, 4, 5)), np.ones(3))
     for wrong in (3, -1):
         with pytest.raises(ArgumentError, match=f"truth: expected classes 0..2 or 255, found {wrong}"):
             weighted_cross_entropy(scores, np.full((2, 4, 5), wrong), np.ones(3))
