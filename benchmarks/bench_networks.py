@@ -19,7 +19,7 @@ from torch.utils.flop_counter import FlopCounterMode
 
 from semgrid_edu.datasets.samples import sample_drive, sample_frames
 from semgrid_edu.datasets.training_set import Sample
-from semgrid_edu.networks import SEGMENTERS, Architecture, SemanticGridNet, build_net
+from semgrid_edu.networks import SEGMENTERS, Architecture, SemanticGridNet, build_net, unit_image
 from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.training.allocator import keep_freed_memory
 from semgrid_edu.training.batches import draw_batch, grid_logits, image_scores
@@ -74,7 +74,7 @@ def matrix_product_rate(size: int = 2048) -> float:
 def inference_time(net: SemanticGridNet) -> float:
     """Return the milliseconds from image and occupancy grid to logits."""
     frame = sample_frames()[0]
-    image, occupancy = frame.image[None] / 255, frame.occupancy[None]
+    image, occupancy = unit_image(frame.image[None]), frame.occupancy[None]
     with torch.inference_mode():
         return best_times([lambda: net(image, occupancy)], ROUNDS)[0]
 

@@ -134,7 +134,7 @@ def main() -> None:
     calibration = GridSpec.paper(), plane_heights(), kitti_camera()
     build = best_times([lambda: PlaneSampler(*plane_pixels(*calibration), KITTI_SIZE)], 5)[0]
     pixels, visible = plane_pixels(*calibration)
-    operator = sum(part.nbytes for part in PlaneSampler(pixels, visible, KITTI_SIZE).buffers()) / 1e6
+    operator = PlaneSampler(pixels, visible, KITTI_SIZE).operator.nbytes / 1e6
     grid = normalised(pixels, visible).nbytes / 1e6
     print(f"{len(visible)} planes, {visible.mean():.0%} visible")
     print(f"built from the calibration in {build:.0f} ms; {operator:.0f} MB (the grid of F.grid_sample: {grid:.0f} MB)")

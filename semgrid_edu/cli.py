@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer.core import TyperCommand
 
 from semgrid_edu.errors import ArgumentError, DataError
 
@@ -136,26 +137,38 @@ def build(folder: Annotated[Path, typer.Argument(help="A missing or empty folder
     typer.echo(f"{folder}: {len(assignments)} assignments, {', '.join(assignments)}; read {folder / 'README.md'}")
 
 
-@app.command()
+class _TrainCommand(TyperCommand):
+    """A command whose help names every image network: looked up when the help is shown, since that loads PyTorch."""
+
+    def format_help(self, ctx, formatter) -> None:
+        """Write the help."""
+        from semgrid_edu.networks import SEGMENTERS
+
+        (segmenter,) = (option for option in self.params if option.name == "segmenter")
+        segmenter.help = f"The image network: {', '.join(SEGMENTERS)}."
+        super().format_help(ctx, formatter)
+
+
+@app.command(cls=_TrainCommand)
 def train(
     data: Annotated[Path, typer.Option(help="A data set with train frames, such as data/minikitti.")],
     out: Annotated[Path, typer.Option(help="A folder for the weights, the log and their provenance.")],
-    segmenter: Annotated[str, typer.Option(help="The image network: segnet, fcn, deeplab or unet.")] = "segnet",
+    segmenter: Annotated[str, typer.Option(help="The image network.")] = "segnet",
     preset: Annotated[
         str, typer.Option(help="compact, or paper: published size, whole images, 0.2 m cells.")
     ] = "compact",
     imagenet: Annotated[
-        Path | None, typer.Option(help="VGG16 or ResNet-101 as safetensors: initial weights for --preset paper.")
+        Path | None, typer.Option(help="ImageNet weights (VGG16 or ResNet-101, safetensors) to start --preset paper.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed for the initial weights and the order of the frames.")] = 0,
-    iterations: Annotated[int, typer.Option(min=1, help="Number of steps of each of the two stages.")] = 2000,
+    iterations: Annotated[int, typer.Option(min=1, help="Steps of each of the two stages.")] = 2000,
     two_stage: Annotated[
-        bool, typer.Option("--two-stage", help="Keep the image network as it is in the second stage.")
+        bool, typer.Option("--two-stage", help="Keep the image network fixed while the fusion learns.")
     ] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue a training run that was interrupted.")] = False,
-    device: Annotated[str, typer.Option(help="auto (a GPU when there is one), cpu, cuda or cuda:N.")] = "auto",
+    resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was interrupted.")] = False,
+    device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu, cuda or cuda:N.")] = "auto",
 ) -> None:
-    """Train a network: its image network first, then all of it on the grid. torchrun runs it in several processes."""
+    """Train a network: first its image network, then all of it on grids. torchrun runs it in several processes."""
     from semgrid_edu.training.run import how_to_go_on, train_network, training_params
 
     params = training_params(preset, iterations, end_to_end=not two_stage, from_imagenet=imagenet is not None)

@@ -324,7 +324,7 @@ plt.show()
 
 # %%
 n_points, n_pixels = visible.size, np.prod(camera.size)
-bytes_sparse = sum(buffer.nbytes for buffer in sampler.buffers())
+bytes_sparse = sampler.operator.nbytes
 print(f"A: {n_points:,} x {n_pixels:,}, {100 * visible.mean():.0f} % of its rows have weights")
 print(
     f"as a full matrix {4 * n_points * n_pixels / 1e9:.0f} GB; sparse, with its transpose, {bytes_sparse / 1e6:.0f} MB"

@@ -43,7 +43,7 @@ from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 
 # %%
-from semgrid_edu.networks import SEGMENTERS, build_segmenter, load_net
+from semgrid_edu.networks import build_segmenter, load_net
 from semgrid_edu.networks.deeplab import interpolate
 from semgrid_edu.networks.fcn import enlarge
 from semgrid_edu.networks.imagenet import imagenet_tensors
@@ -739,7 +739,7 @@ def parameters(name, preset):
 
 
 print("                parameters   (paper)   field [pixels]   a score every ... pixels")
-for name in SEGMENTERS:
+for name in NAMES:
     sizes = f"{parameters(name, 'compact'):11,} {parameters(name, 'paper'):12,}"
     print(f"{NAMES[name]:<11} {sizes} {receptive_field(CHAINS[name])[0]:12.0f} {EVERY[name]:16}")
 

@@ -25,7 +25,8 @@ def pair_weights(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
     Returns
     -------
     (H W, H W) float64
-        What two cells of different labels cost, cells counted row by row. Zero on the diagonal: a cell is no pair.
+        The cost of two cells having different labels; cells are counted row by row. Zero on the diagonal, since a cell
+        is no pair with itself.
 
     Raises
     ------
@@ -48,7 +49,7 @@ def pair_weights(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
 
 
 def _gaussian(features: NDArray, normalization: str) -> NDArray[np.float64]:
-    """Return exp(-|f_i - f_j|^2 / 2) of all pairs, normalised."""
+    """Return exp(-|f_i - f_j|^2 / 2) for all pairs of the (N, d) features, normalised; (N, N)."""
     kernel = np.exp(-0.5 * cdist(features, features, "sqeuclidean"))
     if normalization == "symmetric":
         root = np.sqrt(kernel.sum(axis=1))
@@ -86,7 +87,7 @@ def energy(labels: ArrayLike, unary: ArrayLike, values: ArrayLike, params: CrfPa
 
     Examples
     --------
-    Two neighbouring cells in the same state, nothing but the spatial kernel: the price of a border is
+    Two neighbouring cells in the same state, and only the spatial kernel: the cost of a border between them is
     w2 exp(-1 / (2 sigma_gamma^2)).
 
     >>> values = np.full((4, 1, 2), 0.25)
@@ -117,8 +118,8 @@ def mean_field_naive(
         Q_i(l) = exp(-phi_u(l) - sum_{j != i} k_ij (1 - Q_j(l))) / Z_i
 
     which is iterated from Q_i(l) = exp(-phi_u(l)) / Z_i, all cells at once (Kraehenbuehl and Koltun 2011, algorithm 1).
-    Updated one after the other, cells would lower the free energy at every step; all at once they usually do, but two
-    cells that strongly attract each other can swap labels for ever.
+    If the cells were updated one after the other, no update could raise the free energy. Updating all at once usually
+    lowers it as well, but two cells that strongly attract each other can swap their labels for ever.
 
     Parameters
     ----------
@@ -129,7 +130,8 @@ def mean_field_naive(
     params : CrfParams
         Weights, widths and normalisation.
     iterations : int
-        Updates of all cells at once. Ten settle the labels, not every probability: single cells still move later.
+        Number of updates of all cells at once. After ten the labels have settled; probabilities of single cells still
+        change later.
 
     Returns
     -------

@@ -1,8 +1,9 @@
 """The permutohedral lattice: Gaussian filtering in many dimensions at the cost of a blur (Adams, Baek, Davis 2010).
 
-Every point lies in one simplex of a lattice whose corners are few where points are many. Its values are splatted onto
-the d + 1 corners, the corners blurred with (1/4, 1/2, 1/4) along each of the d + 1 lattice directions, and the result
-sliced back at the points. `simplices` holds the geometry.
+Every point lies in one simplex of a lattice; where points are dense, many of them share its corners. The values of
+the points are splatted onto the d + 1 corners of their simplices, the values of the corners are blurred with
+(1/4, 1/2, 1/4) along each of the d + 1 lattice directions, and the result is sliced, that is interpolated, at the
+points. The module `simplices` holds the geometry.
 """
 
 from dataclasses import dataclass, replace
@@ -25,25 +26,26 @@ from semgrid_edu.errors import ArgumentError
 
 @dataclass(frozen=True)
 class PermutohedralLattice:
-    """Sums over points, weighed by a Gaussian of the distance of their features; built once, used for many values.
+    """Sums over points, weighted by a Gaussian of the distance between their features.
 
-    The kernel is the literal exp(-|f_i - f_j|^2 / 2) up to the lattice's approximation: the blur has the Gaussian's
-    variance and integral but a finite reach, and what it moves to a corner without points is lost.
+    A lattice is built once for the features and then filters any number of values. Its kernel approximates
+    exp(-|f_i - f_j|^2 / 2): the blur has the variance and the integral of the Gaussian but a finite reach, and what it
+    moves to a corner without points is lost.
 
     Parameters
     ----------
     corners : (N, d + 1) int32
-        The lattice vertices around each point.
+        The numbers of the M lattice vertices at the corners of each point's simplex.
     slices : (N, d + 1) float32
-        What a point takes from each of its corners.
+        The weight with which a point takes the value of each of its corners.
     neighbours : (d + 1, 2, M) int32
-        The vertex one step forth and back along each direction; M where there is none.
+        The vertex one step forward and one step backward along each direction; M where there is none.
     starts : (M + 1,) int32
-        Where each vertex's share of the next two begins.
+        Where each vertex's part of `points` and `splats` begins, and where the last one ends.
     points, splats : (N (d + 1),) int32, float32
-        The points around each vertex, vertex after vertex, and what they give to it.
+        The points around each vertex, vertex after vertex, and the weights with which they add to it.
     diagonal : (N,) float32
-        How much of its own value each point gets back: k(f_i, f_i) as this lattice has it.
+        The share of its own value that each point gets back: k(f_i, f_i) of this lattice.
     """
 
     corners: NDArray[np.int32]
@@ -56,17 +58,17 @@ class PermutohedralLattice:
 
     @classmethod
     def build(cls, features: NDArray) -> "PermutohedralLattice":
-        """Embed points in the lattice.
+        """Place points in the lattice.
 
         Parameters
         ----------
         features : (N, d) float
-            The points, in units of the Gaussian's standard deviation.
+            One row per point, in units of the Gaussian's standard deviation.
 
         Returns
         -------
         PermutohedralLattice
-            Ready to filter.
+            Ready to filter values at these points.
 
         Raises
         ------
@@ -77,7 +79,7 @@ class PermutohedralLattice:
         if features.ndim != 2 or 0 in features.shape or not np.isfinite(features).all():
             raise ArgumentError("features", "finite numbers of shape (N, d)", f"shape {features.shape}")
         dimensions = features.shape[1]
-        # einsum, not @: the threads of BLAS would fight with numba's for the same cores.
+        # einsum, not @: the threads of BLAS would compete with numba's for the same cores.
         elevated = np.einsum("nd,jd->nj", features, elevation(dimensions))
         if np.abs(elevated).max() > 2**30:
             raise ArgumentError("features", "fewer standard deviations, or a larger sigma", np.abs(features).max())
@@ -97,17 +99,17 @@ class PermutohedralLattice:
         )
 
     def scaled(self, scale: NDArray) -> "PermutohedralLattice":
-        """Fold a factor of each point into the kernel: diag(scale) K diag(scale).
+        """Return the lattice of the kernel diag(scale) K diag(scale).
 
         Parameters
         ----------
         scale : (N,) float
-            The factors.
+            One factor per point.
 
         Returns
         -------
         PermutohedralLattice
-            The same lattice with other weights.
+            The same vertices with other weights.
         """
         scale = scale.astype(np.float32)
         return replace(
@@ -123,7 +125,7 @@ class PermutohedralLattice:
         Parameters
         ----------
         values : (N, K) float32
-            One row a point.
+            One row per point.
 
         Returns
         -------
@@ -138,7 +140,7 @@ class PermutohedralLattice:
 
 @njit(cache=True, parallel=True, fastmath=True)
 def _splat(values, starts, points, weights):
-    """Gather, at each vertex, what its points give: (M + 1, K), the last row zero for neighbours that aren't there."""
+    """Sum at each vertex what its points add: (M + 1, K); the last row is zero and stands for missing neighbours."""
     n_vertices = len(starts) - 1
     out = np.zeros((n_vertices + 1, values.shape[1]), np.float32)
     for v in prange(n_vertices):
@@ -150,7 +152,7 @@ def _splat(values, starts, points, weights):
 
 @njit(cache=True, parallel=True, fastmath=True)
 def _blur(values, forth, back):
-    """Blur along one direction with (1/4, 1/2, 1/4)."""
+    """Blur (M + 1, K) values along one direction with (1/4, 1/2, 1/4), given each vertex's two neighbours."""
     out = np.zeros_like(values)
     for v in prange(len(forth)):
         for k in range(values.shape[1]):
@@ -160,7 +162,7 @@ def _blur(values, forth, back):
 
 @njit(cache=True, parallel=True, fastmath=True)
 def _slice(values, corners, weights):
-    """Interpolate each point's value from its corners."""
+    """Interpolate the values at the N points from their corners: (M + 1, K) -> (N, K)."""
     out = np.zeros((len(corners), values.shape[1]), np.float32)
     for i in prange(len(corners)):
         for corner in range(corners.shape[1]):

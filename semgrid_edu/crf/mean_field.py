@@ -12,25 +12,27 @@ from semgrid_edu.crf.params import CrfParams, check_inputs, check_iterations
 from semgrid_edu.crf.spatial import SeparableGaussian
 
 LANES = 16
-"""The class axis is padded to a multiple of this: 16 floats fill a cache line, and loops over them vectorise."""
+"""The class axis is padded to a multiple of this number: 16 floats fill a cache line, and loops over them vectorise."""
 
 _NEVER = 1e30
-"""A unary that stands for infinity: inf - inf can't happen, and exp(-1e30) is 0."""
+"""A unary in place of infinity: it avoids inf - inf, which is NaN, and exp(-1e30) is 0."""
 
 _ZERO_SUM_STATES = np.array([[1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1]]) / 2
-"""An orthonormal basis of the space orthogonal to (1, 1, 1, 1): since states sum to one, it keeps every distance."""
+"""An orthonormal basis of the space orthogonal to (1, 1, 1, 1). The four probabilities sum to one, so three numbers in
+this basis keep every distance between the states of two cells."""
 
 
 class Kernel(Protocol):
-    """One term of eq. (4) as a filter: call it for sum_j k_ij values_j; `diagonal` holds the k_ii in it."""
+    """One term of eq. (4) as a filter over N cells: a call returns sum_j k_ij values_j; `diagonal` holds k_ii, (N,)."""
 
     diagonal: NDArray[np.float32]
 
-    def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]: ...
+    def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return sum_j k_ij values_j for each cell i, (N, K) -> (N, K)."""
 
 
 def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice:
-    """Build the first kernel of eq. (4), on place and occupancy, with weight and normalisation folded in.
+    """Build the first kernel of eq. (4), on place and occupancy, including its weight and normalisation.
 
     Parameters
     ----------
@@ -42,7 +44,7 @@ def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice
     Returns
     -------
     PermutohedralLattice
-        Over H W points in five dimensions: two of place, three of state.
+        Of H W points in five dimensions: two for the place, three for the state.
     """
     place = np.indices(values.shape[1:]) / params.sigma_alpha
     state = np.einsum("ks,shw->khw", _ZERO_SUM_STATES, values) / params.sigma_beta
@@ -56,8 +58,9 @@ def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice
 def mean_field(unary: ArrayLike, values: ArrayLike, params: CrfParams, iterations: int = 10) -> NDArray[np.float32]:
     """Approximate the CRF's marginals by mean field, fast (eq. (3), (4)); the twin of `mean_field_naive`.
 
-    The sum over all pairs becomes two filters: the spatial one exact (`SeparableGaussian`), the bilateral one on the
-    permutohedral lattice, whose kernel is only nearly Gaussian. What a cell would tell itself is taken off again.
+    The sum over all pairs becomes two filters: the spatial one is exact (`SeparableGaussian`), the bilateral one uses
+    the permutohedral lattice, whose kernel is only nearly Gaussian. Filters include the cell itself, which is no
+    pair, so its own contribution is subtracted.
 
     Parameters
     ----------
@@ -68,7 +71,8 @@ def mean_field(unary: ArrayLike, values: ArrayLike, params: CrfParams, iteration
     params : CrfParams
         Weights, widths and normalisation.
     iterations : int
-        Updates of all cells at once. Ten settle the labels, not every probability: single cells still move later.
+        Number of updates of all cells at once. After ten the labels have settled; probabilities of single cells still
+        change later.
 
     Returns
     -------
@@ -88,24 +92,24 @@ def mean_field(unary: ArrayLike, values: ArrayLike, params: CrfParams, iteration
 
 
 def iterate(phi: NDArray[np.float32], kernels: Sequence[Kernel], iterations: int) -> NDArray[np.float32]:
-    """Run the mean-field update, given any kernels.
+    """Run the mean-field update with any kernels.
 
-    Since sum_l Q_j(l) = 1, the cost of disagreeing, sum_j k_ij (1 - Q_j(l)), is the reward of agreeing,
-    -sum_j k_ij Q_j(l), up to a number that is the same for all classes.
+    The cost of disagreeing, sum_j k_ij (1 - Q_j(l)), differs from the negative reward of agreeing,
+    -sum_j k_ij Q_j(l), only by sum_j k_ij, which is the same for all classes and cancels in the soft-max.
 
     Parameters
     ----------
     phi : (N, K) float32
-        The unary term, finite, at least 0 and 0 for the best class of each cell.
+        The unary term, finite, at least 0, and 0 for the best class of each cell.
     kernels : sequence of Kernel
-        What eq. (4) sums.
+        The terms of eq. (4).
     iterations : int
-        Updates.
+        Number of updates of all cells at once.
 
     Returns
     -------
     (N, K) float32
-        Q.
+        Q, the distribution over classes in each cell.
     """
     self_weight = sum(kernel.diagonal for kernel in kernels)
     Q = _softmax(-phi)
@@ -116,7 +120,7 @@ def iterate(phi: NDArray[np.float32], kernels: Sequence[Kernel], iterations: int
 
 
 def _in_lanes(unary: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Return the unary term as (N, K), best class 0, classes padded with ones that never win."""
+    """Return the unary term as (N, K), 0 for the best class; the classes are padded with impossible ones."""
     n_classes = len(unary)
     phi = np.full((unary[0].size, -(-n_classes // LANES) * LANES), _NEVER, np.float32)
     phi[:, :n_classes] = np.minimum(unary - unary.min(axis=0), _NEVER).reshape(n_classes, -1).T
@@ -125,7 +129,7 @@ def _in_lanes(unary: NDArray[np.float64]) -> NDArray[np.float32]:
 
 @njit(cache=True, parallel=True, fastmath=True)
 def _logits(reward, self_weight, Q, phi):
-    """Return log Q_i(l) up to a number a cell: what the others say, without the cell itself, less the unary term."""
+    """Return log Q_i(l) up to one number per cell: the reward without the cell's own part, minus the unary term."""
     out = np.empty_like(Q)
     for i in prange(len(Q)):
         for k in range(Q.shape[1]):
@@ -134,7 +138,7 @@ def _logits(reward, self_weight, Q, phi):
 
 
 def _softmax(logits: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return exp(logits) over its sum along the class axis; overwrites its argument."""
+    """Return the soft-max along the class axis, (N, K); overwrites its argument."""
     _subtract_best(logits)
     np.exp(logits, out=logits)  # numpy's exp is vectorised, numba's isn't
     _normalise(logits)

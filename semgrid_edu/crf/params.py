@@ -20,20 +20,23 @@ class CrfParams:
     Parameters
     ----------
     w_bilateral, w_spatial : float
-        w1 and w2, the weights of the two kernels. 4 and 3: Kraehenbuehl and Koltun's published code takes 10 and 3
-        for images; ours trusts occupancy less than colour, because many classes share a state.
+        w1 and w2, the weights of the two kernels. The defaults are 4 and 3. Kraehenbuehl and Koltun's published code
+        takes 10 and 3 for images; occupancy gets less weight here than colour does there, because many classes share
+        a state.
     sigma_alpha : float
-        Reach of the bilateral kernel, in cells: 8 are 1.6 m in the paper's grid, the width of a car.
+        Width of the bilateral kernel in space, cells: 8 cells are 1.6 m in the paper's grid, the width of a car.
     sigma_beta : float
-        Reach of the bilateral kernel in state probability. Two certain, different states lie sqrt(2) apart, seven times
-        0.2, and don't talk to each other; a cell that is 90 % free still hears one that is certainly free.
+        Width of the bilateral kernel in state probability. Two certain, different states lie sqrt(2) apart, which is
+        seven times 0.2, so such cells hardly influence each other; a cell that is 90 % free is still influenced by a
+        cell that is certainly free.
     sigma_gamma : float
-        Reach of the spatial kernel, in cells: 3, as in Kraehenbuehl and Koltun's published code, removes specks.
+        Width of the spatial kernel, cells: 3, as in Kraehenbuehl and Koltun's published code, removes single wrong
+        cells.
     normalization : {"symmetric", "none"}
         "symmetric" replaces each kernel K (its diagonal, 1, included) by D^-1/2 K D^-1/2 with D its row sums, as
-        Kraehenbuehl's code does by default: every cell hears about as much, so the weights don't depend on the
-        sigmas or on how common a cell's state is. "none" is eq. (4) as printed: hundreds of neighbours speak at full
-        weight, which over-smooths.
+        Kraehenbuehl's code does by default: every cell receives about the same total weight, so the weights don't
+        depend on the sigmas or on how common a cell's state is. "none" is eq. (4) as printed: hundreds of neighbours
+        count with full weight, which over-smooths.
 
     Raises
     ------
@@ -50,12 +53,17 @@ class CrfParams:
 
     @classmethod
     def for_cells(cls, cell: float) -> "CrfParams":
-        """Return the defaults for cells of another size: what reaches 1.6 m and 0.6 m shall do so in any grid.
+        """Return the defaults for cells of another size: the kernels reach 1.6 m and 0.6 m in any grid.
 
         Parameters
         ----------
         cell : float
             Side of a cell, metres; the defaults are for the paper's 0.2.
+
+        Returns
+        -------
+        CrfParams
+            Its sigmas in cells of that size.
 
         Examples
         --------
@@ -66,7 +74,7 @@ class CrfParams:
         return cls(sigma_alpha=cls.sigma_alpha * scale, sigma_gamma=cls.sigma_gamma * scale)
 
     def __post_init__(self) -> None:
-        """Refuse what eq. (4) has no meaning for."""
+        """Refuse numbers for which eq. (4) has no meaning."""
         for name in ("w_bilateral", "w_spatial"):
             weight = getattr(self, name)
             if not (np.isfinite(weight) and weight >= 0):
@@ -85,7 +93,7 @@ def unary_from_probability(probability: ArrayLike) -> NDArray[np.float64]:
     Parameters
     ----------
     probability : (C, ...) float
-        The distribution over classes (the soft-max of the network's scores) of each cell.
+        The distribution over the classes in each cell (the soft-max of the network's scores).
 
     Returns
     -------
@@ -110,7 +118,7 @@ def unary_from_probability(probability: ArrayLike) -> NDArray[np.float64]:
 
 
 def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return unary (C, H, W) and values (4, H, W) as float64, or refuse them.
+    """Return unary (C, H, W) and values (4, H, W) as float64, after checking them.
 
     Raises
     ------
@@ -132,12 +140,12 @@ def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float6
 
 
 def check_iterations(iterations: int) -> None:
-    """Refuse a number of iterations that can't be counted.
+    """Refuse a number of iterations that isn't a whole number of at least 0.
 
     Raises
     ------
     ArgumentError
-        When it isn't a whole number of at least 0.
+        When it is negative or no whole number.
     """
     if not isinstance(iterations, int | np.integer) or iterations < 0:
         raise ArgumentError("iterations", "a whole number of at least 0", iterations)

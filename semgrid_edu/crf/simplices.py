@@ -1,7 +1,8 @@
-"""Points in the permutohedral lattice: their simplices, its vertices and who is next to whom (Adams, Baek, Davis 2010).
+"""Points in the permutohedral lattice: their simplices, its vertices and their neighbours (Adams, Baek, Davis 2010).
 
-The lattice lies in the plane of zero sum of d + 1 dimensions. A vertex is d + 1 integers that sum to zero and have one
-remainder modulo d + 1; a step in direction j adds one to all of them but takes d from the j-th.
+The lattice lies in the hyperplane of d + 1 dimensions in which the coordinates sum to zero. A vertex is d + 1 integers
+that sum to zero and have the same remainder modulo d + 1; a step in direction j adds one to all of them except the
+j-th, from which it takes d.
 """
 
 import numpy as np
@@ -12,9 +13,10 @@ _FORTH, _BACK = 0, 1
 
 
 def elevation(d: int) -> NDArray[np.float64]:
-    """Return the (d + 1, d) map onto the plane of zero sum, scaled so that the whole filter has unit variance.
+    """Return the (d + 1, d) matrix from d features to the hyperplane of zero sum.
 
-    Splat and slice have variance (d + 1)^2 / 12 along each axis, the blur (d + 1)^2 / 2 (Adams 2010, section 3.1).
+    It is scaled so that the whole filter has unit variance: splat and slice have variance (d + 1)^2 / 12 along each
+    axis, the blur (d + 1)^2 / 2 (Adams 2010, section 3.1).
     """
     basis = np.zeros((d + 1, d))
     for j in range(d):
@@ -24,7 +26,7 @@ def elevation(d: int) -> NDArray[np.float64]:
 
 
 def peak(d: int) -> float:
-    """Return the factor that gives the filter the Gaussian's integral, (2 pi)^(d/2).
+    """Return the factor that gives the filter of d features the integral of the Gaussian, (2 pi)^(d/2).
 
     Without it the integral is the volume of feature space that belongs to one vertex, (3/2)^(d/2) / sqrt(d + 1).
     """
@@ -33,7 +35,22 @@ def peak(d: int) -> float:
 
 @njit(cache=True, parallel=True)
 def enclosing_simplices(elevated):
-    """Find each point's simplex: its corner of remainder 0, the order of the coordinates, barycentric weights."""
+    """Find the simplex around each point.
+
+    Parameters
+    ----------
+    elevated : (N, d + 1) float
+        The points on the hyperplane of zero sum, see `elevation`.
+
+    Returns
+    -------
+    origins : (N, d + 1) int32
+        The corner of the simplex whose coordinates have remainder 0 modulo d + 1.
+    ranks : (N, d + 1) int32
+        The rank of each coordinate's distance from that corner, 0 for the largest; it names the simplex at the corner.
+    weights : (N, d + 1) float64
+        The barycentric weights of the corners with remainders 0 .. d; they sum to 1.
+    """
     n_points, size = elevated.shape
     origins = np.empty((n_points, size), np.int32)
     ranks = np.zeros((n_points, size), np.int32)
@@ -50,7 +67,7 @@ def enclosing_simplices(elevated):
                     ranks[i, k] += 1
                 else:
                     ranks[i, j] += 1
-        # Rounding left the plane of zero sum: move the coordinates that were rounded the farthest.
+        # Rounding left the hyperplane of zero sum: move the coordinates that were rounded the farthest.
         for j in range(size):
             ranks[i, j] += excess
             if ranks[i, j] < 0:
@@ -79,7 +96,7 @@ def _differ(a, b):
 
 @njit(cache=True)
 def _lookup(key, keys, slots):
-    """Return the slot of the hash table that holds this key, or the empty one where it belongs."""
+    """Return the slot of the hash table that holds this key, or the empty slot where the key belongs."""
     code = np.uint64(0)
     for j in range(len(key) - 1):  # the last coordinate follows from the others: they sum to zero
         code = (code + np.uint64(key[j])) * np.uint64(0x9E3779B97F4A7C15)
@@ -92,7 +109,22 @@ def _lookup(key, keys, slots):
 
 @njit(cache=True)
 def number_vertices(origins, ranks):
-    """Give a number to each distinct corner: return (N, d + 1) numbers, (M, d + 1) keys and the hash table."""
+    """Give a number to each distinct corner, which makes it a vertex.
+
+    Parameters
+    ----------
+    origins, ranks : (N, d + 1) int32
+        The simplex around each point, see `enclosing_simplices`.
+
+    Returns
+    -------
+    corners : (N, d + 1) int32
+        The numbers of the vertices at the corners of each simplex.
+    keys : (M, d + 1) int32
+        The coordinates of each vertex.
+    slots : (2^k,) int32
+        A hash table from coordinates to numbers; -1 in empty slots.
+    """
     n_points, size = origins.shape
     corners = np.empty((n_points, size), np.int32)
     keys = np.empty((n_points * size, size), np.int32)
@@ -117,7 +149,10 @@ def number_vertices(origins, ranks):
 
 @njit(cache=True, parallel=True)
 def find_neighbours(keys, slots):
-    """Return the (d + 1, 2, M) vertices one step forth and back along each direction; M where there is none."""
+    """Find the vertices one step forward and one step backward along each direction, (d + 1, 2, M) int32.
+
+    Where there is no vertex stands M. The arguments are two of the results of `number_vertices`.
+    """
     n_vertices, size = keys.shape
     neighbours = np.full((size, 2, n_vertices), n_vertices, np.int32)
     for v in prange(n_vertices):
@@ -134,7 +169,7 @@ def find_neighbours(keys, slots):
 
 @njit(cache=True)
 def _walk(vertex, a, b, shift, ranks, neighbours):
-    """Return the weight of one of the blur's paths from a simplex's corner a, the given vertex, to its corner b."""
+    """Return the weight of one path of the blur from corner a of a simplex, the given vertex, to its corner b."""
     size = len(ranks)
     weight = 1.0
     for direction in range(size):
@@ -151,10 +186,26 @@ def _walk(vertex, a, b, shift, ranks, neighbours):
 
 @njit(cache=True, parallel=True)
 def self_responses(corners, ranks, weights, neighbours):
-    """Return the (N,) diagonal of the filter, without its peak factor: paths between corners of the same simplex.
+    """Compute what share of its own value the filter gives back to each point, without the factor of `peak`.
 
-    From corner a to b > a leads one step along each coordinate whose rank is d - a down to d - b + 1. Since one step
-    along all d + 1 directions leads nowhere, so does that path with every step raised or lowered by one.
+    A point's value reaches it again over the paths of the blur between corners of its simplex. The path from corner a
+    to b > a makes one step along each coordinate whose rank is d - a down to d - b + 1. One step along all d + 1
+    directions together leads back to where it began; so raising or lowering every step of a path by one gives a further
+    path to the same corner.
+
+    Parameters
+    ----------
+    corners : (N, d + 1) int32
+        The vertices around each point, see `number_vertices`.
+    ranks, weights : (N, d + 1) int32, float64
+        Order of the coordinates and barycentric weights, see `enclosing_simplices`.
+    neighbours : (d + 1, 2, M) int32
+        See `find_neighbours`.
+
+    Returns
+    -------
+    (N,) float32
+        The diagonal of the filter.
     """
     n_points, size = corners.shape
     diagonal = np.zeros(n_points, np.float32)
@@ -169,7 +220,11 @@ def self_responses(corners, ranks, weights, neighbours):
 
 @njit(cache=True)
 def sort_by_vertex(vertices, n_vertices):
-    """Sort the corners by the vertex they are (counting sort): where each vertex starts, and the sorted corners."""
+    """Sort corners by their vertices (counting sort), given the vertex of each corner and the number M of vertices.
+
+    Returns where the corners of each vertex begin, and where the last ones end, (M + 1,) int32, and the indices of the
+    corners, vertex after vertex, (N (d + 1),) int32.
+    """
     starts = np.zeros(n_vertices + 1, np.int32)
     for v in vertices:
         starts[v + 1] += 1

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class SeparableGaussian:
-    """Sums over all cells of a grid, weighed by exp(-|c_i - c_j|^2 / (2 sigma^2)): a convolution along each axis.
+    """Sums over all cells of a grid, weighted by exp(-|c_i - c_j|^2 / (2 sigma^2)): one convolution along each axis.
 
     Parameters
     ----------
     taps : (R + 1,) float32
-        The Gaussian at distances 0 to R cells. R is 5 sigma; beyond lies less than a millionth of the weight.
+        The Gaussian at distances of 0 to R cells. R is 5 sigma; less than a millionth of the weight lies beyond.
     row_scale, column_scale : (H,), (W,) float32
-        Normalisation and weight: k_ij is the Gaussian times both scales of cell i and both of cell j.
+        Normalisation and weight: k_ij is the Gaussian times both scales of cell i and both scales of cell j.
     """
 
     taps: NDArray[np.float32]
@@ -25,25 +25,26 @@ class SeparableGaussian:
 
     @classmethod
     def build(cls, shape: tuple[int, int], sigma: float, weight: float, normalization: str) -> "SeparableGaussian":
-        """Compute the taps, and the scales that fold weight and normalisation in.
+        """Compute the taps, and the scales that hold weight and normalisation.
 
-        The row sums of the whole kernel are products of those of the two axes, so each is normalised by itself.
+        The row sums of the whole kernel are products of the row sums of the two axes, so each axis is normalised by
+        itself.
 
         Parameters
         ----------
         shape : (int, int)
-            H and W.
+            H and W, the number of rows and columns of the grid.
         sigma : float
-            Width, in cells.
+            Width of the Gaussian, cells.
         weight : float
             Factor of the whole kernel.
         normalization : {"symmetric", "none"}
-            See `CrfParams`.
+            How the kernel is normalised, see `CrfParams`.
 
         Returns
         -------
         SeparableGaussian
-            Ready to filter.
+            Ready to filter values on such a grid.
         """
         reach = int(min(np.ceil(5 * sigma), max(shape) - 1))
         taps = np.exp(-0.5 * (np.arange(reach + 1) / sigma) ** 2)
@@ -55,7 +56,7 @@ class SeparableGaussian:
 
     @property
     def diagonal(self) -> NDArray[np.float32]:
-        """What each cell gets back of its own value, (H W,)."""
+        """k_ii, the share of its own value that each cell gets back, (H W,)."""
         return np.outer(self.row_scale**2, self.column_scale**2).ravel()
 
     def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -64,7 +65,7 @@ class SeparableGaussian:
         Parameters
         ----------
         values : (H W, K) float32
-            One row a cell, cells counted row by row.
+            One row per cell, cells counted row by row.
 
         Returns
         -------
@@ -77,15 +78,15 @@ class SeparableGaussian:
 
 
 def _row_sums(size: int, sigma: float) -> NDArray[np.float64]:
-    """Return the row sums of the Gaussian between all cells of one axis."""
+    """Return the row sums of the Gaussian between all cells of one axis, (size,)."""
     place = np.arange(size) / sigma
     return np.exp(-0.5 * np.subtract.outer(place, place) ** 2).sum(axis=1)
 
 
-# Loops, though BLAS has matrix products: its threads and numba's would fight for the same cores.
+# Loops, though BLAS has matrix products: its threads would compete with numba's for the same cores.
 @njit(cache=True, parallel=True, fastmath=True)
 def _convolve(values, lanes, taps, row_scale, column_scale):
-    """Convolve (H, W K) values, K lanes a cell, along both axes; the scale of columns is W K long too."""
+    """Convolve (H, W K) values, K per cell, along both axes; `column_scale` repeats each column's scale K times."""
     height, length = values.shape
     reach = len(taps) - 1
     out = np.empty_like(values)

@@ -8,15 +8,12 @@ from semgrid_edu.datasets.kitti_raw import KittiRawDrive
 from semgrid_edu.datasets.training_cache import SEED
 from semgrid_edu.datasets.training_set import Sample, TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS
+from semgrid_edu.networks import IMAGE_STAGE, SEGMENTERS, WEIGHTS
 from semgrid_edu.storage.provenance import FILE_NAME, provenance_problems, write_provenance
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
 
 FRAMES = "frames.safetensors"
 """Name of the file that holds an excerpt."""
-
-TRAINED = ("segnet", "fcn", "deeplab")
-"""The image networks whose trained weights are shipped."""
 
 
 def samples_dir() -> Path:
@@ -43,13 +40,18 @@ def sample_drive() -> KittiRawDrive:
     return KittiRawDrive(samples_dir() / "sample", "2026_01_01", "0001")
 
 
+def trained_segmenters() -> list[str]:
+    """Return the names of the image networks in `SEGMENTERS` whose trained compact networks are shipped."""
+    return [name for name in SEGMENTERS if _trained_folder(name).is_dir()]
+
+
 def sample_weights(segmenter: str = "segnet") -> Path:
     """Return the file of a trained compact network, from image and occupancy grid to semantic grid.
 
     Parameters
     ----------
     segmenter : str
-        Its image network, one of `TRAINED`.
+        Name of its image network, one of `trained_segmenters`.
 
     Returns
     -------
@@ -69,7 +71,7 @@ def sample_image_stage(segmenter: str = "segnet") -> Path:
     Parameters
     ----------
     segmenter : str
-        Its image network, one of `TRAINED`.
+        Name of its image network, one of `trained_segmenters`.
 
     Returns
     -------
@@ -84,8 +86,14 @@ def sample_image_stage(segmenter: str = "segnet") -> Path:
 
 
 def _trained(segmenter: str) -> Path:
-    if segmenter not in TRAINED:
-        raise ArgumentError("segmenter", f"one of {', '.join(TRAINED)}", repr(segmenter))
+    """Return the folder of a trained compact network, or refuse a name that has none."""
+    if segmenter not in (trained := trained_segmenters()):
+        raise ArgumentError("segmenter", f"one of {', '.join(trained)}", repr(segmenter))
+    return _trained_folder(segmenter)
+
+
+def _trained_folder(segmenter: str) -> Path:
+    """Return where the trained compact network with this image network is or would be shipped."""
     return samples_dir() / f"{segmenter}_compact"
 
 

@@ -14,7 +14,7 @@ import torch
 from semgrid_edu.datasets.samples import sample_drive, sample_frames
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.metrics import confusion_matrix, pixel_accuracy
-from semgrid_edu.networks import SEGMENTERS, Architecture, SemanticGridNet, build_net
+from semgrid_edu.networks import SEGMENTERS, Architecture, SemanticGridNet, build_net, unit_image
 from semgrid_edu.storage.provenance import versions
 from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.training.log import LOG, read_log
@@ -124,7 +124,7 @@ def network_accuracy(net: SemanticGridNet, frames: Sequence[Sample], training: b
         Share of labelled cells that are called right, 0..1.
     """
     image, occupancy = (torch.stack(parts) for parts in zip(*((f.image, f.occupancy) for f in frames), strict=True))
-    logits = deepcopy(net).train(training)(image / 255, occupancy)
+    logits = deepcopy(net).train(training)(unit_image(image), occupancy)
     truth = np.stack([frame.truth.numpy() for frame in frames])
     return pixel_accuracy(confusion_matrix(truth, logits.argmax(1).numpy(), net.n_classes))
 

@@ -123,7 +123,7 @@ def passing_cars(step: int) -> list[Box]:
     return [Box.around(3 + travelled, -1, 2, 1, 1.5), Box.around(13 - travelled, 1, 2, 1, 1.5)]
 
 
-def evidence_of(boxes: list[Box]) -> Evidence:
+def evidence_of_boxes(boxes: list[Box]) -> Evidence:
     """Return the evidence of a scan that hits each cell of the boxes once, and passes through every other cell.
 
     Parameters
@@ -171,7 +171,7 @@ def run_bof() -> Iterator[tuple[NDArray, NDArray]]:
     remainder = np.zeros((len(lattice), 2))
     state = BofState(belief[State.FREE], belief[State.UNKNOWN], occupied, lattice.velocities, remainder)
     for step in range(1, STEPS + 1):
-        state = bof_update(bof_predict(state, SPEC, PARAMS, DT), SPEC, evidence_of(passing_cars(step)), PARAMS)
+        state = bof_update(bof_predict(state, SPEC, PARAMS, DT), SPEC, evidence_of_boxes(passing_cars(step)), PARAMS)
         yield state.probability[State.DYNAMIC], bof_velocity(state)[0]
 
 
@@ -196,7 +196,9 @@ def run_cmcdot(number: int, seed: int) -> Iterator[tuple[NDArray, NDArray]]:
     state = _first_particles(number, rng)
     for step in range(1, STEPS + 1):
         predicted = predict(state, SPEC, PARAMS.world, DT, rng)
-        state = resample(update(predicted, SPEC, evidence_of(passing_cars(step)), PARAMS.world), SPEC, spending, rng)
+        state = resample(
+            update(predicted, SPEC, evidence_of_boxes(passing_cars(step)), PARAMS.world), SPEC, spending, rng
+        )
         cells = cells_of(state.particles.position, SPEC)
         yield state.probability[State.DYNAMIC], velocity_moments(state.particles, cells, SPEC.shape)[0]
 

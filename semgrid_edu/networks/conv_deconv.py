@@ -12,28 +12,29 @@ from semgrid_edu.errors import ArgumentError
 
 
 def conv_bn_relu(n_in: int, n_out: int) -> nn.Sequential:
-    """Return one layer of Fig. 5: 3x3 convolution, batch normalisation, ReLU; the size stays."""
+    """Return one layer of Fig. 5: 3x3 convolution, batch normalisation, ReLU; the size of the map stays."""
     return nn.Sequential(nn.Conv2d(n_in, n_out, 3, padding=1), nn.BatchNorm2d(n_out), nn.ReLU(inplace=True))
 
 
 class ConvDeconv(nn.Module):
-    """Encode by convolutions and max-pooling, decode by unpooling to where the maxima were.
+    """Encode a map by convolutions and max-pooling; decode it by unpooling to where the maxima were, and convolutions.
 
     Each of the S stages halves the map on the way down and restores it on the way up. The decoder has as many
-    layers as the encoder, in reverse order, and its last one gives the result, without normalisation or ReLU.
-    Pooling forgets where in its 2x2 window the maximum was; the indices, kept from the way down, put it back,
-    so that borders stay sharp without any weights (Badrinarayanan, Kendall and Cipolla, SegNet, PAMI 2017).
+    layers as the encoder, in reverse order, and its last layer gives the result, without normalisation or ReLU.
+    A pooled map doesn't say where in its 2x2 window each maximum was. The indices, kept from the way down, put the
+    values back there, so that borders stay sharp without any weights (Badrinarayanan, Kendall and Cipolla, SegNet,
+    PAMI 2017).
 
     Parameters
     ----------
     n_in, n_out : int
-        Channels of the input and of the result.
+        Number of channels of the input and of the result.
     widths : (S,) int
-        Channels of each stage.
+        Number of channels in each stage.
     depths : (S,) int
-        Convolutions of each stage, on the way down and again on the way up.
+        Number of convolutions in each stage, on the way down and again on the way up.
     skips : bool
-        Whether each decoder stage also sees what its encoder stage saw before pooling (Ronneberger, Fischer
+        Whether each decoder stage also sees the map that its encoder stage had before pooling (Ronneberger, Fischer
         and Brox, U-Net, 2015).
     """
 
@@ -59,7 +60,7 @@ class ConvDeconv(nn.Module):
         Raises
         ------
         ArgumentError
-            When a side is smaller than 2^S: halved S times, nothing would be left of it.
+            When a side is smaller than 2^S: after S halvings nothing would be left of it.
         """
         smallest = 2 ** len(self.encoder)
         if min(x.shape[2:]) < smallest:
@@ -79,40 +80,46 @@ class ConvDeconv(nn.Module):
 
 
 def _layers(channels: list[int], plain_end: bool = False) -> list[nn.Module]:
-    """Return the layers that lead from each number of channels to the next."""
+    """Return the layers from each number of channels to the next; with `plain_end` the last is a convolution alone."""
     layers = [conv_bn_relu(n_in, n_out) for n_in, n_out in pairwise(channels)]
     return [*layers[:-1], layers[-1][0]] if plain_end else layers
 
 
 @contextmanager
 def fresh_weights(net: nn.Module, seed: int) -> Iterator[None]:
-    """Build layers inside, and their weights depend on the seed alone; the global generator stays as it was.
+    """Make layers inside the block, and their weights depend on the seed alone.
 
-    PyTorch's layers draw their first weights from that generator as they are made.
+    PyTorch's layers draw their first weights from the global generator of the CPU when they are made. In the block
+    that generator starts from the seed; after it, it is as it was before. Then `initialise` draws the convolutions'
+    weights anew.
 
     Parameters
     ----------
     net : Module
-        Gets the layers.
+        The network whose layers are made in the block.
     seed : int
+        Seed for the initial weights.
     """
     with torch.random.fork_rng(devices=[]):
+        torch.default_generator.manual_seed(seed)
         yield
     initialise(net, seed)
 
 
 def initialise(net: nn.Module, seed: int) -> None:
-    """Draw all weights anew, so that they depend on the seed alone.
+    """Draw the weights of all convolutions anew, so that the signals keep their size from layer to layer.
 
-    Convolutions are normal with the variance that keeps a ReLU network's signals at one size (He et al.,
-    2015), biases zero. So are up-convolutions, which no ReLU follows and whose strides leave no overlap: an
-    output pixel sums over the input's channels alone.
+    The weights are normal and the biases zero. The variance of convolutions is 2 / fan-in, because a ReLU that follows
+    halves the power of its input (He et al., 2015). The variance of up-convolutions is 1 / (number of input channels):
+    no ReLU follows them, and since their strides leave no overlap, a pixel of the result sums over the input's
+    channels at one place. Other layers are left as they are.
 
     Parameters
     ----------
     net : Module
-        Changed in place.
+        The network, changed in place.
     seed : int
+        Seed for the weights.
     """
     generator = torch.Generator().manual_seed(seed)
     for module in net.modules():

@@ -8,25 +8,25 @@ from semgrid_edu.occupancy import N_STATES
 
 
 class FusionNet(nn.Module):
-    """Fuse what the image says on D planes with the occupancy grid: (p, o) -> g.
+    """Fuse the image's scores on D planes with the occupancy grid: (p, o) -> g.
 
-    A 1x1 convolution over all D x C planes picks, for each cell alike, which heights and classes to listen
-    to; the four occupancy planes join what is left, and a small conv-deconv network with skip connections
-    gives the classes.
+    A 1x1 convolution reduces the D x C planes to a few; its weights, the same in each cell, say which heights and
+    classes count. The four planes of the occupancy grid are appended, and a small conv-deconv network with skip
+    connections scores the classes.
 
     Parameters
     ----------
     n_scores : int
-        Score classes of the planes.
+        Number of classes that the planes hold scores of.
     n_planes : int
-        D.
+        D, the number of planes.
     n_classes : int
-        C of the semantic grid.
+        C, the number of classes of the semantic grid.
     n_reduced : int
-        Planes left after the reduction. The paper gives no number; with 16 of 280 the reduction costs less
+        Number of planes after the reduction. The paper gives no number; with 16 of 280 the reduction costs less
         than the network after it.
     seed : int
-        Of the initial weights.
+        Seed for the initial weights.
     """
 
     WIDTHS, DEPTHS = (32, 48, 64), (1, 1, 2)
@@ -47,17 +47,18 @@ class FusionNet(nn.Module):
         Parameters
         ----------
         planes : (B, C, D, H, W) float
-            p.
+            p, the image's scores on the planes.
         occupancy : (B, 4, H, W) float
-            o, summing to 1 in each cell.
+            o, the probabilities of the four states; they sum to 1 in each cell.
 
         Returns
         -------
         (B, C, H, W) float
+            g before the soft-max.
         """
         return self.fuse(self.reduce(planes), occupancy)
 
     def fuse(self, reduced: Tensor, occupancy: Tensor) -> Tensor:
-        """Return the logits, as `forward`, of what `reduce` left of the planes, (B, n_reduced, 1, H, W)."""
+        """Return the logits, as `forward` does, from the planes after `reduce`, (B, n_reduced, 1, H, W)."""
         occupancy = occupancy.contiguous(memory_format=torch.channels_last)
         return self.conv_deconv(torch.cat([reduced.squeeze(2), occupancy], dim=1))

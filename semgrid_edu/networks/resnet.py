@@ -6,26 +6,27 @@ from torch import Tensor, nn
 from semgrid_edu.errors import ArgumentError
 
 EXPANSION = 4
-"""Channels that leave a bottleneck for each one inside it (He et al., table 1)."""
+"""Channels that leave a bottleneck for each channel inside it (He et al., table 1)."""
 
 
 class ResNet(nn.Module):
-    """A stem and four stages of bottlenecks, whose last ones give up their stride for holes in their kernels.
+    """Compute a feature map by a stem and four stages of bottlenecks, the last of which dilate instead of striding.
 
-    A stage with stride 2 halves the map. The atrous algorithm leaves the stride out and dilates every later
-    kernel by what was left out instead: the values that the strided network would have given are still there,
-    unchanged, and those between them as well. Parameters are named as in torchvision's `resnet101`, whose
+    A stage with stride 2 halves the map. The atrous algorithm leaves the stride out and instead dilates every later
+    kernel by the stride that was left out. The values that the strided network would have given are still there,
+    unchanged, together with the values between them. Parameters are named as in torchvision's `resnet101`, whose
     strides are in the 3x3 convolutions.
 
     Parameters
     ----------
     width : int
-        Channels of the stem; 64 in the publication. Stage k has width 2^k channels inside its bottlenecks.
+        Number of channels of the stem; 64 in the publication. Stage k = 0 .. 3 has width 2^k channels inside its
+        bottlenecks.
     depths : (4,) int
-        Bottlenecks of each stage; (3, 4, 23, 3) in ResNet-101.
+        Number of bottlenecks in each stage; (3, 4, 23, 3) in ResNet-101.
     output_stride : int
-        8: the last two stages atrous, with rates 2 and 4, as in DeepLab; 16: the last one; 32: none, as in
-        the publication.
+        Pixels from one cell of the result to the next. 8: the last two stages are atrous, with rates 2 and 4, as in
+        DeepLab; 16: only the last stage is; 32: none is, as in the publication.
 
     Raises
     ------
@@ -42,7 +43,7 @@ class ResNet(nn.Module):
         n_in, reached, rate = width, 4, 1
         for stage, depth in enumerate(depths):
             stride = 1 if stage == 0 else 2
-            # The kernel whose stride is left out still sees the map before it: it keeps its rate.
+            # The kernel whose stride is left out keeps its rate: it still sees the map before the halving.
             first_rate = rate
             if reached * stride > output_stride:
                 stride, rate = 1, rate * stride
@@ -56,21 +57,21 @@ class ResNet(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         """Return the last stage's map, (B, 3, h, w) -> (B, n_out, ceil(h / stride), ceil(w / stride)).
 
-        Its cell i lies on pixel stride x i: all strides start at the first pixel.
+        Cell i of the result lies on pixel stride x i, because all strides start at the first pixel.
         """
         x = F.max_pool2d(F.relu(self.bn1(self.conv1(x)), inplace=True), 3, stride=2, padding=1)
         return self.layer4(self.layer3(self.layer2(self.layer1(x))))
 
 
 class Bottleneck(nn.Module):
-    """Add to a map what a 1x1, a 3x3 and a 1x1 convolution make of it.
+    """Add to a map what three convolutions, 1x1, 3x3 and 1x1, make of it (the residual).
 
     Parameters
     ----------
     n_in, width : int
-        Channels that come in, and inside; 4 x width go out.
+        Number of channels that come in, and between the convolutions; 4 width channels go out.
     stride, rate : int
-        Of the 3x3 convolution.
+        Stride and dilation of the 3x3 convolution.
     """
 
     def __init__(self, n_in: int, width: int, stride: int, rate: int) -> None:
@@ -87,7 +88,7 @@ class Bottleneck(nn.Module):
             self.downsample = nn.Sequential(nn.Conv2d(n_in, n_out, 1, stride, bias=False), nn.BatchNorm2d(n_out))
 
     def forward(self, x: Tensor) -> Tensor:
-        """Return the sum, (B, n_in, H, W) -> (B, 4 width, H, W), halved where the stride is 2."""
+        """Return the sum, (B, n_in, H, W) -> (B, 4 width, H, W); H and W are halved when the stride is 2."""
         residual = F.relu(self.bn1(self.conv1(x)), inplace=True)
         residual = F.relu(self.bn2(self.conv2(residual)), inplace=True)
         residual = self.bn3(self.conv3(residual))

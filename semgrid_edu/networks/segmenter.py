@@ -1,4 +1,4 @@
-"""What all image networks share: RGB in 0..1 -> a score for each class and pixel (paper, section 3.1)."""
+"""What all image networks share: RGB in 0..1 -> one score per class and pixel (paper, section 3.1)."""
 
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar
@@ -10,20 +10,24 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks.conv_deconv import fresh_weights
 
 IMAGENET_MEAN, IMAGENET_STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
-"""Of red, green and blue over ImageNet's images, 0..1: what weights learnt there expect."""
+"""Mean and standard deviation of red, green and blue over ImageNet's images, 0..1: weights learnt on ImageNet expect
+inputs that are normalised by them."""
 
 
 class Segmenter(nn.Module, ABC):
-    """An image network, i -> s. A subclass lists its presets and says how it builds and scores.
+    """An image network, i -> s: normalises the image, then scores it.
+
+    A subclass lists its presets, makes its layers in `build` and scores an image in `scores`. CONTRIBUTING.md says how
+    to add one.
 
     Parameters
     ----------
     n_classes : int
-        C.
+        C, the number of classes that are scored.
     preset : str
-        "compact" or "paper".
+        Name of a size in `PRESETS`: "compact" or "paper".
     seed : int
-        Of the initial weights.
+        Seed for the initial weights.
 
     Raises
     ------
@@ -32,7 +36,11 @@ class Segmenter(nn.Module, ABC):
     """
 
     PRESETS: ClassVar[dict[str, dict[str, Any]]]
-    """What `build` takes, for each preset."""
+    """The keyword arguments of `build`, for each preset."""
+
+    IMAGENET: ClassVar[str | None] = None
+    """The published network, by torchvision's name, whose ImageNet weights the encoder can start from; None if there is
+    none."""
 
     def __init__(self, n_classes: int, preset: str = "compact", seed: int = 0) -> None:
         super().__init__()
@@ -45,7 +53,7 @@ class Segmenter(nn.Module, ABC):
             self.build(n_classes, **self.PRESETS[preset])
 
     def forward(self, image: Tensor) -> Tensor:
-        """Return s, the scores of each class at each pixel, no soft-max.
+        """Return s, the scores of each class at each pixel, without a soft-max.
 
         Parameters
         ----------
@@ -55,11 +63,12 @@ class Segmenter(nn.Module, ABC):
         Returns
         -------
         (B, C, h, w) float
+            One score per class and pixel.
 
         Raises
         ------
         ArgumentError
-            When the image isn't of floats or of another shape, or too small for the network.
+            When the image isn't of floats, has another shape, or is too small for the network.
         """
         if image.ndim != 4 or image.shape[1] != 3:
             raise ArgumentError("image", "shape (B, 3, h, w)", tuple(image.shape))
@@ -70,8 +79,20 @@ class Segmenter(nn.Module, ABC):
 
     @abstractmethod
     def build(self, n_classes: int, **preset: Any) -> None:
-        """Make the layers of one preset; their first weights are drawn afterwards."""
+        """Make the layers of one preset; `initialise` draws their first weights afterwards.
+
+        Parameters
+        ----------
+        n_classes : int
+            C, the number of classes that are scored.
+        **preset
+            The entry of `PRESETS`.
+        """
 
     @abstractmethod
     def scores(self, x: Tensor) -> Tensor:
-        """Return the scores, (B, C, h, w), of images of zero mean and unit deviation, (B, 3, h, w)."""
+        """Return the scores, (B, C, h, w), of images normalised to zero mean and unit deviation, (B, 3, h, w)."""
+
+    def imagenet_tensors(self) -> dict[str, Tensor]:
+        """Return the tensors of the encoder that ImageNet weights fill, by their names in torchvision's `IMAGENET`."""
+        return {}

@@ -5,18 +5,19 @@ from typing import NamedTuple
 from torch import Tensor, nn
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.networks.architecture import Architecture
 from semgrid_edu.networks.fusion import FusionNet
 from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.planes import PlaneSampler
 
 
-class Stages(NamedTuple):
-    """What the network computes on its way, each a symbol of Fig. 2.
+class NetOutputs(NamedTuple):
+    """What the network computes on its way from image to grid; each part is a symbol of Fig. 2.
 
     Parameters
     ----------
     scores : (B, C, h, w) float
-        s, of the image.
+        s, the scores of each class at each pixel, before any soft-max.
     planes : (B, C, D, H, W) float
         p, the scores on the planes.
     logits : (B, C, H, W) float
@@ -31,58 +32,105 @@ class Stages(NamedTuple):
 class SemanticGridNet(nn.Module):
     """Segment the image, sample its scores on the planes, fuse them with the occupancy grid.
 
-    Every step is differentiable, so that the loss on the grid teaches the image network as well.
+    Every step is differentiable, so the loss on the grid also teaches the image network.
 
     Parameters
     ----------
     segmenter : Module
-        i -> s; its `n_classes`, where it has one, is the C of the scores, which is else that of the grid.
+        The image network, i -> s: (B, 3, h, w) RGB in 0..1 -> (B, C, h, w) scores. Its `n_classes`, if it has this
+        attribute, is the C of the scores; otherwise they have the classes of the grid.
     sampler : PlaneSampler
         s -> p, for one calibration.
     n_classes : int
-        C of the semantic grid.
+        C, the number of classes of the semantic grid.
     seed : int
-        Of the initial weights of the fusion.
+        Seed for the initial weights of the fusion network.
+    architecture : Architecture, optional
+        The description that the parts were built from, as `build_net` gives it. A network without one can be used,
+        but neither saved nor trained, since nothing says how to build it again.
     """
 
-    def __init__(self, segmenter: nn.Module, sampler: PlaneSampler, n_classes: int, seed: int = 0) -> None:
+    def __init__(
+        self,
+        segmenter: nn.Module,
+        sampler: PlaneSampler,
+        n_classes: int,
+        seed: int = 0,
+        *,
+        architecture: Architecture | None = None,
+    ) -> None:
         super().__init__()
         self.segmenter = segmenter
         self.sampler = sampler
         self.n_classes = n_classes
+        self.architecture = architecture
         n_scores = getattr(segmenter, "n_classes", n_classes)
         self.fusion = FusionNet(n_scores, sampler.planes_shape[0], n_classes, seed=seed)
 
-    def stages(self, image: Tensor, occupancy: Tensor) -> Stages:
-        """Return the result and what led to it.
+    def need_architecture(self) -> Architecture:
+        """Return the architecture, for work that can't be done without it, such as saving or training.
+
+        Raises
+        ------
+        ArgumentError
+            When the network was put together by hand, without one.
+        """
+        if self.architecture is None:
+            expected = "a network of build_net, which records its architecture"
+            raise ArgumentError("net", expected, "one made by hand, without an architecture")
+        return self.architecture
+
+    def stages(self, image: Tensor, occupancy: Tensor, mirrored: bool = False) -> NetOutputs:
+        """Return the result of every stage, from the scores to the semantic grid.
 
         Parameters
         ----------
         image : (B, 3, h, w) float
             RGB, 0..1.
         occupancy : (B, 4, H, W) float
-            Probability of FREE, STATIC, DYNAMIC, UNKNOWN.
+            Probability of FREE, STATIC, DYNAMIC, UNKNOWN; they sum to 1 in each cell.
+        mirrored : bool
+            Whether the learnt parts see image and grid with left and right exchanged, as they do for half of the
+            batches in training. Every result is mirrored back. The planes are always sampled unmirrored: the camera
+            isn't quite symmetric, so a mirrored image would no longer lie where equation (1) looks.
+
+        Returns
+        -------
+        NetOutputs
+            Scores, planes and logits.
 
         Raises
         ------
         ArgumentError
-            When a size isn't the one that the network was built for, one of the two isn't of floats, or there
-            aren't as many of one as of the other.
+            When a size isn't the one that the network was built for, the image or the occupancy grid isn't of
+            floats, or there are more of one than of the other.
         """
         _check("image", image, (3, *self.sampler.image_size))
         _check("occupancy", occupancy, (N_STATES, *self.sampler.planes_shape[1:]))
         if len(image) != len(occupancy):
             raise ArgumentError("occupancy", f"one for each of the {len(image)} images", len(occupancy))
-        scores = self.segmenter(image)
+        scores = self.image_scores(image, mirrored)
         planes = self.sampler(scores)
-        return Stages(scores, planes, self.fusion(planes, occupancy))
+        # Mirrored after the 1x1 convolution, which looks at one cell at a time: there is less to move.
+        reduced, occupancy = (_flip(part, mirrored) for part in (self.fusion.reduce(planes), occupancy))
+        return NetOutputs(scores, planes, _flip(self.fusion.fuse(reduced, occupancy), mirrored))
+
+    def image_scores(self, image: Tensor, mirrored: bool = False) -> Tensor:
+        """Return s, the image network's scores, (B, C, h, w), before any soft-max; arguments as in `stages`."""
+        return _flip(self.segmenter(_flip(image, mirrored)), mirrored)
 
     def forward(self, image: Tensor, occupancy: Tensor) -> Tensor:
         """Return the logits of the semantic grid, (B, C, H, W); arguments as in `stages`."""
         return self.stages(image, occupancy).logits
 
 
+def _flip(x: Tensor, mirrored: bool) -> Tensor:
+    """Return images or grids with left and right exchanged if they are to be mirrored, as they are otherwise."""
+    return x.flip(-1) if mirrored else x
+
+
 def _check(name: str, batch: Tensor, shape: tuple[int, ...]) -> None:
+    """Refuse a batch that isn't of floats or of another shape than (B, *shape)."""
     if batch.ndim != 4 or tuple(batch.shape[1:]) != shape:
         raise ArgumentError(name, f"shape (B, {', '.join(map(str, shape))})", tuple(batch.shape))
     if not batch.is_floating_point():

@@ -13,24 +13,29 @@ from semgrid_edu.networks.segmenter import Segmenter
 
 
 class UNet(Segmenter):
-    """Segment an image by an encoder and a decoder that sees each of the encoder's maps beside its own.
+    """Segment an image by an encoder, and a decoder that sees each of the encoder's maps beside its own.
+
+    Every stage has two 3x3 convolutions. The encoder halves the map between stages by max-pooling; the decoder doubles
+    it by a learnt up-convolution and appends the encoder's map of that size as further channels (the skip connection).
+    A 1x1 convolution scores the classes.
 
     Parameters
     ----------
     n_classes : int
-        C.
+        C, the number of classes that are scored.
     preset : str
         "paper" has the published widths, 64 to 1024, and 31,044,366 parameters for 14 classes; "compact" is an
         eighth as wide.
     seed : int
-        Of the initial weights.
+        Seed for the initial weights.
 
     Notes
     -----
-    The padded variant: convolutions keep the size, so the encoder's maps fit without cropping and the scores
-    have the image's size; the publication loses 92 pixels on each side. Each 3x3 convolution is followed by
-    batch normalisation, as in SegNet; the publication has none, and dropout, which would draw from a global
-    generator. Where a map has an odd side, the up-convolution's last row or column is its bias alone.
+    This is the padded variant: convolutions keep the size, so the encoder's maps fit without cropping and the scores
+    have the size of the image, whereas the publication loses 92 pixels on each side. Each 3x3 convolution is followed
+    by batch normalisation, as in SegNet; the publication has none. It has dropout, which is left out here because it
+    would draw from a global generator. Where a map has an odd side, the last row or column of the up-convolution is
+    its bias alone.
 
     References
     ----------
@@ -43,7 +48,7 @@ class UNet(Segmenter):
     }
 
     def build(self, n_classes: int, widths: tuple[int, ...]) -> None:
-        """Make encoder, up-convolutions, decoder and the final 1x1 convolution; the decoder's finest stage first."""
+        """Make encoder, up-convolutions, decoder (its finest stage first) and the final 1x1 convolution."""
         self.encoder = nn.ModuleList(_double(n_in, n_out) for n_in, n_out in pairwise((3, *widths)))
         self.up = nn.ModuleList(nn.ConvTranspose2d(below, width, 2, stride=2) for width, below in pairwise(widths))
         self.decoder = nn.ModuleList(_double(2 * width, width) for width in widths[:-1])
@@ -65,5 +70,5 @@ class UNet(Segmenter):
 
 
 def _double(n_in: int, n_out: int) -> nn.Sequential:
-    """Return the two convolutions of each stage."""
+    """Return the two convolutions of one stage, with normalisation and ReLU."""
     return nn.Sequential(conv_bn_relu(n_in, n_out), conv_bn_relu(n_out, n_out))

@@ -1,15 +1,16 @@
 """VGG16's thirteen convolutions: the encoder of FCN (paper, section 3.1; Simonyan and Zisserman, 2015)."""
 
+from collections.abc import Iterable
 from itertools import pairwise
 
 from torch import Tensor, nn
 
 DEPTHS = (2, 2, 3, 3, 3)
-"""Convolutions of each stage: thirteen (Simonyan and Zisserman, table 1, column D)."""
+"""The number of convolutions in each stage, thirteen together (Simonyan and Zisserman, table 1, column D)."""
 
 
 class Vgg(nn.Module):
-    """Five stages of 3x3 convolutions, each halved by max-pooling at its end.
+    """Compute feature maps by five stages of 3x3 convolutions with ReLU, each of which ends with 2x2 max-pooling.
 
     Pooling rounds up, as in the framework that the network was published in: a last odd row or column is kept,
     and cell i of a pooled map covers pixels 2 i and 2 i + 1, whatever the size. Parameters are named as in
@@ -18,7 +19,7 @@ class Vgg(nn.Module):
     Parameters
     ----------
     widths : (5,) int
-        Channels of each stage.
+        Number of channels in each stage.
     batch_norm : bool
         Whether each convolution is followed by batch normalisation; the published network has none.
     """
@@ -31,7 +32,7 @@ class Vgg(nn.Module):
         )
 
     def forward(self, x: Tensor) -> list[Tensor]:
-        """Return what each stage's pooling gives, (B, 3, h, w) -> five maps of 1/2, 1/4, ... 1/32 of the size."""
+        """Return the map after each stage's pooling, (B, 3, h, w) -> five maps at 1/2, 1/4, ... 1/32 of the size."""
         pooled = []
         for layer in self.features:
             x = layer(x)
@@ -46,21 +47,48 @@ def conv_relu(n_in: int, n_out: int, kernel: int, batch_norm: bool) -> list[nn.M
     Parameters
     ----------
     n_in, n_out : int
-        Channels.
+        Number of channels of the input and of the result.
     kernel : int
-        Its side, odd, pixels.
+        Side of the kernel, odd, pixels.
     batch_norm : bool
+        Whether batch normalisation stands between convolution and ReLU.
 
     Returns
     -------
     list of Module
+        Two or three layers, in their order.
     """
     norm = [nn.BatchNorm2d(n_out)] if batch_norm else []
     return [nn.Conv2d(n_in, n_out, kernel, padding=kernel // 2), *norm, nn.ReLU(inplace=True)]
 
 
+def vgg16_tensors(layers: Iterable[nn.Module]) -> dict[str, Tensor]:
+    """Return the weights and biases of layers by the names that they have in torchvision's `vgg16`.
+
+    Parameters
+    ----------
+    layers : iterable of Module
+        The convolutions from the first on, then the convolutions that stand for the two hidden layers of the
+        classifier. The last ones may be missing.
+
+    Returns
+    -------
+    dict of str to Tensor
+        Such as "features.0.weight"; the tensors are the layers' own.
+    """
+    named = zip(_layer_names(), layers, strict=False)
+    return {f"{name}.{part}": own for name, layer in named for part, own in layer.named_parameters()}
+
+
+def _layer_names() -> list[str]:
+    """Return torchvision's names of VGG16's layers with weights; it numbers all layers, ReLU and pooling included."""
+    starts = [sum(2 * depth + 1 for depth in DEPTHS[:stage]) for stage in range(len(DEPTHS))]
+    features = [f"features.{start + 2 * k}" for start, depth in zip(starts, DEPTHS, strict=True) for k in range(depth)]
+    return [*features, "classifier.0", "classifier.3"]
+
+
 def _stage(start: int, width: int, depth: int, batch_norm: bool) -> list[nn.Module]:
-    """Return the layers of one stage, pooling included."""
+    """Return the layers of one stage, from `start` channels to `width`, pooling included."""
     channels = [start] + [width] * depth
     layers = [layer for n_in, n_out in pairwise(channels) for layer in conv_relu(n_in, n_out, 3, batch_norm)]
     return [*layers, nn.MaxPool2d(2, ceil_mode=True)]

@@ -7,14 +7,15 @@ from pathlib import Path
 from torch import Tensor
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import DataError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.networks.build import Architecture, build_net
+from semgrid_edu.networks.architecture import Architecture
+from semgrid_edu.networks.build import build_net
 from semgrid_edu.networks.semantic_grid import SemanticGridNet
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
 
 IMAGE_STAGE, WEIGHTS = "image_stage.safetensors", "weights.safetensors"
-"""What a training leaves in its folder: the network after each of its two stages."""
+"""The files that a training run leaves in its folder: the network after each of the two stages."""
 
 
 def save_net(net: SemanticGridNet, path: str | Path) -> None:
@@ -23,23 +24,23 @@ def save_net(net: SemanticGridNet, path: str | Path) -> None:
     Parameters
     ----------
     net : SemanticGridNet
-        Made by `build_net` or `load_net`. The camera's calibration isn't kept: it belongs to the drive.
+        A network with an architecture, as `build_net` and `load_net` make it. The camera's calibration isn't
+        written: it belongs to the drive.
     path : path-like
-        A safetensors file.
+        The safetensors file to write.
 
     Raises
     ------
     ArgumentError
-        When the network was put together by hand, so that nothing tells how.
+        When the network has no architecture, so that nothing says how to build it again.
     """
-    if not hasattr(net, "architecture"):
-        raise ArgumentError("net", "a network of build_net, which records its architecture", "one made by hand")
+    architecture = json.dumps(asdict(net.need_architecture()))
     tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in net.state_dict().items()}
-    write_tensors(path, tensors, {"architecture": json.dumps(asdict(net.architecture))})
+    write_tensors(path, tensors, {"architecture": architecture})
 
 
 def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:
-    """Read a network and fit its planes to a camera.
+    """Read a trained network and place its planes for a camera.
 
     Parameters
     ----------
@@ -56,8 +57,8 @@ def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:
     Raises
     ------
     DataError
-        When the file is missing, damaged, of another program, or holds weights of another architecture than
-        its header says.
+        When the file is missing, damaged or of another program, or its weights aren't those of the architecture in
+        its header.
     """
     header, tensors = read_tensors(path)
     try:
@@ -70,25 +71,25 @@ def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:
 
 
 def _architecture(values: dict) -> Architecture:
-    """Return the architecture that `asdict` took apart."""
+    """Return the architecture from the nested dictionary that `asdict` made of it."""
     tuples = {name: tuple(values[name]) for name in ("image_size", "heights")}
     return Architecture(**(values | tuples | {"grid": GridSpec(**values["grid"])}))
 
 
 def check_tensors(path: str | Path, found: dict[str, Tensor], expected: dict[str, Tensor]) -> None:
-    """Refuse tensors that aren't the network's, naming the first.
+    """Refuse tensors that aren't the network's; the error names the first one that differs.
 
     Parameters
     ----------
     path : path-like
-        Where they were found.
+        The file that they come from.
     found, expected : dict of str to Tensor
-        Only their names and shapes count.
+        The tensors of the file and those of the network; only names and shapes are compared.
 
     Raises
     ------
     DataError
-        When one is missing, too many, or of another shape.
+        When a tensor is missing, isn't the network's, or has another shape.
     """
     for name in sorted(found.keys() | expected.keys()):
         have, want = (

@@ -14,15 +14,16 @@ def sample_planes_naive(scores: ArrayLike, pixels: ArrayLike, visible: ArrayLike
     Parameters
     ----------
     scores : (C, h, w) float
-        s, one value a class and pixel.
+        s, one value per class and pixel.
     pixels : (D, H, W, 2) float
-        u, v of each point.
+        u, v of each point in pixels, from `plane_pixels`.
     visible : (D, H, W) bool
+        The points that take a value; the others take zero.
 
     Returns
     -------
     (C, D, H, W) float64
-        p; zero where a point isn't visible.
+        p, one value per class and point.
 
     Raises
     ------
@@ -47,4 +48,5 @@ def sample_planes_naive(scores: ArrayLike, pixels: ArrayLike, visible: ArrayLike
 
 
 def _bilinear_kernel(t: NDArray) -> NDArray:
+    """Return k(t), the weight of a pixel at distance t along one axis."""
     return np.maximum(0, 1 - np.abs(t))

@@ -9,20 +9,25 @@ from semgrid_edu.grid import GridSpec
 
 
 def plane_heights(n_planes: int = 20, spacing: float = 0.2) -> NDArray[np.float64]:
-    """Return the heights delta_i of the planes above the ground, the lowest on it.
+    """Return the heights delta_i of the planes above the ground; the lowest plane lies on it.
 
     Parameters
     ----------
     n_planes : int
-        D; the paper's 20 (section 4.1).
+        D, the number of planes; 20 in the paper (section 4.1).
     spacing : float
-        The constant d between planes, metres. The paper doesn't give it. 0.2 m is the side of the paper's
-        cells; 20 planes then reach 3.8 m, above cars, people, trucks and most signs.
+        d, the constant distance between planes, metres. The paper doesn't give it. 0.2 m is the side of the
+        paper's cells; 20 planes then reach 3.8 m, above cars, people, trucks and most signs.
 
     Returns
     -------
     (D,) float64
-        Metres.
+        Heights in metres, from 0 upwards.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no plane, or the spacing isn't a positive distance.
 
     Examples
     --------
@@ -49,13 +54,14 @@ def plane_pixels(spec: GridSpec, heights: ArrayLike, camera: Camera) -> tuple[ND
     heights : (D,) float
         delta_i, metres above the ground.
     camera : Camera
+        The camera at the size of the image, see `Camera.resized`.
 
     Returns
     -------
     pixels : (D, H, W, 2) float64
-        u, v; NaN behind the camera.
+        u, v of each point in pixels; NaN for points behind the camera.
     visible : (D, H, W) bool
-        In front of the camera and inside the image.
+        Whether the point is in front of the camera and inside the image.
 
     Raises
     ------
@@ -66,7 +72,7 @@ def plane_pixels(spec: GridSpec, heights: ArrayLike, camera: Camera) -> tuple[ND
     centers, T_camera_from_grid = spec.centers(), camera.T_camera_from_grid
     visible = np.empty((len(heights), *spec.shape), dtype=bool)
     pixels = np.empty((*visible.shape, 2))
-    # Plane by plane, as in `sparse.bilinear_matrix`: what is computed on the way stays in the processor's cache.
+    # One plane at a time, as in `sparse.bilinear_matrix`: intermediate results fit into the processor's cache.
     for i, delta in enumerate(heights):
         points = np.dstack([centers, np.full(spec.shape, delta)])
         pixels[i], visible[i] = project(transform_points(T_camera_from_grid, points), camera)
@@ -74,7 +80,7 @@ def plane_pixels(spec: GridSpec, heights: ArrayLike, camera: Camera) -> tuple[ND
 
 
 def check_heights(heights: ArrayLike) -> NDArray[np.float64]:
-    """Return the heights of planes as an array, (D,) metres, or refuse them.
+    """Return the heights of planes as an array of metres, (D,) float64, after checking them.
 
     Raises
     ------
@@ -88,7 +94,7 @@ def check_heights(heights: ArrayLike) -> NDArray[np.float64]:
 
 
 def check_points(pixels: NDArray, visible: NDArray, image_size: tuple[int, int]) -> None:
-    """Refuse points that don't fit each other or the image.
+    """Refuse pixels (D, H, W, 2) and visible (D, H, W) that don't fit each other or an image of (h, w) pixels.
 
     Raises
     ------

@@ -1,38 +1,29 @@
-"""Equation (2), fast and differentiable: one sparse matrix for each calibration (section 3.3)."""
+"""Equation (2), fast and differentiable, as a module of a network (section 3.3)."""
 
-from copy import deepcopy
-from functools import lru_cache
-from math import prod
+from collections.abc import Callable
 
-import numpy as np
-import torch
 from numpy.typing import ArrayLike
-from scipy.sparse import csr_array
 from torch import Tensor, nn
 
-from semgrid_edu.camera import Camera
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.grid import GridSpec
-from semgrid_edu.planes.pixels import check_heights, check_points, plane_pixels
-from semgrid_edu.planes.sparse import SparseMatrix, SparseProduct, bilinear_matrix
+from semgrid_edu.planes.operator import PlaneOperator
 
 
 class PlaneSampler(nn.Module):
     """Resample scores on the planes: equation (2), fast and differentiable.
 
-    For a fixed calibration the four pixels around each point and their weights never change, so equation (2)
-    is one sparse matrix that maps pixels to points. It and its transpose, which carries gradients back, are
-    built once; for a batch they stand along a diagonal, once an image, and the last batch's are kept. Points that
-    aren't visible are empty rows and cost nothing. `for_camera` goes all the way from a calibration, and remembers.
+    The module holds one `PlaneOperator`, which is fixed, and no weights. It also keeps the operator of its last batch,
+    because all batches of a training run have the same size. Where it is moved to another device or type, it gets an
+    operator of its own there; other modules that shared the old one keep it.
 
     Parameters
     ----------
     pixels : (D, H, W, 2) float
-        u, v of each point, from `plane_pixels`.
+        u, v of each point in pixels, from `plane_pixels`.
     visible : (D, H, W) bool
         The points that take a value; the others take zero.
     image_size : (int, int)
-        h, w of the scores.
+        Height h and width w of the scores, pixels.
 
     Raises
     ------
@@ -48,53 +39,40 @@ class PlaneSampler(nn.Module):
 
     def __init__(self, pixels: ArrayLike, visible: ArrayLike, image_size: tuple[int, int]) -> None:
         super().__init__()
-        pixels, visible = np.asarray(pixels), np.asarray(visible)
-        check_points(pixels, visible, image_size)
-        self.image_size = tuple(image_size)
-        self.planes_shape = visible.shape
-        matrix = bilinear_matrix(pixels, visible, image_size)
-        self._register_matrix("matrix", matrix)
-        self._register_matrix("transpose", matrix.T.tocsr())
+        self._hold(PlaneOperator.build(pixels, visible, image_size))
 
-    @staticmethod
-    def for_camera(spec: GridSpec, heights: ArrayLike, camera: Camera) -> "PlaneSampler":
-        """Return the sampler of a calibration: equation (1), then (2), worked out at the first call for it.
+    @classmethod
+    def from_operator(cls, operator: PlaneOperator) -> "PlaneSampler":
+        """Return a sampler around an operator that is already there, which it shares with others that have it.
 
         Parameters
         ----------
-        spec : GridSpec
-            The cells.
-        heights : (D,) float
-            delta_i, metres above the ground.
-        camera : Camera
-            Of the image that the scores are of, at their size.
+        operator : PlaneOperator
+            For one image.
 
         Returns
         -------
         PlaneSampler
-            A module of its own; its matrices are shared with the others of this calibration until it is moved
-            to another device or type.
-
-        Raises
-        ------
-        ArgumentError
-            As `plane_pixels`.
+            A module of its own.
         """
-        heights = tuple(check_heights(heights).tolist())
-        matrices = (np.asarray(T, dtype=np.float64).tobytes() for T in (camera.K, camera.T_camera_from_lidar))
-        built = _build_sampler(spec, heights, *matrices, tuple(camera.size), camera.lidar_height)
-        # What counts as copied already stays shared.
-        return deepcopy(built, {id(part): part for part in built.buffers()})
+        sampler = cls.__new__(cls)
+        nn.Module.__init__(sampler)
+        sampler._hold(operator)
+        return sampler
 
-    def _register_matrix(self, name: str, matrix: csr_array) -> None:
-        """Keep a sparse matrix as buffers: they follow the module to its device, and stay out of its weights."""
-        for part, values in zip(SparseMatrix._fields, (matrix.indices, matrix.indptr, matrix.data), strict=True):
-            self.register_buffer(f"{name}_{part}", torch.from_numpy(values), persistent=False)
+    def _hold(self, operator: PlaneOperator) -> None:
+        """Take this operator from now on, and forget the last batch's."""
+        self.operator = self._of_batch = operator
 
-    def _matrix(self, name: str, n_images: int, n_columns: int) -> SparseMatrix:
-        """Return a matrix for as many images side by side: their planes then needn't be copied into one batch."""
-        matrix = SparseMatrix(*(getattr(self, f"{name}_{part}") for part in SparseMatrix._fields))
-        return matrix if n_images == 1 else _block_diagonal(matrix, n_images, n_columns)
+    @property
+    def image_size(self) -> tuple[int, int]:
+        """Height h and width w of the scores, pixels."""
+        return self.operator.image_size
+
+    @property
+    def planes_shape(self) -> tuple[int, int, int]:
+        """D planes of H x W points."""
+        return self.operator.planes_shape
 
     def forward(self, scores: Tensor) -> Tensor:
         """Return the planes of each image.
@@ -102,11 +80,13 @@ class PlaneSampler(nn.Module):
         Parameters
         ----------
         scores : (B, C, h, w) float
+            s, one value per class and pixel of each image.
 
         Returns
         -------
         (B, C, D, H, W) float
-            Channels-last in memory, (B, D, H, W, C), as the convolution that follows likes it.
+            p, in the type of `scores`. Channels-last in memory, (B, D, H, W, C), as the convolution that follows
+            likes it.
 
         Raises
         ------
@@ -117,27 +97,17 @@ class PlaneSampler(nn.Module):
             raise ArgumentError(
                 "scores", f"shape (B, C, {self.image_size[0]}, {self.image_size[1]})", tuple(scores.shape)
             )
-        n_images, n_pixels, n_points = len(scores), prod(self.image_size), prod(self.planes_shape)
-        matrix = self._matrix("matrix", n_images, n_pixels)
-        transpose = self._matrix("transpose", n_images, n_points)
-        planes = SparseProduct.apply(scores.permute(0, 2, 3, 1).flatten(0, 2), matrix, transpose)
-        return planes.unflatten(0, (n_images, *self.planes_shape)).permute(0, 4, 1, 2, 3)
+        return self._operator_for(len(scores))(scores)
 
+    def _operator_for(self, n_images: int) -> PlaneOperator:
+        """Return the operator for so many images at once, the last batch's where it fits."""
+        if n_images == 1:
+            return self.operator
+        if self._of_batch.n_images != n_images:
+            self._of_batch = self.operator.block_diagonal(n_images)
+        return self._of_batch
 
-# One matrix and its transpose: all batches of a training are of one size.
-_block_diagonal = lru_cache(maxsize=2)(SparseMatrix.block_diagonal)
-
-
-# Four calibrations: an operator at the paper's scale holds 67 MB.
-@lru_cache(maxsize=4)
-def _build_sampler(
-    spec: GridSpec,
-    heights: tuple[float, ...],
-    K: bytes,
-    T_camera_from_lidar: bytes,
-    size: tuple[int, int],
-    lidar_height: float,
-) -> PlaneSampler:
-    """Build a sampler from nothing but the key it is remembered by."""
-    matrices = np.frombuffer(K).reshape(3, 3), np.frombuffer(T_camera_from_lidar).reshape(4, 4)
-    return PlaneSampler(*plane_pixels(spec, heights, Camera(*matrices, size, lidar_height)), size)
+    def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> "PlaneSampler":
+        """Move the operator as well: PyTorch's `.to`, `.double`, `.cuda` and their like all come through here."""
+        self._hold(self.operator.map(fn))
+        return super()._apply(fn, recurse)

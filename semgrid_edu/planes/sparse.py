@@ -11,27 +11,28 @@ from torch import Tensor
 
 
 def bilinear_matrix(pixels: NDArray, visible: NDArray, image_size: tuple[int, int]) -> csr_array:
-    """Return equation (2) as a matrix: a row a point, a column a pixel, four weights in each visible row.
+    """Return equation (2) as a matrix: one row per point, one column per pixel, four weights in each visible row.
 
     Parameters
     ----------
     pixels : (D, H, W, 2) float
-        u, v of each point; of a visible one, inside the image.
+        u, v of each point in pixels; a visible point lies inside the image.
     visible : (D, H, W) bool
-        The rows of the others are empty.
+        The points that take a value; the rows of the others are empty.
     image_size : (int, int)
-        h, w.
+        Height h and width w of the image, pixels.
 
     Returns
     -------
     (D H W, h w) float32
+        Points and pixels counted row by row, points also plane by plane.
 
     Examples
     --------
     >>> bilinear_matrix(np.full((1, 1, 1, 2), 0.25), np.ones((1, 1, 1), bool), (2, 2)).toarray()
     array([[0.5625, 0.1875, 0.1875, 0.0625]], dtype=float32)
     """
-    # Plane by plane, what is computed on the way stays in the processor's cache.
+    # One plane at a time: intermediate results then fit into the processor's cache.
     corners = [_corners(points[seen], image_size) for points, seen in zip(pixels, visible, strict=True)]
     indices, weights = map(np.concatenate, zip(*corners, strict=True))
     offsets = np.concatenate([[0], np.cumsum(4 * visible.ravel())])
@@ -42,7 +43,7 @@ def bilinear_matrix(pixels: NDArray, visible: NDArray, image_size: tuple[int, in
 
 
 def _corners(points: NDArray, image_size: tuple[int, int]) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Return the four pixels around each point, (N, 4) columns of the matrix, and their weights."""
+    """Return the four pixels around each point as columns of the matrix, (N, 4), and their weights, (N, 4)."""
     height, width = image_size
     u, v = points.T
     left, top = np.floor(u), np.floor(v)
@@ -65,7 +66,7 @@ def _corners(points: NDArray, image_size: tuple[int, int]) -> tuple[NDArray[np.i
 
 
 class SparseMatrix(NamedTuple):
-    """Compressed sparse rows: row r holds weights[offsets[r]:offsets[r + 1]] in the columns indices[...].
+    """Compressed sparse rows: row r holds weights[a:b] in the columns indices[a:b], a, b = offsets[r], offsets[r + 1].
 
     Parameters
     ----------
@@ -74,30 +75,35 @@ class SparseMatrix(NamedTuple):
     offsets : (rows + 1,) int32
         Where each row begins, and where the last one ends.
     weights : (N,) float
-        No unit; those of equation (2) sum to 1 in each visible row.
+        No unit; the weights of equation (2) sum to 1 in each visible row.
     """
 
     indices: Tensor
     offsets: Tensor
     weights: Tensor
 
+    @classmethod
+    def from_scipy(cls, matrix: csr_array) -> "SparseMatrix":
+        """Return SciPy's matrix, (rows, columns), as tensors that share its memory."""
+        return cls(*map(torch.from_numpy, (matrix.indices, matrix.indptr, matrix.data)))
+
     def multiply(self, rows: Tensor) -> Tensor:
-        """Return the product with a dense matrix, equation (2) for all points at once.
+        """Return the product with a dense matrix: equation (2) for all points at once.
 
         Parameters
         ----------
         rows : (columns, C) float
-            A row a pixel: its scores.
+            One row per pixel, its C scores.
 
         Returns
         -------
         (rows, C) float
-            In the type of `rows`.
+            One row per point, in the type of the argument.
 
         Notes
         -----
-        PyTorch's bag of embeddings is just that, a weighted sum of gathered rows, and several times
-        faster on a CPU than its sparse matrices.
+        PyTorch's bag of embeddings computes just that, a weighted sum of gathered rows, and on a CPU it is
+        several times faster than PyTorch's sparse matrices.
         """
         weights = self.weights.to(rows.dtype)
         return F.embedding_bag(
@@ -105,19 +111,19 @@ class SparseMatrix(NamedTuple):
         )
 
     def block_diagonal(self, n_blocks: int, n_columns: int) -> "SparseMatrix":
-        """Return the matrix that multiplies several dense ones at once, laid one below the other.
+        """Return the matrix that multiplies several dense matrices at once, one stacked below the other.
 
         Parameters
         ----------
         n_blocks : int
-            How often this matrix stands along the diagonal: once an image.
+            How often this matrix stands along the diagonal: once per image.
         n_columns : int
-            The columns of this matrix, which its empty last ones don't show.
+            The number of columns of this matrix. Its entries don't say, since its last columns may be empty.
 
         Returns
         -------
         SparseMatrix
-            Of n_blocks times as many rows, columns and weights.
+            With n_blocks times as many rows, columns and weights.
         """
         block = torch.arange(n_blocks, dtype=self.offsets.dtype, device=self.offsets.device)[:, None]
         n_weights = self.offsets[-1:]
@@ -130,16 +136,20 @@ class SparseMatrix(NamedTuple):
 
 
 class SparseProduct(torch.autograd.Function):
-    """y = A x, whose gradient is A^T dL/dy; the transpose is given, so that nothing is scattered."""
+    """The product y = A x with the gradient A^T dL/dy.
+
+    The transpose is given, so that the backward pass gathers rows as the forward pass does; scattering them into the
+    pixels would be slower.
+    """
 
     @staticmethod
     def forward(ctx, rows: Tensor, matrix: SparseMatrix, transpose: SparseMatrix) -> Tensor:
-        """Return A x; `rows` is x, (columns, C)."""
+        """Return A x, (rows, C); the argument `rows` is x, (columns, C)."""
         ctx.matrices = matrix, transpose
         return matrix.multiply(rows.contiguous())
 
     @staticmethod
     def backward(ctx, grad: Tensor) -> tuple[Tensor, None, None]:
-        """Return A^T dL/dy, which can be differentiated again; the matrices are fixed."""
+        """Return A^T dL/dy, (columns, C), which can be differentiated again; the matrices have no gradient."""
         matrix, transpose = ctx.matrices
         return SparseProduct.apply(grad, transpose, matrix), None, None

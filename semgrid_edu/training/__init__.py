@@ -1,7 +1,13 @@
 """Learning the weights: batches, loss, loop, checkpoints, devices and processes (paper, section 4.1)."""
 
 from semgrid_edu.training.loop import CHECKPOINT, CHECKPOINT_EVERY, train
-from semgrid_edu.training.loss import Objective, class_frequencies, class_weights, median_frequency_weights
+from semgrid_edu.training.loss import (
+    Objective,
+    class_frequencies,
+    class_weights,
+    median_frequency_weights,
+    weighted_cross_entropy,
+)
 from semgrid_edu.training.params import TrainingParams
 
 __all__ = [
@@ -13,4 +19,5 @@ __all__ = [
     "class_weights",
     "median_frequency_weights",
     "train",
+    "weighted_cross_entropy",
 ]

@@ -1,4 +1,4 @@
-"""Batches of labelled frames, jittered and mirrored, and the network on them (paper, section 4.1)."""
+"""Batches of labelled frames, jittered and mirrored, and the network's results for them (paper, section 4.1)."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -8,49 +8,52 @@ import torch
 from torch import Tensor
 
 from semgrid_edu.datasets.training_set import Sample
-from semgrid_edu.networks import SemanticGridNet
+from semgrid_edu.networks import SemanticGridNet, unit_image
 
 
 class Batch(NamedTuple):
-    """Frames side by side, and whether the step sees them in a mirror.
+    """The frames of one step, and whether the network sees them mirrored.
 
     Parameters
     ----------
     frames : Sample
-        Each field with a first axis B more; `image` is float32 in 0..1.
+        The fields of all frames, each with an additional first axis B; `image` is float32 in 0..1.
     mirrored : bool
-        Left and right change places inside `image_scores` and `grid_logits`, which change them back.
+        Whether the network sees them with left and right exchanged. `image_scores` and `grid_logits` mirror their
+        results back, so that they fit the labels of `frames`.
     """
 
     frames: Sample
     mirrored: bool
 
-    def flip(self, x: Tensor) -> Tensor:
-        """Mirror images or grids, if this batch is to be."""
-        return x.flip(-1) if self.mirrored else x
-
 
 def draw_batch(
     dataset: Sequence[Sample], size: int, jitter: float, iteration: int, seed: int, mirror: bool = True
 ) -> Batch:
-    """Return the frames of a step: each pass over the data takes them in a new order, whole batches only.
+    """Return the frames of a step, with jittered brightness and contrast, mirrored by chance (data augmentation).
+
+    Each pass over the data takes the frames in a new order. There are whole batches only, so a pass may leave a few
+    frames out.
 
     Parameters
     ----------
     dataset : sequence of Sample
+        The frames to learn from.
     size : int
-        Frames a batch, B.
+        B, the number of frames in a batch.
     jitter : float
-        How far brightness and contrast vary, as a share.
+        How far brightness and contrast vary, as a share of the range of an image: 0.2 is up to 20 % either way.
     iteration : int
-        Number of the step; with the seed, it decides everything.
+        Number of the step; together with the seed it decides everything.
     seed : int
+        Seed for the order, the jitter and the mirroring.
     mirror : bool
-        Whether half of the batches are to be seen in a mirror.
+        Whether about half of the batches are mirrored.
 
     Returns
     -------
     Batch
+        B frames.
     """
     epoch, k = divmod(iteration, len(dataset) // size)
     order = np.random.default_rng((seed, 0, epoch)).permutation(len(dataset))
@@ -58,7 +61,7 @@ def draw_batch(
     frames = Sample(*map(torch.stack, zip(*(dataset[i] for i in chosen.tolist()), strict=True)))
     rng = np.random.default_rng((seed, 1, iteration))
     contrast, brightness = rng.uniform(-jitter, jitter, (2, size, 1, 1, 1)).astype(np.float32)
-    image = (frames.image / 255 - 0.5) * (1 + torch.from_numpy(contrast)) + 0.5 + torch.from_numpy(brightness)
+    image = (unit_image(frames.image) - 0.5) * (1 + torch.from_numpy(contrast)) + 0.5 + torch.from_numpy(brightness)
     return Batch(frames._replace(image=image.clamp(0, 1)), mirrored=mirror and bool(rng.random() < 0.5))
 
 
@@ -68,15 +71,16 @@ def share_of_batch(batch: Batch, process: int, n_processes: int, device: torch.d
     Parameters
     ----------
     batch : Batch
-        Of B frames.
+        B frames.
     process, n_processes : int
-        The number of the process, from 0, and how many there are; B is a multiple.
-    device : device
+        The number of the process, from 0, and how many processes there are, which divides B.
+    device : torch.device or str
+        The device of the process.
 
     Returns
     -------
     Batch
-        Of B / n_processes frames.
+        B / n_processes frames.
     """
     size = len(batch.frames.image) // n_processes
     part = slice(process * size, (process + 1) * size)
@@ -84,37 +88,36 @@ def share_of_batch(batch: Batch, process: int, n_processes: int, device: torch.d
 
 
 def image_scores(net: SemanticGridNet, batch: Batch) -> Tensor:
-    """Return the image network's scores of a batch, before any soft-max.
+    """Return the image network's scores for a batch, before any soft-max.
 
     Parameters
     ----------
     net : SemanticGridNet
+        The network, on the device of the batch.
     batch : Batch
+        B frames.
 
     Returns
     -------
     (B, C, h, w) float32
         s, unmirrored.
     """
-    return batch.flip(net.segmenter(batch.flip(batch.frames.image)))
+    return net.image_scores(batch.frames.image, batch.mirrored)
 
 
 def grid_logits(net: SemanticGridNet, batch: Batch) -> Tensor:
     """Return the semantic grid of a batch before the soft-max.
 
-    The planes are sampled unmirrored: the camera isn't quite symmetric, so that a mirrored image alone would
-    no longer lie where equation (1) looks.
-
     Parameters
     ----------
     net : SemanticGridNet
+        The network, on the device of the batch.
     batch : Batch
+        B frames.
 
     Returns
     -------
     (B, C, H, W) float32
-        log g up to a number a cell, unmirrored.
+        The logits, unmirrored.
     """
-    # What the 1x1 convolution leaves is mirrored: it looks at one cell at a time, and leaves less to move.
-    reduced = net.fusion.reduce(net.sampler(image_scores(net, batch)))
-    return batch.flip(net.fusion.fuse(batch.flip(reduced), batch.flip(batch.frames.occupancy)))
+    return net.stages(batch.frames.image, batch.frames.occupancy, batch.mirrored).logits

@@ -1,4 +1,4 @@
-"""Checkpoints: a training that was killed goes on as if it had not been (paper, section 4.1)."""
+"""Checkpoints: a training run that was killed goes on as if it hadn't been (paper, section 4.1)."""
 
 import json
 from pathlib import Path
@@ -17,13 +17,16 @@ def save_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimise
     Parameters
     ----------
     path : Path
-        A safetensors file, written atomically: a full disk or a kill leaves the checkpoint before it.
+        The safetensors file. It is written atomically: after a kill or on a full disk, the checkpoint before it is
+        still there.
     run : dict
-        What tells this run from others, by name; anything that JSON can hold.
+        What tells this run from others, such as its seed, by name; anything that JSON can hold.
     net : Module
+        The network that learns.
     optimiser : SGD
-        Of the parameters of `net`.
+        The optimiser of the parameters of `net`, which holds their momenta.
     iteration : int
+        Number of the next step, from 0.
     """
     tensors = {f"net.{name}": tensor for name, tensor in net.state_dict().items()}
     for name, parameter in net.named_parameters():
@@ -33,26 +36,37 @@ def save_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimise
 
 
 def load_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimiser: SGD) -> int:
-    """Restore weights and momenta and return the number of the next step.
+    """Restore weights and momenta, and return the number of the next step.
 
     Parameters
     ----------
-    path, run, net, optimiser
-        As for `save_checkpoint`; network and optimiser are changed in place.
+    path : Path
+        A file that `save_checkpoint` wrote.
+    run : dict
+        What tells this run from others; it must equal what the file says.
+    net : Module
+        The network, whose weights are replaced.
+    optimiser : SGD
+        The optimiser of its parameters, whose momenta are replaced.
+
+    Returns
+    -------
+    int
+        Number of the next step, from 0.
 
     Raises
     ------
     DataError
         When the file is missing or damaged.
     ArgumentError
-        When it belongs to another run; it says in what they differ.
+        When the file belongs to another run; the message says in what the two differ.
     """
     header, tensors = read_tensors(path)
     try:
         found, iteration = json.loads(header["run"]), int(header["iteration"])
         found = dict(found)
     except (KeyError, TypeError, ValueError) as error:
-        raise DataError(path, "a checkpoint of a training", error) from error
+        raise DataError(path, "a checkpoint of a training run", error) from error
     _check_run(path, found, json.loads(json.dumps(run)))
     momenta = {name: tensors.pop(f"momentum.{name}", None) for name, _ in net.named_parameters()}
     weights = {name.removeprefix("net."): tensor for name, tensor in tensors.items()}
@@ -65,7 +79,7 @@ def load_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimise
 
 
 def _check_run(path: Path, found: dict[str, object], run: dict[str, object]) -> None:
-    """Refuse the checkpoint of another run, naming what differs."""
+    """Refuse the checkpoint of another run, and name what differs."""
     differing = [name for name in sorted(found.keys() | run.keys()) if found.get(name) != run.get(name)]
     if differing:
         theirs, ours = ({name: one.get(name) for name in differing} for one in (found, run))

@@ -1,4 +1,4 @@
-"""Where a training computes, and with how many bits (section 4.1)."""
+"""The device that a training run computes on, and the precision that it computes with (section 4.1)."""
 
 import re
 
@@ -13,18 +13,19 @@ def choose_device(name: str = "auto", process: int = 0) -> torch.device:
     Parameters
     ----------
     name : str
-        "cpu", "cuda", "cuda:N" for the GPU with that number, or "auto": a GPU when there is one.
+        "cpu", "cuda", "cuda:N" for the GPU with that number, or "auto": a GPU when there is one, else the CPU.
     process : int
-        Number of this process on its machine: "cuda" and "auto" give each process a GPU of its own.
+        Number of this process on its machine, from 0: "cuda" and "auto" give each process a GPU of its own.
 
     Returns
     -------
     torch.device
+        The CPU or one GPU.
 
     Raises
     ------
     ArgumentError
-        When it is none of these, there is no such GPU, or several processes are to share it.
+        When the name is none of these, there is no such GPU, or several processes would share one GPU.
 
     Examples
     --------
@@ -46,19 +47,20 @@ def choose_device(name: str = "auto", process: int = 0) -> torch.device:
 
 
 def mixed_precision(device: torch.device) -> torch.autocast:
-    """Return a context in which a GPU convolves in bfloat16, half the bits of float32 at its range.
+    """Return a context in which a GPU convolves in bfloat16, which has half the bits of float32 and the same range.
 
-    Weights, sums and losses stay float32; with that range, gradients need no scaling. A GPU without bfloat16
-    (before NVIDIA's Ampere), and a CPU, compute in float32 throughout.
+    Weights, sums and losses stay float32. Because the range is the same, gradients need no scaling. A CPU, and a GPU
+    without bfloat16 (before NVIDIA's Ampere), compute everything in float32.
 
     Parameters
     ----------
     device : torch.device
+        The device that computes.
 
     Returns
     -------
     torch.autocast
-        For the forward pass alone.
+        A context for the forward pass.
     """
     able = device.type == "cuda" and torch.cuda.is_bf16_supported(including_emulation=False)
     return torch.autocast(device.type, torch.bfloat16, enabled=able)

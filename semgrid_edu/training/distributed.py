@@ -1,4 +1,4 @@
-"""One training in several processes, each with its share of every batch (section 4.1)."""
+"""One training run in several processes, each with its share of every batch (section 4.1)."""
 
 import os
 import warnings
@@ -16,24 +16,24 @@ from torch.nn.parallel import DistributedDataParallel
 from semgrid_edu.training.devices import choose_device
 
 PATIENCE = timedelta(minutes=30)
-"""A process waits so long for the others: the first may be making the data set's arrays."""
+"""How long a process waits for the others: the first may be making the data set's arrays."""
 
 
 @contextmanager
 def process_group(device: str = "auto") -> Iterator[torch.device]:
-    """Join the processes that torchrun started, if it started this one, and leave them with the block.
+    """Join the processes that torchrun started, if it started this one, for the length of the block.
 
-    When one fails, torchrun ends the others.
+    When one process fails, torchrun ends the others.
 
     Parameters
     ----------
     device : str
-        As `choose_device` takes it.
+        "cpu", "cuda", "cuda:N" or "auto", see `choose_device`.
 
     Yields
     ------
     torch.device
-        That of this process.
+        The device of this process.
 
     Raises
     ------
@@ -60,24 +60,24 @@ def rank() -> int:
 
 
 def world_size() -> int:
-    """Return the number of processes, 1 for a training without torchrun."""
+    """Return the number of processes, 1 for a training run without torchrun."""
     return dist.get_world_size() if dist.is_initialized() else 1
 
 
 @contextmanager
 def first_process_first() -> Iterator[None]:
-    """Let process 0 run the block before the others do: it makes the files that they then find."""
+    """Let process 0 run the block before the others do, so that they find the files that it makes."""
     if rank() > 0:
         dist.barrier()
     try:
         yield
-    finally:  # when it fails, the others fail alike instead of waiting
+    finally:  # when process 0 fails, the others go on and fail in the same way instead of waiting
         if rank() == 0 and world_size() > 1:
             dist.barrier()
 
 
 class _Total(torch.autograd.Function):
-    """A sum over processes. Its parts work on the losses of all, so that a part's gradient is a sum again."""
+    """A sum over processes; every process's loss depends on each summand, so the gradient is a sum over them too."""
 
     @staticmethod
     def forward(ctx, x: Tensor) -> Tensor:
@@ -96,25 +96,47 @@ def process_total(x: Tensor) -> Tensor:
     Parameters
     ----------
     x : (...) float
-        Of the same shape in each process.
+        This process's summand, of the same shape in each process.
 
     Returns
     -------
     (...) float
-        `x` itself when there is one process.
+        The sum; `x` itself when there is one process.
     """
     return _Total.apply(x) if world_size() > 1 else x
 
 
+def shared_mean(losses: Tensor, weights: Tensor) -> Tensor:
+    """Return this process's part of a weighted mean over all processes: the mean of the parts is the whole's mean.
+
+    Taking the mean over processes is what `DistributedDataParallel` does with gradients. With one process the part is
+    the mean, losses / weights.
+
+    Parameters
+    ----------
+    losses : () float
+        Sum of the weighted losses in this process.
+    weights : () float
+        Sum of the weights in this process.
+
+    Returns
+    -------
+    () float
+        0 when no process has any weight: such a batch teaches nothing, and 0/0 would stop the run.
+    """
+    total = process_total(weights)
+    return world_size() * losses / total.clamp_min(torch.finfo(total.dtype).tiny)
+
+
 def in_parallel(module: nn.Module, some_unused: bool) -> nn.Module:
-    """Return a module whose gradients are means over all processes, so that their weights stay the same.
+    """Return a module whose gradients are means over all processes, so that all of them keep the same weights.
 
     Parameters
     ----------
     module : Module
-        Its forward gives a loss.
+        A module whose forward pass gives what the loss is made of.
     some_unused : bool
-        Whether the loss leaves some weights out.
+        Whether the loss doesn't depend on some of the weights.
 
     Returns
     -------
@@ -123,22 +145,22 @@ def in_parallel(module: nn.Module, some_unused: bool) -> nn.Module:
     """
     if world_size() == 1:
         return module
-    with warnings.catch_warnings():  # PyTorch 2.13 has a new name for `broadcast_buffers`, which 2.6 doesn't know
+    with warnings.catch_warnings():  # PyTorch 2.13 has a new name for `broadcast_buffers` that 2.6 doesn't know
         warnings.simplefilter("ignore", FutureWarning)
         return DistributedDataParallel(module, find_unused_parameters=some_unused, broadcast_buffers=False)
 
 
 @contextmanager
 def shared_batch_norm(net: nn.Module) -> Iterator[None]:
-    """Inside, a network's batch normalisation takes mean and variance over the batches of all processes.
+    """Let a network's batch normalisation take mean and variance over the batches of all processes in the block.
 
-    So that half the batch in each of two processes is one step of the whole batch. PyTorch's own way to do it,
-    SyncBatchNorm, works on GPUs alone.
+    Half the batch in each of two processes then makes the same step as the whole batch in one. PyTorch's own module
+    for it, SyncBatchNorm, works on GPUs only.
 
     Parameters
     ----------
     net : Module
-        As it was after the block.
+        The network; after the block it is as it was before.
     """
     norms = [module for module in net.modules() if isinstance(module, _BatchNorm)] if world_size() > 1 else []
     for norm in norms:
@@ -151,7 +173,7 @@ def shared_batch_norm(net: nn.Module) -> Iterator[None]:
 
 
 def _normalise(norm: _BatchNorm, x: Tensor) -> Tensor:
-    """Do what `norm.forward` does, with mean and variance over all processes; the same number of values in each."""
+    """Do what `norm.forward` does, with mean and variance over all processes, which have equally many values."""
     if not norm.training:
         return type(norm).forward(norm, x)
     axes = [0, *range(2, x.ndim)]

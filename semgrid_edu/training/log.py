@@ -1,4 +1,4 @@
-"""What a training writes down of every step (section 4.1)."""
+"""The log of a training run: one line per step (section 4.1)."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -10,11 +10,23 @@ from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import named_errors, write_text
 
 LOG = "log.csv"
-"""The file's name in the folder of a training."""
+"""Name of the log's file in the folder of a training run."""
 
 
 class Step(NamedTuple):
-    """One line: number of the step, its stage ("image" or "grid"), its learning rate, and the loss before it."""
+    """One line of the log.
+
+    Parameters
+    ----------
+    iteration : int
+        Number of the step, from 0.
+    stage : str
+        "image" or "grid".
+    learning_rate : float
+        The learning rate of this step.
+    loss : float
+        Weighted cross-entropy of the batch before the step, nats.
+    """
 
     iteration: int
     stage: str
@@ -23,20 +35,22 @@ class Step(NamedTuple):
 
 
 HEADER = ",".join(Step._fields) + "\n"
+"""The first line of a log: the names of its columns."""
 
 
 class TrainingLog(NamedTuple):
-    """All steps of a training, an array each.
+    """All steps of a training run: one array per column of the log.
 
     Parameters
     ----------
     iteration : (N,) int
-        The number of the step, from 0.
+        Number of each step, from 0.
     stage : (N,) str
         "image" or "grid".
     learning_rate : (N,) float
+        The learning rate of each step.
     loss : (N,) float
-        Weighted cross-entropy of the batch before the step, nats.
+        Weighted cross-entropy of the batch before each step, nats.
     """
 
     iteration: NDArray[np.int64]
@@ -46,7 +60,7 @@ class TrainingLog(NamedTuple):
 
 
 def read_log(path: str | Path) -> TrainingLog:
-    """Read the log of a training, ended or not.
+    """Read the log of a training run, finished or not.
 
     Parameters
     ----------
@@ -56,15 +70,16 @@ def read_log(path: str | Path) -> TrainingLog:
     Returns
     -------
     TrainingLog
+        N steps.
 
     Raises
     ------
     DataError
-        When there is no such file, or one of its lines, which is named, isn't that of a log.
+        When there is no such file, or a line isn't one of a log; the message gives the number of the line.
     """
     path = Path(path)
     if not path.is_file():
-        raise DataError(path, "the log of a training", "no such file")
+        raise DataError(path, "the log of a training run", "no such file")
     steps = _steps(path, _lines(path))
     columns = zip(*steps, strict=True) if steps else [()] * len(Step._fields)
     types = (np.int64, np.str_, np.float64, np.float64)
@@ -76,7 +91,7 @@ def _lines(path: Path) -> list[str]:
 
 
 def _steps(path: Path, lines: list[str]) -> list[Step]:
-    """Return what the lines of a log say, after checking all of them."""
+    """Return the steps in the lines of a log, after checking all of them."""
     header, *others = [line.rstrip("\n") for line in lines] or [""]
     if header != HEADER.strip():
         raise DataError(path, f"{HEADER.strip()} in line 1", repr(header))
@@ -94,18 +109,19 @@ def _step(path: Path, number: int, line: str) -> Step:
 
 
 def begin_log(path: Path, start: int) -> None:
-    """Begin a log, or go on with it before the step `start`, dropping later ones that no checkpoint holds.
+    """Begin a log, or continue one from the step `start` on; later steps, which no checkpoint holds, are dropped.
 
     Parameters
     ----------
     path : Path
+        The file to write.
     start : int
-        The number of the first step to come.
+        Number of the first step to come.
 
     Raises
     ------
     DataError
-        When a step before `start` is missing, or its line, which is named, isn't one of a log.
+        When a step before `start` is missing, or its line isn't one of a log; the message gives the number of the line.
     """
     lines = [HEADER]
     if start:
@@ -117,17 +133,19 @@ def begin_log(path: Path, start: int) -> None:
 
 
 def append_step(path: Path, step: Step) -> None:
-    """Add a line; it is in the file at once, for whoever watches.
+    """Add a line to a log; it is in the file at once, so that a running training run can be watched.
 
     Parameters
     ----------
     path : Path
+        The file to add to.
     step : Step
+        The step that was just made.
 
     Raises
     ------
     OSError
-        Names the file, as when the disk is full.
+        When the file can't be written, for example on a full disk; the error names the file.
     """
     with named_errors(path), path.open("a", encoding="utf-8", newline="\n") as log:
         log.write(f"{step.iteration},{step.stage},{step.learning_rate:.6g},{step.loss:.6g}\n")

@@ -18,14 +18,22 @@ from semgrid_edu.training.allocator import keep_freed_memory
 from semgrid_edu.training.batches import Batch, draw_batch, share_of_batch
 from semgrid_edu.training.checkpoint import load_checkpoint, save_checkpoint
 from semgrid_edu.training.devices import mixed_precision
-from semgrid_edu.training.distributed import in_parallel, process_total, rank, shared_batch_norm, world_size
+from semgrid_edu.training.distributed import (
+    in_parallel,
+    process_total,
+    rank,
+    shared_batch_norm,
+    shared_mean,
+    world_size,
+)
 from semgrid_edu.training.log import LOG, Step, append_step, begin_log
 from semgrid_edu.training.loss import Objective, class_weights
 from semgrid_edu.training.params import TrainingParams
 
 CHECKPOINT = "checkpoint.safetensors"
+"""The file from which an interrupted run goes on, in the folder of the run."""
 CHECKPOINT_EVERY = 100
-"""Iterations between checkpoints: some twenty seconds of work is lost at most."""
+"""Iterations between checkpoints: an interruption costs about twenty seconds of work at most."""
 
 
 def train(
@@ -39,36 +47,39 @@ def train(
 ) -> None:
     """Train a network, leaving a log of every step and a checkpoint to resume from.
 
-    All that is random is a function of the seed and the number of the step. So a run that was killed and
-    resumed ends with the same weights, bit for bit (on a CPU), as one that was not.
+    Everything random is a function of the seed and the number of the step. So a run that was killed and resumed
+    ends with the same weights as one that wasn't, bit for bit on a CPU.
 
-    Inside `process_group` with several processes, each takes its share of every batch, and the sum is the same
-    step; all must see the same data and folder.
+    Inside `process_group` with several processes, each process takes its share of every batch, and together they make
+    the same step as one process would; all of them must see the same data and the same folder.
 
     Parameters
     ----------
     net : SemanticGridNet
-        Of `build_net`; changed in place, in evaluation mode afterwards, on `device`.
+        A network with an architecture, as `build_net` makes it. It is changed in place; afterwards it is in
+        evaluation mode and on `device`.
     dataset : sequence of Sample
         The frames to learn from.
     folder : path-like
-        Takes `log.csv`, the network after the first stage as `image_stage.safetensors`, the trained one as
-        `weights.safetensors` and, until that is there, `checkpoint.safetensors`.
+        Where to write `log.csv`, the network after the first stage as `image_stage.safetensors`, the trained network
+        as `weights.safetensors` and, as long as the run isn't finished, `checkpoint.safetensors`.
     params : TrainingParams, optional
+        Numbers of iterations, rates and the like; the defaults if left out.
     seed : int
-        Of the order of the frames and of their jitter.
+        Seed for the order of the frames and for their jitter.
     resume : bool
         Whether to continue from the folder's checkpoint.
-    device : device
-        Where to compute.
+    device : torch.device or str
+        The device to compute on.
 
     Raises
     ------
     ArgumentError
-        When the data don't fit the network, the checkpoint is of another run, or the loss isn't finite.
+        When the network has no architecture, the data don't fit the network, the checkpoint belongs to another run, or
+        the loss isn't finite.
     DataError
-        When there is no checkpoint to resume from, or it is damaged; or there is one, or a trained network, that
-        a training which doesn't resume would overwrite.
+        When there is no checkpoint to resume from or it is damaged; or when the folder holds a checkpoint or a trained
+        network that a new run would overwrite.
     """
     params, folder, device = params or TrainingParams(), Path(folder), torch.device(device)
     _check_folder(folder, resume)
@@ -76,7 +87,7 @@ def train(
     stages = [stage for stage, n in (("image", params.image_iterations), ("grid", params.grid_iterations)) if n]
     alpha = {stage: class_weights(dataset, stage, net.n_classes, params.weight_limit) for stage in stages}
     optimiser = torch.optim.SGD(net.to(device).parameters(), lr=params.learning_rate, momentum=params.momentum)
-    run = {"seed": seed, "frames": len(dataset), **asdict(params), **asdict(net.architecture)}
+    run = {"seed": seed, "frames": len(dataset), **asdict(params), **asdict(net.need_architecture())}
     run |= {f"{stage} class weights": weights.tolist() for stage, weights in alpha.items()}
     start = load_checkpoint(folder / CHECKPOINT, run, net, optimiser) if resume else 0
     if rank() == 0:
@@ -102,7 +113,7 @@ def train(
 
 
 def _objective(net: SemanticGridNet, stage: str, alpha: Tensor, end_to_end: bool) -> nn.Module:
-    """Return the loss of a stage that begins, after stopping what doesn't learn in it."""
+    """Return the objective of a stage that begins, after stopping the weights that don't learn in it."""
     if stage == "grid" and not end_to_end:
         net.segmenter.eval().requires_grad_(False)
     return in_parallel(Objective(net, stage, alpha), some_unused=stage == "image")
@@ -112,7 +123,7 @@ def _learn(objective: nn.Module, optimiser: torch.optim.SGD, batch: Batch, devic
     """Change the weights by one step of gradient descent and return the loss before it."""
     optimiser.zero_grad()
     with mixed_precision(device):
-        loss = objective(batch)
+        loss = shared_mean(*objective(batch))
     loss.backward()
     optimiser.step()
     return process_total(loss.detach()).item() / world_size()
@@ -121,7 +132,7 @@ def _learn(objective: nn.Module, optimiser: torch.optim.SGD, batch: Batch, devic
 def _write_down(
     step: Step, folder: Path, image_iterations: int, run: dict, net: SemanticGridNet, optimiser: torch.optim.SGD
 ) -> None:
-    """Log a step, and save what is due after it."""
+    """Log a step, and save the network or a checkpoint if it is time for one."""
     append_step(folder / LOG, step)
     done = step.iteration + 1
     if done == image_iterations:
@@ -132,7 +143,7 @@ def _write_down(
 
 @contextmanager
 def _gradients_as_found(net: nn.Module) -> Iterator[None]:
-    """Let the weights that learnt before the block learn after it."""
+    """Let the weights that could learn before the block, and only these, learn again after it."""
     found = [(parameter, parameter.requires_grad) for parameter in net.parameters()]
     try:
         yield
@@ -142,17 +153,16 @@ def _gradients_as_found(net: nn.Module) -> Iterator[None]:
 
 
 def _check_folder(folder: Path, resume: bool) -> None:
-    """Refuse to overwrite a training."""
+    """Refuse to overwrite a finished or an interrupted run."""
     if (folder / WEIGHTS).exists():
         raise DataError(folder, "a folder without a trained network, which would be lost", WEIGHTS)
     if (folder / CHECKPOINT).exists() and not resume:
-        raise DataError(folder, "a folder without a training to resume (--resume continues it)", CHECKPOINT)
+        raise DataError(folder, "a folder without an interrupted run (--resume continues it)", CHECKPOINT)
 
 
 def _check_dataset(net: SemanticGridNet, dataset: Sequence[Sample], params: TrainingParams) -> None:
-    """Refuse a network that can't be saved, frames that it can't take, and batches that can't be shared."""
-    if not hasattr(net, "architecture"):
-        raise ArgumentError("net", "a network of build_net, which records its architecture", "one made by hand")
+    """Refuse a network that can't be saved, frames that don't fit it, and batches that can't be shared."""
+    net.need_architecture()
     if len(dataset) < params.batch_size:
         raise ArgumentError("dataset", f"at least one batch of {params.batch_size} frames", f"{len(dataset)} frames")
     if params.batch_size % world_size():
@@ -166,7 +176,7 @@ def _check_dataset(net: SemanticGridNet, dataset: Sequence[Sample], params: Trai
 
 
 def _check_finite(step: Step, learning_rate: float) -> None:
-    """Refuse to go on when nothing can be learnt any more."""
+    """Refuse to go on after a loss that is infinite or NaN, from which nothing can be learnt any more."""
     if not math.isfinite(step.loss):
         found = f"{learning_rate}, with which it is {step.loss} in iteration {step.iteration}"
         raise ArgumentError("learning_rate", "a rate that keeps the loss finite", found)

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import torch
 import torch.nn.functional as F
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import log_softmax
 from torch import Tensor, nn
 
 from semgrid_edu.datasets.training_set import Sample
@@ -14,26 +15,25 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.labels import IGNORE
 from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.training.batches import Batch, grid_logits, image_scores
-from semgrid_edu.training.distributed import process_total, world_size
 
 TRUTH = {"image": "labels", "grid": "truth"}
-"""What each stage learns from: the field of `Sample`."""
+"""The field of `Sample` that each stage learns from."""
 
 
 def class_frequencies(maps: Iterable[NDArray], n_classes: int) -> NDArray[np.float64]:
-    """Return f(c) = cells of c / cells of the maps in which c occurs (paper, section 4.1).
+    """Return f(c) = (number of cells of class c) / (number of cells of the maps in which c occurs), section 4.1.
 
     Parameters
     ----------
-    maps : sequence of (...) int
-        Grids or images of classes; unlabelled cells, 255, count neither above nor below.
+    maps : iterable of (...) int
+        Grids or images of classes. Unlabelled cells, 255, count neither in the upper nor in the lower number.
     n_classes : int
-        C.
+        C, the number of classes.
 
     Returns
     -------
     (C,) float64
-        0 for a class that occurs in no map.
+        A share, 0..1; 0 for a class that occurs in no map.
 
     Raises
     ------
@@ -59,26 +59,28 @@ def class_frequencies(maps: Iterable[NDArray], n_classes: int) -> NDArray[np.flo
 
 
 def median_frequency_weights(maps: Iterable[NDArray], n_classes: int, limit: float = math.inf) -> NDArray[np.float64]:
-    """Return the weights alpha_c = median f / f(c) that keep frequent classes from buying the loss (section 4.1).
+    """Return the weights alpha_c = (median of f) / f(c) of the classes in the loss (section 4.1).
+
+    Rare classes get large weights, so that predicting the frequent classes everywhere doesn't give a low loss.
 
     Parameters
     ----------
-    maps : sequence of (...) int
-        As for `class_frequencies`.
+    maps : iterable of (...) int
+        Grids or images of classes, as for `class_frequencies`.
     n_classes : int
-        C.
+        C, the number of classes.
     limit : float
-        No weight is above `limit` or below 1 / `limit`. The paper has none.
+        No weight is above `limit` or below 1 / `limit`. The paper has no limit.
 
     Returns
     -------
     (C,) float64
-        0 for a class that occurs in no map; it isn't part of the median.
+        0 for a class that occurs in no map; such a class isn't part of the median.
 
     Raises
     ------
     ArgumentError
-        When no cell is labelled, or a map holds something else than classes.
+        When no cell is labelled, or a map holds a number that is neither a class nor 255.
 
     Examples
     --------
@@ -95,24 +97,28 @@ def median_frequency_weights(maps: Iterable[NDArray], n_classes: int, limit: flo
 
 
 def class_weights(dataset: Sequence[Sample], stage: str, n_classes: int, limit: float) -> Tensor:
-    """Return the loss's weight of each class in a stage.
+    """Return the weight of each class in the loss of a stage.
 
     Parameters
     ----------
     dataset : sequence of Sample
+        The frames to learn from.
     stage : str
-        "image" or "grid".
-    n_classes, limit
-        As for `median_frequency_weights`.
+        "image" for the labels of pixels, "grid" for the true classes of cells.
+    n_classes : int
+        C, the number of classes.
+    limit : float
+        The largest weight, as for `median_frequency_weights`.
 
     Returns
     -------
     (C,) float32
+        alpha_c, 0 for a class that occurs in no frame.
 
     Raises
     ------
     ArgumentError
-        When nothing is labelled, or with something else than classes.
+        When nothing is labelled, or a label is neither a class nor 255.
     """
     maps = (getattr(sample, TRUTH[stage]).numpy() for sample in dataset)
     try:
@@ -122,34 +128,113 @@ def class_weights(dataset: Sequence[Sample], stage: str, n_classes: int, limit: 
         raise ArgumentError(f"{TRUTH[stage]} of the dataset", expected, found) from None
 
 
-class Objective(nn.Module):
-    """The loss of a stage: cross-entropy, weighted by class, over the labelled pixels or cells of a batch.
+def weighted_cross_entropy(scores: ArrayLike, truth: ArrayLike, alpha: ArrayLike) -> float:
+    """Compute the loss of section 4.1 literally: cross-entropy, weighted by class, of the labelled pixels or cells.
 
-    It is a module because `DistributedDataParallel` works through the forward pass of one.
+    L = sum_j alpha[c_j] (-log g_j[c_j]) / sum_j alpha[c_j], where j runs over the labelled cells, c_j is the true class
+    of cell j, and g_j the soft-max of its scores. It is a weighted mean of -log g, in which the cells of a rare class
+    have more weight.
+
+    Parameters
+    ----------
+    scores : (B, C, ...) float
+        Scores of each class before any soft-max, such as s of images (B, C, h, w) or logits of grids (B, C, H, W).
+    truth : (B, ...) int
+        The true class of each pixel or cell, 0 .. C - 1; 255 where it is unlabelled.
+    alpha : (C,) float
+        The weight of each class, from `median_frequency_weights`.
+
+    Returns
+    -------
+    float
+        Nats. 0 when nothing is labelled, or only classes of weight 0: there is nothing to learn.
+
+    Raises
+    ------
+    ArgumentError
+        When the shapes don't agree, or `truth` holds something else than classes and 255.
+
+    Examples
+    --------
+    Two cells with even scores: -log 1/2 = 0.693, whatever the weights.
+
+    >>> round(weighted_cross_entropy(np.zeros((1, 2, 2)), [[0, 1]], alpha=[1, 3]), 3)
+    0.693
+    """
+    scores, alpha = (np.asarray(part, dtype=np.float64) for part in (scores, alpha))
+    truth = np.asarray(truth)
+    _check_loss_inputs(scores, truth, alpha)
+    labelled = truth != IGNORE
+    c = truth[labelled]
+    log_g = log_softmax(np.moveaxis(scores, 1, -1)[labelled], axis=1)  # one row per labelled cell, one column per class
+    weights = alpha[c]
+    losses = -log_g[np.arange(len(c)), c]
+    return float((weights * losses).sum() / weights.sum()) if weights.any() else 0.0
+
+
+def _check_loss_inputs(scores: NDArray, truth: NDArray, alpha: NDArray) -> None:
+    """Refuse scores (B, C, ...), truth (B, ...) and weights (C,) that don't fit each other."""
+    if scores.ndim < 2 or truth.shape != scores.shape[:1] + scores.shape[2:]:
+        found = f"scores of shape {scores.shape}, truth of shape {truth.shape}"
+        raise ArgumentError("truth", "shape (B, ...) for scores of shape (B, C, ...)", found)
+    n_classes = scores.shape[1]
+    if alpha.shape != (n_classes,):
+        raise ArgumentError("alpha", f"shape ({n_classes},), one weight per class", f"shape {alpha.shape}")
+    if truth.dtype.kind not in "iu":
+        raise ArgumentError("truth", "integers, the numbers of classes", truth.dtype)
+    wrong = truth[(truth != IGNORE) & ((truth < 0) | (truth >= n_classes))]
+    if wrong.size:
+        raise ArgumentError("truth", f"classes 0..{n_classes - 1} or {IGNORE}", wrong[0])
+
+
+def cross_entropy_sums(scores: Tensor, truth: Tensor, alpha: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the upper and the lower sum of `weighted_cross_entropy`, fast and differentiable (section 4.1).
+
+    The loss is their quotient. They are handed out apart because a batch can be shared among processes: its loss is
+    the quotient of the sums over all of them.
+
+    Parameters
+    ----------
+    scores : (B, C, ...) float
+        Scores of each class before any soft-max.
+    truth : (B, ...) int
+        The true class of each pixel or cell; 255 where it is unlabelled.
+    alpha : (C,) float
+        The weight of each class.
+
+    Returns
+    -------
+    losses : () float
+        sum_j alpha[c_j] (-log g_j[c_j]), nats.
+    weights : () float
+        sum_j alpha[c_j]; it has no gradient.
+    """
+    scores = scores.to(torch.promote_types(scores.dtype, torch.float32))  # mixed precision sums in float32
+    alpha, truth = alpha.to(scores), truth.long()
+    losses = F.cross_entropy(scores, truth, weight=alpha, ignore_index=IGNORE, reduction="sum")
+    return losses, alpha[truth[truth != IGNORE]].sum()
+
+
+class Objective(nn.Module):
+    """The objective of one stage of training: the weighted cross-entropy of a batch, as its two sums.
+
+    It is a module because `DistributedDataParallel` works through the forward pass of a module.
 
     Parameters
     ----------
     net : SemanticGridNet
+        The network that learns.
     stage : str
-        "image" or "grid".
+        "image" for the scores of pixels, "grid" for the logits of cells.
     alpha : (C,) float
-        The weights of the classes.
+        The weight of each class, from `class_weights`.
     """
 
     def __init__(self, net: SemanticGridNet, stage: str, alpha: Tensor) -> None:
         super().__init__()
         self.net, self.stage, self.alpha = net, stage, alpha
 
-    def forward(self, batch: Batch) -> Tensor:
-        """Return sum_j alpha_c(j) (-log g_c(j)) / sum_j alpha_c(j), c(j) being the true class of pixel or cell j.
-
-        With several processes, whose mean is taken, the lower sum is over the batches of all of them. A batch in
-        which nothing is labelled teaches nothing: its loss is 0, not 0/0.
-        """
+    def forward(self, batch: Batch) -> tuple[Tensor, Tensor]:
+        """Return the sum of the weighted losses and the sum of the weights of a batch, see `cross_entropy_sums`."""
         scores = (image_scores if self.stage == "image" else grid_logits)(self.net, batch)
-        scores = scores.to(torch.promote_types(scores.dtype, torch.float32))  # of mixed precision
-        alpha = self.alpha.to(scores)
-        truth = getattr(batch.frames, TRUTH[self.stage]).long()
-        weights = process_total(alpha[truth[truth != IGNORE]].sum())
-        losses = F.cross_entropy(scores, truth, weight=alpha, ignore_index=IGNORE, reduction="sum")
-        return world_size() * losses / weights.clamp_min(torch.finfo(weights.dtype).tiny)
+        return cross_entropy_sums(scores, getattr(batch.frames, TRUTH[self.stage]), self.alpha)

@@ -1,4 +1,4 @@
-"""How the network learns: stages, steps, rates (paper, section 4.1)."""
+"""The parameters of a training run: stages, steps, rates (paper, section 4.1)."""
 
 import math
 from dataclasses import dataclass
@@ -8,31 +8,34 @@ from semgrid_edu.errors import ArgumentError
 
 @dataclass(frozen=True)
 class TrainingParams:
-    """How the network learns: first the image network on image labels, then all of it on the grid, end to end.
+    """How the network learns: first the image network from image labels, then the whole network from grids.
 
-    The first stage stands in for the paper's ImageNet weights.
+    The first stage takes the place of the paper's ImageNet weights.
 
     Parameters
     ----------
     image_iterations, grid_iterations : int
-        Of the two stages; the paper stops at 2000.
+        Number of steps of the first and of the second stage; the paper stops at 2000.
     batch_size : int
-        Frames a step; the paper's 6.
+        Frames per step; 6 in the paper.
     learning_rate : float
-        At the start of each stage; it falls to zero along half a cosine. The paper's 1e-3 refines weights
-        that come from ImageNet; ours start at random, normalised in every layer, and stand far more.
+        The rate at the start of each stage, from which it falls to zero along half a cosine. The paper's 1e-3 refines
+        weights that come from ImageNet. Ours start at random with normalisation in every layer, and can take much
+        larger steps.
     momentum : float
-        The paper's 0.9.
+        The share of the last step that is added to the next; 0.9 in the paper.
     weight_limit : float
-        Largest weight of a class, see `median_frequency_weights`. Without it a cell of signage counts three hundred
-        times one of unknown-unobserved in minikitti, and the loss is made of a handful of cells.
+        Largest weight of a class, see `median_frequency_weights`. Without a limit, a cell of signage counts three
+        hundred times as much as a cell of unknown-unobserved in minikitti, and a handful of cells decides the loss.
     jitter : float
-        How far brightness and contrast of the images vary, as a share: 142 frames teach little about light.
+        How far brightness and contrast of the images vary, as a share of their range (data augmentation): 142 frames
+        show few kinds of light.
     end_to_end : bool
-        Whether the grid teaches the image network too. If not, training has two separate stages, as in the
-        authors' earlier work: the image network stays as the first one left it.
+        Whether the loss on the grid teaches the image network too. If not, training has two separate stages, as in the
+        authors' earlier work, and the second stage doesn't change the image network.
     mirror : bool
-        Whether every other batch, by chance, is seen in a mirror: streets are as likely to be the other way round.
+        Whether about half of the batches, by chance, are mirrored: a street with left and right exchanged is just as
+        likely.
 
     Raises
     ------
@@ -66,11 +69,11 @@ class TrainingParams:
 
     @property
     def iterations(self) -> int:
-        """Of both stages together."""
+        """Number of steps of both stages together."""
         return self.image_iterations + self.grid_iterations
 
     def stage(self, iteration: int) -> tuple[str, float]:
-        """Return the stage that an iteration is in, "image" or "grid", and its learning rate."""
+        """Return the stage that an iteration, counted from 0, belongs to ("image" or "grid"), and its learning rate."""
         if iteration < self.image_iterations:
             stage, done = "image", iteration / self.image_iterations
         else:

@@ -1,4 +1,4 @@
-"""Train a network on a data set, with its provenance (paper, section 4.1)."""
+"""Train a network on a data set and write down how it was made (paper, section 4.1)."""
 
 import math
 from dataclasses import asdict, replace
@@ -16,22 +16,23 @@ from semgrid_edu.training.distributed import first_process_first, process_group,
 from semgrid_edu.training.loop import CHECKPOINT, TrainingParams, train
 
 PAPER_IMAGE = (375, 1242)
-"""Height and width of KITTI's images, pixels, which the paper's networks see as they are."""
+"""Height and width of KITTI's images, pixels; the paper's networks see them at this size."""
 
 
 def architecture(segmenter: str, preset: str = "compact") -> Architecture:
-    """Return the network that a preset names, with the images and the grid that belong to it.
+    """Return the architecture that a preset stands for, with its size of images and its grid.
 
     Parameters
     ----------
     segmenter : str
-        The image network, as `build_segmenter` takes it.
+        Name of the image network, a key of `SEGMENTERS`.
     preset : str
-        "compact" for the CPU; "paper" has the published networks, KITTI's images as they are, and 0.2 m cells.
+        "compact" for the CPU; "paper" for the published networks, KITTI's images at full size, and 0.2 m cells.
 
     Returns
     -------
     Architecture
+        What `build_net` takes.
 
     Raises
     ------
@@ -48,23 +49,24 @@ def architecture(segmenter: str, preset: str = "compact") -> Architecture:
 def training_params(
     preset: str, iterations: int, end_to_end: bool = True, from_imagenet: bool = False
 ) -> TrainingParams:
-    """Return how a preset learns.
+    """Return the training parameters that a preset stands for.
 
     Parameters
     ----------
     preset : str
-        "compact" for the defaults; "paper" for section 4.1: a learning rate of 1e-3, and weights of the classes as
-        they come.
+        "compact" for the defaults; "paper" for section 4.1: a learning rate of 1e-3, and class weights without a
+        limit.
     iterations : int
-        Of each stage.
+        Number of steps of each stage.
     end_to_end : bool
-        Whether the grid teaches the image network too.
+        Whether the loss on the grid teaches the image network too.
     from_imagenet : bool
-        Whether the image network has learnt on ImageNet: end to end, it then needs no first stage.
+        Whether the image network starts from ImageNet weights. Training end to end then needs no first stage.
 
     Returns
     -------
     TrainingParams
+        What `train` takes.
     """
     image_iterations = 0 if from_imagenet and end_to_end else iterations
     params = TrainingParams(image_iterations, iterations, end_to_end=end_to_end)
@@ -83,25 +85,35 @@ def train_network(
     imagenet: str | Path | None = None,
     device: str = "cpu",
 ) -> None:
-    """Train on the split "train" of a data set; under torchrun, in all its processes.
+    """Train a network on the split "train" of a data set; under torchrun, in all of its processes.
 
     Parameters
     ----------
     dataset_dir : path-like
-        Such as data/minikitti.
+        The folder of the data set, such as data/minikitti.
     folder : path-like
-        Takes what `train` writes, and `provenance.json`, which also names the data by their index's SHA-256.
-    segmenter, preset : str
-        As `architecture` takes them.
+        Where to write the files of `train`, and `provenance.json`, which names the data by the SHA-256 of their index.
+    segmenter : str
+        Name of the image network, a key of `SEGMENTERS`.
     params : TrainingParams
+        Numbers of iterations, rates and the like.
     seed : int
-        Of the initial weights, and of the order and looks of the frames.
+        Seed for the initial weights, and for the order and the jitter of the frames.
     resume : bool
         Whether to continue a run that was interrupted.
+    preset : str
+        "compact" or "paper", see `architecture`.
     imagenet : path-like, optional
-        First weights of the image network, for the preset "paper": see `load_imagenet`.
+        ImageNet weights for the image network of preset "paper": see `load_imagenet`.
     device : str
-        As `choose_device` takes it.
+        "cpu", "cuda", "cuda:N" or "auto", see `choose_device`.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such image network, preset or device, or as `train` raises it.
+    DataError
+        When a file is missing or damaged, or the folder holds a run that would be overwritten.
     """
     began, description = datetime.now(UTC), architecture(segmenter, preset)
     with process_group(device) as chosen:
@@ -136,7 +148,7 @@ def _command(
     seed: int,
     params: TrainingParams,
 ) -> str:
-    """Return the command that trains so."""
+    """Return the command that makes the same training run."""
     options = [
         f"--data {_name(dataset_dir)} --out {_name(folder)} --segmenter {description.segmenter}",
         f"--preset {description.preset}" if description.preset != Architecture.preset else "",
@@ -148,11 +160,11 @@ def _command(
 
 
 def _name(path: str | Path) -> str:
-    """Return the last part of a path, that of the current folder too."""
+    """Return the last part of a path, also for a path such as `.`."""
     return Path(path).resolve().name
 
 
 def how_to_go_on(folder: str | Path) -> str:
-    """Return what to do after a training was interrupted: its steps since the last checkpoint are lost."""
+    """Return a sentence on how to go on after an interruption, which loses the steps since the last checkpoint."""
     path = Path(folder) / CHECKPOINT
     return f"--resume goes on from {path}" if path.exists() else f"start again: there is no {path} yet"

@@ -5,7 +5,7 @@ import numpy as np
 from semgrid_edu.illustrations.boxes import cells_in
 from semgrid_edu.illustrations.convergence import (
     SPEC,
-    evidence_of,
+    evidence_of_boxes,
     measure_convergence,
     passing_cars,
     run_bof,
@@ -35,7 +35,7 @@ def test_the_same_seed_gives_the_same_bits():
 
 
 def test_evidence_is_of_the_cars_alone():
-    evidence = evidence_of(passing_cars(2))
+    evidence = evidence_of_boxes(passing_cars(2))
     hit = evidence.occupied > evidence.free
     assert np.array_equal(hit, cells_in(passing_cars(2)[0], SPEC) | cells_in(passing_cars(2)[1], SPEC))
     assert hit.sum() == 2 * 4 * 2

@@ -3,7 +3,7 @@ import torch
 from torch import nn
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.networks.conv_deconv import ConvDeconv, initialise
+from semgrid_edu.networks.conv_deconv import ConvDeconv, fresh_weights, initialise
 
 
 def _convolutions(module):
@@ -61,6 +61,33 @@ def test_weights_depend_on_the_seed_alone():
 
     assert torch.equal(weights(1), weights(1))
     assert not torch.equal(weights(1), weights(2))
+
+
+class _EveryLayer(nn.Module):
+    """Layers whose weights `initialise` doesn't draw: they come from PyTorch, as the layers are made."""
+
+    def __init__(self, seed):
+        super().__init__()
+        with fresh_weights(self, seed):
+            self.parts = nn.ModuleList(
+                [nn.Linear(3, 4), nn.Embedding(5, 6), nn.ConvTranspose3d(2, 3, 2), nn.GRU(3, 4), nn.Conv2d(2, 3, 1)]
+            )
+
+
+def test_the_seed_alone_decides_the_weights_of_every_kind_of_layer():
+    """From two states of the global generator, both of which it leaves as they were."""
+    weights = []
+    with torch.random.fork_rng(devices=[]):
+        for state, seed in ((11, 1), (12, 1), (11, 2)):
+            torch.manual_seed(state)
+            before = torch.get_rng_state()
+            net = _EveryLayer(seed)
+            assert torch.equal(torch.get_rng_state(), before)
+            weights.append([nn.utils.parameters_to_vector(part.parameters()) for part in net.parts])
+    one, same, other = weights
+    for a, b, c in zip(one, same, other, strict=True):
+        assert torch.equal(a, b)
+        assert not torch.equal(a, c)
 
 
 def test_initial_signals_keep_their_size():

@@ -117,7 +117,10 @@ def test_the_classifier_is_expected_as_it_was_published(tiny, vgg_file):
         load_imagenet(tiny("fcn"), vgg_file)
 
 
-@pytest.mark.parametrize("name", ["segnet", "fcn", "deeplab"])
+PUBLISHED = [name for name, network in SEGMENTERS.items() if network.IMAGENET]
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
 def test_weights_of_another_network_or_preset_are_refused(name, vgg_file):
     with pytest.raises(DataError, match=r"vgg16.safetensors: expected \(.*\) for .*, found"):
         load_imagenet(build_segmenter(name, 3), vgg_file)
@@ -130,6 +133,13 @@ def test_a_pickle_is_refused(tiny, tmp_path):
         load_imagenet(tiny("segnet"), path)
 
 
+@pytest.mark.parametrize("name", SEGMENTERS)
+def test_a_network_names_its_published_weights_exactly_when_it_takes_some(name):
+    with torch.device("meta"):
+        assert bool(build_segmenter(name, 3, preset="paper").imagenet_tensors()) == (name in PUBLISHED)
+
+
 def test_unet_has_no_imagenet_weights(vgg_file):
-    with pytest.raises(ArgumentError, match="segmenter: expected a SegNet, Fcn or DeepLab, found UNet"):
+    message = "segmenter: expected one with published ImageNet weights: segnet, fcn, deeplab, found UNet"
+    with pytest.raises(ArgumentError, match=message):
         load_imagenet(build_segmenter("unet", 3), vgg_file)

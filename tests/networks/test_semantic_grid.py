@@ -62,6 +62,15 @@ def test_stages_follow_each_other(small_net, batch):
     torch.testing.assert_close(stages.logits, small_net(image, occupancy))
 
 
+def test_a_mirror_exchanges_left_and_right_for_the_learnt_parts_alone(small_net, batch):
+    image, occupancy, _ = batch
+    seen = small_net.stages(image, occupancy, mirrored=True)
+    torch.testing.assert_close(seen.scores, small_net.segmenter(image.flip(-1)).flip(-1))
+    torch.testing.assert_close(seen.planes, small_net.sampler(seen.scores))
+    torch.testing.assert_close(seen.logits, small_net.fusion(seen.planes.flip(-1), occupancy.flip(-1)).flip(-1))
+    assert not torch.allclose(seen.logits, small_net(image, occupancy))
+
+
 def test_frames_of_a_batch_do_not_touch(small_net, batch):
     image, occupancy, _ = batch
     alone = torch.cat([small_net(image[k : k + 1], occupancy[k : k + 1]) for k in range(2)])
@@ -115,7 +124,7 @@ def _slope(loss, weight, direction, step=1e-7):
 
 
 def test_unknown_names_are_refused_with_those_there_are(camera):
-    with pytest.raises(ArgumentError, match="name: expected one of segnet, fcn, deeplab, unet, found 'vit'"):
+    with pytest.raises(ArgumentError, match=f"name: expected one of {', '.join(SEGMENTERS)}, found 'vit'"):
         build_segmenter("vit", 14)
     with pytest.raises(ArgumentError, match="label_set: expected one of KITTI-14, SYNTHIA-10"):
         build_net(Architecture(label_set="COCO"), camera)

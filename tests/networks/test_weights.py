@@ -81,9 +81,15 @@ def test_the_compact_network_fits_its_budget(segmenter, camera, tmp_path):
 
 def test_a_network_made_by_hand_is_not_saved(net, tmp_path):
     by_hand = SemanticGridNet(net.segmenter, net.sampler, net.n_classes)
-    with pytest.raises(ArgumentError, match="net: expected a network of build_net"):
+    with pytest.raises(ArgumentError, match=r"net: expected a network of build_net.*without an architecture"):
         save_net(by_hand, tmp_path / "net.safetensors")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_network_made_by_hand_is_saved_with_the_architecture_it_was_given(net, tmp_path, camera):
+    by_hand = SemanticGridNet(net.segmenter, net.sampler, net.n_classes, seed=3, architecture=SMALL).eval()
+    save_net(by_hand, tmp_path / "net.safetensors")
+    assert torch.equal(load_net(tmp_path / "net.safetensors", camera)(*_inputs(SMALL)), net(*_inputs(SMALL)))
 
 
 def test_a_missing_file_is_named(tmp_path, camera):

@@ -1,4 +1,4 @@
-from dataclasses import replace
+from copy import deepcopy
 
 import numpy as np
 import pytest
@@ -12,9 +12,7 @@ from scipy.spatial.transform import Rotation
 from semgrid_edu.camera import Camera, rigid_transform
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.networks import Architecture, build_net
-from semgrid_edu.planes import PlaneSampler, plane_heights, plane_pixels, sample_planes_naive
-from semgrid_edu.planes import sampler as sampling
+from semgrid_edu.planes import PlaneOperator, PlaneSampler, plane_heights, plane_pixels, sample_planes_naive
 
 # Grid axes (x ahead, y left, z up) to camera axes (z ahead, x right, y down), one metre above the ground.
 LOOKING_AHEAD = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]])
@@ -270,6 +268,70 @@ def test_a_sampler_holds_no_weights():
     assert not sampler.state_dict()
 
 
+def _tensors(operator):
+    return [*operator.matrix, *operator.transpose]
+
+
+def _operator():
+    return PlaneOperator.build(*_random_points(np.random.default_rng(6), (30, 40), shape=(5, 20, 10)), (30, 40))
+
+
+def test_samplers_around_one_operator_share_its_memory():
+    operator = _operator()
+    one, other = (PlaneSampler.from_operator(operator) for _ in range(2))
+    copied = deepcopy(one)
+    for sampler in (one, other, copied):
+        assert [part.data_ptr() for part in _tensors(sampler.operator)] == [
+            part.data_ptr() for part in _tensors(operator)
+        ]
+    assert operator.nbytes == sum(part.numel() * part.element_size() for part in _tensors(operator))
+
+
+@pytest.mark.parametrize("n_images", [1, 3])
+def test_a_sampler_follows_its_module_to_another_type_and_leaves_the_others(n_images):
+    """As on the way to a GPU: PyTorch moves a module by handing each of its tensors to a function."""
+    operator = _operator()
+    scores = torch.randn(n_images, 2, 30, 40, generator=torch.Generator().manual_seed(0))
+    one, other = (PlaneSampler.from_operator(operator) for _ in range(2))
+    before = one(scores)
+    torch.nn.Sequential(one).double()
+    assert one(scores.double()).dtype == torch.float64
+    torch.testing.assert_close(one(scores.double()).float(), before)
+    assert {part.dtype for part in _tensors(one.operator)} == {torch.float64, torch.int32}
+    assert {part.dtype for part in _tensors(operator)} == {torch.float32, torch.int32}
+    assert torch.equal(other(scores), before)
+
+
+def test_a_sampler_follows_its_module_to_another_device():
+    sampler = PlaneSampler.from_operator(_operator())
+    sampler(torch.zeros(2, 1, 30, 40))
+    sampler.to("meta")
+    assert {part.device.type for part in _tensors(sampler.operator)} == {"meta"}
+    for n_images in (1, 2):
+        assert sampler(torch.zeros(n_images, 1, 30, 40, device="meta")).shape == (n_images, 1, 5, 20, 10)
+
+
+def test_batches_of_one_size_build_their_operator_once(monkeypatch):
+    sampler, built, original = PlaneSampler.from_operator(_operator()), [], PlaneOperator.block_diagonal
+    monkeypatch.setattr(PlaneOperator, "block_diagonal", lambda operator, n: built.append(n) or original(operator, n))
+    for n_images in (3, 3, 1, 3, 2, 2):
+        scores = torch.randn(n_images, 2, 30, 40, generator=torch.Generator().manual_seed(n_images))
+        alone = torch.cat([sampler(image[None]) for image in scores])
+        assert torch.equal(sampler(scores), alone)
+    assert built == [3, 2]
+
+
+@pytest.mark.parametrize("n_images", [1, 3])
+def test_a_sampler_used_for_inference_learns_as_well(n_images):
+    with torch.inference_mode():
+        sampler = PlaneSampler.from_operator(_operator())
+        sampler(torch.ones(n_images, 1, 30, 40))
+    scores = torch.ones(n_images, 1, 30, 40, requires_grad=True)
+    planes = sampler(scores)
+    planes.sum().backward()
+    torch.testing.assert_close(scores.grad.sum(), planes.sum())
+
+
 def test_nothing_visible_gives_zero():
     sampler = PlaneSampler(np.full((1, 2, 2, 2), np.nan), np.zeros((1, 2, 2), dtype=bool), (4, 5))
     assert (sampler(torch.ones(1, 3, 4, 5)) == 0).all()
@@ -287,98 +349,6 @@ def test_a_drawn_world_lands_in_its_cells():
     scores = torch.from_numpy(left).float()[None, None]
     planes = PlaneSampler(pixels, visible, camera.size)(scores)[0, 0, 0]
     np.testing.assert_allclose(planes, spec.centers()[..., 1], atol=0.01)
-
-
-COARSE = GridSpec(x_min=2, x_max=12, y_min=-4, y_max=4, cell=1.0)
-HEIGHTS = (0.0, 0.5)
-
-
-@pytest.fixture
-def built(monkeypatch):
-    """Forget what other tests built; return a list that grows by one for each operator built."""
-    sampling._build_sampler.cache_clear()
-    shapes, original = [], sampling.bilinear_matrix
-
-    def counted(*arguments):
-        shapes.append((matrix := original(*arguments)).shape)
-        return matrix
-
-    monkeypatch.setattr(sampling, "bilinear_matrix", counted)
-    return shapes
-
-
-def test_the_operator_of_a_calibration_is_built_once(built):
-    camera = _camera()
-    first = PlaneSampler.for_camera(COARSE, HEIGHTS, camera)
-    second = PlaneSampler.for_camera(replace(COARSE), np.array(HEIGHTS), replace(camera, K=camera.K.copy()))
-    assert len(built) == 1
-    by_hand = PlaneSampler(*plane_pixels(COARSE, HEIGHTS, camera), camera.size)
-    for a, b, c in zip(first.buffers(), second.buffers(), by_hand.buffers(), strict=True):
-        assert a.data_ptr() == b.data_ptr()
-        assert torch.equal(a, c)
-
-
-def test_networks_of_one_calibration_share_its_operator(built):
-    for segmenter in ("segnet", "fcn"):
-        build_net(Architecture(segmenter, image_size=(32, 64), grid=COARSE, heights=HEIGHTS), _camera())
-    assert len(built) == 1
-
-
-TURNED = rigid_transform(Rotation.from_euler("z", 0.1).as_matrix(), np.zeros(3))
-
-
-@pytest.mark.parametrize(
-    ("spec", "heights", "camera"),
-    [
-        (replace(COARSE, cell=0.5), HEIGHTS, _camera()),
-        (COARSE, (0.0, 0.6), _camera()),
-        (COARSE, HEIGHTS, _camera(focal=90.0)),
-        (COARSE, HEIGHTS, replace(_camera(), T_camera_from_lidar=LOOKING_AHEAD @ TURNED)),
-        (COARSE, HEIGHTS, _camera(size=(90, 201))),
-        (COARSE, HEIGHTS, replace(_camera(), lidar_height=1.2)),
-    ],
-    ids=["cells", "heights", "K", "pose", "size", "lidar_height"],
-)
-def test_whatever_decides_the_operator_gets_its_own(built, spec, heights, camera):
-    PlaneSampler.for_camera(COARSE, HEIGHTS, _camera())
-    cached = PlaneSampler.for_camera(spec, heights, camera)
-    assert len(built) == 2
-    by_hand = PlaneSampler(*plane_pixels(spec, heights, camera), camera.size)
-    for a, b in zip(cached.buffers(), by_hand.buffers(), strict=True):
-        assert torch.equal(a, b)
-
-
-def test_a_camera_changed_in_place_gets_its_own_operator(built):
-    camera = _camera()
-    before = PlaneSampler.for_camera(COARSE, HEIGHTS, camera)
-    camera.K[0, 0] = 90
-    after = PlaneSampler.for_camera(COARSE, HEIGHTS, camera)
-    assert len(built) == 2
-    assert not torch.equal(before.matrix_weights, after.matrix_weights)
-
-
-def test_moving_one_sampler_leaves_the_others_alone(built):
-    scores = torch.randn(1, 2, 101, 201, generator=torch.Generator().manual_seed(0))
-    one, other = (PlaneSampler.for_camera(COARSE, HEIGHTS, _camera()) for _ in range(2))
-    before = other(scores)
-    one.double()
-    assert one(scores.double()).dtype == torch.float64
-    assert {part.dtype for part in one.buffers()} == {torch.float64, torch.int32}
-    for sampler in (other, PlaneSampler.for_camera(COARSE, HEIGHTS, _camera())):
-        assert sampler.matrix_weights.dtype == torch.float32
-        assert torch.equal(sampler(scores), before)
-    assert len(built) == 1
-
-
-@pytest.mark.parametrize("n_images", [1, 3])
-def test_an_operator_built_for_inference_learns_as_well(built, n_images):
-    with torch.inference_mode():
-        PlaneSampler.for_camera(COARSE, HEIGHTS, _camera())(torch.ones(n_images, 1, 101, 201))
-    scores = torch.ones(n_images, 1, 101, 201, requires_grad=True)
-    planes = PlaneSampler.for_camera(COARSE, HEIGHTS, _camera())(scores)
-    planes.sum().backward()
-    assert len(built) == 1
-    torch.testing.assert_close(scores.grad.sum(), planes.sum())
 
 
 def test_wrong_inputs_are_named():
@@ -399,7 +369,7 @@ def test_wrong_inputs_are_named():
         plane_pixels(GridSpec.compact(), [np.nan], _camera())
     for heights in ([[0.0]], [np.inf], []):
         with pytest.raises(ArgumentError, match="heights"):
-            PlaneSampler.for_camera(GridSpec.compact(), heights, _camera())
+            plane_pixels(GridSpec.compact(), heights, _camera())
     with pytest.raises(ArgumentError, match="n_planes"):
         plane_heights(0)
     with pytest.raises(ArgumentError, match="spacing"):

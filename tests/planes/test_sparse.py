@@ -9,10 +9,6 @@ def _random_matrix():
     return random_array((30, 20), density=0.1, format="csr", dtype=np.float32, rng=np.random.default_rng(0))
 
 
-def _tensors(matrix):
-    return SparseMatrix(*(torch.from_numpy(part) for part in (matrix.indices, matrix.indptr, matrix.data)))
-
-
 def test_the_four_weights_of_a_visible_point_sum_to_one():
     rng = np.random.default_rng(1)
     pixels, visible = rng.uniform(0, 1, (2, 5, 6, 2)) * (8, 6), rng.random((2, 5, 6)) < 0.7
@@ -28,13 +24,13 @@ def test_products_are_those_of_scipy():
     matrix = _random_matrix()
     assert (np.diff(matrix.indptr) == 0).any()  # empty rows among them
     x = torch.randn(20, 3, generator=torch.Generator().manual_seed(0))
-    torch.testing.assert_close(_tensors(matrix).multiply(x), torch.from_numpy(matrix @ x.numpy()))
+    torch.testing.assert_close(SparseMatrix.from_scipy(matrix).multiply(x), torch.from_numpy(matrix @ x.numpy()))
 
 
 def test_blocks_along_a_diagonal_are_those_of_scipy():
     matrix = _random_matrix()
     x = torch.randn(60, 3, generator=torch.Generator().manual_seed(0))
-    product = _tensors(matrix).block_diagonal(3, n_columns=20).multiply(x)
+    product = SparseMatrix.from_scipy(matrix).block_diagonal(3, n_columns=20).multiply(x)
     torch.testing.assert_close(product, torch.from_numpy(block_diag([matrix] * 3) @ x.numpy()))
 
 
@@ -42,5 +38,5 @@ def test_the_gradient_of_a_product_is_that_by_the_transpose():
     matrix = _random_matrix()
     x = torch.zeros(20, 3, requires_grad=True)
     grad = torch.randn(30, 3, generator=torch.Generator().manual_seed(1))
-    SparseProduct.apply(x, _tensors(matrix), _tensors(matrix.T.tocsr())).backward(grad)
+    SparseProduct.apply(x, SparseMatrix.from_scipy(matrix), SparseMatrix.from_scipy(matrix.T.tocsr())).backward(grad)
     torch.testing.assert_close(x.grad, torch.from_numpy(matrix.T @ grad.numpy()))

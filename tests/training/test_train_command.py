@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from semgrid_edu.camera import Camera
 from semgrid_edu.cli import app
 from semgrid_edu.datasets.training_set import Sample
-from semgrid_edu.networks import Architecture, Fcn, load_net
+from semgrid_edu.networks import SEGMENTERS, Architecture, Fcn, load_net
 from semgrid_edu.storage.files import sha256, write_text
 from semgrid_edu.storage.provenance import provenance_problems
 from semgrid_edu.training import CHECKPOINT
@@ -155,7 +155,7 @@ def test_ctrl_c_says_how_to_go_on(monkeypatch, tmp_path, kept):
     [
         (["--device", "cuda:99"], "--device: expected cpu or one of the"),
         (["--preset", "huge"], "--preset: expected compact or paper, found 'huge'"),
-        (["--segmenter", "unknown"], "name: expected one of segnet, fcn, deeplab, unet"),
+        (["--segmenter", "unknown"], f"name: expected one of {', '.join(SEGMENTERS)}"),
         (["--imagenet", "nowhere.safetensors"], "nowhere.safetensors: expected a safetensors file"),
     ],
 )

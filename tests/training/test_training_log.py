@@ -73,7 +73,7 @@ def test_another_file_is_refused(path, content):
 
 
 def test_a_missing_log_is_named(tmp_path):
-    with pytest.raises(DataError, match=r"log.csv: expected the log of a training, found no such file"):
+    with pytest.raises(DataError, match=r"log.csv: expected the log of a training run, found no such file"):
         read_log(tmp_path / "log.csv")
 
 

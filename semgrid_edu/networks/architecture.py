@@ -1,0 +1,37 @@
+"""The description of a whole network, small enough to stand in the header of its weights file (sections 3.1, 3.4)."""
+
+from dataclasses import dataclass, field
+
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.planes import plane_heights
+
+
+@dataclass(frozen=True)
+class Architecture:
+    """Everything that decides the shapes of a network's weights and where its planes lie.
+
+    The camera isn't part of it: one trained network serves every calibration, because only its planes move.
+
+    Parameters
+    ----------
+    segmenter : str
+        Name of the image network, a key of `SEGMENTERS`.
+    preset : str
+        Size of the image network: "compact" for the CPU, "paper" for the published size.
+    label_set : str
+        Name of the label set, a key of `LABEL_SETS`, whose classes both the scores and the grid have.
+    image_size : (int, int)
+        Height h and width w that every image is scaled to, pixels. (96, 320) keeps the aspect of KITTI's images at
+        a fifteenth of their pixels.
+    grid : GridSpec
+        The cells of the semantic grid, (H, W) of them.
+    heights : (D,) float
+        delta_i, the heights of the planes above the ground, metres.
+    """
+
+    segmenter: str = "segnet"
+    preset: str = "compact"
+    label_set: str = "KITTI-14"
+    image_size: tuple[int, int] = (96, 320)
+    grid: GridSpec = field(default_factory=GridSpec.compact)
+    heights: tuple[float, ...] = tuple(plane_heights().tolist())
