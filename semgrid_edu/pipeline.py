@@ -22,7 +22,7 @@ STAGES = ("occupancy", "segmentation", "planes", "fusion", "crf")
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class FrameResult:
     """What every stage made of one frame.
 
     Parameters
@@ -55,7 +55,7 @@ def run_pipeline(
     occupancy: CmcdotParams | None = None,
     crf: CrfParams | None = None,
     seed: int = 0,
-) -> Iterator[Result]:
+) -> Iterator[FrameResult]:
     """Send the frames of a drive through every stage, one after the other.
 
     Parameters
@@ -71,7 +71,7 @@ def run_pipeline(
 
     Yields
     ------
-    Result
+    FrameResult
         One a frame.
 
     Raises
@@ -101,7 +101,7 @@ def run_pipeline(
                 log_g = net.fusion(p, o)[0].log_softmax(dim=0).numpy()
         with _clock(seconds, "crf"):
             refined = mean_field(-log_g, belief.probability, crf or CrfParams.for_cells(net.architecture.grid.cell))
-        yield Result(frame, belief, s[0].numpy(), np.exp(log_g), refined, seconds)
+        yield FrameResult(frame, belief, s[0].numpy(), np.exp(log_g), refined, seconds)
 
 
 def network_image(frame: Frame, size: tuple[int, int]) -> Tensor:

@@ -13,7 +13,7 @@ from semgrid_edu.datasets.truth import grid_truth
 from semgrid_edu.demo.rasters import scores_layer
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LabelSet
-from semgrid_edu.pipeline import Result
+from semgrid_edu.pipeline import FrameResult
 from semgrid_edu.plotting.images import draw_image
 from semgrid_edu.plotting.legends import colour_patches
 from semgrid_edu.storage.files import atomic_path
@@ -22,12 +22,12 @@ REACH = 50.0
 """Metres ahead that the picture shows: beyond, few cells are seen."""
 
 
-def save_overview(result: Result, spec: GridSpec, label_set: LabelSet, path: str | Path) -> None:
+def save_overview(result: FrameResult, spec: GridSpec, label_set: LabelSet, path: str | Path) -> None:
     """Draw image and grids of one frame side by side and save them as PNG.
 
     Parameters
     ----------
-    result : Result
+    result : FrameResult
     spec : GridSpec
     label_set : LabelSet
     path : path-like
@@ -39,7 +39,7 @@ def save_overview(result: Result, spec: GridSpec, label_set: LabelSet, path: str
     plt.close(figure)
 
 
-def draw_overview(result: Result, spec: GridSpec, label_set: LabelSet) -> Figure:
+def draw_overview(result: FrameResult, spec: GridSpec, label_set: LabelSet) -> Figure:
     """Draw image and grids of one frame: (l, i), s, o, g, refined g and, where it is known, the truth."""
     maps = {"semantic grid g": result.grid.argmax(axis=0), "g refined by the CRF": result.refined.argmax(axis=0)}
     if result.frame.labels is not None:
@@ -61,7 +61,7 @@ def draw_overview(result: Result, spec: GridSpec, label_set: LabelSet) -> Figure
     return figure
 
 
-def _draw_scores(ax: Axes, result: Result, label_set: LabelSet) -> None:
+def _draw_scores(ax: Axes, result: FrameResult, label_set: LabelSet) -> None:
     draw_image(result.frame.image, ax)
     height, width = result.frame.image.shape[:2]
     ax.imshow(scores_layer(result.scores, label_set), extent=(-0.5, width - 0.5, height - 0.5, -0.5))

@@ -11,7 +11,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS, confusion_matrix, semantic_cells
 from semgrid_edu.occupancy import State
-from semgrid_edu.pipeline import STAGES, Result
+from semgrid_edu.pipeline import STAGES, FrameResult
 from semgrid_edu.plotting import occupancy_colours
 from semgrid_edu.plotting.images import visible_points
 
@@ -36,7 +36,7 @@ class Record:
         The frames to show.
     labelled : int
         How many frames have had truth.
-    liveliest : Result or None
+    liveliest : FrameResult or None
         The shown frame with the most moving cells.
     """
 
@@ -44,13 +44,13 @@ class Record:
         self.spec, self.label_set, self.every = spec, label_set, every
         self.views: list[FrameView] = []
         self.labelled = 0
-        self.liveliest: Result | None = None
+        self.liveliest: FrameResult | None = None
         self._frames = 0
         self._confusion = {name: np.zeros((len(label_set),) * 2, np.int64) for name in ESTIMATES}
         self._occurs = np.zeros(256, bool)
         self._seconds: list[list[float]] = []
 
-    def add(self, result: Result) -> None:
+    def add(self, result: FrameResult) -> None:
         """Take in the next frame."""
         labels, belief = result.frame.labels, result.belief
         maps = {name: getattr(result, name).argmax(axis=0).astype(np.uint8) for name in ESTIMATES.values()}
@@ -83,7 +83,7 @@ class Record:
         for name, attribute in ESTIMATES.items():
             self._confusion[name] += confusion_matrix(maps["truth"], maps[attribute], len(self.label_set))
 
-    def _show(self, result: Result, maps: dict[str, NDArray]) -> None:
+    def _show(self, result: FrameResult, maps: dict[str, NDArray]) -> None:
         frame, belief = result.frame, result.belief
         for labels in (*maps.values(), result.scores.argmax(axis=0)):
             self._occurs[np.unique(labels)] = True
@@ -100,11 +100,11 @@ class Record:
         self.views.append(FrameView(clock, images, _texts(result, maps, self.label_set), arrows))
 
 
-def _moving(result: Result) -> int:
+def _moving(result: FrameResult) -> int:
     return int((result.belief.probability[State.DYNAMIC] > 0.5).sum())
 
 
-def _texts(result: Result, maps: dict[str, NDArray], label_set: LabelSet) -> dict[str, str]:
+def _texts(result: FrameResult, maps: dict[str, NDArray], label_set: LabelSet) -> dict[str, str]:
     """Say in words what the pictures of a frame show."""
     states = np.bincount(result.belief.probability.argmax(axis=0).ravel(), minlength=4) / maps["grid"].size
     occupancy = ", ".join(f"{share:.1%} {state.name.lower()}" for state, share in zip(State, states, strict=True))
