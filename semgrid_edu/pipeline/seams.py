@@ -114,7 +114,8 @@ class Seam:
             raise self.error(f"shape {shape}", f"shape {value.shape}{shape_hint(value.shape, shape)}")
         if value.dtype.kind != "f":
             raise self.error("floating-point numbers", f"{value.dtype}")
-        return value.astype(np.float32, order="K", copy=not self.own)
+        with np.errstate(over="ignore"):  # what is too large becomes infinite, and is refused as such
+            return value.astype(np.float32, order="K", copy=not self.own)
 
     def finite(self, values: NDArray) -> None:
         """Refuse NaN and infinity."""
@@ -125,8 +126,8 @@ class Seam:
     def probabilities(self, values: NDArray, axis: str = "class") -> None:
         """Refuse what aren't distributions over the first axis, the "class" or "state" axis of (K, H, W)."""
         wrong, total = _wrong_sums(values)
-        if wrong:
-            found = f"the {len(values)} {_PLURAL[axis]} of cell {wrong} sum to {total:.4g}"
+        if wrong is not None:
+            found = f"that the {len(values)} {_PLURAL[axis]} of cell {wrong} sum to {total:.4g}"
             raise self.error("probabilities that sum to 1 in each cell", f"{found}: {sum_hint(values, total, axis)}")
         if values.min() < -TOLERANCE:
             cell = _first((values < -TOLERANCE).any(axis=0))
@@ -136,22 +137,23 @@ class Seam:
         """Refuse what aren't logarithms of distributions over the first axis, (C, H, W)."""
         with np.errstate(over="ignore"):
             wrong, total = _wrong_sums(np.exp(values))
-        if wrong:
-            found = f"exp of the {len(values)} classes of cell {wrong} sums to {total:.4g}"
+        if wrong is not None:
+            found = f"that exp of the {len(values)} classes of cell {wrong} sums to {total:.4g}"
             raise self.error(
                 "log-probabilities, whose exp sums to 1 in each cell", f"{found}: {log_sum_hint(values, total)}"
             )
 
 
 _VALUES = {"segment": Seam.finite, "fuse": Seam.log_probabilities, "refine": Seam.probabilities}
-"""What is checked beyond the shape. The planes are too many to be searched at each frame: see `run`."""
+"""What is checked beyond the shape. The planes hold too many numbers for each frame: see `FrameWork.result`."""
 
 _PLURAL = {"class": "classes", "state": "states"}
 
 
 def _wrong_sums(values: NDArray) -> tuple[tuple[int, int] | None, float]:
     """Return the first cell of (K, H, W) that doesn't sum to 1, if there is one, and its sum."""
-    total = values.sum(axis=0)
+    with np.errstate(invalid="ignore"):
+        total = values.sum(axis=0)
     right = np.abs(total - 1) <= TOLERANCE  # NaN isn't
     if right.all():
         return None, 1.0

@@ -12,6 +12,7 @@ from semgrid_edu.experiments.evaluate import confusion_matrices, evaluate, score
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import Architecture, build_net, save_net
+from semgrid_edu.pipeline import StageError
 from semgrid_edu.storage.files import sha256
 
 ROAD, CAR, FREE, STATIC = (KITTI_14.index(name) for name in ("road", "car", "unknown-free", "unknown-static"))
@@ -72,6 +73,22 @@ def test_scores_are_those_counted_by_hand(found):
         "geometry, true labels, gaps closed": 0.5,  # the free and the static cell take the class of their neighbour
     }
     assert found["network"]["semantic"]["class accuracy"] == 0.5
+
+
+def test_another_refinement_has_a_row_of_its_own():
+    def always_car(log_g, o):
+        assert log_g.shape == (14, 2, 2)
+        assert o.shape == (4, 2, 2)
+        return np.eye(14)[np.full((2, 2), CAR)].transpose(2, 0, 1)
+
+    confusions = confusion_matrices(AlwaysRoad(), {}, FourCells(), np.full((2, 2), CAR), always_car)
+    assert confusions.keys() >= {"network", "network + always_car"}
+    np.testing.assert_array_equal(np.argwhere(confusions["network + always_car"])[:, 1], CAR)
+
+
+def test_a_refinement_that_gives_no_probabilities_is_refused():
+    with pytest.raises(StageError, match=r"^refine \(test_evaluate.py, line \d+\), frame 0: .* log-probabilities"):
+        confusion_matrices(AlwaysRoad(), {}, FourCells(), np.full((2, 2), CAR), lambda log_g, o: log_g)
 
 
 def test_table_shows_every_method_and_number(found):
