@@ -158,7 +158,7 @@ class Stages:
         DataError
             When it is needed and there are no shipped samples.
         """
-        if all((self.segment, self.sample, self.fuse)):
+        if {"segment", "sample", "fuse"} <= set(self.given):
             architecture = self.architecture or Architecture()
             refine = _mean_field(crf, architecture.grid.cell)
             own = Stages(track=_filter(occupancy, seed), refine=refine, architecture=architecture)

@@ -203,6 +203,15 @@ def test_an_image_network_of_ones_own_is_shown_too_and_its_classes_are_in_the_le
     assert re.search(r'<b>Classes</b>.*?">signage</span>', html)
 
 
+def test_without_truth_both_are_shown_and_neither_is_scored(tmp_path):
+    write_tiny_drive(tmp_path, n_frames=2, labelled=())
+    page = write_demo(KittiRawDrive(tmp_path, DATE, "0001"), sample_weights(), tmp_path / "out", EXAMPLE)
+    html = page.read_text(encoding="utf-8")
+    assert "Expect poor semantics" in html
+    assert len(Page(html).all("figure")) == 2 + 2 * 3
+    assert "FmIoU" not in html
+
+
 class TestMistakes:
     def test_a_stage_that_fails_leaves_no_page(self, drive, tmp_path):
         stages = write(tmp_path, "def refine(log_g, o): return log_g[14]\n")
