@@ -30,6 +30,10 @@ def demo(
     kitti: Annotated[Path | None, typer.Option(help="A folder of KITTI raw drives, which holds the dates.")] = None,
     date: Annotated[str | None, typer.Option(help="Such as 2011_09_26.")] = None,
     drive: Annotated[str | None, typer.Option(help="Such as 0013.")] = None,
+    stages: Annotated[
+        Path | None,
+        typer.Option(help="A Python file with your own track, segment, sample, fuse or refine, to compare."),
+    ] = None,
     out: Annotated[Path, typer.Option(help="Where to write the page.")] = Path("out/demo"),
 ) -> None:
     """Run every stage over a drive, the shipped one by default, and write a page that shows it."""
@@ -42,7 +46,7 @@ def demo(
     if given and len(given) < len(named):
         raise ArgumentError(", ".join(named), "all three or none", f"only {' and '.join(given)}")
     chosen = KittiRawDrive(kitti, date, drive) if kitti and date and drive else sample_drive()
-    page = write_demo(chosen, sample_weights(), out)
+    page = write_demo(chosen, sample_weights(), out, stages)
     typer.echo(f"open {page.resolve().as_uri()}\nin one picture: {page.parent / 'overview.png'}")
 
 
@@ -204,12 +208,12 @@ def evaluate(
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("evaluation.json"),
 ) -> None:
     """Score a trained network and two simple baselines on the test frames."""
-    from semgrid_edu.experiments.evaluate import evaluate, table
+    from semgrid_edu.experiments.evaluate import evaluate, scores_table
     from semgrid_edu.storage.files import check_writable
 
     check_writable(out)
     result = evaluate(data, weights)
-    _keep(result, table(result["scores"]), out)
+    _keep(result, scores_table(result["scores"]), out)
 
 
 @reproduce.callback()

@@ -41,8 +41,8 @@ class FrameLabels:
     def birdseye_on(self, spec: GridSpec) -> NDArray[np.uint8]:
         """Pool the bird's-eye labels to a coarser grid.
 
-        A cell takes the most frequent class of what stands in it, even if that is a thin pole in a single fine cell.
-        Where nothing stands, it takes the most frequent class of the ground.
+        A cell takes the class that `LabelSet.most_voted` finds among its fine cells: what stands in it, even if that is
+        a thin pole in a single fine cell, or else the ground.
 
         Parameters
         ----------
@@ -61,11 +61,7 @@ class FrameLabels:
         """
         fine = blocks(self.birdseye, spec)
         counts = np.stack([(fine == c).sum(axis=-1) for c in range(len(self.label_set))])
-        flat = [self.label_set.index(name) for name in self.label_set.flat]
-        standing = counts.copy()
-        standing[flat] = 0
-        best = np.where(standing.any(axis=0), standing.argmax(axis=0), counts.argmax(axis=0))
-        return np.where(counts.any(axis=0), best, IGNORE).astype(np.uint8)
+        return self.label_set.most_voted(counts, otherwise=IGNORE)
 
     def visible_on(self, spec: GridSpec) -> NDArray[np.bool_]:
         """Pool visibility to a coarser grid: a cell is visible when any part of it is.

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.errors import ArgumentError
 
@@ -77,6 +77,36 @@ class LabelSet:
         palette = np.full((256, 3), 255, dtype=np.uint8)
         palette[: len(self)] = self.rgb
         return palette[np.asarray(labels)]
+
+    def most_voted(self, votes: NDArray, otherwise: ArrayLike) -> NDArray[np.uint8]:
+        """Return the class that each cell takes when several were seen in it.
+
+        What stands in a cell outvotes the ground below it, be it one vote for a thin pole against many for the road;
+        otherwise the most frequent class wins, and of equally frequent ones the first.
+
+        Parameters
+        ----------
+        votes : (C, ...) int
+            How often each class was seen in each cell.
+        otherwise : (...) int, or int
+            The class of cells without a vote.
+
+        Returns
+        -------
+        (...) uint8
+
+        Examples
+        --------
+        >>> votes = np.zeros((14, 3), int)
+        >>> votes[KITTI_14.index("road")] = 5, 5, 0
+        >>> votes[KITTI_14.index("car")] = 0, 1, 0
+        >>> KITTI_14.most_voted(votes, otherwise=IGNORE)
+        array([  0,   3, 255], dtype=uint8)
+        """
+        standing = votes.copy()
+        standing[[self.index(name) for name in self.flat]] = 0
+        best = np.where(standing.any(axis=0), standing.argmax(axis=0), votes.argmax(axis=0))
+        return np.where(votes.any(axis=0), best, otherwise).astype(np.uint8)
 
 
 # The palette of Cityscapes (Cordts et al., 2016), moved as little as needed for a deuteranope to tell every pair apart.

@@ -14,7 +14,7 @@ TICK = 10
 """Metres between the marks of an axis."""
 
 
-def grid_svg(name: str, spec: GridSpec, camera: Camera, raster: str, text: str) -> str:
+def grid_svg(name: str, spec: GridSpec, camera: Camera, raster: str, text: str, arrows: bool = False) -> str:
     """Frame a raster with axes in metres, the vehicle and the borders of what the camera sees.
 
     SVG has x to the right and y down; the grid has y to the left and x up, so both change their signs.
@@ -29,6 +29,8 @@ def grid_svg(name: str, spec: GridSpec, camera: Camera, raster: str, text: str) 
         Data URI; empty when there is nothing to show.
     text : str
         What a reader hears who doesn't see the picture.
+    arrows : bool
+        Whether the script draws velocities over the raster.
 
     Returns
     -------
@@ -39,13 +41,13 @@ def grid_svg(name: str, spec: GridSpec, camera: Camera, raster: str, text: str) 
     left, top = -spec.y_max, -spec.x_max
     box = f'x="{left:g}" y="{top:g}" width="{width:g}" height="{height:g}"'
     href = f'href="{raster}"' if raster else ""
-    arrows = '<path class="arrows" d=""/>' if name == "occupancy" else ""
+    paths = f'<path class="arrows" data-arrows="{name}" d=""/>' if arrows else ""
     return (
         f'<svg viewBox="{left - 6.5:g} {top - 1:g} {width + 7.5:g} {height + 7:g}" role="img" '
         f'data-text="{name}" aria-label="{text}">{_axes(spec)}'
         f'<svg {box} viewBox="{left:g} {top:g} {width:g} {height:g}">'
         f'<image data-image="{name}" {href} {box} preserveAspectRatio="none"/>'
-        f'<path class="sight" d="{_sight(camera, spec)}"/>{arrows}</svg>'
+        f'<path class="sight" d="{_sight(camera, spec)}"/>{paths}</svg>'
         f'<rect class="frame" {box}/><path class="vehicle" d="M0-1.6.9.7-.9.7z"/></svg>'
     )
 

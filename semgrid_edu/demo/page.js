@@ -18,7 +18,9 @@ function show(k) {
     const name = element.tagName === "IMG" ? "alt" : "aria-label";
     element.setAttribute(name, frame.texts[element.dataset.text] ?? "");
   }
-  document.querySelector(".arrows").setAttribute("d", frame.arrows);
+  for (const path of document.querySelectorAll("[data-arrows]")) {
+    path.setAttribute("d", frame.arrows[path.dataset.arrows]);
+  }
   for (const element of document.querySelectorAll("[data-missing]")) {
     element.toggleAttribute("hidden", element.dataset.missing in frame.images);
   }

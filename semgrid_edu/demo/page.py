@@ -2,89 +2,29 @@
 
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from importlib.resources import files
 from string import Template
-from typing import NamedTuple
 
 import numpy as np
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.demo.grids import grid_svg
+from semgrid_edu.demo.comparison import Comparison
+from semgrid_edu.demo.panels import PanelFrame, panels_html, your_scores_html
+from semgrid_edu.demo.record import FrameView
 from semgrid_edu.demo.tables import metrics_table, times_table
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.plotting import DEPTH_RANGE, STATE_COLOURS, STATE_NAMES, depth_colours
 
-
-class Panel(NamedTuple):
-    """A bird's-eye panel: its raster's name, its title, its symbol in Fig. 2 and what to see."""
-
-    name: str
-    title: str
-    symbol: str
-    see: str
-
-
-GRID_PANELS = (
-    Panel(
-        "occupancy",
-        "Occupancy grid",
-        "o",
-        "Light is free, dark stands still, orange moves, grey nobody has seen. Behind each obstacle lies a grey "
-        "shadow. Arrows reach as far as things move in half a second.",
-    ),
-    Panel(
-        "grid",
-        "Semantic grid",
-        "g",
-        "Occupancy says where something stands, the image says what it is. Road and sidewalk, both just free in the "
-        "occupancy grid, part here.",
-    ),
-    Panel(
-        "refined",
-        "Refined grid",
-        "g after the CRF",
-        "Cells that lie close and have like occupancy agree on a class, so specks and holes go. What is thin or rare "
-        "may go with them: compare.",
-    ),
-    Panel(
-        "truth",
-        "Truth",
-        "",
-        "What stands in the cells that the camera sees; the others are unknown, named by their occupancy. Where does "
-        "the estimate differ, and how far away?",
-    ),
-)
-
 NOTICE = (
-    '<p class="notice"><b>Expect poor semantics here.</b> No truth is known for this drive, and the network has learnt '
-    "from simulated streets alone. Real images are out of its domain: image scores, semantic grid and refined grid "
-    "are often wrong. Occupancy and geometry learn nothing from images and hold, with one reserve: the filter takes "
-    "the ground as flat, so a slope or high grass beside the road counts as standing.</p>"
+    '<p class="notice"><b>Expect poor semantics here.</b> The truth is not known for this drive, and the network has '
+    "learned from simulated streets alone. Real images look different, so expect many wrong classes in the image "
+    "scores, the semantic grid and the refined grid. The occupancy grid and the geometry learn nothing from images, so "
+    "they work here as they do on simulated drives, with one reservation: the filter finds the ground by following it "
+    "outward from the vehicle. Where parked cars or a fence hide the foot of a bank, it can lose the ground, and then "
+    "it takes the bank for an obstacle.</p>"
 )
-
-
-@dataclass(frozen=True)
-class FrameView:
-    """One frame as the page shows it.
-
-    Parameters
-    ----------
-    clock : str
-        Which frame, and when.
-    images : dict of str to str
-        Data URIs of photo, points, scores, occupancy, grid, refined and, where it is known, truth.
-    texts : dict of str to str
-        What a reader hears who doesn't see them.
-    arrows : str
-        Velocities, as an SVG path.
-    """
-
-    clock: str
-    images: dict[str, str]
-    texts: dict[str, str]
-    arrows: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +47,10 @@ class Summary:
         Frames with truth; with none, the page shows no metrics and says what to expect.
     milliseconds : dict of str to float
         Time of each stage.
+    comparison : Comparison, optional
+        Says that a second run with a student's stages is shown beside the package's own.
+    your_milliseconds : dict of str to float
+        Time of each stage in that run.
     """
 
     title: str
@@ -117,6 +61,8 @@ class Summary:
     metrics: dict[str, dict[str, float]]
     labelled: int
     milliseconds: dict[str, float]
+    comparison: Comparison | None = None
+    your_milliseconds: dict[str, float] = field(default_factory=dict)
 
 
 def page_html(summary: Summary, frames: Sequence[FrameView]) -> str:
@@ -135,7 +81,7 @@ def page_html(summary: Summary, frames: Sequence[FrameView]) -> str:
     """
     first, ramp = frames[0], depth_colours(np.geomspace(*DEPTH_RANGE, 9))
     near, far = DEPTH_RANGE
-    panels = [panel for panel in GRID_PANELS if panel.name != "truth" or summary.labelled]
+    shared = PanelFrame(summary.spec, summary.camera, first)
     return Template(_resource("page.html")).substitute(
         title=escape(f"semgrid_edu: {summary.title}"),
         style=_resource("page.css"),
@@ -150,11 +96,12 @@ def page_html(summary: Summary, frames: Sequence[FrameView]) -> str:
         far=f"{far:g}",
         ramp=",".join(f"rgb{tuple(colour)}" for colour in ramp.tolist()),
         network_size="{1} × {0} pixels".format(*summary.network_size),
-        grids="\n".join(_panel(panel, summary, first) for panel in panels),
+        your_scores=your_scores_html(first, summary.comparison),
+        grids=panels_html(shared, bool(summary.labelled), summary.comparison),
         states=_swatches(zip(STATE_NAMES, STATE_COLOURS, strict=True)),
         classes=_swatches(summary.classes),
-        metrics=metrics_table(summary.metrics, summary.labelled) if summary.labelled else "",
-        times=times_table(summary.milliseconds),
+        metrics=metrics_table(summary.metrics, summary.labelled, summary.comparison) if summary.labelled else "",
+        times=times_table(summary.milliseconds, summary.your_milliseconds, summary.comparison),
         frames=json.dumps([vars(frame) for frame in frames]).replace("<", "\\u003c"),
     )
 
@@ -163,21 +110,13 @@ def _lead(summary: Summary, n_frames: int) -> str:
     spec = summary.spec
     size = f"{spec.x_max - spec.x_min:g} m long and {spec.y_max - spec.y_min:g} m wide"
     return (
+        f"{summary.comparison.lead() + ' ' if summary.comparison else ''}"
         f"Here are {n_frames} frames of the drive <b>{escape(summary.title)}</b>, sent through every stage of the "
-        "method. A Bayes filter turns laser scans into a grid of what is free, what stands and what moves. A network "
-        "names what the camera sees; planes above the ground carry the names into the same grid, where a second "
-        f"network fuses both. Out comes a map, {size}, of what stands where. Move the slider, press play, or use the "
-        "arrow keys."
+        "method. A Bayes filter turns the laser scans into a grid of what is free, what stands still and what moves. A "
+        "network gives each pixel of the camera image a score for each class. Planes above the ground carry these "
+        "scores into the same grid, where a second network fuses them with the occupancy. The result is a map, "
+        f"{size}, of what stands where. Move the slider, press play, or use the arrow keys."
     )
-
-
-def _panel(panel: Panel, summary: Summary, first: FrameView) -> str:
-    raster, text = first.images.get(panel.name, ""), escape(first.texts.get(panel.name, ""))
-    svg = grid_svg(panel.name, summary.spec, summary.camera, raster, text)
-    hidden = " hidden" if panel.name in first.images else ""
-    missing = f'<p class="note" data-missing="{panel.name}"{hidden}>Nobody labelled this frame.</p>'
-    symbol = f" <i>{panel.symbol}</i>" if panel.symbol else ""
-    return f"<figure>{svg}{missing}<figcaption><b>{panel.title}</b>{symbol} — {panel.see}</figcaption></figure>"
 
 
 def _swatches(colours: Iterable[tuple[str, tuple[int, int, int]]]) -> str:

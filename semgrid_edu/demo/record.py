@@ -1,22 +1,50 @@
 """What the demo keeps of a drive while it runs: encoded frames, counts and times."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.datasets.truth import grid_truth
+from semgrid_edu.demo.comparison import MADE_BY, Comparison
 from semgrid_edu.demo.grids import arrows_path
-from semgrid_edu.demo.page import FrameView
 from semgrid_edu.demo.rasters import classes_uri, photo_uri, points_layer, raster_uri, scores_layer
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS, confusion_matrix, semantic_cells
 from semgrid_edu.occupancy import State
-from semgrid_edu.pipeline import STAGES, Result
+from semgrid_edu.pipeline import STAGES, FrameResult
 from semgrid_edu.plotting import occupancy_colours
 from semgrid_edu.plotting.images import visible_points
 
-ESTIMATES = {"network": "grid", "network + CRF": "refined"}
-"""Which of a result's grids stands in which row of the page's table."""
+YOURS = "your_"
+"""What the names of pictures made with a student's stages begin with."""
+
+ESTIMATES = ("grid", "refined")
+"""The grids of a result that are scored."""
+
+
+@dataclass(frozen=True)
+class FrameView:
+    """One frame as the page shows it.
+
+    Parameters
+    ----------
+    clock : str
+        Which frame, and when.
+    images : dict of str to str
+        Data URIs of photo, points, scores, occupancy, grid, refined and, where it is known, truth; those made with a
+        student's stages under names that begin with `YOURS`.
+    texts : dict of str to str
+        What a reader hears who doesn't see them.
+    arrows : dict of str to str
+        Velocities as an SVG path, for each occupancy grid among the images.
+    """
+
+    clock: str
+    images: dict[str, str]
+    texts: dict[str, str]
+    arrows: dict[str, str]
 
 
 class Record:
@@ -29,6 +57,8 @@ class Record:
         The network's classes.
     every : int
         Of so many frames one is shown.
+    comparison : Comparison, optional
+        Says that each frame has two results, the package's and one with a student's stages.
 
     Attributes
     ----------
@@ -36,41 +66,59 @@ class Record:
         The frames to show.
     labelled : int
         How many frames have had truth.
-    liveliest : Result or None
-        The shown frame with the most moving cells.
+    liveliest : (FrameResult, FrameResult or None), or None
+        The results of the shown frame with the most moving cells.
     """
 
-    def __init__(self, spec: GridSpec, label_set: LabelSet, every: int = 1) -> None:
-        self.spec, self.label_set, self.every = spec, label_set, every
+    def __init__(
+        self, spec: GridSpec, label_set: LabelSet, every: int = 1, comparison: Comparison | None = None
+    ) -> None:
+        self.spec, self.label_set, self.every, self.comparison = spec, label_set, every, comparison
         self.views: list[FrameView] = []
         self.labelled = 0
-        self.liveliest: Result | None = None
+        self.liveliest: tuple[FrameResult, FrameResult | None] | None = None
         self._frames = 0
-        self._confusion = {name: np.zeros((len(label_set),) * 2, np.int64) for name in ESTIMATES}
+        self._rows = _rows(comparison)
+        self._confusion = {name: np.zeros((len(label_set),) * 2, np.int64) for name in self._rows.values()}
         self._occurs = np.zeros(256, bool)
         self._seconds: list[list[float]] = []
+        self._your_seconds: list[list[float]] = []
 
-    def add(self, result: Result) -> None:
-        """Take in the next frame."""
-        labels, belief = result.frame.labels, result.belief
-        maps = {name: getattr(result, name).argmax(axis=0).astype(np.uint8) for name in ESTIMATES.values()}
-        if labels is not None:
-            maps["truth"] = grid_truth(labels, belief.probability, self.spec)
+    def add(self, package: FrameResult, yours: FrameResult | None = None) -> None:
+        """Take in the next frame.
+
+        Parameters
+        ----------
+        package : FrameResult
+            With the package's own stages. Its occupancy grid names the unknown cells of the truth, for both results.
+        yours : FrameResult, optional
+            With a student's stages.
+        """
+        maps = {name: _best(getattr(package, name)) for name in ESTIMATES}
+        self._seconds.append([package.seconds[stage] for stage in STAGES])
+        if yours is not None:
+            maps |= {YOURS + name: _best(getattr(yours, name)) for name in ESTIMATES if name in self.comparison.changed}
+            self._your_seconds.append([yours.seconds[stage] for stage in STAGES])
+        if package.frame.labels is not None:
+            maps["truth"] = grid_truth(package.frame.labels, package.belief.probability, self.spec)
             self._count(maps)
         if self._frames % self.every == 0:
-            self._show(result, maps)
-        self._seconds.append([result.seconds[stage] for stage in STAGES])
+            self._show(package, yours, maps)
         self._frames += 1
 
     def milliseconds(self) -> dict[str, float]:
-        """Return the median time of each stage: the first frames also load compiled code."""
-        medians = 1000 * np.median(self._seconds, axis=0)
-        return dict(zip(STAGES, medians.tolist(), strict=True))
+        """Return the median time of each of the package's stages: the first frames also load compiled code."""
+        return _medians(self._seconds)
+
+    def your_milliseconds(self) -> dict[str, float]:
+        """Return the same for the results with a student's stages; empty without them."""
+        return _medians(self._your_seconds) if self._your_seconds else {}
 
     def metrics(self) -> dict[str, dict[str, float]]:
         """Return each of `METRICS`, 0..1, by cells and estimate."""
-        rows = {f"all cells, {name}": matrix for name, matrix in self._confusion.items()}
-        rows |= {f"semantic cells, {name}": semantic_cells(m, self.label_set) for name, m in self._confusion.items()}
+        confusion = {row: self._confusion[name] for row, name in self._rows.items()}
+        rows = {f"all cells, {row}": matrix for row, matrix in confusion.items()}
+        rows |= {f"semantic cells, {row}": semantic_cells(m, self.label_set) for row, m in confusion.items()}
         return {metric: {row: of(matrix) for row, matrix in rows.items()} for metric, of in METRICS.items()}
 
     def classes(self) -> list[tuple[str, tuple[int, int, int]]]:
@@ -80,40 +128,73 @@ class Record:
 
     def _count(self, maps: dict[str, NDArray]) -> None:
         self.labelled += 1
-        for name, attribute in ESTIMATES.items():
-            self._confusion[name] += confusion_matrix(maps["truth"], maps[attribute], len(self.label_set))
+        for name, confusion in self._confusion.items():
+            confusion += confusion_matrix(maps["truth"], maps[name], len(self.label_set))
 
-    def _show(self, result: Result, maps: dict[str, NDArray]) -> None:
-        frame, belief = result.frame, result.belief
-        for labels in (*maps.values(), result.scores.argmax(axis=0)):
+    def _show(self, package: FrameResult, yours: FrameResult | None, maps: dict[str, NDArray]) -> None:
+        frame = package.frame
+        if self.liveliest is None or _moving(package) > _moving(self.liveliest[0]):
+            self.liveliest = package, yours
+        returns = f"Camera image with the {len(visible_points(frame)[1])} LIDAR returns that the camera sees."
+        images = {"photo": photo_uri(frame.image), "points": raster_uri(points_layer(frame))}
+        view = FrameView(f"frame {self._frames}, {frame.time:.1f} s", images, {"points": returns}, {})
+        self._draw(view, package, tuple(MADE_BY))
+        if yours is not None:
+            self._draw(view, yours, self.comparison.changed, YOURS)
+        for name, labels in maps.items():
             self._occurs[np.unique(labels)] = True
-        if self.liveliest is None or _moving(result) > _moving(self.liveliest):
-            self.liveliest = result
-        images = {
-            "photo": photo_uri(frame.image),
-            "points": raster_uri(points_layer(frame)),
-            "scores": raster_uri(scores_layer(result.scores, self.label_set)),
-            "occupancy": raster_uri(occupancy_colours(belief.probability)),
-        } | {name: classes_uri(labels, self.label_set) for name, labels in maps.items()}
-        arrows = arrows_path(self.spec, belief.probability, belief.velocity)
-        clock = f"frame {self._frames}, {frame.time:.1f} s"
-        self.views.append(FrameView(clock, images, _texts(result, maps, self.label_set), arrows))
+            view.images[name] = classes_uri(labels, self.label_set)
+            view.texts[name] = f"{self._whose(name)}Map of classes seen from above: {_shares(labels, self.label_set)}."
+        self.views.append(view)
+
+    def _draw(self, view: FrameView, result: FrameResult, wanted: tuple[str, ...], prefix: str = "") -> None:
+        """Add scores and occupancy grid of a result to a view."""
+        if "scores" in wanted:
+            name, best = f"{prefix}scores", _best(result.scores)
+            self._occurs[np.unique(best)] = True
+            view.images[name] = raster_uri(scores_layer(result.scores, self.label_set))
+            shares = _shares(best, self.label_set)
+            view.texts[name] = f"{self._whose(name)}Camera image painted with classes: {shares}."
+        if "occupancy" in wanted:
+            name, belief = f"{prefix}occupancy", result.belief
+            view.images[name] = raster_uri(occupancy_colours(belief.probability))
+            view.texts[name] = f"{self._whose(name)}Occupancy grid seen from above: {_states(belief.probability)}."
+            view.arrows[name] = arrows_path(self.spec, belief.probability, belief.velocity)
+
+    def _whose(self, name: str) -> str:
+        return f"{self.comparison.file}: " if name.startswith(YOURS) else ""
 
 
-def _moving(result: Result) -> int:
+def _rows(comparison: Comparison | None) -> dict[str, str]:
+    """Return which map each row of the table of metrics scores, by the words of the row."""
+    if comparison is None:
+        return {"network": "grid", "network + CRF": "refined"}
+    words = {"grid": "semantic grid", "refined": "refined grid"}
+    rows = {f"{words[name]}, the package's": name for name in ESTIMATES}
+    return rows | {
+        f"{words[name]}, {comparison.file}": YOURS + name for name in ESTIMATES if name in comparison.changed
+    }
+
+
+def _medians(seconds: list[list[float]]) -> dict[str, float]:
+    medians = 1000 * np.median(seconds, axis=0)
+    return dict(zip(STAGES, medians.tolist(), strict=True))
+
+
+def _best(values: NDArray) -> NDArray[np.uint8]:
+    """Return the class of the largest value in each place of (C, ...)."""
+    return values.argmax(axis=0).astype(np.uint8)
+
+
+def _moving(result: FrameResult) -> int:
     return int((result.belief.probability[State.DYNAMIC] > 0.5).sum())
 
 
-def _texts(result: Result, maps: dict[str, NDArray], label_set: LabelSet) -> dict[str, str]:
-    """Say in words what the pictures of a frame show."""
-    states = np.bincount(result.belief.probability.argmax(axis=0).ravel(), minlength=4) / maps["grid"].size
-    occupancy = ", ".join(f"{share:.1%} {state.name.lower()}" for state, share in zip(State, states, strict=True))
-    texts = {
-        "points": f"Camera image with the {len(visible_points(result.frame)[1])} LIDAR returns that it sees.",
-        "scores": f"Camera image painted with classes: {_shares(result.scores.argmax(axis=0), label_set)}.",
-        "occupancy": f"Occupancy grid seen from above: {occupancy}.",
-    }
-    return texts | {name: f"Map of classes seen from above: {_shares(m, label_set)}." for name, m in maps.items()}
+def _states(probability: NDArray) -> str:
+    """Say in words how many cells are most probably in each state."""
+    best = probability.argmax(axis=0)
+    shares = np.bincount(best.ravel(), minlength=len(State)) / best.size
+    return ", ".join(f"{share:.1%} {state.name.lower()}" for state, share in zip(State, shares, strict=True))
 
 
 def _shares(labels: NDArray, label_set: LabelSet) -> str:

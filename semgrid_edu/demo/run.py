@@ -5,19 +5,21 @@ from pathlib import Path
 from tqdm.auto import tqdm
 
 from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.demo.comparison import Comparison
 from semgrid_edu.demo.overview import save_overview
 from semgrid_edu.demo.page import Summary, page_html
 from semgrid_edu.demo.record import Record
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.networks import load_net
-from semgrid_edu.pipeline import run_pipeline
+from semgrid_edu.pipeline import Stages, load_stages, run_side_by_side
 from semgrid_edu.storage.files import write_text
 
 SHOWN = 40
 """The page holds no more frames than this, evenly spaced, so that it stays near 10 MB."""
 
 
-def write_demo(drive: KittiRawDrive, weights: str | Path, out: str | Path) -> Path:
+def write_demo(drive: KittiRawDrive, weights: str | Path, out: str | Path, stages: str | Path | None = None) -> Path:
     """Run every stage over a drive and write a page that shows it.
 
     Parameters
@@ -28,6 +30,8 @@ def write_demo(drive: KittiRawDrive, weights: str | Path, out: str | Path) -> Pa
         Of the network, as `save_net` wrote them.
     out : path-like
         The folder to write index.html and overview.png to; made when missing.
+    stages : path-like, optional
+        A file with stages of one's own, as `load_stages` reads them: the page then shows them beside the package's.
 
     Returns
     -------
@@ -37,16 +41,23 @@ def write_demo(drive: KittiRawDrive, weights: str | Path, out: str | Path) -> Pa
     Raises
     ------
     ArgumentError
-        When the drive has no images.
+        When the drive has no images, or the stages of the file work on another grid or with other classes.
     DataError
-        When a file of the drive, or the weights, can't be read.
+        When a file of the drive, the weights or the stages can't be read.
+    StageError
+        When a stage of the file raises an error, or returns what the next one can't use.
     """
     net = load_net(weights, drive.camera)
-    Path(out).mkdir(parents=True, exist_ok=True)  # a folder that can't be made shall be known before the work
+    own, yours, comparison = Stages.of(net), (), None
+    if stages is not None:
+        mine = load_stages(stages)
+        yours, comparison = (_beside(own, mine),), Comparison(Path(stages).name, mine.given)
+    Path(out).mkdir(parents=True, exist_ok=True)  # before the work, so that nobody waits to learn that it can't be made
     label_set = LABEL_SETS[net.architecture.label_set]
-    record = Record(net.architecture.grid, label_set, every=-(-len(drive) // SHOWN))
-    for result in tqdm(run_pipeline(drive, net), total=len(drive), desc=drive.folder.name, unit="frame"):
-        record.add(result)
+    record = Record(net.architecture.grid, label_set, every=-(-len(drive) // SHOWN), comparison=comparison)
+    results = run_side_by_side(drive, own, *yours)
+    for of_frame in tqdm(results, total=len(drive), desc=drive.folder.name, unit="frame"):
+        record.add(*of_frame)
     summary = Summary(
         title=drive.folder.name,
         spec=record.spec,
@@ -56,8 +67,20 @@ def write_demo(drive: KittiRawDrive, weights: str | Path, out: str | Path) -> Pa
         metrics=record.metrics(),
         labelled=record.labelled,
         milliseconds=record.milliseconds(),
+        comparison=comparison,
+        your_milliseconds=record.your_milliseconds(),
     )
-    save_overview(record.liveliest, record.spec, label_set, Path(out) / "overview.png")
+    save_overview(*record.liveliest, record.spec, label_set, Path(out) / "overview.png", comparison)
     page = Path(out) / "index.html"
     write_text(page, page_html(summary, record.views))
     return page
+
+
+def _beside(own: Stages, mine: Stages) -> Stages:
+    """Return a complete set of stages that can be compared with the package's own."""
+    complete = mine.over(own)
+    for name in ("grid", "label_set"):
+        ours, theirs = getattr(own.architecture, name), getattr(complete.architecture, name)
+        if ours != theirs:
+            raise ArgumentError(f"the {name} of the stages", f"{ours}, to compare them with the package's", theirs)
+    return complete

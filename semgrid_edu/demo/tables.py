@@ -2,6 +2,7 @@
 
 from html import escape
 
+from semgrid_edu.demo.comparison import Comparison
 from semgrid_edu.occupancy.tracking import LIDAR_PERIOD
 
 SCAN_MILLISECONDS = 1000 * LIDAR_PERIOD
@@ -17,7 +18,10 @@ STAGE_WORDS = {
 """Symbols and words of each stage of the pipeline."""
 
 
-def metrics_table(metrics: dict[str, dict[str, float]], labelled: int) -> str:
+COMPARED = " The package's occupancy grid names the unknown cells of the truth, so that both runs have the same truth."
+
+
+def metrics_table(metrics: dict[str, dict[str, float]], labelled: int, comparison: Comparison | None = None) -> str:
     """Return a table of values in per cent.
 
     Parameters
@@ -26,14 +30,18 @@ def metrics_table(metrics: dict[str, dict[str, float]], labelled: int) -> str:
         Values, 0..1, by column and row.
     labelled : int
         Frames with truth.
+    comparison : Comparison, optional
+        Says that rows of a second run are among them.
     """
     head = "".join(f"<th>{escape(column)}</th>" for column in metrics)
     rows = "".join(_metrics_row(row, metrics) for row in next(iter(metrics.values())))
     return (
-        f"<div><table><caption><b>How often it is right</b>Per cent, over the {labelled} frames whose truth is known. "
-        "Class accuracy: the mean over classes, so rare ones count as much as road. FmIoU: overlap of each class with "
-        "its truth, weighted by how often it occurs. Semantic cells: those whose truth is none of the unknown "
-        "classes.</caption>"
+        "<div><table><caption><b>How often it is right</b>In per cent, over the "
+        f"{labelled} frames whose truth is known. Pixel accuracy is the share of cells with the right class. Class "
+        "accuracy is the mean over the classes, so a rare class counts as much as road. FmIoU is the intersection over "
+        "union of each class with its truth, weighted by how often the class occurs. Semantic cells are those whose "
+        "truth is none of the unknown classes."
+        f"{COMPARED if comparison else ''}</caption>"
         f"<thead><tr><th></th>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
     )
 
@@ -43,24 +51,42 @@ def _metrics_row(row: str, metrics: dict[str, dict[str, float]]) -> str:
     return f"<tr><th>{escape(row)}</th>{cells}</tr>"
 
 
-def times_table(milliseconds: dict[str, float]) -> str:
+def times_table(
+    milliseconds: dict[str, float],
+    yours: dict[str, float] | None = None,
+    comparison: Comparison | None = None,
+) -> str:
     """Return a table of the stages' times beside the LIDAR's period.
 
     Parameters
     ----------
     milliseconds : dict of str to float
         By stage.
+    yours : dict of str to float, optional
+        The same in a second run, whose stages `comparison` names.
+    comparison : Comparison, optional
     """
-    rows = "".join(_time_row(*STAGE_WORDS[stage], value) for stage, value in milliseconds.items())
-    total = _time_row("", "all stages", sum(milliseconds.values()), "total")
+    runs = [milliseconds, yours] if comparison else [milliseconds]
+    replaced = comparison.replaced() if comparison else {}
+    rows = "".join(_time_row(*_words(stage, replaced), [run[stage] for run in runs]) for stage in milliseconds)
+    total = _time_row("", "all stages", [sum(run.values()) for run in runs], "total")
+    heads = ["the package's, ms", f"{escape(comparison.file)}, ms"] if comparison else ["ms"]
     return (
-        "<div><table><caption><b>How long it takes</b>Median of a frame, here, without a GPU. The LIDAR gives a scan "
-        f"every {SCAN_MILLISECONDS:g} ms: that would be a full bar.</caption>"
-        f"<thead><tr><th></th><th></th><th>ms</th><th></th></tr></thead><tbody>{rows}{total}</tbody></table></div>"
+        "<div><table><caption><b>How long it takes</b>Median time for a frame on the computer that made this page, "
+        f"without a GPU. A full bar is {SCAN_MILLISECONDS:g} ms, the time from one scan of KITTI's LIDAR to the next."
+        "</caption>"
+        f"<thead><tr><th></th><th></th>{''.join(f'<th>{head}</th>' for head in heads)}<th></th></tr></thead>"
+        f"<tbody>{rows}{total}</tbody></table></div>"
     )
 
 
-def _time_row(symbols: str, words: str, value: float, kind: str = "stage") -> str:
-    width = min(100.0, 100 * value / SCAN_MILLISECONDS)
-    bar = f'<td class="share"><span style="width:{width:.1f}%"></span></td>'
-    return f'<tr class="{kind}"><th><i>{symbols}</i></th><th>{words}</th><td>{value:.1f}</td>{bar}</tr>'
+def _words(stage: str, replaced: dict[str, str]) -> tuple[str, str]:
+    """Return symbols and words of a stage, and what replaces it."""
+    symbols, words = STAGE_WORDS[stage]
+    return symbols, f"{words}; replaced by <b>{replaced[stage]}</b>" if stage in replaced else words
+
+
+def _time_row(symbols: str, words: str, values: list[float], kind: str = "stage") -> str:
+    numbers = "".join(f"<td>{value:.1f}</td>" for value in values)
+    bars = "".join(f'<span style="width:{min(100.0, 100 * v / SCAN_MILLISECONDS):.1f}%"></span>' for v in values)
+    return f'<tr class="{kind}"><th><i>{symbols}</i></th><th>{words}</th>{numbers}<td class="share">{bars}</td></tr>'

@@ -34,10 +34,9 @@ def majority_class(truths: NDArray) -> NDArray[np.uint8]:
 def carry_labels(labels: NDArray, pixels: NDArray, cells: NDArray, occupancy: NDArray) -> NDArray[np.uint8]:
     """Carry image labels to the grid with the LIDAR's depth: pure geometry, as the paper makes its ground truth.
 
-    Each return that the camera sees takes the class of its pixel to its cell. A cell takes the most frequent class
-    of what stands in it or, where nothing does, of the ground, just as the truth is pooled; cells that no
-    labelled return reaches are unknown by occupancy state. Sky sends no return, so such a label is an error
-    at an object's outline and is dropped.
+    Each return that the camera sees takes the class of its pixel to its cell. There the returns vote as the fine
+    cells of the truth do (`LabelSet.most_voted`); a cell that no labelled return reaches is unknown by occupancy
+    state. Sky sends no return, so such a label is an error at an object's outline and is dropped.
 
     Parameters
     ----------
@@ -65,10 +64,7 @@ def carry_labels(labels: NDArray, pixels: NDArray, cells: NDArray, occupancy: ND
     kept = (classes != IGNORE) & (classes != KITTI_14.index("sky"))
     n = len(KITTI_14)
     votes = np.bincount(cells[kept] * n + classes[kept], minlength=unknown.size * n).reshape(*unknown.shape, n)
-    standing = votes.copy()
-    standing[..., [KITTI_14.index(name) for name in KITTI_14.flat]] = 0
-    best = np.where(standing.any(axis=-1), standing.argmax(axis=-1), votes.argmax(axis=-1))
-    return np.where(votes.any(axis=-1), best, unknown).astype(np.uint8)
+    return KITTI_14.most_voted(np.moveaxis(votes, -1, 0), otherwise=unknown)
 
 
 def close_gaps(grid: NDArray, cell: float, reach: float = CLOSING_REACH) -> NDArray[np.uint8]:

@@ -1,5 +1,6 @@
 """The trained network against what learns next to nothing, on frames that none has seen (sections 4.2 and 4.3)."""
 
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -9,14 +10,15 @@ from numpy.typing import NDArray
 from torch import nn
 from tqdm.auto import tqdm
 
-from semgrid_edu.crf import CrfParams, mean_field
 from semgrid_edu.datasets.training_cache import SEED
 from semgrid_edu.datasets.training_set import Sample, TrainingSet
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.baselines import carry_labels, close_gaps, majority_class
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS, confusion_matrix, semantic_cells
-from semgrid_edu.networks import IMAGE_STAGE, SemanticGridNet, load_net
+from semgrid_edu.networks import IMAGE_STAGE, SemanticGridNet, load_net, unit_image
+from semgrid_edu.pipeline import Stages
+from semgrid_edu.pipeline.seams import Seam
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import versions
 
@@ -24,7 +26,11 @@ Scores = dict[str, dict[str, dict[str, float]]]
 """By method, by cells ("all" or "semantic"), by metric; 0..1."""
 
 
-def evaluate(dataset_dir: str | Path, weights: str | Path) -> dict[str, object]:
+Refine = Callable[[NDArray, NDArray], NDArray]
+"""(log_g (C, H, W), o (4, H, W)) -> g (C, H, W), as `semgrid_edu.pipeline.Stages` describes it."""
+
+
+def evaluate(dataset_dir: str | Path, weights: str | Path, refine: Refine | None = None) -> dict[str, object]:
     """Score the network and the baselines on the test split of a data set.
 
     Parameters
@@ -34,6 +40,8 @@ def evaluate(dataset_dir: str | Path, weights: str | Path) -> dict[str, object]:
     weights : path-like
         A network that learned from the training split. Where `image_stage.safetensors` lies beside it, its image
         labels are carried to the grid as well: those that learned from images alone, not yet from grids.
+    refine : callable, optional
+        Refines the network's grids, as in `Stages`, and is named in the row "network + ..."; the CRF when left out.
 
     Returns
     -------
@@ -47,6 +55,8 @@ def evaluate(dataset_dir: str | Path, weights: str | Path) -> dict[str, object]:
         When the data set lacks a split, or the network is for other grids or images.
     DataError
         When a file is missing or damaged.
+    StageError
+        When `refine` raises an error, or returns anything but probabilities.
     """
     training, test = TrainingSet(dataset_dir, "train"), TrainingSet(dataset_dir, "test")
     net = load_net(weights, test.camera)
@@ -54,22 +64,32 @@ def evaluate(dataset_dir: str | Path, weights: str | Path) -> dict[str, object]:
     image_stage = Path(weights).with_name(IMAGE_STAGE)
     if image_stage.exists():
         segmenters["image-stage"] = load_net(image_stage, test.camera).segmenter
-    confusions = confusion_matrices(net, segmenters, test, majority_class(training.arrays["truth"]))
+    confusions = confusion_matrices(net, segmenters, test, majority_class(training.arrays["truth"]), refine)
     return {
         "scores": scores(confusions, test.label_set),
         "confusion": {method: confusion.tolist() for method, confusion in confusions.items()},
         "classes": list(test.label_set.names),
         "frames": {"train": len(training), "test": len(test)},
         "weights": {"file": Path(weights).name, "sha256": sha256(weights)},
-        "command": f"semgrid-edu evaluate --data {Path(dataset_dir).name} --weights {Path(weights).name}",
+        "command": _command(Path(dataset_dir).name, Path(weights).name, refine),
         "seed": SEED,
         "date": f"{datetime.now(UTC):%Y-%m-%d}",
         "versions": versions("numpy", "torch", "numba"),
     }
 
 
+def _command(data: str, weights: str, refine: Refine | None) -> str:
+    if refine is None:
+        return f"semgrid-edu evaluate --data {data} --weights {weights}"
+    return f'evaluate("{data}", "{weights}", refine={_name(refine)})'
+
+
 def confusion_matrices(
-    net: SemanticGridNet, segmenters: dict[str, nn.Module], test: TrainingSet, majority: NDArray
+    net: SemanticGridNet,
+    segmenters: dict[str, nn.Module],
+    test: TrainingSet,
+    majority: NDArray,
+    refine: Refine | None = None,
 ) -> dict[str, NDArray[np.int64]]:
     """Count what each method makes of every frame.
 
@@ -82,6 +102,8 @@ def confusion_matrices(
         The frames.
     majority : (H, W) int
         The majority class of each cell.
+    refine : callable, optional
+        As for `evaluate`.
 
     Returns
     -------
@@ -99,8 +121,8 @@ def confusion_matrices(
     total: dict[str, NDArray[np.int64]] = {}
     for k in tqdm(range(len(test)), desc="evaluate", unit="frame"):
         truth, sample = test.arrays["truth"][k], test[k]
-        grids = {"majority class": majority, **learned_grids(net, sample)}
-        labels = {name: image_labels(segmenter, sample) for name, segmenter in segmenters.items()}
+        grids = {"majority class": majority, **learned_grids(net, sample, refine, k)}
+        labels = {name: best_labels(segmenter, sample) for name, segmenter in segmenters.items()}
         for name, label_image in (labels | {"true": sample.labels.numpy()}).items():
             carried = carry_labels(label_image, *test.returns(k), sample.occupancy.numpy())
             grids[f"geometry, {name} labels"] = carried
@@ -110,23 +132,51 @@ def confusion_matrices(
     return total
 
 
-def learned_grids(net: SemanticGridNet, sample: Sample) -> dict[str, NDArray]:
-    """Return the arg-max of the network's grid and of the refined one, (H, W) int."""
-    unary = learned_unary(net, sample)
-    refined = mean_field(unary, sample.occupancy.numpy(), CrfParams.for_cells(net.architecture.grid.cell))
-    return {"network": unary.argmin(axis=0), "network + CRF": refined.argmax(axis=0)}
+def learned_grids(
+    net: SemanticGridNet, sample: Sample, refine: Refine | None = None, number: int = 0
+) -> dict[str, NDArray[np.int64]]:
+    """Return the most probable class of each cell, before and after refinement.
+
+    Parameters
+    ----------
+    net : SemanticGridNet
+    sample : Sample
+        A frame of a data set.
+    refine : callable, optional
+        As for `evaluate`.
+    number : int
+        Of the frame, for error messages.
+
+    Returns
+    -------
+    dict of str to (H, W) int64
+        "network", and "network + " with the name of what refined it.
+
+    Raises
+    ------
+    StageError
+        When `refine` raises an error, or returns anything but probabilities.
+    """
+    log_g = learned_log_g(net, sample)
+    seam = Seam("refine", refine or Stages.of(net).refine, number)
+    refined, _ = seam.call(log_g.shape, log_g, sample.occupancy.numpy())
+    return {"network": log_g.argmax(axis=0), f"network + {_name(refine)}": refined.argmax(axis=0)}
+
+
+def _name(refine: Refine | None) -> str:
+    return "CRF" if refine is None else getattr(refine, "__name__", type(refine).__name__)
 
 
 @torch.inference_mode()
-def learned_unary(net: SemanticGridNet, sample: Sample) -> NDArray[np.float32]:
-    """Return phi_u of equation (3) from the network: -log g, (C, H, W)."""
-    return -net(sample.image[None] / 255, sample.occupancy[None])[0].log_softmax(dim=0).numpy()
+def learned_log_g(net: SemanticGridNet, sample: Sample) -> NDArray[np.float32]:
+    """Return the network's semantic grid of a frame as log-probabilities, (C, H, W)."""
+    return net(unit_image(sample.image)[None], sample.occupancy[None])[0].log_softmax(dim=0).numpy()
 
 
 @torch.inference_mode()
-def image_labels(segmenter: nn.Module, sample: Sample) -> NDArray[np.int64]:
+def best_labels(segmenter: nn.Module, sample: Sample) -> NDArray[np.int64]:
     """Return the arg-max of an image network's scores, (h, w)."""
-    return segmenter(sample.image[None] / 255)[0].argmax(dim=0).numpy()
+    return segmenter(unit_image(sample.image)[None])[0].argmax(dim=0).numpy()
 
 
 def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:
@@ -140,7 +190,7 @@ def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:
     }
 
 
-def table(result: Scores) -> str:
+def scores_table(result: Scores) -> str:
     """Return the scores as a table to print, in per cent."""
     width = max(map(len, result))
     group = " ".join(f"{name:>14}" for name in METRICS)

@@ -8,7 +8,7 @@ import numpy as np
 from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.training_set import TrainingSet
-from semgrid_edu.experiments.evaluate import Scores, image_labels, learned_unary, scores
+from semgrid_edu.experiments.evaluate import Scores, best_labels, learned_log_g, scores
 from semgrid_edu.metrics import METRICS, confusion_matrix
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, load_net
 from semgrid_edu.storage.files import sha256
@@ -89,8 +89,8 @@ def score_grid_and_image(net: SemanticGridNet, test: TrainingSet) -> Scores:
     for k in tqdm(range(len(test)), desc="score", unit="frame"):
         sample = test[k]
         for name, truth, predicted in (
-            ("grid", sample.truth, learned_unary(net, sample).argmin(axis=0)),
-            ("image", sample.labels, image_labels(net.segmenter, sample)),
+            ("grid", sample.truth, learned_log_g(net, sample).argmax(axis=0)),
+            ("image", sample.labels, best_labels(net.segmenter, sample)),
         ):
             confusions[name] = confusions[name] + confusion_matrix(truth.numpy(), predicted, net.n_classes)
     return scores(confusions, test.label_set)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.planes.pixels import check_points
+from semgrid_edu.planes.pixels import check_plane_points
 
 
 def sample_planes_naive(scores: ArrayLike, pixels: ArrayLike, visible: ArrayLike) -> NDArray[np.float64]:
@@ -37,7 +37,7 @@ def sample_planes_naive(scores: ArrayLike, pixels: ArrayLike, visible: ArrayLike
     array([[[[1.5]]]])
     """
     s, pixels, visible = np.asarray(scores, dtype=np.float64), np.asarray(pixels), np.asarray(visible)
-    check_points(pixels, visible, s.shape[1:])
+    check_plane_points(pixels, visible, s.shape[1:])
     n, m = np.arange(s.shape[1]), np.arange(s.shape[2])
     p = np.zeros((s.shape[0], *visible.shape))
     for j in np.ndindex(visible.shape):

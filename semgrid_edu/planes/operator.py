@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from semgrid_edu.planes.pixels import check_points
+from semgrid_edu.planes.pixels import check_plane_points
 from semgrid_edu.planes.sparse import SparseMatrix, SparseProduct, bilinear_matrix
 
 
@@ -50,7 +50,7 @@ class PlaneOperator:
             When the shapes don't agree or a visible point lies outside the image.
         """
         pixels, visible = np.asarray(pixels), np.asarray(visible)
-        check_points(pixels, visible, image_size)
+        check_plane_points(pixels, visible, image_size)
         matrix = bilinear_matrix(pixels, visible, image_size)
         both = (SparseMatrix.from_scipy(part) for part in (matrix, matrix.T.tocsr()))
         return cls(*both, tuple(image_size), visible.shape)

@@ -93,7 +93,7 @@ def check_heights(heights: ArrayLike) -> NDArray[np.float64]:
     return heights
 
 
-def check_points(pixels: NDArray, visible: NDArray, image_size: tuple[int, int]) -> None:
+def check_plane_points(pixels: NDArray, visible: NDArray, image_size: tuple[int, int]) -> None:
     """Refuse pixels (D, H, W, 2) and visible (D, H, W) that don't fit each other or an image of (h, w) pixels.
 
     Raises

@@ -1,15 +1,13 @@
 """The demo's page: whole, self-contained, and true to the pipeline's results."""
 
-import base64
-import io
 import json
 import re
-from html.parser import HTMLParser
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from PIL import Image
+from read_page import Page, decode
 from tiny_drive import DATE, write_tiny_drive
 from typer.testing import CliRunner
 
@@ -19,9 +17,9 @@ from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.truth import grid_truth
 from semgrid_edu.demo import write_demo
 from semgrid_edu.demo.grids import arrows_path, grid_svg
-from semgrid_edu.demo.page import FrameView, Summary, page_html
+from semgrid_edu.demo.page import Summary, page_html
 from semgrid_edu.demo.rasters import classes_uri, points_layer, raster_uri, scores_layer
-from semgrid_edu.demo.record import Record
+from semgrid_edu.demo.record import FrameView, Record
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
@@ -29,45 +27,6 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import Architecture, build_net, save_net
 from semgrid_edu.pipeline import STAGES, run_pipeline
 from semgrid_edu.plotting import depth_colours
-
-VOID_TAGS = {"meta", "img", "input", "link", "br"}
-
-
-class Page(HTMLParser):
-    """Every element with its attributes; complains when tags don't match."""
-
-    def __init__(self, html):
-        super().__init__()
-        self.elements, self.text, self._open = [], {}, []
-        self.feed(html)
-        self.close()
-        assert self._open == []
-
-    def handle_starttag(self, tag, attributes):
-        self.elements.append((tag, dict(attributes)))
-        if tag not in VOID_TAGS:
-            self._open.append((tag, dict(attributes).get("id", tag)))
-
-    def handle_startendtag(self, tag, attributes):
-        self.elements.append((tag, dict(attributes)))
-
-    def handle_endtag(self, tag):
-        assert self._open.pop()[0] == tag
-
-    def handle_data(self, data):
-        if self._open:
-            key = self._open[-1][1]
-            self.text[key] = self.text.get(key, "") + data
-
-    def all(self, tag):
-        return [attributes for name, attributes in self.elements if name == tag]
-
-
-def decode(uri):
-    kind, content = re.fullmatch(r"data:image/(png|webp);base64,(.+)", uri).groups()
-    image = Image.open(io.BytesIO(base64.b64decode(content, validate=True)))
-    assert image.format == kind.upper()
-    return image
 
 
 @pytest.fixture(scope="module")
@@ -238,6 +197,7 @@ class TestPanels:
 
     def test_lines_of_sight_follow_eq_1(self):
         svg = grid_svg("grid", self.SPEC, self.CAMERA, "data:image/png;base64,", "")
+        assert "data-arrows" not in svg
         left, right = re.findall(
             r"M-?0\.00 -?0\.00L(-?[\d.]+) (-?[\d.]+)", re.search(r'class="sight" d="([^"]+)"', svg)[1]
         )
@@ -270,7 +230,7 @@ class TestPanels:
         uri = raster_uri(np.zeros((2, 2, 3), np.uint8))
         names = ("photo", "points", "scores", "occupancy", "grid", "refined")
         texts = dict.fromkeys(names[1:], '</script><b a="')
-        view = FrameView("</script>", dict.fromkeys(names, uri), texts, "")
+        view = FrameView("</script>", dict.fromkeys(names, uri), texts, {"occupancy": ""})
         summary = Summary(
             "<i>&", self.SPEC, self.CAMERA, (96, 320), [("<u>", (1, 2, 3))], {}, 0, dict.fromkeys(STAGES, 1)
         )

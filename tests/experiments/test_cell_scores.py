@@ -1,4 +1,4 @@
-"""CellScores of occupancy filters, on truths made by hand."""
+"""Scores of occupancy filters, on truths made by hand."""
 
 import numpy as np
 import pytest

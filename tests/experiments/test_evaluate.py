@@ -8,10 +8,11 @@ import torch
 from tiny_drive import write_tiny_dataset
 
 from semgrid_edu.datasets import KittiRawDrive, training_cache
-from semgrid_edu.experiments.evaluate import confusion_matrices, evaluate, scores, table
+from semgrid_edu.experiments.evaluate import confusion_matrices, evaluate, scores, scores_table
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import Architecture, build_net, save_net
+from semgrid_edu.pipeline import StageError
 from semgrid_edu.storage.files import sha256
 
 ROAD, CAR, FREE, STATIC = (KITTI_14.index(name) for name in ("road", "car", "unknown-free", "unknown-static"))
@@ -74,8 +75,24 @@ def test_scores_are_those_counted_by_hand(found):
     assert found["network"]["semantic"]["class accuracy"] == 0.5
 
 
+def test_another_refinement_has_a_row_of_its_own():
+    def always_car(log_g, o):
+        assert log_g.shape == (14, 2, 2)
+        assert o.shape == (4, 2, 2)
+        return np.eye(14)[np.full((2, 2), CAR)].transpose(2, 0, 1)
+
+    confusions = confusion_matrices(AlwaysRoad(), {}, FourCells(), np.full((2, 2), CAR), always_car)
+    assert confusions.keys() >= {"network", "network + always_car"}
+    np.testing.assert_array_equal(np.argwhere(confusions["network + always_car"])[:, 1], CAR)
+
+
+def test_a_refinement_that_gives_no_probabilities_is_refused():
+    with pytest.raises(StageError, match=r"^refine \(test_evaluate.py, line \d+\), frame 0: .* log-probabilities"):
+        confusion_matrices(AlwaysRoad(), {}, FourCells(), np.full((2, 2), CAR), lambda log_g, o: log_g)
+
+
 def test_table_shows_every_method_and_number(found):
-    lines = table(found).splitlines()
+    lines = scores_table(found).splitlines()
     assert len(lines) == 2 + len(found)
     assert [float(word) for word in lines[-2].split("labels")[1].split()] == [100.0] * 6
     assert json.loads(json.dumps(found)) == found

@@ -1,0 +1,63 @@
+"""A student's stages beside the package's own: what the page says of them, and which pictures they can change."""
+
+from dataclasses import dataclass
+from html import escape
+
+from semgrid_edu.pipeline import STAGES
+from semgrid_edu.pipeline.stages import ARGUMENTS
+
+MADE_BY = {
+    "scores": ("segment",),
+    "occupancy": ("track",),
+    "grid": ("track", "segment", "sample", "fuse"),
+    "refined": tuple(ARGUMENTS),
+}
+"""The stages that a picture depends on."""
+
+ARROWS = dict(zip(ARGUMENTS, ("l → o", "i → s", "s → p", "(p, o) → g", "g → g"), strict=True))
+"""What each stage makes of what, in the symbols of the paper's Fig. 2."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Which stages of the second run come from a student's file; all others are the package's own in both runs.
+
+    Parameters
+    ----------
+    file : str
+        The file's name.
+    stages : tuple of str
+        Such as ("track", "refine").
+    """
+
+    file: str
+    stages: tuple[str, ...]
+
+    @property
+    def changed(self) -> tuple[str, ...]:
+        """The pictures that these stages can change, which the page therefore shows twice."""
+        return tuple(name for name, stages in MADE_BY.items() if set(stages) & set(self.stages))
+
+    def lead(self) -> str:
+        """Return the sentences that open the page, as HTML."""
+        named = _listed([f"<b>{name}</b> ({ARROWS[name]})" for name in self.stages])
+        return (
+            f"This page compares two runs over the same frames. The first is the package's own. In the second, {named} "
+            f"{'comes' if len(self.stages) == 1 else 'come'} from <b>{escape(self.file)}</b>, and the other stages are "
+            "the package's. A picture that can differ is shown twice, the package's first."
+        )
+
+    def made_with(self, picture: str) -> str:
+        """Say which of the file's stages a picture depends on, as HTML."""
+        stages = [f"<b>{name}</b>" for name in self.stages if name in MADE_BY[picture]]
+        return f"Made with {_listed(stages)} of {escape(self.file)}. Where does it differ from the picture beside it?"
+
+    def replaced(self) -> dict[str, str]:
+        """Return the names of the replaced stages by what they do, a key of `STAGES`."""
+        return {work: name for work, name in zip(STAGES, ARGUMENTS, strict=True) if name in self.stages}
+
+
+def _listed(words: list[str]) -> str:
+    """Join words as in a sentence: "a, b and c"."""
+    *others, last = words
+    return f"{', '.join(others)} and {last}" if others else last

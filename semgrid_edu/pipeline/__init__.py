@@ -1,0 +1,22 @@
+"""One frame through every stage, from LIDAR scan and image to the refined semantic grid (paper, Fig. 2).
+
+`Stages` holds the five stages as functions that can be exchanged, `run_pipeline` sends frames through them and checks
+what each hands to the next, and `load_stages` reads a student's own functions from a file.
+"""
+
+from semgrid_edu.pipeline.frame_work import STAGES, FrameResult, network_image
+from semgrid_edu.pipeline.from_file import load_stages
+from semgrid_edu.pipeline.run import run_pipeline, run_side_by_side
+from semgrid_edu.pipeline.seams import StageError
+from semgrid_edu.pipeline.stages import Stages
+
+__all__ = [
+    "STAGES",
+    "FrameResult",
+    "StageError",
+    "Stages",
+    "load_stages",
+    "network_image",
+    "run_pipeline",
+    "run_side_by_side",
+]

@@ -1,0 +1,110 @@
+"""A tracker that follows a drive: it takes the frames one at a time, and yields a belief for each."""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from semgrid_edu.frame import Frame
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import N_STATES, Belief
+from semgrid_edu.pipeline.seams import Seam
+
+TAKES_TURNS = "a generator that takes a frame, yields its belief, and only then takes the next"
+
+_END = object()
+
+
+class Follower:
+    """Run `track(frames, spec)` in step with whoever reads the frames.
+
+    Parameters
+    ----------
+    track : callable
+        l -> o, as `Stages` describes it.
+    spec : GridSpec
+        The grid of the beliefs.
+    """
+
+    def __init__(self, track: Callable, spec: GridSpec) -> None:
+        self._track, self._spec = track, spec
+        self._beliefs: Iterator | None = None
+        self._waiting: Frame | None = None
+        self._over = False
+        self._seam = Seam("track", track, 0)
+
+    def belief(self, frame: Frame, number: int) -> tuple[Belief, float]:
+        """Let the tracker take a frame, and return what it believes then.
+
+        Parameters
+        ----------
+        frame : Frame
+        number : int
+            Of the frame, for error messages.
+
+        Returns
+        -------
+        belief : Belief
+            Checked; without velocities, which are then NaN, when the tracker yields the probabilities alone.
+        seconds : float
+            How long the tracker took.
+
+        Raises
+        ------
+        StageError
+            When the tracker doesn't yield one belief for each frame, or not four probabilities for each cell.
+        """
+        seam = self._seam = replace(self._seam, frame=number)
+        self._waiting = frame if seam.own else replace(frame, points=frame.points.copy())
+        start = time.perf_counter()
+        yielded = self._next()
+        seconds = time.perf_counter() - start
+        if yielded is _END:
+            raise seam.error("a belief for each frame", "the end: does it stop, or return, before the last frame?")
+        if self._waiting is not None:
+            raise seam.error(TAKES_TURNS, "a belief before it took the frame: does it yield twice?")
+        return self._checked(yielded), seconds
+
+    def finish(self) -> None:
+        """Tell the tracker that there are no more frames.
+
+        Raises
+        ------
+        StageError
+            When it still yields.
+        """
+        self._over = True
+        if self._beliefs is not None and self._next() is not _END:
+            raise self._seam.error("one belief for each frame", "another one after the last frame")
+
+    def _next(self) -> object:
+        """Return what the tracker yields next; `_END` when it has ended."""
+        with self._seam.blamed():
+            if self._beliefs is None:
+                self._beliefs = self._track(self._frames(), self._spec)
+            if not isinstance(self._beliefs, Iterator):
+                raise self._seam.error(TAKES_TURNS, f"{type(self._beliefs).__name__}: is the `yield` missing?")
+            return next(self._beliefs, _END)
+
+    def _frames(self) -> Iterator[Frame]:
+        """Hand out the frame that waits, until there are no more."""
+        while not self._over:
+            if self._waiting is None:
+                raise self._seam.error(TAKES_TURNS, "one that takes another frame before it yields this one's belief")
+            frame, self._waiting = self._waiting, None
+            yield frame
+
+    def _checked(self, yielded: object) -> Belief:
+        """Return a belief that the next stage can use."""
+        grid = self._spec.shape
+        belief = yielded if isinstance(yielded, Belief) else _without_velocity(yielded, grid)
+        shapes = {"probability": (N_STATES, *grid), "velocity": (2, *grid), "velocity_covariance": (2, 2, *grid)}
+        arrays = {name: self._seam.array(getattr(belief, name), shape) for name, shape in shapes.items()}
+        self._seam.probabilities(arrays["probability"], "state")
+        return Belief(**arrays)
+
+
+def _without_velocity(probability: object, grid: tuple[int, int]) -> Belief:
+    unknown = np.full((2, 2, *grid), np.nan, np.float32)
+    return Belief(probability, unknown[0], unknown)

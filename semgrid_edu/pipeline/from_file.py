@@ -1,0 +1,78 @@
+"""A student's own stages, read from a Python file."""
+
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.pipeline.hints import in_short
+from semgrid_edu.pipeline.stages import ARGUMENTS, Stages
+
+NAMES = ", ".join(ARGUMENTS)
+
+
+def load_stages(path: str | Path) -> Stages:
+    """Read stages from a Python file: those of track, segment, sample, fuse and refine that it has as functions.
+
+    A file can also make its stages itself: where it has a `Stages` named `stages`, that one counts alone.
+
+    Parameters
+    ----------
+    path : path-like
+        The file, which is executed. It may import other files of its folder.
+
+    Returns
+    -------
+    Stages
+        Those of the file; the others are left out.
+
+    Raises
+    ------
+    DataError
+        When there is no such file, Python can't import it, it has none of these names, or what has such a name isn't a
+        function of the right number of arguments.
+
+    Examples
+    --------
+    >>> list(run_pipeline(drive, load_stages("my_stages.py")))                          # doctest: +SKIP
+    """
+    path = Path(path)
+    if path.suffix != ".py" or not path.is_file():
+        found = "another file" if path.is_file() else "a folder" if path.is_dir() else "no such file"
+        raise DataError(path, f"a Python file with functions named {NAMES}", found)
+    module = _imported(path)
+    stages = getattr(module, "stages", None)
+    if stages is None:
+        return _from_functions(path, module)
+    if not isinstance(stages, Stages):
+        raise DataError(path, "a semgrid_edu.pipeline.Stages under the name `stages`", type(stages).__name__)
+    return stages
+
+
+def _from_functions(path: Path, module: ModuleType) -> Stages:
+    found = {name: getattr(module, name) for name in ARGUMENTS if hasattr(module, name)}
+    if not found:
+        others = [name for name, value in vars(module).items() if callable(value) and not name.startswith("_")]
+        raise DataError(path, f"at least one function named {NAMES}", ", ".join(others) or "no function at all")
+    try:
+        return Stages(**found)
+    except ArgumentError as error:
+        name, expected, wrong = error.args
+        raise DataError(path, f"{name} to be {expected}", wrong) from error
+
+
+def _imported(path: Path) -> ModuleType:
+    """Execute a file as a module, while its folder is searched for what it imports."""
+    spec = spec_from_file_location(f"_stages_in_{path.stem}", path)
+    module = module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses in the file look themselves up there
+    searched = sys.path[:]
+    sys.path.insert(0, str(path.resolve().parent))
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
+        raise DataError(path, "a file that Python can import", in_short(error, spec.origin)) from error
+    finally:
+        sys.path[:] = searched
+    return module

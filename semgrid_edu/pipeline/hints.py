@@ -1,0 +1,126 @@
+"""What an error about a stage says beyond the fact: where the function is written, and what is probably wrong."""
+
+import inspect
+import traceback
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from types import CodeType
+
+import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
+
+from semgrid_edu.occupancy import N_STATES
+
+
+def where(function: Callable) -> str:
+    """Say where a function was written.
+
+    Parameters
+    ----------
+    function : callable
+
+    Returns
+    -------
+    str
+        Such as "my_stages.py, line 12"; the class of an object that isn't a function.
+    """
+    code = _code(function)
+    if code is None:
+        return f"an object of class {type(function).__name__}"
+    return _place(code.co_filename, code.co_firstlineno)
+
+
+def file_of(function: Callable) -> str:
+    """Return the file that a function was written in; "" when nothing tells."""
+    code = _code(function)
+    return code.co_filename if code else ""
+
+
+def in_short(error: BaseException, file: str) -> str:
+    """Return an exception in one line, with the last line of a file that it passed through."""
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
+    first_line = str(error).strip().partition("\n")[0]
+    message = f"{type(error).__name__}: {first_line}" if first_line else type(error).__name__
+    return f"{message} ({_place(file, lines[-1])})" if lines else message
+
+
+def _code(function: Callable) -> CodeType | None:
+    while isinstance(function, partial):
+        function = function.func
+    return getattr(inspect.unwrap(function), "__code__", None)
+
+
+def _place(file: str, line: int) -> str:
+    """Name a line of a file; the file that stands for a notebook's cell has a name that helps nobody."""
+    return f"{'a cell of the notebook' if 'ipykernel' in file else Path(file).name}, line {line}"
+
+
+def kind_of(value: object) -> str:
+    """Name what was returned in place of an array, and the usual cause."""
+    if value is None:
+        return "None: is the `return` missing?"
+    if isinstance(value, Tensor):
+        return "a torch Tensor: end with `.detach().numpy()`"
+    if inspect.isgenerator(value):
+        return "a generator: this stage returns its result, only track yields"
+    return type(value).__name__
+
+
+def shape_hint(found: tuple[int, ...], expected: tuple[int, ...]) -> str:
+    """Return the probable cause of a wrong shape, as the end of a sentence; "" when none comes to mind.
+
+    Parameters
+    ----------
+    found, expected : tuple of int
+
+    Examples
+    --------
+    >>> shape_hint((355, 155, 14), (14, 355, 155))
+    ': is the class axis last? np.moveaxis(x, -1, 0) moves it to the front'
+    """
+    axis = {2: "velocity", N_STATES: "state"}.get(expected[0], "class")
+    if found == (*expected[1:], expected[0]):
+        return f": is the {axis} axis last? np.moveaxis(x, -1, 0) moves it to the front"
+    if found == (1, *expected):
+        return ": is this a batch of one? Return its only entry, x[0]"
+    if found == expected[1:]:
+        return f": is this one label in each place? Return a number for each {axis}"
+    if found == (expected[0], *expected[:0:-1]):
+        return ": are rows and columns swapped?"
+    if sorted(found) == sorted(expected):
+        return ": are the axes in another order?"
+    return ""
+
+
+def sum_hint(values: NDArray, total: float, axis: str) -> str:
+    """Return the probable cause of probabilities, (K, H, W), that don't sum to 1.
+
+    Parameters
+    ----------
+    values : (K, H, W) float
+        All of them.
+    total : float
+        What a wrong cell sums to.
+    axis : str
+        "class" or "state".
+    """
+    if np.isnan(total):
+        return "was something divided by a sum of 0?"
+    if (values <= 0).all() and _sums_to_one(np.exp(values)):
+        return "are these log-probabilities? Return np.exp of them"
+    return f"did you normalise over the {axis} axis (axis 0)?"
+
+
+def log_sum_hint(values: NDArray, total: float) -> str:
+    """Return the probable cause of log-probabilities, (C, H, W), whose exponentials sum to `total`, not to 1."""
+    if np.isnan(total):
+        return "is there a logarithm of a negative number?"
+    if (values >= 0).all() and _sums_to_one(values):
+        return "are these probabilities? Return np.log of them"
+    return "are these scores? Subtract scipy.special.logsumexp(scores, axis=0)"
+
+
+def _sums_to_one(values: NDArray) -> bool:
+    return bool(np.allclose(values.sum(axis=0), 1, atol=1e-3))

@@ -1,0 +1,221 @@
+"""The five stages of the system as functions that can be exchanged (paper, Fig. 2)."""
+
+import inspect
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from semgrid_edu.camera import Camera
+from semgrid_edu.crf import CrfParams, mean_field, unary_from_log_probability
+from semgrid_edu.datasets.samples import sample_weights
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.frame import Frame
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.networks import Architecture, SemanticGridNet, load_net
+from semgrid_edu.occupancy import Belief, CmcdotParams, track_drive
+
+ARGUMENTS = {
+    "track": ("frames", "spec"),
+    "segment": ("image",),
+    "sample": ("s",),
+    "fuse": ("p", "o"),
+    "refine": ("log_g", "o"),
+}
+"""The stages in their order, and what each of them takes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stages:
+    """The five stages as functions on numpy arrays, one frame at a time.
+
+    A stage that is left out is the package's own. C is the number of classes, D that of planes.
+
+    Parameters
+    ----------
+    track : callable, optional
+        l -> o: `track(frames, spec)` yields a `Belief`, or an array (4, H, W) float, for each frame: the probability of
+        FREE, STATIC, DYNAMIC and UNKNOWN, which sum to 1 in each cell. A generator function like `track_drive`: it
+        takes a frame, yields its belief, and only then takes the next one, so it can remember what it saw.
+    segment : callable, optional
+        i -> s: `segment(image (3, h, w))` returns scores (C, h, w) float without soft-max; the image is RGB, 0..1.
+    sample : callable, optional
+        s -> p: `sample(s (C, h, w))` returns the scores on the planes, (C, D, H, W) float.
+    fuse : callable, optional
+        (p, o) -> g: `fuse(p (C, D, H, W), o (4, H, W))` returns log g (C, H, W) float, natural logarithms of
+        probabilities: exp(log g) sums to 1 in each cell.
+    refine : callable, optional
+        g -> g: `refine(log_g (C, H, W), o (4, H, W))` returns g (C, H, W) float, probabilities that sum to 1 in each
+        cell.
+    architecture : Architecture, optional
+        The grid, the image size, the planes and the classes that all of them work with. When left out, those of the
+        package's own stages.
+
+    Raises
+    ------
+    ArgumentError
+        When a stage isn't a function of so many arguments.
+
+    Examples
+    --------
+    >>> def forget(log_g, o):
+    ...     return np.full_like(log_g, 1 / len(log_g))
+    >>> Stages(refine=forget).given
+    ('refine',)
+    """
+
+    track: Callable[[Iterable[Frame], GridSpec], Iterator[Belief | NDArray]] | None = None
+    segment: Callable[[NDArray], NDArray] | None = None
+    sample: Callable[[NDArray], NDArray] | None = None
+    fuse: Callable[[NDArray, NDArray], NDArray] | None = None
+    refine: Callable[[NDArray, NDArray], NDArray] | None = None
+    architecture: Architecture | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what can't be called as a stage is called."""
+        for name in self.given:
+            _check_function(name, getattr(self, name))
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """The names of the stages that weren't left out, in their order."""
+        return tuple(name for name in ARGUMENTS if getattr(self, name) is not None)
+
+    @classmethod
+    def of(
+        cls, net: SemanticGridNet, occupancy: CmcdotParams | None = None, crf: CrfParams | None = None, seed: int = 0
+    ) -> "Stages":
+        """Return the package's own five stages.
+
+        Parameters
+        ----------
+        net : SemanticGridNet
+            Of `build_net` or `load_net`, for the camera of the drive; in evaluation mode.
+        occupancy : CmcdotParams, optional
+            What the filter assumes.
+        crf : CrfParams, optional
+            Of the refinement; `CrfParams.for_cells` when left out.
+        seed : int
+            Seed for the particles of the filter.
+
+        Raises
+        ------
+        ArgumentError
+            When the network was put together by hand, so that nothing tells its grid.
+
+        Examples
+        --------
+        >>> own = Stages.of(load_net(sample_weights(), drive.camera))                   # doctest: +SKIP
+        >>> dataclasses.replace(own, refine=my_refine)                                  # doctest: +SKIP
+        """
+        architecture = net.need_architecture()
+        refine = _mean_field(crf, architecture.grid.cell)
+        return cls(_filter(occupancy, seed), *_functions_of(net), refine, architecture)
+
+    def over(self, other: "Stages") -> "Stages":
+        """Return these stages, and those of `other` where one was left out.
+
+        Parameters
+        ----------
+        other : Stages
+            Such as `Stages.of(net)`.
+
+        Raises
+        ------
+        ArgumentError
+            When both have an architecture and the two differ, so that they can't be mixed.
+        """
+        if self.given == tuple(ARGUMENTS) and self.architecture:
+            return self
+        if self.architecture not in (None, other.architecture):
+            raise ArgumentError("architecture", f"that of the other stages, {other.architecture}", self.architecture)
+        return replace(other, **{name: getattr(self, name) for name in self.given})
+
+    def completed(
+        self, camera: Camera, occupancy: CmcdotParams | None = None, crf: CrfParams | None = None, seed: int = 0
+    ) -> "Stages":
+        """Return these stages, and the package's own where one was left out.
+
+        The filter and the CRF need no network. Where `segment`, `sample` or `fuse` is left out, that of the shipped
+        SegNet stands in, fitted to the camera.
+
+        Parameters
+        ----------
+        camera : Camera
+            As it took the images of the drive.
+        occupancy, crf, seed
+            Of the package's own filter and refinement, as in `of`.
+
+        Raises
+        ------
+        ArgumentError
+            When the shipped network is needed and has another architecture.
+        DataError
+            When it is needed and there are no shipped samples.
+        """
+        if {"segment", "sample", "fuse"} <= set(self.given):
+            architecture = self.architecture or Architecture()
+            refine = _mean_field(crf, architecture.grid.cell)
+            own = Stages(track=_filter(occupancy, seed), refine=refine, architecture=architecture)
+        else:
+            own = self.of(load_net(sample_weights(), camera), occupancy, crf, seed)
+        return self.over(own)
+
+
+def _check_function(name: str, function: object) -> None:
+    usage = f"a function {name}({', '.join(ARGUMENTS[name])})"
+    if not callable(function):
+        raise ArgumentError(name, usage, f"a {type(function).__name__}")
+    try:
+        signature = inspect.signature(function)
+    except ValueError:  # some functions written in C don't say what they take
+        return
+    try:
+        signature.bind(*ARGUMENTS[name])
+    except TypeError as error:
+        raise ArgumentError(name, usage, f"{name}{signature}") from error
+
+
+def _filter(params: CmcdotParams | None, seed: int) -> Callable:
+    def track(frames: Iterable[Frame], spec: GridSpec) -> Iterator[Belief]:
+        return track_drive(frames, spec, params, seed)
+
+    return track
+
+
+def _functions_of(net: SemanticGridNet) -> tuple[Callable, Callable, Callable]:
+    """Return the three stages of a network as functions on arrays."""
+
+    @torch.inference_mode()
+    def segment(image: NDArray) -> NDArray:
+        return net.segmenter(_tensor(image)[None])[0].numpy()
+
+    @torch.inference_mode()
+    def sample(s: NDArray) -> NDArray:
+        return net.sampler(_tensor(s)[None])[0].numpy()
+
+    @torch.inference_mode()
+    def fuse(p: NDArray, o: NDArray) -> NDArray:
+        planes = _tensor(p)
+        # PyTorch knows channels-last planes by the stride of the batch axis too, and would copy them without it.
+        planes = planes.as_strided((1, *planes.shape), (planes.numel(), *planes.stride()))
+        return net.fusion(planes, _tensor(o)[None])[0].log_softmax(dim=0).numpy()
+
+    return segment, sample, fuse
+
+
+def _tensor(array: NDArray) -> Tensor:
+    """Return a tensor that shares the memory of a float32 array and has its layout."""
+    return torch.from_numpy(np.asarray(array, dtype=np.float32))
+
+
+def _mean_field(params: CrfParams | None, cell: float) -> Callable:
+    params = params or CrfParams.for_cells(cell)
+
+    def refine(log_g: NDArray, o: NDArray) -> NDArray:
+        return mean_field(unary_from_log_probability(log_g), o, params)
+
+    return refine

@@ -1,0 +1,237 @@
+"""A student's stages beside the package's own: the example file, and the page that shows both."""
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from read_page import Page, decode
+from tiny_drive import DATE, write_tiny_drive
+from typer.testing import CliRunner
+
+from semgrid_edu.cli import app
+from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.datasets.samples import sample_drive, sample_weights
+from semgrid_edu.datasets.truth import grid_truth
+from semgrid_edu.demo import example_stages, write_demo
+from semgrid_edu.demo.comparison import MADE_BY, Comparison
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.frame import Frame
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import KITTI_14
+from semgrid_edu.networks import load_net
+from semgrid_edu.occupancy import State
+from semgrid_edu.pipeline import StageError, Stages, load_stages, run_side_by_side
+
+EXAMPLE = Path(example_stages.__file__)
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    root = tmp_path_factory.mktemp("drive")
+    write_tiny_drive(root, labelled=(1, 2))
+    return KittiRawDrive(root, DATE, "0001")
+
+
+@pytest.fixture(scope="module")
+def out(drive, tmp_path_factory):
+    """The page of the tiny drive with the example under a student's name, made by the command line."""
+    folder = tmp_path_factory.mktemp("student")
+    shutil.copy(EXAMPLE, folder / "my_stages.py")
+    root = str(drive.folder.parents[1])
+    arguments = ["--kitti", root, "--date", DATE, "--drive", "0001", "--stages", str(folder / "my_stages.py")]
+    result = CliRunner().invoke(app, ["demo", *arguments, "--out", str(folder / "out")])
+    assert result.exit_code == 0, result.exception
+    return folder / "out"
+
+
+@pytest.fixture(scope="module")
+def page(out):
+    return Page((out / "index.html").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def words(out):
+    """What the page says, without its tags."""
+    return re.sub(r"<[^>]*>", "", (out / "index.html").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def frames(page):
+    return json.loads(page.text["frames"])
+
+
+@pytest.fixture(scope="module")
+def results(drive):
+    own = Stages.of(load_net(sample_weights(), drive.camera))
+    return list(run_side_by_side(drive, own, load_stages(EXAMPLE).over(own)))
+
+
+class TestExample:
+    def test_a_wall_is_static_what_lies_before_it_free_and_what_lies_behind_it_unknown(self, drive):
+        x, y = np.meshgrid(np.arange(3, 19, 0.2), np.arange(-4, 4, 0.1))
+        ground = np.stack([x, y, np.full_like(x, -1.73), np.ones_like(x)], axis=-1).reshape(-1, 4)
+        wall = np.array([[20.25, y, -0.7, 1] for y in np.arange(-4, 4, 0.05)])
+        points = np.concatenate([ground, wall]).astype(np.float32)
+        spec = GridSpec(0, 40, -4, 4, 0.5)
+        (o,) = example_stages.track([Frame(None, points, drive.camera, np.eye(4), 0.0)], spec)
+        rows, cols, _ = spec.cells(np.array([[20.25, 0.25], [10.25, 0.25], [30.25, 0.25]]))
+        assert o[:, rows, cols].argmax(axis=0).tolist() == [State.STATIC, State.FREE, State.UNKNOWN]
+        np.testing.assert_allclose(o.sum(axis=0), 1, rtol=1e-6)
+
+    def test_the_blur_leaves_a_lone_cell_the_middle_of_a_gaussian(self):
+        g = np.zeros((14, 41, 41))
+        g[0] = 1
+        g[:, 20, 20] = np.eye(14)[3]
+        with np.errstate(divide="ignore"):
+            refined = example_stages.refine(np.log(g), None)
+        assert refined[3, 20, 20] == pytest.approx(1 / (2 * np.pi * example_stages.WIDTH**2), rel=0.01)
+        assert refined[3].sum() == pytest.approx(1)
+        np.testing.assert_allclose(refined.sum(axis=0), 1)
+
+    def test_runs_on_the_first_frames_of_the_shipped_drive(self):
+        shipped = sample_drive()
+        own = Stages.of(load_net(sample_weights(), shipped.camera))
+        (before, _), (package, yours) = run_side_by_side(shipped[:2], own, load_stages(EXAMPLE).over(own))
+        assert before.belief.probability.shape == yours.belief.probability.shape
+        np.testing.assert_array_equal(package.scores, yours.scores)
+        assert (package.grid != yours.grid).any()
+        assert (yours.belief.probability[State.DYNAMIC] < 0.5).all()  # one scan doesn't tell what moves
+
+
+class TestPage:
+    def test_shows_the_packages_picture_and_yours_side_by_side(self, page, frames, results):
+        assert [a.get("class") for a in page.all("div")].count("pair") == 3
+        assert len(page.all("figure")) == len(page.all("figcaption")) == 9
+        for frame, (package, yours) in zip(frames, results, strict=True):
+            for name in ("grid", "refined"):
+                ours, theirs = (np.array(decode(frame["images"][prefix + name])) for prefix in ("", "your_"))
+                np.testing.assert_array_equal(ours, getattr(package, name).argmax(axis=0))
+                np.testing.assert_array_equal(theirs, getattr(yours, name).argmax(axis=0))
+            assert frame["images"]["occupancy"] != frame["images"]["your_occupancy"]
+            assert "your_scores" not in frame["images"]  # the same network made them
+
+    def test_every_picture_has_its_words_and_yours_say_so(self, words, frames):
+        for frame in frames:
+            assert set(frame["texts"]) == set(frame["images"]) - {"photo"}
+            for name, text in frame["texts"].items():
+                assert text.startswith("my_stages.py: ") == name.startswith("your_")
+        assert words.count("Made with track of my_stages.py") == 2
+        assert words.count("Made with track and refine of my_stages.py") == 1
+
+    def test_first_frame_shows_without_the_script_and_each_occupancy_grid_has_its_arrows(self, page, frames):
+        shown = {a["data-image"]: a.get("src") or a.get("href") for _, a in page.elements if "data-image" in a}
+        assert {name: uri for name, uri in shown.items() if uri} == frames[0]["images"]
+        arrows = [a["data-arrows"] for _, a in page.elements if "data-arrows" in a]
+        assert arrows == ["occupancy", "your_occupancy"] == list(frames[0]["arrows"])
+
+    def test_opens_with_whose_stages_they_are(self, words):
+        assert (
+            "In the second, track (l → o) and refine (g → g) come from my_stages.py, and the other stages are" in words
+        )
+
+    def test_tables_hold_both(self, out, results):
+        html = (out / "index.html").read_text(encoding="utf-8")
+        rows = re.findall(r"<tr><th>(?:all|semantic) cells, (.*?)</th>", html)
+        names = [
+            f"{grid}, {whose}"
+            for whose in ("the package&#x27;s", "my_stages.py")
+            for grid in ("semantic grid", "refined grid")
+        ]
+        assert rows == 2 * names
+        times = re.findall(r'<tr class="stage">.*?</tr>', html)
+        assert len(times) == 5
+        assert all(len(re.findall(r"<td>[\d.]+</td>", row)) == 2 for row in times)
+        assert ["replaced by" in row for row in times] == [True, False, False, False, True]
+
+    def test_yours_are_scored_against_the_truth_of_the_packages_filter(self, out, results):
+        html = (out / "index.html").read_text(encoding="utf-8")
+        right = [
+            yours.refined.argmax(axis=0)
+            == grid_truth(package.frame.labels, package.belief.probability, GridSpec.compact())
+            for package, yours in results[1:]
+        ]
+        row = re.search(r"<tr><th>all cells, refined grid, my_stages.py</th><td>([\d.]+)</td>", html)
+        assert float(row[1]) == pytest.approx(100 * np.mean(right), abs=0.051)
+
+    def test_the_package_alone_gives_the_same_pictures(self, drive, frames, tmp_path):
+        alone = Page(write_demo(drive, sample_weights(), tmp_path).read_text(encoding="utf-8"))
+        for both, one in zip(frames, json.loads(alone.text["frames"]), strict=True):
+            assert both["images"].items() >= one["images"].items()
+
+    def test_overview_has_a_second_row(self, drive, out, tmp_path):
+        write_demo(drive, sample_weights(), tmp_path)
+        with Image.open(out / "overview.png") as both, Image.open(tmp_path / "overview.png") as one:
+            assert both.width == one.width
+            assert both.height > 1.5 * one.height
+
+
+class TestComparison:
+    @pytest.mark.parametrize(
+        ("stages", "changed"),
+        [
+            (("refine",), ("refined",)),
+            (("sample",), ("grid", "refined")),
+            (("segment", "fuse"), ("scores", "grid", "refined")),
+            (("track",), ("occupancy", "grid", "refined")),
+        ],
+    )
+    def test_only_what_can_differ_is_shown_twice(self, stages, changed):
+        assert Comparison("my_stages.py", stages).changed == changed
+
+    def test_every_picture_is_made_by_some_stage(self):
+        assert all(MADE_BY.values())
+
+
+def write(folder, text):
+    path = folder / "my_stages.py"
+    path.write_text(f"import numpy as np\n{text}")
+    return path
+
+
+def test_an_image_network_of_ones_own_is_shown_too_and_its_classes_are_in_the_legend(drive, tmp_path):
+    signage = KITTI_14.index("signage")
+    scores = f"np.eye(14)[np.full((96, 320), {signage})].transpose(2, 0, 1)"
+    page = write_demo(drive, sample_weights(), tmp_path, write(tmp_path, f"def segment(image): return {scores}\n"))
+    html = page.read_text(encoding="utf-8")
+    elements = Page(html)
+    assert "your_scores" in json.loads(elements.text["frames"])[0]["images"]
+    assert [a["data-image"] for a in elements.all("img")].count("your_scores") == 1
+    assert re.search(r'<b>Classes</b>.*?">signage</span>', html)
+
+
+def test_without_truth_both_are_shown_and_neither_is_scored(tmp_path):
+    write_tiny_drive(tmp_path, n_frames=2, labelled=())
+    page = write_demo(KittiRawDrive(tmp_path, DATE, "0001"), sample_weights(), tmp_path / "out", EXAMPLE)
+    html = page.read_text(encoding="utf-8")
+    assert "Expect poor semantics" in html
+    assert len(Page(html).all("figure")) == 2 + 2 * 3
+    assert "FmIoU" not in html
+
+
+class TestMistakes:
+    def test_a_stage_that_fails_leaves_no_page(self, drive, tmp_path):
+        stages = write(tmp_path, "def refine(log_g, o): return log_g[14]\n")
+        with pytest.raises(StageError, match=r"^refine \(my_stages.py, line 2\), frame 0: .* IndexError"):
+            write_demo(drive, sample_weights(), tmp_path / "out", stages)
+        assert list((tmp_path / "out").iterdir()) == []
+
+    def test_stages_for_another_grid_are_refused_before_the_work(self, drive, tmp_path):
+        text = (
+            "from semgrid_edu.grid import GridSpec\n"
+            "from semgrid_edu.networks import Architecture\n"
+            "from semgrid_edu.pipeline import Stages\n"
+            "def one(s): return s\n"
+            "def two(a, b): return a\n"
+            "stages = Stages(two, one, one, two, two, Architecture(grid=GridSpec.paper()))\n"
+        )
+        with pytest.raises(ArgumentError, match="the grid of the stages"):
+            write_demo(drive, sample_weights(), tmp_path / "out", write(tmp_path, text))
+        assert not (tmp_path / "out").exists()
+
+    def test_names_are_escaped(self):
+        comparison = Comparison("<b>.py", ("track",))
+        assert "<b>.py" not in comparison.lead() + comparison.made_with("grid")

@@ -1,0 +1,148 @@
+"""The whole pipeline on a hand-made drive: each stage's part equals the stage called by itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from tiny_drive import DATE, write_tiny_drive
+
+from semgrid_edu.crf import CrfParams, mean_field, unary_from_log_probability
+from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.datasets.samples import sample_weights
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.frame import Frame
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.networks import Architecture, build_net, load_net
+from semgrid_edu.occupancy import CmcdotParams, track_drive
+from semgrid_edu.pipeline import STAGES, Stages, network_image, run_pipeline, run_side_by_side
+
+FEW = CmcdotParams(n_particles=2000)
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    root = tmp_path_factory.mktemp("drive")
+    write_tiny_drive(root)
+    return KittiRawDrive(root, DATE, "0001")
+
+
+@pytest.fixture(scope="module")
+def net(drive):
+    return build_net(Architecture(), drive.camera, seed=3).eval()
+
+
+@pytest.fixture(scope="module")
+def results(drive, net):
+    return list(run_pipeline(drive, net, occupancy=FEW))
+
+
+def test_every_frame_comes_out_with_every_stage_timed(drive, results):
+    assert len(results) == len(drive)
+    for frame, result in zip(drive, results, strict=True):
+        np.testing.assert_array_equal(result.frame.points, frame.points)
+        assert tuple(result.seconds) == STAGES
+        assert min(result.seconds.values()) > 0
+
+
+def test_occupancy_is_that_of_track_drive(drive, net, results):
+    beliefs = track_drive(drive, net.architecture.grid, FEW, seed=0)
+    for belief, result in zip(beliefs, results, strict=True):
+        np.testing.assert_array_equal(result.belief.probability, belief.probability)
+        np.testing.assert_array_equal(result.belief.velocity, belief.velocity)
+
+
+def test_the_semantic_grids_are_those_of_network_and_crf_bit_for_bit(net, results):
+    for result in results:
+        image, occupancy = network_image(result.frame, (96, 320)), torch.from_numpy(result.belief.probability)
+        with torch.inference_mode():
+            scores = net.segmenter(image[None])[0].numpy()
+            log_g = net(image[None], occupancy[None])[0].log_softmax(dim=0).numpy()
+        refined = mean_field(unary_from_log_probability(log_g), result.belief.probability, CrfParams.for_cells(0.5))
+        np.testing.assert_array_equal(result.scores, scores)
+        np.testing.assert_array_equal(result.grid, np.exp(log_g))
+        np.testing.assert_array_equal(result.refined, refined)
+
+
+def assert_equal_results(result, expected):
+    for name in ("scores", "grid", "refined"):
+        np.testing.assert_array_equal(getattr(result, name), getattr(expected, name))
+    np.testing.assert_array_equal(result.belief.probability, expected.belief.probability)
+
+
+def test_the_stages_of_a_net_do_what_the_net_does(drive, net, results):
+    for result, expected in zip(run_pipeline(drive, Stages.of(net, FEW)), results, strict=True):
+        assert_equal_results(result, expected)
+
+
+def test_stages_that_are_left_out_are_the_packages_own(drive):
+    def keep(log_g, o):
+        return np.exp(log_g)
+
+    shipped = load_net(sample_weights(), drive.camera)
+    ours, theirs = run_pipeline(drive, shipped, FEW), run_pipeline(drive, Stages(refine=keep), FEW)
+    for result, expected in zip(theirs, ours, strict=True):
+        assert_equal_results(replace(result, refined=None), replace(expected, refined=None))
+        np.testing.assert_array_equal(result.refined, expected.grid)
+
+
+def test_without_learned_stages_left_out_no_network_is_read(drive, monkeypatch):
+    monkeypatch.setattr("semgrid_edu.pipeline.stages.load_net", None)
+    small = Architecture(image_size=(6, 20), grid=GridSpec(0, 4, -2, 2, 1), heights=(0.0, 1.0))
+    stages = Stages(
+        segment=lambda image: np.ones((14, 6, 20)),
+        sample=lambda s: np.ones((14, 2, 4, 4)),
+        fuse=lambda p, o: np.full((14, 4, 4), -np.log(14)),
+        architecture=small,
+    )
+    for result in run_pipeline(drive, stages, FEW):
+        assert result.belief.probability.shape == (4, 4, 4)
+        np.testing.assert_allclose(result.refined, 1 / 14, rtol=1e-5)
+
+
+def test_sets_of_stages_side_by_side_give_what_each_gives_alone_and_share_the_same_work(drive, net, results):
+    calls = []
+
+    def segment(image):
+        calls.append(image)
+        return own.segment(image)
+
+    own = Stages.of(net, FEW)
+    first = replace(own, segment=segment)
+    second = replace(first, refine=lambda log_g, o: np.exp(log_g))
+    for (a, b), expected in zip(run_side_by_side(drive, first, second), results, strict=True):
+        assert_equal_results(a, expected)
+        assert_equal_results(b, replace(expected, refined=expected.grid))
+    assert len(calls) == len(drive)
+
+
+def test_both_grids_are_distributions(results):
+    for result in results:
+        np.testing.assert_allclose(result.grid.sum(axis=0), 1, atol=1e-5)
+        np.testing.assert_allclose(result.refined.sum(axis=0), 1, atol=1e-5)
+
+
+def test_frames_are_read_one_at_a_time(drive, net):
+    read = []
+
+    def reading():
+        for k in range(len(drive)):
+            read.append(k)
+            yield drive[k]
+
+    next(run_pipeline(reading(), net, occupancy=FEW))
+    assert read == [0]
+
+
+def test_the_network_sees_the_mean_of_the_pixels_it_gathers(drive):
+    image = np.arange(4 * 4 * 3, dtype=np.uint8).reshape(4, 4, 3)
+    frame = Frame(image, np.empty((0, 4), np.float32), drive.camera, np.eye(4), time=0.0)
+    expected = image.reshape(2, 2, 2, 2, 3).mean(axis=(1, 3)).transpose(2, 0, 1) / 255
+    np.testing.assert_allclose(network_image(frame, (2, 2)), expected, atol=0.5 / 255)
+
+
+def test_a_frame_without_image_is_refused(drive, net):
+    frame = drive[0]
+    blind = Frame(None, frame.points, frame.camera, frame.T_world_from_lidar, frame.time)
+    with pytest.raises(ArgumentError, match="camera image"):
+        next(run_pipeline([blind], net, occupancy=FEW))
