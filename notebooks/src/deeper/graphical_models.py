@@ -42,8 +42,8 @@ FREE, OCCUPIED = 0, 1
 # some things don't depend on others. Such assumptions are hard to see in code.
 #
 # A graph makes them visible. Each variable is a circle. Variables that depend on each other directly are linked, so
-# every assumption is **an edge that isn't there**. Here are three graphs of three variables each, which return in all
-# lectures:
+# every assumption is **an edge that isn't there**. Here are three graphs of three variables each, which return
+# throughout the course:
 
 # %% jupyter={"source_hidden": true} alt="three graphs of three variables: a chain of arrows from before to now to after; arrows from two cells to one beam z; three cells in a row linked by black squares"
 CHAIN = {"now": ("before",), "after": ("now",)}
@@ -96,11 +96,11 @@ plt.show()
 # <details><summary>Answer</summary>Add the column "return": 0.04 + 0.16 = 0.2. Then keep only this column and divide
 # by its sum: 0.16 / 0.2 = 0.8. The second answer is Bayes' rule. You needed no formula, only the table.</details>
 #
-# You have used three operations: you *multiplied* two tables, you *summed out* a variable, and you *sliced* the table
-# at what was seen. These three are all of inference. A table of non-negative numbers whose axes have names is called a
-# **factor**; in code it is a pair, names and table. We need the names because the order of the axes must not matter.
-# To multiply, we give both tables the same axes in the same order, with an axis of length 1 where a table doesn't
-# depend on a variable, and let numpy broadcast:
+# You have *multiplied* two tables, *summed out* a variable, and *sliced* a table at what was seen. With these three
+# operations and a division you get every probability on this page. A table of non-negative numbers whose axes have
+# names is called a **factor**; in code it is a pair, names and table. We need the names because the order of the axes
+# must not matter. To multiply, we give both tables the same axes in the same order, with an axis of length 1 where a
+# table doesn't depend on a variable, and let numpy broadcast:
 
 
 # %% tags=["factor"]
@@ -287,7 +287,7 @@ plt.show()
 # and the chain stays open. And z lies below the collider r, so knowing it opens r.</details>
 
 # %% jupyter={"outputs_hidden": true}
-cell_in_time, beam_in_space = any_model(HIDDEN_MARKOV), any_model(NOISY_RANGE)
+cell_in_time, beam_in_space = any_model(HIDDEN_MARKOV), any_model(NOISY_RANGE)  # with tables that don't matter
 print("open path:", why_dependent(cell_in_time, "before", "after", given=("z1", "z2", "z3")))
 print("open path:", why_dependent(cell_in_time, "before", "after", given=("now", "z1", "z3")))
 print("open path:", why_dependent(beam_in_space, "m1", "m2", given="z"))
@@ -299,14 +299,13 @@ print("open path:", why_dependent(beam_in_space, "m1", "m2", given="z"))
 # ## No arrows: neighbours that like to agree
 #
 # Not every dependence has a direction. Walls are long, so neighbouring cells tend to agree. Which of the two should
-# get the arrow? Neither: we only want to say that agreement is more plausible. So give each pair of neighbours a
-# factor $\psi$ that is 3 when they agree and 1 when they don't. These numbers aren't probabilities of anything. We
-# multiply them all and divide by whatever makes the sum 1:
+# get the arrow? Neither. So give each pair of neighbours a factor $\psi$ that is 3 when they agree and 1 when they
+# don't. These numbers aren't probabilities of anything. We multiply them all and divide by whatever makes the sum 1:
 #
 # $$ P(m_1, m_2, m_3) = \frac{1}{Z}\, \psi(m_1, m_2)\, \psi(m_2, m_3), \qquad Z = \sum_{m_1, m_2, m_3} \psi(m_1, m_2)\, \psi(m_2, m_3) $$
 #
-# Such a model is called **undirected**, or a Markov random field; $Z$ is its **partition function**. The paper's CRF,
-# a conditional random field, is one.
+# Such a model is called **undirected**, or a Markov random field, and $Z$ is its **partition function**. The paper's
+# CRF (conditional random field) is one.
 #
 # **Predict before you run.** There are eight maps of three cells in a row. What is $Z$? And how probable is it that
 # $m_1$ and $m_3$, which share no factor, agree?
@@ -415,7 +414,6 @@ for order in (["street", *cells_only], [*cells_only, "street"]):
     m1, entries = eliminate_literal(star.factors, order)
     np.testing.assert_allclose(m1.table, enumerate_marginals(star, "m1").table)
     print(f"{order[0]:<7} first: tables of {entries} entries")
-print("the package chooses", min_fill_order(star, keep=["m1"]))
 
 # %% [markdown]
 # The answer is the same, and the cost isn't. Eliminating *street* first couples all six cells, since each of them
@@ -482,10 +480,10 @@ ax.set_ylim(-0.9, 0.7)
 plt.show()
 
 # %% [markdown]
-# Eliminate from the left, and what arrives at *now* is a table that sums up everything to its left: a **message**.
-# Eliminate from the right, and another message arrives that sums up everything to its right. The belief of *now* is
-# the product of both messages and of its own scan. Each message serves several questions, so one sweep in each
-# direction gives *all* marginals. This is the **forward-backward algorithm**. Let $\overrightarrow{b}_t$ be the
+# Eliminate from the left (blue), and what arrives at *now* is a table that sums up everything to its left: a
+# **message**. Eliminate from the right (orange), and another message sums up everything to its right. The belief of
+# *now* is the product of both messages and of its own scan. Each message serves several questions, so one sweep in
+# each direction gives *all* marginals. This is the **forward-backward algorithm**. Let $\overrightarrow{b}_t$ be the
 # forward message into time $t$, $\overleftarrow{b}_t$ the backward one, $\ell_t$ the likelihood of the scan, and
 # multiply entry by entry:
 #
@@ -537,9 +535,36 @@ print("most likely sequence:", {name: ("FREE", "OCCUPIED")[state] for name, stat
 #
 # ## When messages meet their own echo
 #
-# What happens when there is a loop? Close the row of three cells to a triangle, in which each pair likes to agree.
-# Only $m_1$ has been scanned, and the scan says: occupied with probability 0.8. Nothing was seen of the other two.
-#
+# What happens when there is a loop? Close the row of three cells to a triangle, with the same factors. Only $m_1$ has
+# been scanned, and the scan says: occupied with probability 0.8.
+
+
+# %% jupyter={"source_hidden": true} alt="three cells in a triangle, each pair linked through a black square, and one more square at m1, its scan; orange arrows run round the triangle from m1 to m2 to m3 and back"
+def triangle(pull, p_first):
+    """Return three cells that like to agree, `pull` times as much as not; the first has been scanned."""
+    pair = [[pull, 1], [1, pull]]
+    sides = [Factor(names, pair) for names in (("m1", "m2"), ("m2", "m3"), ("m1", "m3"))]
+    return GraphicalModel([Factor("m1", [1 - p_first, p_first]), *sides])
+
+
+def p_occupied(marginals):
+    """Return P(occupied) of m1 and m2."""
+    return [round(float(marginals[name][OCCUPIED]), 2) for name in ("m1", "m2")]
+
+
+CORNERS = {"m1": (0, 0), "m2": (1.9, 0), "m3": (0.95, 1.45)}
+fig, ax = plt.subplots(figsize=(3.2, 2.4), layout="constrained")
+draw(triangle(3, 0.8), ax, positions=CORNERS | {"f(m1)": (-0.6, 0)})
+centre = np.mean(list(CORNERS.values()), axis=0)
+for one, other in (("m1", "m2"), ("m2", "m3"), ("m3", "m1")):
+    start, end = np.array([CORNERS[one], CORNERS[other]])
+    outwards = 0.6 * ((start + end) / 2 - centre)
+    ends = [start + share * (end - start) + outwards for share in (0.75, 0.25)]
+    ax.annotate("", *ends, arrowprops={"arrowstyle": "->", "color": "#d55e00", "lw": 1.8})
+ax.set(xlim=(-0.9, 2.5), ylim=(-0.6, 1.9))
+plt.show()
+
+# %% [markdown]
 # **Predict before you run.** What is the exact probability of $m_1$: more than 0.8, less, or 0.8? And what will
 # messages say that go round the triangle, $m_1$ to $m_2$ to $m_3$ to $m_1$?
 #
@@ -548,20 +573,7 @@ print("most likely sequence:", {name: ("FREE", "OCCUPIED")[state] for name, stat
 # opinion. It becomes too sure.</details>
 
 
-# %%
-def triangle(pull, p_first):
-    """Return three cells that like to agree, `pull` times as much as not; the first has been scanned."""
-    pair = [[pull, 1], [1, pull]]
-    sides = [Factor(names, pair) for names in (("m1", "m2"), ("m2", "m3"), ("m1", "m3"))]
-    return GraphicalModel([Factor("m1", [1 - p_first, p_first]), *sides])
-
-
 # %% jupyter={"outputs_hidden": true}
-def p_occupied(marginals):
-    """Return P(occupied) of m1 and m2."""
-    return [round(float(marginals[name][OCCUPIED]), 2) for name in ("m1", "m2")]
-
-
 model = triangle(pull=3, p_first=0.8)
 exact = {name: eliminate(model, name).normalised().table for name in model.names}
 loopy = sum_product(model)
@@ -570,8 +582,8 @@ print("m1, m2:  exact", p_occupied(exact), "  messages", p_occupied(loopy.margin
 
 # %% [markdown]
 # The messages have converged, and they are wrong: 0.85 instead of 0.80, because the same scan was counted again on its
-# way round. **Loopy belief propagation**, as this is called, is still useful where loops are long and couplings weak,
-# since there the echo is faint. The flag `exact` tells you whether the graph was a tree.
+# way round. This is called **loopy belief propagation**. It errs least where loops are long and couplings weak, since
+# there the echo is faint.
 #
 # ## Mean field: pretend that nothing is coupled
 #
@@ -793,13 +805,14 @@ plt.show()
 #
 # ## In five lines
 #
-# 1. A factor is a table with named axes. Multiply, sum out, slice: that is all of inference.
+# 1. A factor is a table with named axes. Multiply, sum out, slice and divide: that gives every probability.
 # 2. Arrows: one table per variable given its parents. A collider opens when it or something below it is seen; chains
 #    and forks close.
 # 3. Without arrows: factors say what is plausible, $Z$ normalises, and what is known only ever separates.
 # 4. Elimination costs as much as its largest table, and the order decides. On a chain two sweeps of messages give all
 #    answers; the forward one is the Bayes filter.
-# 5. Loops make messages too sure, mean field picks a side, and a forgotten edge makes exact inference exactly wrong.
+# 5. Messages that run round a loop count evidence twice, mean field picks a side, and a forgotten edge makes the best
+#    inference sure and wrong.
 #
 # ## Further reading
 #
@@ -810,7 +823,6 @@ plt.show()
 # - Kschischang, Frey and Loeliger, *Factor graphs and the sum-product algorithm*, IEEE Transactions on Information
 #   Theory 47(2), 2001.
 # - Rabiner, *A tutorial on hidden Markov models*, Proceedings of the IEEE 77(2), 1989: forward, backward, Viterbi.
-#
 #
 # ## Exercise
 #
