@@ -189,7 +189,7 @@ def multiply(f, g):
         mistake(
             "g's axes taken in f's order",
             task="multiply",
-            loses=2,
+            loses=1,
             says="the axes of g stand the other way round",
             code="""
 def multiply(f, g):
@@ -211,7 +211,7 @@ def multiply(f, g):
         mistake(
             "in place",
             task="multiply",
-            loses=2,
+            loses=1,
             says="multiply changed the table of `g`",
             code="""
 def multiply(f, g):
@@ -663,7 +663,7 @@ def eliminate(factors, order):
         mistake(
             "everything multiplied first",
             task="eliminate",
-            loses=3,
+            loses=1,
             says="you multiplied all factors first",
             code="""
 def eliminate(factors, order):
@@ -676,35 +676,35 @@ def eliminate(factors, order):
         mistake(
             "counted after the sum",
             task="eliminate",
-            loses=3,
+            loses=1,
             says="count the product before the variable is summed out",
             code=ELIMINATE.replace("together.table.size", "together.sum(name).table.size"),
         ),
         mistake(
             "axes instead of entries",
             task="eliminate",
-            loses=3,
+            loses=1,
             says="and its entries, not its axes",
             code=ELIMINATE.replace("together.table.size", "together.table.ndim"),
         ),
         mistake(
             "sizes added up",
             task="eliminate",
-            loses=3,
+            loses=1,
             says="the largest counts",
             code=ELIMINATE.replace("max(largest, together.table.size)", "largest + together.table.size"),
         ),
         mistake(
             "the last size instead of the largest",
             task="eliminate",
-            loses=3,
+            loses=1,
             says="keep the largest, not the last",
             code=ELIMINATE.replace("max(largest, together.table.size)", "together.table.size"),
         ),
         mistake(
             "an order of its own",
             task="eliminate",
-            loses=3,
+            loses=1,
             says="keep to `order`",
             code=ELIMINATE.replace("in order:", "in sorted(order):"),
         ),
@@ -748,7 +748,7 @@ def eliminate(factors, order):
         mistake(
             "every message normalised",
             task="eliminate",
-            loses=3,
+            loses=2,
             says="normalise nowhere",
             code=ELIMINATE.replace("together.sum(name)", "together.sum(name).normalised()").replace(
                 "return result, largest", "return Factor(result.names, result.table / 4), largest"
@@ -757,7 +757,7 @@ def eliminate(factors, order):
         mistake(
             "the result normalised",
             task="eliminate",
-            loses=3,
+            loses=2,
             says="don't normalise",
             code=ELIMINATE.replace("return result,", "return result.normalised(),"),
         ),
@@ -771,14 +771,14 @@ def eliminate(factors, order):
         mistake(
             "two states taken for granted",
             task="eliminate",
-            loses=3,
+            loses=1,
             says="on inputs you haven't seen: wrong size of the largest table",
             code=ELIMINATE.replace("together.table.size", "2 ** together.table.ndim"),
         ),
         mistake(
             "only the last factor returned",
             task="eliminate",
-            loses=3,
+            loses=2,
             says="on inputs you haven't seen: wrong result",
             code=ELIMINATE.replace("result = factors[0]\n", "result = factors[-1]\n    return result, largest\n"),
         ),
@@ -850,7 +850,7 @@ def smoothed(start, M, likelihoods):
             "not normalised",
             task="messages",
             loses=4,
-            says="normalise each belief",
+            says="normalise each row",
             code=FILTERED.replace(" / (b @ row)", "") + SMOOTHED.replace(" / (beliefs[t] @ message)", ""),
         ),
         mistake(

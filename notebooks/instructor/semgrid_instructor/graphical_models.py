@@ -15,19 +15,31 @@ def _named(shapes: dict[str, int], names: tuple[str, ...], rng: np.random.Genera
     return names, rng.uniform(0.1, 1, size=[shapes[name] for name in names])
 
 
-@hidden
-def check_multiply(multiply: Callable) -> None:
-    """Other numbers of states, nothing in common, everything in common, no variable at all."""
-    rng, shapes = np.random.default_rng(21), {"a": 2, "b": 3, "c": 4, "d": 2}
-    for one, other in (("abc", "cb"), ("ab", "cd"), ("bd", "db"), ("abd", "dca"), ("", "ab"), ("a", "")):
+def _check_products(multiply: Callable, pairs: tuple[tuple[str, str], ...], seed: int) -> None:
+    """Multiply factors over these variables, two to four states each."""
+    rng, shapes = np.random.default_rng(seed), {"a": 2, "b": 3, "c": 4, "d": 2}
+    for one, other in pairs:
         f, g = _named(shapes, tuple(one), rng), _named(shapes, tuple(other), rng)
         names, table = multiply(f, g)
         expected = Factor(*f) * Factor(*g)
         about = f"factors over ({', '.join(one)}) and ({', '.join(other)})"
         assert sorted(names) == sorted(expected.names), f"wrong names for {about}"
-        table = np.asarray(table)
-        assert table.shape == tuple(shapes[name] for name in names), f"names and table don't fit for {about}"
+        assert np.shape(table) == tuple(shapes[name] for name in names), f"names and table don't fit for {about}"
         assert np.allclose(table, expected.ordered(*names).table), f"wrong entries for {about}"
+
+
+@hidden
+def check_multiply(multiply: Callable) -> None:
+    """One variable in common, anywhere, of two to four states."""
+    _check_products(multiply, (("abc", "bd"), ("ba", "cb"), ("c", "acd")), seed=21)
+
+
+@hidden
+def check_multiply_shared(multiply: Callable) -> None:
+    """Several variables in common, all of them, none of them, no variable at all."""
+    _check_products(
+        multiply, (("abc", "cb"), ("bd", "db"), ("abd", "dca"), ("ab", "cd"), ("", "ab"), ("a", "")), seed=30
+    )
 
 
 @hidden
@@ -108,21 +120,35 @@ def check_separated_large(separated: Callable) -> None:
     _check_separated(separated, size=6, graphs=300, seed=24)
 
 
+STATES = {"a": 2, "b": 3, "c": 2, "d": 4, "e": 3}
+
+
+def _ring() -> list[Factor]:
+    """Return a ring of four variables, a factor of one of them, and a variable without neighbours."""
+    rng = np.random.default_rng(25)
+    families = (("a", "b"), ("b", "c"), ("c", "d"), ("d", "a"), ("e",), ("b",))
+    return [Factor(names, rng.uniform(0.1, 1, size=[STATES[name] for name in names])) for names in families]
+
+
 @hidden
 def check_eliminate(eliminate: Callable) -> None:
-    """Three states, several variables left, a variable without neighbours, and two orders of a ring."""
-    rng = np.random.default_rng(25)
-    states = {"a": 2, "b": 3, "c": 2, "d": 4, "e": 3}
-    families = (("a", "b"), ("b", "c"), ("c", "d"), ("d", "a"), ("e",), ("b",))
-    factors = [Factor(names, rng.uniform(0.1, 1, size=[states[name] for name in names])) for names in families]
-    for order, right in ((["c", "e", "b"], 24), (["b", "e", "d"], 16), (["e"], 3), (["a", "b", "c", "e"], 24)):
-        result, largest = eliminate(list(factors), list(order))
-        left = [name for name in states if name not in order]
-        assert sorted(result.names) == sorted(left), "the wrong variables are left, where several should be"
+    """Several variables left, one of them without neighbours, and several orders."""
+    factors = _ring()
+    for order in (["c", "e", "b"], ["b", "e", "d"], ["a", "b", "c", "e"], ["e"]):
+        result = eliminate(list(factors), list(order))[0]
+        left = [name for name in STATES if name not in order]
+        assert sorted(result.names) == sorted(left), f"wrong variables are left, where {len(left)} should be"
         expected = eliminate_exactly(GraphicalModel(factors), left)
         assert np.allclose(result.ordered(*left).table, expected.table), (
-            "wrong result for variables of two to four states"
+            f"wrong result where {len(left)} variables are left"
         )
+
+
+@hidden
+def check_cost(eliminate: Callable) -> None:
+    """Two to four states, and several orders."""
+    for order, right in ((["c", "e", "b"], 24), (["b", "e", "d"], 16), (["e"], 3), (["a", "b", "c", "e"], 24)):
+        largest = eliminate(_ring(), list(order))[1]
         assert largest == right, "wrong size of the largest table, for variables of two to four states"
 
 

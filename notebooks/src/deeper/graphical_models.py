@@ -664,7 +664,7 @@ np.testing.assert_allclose(np.abs(np.subtract(found, 0.5)), 0.25, atol=1e-6)
 # $m_1$ is? (Without a running kernel there are no sliders; the figure below them shows three settings.)
 
 
-# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true}
 def compare(agreement, scan, ax):
     """Draw P(occupied) of the three cells by the three methods."""
     model = triangle(agreement, scan)
@@ -684,6 +684,7 @@ def compare(agreement, scan, ax):
     ax.title.set_fontsize(10)
 
 
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 def show(agreement, scan):
     """Draw one setting."""
     compare(agreement, scan, plt.subplots(figsize=(5, 2.6), layout="constrained")[1])

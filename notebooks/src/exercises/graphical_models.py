@@ -7,10 +7,10 @@
 #
 # | task | about | points |
 # |---|---|---|
-# | 1 | multiply two tables with named axes | 2 |
+# | 1 | multiply two tables with named axes | 1 + 1 |
 # | 2 | what is seen: slice, sum out, normalise | 2 + 1 |
 # | 3 | independence read off a graph | 2 + 2 |
-# | 4 | eliminate in a given order, and say what it costs | 3 |
+# | 4 | eliminate in a given order, and say what it costs | 2 + 1 |
 # | 5 | messages forward and backward: filtering and smoothing | 2 + 2 |
 # | 6 | in your own words | 2 |
 #
@@ -35,11 +35,12 @@ def explain(got, slips):
 
 
 # %% [markdown]
-# ## Task 1: multiply by name (2 points)
+# ## Task 1: multiply by name (1 + 1 points)
 #
 # A factor is a pair `(names, table)`: a tuple of names, one for each axis, and a table of non-negative numbers. Complete `multiply`: it returns the product of two
 # factors, again as a pair, over all variables of both, each once. An entry of the product is the entry of `f` times the entry of `g` at the same states. Variables
 # that both have may stand at different places. You may choose the order of the result's axes, as long as `names` tells it.
+# The second point is for factors that share several variables, or none.
 
 
 # %% nbgrader={"grade": false, "grade_id": "multiply", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -56,7 +57,7 @@ def multiply(f, g):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "multiply-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "multiply-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 cell, beam = (("m",), np.array([0.7, 0.3])), (("z", "m"), np.array([[0.9, 0.2], [0.1, 0.8]]))
 before = cell[1].copy(), beam[1].copy()
 got = multiply(cell, beam)
@@ -78,7 +79,14 @@ slips = {
 }
 explain(table, slips)
 np.testing.assert_allclose(table, [[0.63, 0.06], [0.07, 0.24]], err_msg="rows z, columns m: 0.9 * 0.7, 0.2 * 0.3; ...")
+### BEGIN HIDDEN TESTS
+from semgrid_instructor import graphical_models
 
+complaint = graphical_models.check_multiply(multiply)
+assert not complaint, complaint
+### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "multiply-shared-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 f, g = (("m1", "m2"), np.array([[1.0, 2.0], [3.0, 4.0]])), (("m2", "m1"), np.array([[1.0, 10.0], [100.0, 1000.0]]))
 names, table = multiply(f, g)
 table = np.asarray(table) if tuple(names) == ("m1", "m2") else np.asarray(table).T
@@ -91,7 +99,7 @@ np.testing.assert_allclose(table, [[1, 200], [30, 4000]], err_msg="at m1 = 0, m2
 ### BEGIN HIDDEN TESTS
 from semgrid_instructor import graphical_models
 
-complaint = graphical_models.check_multiply(multiply)
+complaint = graphical_models.check_multiply_shared(multiply)
 assert not complaint, complaint
 ### END HIDDEN TESTS
 
@@ -125,8 +133,7 @@ joint = (("m1", "m2", "z"), table.copy())
 got = posterior(joint, "m2", {"z": 1})
 assert got is not None, "posterior returned nothing: did you forget `return`?"
 assert np.array_equal(joint[1], table), "posterior changed the table it was given: make a new one"
-got = np.asarray(got)
-assert got.shape == (2,), f"one probability for each of the 2 states of m2, shape (2,), got {got.shape}"
+assert np.shape(got) == (2,), f"one probability for each of the 2 states of m2, shape (2,), got {np.shape(got)}"
 slips = {
     (19 / 40, 21 / 40): "you summed z out: z is known, so keep only the slice at z = 1",
     (11 / 12, 1 / 12): "that is the slice at z = 0: a known state is an index, use its value",
@@ -211,32 +218,23 @@ def separated(parents, a, b, given=()):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "separated-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "graphs", "locked": true, "schema_version": 3, "solution": false, "task": false}
 chain = {"before": (), "now": ("before",), "after": ("now",)}
 fork = {"m": (), "z1": ("m",), "z2": ("m",)}
 collider = {"m1": (), "m2": (), "z": ("m1", "m2")}
+noisy_range = {"m1": (), "m2": (), "r": ("m1", "m2"), "z": ("r",)}
+scans = {"before": (), "now": ("before",), "after": ("now",), "z1": ("before",), "z2": ("now",), "z3": ("after",)}
+dusty = {"m": (), "dust": (), "z1": ("m", "dust"), "z2": ("m", "dust")}
+pitched = {"m1": (), "m2": (), "pitch": (), "z1": ("m1", "pitch"), "z2": ("m2", "pitch")}
+
+# %% nbgrader={"grade": true, "grade_id": "separated-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 cases = (
     (chain, "before", "after", (), False, "what acts on now acts on after: the chain is open while now isn't known"),
     (chain, "before", "after", ("now",), True, "now is known, so it blocks the chain: before has no other way"),
     (fork, "z1", "z2", (), False, "both beams hint at the same cell: the fork is open while m isn't known"),
     (fork, "z1", "z2", ("m",), True, "m is known, so it blocks the fork: only the sensor's own errors are left"),
-    (
-        collider,
-        "m1",
-        "m2",
-        (),
-        True,
-        "nobody has seen z: arrows that meet block. Take z out in step (1), or mind arrows",
-    ),
-    (
-        collider,
-        "m1",
-        "m2",
-        ("z",),
-        False,
-        "explaining away: a known z opens the collider. Link its parents, in step (2)",
-    ),
-    (collider, "m1", "z", (), False, "an arrow links them: neighbours are never separated"),
+    (collider, "m1", "m2", (), True, "z isn't known: arrows that meet block. Take z out in step (1)"),
+    (collider, "m1", "m2", ("z",), False, "explaining away: a known z opens the way. Link its parents, in step (2)"),
     (collider, "m1", "z", ("m2",), False, "an arrow links them: neighbours are never separated"),
 )
 got = [separated(parents, a, b, given) for parents, a, b, given, _, _ in cases]
@@ -253,10 +251,6 @@ assert not complaint, complaint
 ### END HIDDEN TESTS
 
 # %% nbgrader={"grade": true, "grade_id": "separated-large-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-noisy_range = {"m1": (), "m2": (), "r": ("m1", "m2"), "z": ("r",)}
-scans = {"before": (), "now": ("before",), "after": ("now",), "z1": ("before",), "z2": ("now",), "z3": ("after",)}
-dusty = {"m": (), "dust": (), "z1": ("m", "dust"), "z2": ("m", "dust")}
-pitched = {"m1": (), "m2": (), "pitch": (), "z1": ("m1", "pitch"), "z2": ("m2", "pitch")}
 cases = (
     (noisy_range, "m1", "m2", ("z",), False, "z lies below the collider r and tells something about it, so r is open"),
     (noisy_range, "m1", "m2", (), True, "neither r nor anything below it is known"),
@@ -279,13 +273,13 @@ assert not complaint, complaint
 ### END HIDDEN TESTS
 
 # %% [markdown]
-# ## Task 4: eliminate, and say what it costs (3 points)
+# ## Task 4: eliminate, and say what it costs (2 + 1 points)
 #
 # From here on factors are the package's: `f.names`, `f.table`, the product `f * g`, and `f.sum("x")`, the factor without x.
 #
 # Complete `eliminate`. `factors` is a list of `Factor`s, `order` the names of variables to sum out, one after the other in this order. For each, multiply only those factors
 # that contain it, then sum it out. Return two things: the product of all that is left in the end, as a `Factor`, not normalised; and the number of entries of the
-# largest table from which a variable was summed out. At least one variable is left in the end.
+# largest table from which a variable was summed out. At least one variable is left in the end. Two points are for the factor, one for the size.
 
 
 # %% nbgrader={"grade": false, "grade_id": "eliminate", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -307,13 +301,18 @@ def eliminate(factors, order):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "eliminate-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "star", "locked": true, "schema_version": 3, "solution": false, "task": false}
 street = Factor("street", [0.5, 0.5])
 star = [street, *(Factor(("street", f"m{k}"), [[0.9, 0.1], [0.6, 0.4]]) for k in (1, 2, 3, 4))]
-got = eliminate(list(star), ["m2", "m3", "m4", "street"])
+agree = [[3.0, 1.0], [1.0, 3.0]]
+row = [Factor(("m1", "m2"), agree), Factor(("m2", "m3"), agree)]
+CELLS_FIRST, STREET_FIRST = ["m2", "m3", "m4", "street"], ["street", "m2", "m3", "m4"]
+
+# %% nbgrader={"grade": true, "grade_id": "eliminate-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+got = eliminate(list(star), CELLS_FIRST)
 assert got is not None, "eliminate returned nothing: did you forget `return`?"
 assert isinstance(got, tuple | list), f"return two things, the factor and the size, got one {type(got).__name__}"
-result, largest = got
+result = got[0]
 assert isinstance(result, Factor), f"the first thing must be a Factor, got {type(result).__name__}"
 assert result.names, "nothing is left: put each sum back among the factors, it is multiplied later"
 assert result.names == ("m1",), (
@@ -323,15 +322,31 @@ explain(result.table, {(12, 4): "multiply first, then sum: a sum of products isn
 share = result.table[0] / result.table.sum()
 assert np.isclose(result.table.sum(), 1) or not np.isclose(share, 0.75), "right up to a factor: normalise nowhere"
 np.testing.assert_allclose(result.table, [0.75, 0.25], atol=1e-9, err_msg="P(m1): the mean of 0.9, 0.1 and 0.6, 0.4")
+other = eliminate(list(star), STREET_FIRST)[0]
+np.testing.assert_allclose(other.table, [0.75, 0.25], atol=1e-9, err_msg="another order must not change the answer")
+
+result = eliminate(list(row), ["m2"])[0]
+assert sorted(result.names) == ["m1", "m3"], f"m1 and m3 are left, your result is over {result.names}"
+assert np.isclose(result.table.sum(), 32), (
+    f"the weights must sum to Z = 32, not {result.table.sum():.3g}: don't normalise"
+)
+np.testing.assert_allclose(np.diag(result.table), [10, 10], err_msg="m1 = m3: 3 * 3 + 1 * 1")
+### BEGIN HIDDEN TESTS
+from semgrid_instructor import graphical_models
+
+complaint = graphical_models.check_eliminate(eliminate)
+assert not complaint, complaint
+### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "eliminate-cost-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+largest = eliminate(list(star), CELLS_FIRST)[1]
 costs = {
     32: "you multiplied all factors first: of each variable only those that contain it",
     2: "count the product before the variable is summed out, and its entries, not its axes",
     16: "that is the sum of all sizes: the largest counts",
 }
 assert largest == 4, f"largest {largest}: {costs.get(largest, 'each product here has two axes of two states')}"
-
-result, largest = eliminate(list(star), ["street", "m2", "m3", "m4"])
-np.testing.assert_allclose(result.table, [0.75, 0.25], atol=1e-9, err_msg="another order must not change the answer")
+largest = eliminate(list(star), STREET_FIRST)[1]
 costs = {
     16: "count before the variable is summed out: with the street the product still has five axes",
     4: "street comes first in this order: keep to `order`, and keep the largest, not the last",
@@ -339,19 +354,12 @@ costs = {
     60: "that is the sum of all sizes: the largest counts",
 }
 assert largest == 32, f"largest {largest}: {costs.get(largest, 'street links all four cells: five axes, 32 entries')}"
-
-agree = [[3.0, 1.0], [1.0, 3.0]]
-result, largest = eliminate([Factor(("m1", "m2"), agree), Factor(("m2", "m3"), agree)], ["m2"])
-assert np.isclose(result.table.sum(), 32), (
-    f"the weights must sum to Z = 32, not {result.table.sum():.3g}: don't normalise"
-)
-assert sorted(result.names) == ["m1", "m3"], f"m1 and m3 are left, your result is over {result.names}"
-np.testing.assert_allclose(np.diag(result.table), [10, 10], err_msg="m1 = m3: 3 * 3 + 1 * 1")
+largest = eliminate(list(row), ["m2"])[1]
 assert largest == 8, f"largest {largest}: the product over m1, m2, m3 has 8 entries before m2 is summed out"
 ### BEGIN HIDDEN TESTS
 from semgrid_instructor import graphical_models
 
-complaint = graphical_models.check_eliminate(eliminate)
+complaint = graphical_models.check_cost(eliminate)
 assert not complaint, complaint
 ### END HIDDEN TESTS
 
@@ -391,18 +399,27 @@ def smoothed(start, M, likelihoods):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "filtered-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "chain", "locked": true, "schema_version": 3, "solution": false, "task": false}
 start, M = np.array([0.6, 0.4]), np.array([[0.9, 0.1], [0.3, 0.7]])  # FREE, OCCUPIED
 likelihoods = np.array([[0.95, 0.2], [0.05, 0.8], [0.6, 0.3]])  # no return, a return, a weak hint
-before = start.copy(), M.copy(), likelihoods.copy()
-got = filtered(start, M, likelihoods)
-assert got is not None, "filtered returned nothing: did you forget `return`?"
-for array, old, name in zip((start, M, likelihoods), before, ("start", "M", "likelihoods"), strict=True):
-    assert np.array_equal(array, old), f"filtered changed its argument `{name}`: make a new array"
-got = np.asarray(got)
-assert got.shape == (3, 2), f"one row per scan, one column per state, shape (3, 2), got {got.shape}"
-sums = got.sum(axis=1)
-assert np.allclose(sums, 1), f"rows sum to {sums.round(3).tolist()}: normalise each belief"
+
+
+def check_rows(answer):
+    """Return what an answer gives for this chain, after looking at its arguments, shape and sums."""
+    arguments = start.copy(), M.copy(), likelihoods.copy()
+    got = answer(*arguments)
+    assert got is not None, f"{answer.__name__} returned nothing: did you forget `return`?"
+    for name, array, old in zip(("start", "M", "likelihoods"), arguments, (start, M, likelihoods), strict=True):
+        assert np.array_equal(array, old), f"{answer.__name__} changed its argument `{name}`: make a new array"
+    got = np.asarray(got)
+    assert got.shape == (3, 2), f"one row per scan, one column per state, shape (3, 2), got {got.shape}"
+    sums = got.sum(axis=1)
+    assert np.allclose(sums, 1), f"rows sum to {sums.round(3).tolist()}: normalise each row"
+    return got
+
+
+# %% nbgrader={"grade": true, "grade_id": "filtered-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+got = check_rows(filtered)
 slips = {
     (0.9022, 0.0978): "`start` belongs to the time of the first scan: no move before it",
     (0.6, 0.4): "the first scan is missing in row 0: multiply by its likelihood",
@@ -430,14 +447,7 @@ assert not complaint, complaint
 ### END HIDDEN TESTS
 
 # %% nbgrader={"grade": true, "grade_id": "smoothed-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-start, M = np.array([0.6, 0.4]), np.array([[0.9, 0.1], [0.3, 0.7]])
-likelihoods = np.array([[0.95, 0.2], [0.05, 0.8], [0.6, 0.3]])
-got = smoothed(start.copy(), M.copy(), likelihoods.copy())
-assert got is not None, "smoothed returned nothing: did you forget `return`?"
-got = np.asarray(got)
-assert got.shape == (3, 2), f"one row per scan, one column per state, shape (3, 2), got {got.shape}"
-sums = got.sum(axis=1)
-assert np.allclose(sums, 1), f"rows sum to {sums.round(3).tolist()}: normalise the products, row by row"
+got = check_rows(smoothed)
 slips = {
     (0.7567, 0.2433): "the last scan is counted twice: the backward message into t holds only the scans after t",
     (
