@@ -736,6 +736,8 @@ for scan in (hits, *[passes] * 5):
 # - Rabiner, *A tutorial on hidden Markov models*, Proceedings of the IEEE 77(2), 1989: the same recursion, called the
 #   forward algorithm.
 # - Norris, *Markov Chains*, Cambridge 1997, chapter 2: rates and $\exp(R\,\Delta t)$.
+# - [Graphical models from nothing](deeper/graphical_models.ipynb), a companion to this course: the filter as one half
+#   of message passing, and what a missing edge costs.
 #
 # ## Exercise
 #

@@ -1,0 +1,493 @@
+# %% [markdown]
+# # Exercise: graphical models
+#
+# Five pieces of a small inference library: the product of two tables, Bayes' rule on a table, independence read off a graph, elimination with its price, and
+# the two sweeps of messages on a chain. Then one question to answer in words. About 90 minutes. The companion is
+# [Graphical models from nothing](../deeper/graphical_models.ipynb).
+#
+# | task | about | points |
+# |---|---|---|
+# | 1 | multiply two tables with named axes | 1 + 1 |
+# | 2 | what is seen: slice, sum out, normalise | 2 + 1 |
+# | 3 | independence read off a graph | 2 + 2 |
+# | 4 | eliminate in a given order, and say what it costs | 2 + 1 |
+# | 5 | messages forward and backward: filtering and smoothing | 2 + 2 |
+# | 6 | in your own words | 2 |
+#
+# Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
+# you are wrong. Your instructor's tests use other inputs. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
+
+# %% nbgrader={"grade": false, "grade_id": "setup", "locked": true, "schema_version": 3, "solution": false, "task": false}
+import warnings
+
+import numpy as np
+
+from semgrid_edu.graphical import Factor
+
+warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
+
+
+def explain(got, slips):
+    """Stop with a hint when `got` is what a common slip gives."""
+    for slip, hint in slips.items():
+        if np.shape(got) == np.shape(slip):
+            assert not np.allclose(got, slip, atol=5e-4), f"got {np.round(got, 3).tolist()}: {hint}"
+
+
+# %% [markdown]
+# ## Task 1: multiply by name (1 + 1 points)
+#
+# A factor is a pair `(names, table)`: a tuple of names, one for each axis, and a table of non-negative numbers. Complete `multiply`: it returns the product of two
+# factors, again as a pair, over all variables of both, each once. An entry of the product is the entry of `f` times the entry of `g` at the same states. Variables
+# that both have may stand at different places. You may choose the order of the result's axes, as long as `names` tells it.
+# The second point is for factors that share several variables, or none.
+
+
+# %% nbgrader={"grade": false, "grade_id": "multiply", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def multiply(f, g):
+    """Return the product of two factors as (names, table)."""
+    ### BEGIN SOLUTION
+    names = tuple(dict.fromkeys(tuple(f[0]) + tuple(g[0])))
+    letters = {name: chr(ord("a") + k) for k, name in enumerate(names)}
+
+    def axes(of):
+        return "".join(letters[name] for name in of)
+
+    return names, np.einsum(f"{axes(f[0])},{axes(g[0])}->{axes(names)}", f[1], g[1])
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": true, "grade_id": "multiply-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+cell, beam = (("m",), np.array([0.7, 0.3])), (("z", "m"), np.array([[0.9, 0.2], [0.1, 0.8]]))
+before = cell[1].copy(), beam[1].copy()
+got = multiply(cell, beam)
+assert got is not None, "multiply returned nothing: did you forget `return`?"
+assert np.array_equal(cell[1], before[0]), "multiply changed the table of `f`: make a new one (no *=)"
+assert np.array_equal(beam[1], before[1]), "multiply changed the table of `g`: make a new one (no *=)"
+assert isinstance(got, tuple | list), f"return a pair, (names, table), got {type(got).__name__}"
+assert len(got) == 2, f"return two things, the names and the table, got {len(got)}"
+names, table = tuple(got[0]), np.asarray(got[1])
+assert len(set(names)) == len(names), f"the names {names} hold m twice: a variable that both factors have is one axis"
+assert "m" in names, "m is summed out: a product keeps every variable, the sum comes later"
+assert sorted(names) == ["m", "z"], f"the product is over m and z, yours is over {names}"
+assert table.shape == (2, 2), f"two variables of two states make a table of shape (2, 2), got {table.shape}"
+table = table if names == ("z", "m") else table.T
+slips = {
+    ((0.63, 0.14), (0.03, 0.24)): "the numbers of m were multiplied along the axis of z: line the axes up by name",
+    ((1.6, 0.5), (0.8, 1.1)): "you added: a product multiplies",
+    ((0.63, 0.07), (0.06, 0.24)): "right numbers, wrong names: your names stand in another order than your axes",
+}
+explain(table, slips)
+np.testing.assert_allclose(table, [[0.63, 0.06], [0.07, 0.24]], err_msg="rows z, columns m: 0.9 * 0.7, 0.2 * 0.3; ...")
+### BEGIN HIDDEN TESTS
+from semgrid_instructor import graphical_models
+
+complaint = graphical_models.check_multiply(multiply)
+assert not complaint, complaint
+### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "multiply-shared-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+f, g = (("m1", "m2"), np.array([[1.0, 2.0], [3.0, 4.0]])), (("m2", "m1"), np.array([[1.0, 10.0], [100.0, 1000.0]]))
+names, table = multiply(f, g)
+table = np.asarray(table) if tuple(names) == ("m1", "m2") else np.asarray(table).T
+slips = {
+    ((1.0, 20.0), (300.0, 4000.0)): "the axes of g stand the other way round: sort them by name, not by place",
+    ((1 / 4231, 200 / 4231), (30 / 4231, 4000 / 4231)): "you divided by the sum: a product isn't normalised",
+}
+explain(table, slips)
+np.testing.assert_allclose(table, [[1, 200], [30, 4000]], err_msg="at m1 = 0, m2 = 1: f says 2 and g says 100")
+### BEGIN HIDDEN TESTS
+from semgrid_instructor import graphical_models
+
+complaint = graphical_models.check_multiply_shared(multiply)
+assert not complaint, complaint
+### END HIDDEN TESTS
+
+# %% [markdown]
+# ## Task 2: what is seen (2 + 1 points)
+#
+# `factor` is again a pair `(names, table)`, a joint table of several variables. It need not sum to 1. `given` is a dictionary of what is known, such as `{"z": 1}`;
+# it may be empty.
+#
+# Complete `posterior`: it returns P(wanted | given), an array with one probability for each state of the variable `wanted`. For one more point: what is given may be
+# impossible, because every entry that agrees with it is 0. Then there is no answer, so raise a `ValueError`.
+
+
+# %% nbgrader={"grade": false, "grade_id": "posterior", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def posterior(factor, wanted, given):
+    """Return P(wanted | given) as an array (K,)."""
+    ### BEGIN SOLUTION
+    names, table = factor
+    kept = [name for name in names if name not in given]
+    table = table[tuple(given.get(name, slice(None)) for name in names)]
+    weights = table.sum(axis=tuple(axis for axis, name in enumerate(kept) if name != wanted))
+    if weights.sum() == 0:
+        raise ValueError(f"{given} can't happen")
+    return weights / weights.sum()
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": true, "grade_id": "posterior-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+table = np.array([[[8.0, 2.0], [1.0, 4.0]], [[3.0, 6.0], [0.0, 16.0]]])  # axes m1, m2, z
+joint = (("m1", "m2", "z"), table.copy())
+got = posterior(joint, "m2", {"z": 1})
+assert got is not None, "posterior returned nothing: did you forget `return`?"
+assert np.array_equal(joint[1], table), "posterior changed the table it was given: make a new one"
+assert np.shape(got) == (2,), f"one probability for each of the 2 states of m2, shape (2,), got {np.shape(got)}"
+slips = {
+    (19 / 40, 21 / 40): "you summed z out: z is known, so keep only the slice at z = 1",
+    (11 / 12, 1 / 12): "that is the slice at z = 0: a known state is an index, use its value",
+    (6 / 28, 22 / 28): "that is P(m1 | z = 1): the axes have moved up after the slice, or `wanted` is ignored",
+    (6 / 22, 16 / 22): "you took the largest entry over m1: an unknown variable is summed out",
+    (8.0, 20.0): "these are weights: divide by their sum, 28",
+    (
+        0.2,
+        0.5,
+    ): "these are P(m2, z = 1), the weights divided by the sum of the whole table: divide by that of the slice",
+    (2 / 6, 4 / 6): "you looked at m1 = 0 only: m1 isn't known, sum over its states",
+    (4.0, 10.0): "you took the mean over m1: sum, then divide by the sum",
+}
+explain(got, slips)
+np.testing.assert_allclose(got, [8 / 28, 20 / 28], err_msg="m2 = 0: 2 + 6 = 8; m2 = 1: 4 + 16 = 20")
+got = posterior(joint, "m2", {"m1": 1, "z": 0})
+explain(got, {(9 / 25, 16 / 25): "z = 0 is known too: state 0 is no `False`", (6 / 22, 16 / 22): "that is z = 1"})
+np.testing.assert_allclose(got, [1, 0], err_msg="with both known one row is left: 3 and 0")
+np.testing.assert_allclose(posterior(joint, "z", {}), [12 / 40, 28 / 40], err_msg="nothing given: sum the others out")
+### BEGIN HIDDEN TESTS
+from semgrid_instructor import graphical_models
+
+complaint = graphical_models.check_posterior(posterior)
+assert not complaint, complaint
+### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "impossible-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+silent = (("m", "z"), np.array([[0.5, 0.0], [0.5, 0.0]]))  # a sensor that never says 1
+try:
+    got = posterior(silent, "m", {"z": 1})
+except ValueError:
+    got = None
+assert got is None or not np.isnan(got).any(), "0 / 0 gives NaN, which spreads silently: raise ValueError instead"
+assert got is None, f"z = 1 can't happen, so nothing follows from it, not even {got}: raise ValueError"
+try:
+    certain = posterior((("m", "z"), np.array([[0.5, 0.0], [0.5, 0.2]])), "m", {"z": 1})
+except ValueError:
+    certain = None
+assert certain is not None, "here z = 1 can happen: a zero in one entry is no reason to raise"
+np.testing.assert_allclose(certain, [0, 1], err_msg="only m = 1 explains z = 1")
+### BEGIN HIDDEN TESTS
+from semgrid_instructor import graphical_models
+
+complaint = graphical_models.check_impossible(posterior)
+assert not complaint, complaint
+### END HIDDEN TESTS
+
+# %% [markdown]
+# ## Task 3: independence read off a graph (2 + 2 points)
+#
+# `parents` describes a directed graph: for each variable the tuple of its parents, `()` for one without. Complete `separated`: it returns `True` when every path between
+# `a` and `b` is blocked once the variables in `given` are known, and `False` otherwise. `a` and `b` are two different variables that aren't in `given`.
+#
+# You may follow paths. But there is a shorter recipe with the same result:
+# (1) keep only `a`, `b`, `given` and all their ancestors; (2) link each variable with its parents, and the parents of each variable with each other (moralise); (3) take `given` out;
+# (4) is there still a way from `a` to `b`?
+#
+# Two points are for graphs of three variables, two for larger ones.
+
+
+# %% nbgrader={"grade": false, "grade_id": "separated", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def separated(parents, a, b, given=()):
+    """Return whether the graph alone makes a and b independent once `given` is known."""
+    ### BEGIN SOLUTION
+    kept, queue = set(), [a, b, *given]
+    while queue:
+        name = queue.pop()
+        kept.add(name)
+        queue += parents[name]
+    linked = {name: set() for name in kept}
+    for child in kept:
+        family = {child, *parents[child]}
+        for name in family:
+            linked[name] |= family
+    reached, queue = set(given), [a]
+    while queue:
+        name = queue.pop()
+        if name not in reached:
+            reached.add(name)
+            queue += linked[name]
+    return b not in reached
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": false, "grade_id": "graphs", "locked": true, "schema_version": 3, "solution": false, "task": false}
+chain = {"before": (), "now": ("before",), "after": ("now",)}
+fork = {"m": (), "z1": ("m",), "z2": ("m",)}
+collider = {"m1": (), "m2": (), "z": ("m1", "m2")}
+noisy_range = {"m1": (), "m2": (), "r": ("m1", "m2"), "z": ("r",)}
+scans = {"before": (), "now": ("before",), "after": ("now",), "z1": ("before",), "z2": ("now",), "z3": ("after",)}
+dusty = {"m": (), "dust": (), "z1": ("m", "dust"), "z2": ("m", "dust")}
+pitched = {"m1": (), "m2": (), "pitch": (), "z1": ("m1", "pitch"), "z2": ("m2", "pitch")}
+
+# %% nbgrader={"grade": true, "grade_id": "separated-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+cases = (
+    (chain, "before", "after", (), False, "what acts on now acts on after: the chain is open while now isn't known"),
+    (chain, "before", "after", ("now",), True, "now is known, so it blocks the chain: before has no other way"),
+    (fork, "z1", "z2", (), False, "both beams hint at the same cell: the fork is open while m isn't known"),
+    (fork, "z1", "z2", ("m",), True, "m is known, so it blocks the fork: only the sensor's own errors are left"),
+    (collider, "m1", "m2", (), True, "z isn't known: arrows that meet block. Take z out in step (1)"),
+    (collider, "m1", "m2", ("z",), False, "explaining away: a known z opens the way. Link its parents, in step (2)"),
+    (collider, "m1", "z", ("m2",), False, "an arrow links them: neighbours are never separated"),
+)
+got = [separated(parents, a, b, given) for parents, a, b, given, _, _ in cases]
+assert all(answer in (True, False) for answer in got), f"return True or False, got {got}"
+expected = [case[4] for case in cases]
+assert got != [not answer for answer in expected], "all answers are the opposite: True means separated, no open path"
+for answer, (_, a, b, given, right, hint) in zip(got, cases, strict=True):
+    assert answer == right, f"{a} and {b} given {given}: you say {bool(answer)}, but {hint}"
+### BEGIN HIDDEN TESTS
+from semgrid_instructor import graphical_models
+
+complaint = graphical_models.check_separated_three(separated)
+assert not complaint, complaint
+### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "separated-large-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+cases = (
+    (noisy_range, "m1", "m2", ("z",), False, "z lies below the collider r and tells something about it, so r is open"),
+    (noisy_range, "m1", "m2", (), True, "neither r nor anything below it is known"),
+    (scans, "before", "after", ("z1", "z2", "z3"), False, "a scan of now is not now: the chain stays open"),
+    (scans, "before", "z3", ("now",), True, "now blocks the only way, however long it is"),
+    (dusty, "z1", "z2", ("m",), False, "m blocks one path, and the path through dust is open: all must be blocked"),
+    (dusty, "z1", "z2", ("m", "dust"), True, "both paths are blocked"),
+    (pitched, "m1", "m2", ("z1",), True, "z2 isn't known and blocks: each collider on the path must be open"),
+    (pitched, "m1", "m2", ("z1", "z2"), False, "both colliders are known: the path through the pitch is open"),
+    (pitched, "m1", "m2", ("z1", "z2", "pitch"), True, "pitch is the middle of a fork, and known: it blocks"),
+)
+for parents, a, b, given, right, hint in cases:
+    answer = separated(parents, a, b, given)
+    assert answer == right, f"{a} and {b} given {given}: you say {answer}, but {hint}"
+### BEGIN HIDDEN TESTS
+from semgrid_instructor import graphical_models
+
+complaint = graphical_models.check_separated_large(separated)
+assert not complaint, complaint
+### END HIDDEN TESTS
+
+# %% [markdown]
+# ## Task 4: eliminate, and say what it costs (2 + 1 points)
+#
+# From here on factors are the package's: `f.names`, `f.table`, the product `f * g`, and `f.sum("x")`, the factor without x.
+#
+# Complete `eliminate`. `factors` is a list of `Factor`s, `order` the names of variables to sum out, one after the other in this order. For each, multiply only those factors
+# that contain it, then sum it out. Return two things: the product of all that is left in the end, as a `Factor`, not normalised; and the number of entries of the
+# largest table from which a variable was summed out. At least one variable is left in the end. Two points are for the factor, one for the size.
+
+
+# %% nbgrader={"grade": false, "grade_id": "eliminate", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def eliminate(factors, order):
+    """Return the Factor over the variables that aren't in `order`, and the entries of the largest table."""
+    ### BEGIN SOLUTION
+    factors, largest = list(factors), 0
+    for name in order:
+        together = Factor((), 1.0)
+        for factor in factors:
+            if name in factor.names:
+                together = together * factor
+        largest = max(largest, together.table.size)
+        factors = [factor for factor in factors if name not in factor.names] + [together.sum(name)]
+    result = Factor((), 1.0)
+    for factor in factors:
+        result = result * factor
+    return result, largest
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": false, "grade_id": "star", "locked": true, "schema_version": 3, "solution": false, "task": false}
+street = Factor("street", [0.5, 0.5])
+star = [street, *(Factor(("street", f"m{k}"), [[0.9, 0.1], [0.6, 0.4]]) for k in (1, 2, 3, 4))]
+agree = [[3.0, 1.0], [1.0, 3.0]]
+row = [Factor(("m1", "m2"), agree), Factor(("m2", "m3"), agree)]
+CELLS_FIRST, STREET_FIRST = ["m2", "m3", "m4", "street"], ["street", "m2", "m3", "m4"]
+
+# %% nbgrader={"grade": true, "grade_id": "eliminate-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+got = eliminate(list(star), CELLS_FIRST)
+assert got is not None, "eliminate returned nothing: did you forget `return`?"
+assert isinstance(got, tuple | list), f"return two things, the factor and the size, got one {type(got).__name__}"
+result = got[0]
+assert isinstance(result, Factor), f"the first thing must be a Factor, got {type(result).__name__}"
+assert result.names, "nothing is left: put each sum back among the factors, it is multiplied later"
+assert result.names == ("m1",), (
+    f"m1 alone must be left, not {result.names}: take the factors you have used out of the list"
+)
+explain(result.table, {(12, 4): "multiply first, then sum: a sum of products isn't the product of the sums"})
+share = result.table[0] / result.table.sum()
+assert np.isclose(result.table.sum(), 1) or not np.isclose(share, 0.75), "right up to a factor: normalise nowhere"
+np.testing.assert_allclose(result.table, [0.75, 0.25], atol=1e-9, err_msg="P(m1): the mean of 0.9, 0.1 and 0.6, 0.4")
+other = eliminate(list(star), STREET_FIRST)[0]
+np.testing.assert_allclose(other.table, [0.75, 0.25], atol=1e-9, err_msg="another order must not change the answer")
+
+result = eliminate(list(row), ["m2"])[0]
+assert sorted(result.names) == ["m1", "m3"], f"m1 and m3 are left, your result is over {result.names}"
+assert np.isclose(result.table.sum(), 32), (
+    f"the weights must sum to Z = 32, not {result.table.sum():.3g}: don't normalise"
+)
+np.testing.assert_allclose(np.diag(result.table), [10, 10], err_msg="m1 = m3: 3 * 3 + 1 * 1")
+### BEGIN HIDDEN TESTS
+from semgrid_instructor import graphical_models
+
+complaint = graphical_models.check_eliminate(eliminate)
+assert not complaint, complaint
+### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "eliminate-cost-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+largest = eliminate(list(star), CELLS_FIRST)[1]
+costs = {
+    32: "you multiplied all factors first: of each variable only those that contain it",
+    2: "count the product before the variable is summed out, and its entries, not its axes",
+    16: "that is the sum of all sizes: the largest counts",
+}
+assert largest == 4, f"largest {largest}: {costs.get(largest, 'each product here has two axes of two states')}"
+largest = eliminate(list(star), STREET_FIRST)[1]
+costs = {
+    16: "count before the variable is summed out: with the street the product still has five axes",
+    4: "street comes first in this order: keep to `order`, and keep the largest, not the last",
+    5: "five axes of two states are 32 entries: count entries, not axes",
+    60: "that is the sum of all sizes: the largest counts",
+}
+assert largest == 32, f"largest {largest}: {costs.get(largest, 'street links all four cells: five axes, 32 entries')}"
+largest = eliminate(list(row), ["m2"])[1]
+assert largest == 8, f"largest {largest}: the product over m1, m2, m3 has 8 entries before m2 is summed out"
+### BEGIN HIDDEN TESTS
+from semgrid_instructor import graphical_models
+
+complaint = graphical_models.check_cost(eliminate)
+assert not complaint, complaint
+### END HIDDEN TESTS
+
+# %% [markdown]
+# ## Task 5: forward and backward (2 + 2 points)
+#
+# One grid cell with S states is scanned T times. `start`, shape `(S,)`, is what you believe at the time of the **first** scan, before you have seen it. `M[i, j]` is the probability to
+# go from state i to state j between two scans. `likelihoods`, shape `(T, S)`, has one row per scan: P(scan | state).
+#
+# Complete `filtered`: row t is P(state at time t | scans 0 to t), shape `(T, S)`. For two more points complete `smoothed`: row t is P(state at time t | all T scans). A drive has thousands of scans, and a
+# product of thousands of numbers is 0 in floating point: normalise your messages on the way.
+
+
+# %% nbgrader={"grade": false, "grade_id": "messages", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def filtered(start, M, likelihoods):
+    """Return P(state at t | scans 0 to t), (T, S)."""
+    ### BEGIN SOLUTION
+    beliefs, message = [], start
+    for likelihood in likelihoods:
+        belief = message * likelihood
+        beliefs.append(belief / belief.sum())
+        message = beliefs[-1] @ M
+    return np.array(beliefs)
+    ### END SOLUTION
+
+
+def smoothed(start, M, likelihoods):
+    """Return P(state at t | all scans), (T, S)."""
+    ### BEGIN SOLUTION
+    beliefs, message = filtered(start, M, likelihoods), np.ones(len(start))
+    for t in reversed(range(len(likelihoods))):
+        beliefs[t] *= message
+        beliefs[t] /= beliefs[t].sum()
+        message = M @ (likelihoods[t] * message)
+        message /= message.sum()
+    return beliefs
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": false, "grade_id": "chain", "locked": true, "schema_version": 3, "solution": false, "task": false}
+start, M = np.array([0.6, 0.4]), np.array([[0.9, 0.1], [0.3, 0.7]])  # FREE, OCCUPIED
+likelihoods = np.array([[0.95, 0.2], [0.05, 0.8], [0.6, 0.3]])  # no return, a return, a weak hint
+
+
+def check_rows(answer):
+    """Return what an answer gives for this chain, after looking at its arguments, shape and sums."""
+    arguments = start.copy(), M.copy(), likelihoods.copy()
+    got = answer(*arguments)
+    assert got is not None, f"{answer.__name__} returned nothing: did you forget `return`?"
+    for name, array, old in zip(("start", "M", "likelihoods"), arguments, (start, M, likelihoods), strict=True):
+        assert np.array_equal(array, old), f"{answer.__name__} changed its argument `{name}`: make a new array"
+    got = np.asarray(got)
+    assert got.shape == (3, 2), f"one row per scan, one column per state, shape (3, 2), got {got.shape}"
+    sums = got.sum(axis=1)
+    assert np.allclose(sums, 1), f"rows sum to {sums.round(3).tolist()}: normalise each row"
+    return got
+
+
+# %% nbgrader={"grade": true, "grade_id": "filtered-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+got = check_rows(filtered)
+slips = {
+    (0.9022, 0.0978): "`start` belongs to the time of the first scan: no move before it",
+    (0.6, 0.4): "the first scan is missing in row 0: multiply by its likelihood",
+    (0.8262, 0.1738): "that is the belief after the move: return the belief at the time of the scan",
+}
+explain(got[0], slips)
+np.testing.assert_allclose(
+    got[0], [0.8769, 0.1231], atol=1e-4, err_msg="0.6 * 0.95 and 0.4 * 0.2, divided by their sum"
+)
+slips = {
+    (0.1255, 0.8745): "M is transposed: M[i, j] goes from i to j, so a belief stands to its left",
+    (0.3081, 0.6919): "nothing moved between the scans: multiply by M",
+    (0.0857, 0.9143): "row 1 forgets the first scan: carry the belief on, not `start`",
+    (0.1082, 0.8918): "row 1 forgets the first scan: carry the belief on, not `start`",
+    (0.8262, 0.1738): "that is the prediction: multiply by the second scan's likelihood",
+}
+explain(got[1], slips)
+np.testing.assert_allclose(got[1], [0.2290, 0.7710], atol=1e-4, err_msg="predicted 0.826, 0.174; times 0.05, 0.8")
+np.testing.assert_allclose(got[2], [0.6086, 0.3914], atol=1e-4)
+### BEGIN HIDDEN TESTS
+from semgrid_instructor import graphical_models
+
+complaint = graphical_models.check_filtered(filtered)
+assert not complaint, complaint
+### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "smoothed-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+got = check_rows(smoothed)
+slips = {
+    (0.7567, 0.2433): "the last scan is counted twice: the backward message into t holds only the scans after t",
+    (
+        0.8235,
+        0.1765,
+    ): "a filter run backwards holds scan t too, so it counts twice: only the scans after t belong in the message",
+    (0.75, 0.25): "the past is missing: start from the filtered belief",
+}
+explain(got[2], slips)
+np.testing.assert_allclose(got[2], [0.6086, 0.3914], atol=1e-4, err_msg="no scan follows: the last row is the filter's")
+slips = {
+    (0.2290, 0.7710): "that is still the filter: multiply by the backward message, which holds the likelihoods",
+    (0.4093, 0.5907): "going back, M stands to the left of a column: M @ message sums over where it goes next",
+    (0.0607, 0.9393): "the message from t + 1 holds the likelihood of scan t + 1, you took that of scan t",
+    (0.3727, 0.6273): "the message must pass M: between t + 1 and t the state may change",
+    (0.2763, 0.7237): "the filter is counted twice: divide the smoothed row t + 1 by its prediction first",
+    (0.1934, 0.8066): "beliefs from both sides are multiplied, not averaged",
+}
+explain(got[1], slips)
+np.testing.assert_allclose(got[1], [0.3027, 0.6973], atol=1e-4, err_msg="0.229 * 0.57 and 0.771 * 0.39, normalised")
+explain(
+    got[0], {(0.6077, 0.3923): "row 0 hears of scan 1 only: pass the message on", (0.8769, 0.1231): "still the filter"}
+)
+np.testing.assert_allclose(got[0], [0.6409, 0.3591], atol=1e-4, err_msg="row 0 must hear of both later scans")
+### BEGIN HIDDEN TESTS
+from semgrid_instructor import graphical_models
+
+complaint = graphical_models.check_smoothed(smoothed)
+assert not complaint, complaint
+### END HIDDEN TESTS
+
+# %% [markdown]
+# ## Task 6: in your own words (2 points)
+#
+# Two cells stand one behind the other. Each of two beams crosses both, and each comes back with a range too coarse to say which cell reflected it. An occupancy grid keeps one probability per cell: after each beam it
+# updates both cells separately, by Bayes' rule with that beam's likelihood for each cell. Which edges does the true graph of two cells and two returns have, and which dependence does the grid drop after the first beam? A third sensor now reports for certain that the front cell is occupied.
+# What should happen to the probability of the rear cell, and what happens in the grid? Would ten more such beams repair that? Six sentences are enough.
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "dropped-edge", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
+# Each return has arrows from both cells, so each is a collider, and once the returns are known the two cells depend on each other. The grid keeps only the two marginals after each beam, so it drops the coupling "at
+# least one of you". When the front cell turns out to be occupied it explains the returns, so the probability of the rear cell should fall back towards its prior (explaining away). In the grid nothing happens to it, because nothing links
+# it to the front cell. Ten more beams make it worse: each raises the rear cell once more, as if it were a new witness, until the grid is sure of a wall as thick as two cells. Only something that ties the cells together helps, or a range fine enough to name its cell.
+# One point for the collider and the dropped coupling, one for what should happen to the rear cell and why more beams don't repair it.

@@ -1,0 +1,1065 @@
+"""The graders of the exercise on graphical models, against real mistakes and other right ways."""
+
+from grader_checks import GraderChecks, mistake, right
+
+SLICED = """
+def posterior(factor, wanted, given):
+    names, table = list(factor[0]), factor[1]
+    for name, state in given.items():
+        table = np.take(table, state, axis=names.index(name))
+        names.remove(name)
+    for name in list(names):
+        if name != wanted:
+            table = table.sum(axis=names.index(name))
+            names.remove(name)
+"""
+
+RECIPE = """
+def separated(parents, a, b, given=()):
+    kept, queue = set(), [a, b, *given]
+    while queue:
+        name = queue.pop()
+        kept.add(name)
+        queue += parents[name]
+    linked = {name: set() for name in kept}
+    for child in kept:
+        family = {child, *parents[child]}
+        for name in family:
+            linked[name] |= family
+    reached, queue = set(given), [a]
+    while queue:
+        name = queue.pop()
+        if name not in reached:
+            reached.add(name)
+            queue += linked[name]
+    return b not in reached
+"""
+
+PATHS = """
+def separated(parents, a, b, given=()):
+    children = {name: [c for c in parents if name in parents[c]] for name in parents}
+
+    def below(name):
+        return {name}.union(*(below(c) for c in children[name]))
+
+    def opens(before, middle, after):
+        collider = before in parents[middle] and after in parents[middle]
+        return bool(below(middle) & set(given)) if collider else middle not in given
+
+    def walk(path):
+        if path[-1] == b:
+            return True
+        for following in [*parents[path[-1]], *children[path[-1]]]:
+            inside = len(path) == 1 or opens(path[-2], path[-1], following)
+            if following not in path and inside and walk([*path, following]):
+                return True
+        return False
+
+    return not walk([a])
+"""
+
+ELIMINATE = """
+def eliminate(factors, order):
+    largest = 0
+    for name in order:
+        touching = [f for f in factors if name in f.names]
+        together = touching[0]
+        for f in touching[1:]:
+            together = together * f
+        largest = max(largest, together.table.size)
+        factors = [f for f in factors if name not in f.names] + [together.sum(name)]
+    result = factors[0]
+    for f in factors[1:]:
+        result = result * f
+    return result, largest
+"""
+
+FILTERED = """
+def filtered(start, M, likelihoods):
+    rows, b = [], start
+    for row in likelihoods:
+        b = b * row / (b @ row)
+        rows.append(b)
+        b = b @ M
+    return np.array(rows)
+
+"""
+
+SMOOTHED = """
+def smoothed(start, M, likelihoods):
+    beliefs, message = filtered(start, M, likelihoods), np.ones(len(start))
+    for t in range(len(likelihoods) - 1, -1, -1):
+        beliefs[t] = beliefs[t] * message / (beliefs[t] @ message)
+        message = M @ (likelihoods[t] * message)
+        message = message / message.sum()
+    return beliefs
+"""
+
+
+class TestGraphicalModels(GraderChecks):
+    exercise = "graphical_models"
+    entries = (
+        # ---- task 1
+        right(
+            "broadcasting, axes by name",
+            task="multiply",
+            code="""
+def spread(names, factor):
+    own, table = factor
+    table = table.transpose([own.index(name) for name in names if name in own])
+    return table[tuple(slice(None) if name in own else None for name in names)]
+
+
+def multiply(f, g):
+    names = tuple(dict.fromkeys(f[0] + g[0]))
+    return names, spread(names, f) * spread(names, g)""",
+        ),
+        right(
+            "a loop over all states, names sorted",
+            task="multiply",
+            code="""
+def multiply(f, g):
+    states = dict(zip(f[0], f[1].shape)) | dict(zip(g[0], g[1].shape))
+    names = tuple(sorted(states))
+    table = np.zeros([states[name] for name in names])
+    for index in np.ndindex(table.shape):
+        at = dict(zip(names, index))
+        table[index] = f[1][tuple(at[n] for n in f[0])] * g[1][tuple(at[n] for n in g[0])]
+    return names, table""",
+        ),
+        right(
+            "the package's factors, returned as a list",
+            task="multiply",
+            code="""
+def multiply(f, g):
+    both = Factor(*f) * Factor(*g)
+    return [both.names, both.table]""",
+        ),
+        mistake(
+            "numpy broadcasts by place",
+            task="multiply",
+            loses=2,
+            says="line the axes up by name",
+            code="""
+def multiply(f, g):
+    return (g[0] if len(g[0]) > len(f[0]) else f[0]), (f[1] * g[1].T).T""",
+        ),
+        mistake(
+            "outer product: the shared variable twice",
+            task="multiply",
+            loses=2,
+            says="a variable that both factors have is one axis",
+            code="""
+def multiply(f, g):
+    return f[0] + g[0], np.multiply.outer(f[1], g[1])""",
+        ),
+        mistake(
+            "the shared variable summed out",
+            task="multiply",
+            loses=2,
+            says="a product keeps every variable",
+            code="""
+def multiply(f, g):
+    shared = [name for name in f[0] if name in g[0]]
+    names = tuple(name for name in f[0] + g[0] if name not in shared)
+    axes = [f[0].index(n) for n in shared], [g[0].index(n) for n in shared]
+    return names, np.tensordot(f[1], g[1], axes)""",
+        ),
+        mistake(
+            "added",
+            task="multiply",
+            loses=2,
+            says="a product multiplies",
+            code="""
+def multiply(f, g):
+    both = Factor(*f) * Factor(*g)
+    ones = Factor(f[0], np.ones(f[1].shape)), Factor(g[0], np.ones(g[1].shape))
+    return both.names, (Factor(*f) * ones[1]).table + (ones[0] * Factor(*g)).table""",
+        ),
+        mistake(
+            "normalised",
+            task="multiply",
+            loses=2,
+            says="a product isn't normalised",
+            code="""
+def multiply(f, g):
+    both = (Factor(*f) * Factor(*g)).normalised()
+    return both.names, both.table""",
+        ),
+        mistake(
+            "g's axes taken in f's order",
+            task="multiply",
+            loses=1,
+            says="the axes of g stand the other way round",
+            code="""
+def multiply(f, g):
+    if sorted(f[0]) == sorted(g[0]):
+        return f[0], f[1] * g[1]
+    both = Factor(*f) * Factor(*g)
+    return both.names, both.table""",
+        ),
+        mistake(
+            "names don't fit the table",
+            task="multiply",
+            loses=2,
+            says="right numbers, wrong names",
+            code="""
+def multiply(f, g):
+    both = Factor(*f) * Factor(*g)
+    return tuple(sorted(both.names, reverse=True)), both.table""",
+        ),
+        mistake(
+            "in place",
+            task="multiply",
+            loses=1,
+            says="multiply changed the table of `g`",
+            code="""
+def multiply(f, g):
+    if len(f[0]) == 1 and f[0][0] in g[0]:
+        table = np.moveaxis(g[1], g[0].index(f[0][0]), -1)
+        table *= f[1]
+        return g[0], g[1]
+    both = Factor(*f) * Factor(*g)
+    return both.names, both.table""",
+        ),
+        mistake(
+            "nothing returned",
+            task="multiply",
+            loses=2,
+            says="did you forget `return`?",
+            code="""
+def multiply(f, g):
+    both = Factor(*f) * Factor(*g)
+    (both.names, both.table)""",
+        ),
+        mistake(
+            "at most one shared variable, at most two axes",
+            task="multiply",
+            loses=2,
+            says="on inputs you haven't seen",
+            code="""
+def multiply(f, g):
+    if len(f[0]) > len(g[0]):
+        f, g = g, f
+    if len(f[0]) == 1:
+        return g[0], (g[1] * f[1] if g[0][-1] == f[0][0] else (g[1].T * f[1]).T)
+    return f[0], f[1] * g[1].T""",
+        ),
+        mistake(
+            "an endless loop",
+            task="multiply",
+            loses=2,
+            says="before timeout",
+            code="""
+def multiply(f, g):
+    while True:
+        pass""",
+        ),
+        # ---- task 2
+        right(
+            "slice and sum, one axis after the other",
+            task="posterior",
+            code=SLICED
+            + """
+    if not table.any():
+        raise ValueError("impossible")
+    return table / table.sum()""",
+        ),
+        right(
+            "a loop over all states",
+            task="posterior",
+            code="""
+def posterior(factor, wanted, given):
+    names, table = factor
+    weights = [0.0] * table.shape[names.index(wanted)]
+    for index in np.ndindex(*table.shape):
+        at = dict(zip(names, index))
+        if all(at[name] == state for name, state in given.items()):
+            weights[at[wanted]] += table[index]
+    if sum(weights) == 0:
+        raise ValueError("impossible")
+    return [w / sum(weights) for w in weights]""",
+        ),
+        right(
+            "the package, whose error is a ValueError",
+            task="posterior",
+            code="""
+def posterior(factor, wanted, given):
+    sliced = Factor(*factor).given(**given)
+    return sliced.sum(*(n for n in sliced.names if n != wanted)).normalised().table""",
+        ),
+        mistake(
+            "what is known summed out",
+            task="posterior",
+            loses=3,
+            says="you summed z out",
+            code="""
+def posterior(factor, wanted, given):
+    names, table = factor
+    weights = table.sum(axis=tuple(k for k, n in enumerate(names) if n != wanted))
+    return weights / weights.sum()""",
+        ),
+        mistake(
+            "always state 0",
+            task="posterior",
+            loses=3,
+            says="use its value",
+            code=SLICED.replace("table, state, axis", "table, 0, axis") + "    return table / table.sum()",
+        ),
+        mistake(
+            "state 0 taken for nothing known",
+            task="posterior",
+            loses=3,
+            says="state 0 is no `False`",
+            code="""
+def posterior(factor, wanted, given):
+    names, table = factor
+    index = tuple(given.get(n) or slice(None) for n in names)
+    kept = [n for n in names if not given.get(n)]
+    table = table[index]
+    weights = table.sum(axis=tuple(k for k, n in enumerate(kept) if n != wanted))
+    if weights.sum() == 0:
+        raise ValueError("impossible")
+    return weights / weights.sum()""",
+        ),
+        mistake(
+            "wanted ignored after the slice",
+            task="posterior",
+            loses=2,
+            says="the axes have moved up after the slice, or `wanted` is ignored",
+            code="""
+def posterior(factor, wanted, given):
+    names, table = factor
+    table = table[tuple(given.get(name, slice(None)) for name in names)]
+    weights = table.sum(axis=tuple(range(1, table.ndim)))
+    if weights.sum() == 0:
+        raise ValueError("impossible")
+    return weights / weights.sum()""",
+        ),
+        mistake(
+            "maximum instead of sum",
+            task="posterior",
+            loses=2,
+            says="an unknown variable is summed out",
+            code=SLICED.replace("table.sum(axis", "table.max(axis")
+            + """    if not table.any():
+        raise ValueError("impossible")
+    return table / table.sum()""",
+        ),
+        mistake(
+            "mean instead of sum, not normalised",
+            task="posterior",
+            loses=3,
+            says="you took the mean over m1",
+            code=SLICED.replace("table.sum(axis", "table.mean(axis") + "    return table",
+        ),
+        mistake(
+            "not normalised",
+            task="posterior",
+            loses=3,
+            says="divide by their sum, 28",
+            code=SLICED + "    return table",
+        ),
+        mistake(
+            "divided by the sum of the whole table",
+            task="posterior",
+            loses=3,
+            says="divide by that of the slice",
+            code=SLICED + "    return table / factor[1].sum()",
+        ),
+        mistake(
+            "the unknown variable at state 0",
+            task="posterior",
+            loses=2,
+            says="you looked at m1 = 0 only",
+            code=SLICED.replace("table.sum(axis=names.index(name))", "np.take(table, 0, axis=names.index(name))")
+            + """    if not table.any():
+        raise ValueError("impossible")
+    return table / table.sum()""",
+        ),
+        mistake(
+            "NaN for the impossible",
+            task="posterior",
+            loses=1,
+            says="0 / 0 gives NaN",
+            code=SLICED + "    return table / table.sum()",
+        ),
+        mistake(
+            "uniform for the impossible",
+            task="posterior",
+            loses=1,
+            says="nothing follows from it",
+            code=SLICED
+            + """    if not table.any():
+        return np.full(len(table), 1 / len(table))
+    return table / table.sum()""",
+        ),
+        mistake(
+            "any zero is taken for impossible",
+            task="posterior",
+            loses=3,
+            says="a zero in one entry is no reason to raise",
+            code=SLICED
+            + """    if not table.all():
+        raise ValueError("impossible")
+    return table / table.sum()""",
+        ),
+        mistake(
+            "a tolerance for zero",
+            task="posterior",
+            loses=1,
+            says="on inputs you haven't seen: a tiny weight isn't zero",
+            code=SLICED
+            + """    if np.isclose(table.sum(), 0):
+        raise ValueError("impossible")
+    return table / table.sum()""",
+        ),
+        mistake(
+            "two states taken for granted",
+            task="posterior",
+            loses=2,
+            says="on inputs you haven't seen",
+            code="""
+def posterior(factor, wanted, given):
+    names, table = factor
+    table = table.copy()
+    for name, state in given.items():
+        for other in range(2):
+            if other != state:
+                table[(slice(None),) * names.index(name) + (other,)] = 0
+    weights = table.sum(axis=tuple(k for k, n in enumerate(names) if n != wanted))
+    if weights.sum() == 0:
+        raise ValueError("impossible")
+    return weights / weights.sum()""",
+        ),
+        # ---- task 3
+        right("all paths, one after the other", task="separated", code=PATHS),
+        right(
+            "the Bayes ball",
+            task="separated",
+            code="""
+def separated(parents, a, b, given=()):
+    above, queue = set(), list(given)
+    while queue:
+        name = queue.pop()
+        above.add(name)
+        queue += parents[name]
+    seen, queue = set(), [(a, "up")]
+    while queue:
+        name, way = queue.pop()
+        if (name, way) in seen:
+            continue
+        seen.add((name, way))
+        if name == b:
+            return False
+        if (way == "up" and name not in given) or (way == "down" and name in above):
+            queue += [(p, "up") for p in parents[name]]
+        if name not in given:
+            queue += [(c, "down") for c in parents if name in parents[c]]
+    return True""",
+        ),
+        right(
+            "numbers: random tables and the package's inference",
+            task="separated",
+            code="""
+from semgrid_edu.graphical import GraphicalModel, enumerate_marginals
+
+
+def separated(parents, a, b, given=()):
+    rng, factors = np.random.default_rng(0), []
+    for child, above in parents.items():
+        p = rng.uniform(0.2, 0.8, size=[2] * len(above))
+        factors.append(Factor((*above, child), np.stack([p, 1 - p], axis=-1)))
+    joint = enumerate_marginals(GraphicalModel(factors, parents), (a, b, *given)).table
+    joint = joint / joint.sum(axis=(0, 1))
+    product = joint.sum(axis=1, keepdims=True) * joint.sum(axis=0, keepdims=True)
+    return bool(abs(joint - product).max() < 1e-12)""",
+        ),
+        mistake(
+            "answers the opposite",
+            task="separated",
+            loses=4,
+            says="all answers are the opposite",
+            code=RECIPE.replace("b not in reached", "b in reached"),
+        ),
+        mistake(
+            "arrows ignored",
+            task="separated",
+            loses=4,
+            says="arrows that meet block",
+            code=RECIPE.replace("[a, b, *given]\n", "list(parents)\n", 1)
+            .replace("queue += parents[name]\n    linked", "pass\n    linked")
+            .replace(
+                """        for name in family:
+            linked[name] |= family
+""",
+                """        linked[child] |= family
+        for name in parents[child]:
+            linked[name].add(child)
+""",
+            ),
+        ),
+        mistake(
+            "parents not married",
+            task="separated",
+            loses=4,
+            says="Link its parents",
+            code=RECIPE.replace(
+                """        for name in family:
+            linked[name] |= family
+""",
+                """        linked[child] |= family
+        for name in parents[child]:
+            linked[name].add(child)
+""",
+            ),
+        ),
+        mistake(
+            "married in the whole graph",
+            task="separated",
+            loses=4,
+            says="Take z out in step (1)",
+            code=RECIPE.replace("[a, b, *given]\n", "list(parents)\n", 1),
+        ),
+        mistake(
+            "what is known taken out before marrying",
+            task="separated",
+            loses=4,
+            says="Link its parents",
+            code=RECIPE.replace("    for child in kept:\n", "    for child in kept - set(given):\n"),
+        ),
+        mistake(
+            "ancestors of what is known forgotten",
+            task="separated",
+            loses=4,
+            says="Link its parents",
+            code=RECIPE.replace("[a, b, *given]\n", "[a, b]\n", 1),
+        ),
+        mistake(
+            "direct neighbours only",
+            task="separated",
+            loses=4,
+            says="the chain is open while now isn't known",
+            code="""
+def separated(parents, a, b, given=()):
+    return a not in parents[b] and b not in parents[a]""",
+        ),
+        mistake(
+            "what is known doesn't block",
+            task="separated",
+            loses=4,
+            says="so it blocks the chain",
+            code=RECIPE.replace("set(given), [a]", "set(), [a]"),
+        ),
+        mistake(
+            "what is known blocks even where the two are linked",
+            task="separated",
+            loses=4,
+            says="neighbours are never separated",
+            code=RECIPE.replace(
+                "    kept, queue",
+                "    if given and b in parents and a in parents[b]:\n        return True\n    kept, queue",
+                1,
+            ),
+        ),
+        mistake(
+            "a collider is opened by itself only",
+            task="separated",
+            loses=2,
+            says="z lies below the collider r",
+            code=PATHS.replace("bool(below(middle) & set(given))", "middle in given"),
+        ),
+        mistake(
+            "one blocked path is enough",
+            task="separated",
+            loses=4,
+            says="all must be blocked",
+            code=PATHS.replace(
+                "    return not walk([a])",
+                """    paths, queue = [], [[a]]
+    while queue:
+        path = queue.pop()
+        if path[-1] == b:
+            paths.append(path)
+        else:
+            steps = [*parents[path[-1]], *children[path[-1]]]
+            queue += [[*path, name] for name in steps if name not in path]
+    return not paths or any(
+        not all(opens(*path[k : k + 3]) for k in range(len(path) - 2)) for path in paths
+    )""",
+            ),
+        ),
+        mistake(
+            "one open collider opens the whole path",
+            task="separated",
+            loses=2,
+            says="each collider on the path must be open",
+            code=PATHS.replace("bool(below(middle) & set(given)) if collider", "bool(given) if collider"),
+        ),
+        mistake(
+            "each variable visited once, from whichever side",
+            task="separated",
+            loses=2,
+            says="on inputs you haven't seen",
+            code="""
+def separated(parents, a, b, given=()):
+    above, queue = set(), list(given)
+    while queue:
+        name = queue.pop()
+        above.add(name)
+        queue += parents[name]
+    seen, queue = set(), [(a, "up")]
+    while queue:
+        name, way = queue.pop()
+        if name in seen:
+            continue
+        seen.add(name)
+        if name == b:
+            return False
+        if (way == "up" and name not in given) or (way == "down" and name in above):
+            queue += [(p, "up") for p in parents[name]]
+        if name not in given:
+            queue += [(c, "down") for c in parents if name in parents[c]]
+    return True""",
+        ),
+        # ---- task 4
+        right("lists", task="eliminate", code=ELIMINATE),
+        right(
+            "the package's product, or reduce",
+            task="eliminate",
+            code="""
+from functools import reduce
+
+from semgrid_edu.graphical import product
+
+
+def eliminate(factors, order):
+    sizes = []
+    for name in order:
+        without = [f for f in factors if name not in f.names]
+        together = reduce(lambda f, g: f * g, [f for f in factors if name in f.names])
+        sizes.append(int(np.prod(together.table.shape)))
+        factors = [*without, together.sum(name)]
+    return product(factors), max(sizes)""",
+        ),
+        right(
+            "the package's elimination, sizes from the names alone",
+            task="eliminate",
+            code="""
+from semgrid_edu.graphical import GraphicalModel
+from semgrid_edu.graphical import eliminate as exact
+
+
+def eliminate(factors, order):
+    model = GraphicalModel(factors)
+    left = [name for name in model.names if name not in order]
+    scopes, largest = [set(f.names) for f in factors], 0
+    for name in order:
+        together = set().union(*(s for s in scopes if name in s))
+        largest = max(largest, int(np.prod([model.cardinalities[n] for n in together])))
+        scopes = [s for s in scopes if name not in s] + [together - {name}]
+    return exact(model, left, order=order), largest""",
+        ),
+        mistake(
+            "everything multiplied first",
+            task="eliminate",
+            loses=1,
+            says="you multiplied all factors first",
+            code="""
+def eliminate(factors, order):
+    together = factors[0]
+    for f in factors[1:]:
+        together = together * f
+    largest = together.table.size
+    return together.sum(*order), largest""",
+        ),
+        mistake(
+            "counted after the sum",
+            task="eliminate",
+            loses=1,
+            says="count the product before the variable is summed out",
+            code=ELIMINATE.replace("together.table.size", "together.sum(name).table.size"),
+        ),
+        mistake(
+            "axes instead of entries",
+            task="eliminate",
+            loses=1,
+            says="and its entries, not its axes",
+            code=ELIMINATE.replace("together.table.size", "together.table.ndim"),
+        ),
+        mistake(
+            "sizes added up",
+            task="eliminate",
+            loses=1,
+            says="the largest counts",
+            code=ELIMINATE.replace("max(largest, together.table.size)", "largest + together.table.size"),
+        ),
+        mistake(
+            "the last size instead of the largest",
+            task="eliminate",
+            loses=1,
+            says="keep the largest, not the last",
+            code=ELIMINATE.replace("max(largest, together.table.size)", "together.table.size"),
+        ),
+        mistake(
+            "an order of its own",
+            task="eliminate",
+            loses=1,
+            says="keep to `order`",
+            code=ELIMINATE.replace("in order:", "in sorted(order):"),
+        ),
+        mistake(
+            "used factors kept",
+            task="eliminate",
+            loses=3,
+            says="take the factors you have used out of the list",
+            code=ELIMINATE.replace("[f for f in factors if name not in f.names] + [together", "factors + [together"),
+        ),
+        mistake(
+            "the sum never put back",
+            task="eliminate",
+            loses=3,
+            says="put each sum back among the factors",
+            code=ELIMINATE.replace(" + [together.sum(name)]", "").replace(
+                "    result = factors[0]\n",
+                "    if not factors:\n        return Factor((), 1.0), largest\n    result = factors[0]\n",
+            ),
+        ),
+        mistake(
+            "summed first, then multiplied",
+            task="eliminate",
+            loses=3,
+            says="multiply first, then sum",
+            code="""
+def eliminate(factors, order):
+    largest = 0
+    for name in order:
+        touching = [f for f in factors if name in f.names]
+        largest = max(largest, *(f.table.size for f in touching))
+        together = Factor((), 1.0)
+        for f in touching:
+            together = together * f.sum(name)
+        factors = [f for f in factors if name not in f.names] + [together]
+    result = factors[0]
+    for f in factors[1:]:
+        result = result * f
+    return result, largest""",
+        ),
+        mistake(
+            "every message normalised",
+            task="eliminate",
+            loses=2,
+            says="normalise nowhere",
+            code=ELIMINATE.replace("together.sum(name)", "together.sum(name).normalised()").replace(
+                "return result, largest", "return Factor(result.names, result.table / 4), largest"
+            ),
+        ),
+        mistake(
+            "the result normalised",
+            task="eliminate",
+            loses=2,
+            says="don't normalise",
+            code=ELIMINATE.replace("return result,", "return result.normalised(),"),
+        ),
+        mistake(
+            "only the factor returned",
+            task="eliminate",
+            loses=3,
+            says="got one Factor",
+            code=ELIMINATE.replace("return result, largest", "return result"),
+        ),
+        mistake(
+            "two states taken for granted",
+            task="eliminate",
+            loses=1,
+            says="on inputs you haven't seen: wrong size of the largest table",
+            code=ELIMINATE.replace("together.table.size", "2 ** together.table.ndim"),
+        ),
+        mistake(
+            "only the last factor returned",
+            task="eliminate",
+            loses=2,
+            says="on inputs you haven't seen: wrong result",
+            code=ELIMINATE.replace("result = factors[0]\n", "result = factors[-1]\n    return result, largest\n"),
+        ),
+        # ---- task 5
+        right(
+            "loops over states",
+            task="messages",
+            code="""
+def filtered(start, M, likelihoods):
+    rows, message = [], list(start)
+    for row in likelihoods:
+        weights = [m * p for m, p in zip(message, row)]
+        rows.append([w / sum(weights) for w in weights])
+        message = [sum(rows[-1][i] * M[i][j] for i in range(len(M))) for j in range(len(M))]
+    return np.array(rows)
+
+
+def smoothed(start, M, likelihoods):
+    rows, message = filtered(start, M, likelihoods), [1.0] * len(start)
+    for t in range(len(rows) - 1, -1, -1):
+        weights = [f * m for f, m in zip(rows[t], message)]
+        rows[t] = [w / sum(weights) for w in weights]
+        back = [sum(M[i][j] * likelihoods[t][j] * message[j] for j in range(len(M))) for i in range(len(M))]
+        message = [b / sum(back) for b in back]
+    return rows""",
+        ),
+        right(
+            "backwards by division, after Rauch, Tung and Striebel",
+            task="messages",
+            code=FILTERED
+            + """
+def smoothed(start, M, likelihoods):
+    rows = filtered(start, M, likelihoods)
+    for t in reversed(range(len(rows) - 1)):
+        rows[t] = rows[t] * (M @ (rows[t + 1] / (rows[t] @ M)))
+    return rows""",
+        ),
+        right(
+            "in logarithms",
+            task="messages",
+            code="""
+from scipy.special import logsumexp
+
+
+def filtered(start, M, likelihoods):
+    rows, message = [], np.log(start)
+    for row in np.log(likelihoods):
+        rows.append(message + row - logsumexp(message + row))
+        message = logsumexp(rows[-1][:, None] + np.log(M), axis=0)
+    return np.exp(rows)
+
+
+def smoothed(start, M, likelihoods):
+    rows, message = np.log(filtered(start, M, likelihoods)), np.zeros(len(start))
+    for t in reversed(range(len(rows))):
+        back = logsumexp(np.log(M) + np.log(likelihoods[t]) + message, axis=1)
+        rows[t] += message - logsumexp(rows[t] + message)
+        message = back
+    return np.exp(rows)""",
+        ),
+        mistake(
+            "a move before the first scan",
+            task="messages",
+            loses=4,
+            says="no move before it",
+            code=FILTERED.replace("b = [], start", "b = [], start @ M") + SMOOTHED,
+        ),
+        mistake(
+            "not normalised",
+            task="messages",
+            loses=4,
+            says="normalise each row",
+            code=FILTERED.replace(" / (b @ row)", "") + SMOOTHED.replace(" / (beliefs[t] @ message)", ""),
+        ),
+        mistake(
+            "the prediction returned",
+            task="messages",
+            loses=4,
+            says="return the belief at the time of the scan",
+            code=FILTERED.replace("rows.append(b)\n        b = b @ M", "b = b @ M\n        rows.append(b)") + SMOOTHED,
+        ),
+        mistake(
+            "the first scan missing",
+            task="messages",
+            loses=4,
+            says="the first scan is missing",
+            code="""
+def filtered(start, M, likelihoods):
+    rows = [start]
+    for row in likelihoods[1:]:
+        b = (rows[-1] @ M) * row
+        rows.append(b / b.sum())
+    return np.array(rows)
+
+"""
+            + SMOOTHED,
+        ),
+        mistake(
+            "M transposed",
+            task="messages",
+            loses=4,
+            says="a belief stands to its left",
+            code=FILTERED.replace("b = b @ M", "b = M @ b") + SMOOTHED,
+        ),
+        mistake(
+            "nothing moves",
+            task="messages",
+            loses=4,
+            says="nothing moved between the scans",
+            code=FILTERED.replace("        b = b @ M\n", "") + SMOOTHED,
+        ),
+        mistake(
+            "each row from the start",
+            task="messages",
+            loses=4,
+            says="carry the belief on",
+            code="""
+def filtered(start, M, likelihoods):
+    weights = np.array([start, *[start @ M] * (len(likelihoods) - 1)]) * likelihoods
+    return weights / weights.sum(axis=1, keepdims=True)
+
+"""
+            + SMOOTHED,
+        ),
+        mistake(
+            "arguments changed",
+            task="messages",
+            loses=2,
+            says="changed its argument `likelihoods`",
+            code="""
+def filtered(start, M, likelihoods):
+    likelihoods[0] *= start
+    likelihoods[0] /= likelihoods[0].sum()
+    for t in range(1, len(likelihoods)):
+        likelihoods[t] *= likelihoods[t - 1] @ M
+        likelihoods[t] /= likelihoods[t].sum()
+    return likelihoods
+
+
+def smoothed(start, M, likelihoods):
+    beliefs, message = filtered(start, M, likelihoods.copy()), np.ones(len(start))
+    for t in range(len(likelihoods) - 1, -1, -1):
+        beliefs[t] = beliefs[t] * message / (beliefs[t] @ message)
+        message = M @ (likelihoods[t] * message)
+        message = message / message.sum()
+    return beliefs""",
+        ),
+        mistake(
+            "underflow in the filter",
+            task="messages",
+            loses=4,
+            says="on inputs you haven't seen: NaN after thousands of scans",
+            code="""
+def filtered(start, M, likelihoods):
+    rows, message = [], start
+    for row in likelihoods:
+        rows.append(message * row)
+        message = rows[-1] @ M
+    return np.array(rows) / np.sum(rows, axis=1, keepdims=True)
+
+"""
+            + SMOOTHED,
+        ),
+        mistake(
+            "underflow in the message backwards",
+            task="messages",
+            loses=2,
+            says="on inputs you haven't seen: NaN after thousands of scans",
+            code=FILTERED + SMOOTHED.replace("        message = message / message.sum()\n", ""),
+        ),
+        mistake(
+            "its own scan in the message",
+            task="messages",
+            loses=2,
+            says="the last scan is counted twice",
+            code=FILTERED
+            + """
+def smoothed(start, M, likelihoods):
+    beliefs, message = filtered(start, M, likelihoods), np.ones(len(start))
+    for t in range(len(likelihoods) - 1, -1, -1):
+        message = likelihoods[t] * message
+        beliefs[t] = beliefs[t] * message / (beliefs[t] @ message)
+        message = M @ message
+        message = message / message.sum()
+    return beliefs""",
+        ),
+        mistake(
+            "two filters multiplied",
+            task="messages",
+            loses=2,
+            says="a filter run backwards holds scan t too",
+            code=FILTERED
+            + """
+def smoothed(start, M, likelihoods):
+    both = filtered(start, M, likelihoods) * filtered(start, M, likelihoods[::-1])[::-1]
+    return both / both.sum(axis=1, keepdims=True)""",
+        ),
+        mistake(
+            "the filter run backwards alone",
+            task="messages",
+            loses=2,
+            says="the past is missing",
+            code=FILTERED
+            + """
+def smoothed(start, M, likelihoods):
+    return filtered(start, M, likelihoods[::-1])[::-1]""",
+        ),
+        mistake(
+            "a message without likelihoods",
+            task="messages",
+            loses=2,
+            says="that is still the filter",
+            code=FILTERED + SMOOTHED.replace("(likelihoods[t] * message)", "message"),
+        ),
+        mistake(
+            "M transposed on the way back",
+            task="messages",
+            loses=2,
+            says="M @ message sums over where it goes next",
+            code=FILTERED + SMOOTHED.replace("M @ (likelihoods[t] * message)", "(likelihoods[t] * message) @ M"),
+        ),
+        mistake(
+            "the likelihood of the wrong scan",
+            task="messages",
+            loses=2,
+            says="you took that of scan t",
+            code=FILTERED
+            + """
+def smoothed(start, M, likelihoods):
+    beliefs, message = filtered(start, M, likelihoods), np.ones(len(start))
+    for t in range(len(likelihoods) - 2, -1, -1):
+        message = M @ (likelihoods[t] * message)
+        message = message / message.sum()
+        beliefs[t] = beliefs[t] * message / (beliefs[t] @ message)
+    return beliefs""",
+        ),
+        mistake(
+            "the message doesn't pass M",
+            task="messages",
+            loses=2,
+            says="the message must pass M",
+            code=FILTERED + SMOOTHED.replace("M @ (likelihoods[t] * message)", "likelihoods[t] * message"),
+        ),
+        mistake(
+            "backwards without dividing by the prediction",
+            task="messages",
+            loses=2,
+            says="divide the smoothed row t + 1 by its prediction",
+            code=FILTERED
+            + """
+def smoothed(start, M, likelihoods):
+    rows = filtered(start, M, likelihoods)
+    for t in reversed(range(len(rows) - 1)):
+        rows[t] = rows[t] * (M @ rows[t + 1])
+        rows[t] /= rows[t].sum()
+    return rows""",
+        ),
+        mistake(
+            "averaged",
+            task="messages",
+            loses=2,
+            says="multiplied, not averaged",
+            code=FILTERED
+            + """
+def smoothed(start, M, likelihoods):
+    rows = filtered(start, M, likelihoods)
+    rows[:-1] = (rows[:-1] + filtered(start, M, likelihoods[::-1])[::-1][:-1]) / 2
+    return rows""",
+        ),
+        mistake(
+            "one step back only",
+            task="messages",
+            loses=2,
+            says="row 0 hears of scan 1 only",
+            code=FILTERED
+            + """
+def smoothed(start, M, likelihoods):
+    rows = filtered(start, M, likelihoods)
+    for t in range(len(rows) - 1):
+        rows[t] *= M @ likelihoods[t + 1]
+        rows[t] /= rows[t].sum()
+    return rows""",
+        ),
+    )
