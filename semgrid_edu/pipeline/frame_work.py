@@ -137,7 +137,7 @@ def result_shapes(architecture: Architecture) -> dict[str, tuple[int, ...]]:
     Returns
     -------
     dict of str to tuple of int
-        By the names "track", "segment", "sample", "fuse" and "refine".
+        Shapes by the names "track", "segment", "sample", "fuse" and "refine".
 
     Examples
     --------

@@ -73,7 +73,7 @@ def run_side_by_side(
     Parameters
     ----------
     frames, occupancy, crf, seed
-        As for `run_pipeline`.
+        What `run_pipeline` takes.
     *several : Stages or SemanticGridNet
         The sets of stages, each as in `run_pipeline`.
 
