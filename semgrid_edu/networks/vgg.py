@@ -32,7 +32,18 @@ class Vgg(nn.Module):
         )
 
     def forward(self, x: Tensor) -> list[Tensor]:
-        """Return the map after each stage's pooling, (B, 3, h, w) -> five maps at 1/2, 1/4, ... 1/32 of the size."""
+        """Return the map after the pooling of each stage.
+
+        Parameters
+        ----------
+        x : (B, 3, h, w) float
+            Normalised images.
+
+        Returns
+        -------
+        list of (B, width, H, W) float
+            Five maps, at 1/2, 1/4, ... 1/32 of the size, rounded up.
+        """
         pooled = []
         for layer in self.features:
             x = layer(x)
@@ -74,7 +85,7 @@ def vgg16_tensors(layers: Iterable[nn.Module]) -> dict[str, Tensor]:
     Returns
     -------
     dict of str to Tensor
-        Such as "features.0.weight"; the tensors are the layers' own.
+        The layers' own tensors under names such as "features.0.weight".
     """
     named = zip(_layer_names(), layers, strict=False)
     return {f"{name}.{part}": own for name, layer in named for part, own in layer.named_parameters()}
