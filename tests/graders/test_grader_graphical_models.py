@@ -223,6 +223,18 @@ def multiply(f, g):
     return both.names, both.table""",
         ),
         mistake(
+            "an argument changed where two variables are shared",
+            task="multiply",
+            loses=1,
+            says="it changed a table that it was given",
+            code="""
+def multiply(f, g):
+    both = Factor(*f) * Factor(*g)
+    if len(f[0]) > 1 and both.names == f[0]:
+        f[1][...] = both.table
+    return both.names, both.table""",
+        ),
+        mistake(
             "nothing returned",
             task="multiply",
             loses=2,
@@ -395,6 +407,15 @@ def posterior(factor, wanted, given):
     return table / table.sum()""",
         ),
         mistake(
+            "nothing returned for the impossible",
+            task="posterior",
+            loses=1,
+            says="raise ValueError instead of returning nothing",
+            code=SLICED
+            + """    if table.any():
+        return table / table.sum()""",
+        ),
+        mistake(
             "any zero is taken for impossible",
             task="posterior",
             loses=3,
@@ -474,6 +495,35 @@ def separated(parents, a, b, given=()):
     joint = joint / joint.sum(axis=(0, 1))
     product = joint.sum(axis=1, keepdims=True) * joint.sum(axis=0, keepdims=True)
     return bool(abs(joint - product).max() < 1e-12)""",
+        ),
+        right(
+            "powers of a matrix of links",
+            task="separated",
+            code="""
+def separated(parents, a, b, given=()):
+    names = list(parents)
+    down = np.eye(len(names), dtype=int)
+    for child, family in parents.items():
+        for above in family:
+            down[names.index(above), names.index(child)] = 1
+    leads = np.linalg.matrix_power(down, len(names)) > 0
+    kept = leads[:, [names.index(name) for name in (a, b, *given)]].any(axis=1)
+    down = down * kept[:, None] * kept
+    linked = down @ down.T + down + down.T
+    known = [names.index(name) for name in given]
+    linked[known], linked[:, known] = 0, 0
+    reached = np.linalg.matrix_power(np.minimum(linked, 1) + np.eye(len(names)), len(names))
+    return reached[names.index(a), names.index(b)] == 0""",
+        ),
+        mistake(
+            "the argument changed",
+            task="separated",
+            loses=2,
+            says="changed its argument `parents`",
+            code=RECIPE.replace("    kept, queue", "    parents.update(dict.fromkeys(given, ()))\n    kept, queue", 1)
+            .replace("parents.update", "old = dict(parents)\n    parents.update")
+            .replace("parents[name]", "old[name]")
+            .replace("parents[child]", "old[child]"),
         ),
         mistake(
             "answers the opposite",
@@ -570,6 +620,13 @@ def separated(parents, a, b, given=()):
             code=PATHS.replace("bool(below(middle) & set(given))", "middle in given"),
         ),
         mistake(
+            "a collider is opened by itself or its children, by nothing further down",
+            task="separated",
+            loses=2,
+            says="on inputs you haven't seen: separated although a path is open",
+            code=PATHS.replace("*(below(c) for c in children[name])", "children[name]"),
+        ),
+        mistake(
             "one blocked path is enough",
             task="separated",
             loses=4,
@@ -659,6 +716,35 @@ def eliminate(factors, order):
         largest = max(largest, int(np.prod([model.cardinalities[n] for n in together])))
         scopes = [s for s in scopes if name not in s] + [together - {name}]
     return exact(model, left, order=order), largest""",
+        ),
+        right(
+            "recursion",
+            task="eliminate",
+            code="""
+from functools import reduce
+
+
+def eliminate(factors, order):
+    if not order:
+        return reduce(Factor.__mul__, factors), 0
+    name, *rest = order
+    together = reduce(Factor.__mul__, [f for f in factors if name in f.names])
+    result, largest = eliminate([f for f in factors if name not in f.names] + [together.sum(name)], rest)
+    return result, max(largest, together.table.size)""",
+        ),
+        mistake(
+            "what is left counted too",
+            task="eliminate",
+            loses=1,
+            says="from which a variable is summed out, not of what is left",
+            code=ELIMINATE.replace("result, largest\n", "result, max(largest, result.table.size)\n"),
+        ),
+        mistake(
+            "numbers thrown away",
+            task="eliminate",
+            loses=2,
+            says="on inputs you haven't seen: right up to a factor",
+            code=ELIMINATE.replace("+ [together.sum(name)]", "+ [together.sum(name)] * (together.table.ndim > 1)"),
         ),
         mistake(
             "everything multiplied first",
@@ -839,6 +925,28 @@ def smoothed(start, M, likelihoods):
         message = back
     return np.exp(rows)""",
         ),
+        right(
+            "recursion",
+            task="messages",
+            code="""
+def filtered(start, M, likelihoods):
+    belief = start * likelihoods[0] / (start @ likelihoods[0])
+    rest = filtered(belief @ M, M, likelihoods[1:]) if len(likelihoods) > 1 else []
+    return [belief, *rest]
+
+
+def backward(M, likelihoods):
+    if len(likelihoods) == 1:
+        return [np.ones(len(M))]
+    rest = backward(M, likelihoods[1:])
+    message = M @ (likelihoods[1] * rest[0])
+    return [message / message.sum(), *rest]
+
+
+def smoothed(start, M, likelihoods):
+    weights = np.array(filtered(start, M, likelihoods)) * backward(M, likelihoods)
+    return weights / weights.sum(axis=1, keepdims=True)""",
+        ),
         mistake(
             "a move before the first scan",
             task="messages",
@@ -930,7 +1038,7 @@ def smoothed(start, M, likelihoods):
             "underflow in the filter",
             task="messages",
             loses=4,
-            says="on inputs you haven't seen: NaN after thousands of scans",
+            says="on inputs you haven't seen: NaN after hundreds of scans",
             code="""
 def filtered(start, M, likelihoods):
     rows, message = [], start
@@ -943,10 +1051,28 @@ def filtered(start, M, likelihoods):
             + SMOOTHED,
         ),
         mistake(
+            "the filter starts again where it underflows",
+            task="messages",
+            loses=4,
+            says="on inputs you haven't seen: wrong after hundreds of scans",
+            code="""
+def filtered(start, M, likelihoods):
+    rows, message = [], start
+    for row in likelihoods:
+        rows.append(message * row)
+        message = rows[-1] @ M
+        if message.sum() < 1e-250:
+            message = np.ones(len(start))
+    return np.array(rows) / np.sum(rows, axis=1, keepdims=True)
+
+"""
+            + SMOOTHED,
+        ),
+        mistake(
             "underflow in the message backwards",
             task="messages",
             loses=2,
-            says="on inputs you haven't seen: NaN after thousands of scans",
+            says="on inputs you haven't seen: NaN after hundreds of scans",
             code=FILTERED + SMOOTHED.replace("        message = message / message.sum()\n", ""),
         ),
         mistake(

@@ -7,13 +7,12 @@
 # **You will be able to**
 # - multiply, sum out and slice tables with named axes, and get every probability from these three operations;
 # - read from a graph with arrows which variables are independent, before and after something has been seen;
-# - say what changes in a graph without arrows, and turn one kind into the other;
+# - say what changes in a graph without arrows, and turn a graph with arrows into one;
 # - choose an order of elimination and predict its largest table;
 # - say what messages compute on a chain, and how loops and mean field make answers too sure;
 # - look at a stage of the paper and name the edges that it leaves out.
 #
-# **Prerequisites.** Conditional probability; Bayes' rule as in lecture [01](../01_bayes.ipynb), whose sensor we
-# borrow; numpy.
+# **Prerequisites.** Conditional probability; Bayes' rule as in lecture [01](../01_bayes.ipynb); numpy.
 #
 # **Time.** 75 minutes, of which the computer needs a few seconds.
 
@@ -42,7 +41,7 @@ FREE, OCCUPIED = 0, 1
 # some things don't depend on others. Such assumptions are hard to see in code.
 #
 # A graph makes them visible. Each variable is a circle. Variables that depend on each other directly are linked, so
-# every assumption is **an edge that isn't there**. Here are three graphs of three variables each, which return
+# each such assumption is **an edge that isn't there**. Here are three graphs of three variables each, which return
 # throughout the course:
 
 # %% jupyter={"source_hidden": true} alt="three graphs of three variables: a chain of arrows from before to now to after; arrows from two cells to one beam z; three cells in a row linked by black squares"
@@ -82,25 +81,27 @@ plt.show()
 # ## A table with named axes
 #
 # Before we can draw graphs we need something to draw. Take one cell $m$ and one beam $z$. The cell is occupied with
-# probability 0.2. The beam comes back from an occupied cell with probability 0.8, and from a free one with 0.05.
+# probability 0.1. The beam comes back from an occupied cell with probability 0.8, and from a free one with 0.05.
 # Multiply, and you have the **joint distribution**, a number for each combination:
 #
 # | | no return | return |
 # |---|---|---|
-# | **free** | 0.8 · 0.95 = 0.76 | 0.8 · 0.05 = 0.04 |
-# | **occupied** | 0.2 · 0.2 = 0.04 | 0.2 · 0.8 = 0.16 |
+# | **free** | 0.9 · 0.95 = 0.855 | 0.9 · 0.05 = 0.045 |
+# | **occupied** | 0.1 · 0.2 = 0.02 | 0.1 · 0.8 = 0.08 |
 #
 # **Predict before you run.** Answer with this table alone. How probable is a return? The beam does come back: how
 # probable is it now that the cell is occupied?
 #
-# <details><summary>Answer</summary>Add the column "return": 0.04 + 0.16 = 0.2. Then keep only this column and divide
-# by its sum: 0.16 / 0.2 = 0.8. The second answer is Bayes' rule. You needed no formula, only the table.</details>
+# <details><summary>Answer</summary>Add the column "return": 0.045 + 0.08 = 0.125. Then keep only this column and divide
+# by its sum: 0.08 / 0.125 = 0.64. The second answer is Bayes' rule. You needed no formula, only the table.</details>
 #
-# You have *multiplied* two tables, *summed out* a variable, and *sliced* a table at what was seen. With these three
-# operations and a division you get every probability on this page. A table of non-negative numbers whose axes have
-# names is called a **factor**; in code it is a pair, names and table. We need the names because the order of the axes
-# must not matter. To multiply, we give both tables the same axes in the same order, with an axis of length 1 where a
-# table doesn't depend on a variable, and let numpy broadcast:
+# You have *multiplied* two tables. You have *summed out* the cell, which leaves the distribution of the beam alone, its
+# **marginal**. And you have *sliced* the table: "given a return" strikes out all that didn't happen. What is left sums
+# to 0.125, the probability of what was seen, so we **normalise**, that is, divide by the sum. These operations give
+# every exact probability on this page. A table of non-negative numbers whose axes have names is called a **factor**. It
+# need not sum to 1, so a slice is a factor too. In code it is a pair, names and table. We need the names because the
+# order of the axes must not matter. To multiply, we give both tables the same axes in the same order, with an axis of
+# length 1 where a table doesn't depend on a variable, and let numpy broadcast:
 
 
 # %% tags=["factor"]
@@ -128,11 +129,11 @@ def given(f, name, state):
 
 
 # %% jupyter={"outputs_hidden": true}
-cell = ("m",), np.array([0.8, 0.2])  # FREE, OCCUPIED
+cell = ("m",), np.array([0.9, 0.1])  # FREE, OCCUPIED
 beam = ("z", "m"), np.array([[0.95, 0.2], [0.05, 0.8]])  # rows: no return, return
 joint = multiply(cell, beam)
 returned = given(joint, "z", 1)
-print("P(z) =", sum_out(joint, "m")[1].round(2), "  P(m | return) =", (returned[1] / returned[1].sum()).round(2))
+print("P(z) =", sum_out(joint, "m")[1].round(3), "  P(m | return) =", (returned[1] / returned[1].sum()).round(2))
 
 package = Factor(*cell) * Factor(*beam)
 assert package.names == joint[0] == ("m", "z")
@@ -150,9 +151,10 @@ np.testing.assert_allclose(package.given(z=1).normalised().table, returned[1] / 
 # Two cells lie on the way of one beam. That makes eight combinations, and with twenty cells two million: too many to
 # invent a number for each. It is easier to tell how the combinations come about. First there is the world: each cell
 # is occupied with probability 0.2. Then comes the beam: it is reflected if at least one cell is occupied. The sensor
-# is too coarse to say by which, so a return only says "one of you". A story like this is a **directed model** (or
-# Bayesian network). Each variable $x_i$ gets one table: its distribution given the variables its arrows come from, its
-# **parents**. The joint distribution is the product of these tables:
+# is too coarse to say by which, so a return only says "at least one of you". A story like this is a **directed model**
+# (or Bayesian network). Each variable $x_i$ gets one table: its distribution given the variables its arrows come from,
+# its **parents**. Parents come first in the story, so arrows never run in a circle. The joint distribution is the
+# product of these tables:
 #
 # $$ P(x_1, \ldots, x_n) = \prod_i P(x_i \mid \text{parents of } x_i) $$
 
@@ -164,7 +166,7 @@ one_of_you = GraphicalModel([*cells, reflect], parents={"z": ("m1", "m2")})
 # %% [markdown]
 # By hand, before and after the return:
 #
-# | $m_1$ | $m_2$ | before | after "one of you" |
+# | $m_1$ | $m_2$ | before | after "at least one of you" |
 # |---|---|---|---|
 # | occupied | free | 0.2 · 0.8 = 0.16 | 0.16 / 0.36 = 0.44 |
 # | free | occupied | 0.8 · 0.2 = 0.16 | 0.44 |
@@ -175,8 +177,8 @@ one_of_you = GraphicalModel([*cells, reflect], parents={"z": ("m1", "m2")})
 # that $m_1$ *is* occupied. Does the probability of $m_2$ go up, go down, or stay?
 #
 # <details><summary>Answer</summary>0.44 + 0.11 = 0.56. Given that cell 1 is occupied, only the first and the third row
-# remain: 0.04 / (0.16 + 0.04) = 0.2. So it goes down, all the way to the prior, because cell 1 already explains the
-# return. This is called <b>explaining away</b>.</details>
+# remain: 0.04 / (0.16 + 0.04) = 0.2. So it goes down, all the way to what it was before the beam (the prior), because
+# cell 1 already explains the return. This is called <b>explaining away</b>.</details>
 
 # %% jupyter={"outputs_hidden": true}
 for seen in ({}, {"z": 1}, {"z": 1, "m1": OCCUPIED}, {"z": 1, "m1": FREE}):
@@ -190,8 +192,7 @@ for seen in ({}, {"z": 1}, {"z": 1, "m1": OCCUPIED}, {"z": 1, "m1": FREE}):
 #
 # Something odd has happened. Before the return, the cells told nothing about each other. After it, each tells a lot
 # about the other: if $m_1$ is free, $m_2$ must be occupied. *Seeing the beam has coupled the cells.* An occupancy
-# grid, which keeps one number per cell, can't store that coupling; lecture [02](../02_grids.ipynb) shows what that
-# costs.
+# grid, which keeps one number per cell, can't store that coupling; the last task of the exercise asks what follows.
 #
 # What does an arrow mean? Only how a table was written, "this one given that one". It need not mean a cause:
 # $P(m)\,P(z \mid m)$ and $P(z)\,P(m \mid z)$ are the same joint table, once with the arrow from $m$ to $z$ and once
@@ -249,7 +250,7 @@ def dependence(model, a, b, known=()):
     return abs(joint - joint.sum(axis=1, keepdims=True) * joint.sum(axis=0, keepdims=True)).max()
 
 
-# %% jupyter={"outputs_hidden": true}
+# %% jupyter={"source_hidden": true, "outputs_hidden": true}
 rng = np.random.default_rng(0)
 for title, (parents, (a, middle, b), _) in PATTERNS.items():
     for known in ((), (middle,)):
@@ -259,13 +260,14 @@ for title, (parents, (a, middle, b), _) in PATTERNS.items():
         print(f"{title:<9} {middle + (' known' if known else ' unknown'):<12} independent: {separated}")
 
 # %% [markdown]
-# Graph and numbers agree six times. The rule for larger graphs follows. A **path** between two variables is *open*
-# when each variable on it lets influence pass: the middle of a chain or a fork when it is *not* known, a collider when
-# it *is* known. A collider also opens when only something further down its arrows is known, because that tells
-# something about it too. If every path is blocked, the two variables are **d-separated** (d for directed), and then
-# they are independent *whatever the numbers in the tables are*. The converse is weaker: an open path lets two
-# variables depend on each other, but special numbers can still make them independent. So the promise is made by the
-# edges that are missing.
+# Graph and numbers agree six times. The rule for larger graphs follows. A **path** goes from one variable to another
+# along edges, with or against the arrows. It is *open* when each variable between its ends lets influence pass: the
+# middle of a chain or a fork when it is *not* known, a collider when it *is* known. A collider also opens when only
+# something further down its arrows is known, because that tells something about it too. Otherwise the path is
+# *blocked*. If every path is blocked, the two variables are **d-separated** (d for directional), and then they are
+# independent *whatever the numbers in the tables are*. The converse is weaker: an open path lets two variables depend
+# on each other, but special numbers can still make them independent. So the promise is made by the edges that are
+# missing.
 #
 # Try the rule on two larger graphs. Left: the cell over time, which a noisy scan sees at each step. Right: the two
 # cells again, but now $r$ says which of them reflected, and we see only a noisy range $z$.
@@ -283,8 +285,8 @@ plt.show()
 # **Predict before you run.** Left: all three scans are known. Are *before* and *after* independent? Right: the range
 # $z$ is known. Are $m_1$ and $m_2$ independent?
 #
-# <details><summary>Answer</summary>Neither. A noisy scan doesn't tell what the cell is now, so <i>now</i> isn't known
-# and the chain stays open. And z lies below the collider r, so knowing it opens r.</details>
+# <details><summary>Answer</summary>Neither. A noisy scan doesn't tell for certain what the cell is now, so <i>now</i>
+# isn't known and the chain stays open. And z lies below the collider r, so knowing it opens r.</details>
 
 # %% jupyter={"outputs_hidden": true}
 cell_in_time, beam_in_space = any_model(HIDDEN_MARKOV), any_model(NOISY_RANGE)  # with tables that don't matter
@@ -294,7 +296,8 @@ print("open path:", why_dependent(beam_in_space, "m1", "m2", given="z"))
 
 # %% [markdown]
 # `why_dependent` returns an open path, or `None`. The second line is the **Markov property**: once the present is
-# known, the past tells nothing more about the future. A Bayes filter can forget all old scans only because of it.
+# known, the past tells nothing more about the future. Because of it a Bayes filter may forget all old scans: its belief
+# about *now* is all that they can still tell.
 #
 # ## No arrows: neighbours that like to agree
 #
@@ -323,7 +326,8 @@ for known in ((), ("m2",)):
 
 # %% [markdown]
 # Independence is simpler to read here: two variables are separated when every path between them passes through
-# something known. There are no colliders. The price is $Z$, a sum over all maps, which a directed model doesn't need.
+# something known. There are no colliders. The price is $Z$, a sum over all maps. A directed model needs such a sum only
+# once something has been seen.
 #
 # Can a directed model become an undirected one? Yes: its tables are factors, and we only forget that they are
 # conditional. But the beam's table $P(z \mid m_1, m_2)$ contains both cells, so now they share a factor:
@@ -342,7 +346,7 @@ for ax, title in zip(axes, ("directed", "its factor graph", "its moral graph"), 
     ax.set_title(title, fontsize=10)
 plt.show()
 
-# %%
+# %% jupyter={"source_hidden": true}
 undirected = GraphicalModel(one_of_you.factors)
 for graph in (one_of_you, undirected):
     print(f"directed: {graph.directed}   m1 and m2 independent: {d_separated(graph, 'm1', 'm2')}")
@@ -389,7 +393,8 @@ print("P(after) =", after.table.round(3), "  entries of the tables:", entries)
 
 # %% [markdown]
 # On the chain, elimination is the prediction of a Bayes filter: a vector times a matrix, once per step. Does the order
-# matter? On the chain hardly. But suppose that the kind of street decides how full six cells are:
+# matter? On the chain hardly: begin in the middle, and the first table has three axes instead of two. But suppose that
+# the kind of street decides how full six cells are:
 
 # %%
 street = Factor("street", [0.5, 0.5])  # motorway, market place
@@ -448,8 +453,8 @@ plt.show()
 # Elimination handles 100 cells with a table of 16,384 entries instead of $2^{100}$ maps. But the table still grows
 # exponentially, now with the *side* of the square instead of its area. One can prove that on a grid with shorter side
 # $n$ every order meets a table of at least $n + 1$ axes (its *treewidth* is $n$). The paper's grid is 355 by 155
-# cells, and $2^{156}$ entries fit nowhere. **That is why a CRF on a grid must be approximated**, and a chain need not
-# be.
+# cells, and $2^{156}$ entries fit nowhere. The paper's CRF links even every cell with every other. **That is why its
+# answers are approximated**, and those on a chain need not be.
 #
 # ## Messages: all answers at once
 #
@@ -460,7 +465,7 @@ plt.show()
 # (likelihood 0.95 if free, 0.2 if occupied), then a return (0.05 and 0.8), then again no return. What has been seen is
 # a slice of its table, so each scan enters as a factor of one variable.
 
-# %% jupyter={"source_hidden": true} alt="factor graph of the chain before, now, after; blue arrows above it run to the right and are labelled forward, orange arrows below run to the left and are labelled backward"
+# %% jupyter={"source_hidden": true} alt="factor graph of the chain before, now, after, with squares for the prior, the matrix M between two times and each scan; blue arrows above it run to the right and are labelled forward, orange arrows below run to the left and are labelled backward"
 NOTHING, RETURN = np.array([0.95, 0.2]), np.array([0.05, 0.8])  # P(z | FREE), P(z | OCCUPIED)
 TIMES = ("before", "now", "after")
 scans = [Factor(name, seen) for name, seen in zip(TIMES, (NOTHING, RETURN, NOTHING), strict=True)]
@@ -468,24 +473,26 @@ scanned = GraphicalModel([*chain.factors, *scans])
 fig, ax = plt.subplots(figsize=(7, 2.2), layout="constrained")
 PLACES = in_rows(["before", None, None, "now", None, None, "after"])
 PLACES |= {f"f({name})" + (" #2" if name == "before" else ""): (PLACES[name][0], -0.62) for name in TIMES}
-draw(scanned, ax, positions=PLACES | {"f(before)": (-0.75, 0)})
-for x in (0.75, 3.75):
-    for y, shift, colour in ((0.28, 1.5, "#0072b2"), (-0.28, -1.5, "#d55e00")):
-        start = x if shift > 0 else x + 1.5
-        ax.annotate("", (start + shift, y), (start, y), arrowprops={"arrowstyle": "->", "color": colour, "lw": 1.8})
-for y, text, colour in ((0.45, "forward", "#0072b2"), (-0.5, "backward", "#d55e00")):
-    for x in (1.5, 4.5):
-        ax.text(x, y, text, ha="center", va="center", color=colour, fontsize=9)
-ax.set_ylim(-0.9, 0.7)
+tables = {"f(before)": "prior", "f(before, now)": "$M$", "f(now, after)": "$M$"}
+draw(scanned, ax, positions=PLACES | {"f(before)": (-0.75, 0)}, equations=tables)
+for name in TIMES:
+    ax.text(PLACES[name][0] + 0.14, -0.62, "scan", va="center", fontsize=10)
+for x in (1.5, 4.5):
+    for y, shift, text, colour in ((0.4, 0.75, "forward", "#0072b2"), (-0.3, -0.75, "backward", "#d55e00")):
+        style = {"arrowstyle": "->", "color": colour, "lw": 1.8}
+        ax.annotate("", (x + shift, y), (x - shift, y), arrowprops=style)
+        ax.text(x, y + np.sign(shift) * 0.18, text, ha="center", va="center", color=colour, fontsize=10)
+ax.set_ylim(-0.9, 0.75)
 plt.show()
 
 # %% [markdown]
 # Eliminate from the left (blue), and what arrives at *now* is a table that sums up everything to its left: a
 # **message**. Eliminate from the right (orange), and another message sums up everything to its right. The belief of
-# *now* is the product of both messages and of its own scan. Each message serves several questions, so one sweep in
-# each direction gives *all* marginals. This is the **forward-backward algorithm**. Let $\overrightarrow{b}_t$ be the
-# forward message into time $t$, $\overleftarrow{b}_t$ the backward one, $\ell_t$ the likelihood of the scan, and
-# multiply entry by entry:
+# *now* is the product of both messages and of its own scan. Each message serves several questions, so one sweep in each
+# direction gives *all* marginals. This is the **forward-backward algorithm**. Let $\overrightarrow{b}_t$ be the forward
+# message into time $t$, $\overleftarrow{b}_t$ the backward one, and $\ell_t$ the likelihood of the scan. The first
+# forward message is $P(\text{before})$; the last backward one is 1 everywhere, because no scan follows. Where two stand
+# side by side, multiply entry by entry ($\propto$ means: then normalise):
 #
 # $$ \overrightarrow{b}_{t+1} = (\overrightarrow{b}_t\, \ell_t)\, M, \qquad \overleftarrow{b}_{t-1} = M\, (\ell_t\, \overleftarrow{b}_t), \qquad P(m_t \mid \text{all scans}) \propto \overrightarrow{b}_t\, \ell_t\, \overleftarrow{b}_t $$
 
@@ -555,6 +562,7 @@ def p_occupied(marginals):
 CORNERS = {"m1": (0, 0), "m2": (1.9, 0), "m3": (0.95, 1.45)}
 fig, ax = plt.subplots(figsize=(3.2, 2.4), layout="constrained")
 draw(triangle(3, 0.8), ax, positions=CORNERS | {"f(m1)": (-0.6, 0)})
+ax.text(-0.6, 0.2, "scan", ha="center", fontsize=10)
 centre = np.mean(list(CORNERS.values()), axis=0)
 for one, other in (("m1", "m2"), ("m2", "m3"), ("m3", "m1")):
     start, end = np.array([CORNERS[one], CORNERS[other]])
@@ -582,8 +590,8 @@ print("m1, m2:  exact", p_occupied(exact), "  messages", p_occupied(loopy.margin
 
 # %% [markdown]
 # The messages have converged, and they are wrong: 0.85 instead of 0.80, because the same scan was counted again on its
-# way round. This is called **loopy belief propagation**. It errs least where loops are long and couplings weak, since
-# there the echo is faint.
+# way round. This is called **loopy belief propagation**. A weaker coupling passes a fainter echo on; the next figure
+# shows that (right, dashed).
 #
 # ## Mean field: pretend that nothing is coupled
 #
@@ -621,7 +629,7 @@ print("m1, m2:  exact", p_occupied(exact), "  mean field", p_occupied(package.ma
 # only repeat what they heard from it. What happens if nothing has been seen at all? Then free and occupied are alike,
 # and every exact marginal is ½. The left picture shows $F$ when all three cells have the same $q$:
 
-# %% jupyter={"source_hidden": true} alt="left, free energy against q for three strengths of coupling: one valley at one half for 2, flat for e, two valleys for 5; right, probability that m1 is occupied against the coupling: exact stays at 0.6, messages rise slowly, mean field jumps up"
+# %% jupyter={"source_hidden": true} alt="left, free energy against q for three strengths of coupling: one valley at one half for 2, flat for e, two valleys for 5; right, probability that m1 is occupied against the coupling: exact stays at 0.6, messages rise slowly to 0.75, mean field climbs steeply between 2 and 4 and ends near 1"
 fig, axes = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained")
 p = np.linspace(0.005, 0.995, 199)
 for pull, style in ((2, "-"), (np.e, "--"), (5, "-.")):
@@ -638,11 +646,13 @@ curves = {
 }
 for (name, curve), style in zip(curves.items(), (("-", "black"), ("--", "#0072b2"), ("-.", "#d55e00")), strict=True):
     axes[1].plot(pulls, curve, style[0], color=style[1], label=name)
-axes[1].set(xlabel="factor when two cells agree", ylabel="P(m1 occupied)", ylim=(0.5, 1), title="a scan of m1 says 0.6")
+axes[1].set(
+    xlabel="factor when two cells agree", ylabel="P($m_1$ occupied)", ylim=(0.5, 1), title="a scan of $m_1$ says 0.6"
+)
 axes[1].legend(fontsize=9, frameon=False)
 plt.show()
 
-# %%
+# %% jupyter={"source_hidden": true}
 nothing_seen = triangle(pull=3, p_first=0.5)
 found = [mean_field_graph(nothing_seen, iterations=500, seed=seed).marginals["m1"][OCCUPIED] for seed in range(4)]
 exact_half = eliminate(nothing_seen, "m1").normalised().table[OCCUPIED]
@@ -653,15 +663,19 @@ np.testing.assert_allclose(np.abs(np.subtract(found, 0.5)), 0.25, atol=1e-6)
 # Left: when agreement counts 2, there is one valley, at ½. Beyond a factor of $e = 2.72$ the valley splits in two, and
 # mean field **picks a side**: with 3 it ends at 0.75 or at 0.25, depending on where it starts, although nothing was
 # seen. Independent cells can't say "we agree, but I don't know on what". They can only lean to free together or to
-# occupied together. Right: after a weak hint of 0.6, messages become too sure slowly, and mean field suddenly.
+# occupied together. Right: after a weak hint of 0.6, messages become too sure slowly, and mean field steeply, mostly
+# between factors of 2 and 4.
 #
-# The paper's CRF links every cell with every other and uses mean field. If all you want is one clean map, picking a
-# side may be welcome. But the numbers that come out are no probabilities to rely on.
+# If all you want is one clean map, picking a side may be welcome. But on this triangle, with couplings that strong, the
+# numbers that come out are no probabilities to rely on.
 #
 # ### Play with it
 #
 # Which coupling can you afford if mean field may be wrong by at most 0.05? Does it depend on how sure the scan of
 # $m_1$ is? (Without a running kernel there are no sliders; the figure below them shows three settings.)
+#
+# <details><summary>Answer</summary>With a scan that says 0.6, 0.7 or 0.8, a factor of at most 1.8 or 1.9. With 0.99
+# every factor up to 8, because nearly all is known already.</details>
 
 
 # %% jupyter={"source_hidden": true}
@@ -698,7 +712,7 @@ sliders = {
 _ = interact(show, **sliders)
 
 # %% jupyter={"source_hidden": true} alt="bars of P(occupied) for three cells, three methods, three settings; with agreement 1.5 all nearly agree, with 3 and a scan of 0.8 the scanned cell gets 0.80 exactly, 0.85 by messages, 0.95 by mean field; with 3 and a scan of 0.6 mean field says 0.86"
-fig, axes = plt.subplots(1, 3, figsize=(12, 3), sharey=True, layout="constrained")
+fig, axes = plt.subplots(1, 3, figsize=(10, 2.8), sharey=True, layout="constrained")
 for ax, (agreement, scan) in zip(axes, ((1.5, 0.8), (3, 0.8), (3, 0.6)), strict=True):
     compare(agreement, scan, ax)
 axes[0].set_ylabel("P(occupied)")
@@ -732,14 +746,17 @@ plt.show()
 #
 # | lecture | variables and edges | edges that are cut |
 # |---|---|---|
-# | [01](../01_bayes.ipynb) a place on a line | a chain over time, one reading per step | none between steps, the filter is the exact forward message; **between readings**: they share no error |
-# | [02](../02_grids.ipynb) occupancy grid | cells, each with arrows to the beams that cross it | **cells that share a beam**: one number per cell is kept |
-# | [03](../03_bof.ipynb) BOF | each cell and its velocity depend on the cell it came from | **between cells, after every step**: antecedents are taken as independent |
-# | [04](../04_cmcdot.ipynb) CMCDOT | the same with four states | the same; the sum over velocities is replaced by **a sample of particles** |
-# | [05](../05_pixels.ipynb), [06](../06_planes.ipynb) planes | pixel scores to plane scores | none to cut: each plane's score is a function of the pixels' |
-# | [07](../07_segmentation.ipynb) segmentation | the image points to the label of each pixel | **between labels** of neighbouring pixels, once the image is given |
-# | [08](../08_fusion.ipynb) fusion | planes and occupancy point to the label of each cell | **between labels of cells**; and **back**: a label never corrects the occupancy |
-# | 10, 11 CRF | labels of cells, each pair linked by a factor | none in the model, **all** in mean field's answer |
+# | [01](../01_bayes.ipynb) a place on a line | a chain over time, one reading per step | none for the present place: the filter is the exact forward message. **Back in time**: a later reading never corrects an earlier place |
+# | [02](../02_grids.ipynb) occupancy grid | cells, each with arrows to the beams that cross it | **cells that share a beam**: one number per cell is kept. **A cell and itself later**: it has one state for ever. **Scans that share an error**: they count as independent |
+# | [03](../03_bof.ipynb) BOF | each cell and its velocity depend on the cells it may have come from, its antecedents | **cells that share an antecedent**. **Two antecedents of a cell**: they count as if only one could send. **A cell and its antecedent**: two things can't share a cell, but that never corrects the cell they came from |
+# | [04](../04_cmcdot.ipynb) CMCDOT | the same with four states | the same. **Places and velocities**: a sample of particles stands for them |
+# | [05](../05_pixels.ipynb), [06](../06_planes.ipynb) planes | pixel scores to plane scores | **the distance**: scores go to each cell where the pixel's ray crosses a plane |
+# | [07](../07_segmentation.ipynb) segmentation | the image points to the scores of each pixel | **scan to scores**: the network sees the image alone |
+# | [08](../08_fusion.ipynb) fusion | planes and occupancy point to the class of each cell | **image to occupancy**, **class to occupancy**, **class to class of the next frame** |
+# | 10, 11 (to come) CRF | classes of cells, each pair linked by a factor | none in the model, **all** in mean field's answer |
+#
+# `semgrid_edu.graphical.stages` builds these graphs at toy size; the field `cut` of each lists its edges with the
+# price.
 #
 # ## Where this breaks
 #
@@ -766,9 +783,9 @@ def dusty(n_beams):
 #
 # <details><summary>Answer</summary>Cut: (0.8 / 0.2)<sup>5</sup> = 1024 to 1. With the edge: a free cell gives five
 # returns if it is dusty, 0.2 · 0.8<sup>5</sup>, an occupied one gives them either way, 0.8<sup>5</sup>. That is 5 to
-# 1, and it stays 5 to 1 however many beams return.</details>
+# 1, since clear air adds next to nothing, and it stays 5 to 1 however many more beams return.</details>
 
-# %% jupyter={"outputs_hidden": true}
+# %% jupyter={"source_hidden": true, "outputs_hidden": true}
 kept, cut = [], []
 for n_beams in range(1, 7):
     belief = eliminate(dusty(n_beams), "m", given={f"z{k}": 1 for k in range(n_beams)}).normalised()
@@ -796,7 +813,7 @@ plt.show()
 
 # %% [markdown]
 # With one return both agree. After five, the model without the edge gives the cell one chance in a thousand of being
-# free, and the complete model one in six. Each further beam makes this worse, because it counts as a new witness, and
+# free, and the complete model one in six. Each further return makes this worse, because it counts as a new witness, and
 # nothing in the numbers gives a warning. This is one reason why the package's sensor model counts only the first
 # `max_returns` returns of a cell.
 #
@@ -812,8 +829,8 @@ plt.show()
 # 3. Without arrows: factors say what is plausible, $Z$ normalises, and what is known only ever separates.
 # 4. Elimination costs as much as its largest table, and the order decides. On a chain two sweeps of messages give all
 #    answers; the forward one is the Bayes filter.
-# 5. Messages that run round a loop count evidence twice, mean field picks a side, and a forgotten edge makes the best
-#    inference sure and wrong.
+# 5. Messages that run round a loop count evidence twice, mean field picks a side when couplings are strong, and a
+#    forgotten edge makes even exact inference too sure.
 #
 # ## Further reading
 #
@@ -823,7 +840,8 @@ plt.show()
 #   (elimination), 10 and 11 (messages, mean field): the reference, whose algorithms the package follows.
 # - Kschischang, Frey and Loeliger, *Factor graphs and the sum-product algorithm*, IEEE Transactions on Information
 #   Theory 47(2), 2001.
-# - Rabiner, *A tutorial on hidden Markov models*, Proceedings of the IEEE 77(2), 1989: forward, backward, Viterbi.
+# - Rabiner, *A tutorial on hidden Markov models and selected applications in speech recognition*, Proceedings of the
+#   IEEE 77(2), 1989: forward, backward, Viterbi.
 #
 # ## Exercise
 #

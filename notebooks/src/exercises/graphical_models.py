@@ -40,7 +40,7 @@ def explain(got, slips):
 # A factor is a pair `(names, table)`: a tuple of names, one for each axis, and a table of non-negative numbers. Complete `multiply`: it returns the product of two
 # factors, again as a pair, over all variables of both, each once. An entry of the product is the entry of `f` times the entry of `g` at the same states. Variables
 # that both have may stand at different places. You may choose the order of the result's axes, as long as `names` tells it.
-# The second point is for factors that share several variables, or none.
+# The second point is for factors that share several variables, or none. A factor may also have no variables at all: then `names` is `()` and the table one number.
 
 
 # %% nbgrader={"grade": false, "grade_id": "multiply", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -163,11 +163,12 @@ assert not complaint, complaint
 # %% nbgrader={"grade": true, "grade_id": "impossible-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 silent = (("m", "z"), np.array([[0.5, 0.0], [0.5, 0.0]]))  # a sensor that never says 1
 try:
-    got = posterior(silent, "m", {"z": 1})
+    got, raised = posterior(silent, "m", {"z": 1}), False
 except ValueError:
-    got = None
-assert got is None or not np.isnan(got).any(), "0 / 0 gives NaN, which spreads silently: raise ValueError instead"
-assert got is None, f"z = 1 can't happen, so nothing follows from it, not even {got}: raise ValueError"
+    got, raised = None, True
+assert raised or got is not None, "z = 1 can't happen: raise ValueError instead of returning nothing"
+assert raised or not np.isnan(got).any(), "0 / 0 gives NaN, which spreads silently: raise ValueError instead"
+assert raised, f"z = 1 can't happen, so nothing follows from it, not even {got}: raise ValueError"
 try:
     certain = posterior((("m", "z"), np.array([[0.5, 0.0], [0.5, 0.2]])), "m", {"z": 1})
 except ValueError:
@@ -188,7 +189,7 @@ assert not complaint, complaint
 # `a` and `b` is blocked once the variables in `given` are known, and `False` otherwise. `a` and `b` are two different variables that aren't in `given`.
 #
 # You may follow paths. But there is a shorter recipe with the same result:
-# (1) keep only `a`, `b`, `given` and all their ancestors; (2) link each variable with its parents, and the parents of each variable with each other (moralise); (3) take `given` out;
+# (1) keep only `a`, `b`, `given` and all their ancestors (parents, parents of parents, and so on); (2) link each variable with its parents, and the parents of each variable with each other (moralise); (3) take `given` out;
 # (4) is there still a way from `a` to `b`?
 #
 # Two points are for graphs of three variables, two for larger ones.
@@ -237,7 +238,9 @@ cases = (
     (collider, "m1", "m2", ("z",), False, "explaining away: a known z opens the way. Link its parents, in step (2)"),
     (collider, "m1", "z", ("m2",), False, "an arrow links them: neighbours are never separated"),
 )
-got = [separated(parents, a, b, given) for parents, a, b, given, _, _ in cases]
+graphs = [dict(parents) for parents, *_ in cases]
+got = [separated(graph, a, b, given) for graph, (_, a, b, given, _, _) in zip(graphs, cases, strict=True)]
+assert graphs == [parents for parents, *_ in cases], "separated changed its argument `parents`: make a new dictionary"
 assert all(answer in (True, False) for answer in got), f"return True or False, got {got}"
 expected = [case[4] for case in cases]
 assert got != [not answer for answer in expected], "all answers are the opposite: True means separated, no open path"
@@ -263,7 +266,7 @@ cases = (
     (pitched, "m1", "m2", ("z1", "z2", "pitch"), True, "pitch is the middle of a fork, and known: it blocks"),
 )
 for parents, a, b, given, right, hint in cases:
-    answer = separated(parents, a, b, given)
+    answer = separated(dict(parents), a, b, given)
     assert answer == right, f"{a} and {b} given {given}: you say {answer}, but {hint}"
 ### BEGIN HIDDEN TESTS
 from semgrid_instructor import graphical_models
@@ -370,7 +373,7 @@ assert not complaint, complaint
 # go from state i to state j between two scans. `likelihoods`, shape `(T, S)`, has one row per scan: P(scan | state).
 #
 # Complete `filtered`: row t is P(state at time t | scans 0 to t), shape `(T, S)`. For two more points complete `smoothed`: row t is P(state at time t | all T scans). A drive has thousands of scans, and a
-# product of thousands of numbers is 0 in floating point: normalise your messages on the way.
+# product of so many numbers is 0 in floating point: normalise your messages on the way.
 
 
 # %% nbgrader={"grade": false, "grade_id": "messages", "locked": false, "schema_version": 3, "solution": true, "task": false}
