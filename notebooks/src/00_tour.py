@@ -321,8 +321,8 @@ for name, cells in (("cells that the camera sees", in_sight & in_image), ("hidde
 # %% [markdown]
 # For most cells that the camera sees, one of the twenty holds the truth, and which one is for the network to learn. (A
 # car counts as seen when some of it shows, so its far side is among the others.) Where something stands in the way, all
-# twenty show what stands in the way. If that has the class of what is hidden, the count calls it found; for more than
-# half of the hidden cells nothing in the image is right.
+# twenty show what stands in the way. If that has the class of what is hidden, the count calls it found; for the other
+# hidden cells, here more than half of them, none of the twenty is right.
 
 # %% [markdown]
 # ## Stage 4, $(p, o) \to g$: one map

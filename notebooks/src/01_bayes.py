@@ -545,10 +545,10 @@ plt.show()
 # free and the house STATIC, both above 0.9. For the house that is the prior of first sight and no prediction: the rates
 # have had no time to act. Below on the left the car is there within one scan and mostly DYNAMIC: the right
 # answer, for the reason that you have predicted. It isn't ten to one, though. A little STATIC was left over from
-# before, and more has come in by way of UNKNOWN: what the prediction forgets of the free cell is shared out anew at
-# each scan, and at first sight standing things are more frequent than moving ones. When the car has left, the cell
-# needs three scans to believe it; remember that for the next lecture. On the right the belief fades while the car
-# hides the cell, and is back when it is seen again.
+# before, and nearly as much again has come in by way of UNKNOWN: what the prediction forgets of the free cell is shared
+# out anew at each scan, and at first sight standing things are more frequent than moving ones. When the car has left,
+# the cell needs three scans to believe it; remember that for the next lecture. On the right the belief fades while the
+# car hides the cell, and is back when it is seen again.
 #
 # A few lines agree with `filterpy` and with the package to six digits. The package does this in thousands of cells at
 # once.

@@ -574,8 +574,8 @@ print(f"cells with an opinion: {known[0]:.0f} % after one scan, {known[1]:.0f} %
 # scans, the clamp is at 3.48, a pass is worth -0.85. For the left one, think where its tail lies, seen from you.
 #
 # <details><summary>Answer</summary>A cell survives floor(3.48 / 0.85) = 4 passes, so the tail of the car that drives
-# away is 4 m long, always. The oncoming car's tail lies behind it: in its shadow. No beam passes there, so nothing is
-# ever taken back, and its tail grows by a metre a scan.</details>
+# away grows to 4 m and no further. The oncoming car's tail lies behind it: in its shadow. No beam passes there, so
+# nothing is ever taken back, and its tail grows by a metre a scan.</details>
 #
 # With $\Delta L = \log\left(P(z \mid \text{free}) / P(z \mid \text{occupied})\right)$, what a pass is worth:
 #

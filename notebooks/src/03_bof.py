@@ -701,10 +701,11 @@ for ax in axes:
 plt.show()
 
 # %% [markdown]
-# Left: what is slower than half a spacing just stands. From there P(DYNAMIC) rises until the speed is a whole spacing.
-# With a spacing of 4 m/s a pedestrian is furniture, and something at 3.5 m/s may as well stand as move. Right: the
-# beginnings of a stair. With a spacing of 4 m/s, what does 4 to 6 m/s is said to do 4 to 5, and from there the line
-# climbs steeply to the next velocity of the lattice. With 2 m/s it keeps to the truth, within half a metre a second.
+# Left: what is slower than half a spacing just stands. From there P(DYNAMIC) rises: with a spacing of 4 m/s until the
+# speed is a whole spacing, with 2 m/s until it is one and a half. With a spacing of 4 m/s a pedestrian is furniture,
+# and something at 3.5 m/s may as well stand as move. Right: the beginnings of a stair. With a spacing of 4 m/s, what
+# does 4 to 6 m/s is said to do 4 to 5, and from there the line climbs steeply to the next velocity of the lattice. With
+# 2 m/s it keeps to the truth, within half a metre a second.
 #
 # ## Where this breaks
 #

@@ -902,7 +902,7 @@ print(f"recall {both / np.sum(truth == DYNAMIC):.2f}, precision {both / np.sum(c
 # %% [markdown]
 # Now the filters of lectures 02, 03 and 04, on twenty simulated drives that none of them was tuned on, where the
 # truth of every cell is known. The scanner is KITTI's, the grid the paper's. `semgrid-edu reproduce occupancy` takes
-# about half an hour; its result lies in the repository.
+# about twenty minutes; its result lies in the repository.
 
 # %%
 result = json.loads(Path("../docs/results/occupancy.json").read_text(encoding="utf-8"))
@@ -997,9 +997,9 @@ _ = interact(show, k=IntSlider(value=12, min=0, max=len(frames) - 1, description
 # **Predict before you run.** Which of the two movers dies first when you turn `stop_speed` up? Which when you take
 # particles away?
 #
-# <details><summary>Answer</summary>The person, both times. 2 m/s is faster than a walk, so the person stands. And of
-# few particles hardly one is born in the person's cell or two with the right velocity; the car, thirty cells large,
-# has more luck.</details>
+# <details><summary>Answer</summary>With `stop_speed`, the person: 2 m/s is faster than a walk, so the person stands.
+# With few particles mostly the person: hardly one is born in the person's cell or two with the right velocity. The car,
+# thirty cells large, has better chances, but not every time.</details>
 
 
 # %%
@@ -1066,7 +1066,8 @@ for particles in (100, 1000, 100_000):
     assert particles < 100_000 or min(min(called_moving(run)) for run in runs) > 80
 
 # %% [markdown]
-# With few particles it is a matter of luck, for either of the two. With 100,000 no luck is needed.
+# With few particles it is a matter of luck, for either of the two: with 1000 some seeds find more of the person than of
+# the car. With 100,000 no luck is needed.
 
 # %% [markdown]
 # ## Where this breaks
@@ -1103,7 +1104,7 @@ plt.show()
 
 # %% [markdown]
 # <details><summary>Answer</summary>3 m ahead: STATIC, for two seconds, and then surprisingly FREE. 12 m ahead: FREE,
-# then DYNAMIC when the front comes; but STATIC gains on it while the bus goes by.</details>
+# then DYNAMIC when the front comes; but STATIC gains a little while the bus goes by.</details>
 #
 # This is the **aperture problem**: through the hole of one cell, a long smooth side that slides past looks like a
 # wall, and STATIC predicts a wall perfectly. The same rule keeps the fence beside a moving vehicle from moving, so

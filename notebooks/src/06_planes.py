@@ -882,12 +882,12 @@ plt.show()
 # %% [markdown]
 # Red: where the cars that the camera sees stand. Blue: how much a cell reads *car*, from 0, white, to 1, dark. Top:
 # perfect labels; bottom: those of the network, softer, but the same smear. On the ground plane a car lies *behind* its
-# place, thrown away from the camera like a shadow: only the wheels are right. On the plane at 0.6 m what is lower falls
-# short, what is higher overshoots, and the bodywork at that height is right. At 1.2 m the smear is longest. At 2 m,
-# above the camera, rays rise, and only what towers over it is left: the roof of a van. Of all twenty planes the one at
-# 2.2 m is the purest: three in ten of its cells that read *car* are one. But it finds only a quarter of the cars'
-# cells. Of the planes below the camera, the one at 0.4 m does best: a quarter. No plane is right, each is right for
-# something, and it takes the LIDAR's occupancy to say where along the smear the car stands: lecture 08.
+# place, thrown away from the camera like a shadow: only its wheels land where they are. On the plane at 0.6 m what is
+# lower falls short, what is higher overshoots, and the bodywork at that height is right. At 1.2 m the smear is longest.
+# At 2 m, above the camera, rays rise, and only what towers over it is left: the roof of a van. Of all twenty planes the
+# one at 2.2 m is the purest: three in ten of its cells that read *car* are one. But it finds only a quarter of the
+# cars' cells. Of the planes below the camera, the one at 0.4 m is the purest: a quarter. No plane is right, each is
+# right for something, and it takes the LIDAR's occupancy to say where along the smear the car stands: lecture 08.
 #
 # ## Play with it
 #

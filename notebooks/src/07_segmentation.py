@@ -656,8 +656,9 @@ for column, width in ((9, 1), (10, 1), (9, 4)):
 # **Indices** are sharp, in the right place, and full of holes: a dotted line. **Skips** are right and have a foot of
 # what the coarse maps think. **Strided** is blurred, and how bright it is depends on where the pole stands (compare
 # columns 9 and 10). **Atrous** is as blurred, but the same wherever the pole stands: shift the pole, and the answer
-# shifts. A pole of four pixels comes back much brighter, in its place or nearly, whichever way it went, though
-# nearest makes it eight wide and the indices keep two dotted columns of it. The trouble is with thin things.
+# shifts. A pole of four pixels comes back in its place or nearly, whichever way it went, and strided and atrous give it
+# back much brighter; but nearest makes it eight wide, and the indices keep two dotted columns of it. The trouble is
+# with thin things.
 #
 # ## The same, learnt
 #

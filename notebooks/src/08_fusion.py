@@ -1078,9 +1078,9 @@ assert far[0] > far[2] > far[-1]
 
 # %% [markdown]
 # Left: the farther, the worse; 40 m ahead ten cells, one behind the other, share one row of pixels (lecture 05). Right:
-# of what is rarest to learn from, signage and pedestrians, less than half is found. Building, unknown-static and
-# unknown-dynamic do better than their numbers, since $o$ helps them, and so do bicycles, which ride near us on this
-# drive. Cars do worse than theirs: most of them are far away or half hidden.
+# of signage and pedestrians, which are rare to learn from, less than half is found. Unknown-dynamic is rarer still, but
+# it, unknown-static and building do better than their numbers, since $o$ helps them, and so do bicycles, which ride
+# near us on this drive. Cars do worse than theirs: most of them are far away or half hidden.
 #
 # **Outside of what it has learnt.** Less light, fog, red and blue swapped; and a camera that points one degree higher,
 # or lower, than its calibration says.
