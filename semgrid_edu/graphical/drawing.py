@@ -80,7 +80,7 @@ def draw(
     Raises
     ------
     ArgumentError
-        When a name isn't a variable (or factor, in `positions` and `equations`) of the model.
+        When a name isn't a variable (or factor, in `positions` and `equations`) of the model, or there is no variable.
 
     Examples
     --------
@@ -116,6 +116,8 @@ def draw(
 
 
 def _check(model: GraphicalModel, positions, equations, *groups) -> None:
+    if not model.names:
+        raise ArgumentError("model", "at least one variable to draw", "none")
     for argument, names in (("positions", positions), ("equations", equations)):
         for name in names:
             check_name(argument, name, (*model.names, *model.labels))

@@ -105,6 +105,11 @@ def test_rows_are_centred_and_gaps_stay_free():
     assert in_rows(["a", None, "c"], [None, "d"]) == {"a": (0, 0), "c": (2, 0), "d": (1.5, -1)}
 
 
+def test_there_must_be_something_to_draw():
+    with pytest.raises(ArgumentError, match="at least one variable"):
+        draw(GraphicalModel([Factor((), 1.0)]))
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [

@@ -5,7 +5,7 @@ from itertools import product
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from pyagrum_posteriors import as_directed, posteriors
+from pyagrum_oracle import as_directed, posteriors
 
 from semgrid_edu.crf import CrfParams, energy, mean_field_naive, pair_weights, unary_from_probability
 from semgrid_edu.graphical import d_separated, eliminate, max_product, mean_field_graph

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from oracle_of_stages import assert_oracle_agrees
+from pyagrum_oracle import assert_oracle_agrees
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals, why_dependent
