@@ -65,6 +65,16 @@ def test_plates_surround_their_nodes():
     assert "$k = 1, 2$" in said(ax)
 
 
+def test_a_plate_reaches_round_the_texts_beside_its_nodes():
+    ax = draw(one_of_you(), positions=ROWS, plates={"beams": "z"}, equations={"z": "a word that is long"})
+    ax.figure.canvas.draw()
+    (plate,) = pieces(ax, Rectangle)
+    for text in ("a word that is long", "beams"):
+        drawn = next(one for one in ax.texts if one.get_text() == text).get_window_extent()
+        assert plate.get_window_extent().containsx(drawn.x1)
+        assert not any(e.get_window_extent().overlaps(drawn) for e in pieces(ax, Ellipse))
+
+
 def test_equations_and_own_labels_are_written():
     ax = draw(one_of_you(), equations={"z": "$P(z | m)$", "m1": "$P(z | m)$"}, labels={"m1": "left"}, positions=ROWS)
     assert {"$P(z | m)$", "left"} <= said(ax)

@@ -25,8 +25,8 @@ MARGIN = 6
 CUT = (
     CutEdge(
         "m4 - m5, once z is known",
-        "The grid keeps one number per cell, so it forgets that one of the two explains the return already, and a "
-        "noisy return raises the cell behind a wall again and again.",
+        "The grid keeps one number per cell, so it forgets that one of the two explains the return already, and "
+        "noisy returns raise the cell behind a wall again and again: after four to 0.57 instead of 0.34.",
     ),
 )
 """The edge that an occupancy grid cuts: explaining away."""
@@ -126,6 +126,7 @@ def beam_over_cells(world: BeamWorld | None = None, beams: int = 1) -> StageGrap
         observed=measured,
         positions=in_rows(world.cells, (), reflected, measured),
         equations={reflected[-1]: "which cell reflects", measured[-1]: "range"},
+        plates={"beams": (*reflected, *measured)} if beams == 1 else {},
         cut=CUT,
     )
 

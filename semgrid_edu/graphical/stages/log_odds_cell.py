@@ -47,6 +47,7 @@ def one_log_odds_cell(scans: ArrayLike, prior: float = 0.5) -> StageGraph:
         observed=names,
         positions=in_rows(["m"], names),
         equations={"m": "free or occupied", names[-1]: "scan"},
+        plates={"cells": ("m", *names)},
         cut=LOG_ODDS_CUT,
     )
 

@@ -107,6 +107,11 @@ def test_what_is_no_likelihood_is_refused(bad):
             build(bad)
 
 
+def test_the_next_cell_has_a_chain_of_its_own():
+    for stage in (one_cell(read_scans(".#")), one_log_odds_cell(read_scans(".#"))):
+        assert sorted(stage.plates["cells"]) == sorted(stage.model.names)
+
+
 def test_unknown_letters_are_refused():
     with pytest.raises(ArgumentError, match="says"):
         read_scans(".x")

@@ -126,6 +126,16 @@ def test_the_numbers_of_the_docstring():
     assert len(set(same_belief(SystemWorld().occupancy()[1]))) == 9
 
 
+def test_the_prices_of_the_cut_edges():
+    """What the earlier image adds is what classes that aren't carried on cost; o in both cells tells all scans."""
+    gain = system_gain()
+    np.testing.assert_allclose(gain.scans.log_loss - gain.joint.log_loss, [0.05, 0.10], atol=0.005)
+    np.testing.assert_allclose(gain.neighbours.log_loss, gain.scans.log_loss, atol=1e-12)
+    assert (
+        gain.neighbours.log_loss - gain.joint.log_loss > 0.8 * (gain.cell_by_cell.log_loss - gain.joint.log_loss)
+    ).all()
+
+
 def test_one_instant_leaves_nothing_to_gain_beyond_the_neighbour():
     gain = system_gain(SystemWorld(1))
     np.testing.assert_allclose(gain.joint.log_loss, gain.neighbours.log_loss, atol=1e-12)
