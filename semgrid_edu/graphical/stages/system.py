@@ -35,8 +35,8 @@ CUT = (
     ),
     CutEdge(
         "g0 -> g1",
-        "Only o remembers: classes aren't carried from frame to frame, so what an earlier image showed is forgotten. On "
-        "the toy street that costs 0.05 nats in the near cell and 0.10 in the far one.",
+        "Only o remembers: classes aren't carried from frame to frame, so what an earlier image showed is forgotten. "
+        "On the toy street that costs 0.05 nats in the near cell and 0.10 in the far one.",
     ),
     CutEdge(
         "g0 -> o1",
