@@ -5,6 +5,7 @@ daft (https://docs.daft-pgm.org) draws nodes, edges and plates; this module deci
 
 import re
 from collections.abc import Iterable, Mapping
+from itertools import chain, count
 
 import daft
 import matplotlib.pyplot as plt
@@ -88,11 +89,8 @@ def draw(
     >>> beam = GraphicalModel([Factor("m", [0.8, 0.2]), Factor(("m", "z"), [[0.9, 0.1], [0.2, 0.8]])], {"z": ("m",)})
     >>> ax = draw(beam, observed="z", highlight="m", positions=in_rows(["m"], ["z"]))
     """
-    labels, equations, plates = (
-        labels or {},
-        equations or {},
-        {text: as_names(of) for text, of in (plates or {}).items()},
-    )
+    labels, equations = labels or {}, equations or {}
+    plates = {text: as_names(of) for text, of in (plates or {}).items()}
     observed, highlight = as_names(observed), as_names(highlight)
     _check(model, positions or {}, equations, observed, highlight, labels, *plates.values())
     places = _places(model, positions or {})
@@ -144,9 +142,11 @@ def _factor_place(names: tuple[str, ...], places: Mapping[str, Place]) -> Place:
     """Put a factor in the middle of its variables, or beside its only one: the first place that is clear of others."""
     x, y = np.mean([places[name] for name in names], axis=0)
     around = [(-0.35, 0.35), (0.0, 0.5), (0.35, 0.35), (-0.35, -0.35), (0.35, -0.35), (0.0, -0.5)]
-    tried = [(float(x + right), float(y + up)) for right, up in ([(0.0, 0.0)] if len(names) > 1 else []) + around]
+    rings = (np.multiply(scale, aside) for scale in count(1.0, 0.5) for aside in around)
+    tried = chain([(0.0, 0.0)] if len(names) > 1 else [], rings)
     taken = np.array(list(places.values()))
-    return next((place for place in tried if np.hypot(*(taken - place).T).min() > 0.3), tried[-1])
+    clear = ((x + right, y + up) for right, up in tried if np.hypot(*(taken - (x + right, y + up)).T).min() > 0.3)
+    return tuple(map(float, next(clear)))
 
 
 def _said(name: str, labels: Mapping[str, str]) -> str:

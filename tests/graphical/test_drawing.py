@@ -103,6 +103,13 @@ def test_automatic_places_keep_nodes_apart_and_inside(make, seed):
     assert all(left < x < right and bottom < y < top for x, y in places)
 
 
+def test_many_factors_around_one_variable_find_a_place():
+    ax = draw(GraphicalModel([Factor("x", [1, 2])] * 12 + [Factor(("x", "y"), np.ones((2, 2)))] * 12))
+    squares = [np.mean(square.get_bbox().get_points(), axis=0) for square in pieces(ax, Rectangle)]
+    assert len(squares) == 24
+    assert all(np.hypot(*(one - other)) > 0.25 for one, other in itertools.combinations(squares, 2))
+
+
 def test_parents_stand_above_their_children():
     model = chain(3)[0]
     ax = draw(model)
