@@ -9,9 +9,10 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, why_dependent
 from semgrid_edu.graphical.stages import cmcdot_stage
 from semgrid_edu.graphical.stages.bof import AT_THE_EDGE, STANDING_OR_DRIVING, bof_beliefs, bof_errors
-from semgrid_edu.graphical.stages.cells_in_a_row import Cell, CellsInARow
+from semgrid_edu.graphical.stages.cells_in_a_row import NO_CHANGE, Cell, CellsInARow
 from semgrid_edu.graphical.stages.cmcdot import FORGETTING, LEFT_OR_RIGHT, particle_beliefs, sampling_error
 from semgrid_edu.graphical.stages.cmcdot_graph import FROM_BOTH_SIDES
+from semgrid_edu.graphical.stages.joint_row import exact_beliefs
 
 NUMBERS = [100, 400, 1600, 6400]
 
@@ -59,6 +60,18 @@ def test_the_graph_computes_what_predict_and_update_do_in_one_cell(cells, scan):
     found = eliminate(stage.model, "c1", given).normalised().table
     moving = bof[[Cell.LEFT, Cell.RIGHT]].sum()
     np.testing.assert_allclose(found, [*bof[[Cell.FREE, Cell.STATIC]], moving, bof[Cell.UNKNOWN]], atol=1e-12)
+
+
+@pytest.mark.parametrize("scan", ["?x?", "?.?", "???"])
+@pytest.mark.parametrize("own", [{"right": 0.5}, {"static": 0.3, "left": 0.2, "right": 0.3, "unknown": 0.1}])
+def test_the_graph_is_joint_inference_where_only_the_cell_itself_may_hold_what_moves(own, scan):
+    """FREE cells stay free, so that nothing stands up in a neighbour and is in the way there."""
+    world = CellsInARow(({}, own, {}), (scan,), (NO_CHANGE[0], *FORGETTING[1:]))
+    given = {"one1": 1} | ({"z1": int(scan[1] == "x")} if scan[1] != "?" else {})
+    found = eliminate(cmcdot_stage(world).model, "c1", given).normalised().table
+    exact = exact_beliefs(world)[0, 1]
+    moving = exact[[Cell.LEFT, Cell.RIGHT]].sum()
+    np.testing.assert_allclose(found, [*exact[[Cell.FREE, Cell.STATIC]], moving, exact[Cell.UNKNOWN]], atol=1e-12)
 
 
 def test_inference_in_the_graph_is_pyagrums():
