@@ -8,7 +8,7 @@ from pyagrum_oracle import assert_oracle_agrees
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, why_dependent
 from semgrid_edu.graphical.stages import cmcdot_stage
-from semgrid_edu.graphical.stages.bof import AT_THE_EDGE, STANDING_OR_DRIVING, bof_beliefs, bof_errors
+from semgrid_edu.graphical.stages.bof import AT_THE_EDGE, STANDING_OR_DRIVING, TOWARDS_A_FENCE, bof_beliefs, bof_errors
 from semgrid_edu.graphical.stages.cells_in_a_row import NO_CHANGE, Cell, CellsInARow
 from semgrid_edu.graphical.stages.cmcdot import FORGETTING, LEFT_OR_RIGHT, particle_beliefs, sampling_error
 from semgrid_edu.graphical.stages.cmcdot_graph import FROM_BOTH_SIDES
@@ -40,10 +40,9 @@ def test_the_bias_is_that_of_two_cells_that_hold_the_same_thing():
     assert errors[0, 0] == pytest.approx(0.218, abs=5e-4)
 
 
-def test_particles_of_one_velocity_per_cell_have_nothing_to_sample():
-    np.testing.assert_allclose(
-        particle_beliefs(STANDING_OR_DRIVING, 100, seed=0), bof_beliefs(STANDING_OR_DRIVING), atol=1e-6
-    )
+@pytest.mark.parametrize("world", [STANDING_OR_DRIVING, TOWARDS_A_FENCE])
+def test_particles_of_one_velocity_per_cell_have_nothing_to_sample(world):
+    np.testing.assert_allclose(particle_beliefs(world, 100, seed=0), bof_beliefs(world), atol=1e-6)
 
 
 def test_the_same_seed_gives_the_same_bits():
