@@ -8,12 +8,14 @@ independences off the graph, and `draw` shows it.
 from semgrid_edu.graphical.beliefs import Beliefs
 from semgrid_edu.graphical.distance import total_variation
 from semgrid_edu.graphical.drawing import draw
-from semgrid_edu.graphical.exact import eliminate, enumerate_marginals, max_product, min_fill_order
-from semgrid_edu.graphical.factor import Factor, product
+from semgrid_edu.graphical.elimination_order import min_fill_order
+from semgrid_edu.graphical.exact import eliminate, enumerate_marginals, log_total, max_product
+from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.layout import in_rows
 from semgrid_edu.graphical.mean_field import mean_field_graph
 from semgrid_edu.graphical.messages import sum_product
 from semgrid_edu.graphical.model import GraphicalModel
+from semgrid_edu.graphical.products import product
 from semgrid_edu.graphical.separation import d_separated, why_dependent
 
 __all__ = [
@@ -25,6 +27,7 @@ __all__ = [
     "eliminate",
     "enumerate_marginals",
     "in_rows",
+    "log_total",
     "max_product",
     "mean_field_graph",
     "min_fill_order",

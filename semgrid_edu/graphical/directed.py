@@ -79,20 +79,18 @@ def check_directed(
     for name in {*parents, *(above for family in complete.values() for above in family)}:
         check_name("parents", name, names)
     topological_order(complete)
+    groups: dict[tuple[str, ...], list[Factor]] = {}
+    for factor in factors:
+        groups.setdefault(tuple(sorted(factor.names)), []).append(factor)
     for child, family in families(complete).items():
-        _check_conditional(_only(factors, family), child, complete[child])
+        found = groups.get(tuple(sorted(family)), [])
+        if len(found) != 1:
+            wanted = f"exactly one factor over ({', '.join(family)}), child and parents, in a directed model"
+            raise ArgumentError("factors", wanted, f"{len(found)} among {[factor.names for factor in factors]}")
+        _check_conditional(found[0], child, complete[child])
     if len(factors) > len(complete):
         raise ArgumentError("factors", f"one per variable, {len(complete)} in all", len(factors))
     return complete
-
-
-def _only(factors: Sequence[Factor], family: tuple[str, ...]) -> Factor:
-    """Return the one factor over exactly these variables."""
-    found = [factor for factor in factors if sorted(factor.names) == sorted(family)]
-    if len(found) != 1:
-        wanted = f"exactly one factor over ({', '.join(family)}), child and parents, in a directed model"
-        raise ArgumentError("factors", wanted, f"{len(found)} among {[factor.names for factor in factors]}")
-    return found[0]
 
 
 def _check_conditional(factor: Factor, child: str, parents: tuple[str, ...]) -> None:

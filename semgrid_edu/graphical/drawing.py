@@ -5,6 +5,7 @@ daft (https://docs.daft-pgm.org) draws nodes, edges and plates; this module deci
 
 import re
 from collections.abc import Iterable, Mapping
+from itertools import chain, count
 
 import daft
 import matplotlib.pyplot as plt
@@ -80,7 +81,7 @@ def draw(
     Raises
     ------
     ArgumentError
-        When a name isn't a variable (or factor, in `positions` and `equations`) of the model.
+        When a name isn't a variable (or factor, in `positions` and `equations`) of the model, or there is no variable.
 
     Examples
     --------
@@ -88,18 +89,15 @@ def draw(
     >>> beam = GraphicalModel([Factor("m", [0.8, 0.2]), Factor(("m", "z"), [[0.9, 0.1], [0.2, 0.8]])], {"z": ("m",)})
     >>> ax = draw(beam, observed="z", highlight="m", positions=in_rows(["m"], ["z"]))
     """
-    labels, equations, plates = (
-        labels or {},
-        equations or {},
-        {text: as_names(of) for text, of in (plates or {}).items()},
-    )
+    labels, equations = labels or {}, equations or {}
+    plates = {text: as_names(of) for text, of in (plates or {}).items()}
     observed, highlight = as_names(observed), as_names(highlight)
     _check(model, positions or {}, equations, observed, highlight, labels, *plates.values())
     places = _places(model, positions or {})
     said = {name: _said(name, labels) for name in model.names}
-    boxes = {text: _box(text, of, places, said) for text, of in plates.items()}
-    texts = [(text, _beside(name, places, said)) for name, text in equations.items()]
-    low, high = _extent(places, said, boxes, texts)
+    texts = {name: (text, _beside(name, places, said)) for name, text in equations.items()}
+    boxes = {text: _box(text, of, places, said, texts) for text, of in plates.items()}
+    low, high = _extent(places, said, boxes, texts.values())
     if ax is None:
         ax = plt.subplots(figsize=INCHES * (high - low), layout="constrained")[1]
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
@@ -110,12 +108,14 @@ def draw(
         for name, text in said.items()
     }
     _render([*_plates(boxes, size), *_edges(model, places, nodes), *nodes.values()], ax)
-    for text, place in texts:
+    for text, place in texts.values():
         ax.text(*place, text, fontsize=size, ha="left", va="center")
     return ax
 
 
 def _check(model: GraphicalModel, positions, equations, *groups) -> None:
+    if not model.names:
+        raise ArgumentError("model", "at least one variable to draw", "none")
     for argument, names in (("positions", positions), ("equations", equations)):
         for name in names:
             check_name(argument, name, (*model.names, *model.labels))
@@ -142,9 +142,11 @@ def _factor_place(names: tuple[str, ...], places: Mapping[str, Place]) -> Place:
     """Put a factor in the middle of its variables, or beside its only one: the first place that is clear of others."""
     x, y = np.mean([places[name] for name in names], axis=0)
     around = [(-0.35, 0.35), (0.0, 0.5), (0.35, 0.35), (-0.35, -0.35), (0.35, -0.35), (0.0, -0.5)]
-    tried = [(float(x + right), float(y + up)) for right, up in ([(0.0, 0.0)] if len(names) > 1 else []) + around]
+    rings = (np.multiply(scale, aside) for scale in count(1.0, 0.5) for aside in around)
+    tried = chain([(0.0, 0.0)] if len(names) > 1 else [], rings)
     taken = np.array(list(places.values()))
-    return next((place for place in tried if np.hypot(*(taken - place).T).min() > 0.3), tried[-1])
+    clear = ((x + right, y + up) for right, up in tried if np.hypot(*(taken - (x + right, y + up)).T).min() > 0.3)
+    return tuple(map(float, next(clear)))
 
 
 def _said(name: str, labels: Mapping[str, str]) -> str:
@@ -197,12 +199,14 @@ def _plates(boxes: Mapping[str, tuple[np.ndarray, np.ndarray]], size: float) -> 
     ]
 
 
-def _box(text: str, names: tuple[str, ...], places, said) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lower left and upper right corner of a plate; its text stands at the lower left, clear of arrows."""
+def _box(text: str, names: tuple[str, ...], places, said, texts) -> tuple[np.ndarray, np.ndarray]:
+    """Return two corners of a plate: its text stands at the lower left, clear of arrows, those of its nodes inside."""
     centres = np.array([places[name] for name in names])
     aside = max(MARGIN, *(_half_width(said[name]) + 0.1 for name in names))
     left = max(aside, LETTER * _letters(text) + 0.15)
-    return centres.min(axis=0) - (left, 0.55), centres.max(axis=0) + np.array([aside, MARGIN])
+    right, top = centres.max(axis=0) + np.array([aside, MARGIN])
+    ends = [_end(*texts[name]) + 0.1 for name in names if name in texts]
+    return centres.min(axis=0) - (left, 0.65), np.array([max([right, *ends]), top])
 
 
 def _beside(name: str, places, said) -> Place:
@@ -215,10 +219,15 @@ def _extent(places, said, boxes, texts) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners of the picture: nodes, plates and, at a guess, the texts beside nodes."""
     reach = np.array([(max(MARGIN, _half_width(said.get(name, "")) + 0.05), MARGIN) for name in places])
     centres = np.array(list(places.values()))
-    ends = [(x + LETTER * _letters(text), y) for text, (x, y) in texts]
+    ends = [(_end(text, (x, y)), y) for text, (x, y) in texts]
     corners = [centres - reach, centres + reach, np.reshape(ends, (-1, 2)), *map(np.array, boxes.values())]
     corners = np.concatenate(corners)
     return corners.min(axis=0) - 0.03, corners.max(axis=0) + 0.03
+
+
+def _end(text: str, place: Place) -> float:
+    """Return where a text that begins at a place ends, at a guess."""
+    return place[0] + LETTER * _letters(text)
 
 
 def _letters(text: str) -> int:

@@ -1,16 +1,17 @@
 """Exact inference: the sum over all assignments, and variable elimination (Koller and Friedman, chapters 9 and 13)."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from itertools import combinations
+from collections.abc import Mapping, Sequence
 from itertools import product as every_combination
-from math import prod
+from math import log, log10, prod
 from types import MappingProxyType
 
 import numpy as np
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.graphical.factor import Factor, product
+from semgrid_edu.graphical.elimination_order import min_fill_order
+from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.model import GraphicalModel, possible
+from semgrid_edu.graphical.products import rescaled_product
 from semgrid_edu.graphical.variables import as_names, check_name
 
 MAX_ASSIGNMENTS = 10**6
@@ -98,7 +99,8 @@ def eliminate(
     ------
     ArgumentError
         When a product would have more than 10^7 entries (the message names its variables), a variable or state is
-        unknown, or `order` isn't a permutation of the variables to sum out.
+        unknown, `order` isn't a permutation of the variables to sum out, or the total is beyond the range of floats,
+        as P(given) of a long chain is: then see `log_total`.
 
     Examples
     --------
@@ -107,13 +109,49 @@ def eliminate(
     >>> found.table.round(2), found.table.sum().round(2), found.normalised().table.round(2)
     (array([0.08, 0.16]), np.float64(0.24), array([0.33, 0.67]))
     """
-    model = model.given(**given)
-    names = _wanted(model, names, given)
-    factors = list(model.factors)
-    for name in _checked_order(model, names, order):
-        clique = product(factor for factor in factors if name in factor.names)
-        factors = [factor for factor in factors if name not in factor.names] + [clique.sum(name)]
-    return product(factors).ordered(*names)
+    found, power = _summed_out(model, names, given, order)
+    with np.errstate(over="ignore", under="ignore"):
+        table = np.ldexp(found.table, power)
+    if found.table.any() and not np.finfo(float).tiny <= table.max() < np.inf:
+        wanted = "a total from 1e-308 to 1e308; log_total gives its logarithm, sum_product the marginals of a tree"
+        raise ArgumentError("model and given", wanted, f"about 10^{power * log10(2):.0f}")
+    return Factor(found.names, table)
+
+
+def log_total(model: GraphicalModel, given: Mapping[str, int] = NOTHING, order: Sequence[str] | None = None) -> float:
+    """Return the logarithm of what `eliminate(model, ())` returns: log P(given), or log Z of an undirected model.
+
+    P(given) of a chain of thousands of readings is less than the smallest float, but its logarithm is an ordinary
+    number. The logarithm of P(x | given) is a difference of two of them, with and without x among what is given.
+
+    Parameters
+    ----------
+    model : GraphicalModel
+        Directed or not.
+    given : dict of str to int
+        The states of known variables.
+    order : sequence of str, optional
+        As for `eliminate`.
+
+    Returns
+    -------
+    float
+        In nats; -inf when what is given can't happen.
+
+    Raises
+    ------
+    ArgumentError
+        When a product would have more than 10^7 entries, a variable or state is unknown, or `order` isn't a
+        permutation of the variables that aren't given.
+
+    Examples
+    --------
+    >>> coins = GraphicalModel([Factor(f"x{k}", [0.5, 0.5]) for k in range(2000)])
+    >>> round(log_total(coins, {name: 0 for name in coins.names}) / np.log(2))
+    -2000
+    """
+    found, power = _summed_out(model, (), given, order)
+    return log(found.table) + power * log(2) if found.table > 0 else -np.inf
 
 
 def max_product(model: GraphicalModel, given: Mapping[str, int] = NOTHING) -> dict[str, int]:
@@ -150,7 +188,7 @@ def max_product(model: GraphicalModel, given: Mapping[str, int] = NOTHING) -> di
     model = possible(model, given)
     factors, cliques = list(model.factors), []
     for name in min_fill_order(model):
-        clique = product(factor for factor in factors if name in factor.names).normalised()
+        clique = rescaled_product(factor for factor in factors if name in factor.names)[0].normalised()
         cliques.append((name, clique))
         factors = [factor for factor in factors if name not in factor.names] + [clique.max(name)]
     best: dict[str, int] = {}
@@ -160,45 +198,19 @@ def max_product(model: GraphicalModel, given: Mapping[str, int] = NOTHING) -> di
     return {name: best[name] for name in model.names}
 
 
-def min_fill_order(model: GraphicalModel, keep: Iterable[str] = ()) -> tuple[str, ...]:
-    """Order variables for elimination: next is always the one whose elimination links the fewest strangers.
-
-    Eliminating a variable couples all its neighbours. Pairs that weren't neighbours before are the fill; few of them
-    keep the tables small. Among equals the first in the model's order is taken.
-
-    Parameters
-    ----------
-    model : GraphicalModel
-        Directed or not; two variables are neighbours when a factor contains both.
-    keep : iterable of str
-        Variables that aren't eliminated.
-
-    Returns
-    -------
-    tuple of str
-
-    Examples
-    --------
-    >>> chain = GraphicalModel([Factor(("a", "b"), np.ones((2, 2))), Factor(("b", "c"), np.ones((2, 2)))])
-    >>> min_fill_order(chain)
-    ('a', 'b', 'c')
-    """
-    neighbours, keep = model.neighbours, set(keep)
-    order: list[str] = []
-    while left := [name for name in model.names if name in neighbours and name not in keep]:
-        name = min(left, key=lambda name: len(_fill(neighbours, name)))
-        for one, other in _fill(neighbours, name):
-            neighbours[one].add(other)
-            neighbours[other].add(one)
-        for other in neighbours.pop(name):
-            neighbours[other].discard(name)
-        order.append(name)
-    return tuple(order)
-
-
-def _fill(neighbours: Mapping[str, set[str]], name: str) -> list[tuple[str, str]]:
-    """Return the pairs of neighbours of a variable that aren't neighbours of each other."""
-    return [(one, other) for one, other in combinations(sorted(neighbours[name]), 2) if other not in neighbours[one]]
+def _summed_out(
+    model: GraphicalModel, names: str | Sequence[str], given: Mapping[str, int], order: Sequence[str] | None
+) -> tuple[Factor, int]:
+    """Return what is left over `names` divided by 2^n, and n: a power of two is taken out of each product."""
+    model = model.given(**given)
+    names, power = _wanted(model, names, given), 0
+    factors = list(model.factors)
+    for name in _checked_order(model, names, order):
+        clique, more = rescaled_product(factor for factor in factors if name in factor.names)
+        factors = [factor for factor in factors if name not in factor.names] + [clique.sum(name)]
+        power += more
+    left, more = rescaled_product(factors)
+    return left.ordered(*names), power + more
 
 
 def _wanted(model: GraphicalModel, names: str | Sequence[str], given: Mapping[str, int]) -> tuple[str, ...]:

@@ -4,19 +4,14 @@ Product, sum, maximum, slice: every algorithm of this package is a sequence of t
 Probabilistic Graphical Models, section 4.2 and chapter 9).
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import reduce
-from math import prod
+from math import frexp
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical.variables import as_names, check_name, check_states, shared_cardinalities
-
-MAX_ENTRIES = 10**7
-"""The largest table that a product may have: 80 MB of float64."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +52,8 @@ class Factor:
             raise ArgumentError("names", "each variable once", names)
         if table.ndim != len(names) or table.size == 0:
             raise ArgumentError("table", f"one axis of at least one state for each of {names}", f"shape {table.shape}")
-        if not (np.isfinite(table).all() and (table >= 0).all()):
-            raise ArgumentError("table", "finite entries, none of them negative", table.min())
+        if (bad := ~(np.isfinite(table) & (table >= 0))).any():
+            raise ArgumentError("table", "finite entries, none of them negative", table[bad][0])
 
     @property
     def cardinalities(self) -> dict[str, int]:
@@ -83,9 +78,12 @@ class Factor:
         ArgumentError
             When the two disagree about a variable's number of states.
         """
+        if not isinstance(other, Factor):
+            return NotImplemented
         names = tuple(dict.fromkeys(self.names + other.names))
         shared_cardinalities([self.cardinalities, other.cardinalities])
-        return Factor(names, self._spread(names) * other._spread(names))
+        with np.errstate(over="ignore"):  # a Factor refuses what is infinite
+            return Factor(names, self._spread(names) * other._spread(names))
 
     def _spread(self, names: tuple[str, ...]) -> NDArray[np.float64]:
         """Return the table with its axes in the order of `names`, and an axis of length 1 for each foreign name."""
@@ -199,38 +197,30 @@ class Factor:
         ArgumentError
             When all entries are 0: what is given can't happen under the model.
         """
-        total = self.table.sum()
-        if total == 0:
+        table = self.rescaled()[0].table
+        if not table.any():
             raise ArgumentError(
                 f"factor over {self.names}",
                 "at least one positive entry to normalise by",
                 "only zeros: no assignment agrees with all factors and with what is given",
             )
-        return Factor(self.names, self.table / total)
+        return Factor(self.names, table / table.sum())
 
+    def rescaled(self) -> tuple["Factor", int]:
+        """Take a power of two out, so that the largest entry is from 1/2 to 1: thousands of products stay in range.
 
-def product(factors: Iterable[Factor]) -> Factor:
-    """Multiply factors, after checking that the table of the product isn't too large.
+        Returns
+        -------
+        Factor
+            This one divided by 2^n, which costs no bit, because only the exponents of entries change.
+        int
+            n; 0 when all entries are 0.
 
-    Parameters
-    ----------
-    factors : iterable of Factor
-        None at all gives the constant 1.
-
-    Returns
-    -------
-    Factor
-
-    Raises
-    ------
-    ArgumentError
-        When the product has more than `MAX_ENTRIES` entries; the message names its variables.
-    """
-    factors = tuple(factors)
-    states = shared_cardinalities(factor.cardinalities for factor in factors)
-    entries = prod(states.values())
-    if entries > MAX_ENTRIES:
-        raise ArgumentError(
-            f"clique ({', '.join(states)})", f"a table of at most {MAX_ENTRIES:,} entries", f"{entries:,}"
-        )
-    return reduce(Factor.__mul__, factors, Factor((), 1.0))
+        Examples
+        --------
+        >>> factor, n = Factor("x", [0, 5, 10]).rescaled()
+        >>> factor.table.tolist(), n
+        ([0.0, 0.3125, 0.625], 4)
+        """
+        power = frexp(self.table.max())[1]
+        return Factor(self.names, np.ldexp(self.table, -power)), power

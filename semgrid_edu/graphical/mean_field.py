@@ -13,8 +13,9 @@ from scipy.special import softmax, xlogy
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical.beliefs import TOLERANCE, Beliefs
 from semgrid_edu.graphical.exact import NOTHING
-from semgrid_edu.graphical.factor import Factor, product
+from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.model import GraphicalModel, possible
+from semgrid_edu.graphical.products import rescaled_product
 
 Independent = dict[str, NDArray[np.float64]]
 """One distribution per variable, {name: (K,)}."""
@@ -89,7 +90,7 @@ def _start(model: GraphicalModel, seed: int | None) -> Independent:
         name: [Factor(name, np.full(states, 1 / states)), *(f for f in model.factors if f.names == (name,))]
         for name, states in model.cardinalities.items()
     }
-    return {name: product(factors).normalised().table for name, factors in alone.items()}
+    return {name: rescaled_product(factors)[0].normalised().table for name, factors in alone.items()}
 
 
 def _best(model: GraphicalModel, q: Independent, name: str) -> NDArray[np.float64]:

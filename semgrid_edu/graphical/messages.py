@@ -1,8 +1,9 @@
 """Sum-product message passing on a factor graph: exact on trees, "loopy" elsewhere (Kschischang 2001, section II)."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical.beliefs import TOLERANCE, Beliefs
@@ -10,8 +11,8 @@ from semgrid_edu.graphical.exact import NOTHING
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.model import GraphicalModel, possible
 
-Messages = dict[tuple[str, str], Factor]
-"""From source to target; each a factor over the variable at one of the two ends."""
+Messages = dict[tuple[str, str], NDArray[np.float64]]
+"""From source to target; each a distribution (K,) of the variable at one of the two ends."""
 
 
 def sum_product(
@@ -61,9 +62,11 @@ def sum_product(
     if not 0 <= damping < 1:
         raise ArgumentError("damping", "0 <= damping < 1", damping)
     sliced = possible(model, given)
-    factors = {label: factor for label, factor in zip(model.labels, sliced.factors, strict=True) if factor.names}
+    labelled = zip(model.labels, sliced.factors, strict=True)
+    factors = {label: factor.rescaled()[0] for label, factor in labelled if factor.names}
     links = _links(factors, sliced.names)
-    outwards = _breadth_first(links)
+    parts = _parts(links)
+    outwards = [node for part in parts for node in part]
     messages = _first_messages(factors, sliced.cardinalities)
     converged, iteration = False, 0
     while not converged and iteration < iterations:
@@ -72,78 +75,87 @@ def sum_product(
         for source in (*reversed(outwards), *outwards):
             for target in links[source]:
                 message = _message(source, target, links, factors, messages)
-                messages[source, target] = _damped(message, messages[source, target], damping)
-        converged = all(abs(messages[link].table - before[link].table).max() <= TOLERANCE for link in messages)
-    marginals = {name: _arriving(name, links[name], messages, sliced.cardinalities[name]) for name in sliced.names}
+                messages[source, target] = (1 - damping) * message + damping * messages[source, target]
+        converged = all(abs(messages[link] - before[link]).max() <= TOLERANCE for link in messages)
+    arrived = {name: [messages[label, name] for label in links[name]] for name in sliced.names}
     return Beliefs(
-        marginals={name: belief.table for name, belief in marginals.items()},
+        marginals={name: _product(told, sliced.cardinalities[name]) for name, told in arrived.items()},
         converged=converged,
         iterations=iteration,
-        exact=converged and _is_forest(links),
-        messages={link: message.table for link, message in messages.items()},
+        exact=converged and _is_forest(links, parts),
+        messages=messages,
     )
 
 
 def _links(factors: Mapping[str, Factor], names: tuple[str, ...]) -> dict[str, list[str]]:
     """Return the factor graph: the factors around each variable, and the variables around each factor."""
-    around = {name: [label for label, factor in factors.items() if name in factor.names] for name in names}
-    return around | {label: list(factor.names) for label, factor in factors.items()}
+    links: dict[str, list[str]] = {name: [] for name in names}
+    for label, factor in factors.items():
+        if label in names:
+            raise ArgumentError("model", "no variable that is called like a factor", label)
+        links[label] = list(factor.names)
+        for name in factor.names:
+            links[name].append(label)
+    return links
 
 
-def _breadth_first(links: Mapping[str, list[str]]) -> list[str]:
-    """Return all nodes of the factor graph, each after the neighbour through which it was reached."""
-    order: dict[str, None] = {}
+def _parts(links: Mapping[str, list[str]]) -> list[list[str]]:
+    """Return the connected parts of the factor graph; each node comes after the one through which it was reached."""
+    parts: list[list[str]] = []
+    reached: set[str] = set()
     for root in links:
-        queue = [root] if root not in order else []
-        order.update(dict.fromkeys(queue))
-        while queue:
-            new = [node for node in links[queue.pop(0)] if node not in order]
-            order.update(dict.fromkeys(new))
-            queue += new
-    return list(order)
+        part = [root] if root not in reached else []
+        reached.add(root)
+        for node in part:  # grows on the way
+            new = [other for other in links[node] if other not in reached]
+            reached.update(new)
+            part += new
+        parts += [part] if part else []
+    return parts
 
 
-def _is_forest(links: Mapping[str, list[str]]) -> bool:
-    """Whether leaves can be taken away, one after the other, until no link is left."""
-    left = {node: set(around) for node, around in links.items()}
-    while leaves := [node for node, around in left.items() if len(around) <= 1]:
-        for leaf in leaves:
-            for other in left.pop(leaf):
-                left[other].discard(leaf)
-    return not left
+def _is_forest(links: Mapping[str, list[str]], parts: list[list[str]]) -> bool:
+    """Whether no part has a loop: a tree has one link fewer than nodes."""
+    return sum(map(len, links.values())) // 2 == len(links) - len(parts)
 
 
 def _first_messages(factors: Mapping[str, Factor], states: Mapping[str, int]) -> Messages:
     """Before the first iteration every message says nothing: all states alike."""
-    nothing = {name: Factor((name,), np.full(count, 1 / count)) for name, count in states.items()}
+    nothing = {name: np.full(count, 1 / count) for name, count in states.items()}
     pairs = [(label, name) for label, factor in factors.items() for name in factor.names]
     return {link: nothing[name] for label, name in pairs for link in ((label, name), (name, label))}
 
 
 def _message(
-    source: str,
-    target: str,
-    links: Mapping[str, list[str]],
-    factors: Mapping[str, Factor],
-    messages: Messages,
-) -> Factor:
+    source: str, target: str, links: Mapping[str, list[str]], factors: Mapping[str, Factor], messages: Messages
+) -> NDArray[np.float64]:
     """Return what a node tells a neighbour, from what all its other neighbours told it."""
-    others = [node for node in links[source] if node != target]
-    if source not in factors:
-        return _arriving(source, others, messages, messages[source, target].table.size)
-    told = factors[source].normalised()
-    for name in others:
-        told = (told * messages[name, source]).normalised()
-    return told.sum(*others)
+    heard = {node: messages[node, source] for node in links[source] if node != target}
+    if source in factors:
+        return _from_factor(factors[source], heard)
+    return _product(heard.values(), states=messages[source, target].size)
 
 
-def _arriving(name: str, labels: list[str], messages: Messages, states: int) -> Factor:
-    """Return the normalised product of what factors tell a variable; each partial product is normalised too."""
-    told = Factor((name,), np.full(states, 1 / states))
-    for label in labels:
-        told = (told * messages[label, name]).normalised()
+def _from_factor(factor: Factor, heard: Mapping[str, NDArray]) -> NDArray[np.float64]:
+    """Return the table times what all variables but one say, summed over them."""
+    told = factor.table
+    for axis, name in reversed(list(enumerate(factor.names))):
+        if name in heard:  # behind its axis at most that of the target is left, which takes its place
+            told = _normalised(told.swapaxes(axis, -1) @ heard[name])
+    return _normalised(told)
+
+
+def _product(messages: Iterable[NDArray], states: int) -> NDArray[np.float64]:
+    """Return the normalised product of messages about one variable; each partial product is normalised too."""
+    told = np.full(states, 1 / states)
+    for message in messages:
+        told = _normalised(told * message)
     return told
 
 
-def _damped(new: Factor, old: Factor, damping: float) -> Factor:
-    return Factor(new.names, (1 - damping) * new.table + damping * old.table)
+def _normalised(table: NDArray) -> NDArray[np.float64]:
+    total = table.sum()
+    if total == 0:
+        wanted = "messages that agree on at least one state"
+        raise ArgumentError("given", wanted, "none: no assignment agrees with all factors and with what is given")
+    return table / total

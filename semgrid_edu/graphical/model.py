@@ -1,5 +1,6 @@
 """A graphical model: a product of factors; directed when each is the distribution of a child given its parents."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -76,9 +77,12 @@ class GraphicalModel:
         if self.parents is not None:
             owners = {frozenset(family): child for child, family in families(self.parents).items()}
             return tuple(_conditional(owners[frozenset(factor.names)], self.parents) for factor in self.factors)
-        labels = [f"f({', '.join(factor.names)})" for factor in self.factors]
-        earlier = [labels[:k].count(label) for k, label in enumerate(labels)]
-        return tuple(label if k == 0 else f"{label} #{k + 1}" for label, k in zip(labels, earlier, strict=True))
+        count: Counter[str] = Counter()
+        labels = []
+        for label in (f"f({', '.join(factor.names)})" for factor in self.factors):
+            count[label] += 1
+            labels.append(label if count[label] == 1 else f"{label} #{count[label]}")
+        return tuple(labels)
 
     @property
     def neighbours(self) -> dict[str, set[str]]:
@@ -134,7 +138,8 @@ class GraphicalModel:
         check_states(assignment, self.cardinalities)
         if missing := set(self.names) - set(assignment):
             raise ArgumentError("assignment", "a state for every variable", f"none for {', '.join(sorted(missing))}")
-        return prod(float(factor.table[tuple(assignment[name] for name in factor.names)]) for factor in self.factors)
+        states = {name: int(state) for name, state in assignment.items()}
+        return prod(float(factor.table[tuple(states[name] for name in factor.names)]) for factor in self.factors)
 
 
 def possible(model: GraphicalModel, given: Mapping[str, int]) -> GraphicalModel:

@@ -65,6 +65,16 @@ def test_plates_surround_their_nodes():
     assert "$k = 1, 2$" in said(ax)
 
 
+def test_a_plate_reaches_round_the_texts_beside_its_nodes():
+    ax = draw(one_of_you(), positions=ROWS, plates={"beams": "z"}, equations={"z": "a word that is long"})
+    ax.figure.canvas.draw()
+    (plate,) = pieces(ax, Rectangle)
+    for text in ("a word that is long", "beams"):
+        drawn = next(one for one in ax.texts if one.get_text() == text).get_window_extent()
+        assert plate.get_window_extent().containsx(drawn.x1)
+        assert not any(e.get_window_extent().overlaps(drawn) for e in pieces(ax, Ellipse))
+
+
 def test_equations_and_own_labels_are_written():
     ax = draw(one_of_you(), equations={"z": "$P(z | m)$", "m1": "$P(z | m)$"}, labels={"m1": "left"}, positions=ROWS)
     assert {"$P(z | m)$", "left"} <= said(ax)
@@ -93,6 +103,13 @@ def test_automatic_places_keep_nodes_apart_and_inside(make, seed):
     assert all(left < x < right and bottom < y < top for x, y in places)
 
 
+def test_many_factors_around_one_variable_find_a_place():
+    ax = draw(GraphicalModel([Factor("x", [1, 2])] * 12 + [Factor(("x", "y"), np.ones((2, 2)))] * 12))
+    squares = [np.mean(square.get_bbox().get_points(), axis=0) for square in pieces(ax, Rectangle)]
+    assert len(squares) == 24
+    assert all(np.hypot(*(one - other)) > 0.25 for one, other in itertools.combinations(squares, 2))
+
+
 def test_parents_stand_above_their_children():
     model = chain(3)[0]
     ax = draw(model)
@@ -103,6 +120,11 @@ def test_parents_stand_above_their_children():
 def test_rows_are_centred_and_gaps_stay_free():
     assert in_rows(["a", "b", "c"], ["d"]) == {"a": (0, 0), "b": (1, 0), "c": (2, 0), "d": (1, -1)}
     assert in_rows(["a", None, "c"], [None, "d"]) == {"a": (0, 0), "c": (2, 0), "d": (1.5, -1)}
+
+
+def test_there_must_be_something_to_draw():
+    with pytest.raises(ArgumentError, match="at least one variable"):
+        draw(GraphicalModel([Factor((), 1.0)]))
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,15 @@ from hypothesis import strategies as st
 from random_models import assignments, chain, one_of_you, random_directed, random_undirected, some_evidence
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.graphical import Factor, GraphicalModel, eliminate, enumerate_marginals, max_product, min_fill_order
+from semgrid_edu.graphical import (
+    Factor,
+    GraphicalModel,
+    eliminate,
+    enumerate_marginals,
+    log_total,
+    max_product,
+    min_fill_order,
+)
 
 SEEDS = st.integers(0, 10**6)
 MODELS = st.sampled_from([random_directed, random_undirected])
@@ -136,6 +144,44 @@ def test_on_a_chain_max_product_is_viterbi(steps):
     seen = np.random.default_rng(1).integers(0, 30, size=steps).tolist()
     found = max_product(model, {f"z{t}": z for t, z in enumerate(seen)})
     assert [found[f"x{t}"] for t in range(steps)] == viterbi(first, move, read, seen)
+
+
+def test_what_a_long_chain_read_is_too_improbable_for_a_float_but_not_for_its_logarithm():
+    """The forward recursion adds up log P(z_t | earlier readings)."""
+    model, first, move, read = chain(400, seed=4, symbols=30)
+    seen = np.random.default_rng(1).integers(0, 30, size=400).tolist()
+    known = {f"z{t}": z for t, z in enumerate(seen)}
+    belief, wanted = first, 0.0
+    for t, z in enumerate(seen):
+        belief = (belief @ move if t else belief) * read[:, z]
+        wanted, belief = wanted + np.log(belief.sum()), belief / belief.sum()
+    assert wanted < np.log(1e-308)
+    assert log_total(model, known) == pytest.approx(wanted, rel=1e-12)
+    last = [np.exp(log_total(model, known | {"x399": k}) - wanted) for k in range(3)]
+    np.testing.assert_allclose(last, belief, rtol=1e-9)
+    with pytest.raises(ArgumentError, match=rf"log_total .* found about 10\^{wanted / np.log(10):.0f}"):
+        eliminate(model, "x7", known)
+
+
+@pytest.mark.parametrize("entry", [1e-10, 1e10])
+def test_a_hundred_factors_around_one_variable_neither_vanish_nor_overflow(entry):
+    star = GraphicalModel([Factor("x", [entry, 3 * entry])] + [Factor("x", [entry, entry])] * 99)
+    assert log_total(star) == pytest.approx(100 * np.log(entry) + np.log(4))
+    assert max_product(star) == {"x": 1}
+    with pytest.raises(ArgumentError, match="log_total"):
+        eliminate(star, "x")
+
+
+@settings(max_examples=20, deadline=None)
+@given(MODELS, SEEDS)
+def test_the_logarithm_of_an_ordinary_total(make, seed):
+    model = make(seed)
+    known, _ = some_evidence(model, seed)
+    assert log_total(model, known) == pytest.approx(np.log(eliminate(model, (), known).table))
+
+
+def test_the_logarithm_of_the_impossible():
+    assert log_total(one_of_you(), {"m2": 1, "z": 0}) == -np.inf
 
 
 @pytest.mark.parametrize("inference", [enumerate_marginals, eliminate])

@@ -58,7 +58,7 @@ def test_a_factor_keeps_its_own_table():
         (("x",), np.ones(0), "at least one state"),
         (("x",), [1.0, -0.1], "none of them negative"),
         (("x",), [1.0, np.nan], "finite"),
-        (("x",), [1.0, np.inf], "finite"),
+        (("x",), [1.0, np.inf], "finite .* found inf"),
     ],
 )
 def test_bad_tables_are_refused(names, table, says):
@@ -70,6 +70,7 @@ def test_bad_tables_are_refused(names, table, says):
     ("wrong", "says"),
     [
         (lambda: XY * Factor("y", [1, 1]), "variable y: expected 3 states"),
+        (lambda: Factor("x", [1e200]) * Factor("x", [1e200]), "finite .* found inf"),
         (lambda: XY.sum("w"), "w"),
         (lambda: XY.given(w=0), "w"),
         (lambda: XY.given(x=2), "given x: expected a state from 0 to 1, found 2"),
@@ -82,6 +83,23 @@ def test_bad_tables_are_refused(names, table, says):
 def test_operations_name_what_is_wrong(wrong, says):
     with pytest.raises(ArgumentError, match=says):
         wrong()
+
+
+def test_a_number_is_no_factor():
+    with pytest.raises(TypeError, match="unsupported operand"):
+        XY * 2
+
+
+def test_entries_at_the_ends_of_the_range_of_floats_are_normalised():
+    assert Factor("x", [1e308, 1e308]).normalised().table.tolist() == [0.5, 0.5]
+    assert Factor("x", [5e-324, 5e-324]).normalised().table.tolist() == [0.5, 0.5]
+
+
+@given(st.lists(st.just(0.0) | st.floats(1e-150, 1e150), min_size=1, max_size=5))
+def test_taking_out_a_power_of_two_loses_no_bit(table):
+    factor, power = Factor("x", table).rescaled()
+    assert np.ldexp(factor.table, power).tolist() == table
+    assert factor.table.max() == 0 or 0.5 <= factor.table.max() < 1
 
 
 def test_a_product_too_large_is_refused_by_the_names_of_its_variables():

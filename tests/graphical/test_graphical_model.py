@@ -32,6 +32,7 @@ def test_weights_by_hand():
     """The four maps of two cells: 0.16, 0.16, 0.04 agree with "one of you", 0.64 doesn't."""
     weights = {(a, b): one_of_you().weight({"m1": a, "m2": b, "z": 1}) for a in (0, 1) for b in (0, 1)}
     assert weights == pytest.approx({(0, 0): 0, (0, 1): 0.16, (1, 0): 0.16, (1, 1): 0.04})
+    assert one_of_you().weight({"m1": np.True_, "m2": False, "z": np.int8(1)}) == pytest.approx(0.16)
 
 
 def test_slicing_keeps_one_factor_for_each():

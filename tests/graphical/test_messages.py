@@ -108,6 +108,34 @@ def test_two_factors_over_the_same_pair_are_a_loop():
     assert sum_product(GraphicalModel([tie * tie])).exact
 
 
+def test_many_factors_around_one_variable_do_not_vanish():
+    star = GraphicalModel([Factor("x", [1e-9, 3e-9]), *([Factor("x", [1e-9, 1e-9])] * 99)])
+    np.testing.assert_allclose(sum_product(star).marginals["x"], [0.25, 0.75])
+
+
+def test_factors_that_contradict_each_other_are_refused():
+    with pytest.raises(ArgumentError, match="no assignment agrees"):
+        sum_product(GraphicalModel([Factor("x", [0, 1]), Factor("x", [1, 0])]))
+
+
+def test_a_factor_of_three_variables_of_different_sizes():
+    """Messages to each of three axes, by hand: the table times the other two priors, summed."""
+    rng = np.random.default_rng(0)
+    table, priors = rng.random((2, 3, 4)), [rng.dirichlet(np.ones(k)) for k in (2, 3, 4)]
+    model = GraphicalModel([Factor(tuple("abc"), table), *map(Factor, "abc", priors)])
+    messages = sum_product(model).messages
+    a, b, c = priors
+    for name, wanted in zip(
+        "abc", (table @ c @ b, a @ (table @ c), (a @ table.reshape(2, 12)).reshape(3, 4).T @ b), strict=True
+    ):
+        np.testing.assert_allclose(messages["f(a, b, c)", name], wanted / wanted.sum(), rtol=1e-12)
+
+
+def test_a_variable_called_like_a_factor_is_refused():
+    with pytest.raises(ArgumentError, match=r"called like a factor, found f\(x\)"):
+        sum_product(GraphicalModel([Factor("x", [1, 2]), Factor("f(x)", [1, 2])]))
+
+
 def test_it_stops_when_told():
     stopped = sum_product(ring(0.8), iterations=1)
     assert (stopped.iterations, stopped.converged, stopped.exact) == (1, False, False)

@@ -26,7 +26,7 @@ CUT = (
     CutEdge(
         "m4 - m5, once z is known",
         "The grid keeps one number per cell, so it forgets that one of the two cells already explains the return, and "
-        "noisy returns raise the cell behind a wall again and again.",
+        "noisy returns raise the cell behind a wall again and again: after four to 0.57 instead of 0.34.",
     ),
 )
 """The edge that an occupancy grid cuts: explaining away."""
@@ -126,6 +126,7 @@ def beam_over_cells(world: BeamWorld | None = None, beams: int = 1) -> StageGrap
         observed=measured,
         positions=in_rows(world.cells, (), reflected, measured),
         equations={reflected[-1]: "which cell reflects", measured[-1]: "range"},
+        plates={"beams": (*reflected, *measured)} if beams == 1 else {},
         cut=CUT,
     )
 

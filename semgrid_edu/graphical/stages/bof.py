@@ -149,7 +149,7 @@ def bof_stage(world: CellsInARow = STANDING_OR_DRIVING) -> StageGraph:
         | {f"z{k},1": f"$z_{{{k}}}^{{t}}$" for k in columns},
         equations={
             f"one{columns[-1]},1": "at most one thing",
-            f"c{columns[-1]},0": "free, static, left, right",
+            f"c{columns[-1]},0": "what the cell holds",
             f"z{columns[-1]},1": "pass or hit",
         },
         cut=CUT,

@@ -107,6 +107,7 @@ def one_cell(
         positions=in_rows([None, *above], ["x0", *chain], [None, *below]),
         labels={f"prior{t}": f"$x_{{{t}}}^-$" for t in steps},
         equations={f"v{len(scans)}": "seen?", f"x{len(scans)}": "state", f"z{len(scans)}": "scan"},
+        plates={"cells": tuple(dict.fromkeys(name for factor in factors for name in factor.names))},
         cut=CUT,
     )
 

@@ -6,7 +6,6 @@ from numpy.typing import ArrayLike, NDArray
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.layout import in_rows
 from semgrid_edu.graphical.model import GraphicalModel
-from semgrid_edu.graphical.stages.cell import CUT
 from semgrid_edu.graphical.stages.cell_scans import check_scans
 from semgrid_edu.graphical.stages.stage_graph import CutEdge, StageGraph
 from semgrid_edu.occupancy import Evidence, LogOddsParams, log_odds, probability, update_log_odds
@@ -17,7 +16,16 @@ LOG_ODDS_CUT = (
         "The log-odds grid gives a cell one state for ever, so what moves leaves a smear until enough scans have "
         "contradicted it.",
     ),
-    *CUT[1:],
+    CutEdge(
+        "m of the cells in front -> z1",
+        "Whether a beam reaches this cell depends on what stands in front of it, but the grid takes that as given, so "
+        "a shadow tells it nothing about what casts it.",
+    ),
+    CutEdge(
+        "z1 - z2",
+        "Given the state, the grid takes scans as independent, so an error that lasts from scan to scan is counted "
+        "again with each.",
+    ),
 )
 """What the log-odds grid leaves out when it treats a cell by itself."""
 
@@ -47,6 +55,7 @@ def one_log_odds_cell(scans: ArrayLike, prior: float = 0.5) -> StageGraph:
         observed=names,
         positions=in_rows(["m"], names),
         equations={"m": "free or occupied", names[-1]: "scan"},
+        plates={"cells": ("m", *names)},
         cut=LOG_ODDS_CUT,
     )
 

@@ -81,5 +81,5 @@ class StageGraph:
             equations=self.equations,
             plates=self.plates,
         )
-        ax.set_title(self.title)
+        ax.set_title(self.title, wrap=True)
         return ax

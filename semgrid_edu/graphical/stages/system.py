@@ -30,12 +30,13 @@ CUT = (
     ),
     CutEdge(
         "near1 - far1 in o1",
-        "o holds one distribution per cell, so it can't say that one of two cells explains a return.",
+        "o holds one distribution per cell, so it can't say that one of two cells explains a return. On the toy street "
+        "a fusion that sees o in both cells loses nothing by that, because o tells all sequences of scans apart.",
     ),
     CutEdge(
         "g0 -> g1",
-        "Only o remembers, while classes aren't carried from frame to frame, so a class that an earlier image showed "
-        "is forgotten once the cell is hidden.",
+        "Only o remembers, because classes aren't carried from frame to frame, so a class that an earlier image showed "
+        "is forgotten. On the toy street that costs 0.05 nats in the near cell and 0.10 in the far one.",
     ),
     CutEdge(
         "g0 -> o1",

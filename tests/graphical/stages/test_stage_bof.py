@@ -5,7 +5,7 @@ from itertools import product
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from pyagrum_posteriors import posteriors
+from pyagrum_oracle import posteriors
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, why_dependent

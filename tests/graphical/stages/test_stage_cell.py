@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracle_of_stages import assert_oracle_agrees
+from pyagrum_oracle import assert_oracle_agrees
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals
@@ -105,6 +105,11 @@ def test_what_is_no_likelihood_is_refused(bad):
     for build in (one_cell, one_log_odds_cell, cell_given):
         with pytest.raises(ArgumentError, match="scans"):
             build(bad)
+
+
+def test_the_next_cell_has_a_chain_of_its_own():
+    for stage in (one_cell(read_scans(".#")), one_log_odds_cell(read_scans(".#"))):
+        assert sorted(stage.plates["cells"]) == sorted(stage.model.names)
 
 
 def test_unknown_letters_are_refused():

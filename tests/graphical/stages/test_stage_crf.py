@@ -5,7 +5,7 @@ from itertools import product
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from pyagrum_posteriors import as_directed, posteriors
+from pyagrum_oracle import as_directed, posteriors
 
 from semgrid_edu.crf import CrfParams, energy, mean_field_naive, pair_weights, unary_from_probability
 from semgrid_edu.graphical import d_separated, eliminate, max_product, mean_field_graph
@@ -57,12 +57,14 @@ def test_sixteen_cells_are_still_exact():
     energies = phi[x, np.arange(16)].sum(axis=1) + (differ * k).sum(axis=(1, 2)) / 2
     weights = np.exp(-energies)
     wanted = np.stack([1 - x.T @ weights / weights.sum(), x.T @ weights / weights.sum()])
-    np.testing.assert_allclose(exact_marginals(crf_model(unary, values, params)), wanted, atol=1e-10)
+    model = crf_model(unary, values, params)
+    np.testing.assert_allclose(exact_marginals(model), wanted, atol=1e-10)
+    assert list(max_product(model).values()) == x[energies.argmin()].tolist()
 
 
 @pytest.fixture(scope="module")
 def sweep():
-    return coupling_sweep([0.0, 1.0, 1.5, 4.0])
+    return coupling_sweep([0.0, 1.0, 1.5, 4.0, 2.0])
 
 
 def test_without_coupling_every_method_is_exact(sweep):
@@ -101,6 +103,29 @@ def test_at_the_default_weights_all_pick_a_side_while_the_exact_marginals_stay_u
 def test_between_the_two_the_most_probable_class_of_a_cell_is_not_that_of_the_best_labelling(sweep):
     assert sweep.labelling[1].tolist() == [0] * 9
     assert sweep.wrong_labels["exact"][1] == 4
+
+
+def test_the_numbers_of_the_docstring(sweep):
+    """The centre at couplings of 1, 2 and 4."""
+    centre = {method: found[[1, 4, 3], 0, 4] for method, found in sweep.marginals.items()}
+    np.testing.assert_allclose(centre["exact"], 0.52, atol=0.005)
+    np.testing.assert_allclose(centre["mean field"], [0.52, 0.94, 0.998], atol=0.005)
+    np.testing.assert_allclose(centre["loopy"], [0.52, 0.92, 0.998], atol=0.005)
+    assert sweep.converged[[1, 4, 3]].all()
+
+
+def test_sixteen_cells_have_their_transition_too():
+    """A chequerboard of 0.4 and 0.6 with one cell of 0.64, below and above the coupling of 1.23."""
+    values = all_free((4, 4))
+    board = np.where(np.indices((4, 4)).sum(axis=0) % 2, 0.4, 0.6)
+    board[1, 1] = 0.64
+    assert 1.0 < critical_coupling(2, values) < 1.5
+    errors = coupling_sweep([1.0, 1.5], two_classes(board)).errors
+    below, above = ({method: error[k] for method, error in errors.items()} for k in (0, 1))
+    assert below["loopy"] < below["mean field"] < 0.02
+    assert above["naive"] < above["loopy"] < above["mean field"]
+    assert above["mean field"] > 0.25
+    assert above["fast"] == pytest.approx(above["naive"], abs=0.005)
 
 
 def test_strongly_coupled_cells_vote():

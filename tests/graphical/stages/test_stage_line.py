@@ -8,7 +8,7 @@ import pytest
 from filterpy import discrete_bayes
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracle_of_stages import assert_oracle_agrees
+from pyagrum_oracle import assert_oracle_agrees
 
 from semgrid_edu.course.notebooks import NOTEBOOKS
 from semgrid_edu.errors import ArgumentError

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from oracle_of_stages import assert_oracle_agrees
+from pyagrum_oracle import assert_oracle_agrees
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals, why_dependent
@@ -124,6 +124,16 @@ def test_the_numbers_of_the_docstring():
     np.testing.assert_allclose(gain.joint.right, [0.713, 0.760], atol=0.0006)
     np.testing.assert_allclose(gain.neighbours.log_loss, gain.scans.log_loss, atol=1e-12)
     assert len(set(same_belief(SystemWorld().occupancy()[1]))) == 9
+
+
+def test_the_prices_of_the_cut_edges():
+    """What the earlier image adds is what classes that aren't carried on cost; o in both cells tells all scans."""
+    gain = system_gain()
+    np.testing.assert_allclose(gain.scans.log_loss - gain.joint.log_loss, [0.05, 0.10], atol=0.005)
+    np.testing.assert_allclose(gain.neighbours.log_loss, gain.scans.log_loss, atol=1e-12)
+    assert (
+        gain.neighbours.log_loss - gain.joint.log_loss > 0.8 * (gain.cell_by_cell.log_loss - gain.joint.log_loss)
+    ).all()
 
 
 def test_one_instant_leaves_nothing_to_gain_beyond_the_neighbour():
