@@ -21,6 +21,9 @@ TREES = {module: ast.parse(source) for module, source in SOURCES.items()}
 ENTRY = re.compile(r"(?P<names>\*{0,2}\w+(?:, \*{0,2}\w+)*)( : \S.*)?")
 """The first line of an entry in a numpydoc section, such as `low, high : float`."""
 
+REFERENCE = re.compile(r"\bParameters[\w, ]* are those of `([\w.]+)`")
+"""The sentence by which a docstring leaves its parameters to that of a twin or of a base class."""
+
 
 def definitions(body: list[ast.stmt], *kinds: type) -> list:
     """The public functions, classes or both that a module or a class defines."""
@@ -73,11 +76,22 @@ def described(docstring: str) -> set[str]:
     return names
 
 
+DESCRIBED = {name: described(docstring) for module in TREES for name, docstring, _ in documented(module)}
+"""What each public thing of the package describes itself, by "function", "Class" or "Class.method"."""
+
+
+def described_elsewhere(docstring: str, known: dict[str, set[str]]) -> set[str]:
+    """The parameters that another docstring describes, if this one refers to it by the sentence of `REFERENCE`."""
+    named = REFERENCE.search(" ".join(docstring.split()))
+    return known.get(named[1], set()) if named else set()
+
+
 def undescribed(module: str) -> list[str]:
     """What the docstrings of a module leave out, one line per function, class or method."""
     found = [] if ast.get_docstring(TREES[module]) else [f"{module} has no docstring"]
     for name, docstring, takes in documented(module):
-        missing = [argument for argument in takes if argument not in described(docstring)]
+        known = described(docstring) | described_elsewhere(docstring, DESCRIBED)
+        missing = [argument for argument in takes if argument not in known]
         if missing or not docstring:
             found.append(f"{module}: {name} doesn't describe {', '.join(missing) or 'itself'}")
     return found
@@ -135,3 +149,17 @@ def test_the_docstring_reader_knows_a_parameter_without_words():
         Sum.
     """
     assert described(docstring) == {"a", "b", "rest"}
+
+
+@pytest.mark.parametrize(
+    ("docstring", "parameters"),
+    [
+        ("Fly. Parameters and result are those of `fly`.", {"dt", "rng"}),
+        ("Fly.\n\n    Parameters, result and\n    errors are those of `Bird.fly`, without wind.", {"dt"}),
+        ("Fly. Parameters are those of `swim`, which nothing describes.", set()),
+        ("Fly: the literal twin of `fly`.", set()),
+        ("Fly as `fly` does. Parameters of birds. The wings are those of `fly`.", set()),
+    ],
+)
+def test_a_docstring_may_leave_its_parameters_to_one_that_describes_them(docstring, parameters):
+    assert described_elsewhere(docstring, {"fly": {"dt", "rng"}, "Bird.fly": {"dt"}}) == parameters

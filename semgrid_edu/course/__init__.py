@@ -1,1 +1,1 @@
-"""The course: its notebooks built from percent sources, its exercises, its grading, its equation register."""
+"""The course: notebooks built from percent sources, exercises, their grading, and the equation register."""

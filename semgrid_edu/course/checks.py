@@ -1,4 +1,4 @@
-"""What must hold of every committed notebook: in step with its source, run, quiet, small, free of this machine."""
+"""Checks of every committed notebook: up to date, executed without warnings, small, and free of paths of a machine."""
 
 import re
 from pathlib import Path
@@ -19,13 +19,13 @@ from semgrid_edu.course.notebooks import (
 from semgrid_edu.course.rules import RULES, Rule
 
 MAX_LINES = 25
-"""Lines of a code cell that a student can still take in."""
+"""Most lines of a code cell, so that a student can take it in at once."""
 
 MAX_BYTES = 2_000_000
-"""Size of a lecture or companion: figures and one or two animations."""
+"""Largest size of a lecture or companion, bytes: it has room for figures and one or two animations."""
 
 MAX_BYTES_TOGETHER = 16_000_000
-"""Size of all notebooks, so that the project is quick to clone."""
+"""Largest size of all notebooks together, bytes, so that the project is quick to clone."""
 
 COMMON_PARTS = {
     "a thesis": r"\*\*In one sentence\.\*\*",
@@ -52,7 +52,7 @@ COMPANION_PARTS = COMMON_PARTS | {
 """The parts of a companion, and how each is recognised in its source."""
 
 COMPANION_RULES = {name: rule for name, rule in RULES.items() if name != "length"}
-"""A companion may be long: nobody has to read it."""
+"""The rules for a companion. It may be long, because students choose whether to read it."""
 
 MACHINE = re.compile(r"(?<![\w.:/<])(?:/(?:home|root|tmp|work|usr|opt|mnt|srv|private|Users)/|[A-Z]:\\\\)\S*")
 ADDRESS = re.compile(r"\bat 0x[0-9a-f]{6,}\b")
@@ -60,23 +60,34 @@ LINK = re.compile(r"\]\((?!https?:|#|mailto:)([^)#\s]+)[^)]*\)")
 
 
 def lecture_problems(source: Path) -> list[str]:
-    """List all that is wrong with a lecture.
+    """List everything that is wrong with a lecture.
 
     Parameters
     ----------
     source : Path
-        `notebooks/src/NN_name.py`; the executed notebook is looked for where `built_path` puts it.
+        The source, `notebooks/src/NN_name.py`. The executed notebook is looked for where `built_path` puts it.
 
     Returns
     -------
     list of str
-        One sentence each, naming the notebook; empty when all is well.
+        One sentence per problem, with the name of the notebook; empty when nothing is wrong.
     """
     return [f"{built_path(source).name}: {problem}" for problem in _problems(source, LECTURE_PARTS, RULES)]
 
 
 def companion_problems(source: Path) -> list[str]:
-    """List all that is wrong with a companion, `notebooks/src/deeper/NAME.py`; as `lecture_problems`."""
+    """List everything that is wrong with a companion.
+
+    Parameters
+    ----------
+    source : Path
+        The source, `notebooks/src/deeper/NAME.py`. The executed notebook is looked for where `built_path` puts it.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem, with the name of the notebook; empty when nothing is wrong.
+    """
     name = f"{notebook_name(source)}.ipynb"
     problems = _problems(source, COMPANION_PARTS, COMPANION_RULES)
     if not any(f"]({name})" in lecture.read_text(encoding="utf-8") for lecture in source.parents[1].glob("*.py")):
@@ -85,17 +96,17 @@ def companion_problems(source: Path) -> list[str]:
 
 
 def exercise_problems(source: Path) -> list[str]:
-    """List all that is wrong with the student version of an exercise.
+    """List everything that is wrong with the student version of an exercise.
 
     Parameters
     ----------
     source : Path
-        `notebooks/src/exercises/NAME.py`.
+        The source, `notebooks/src/exercises/NAME.py`.
 
     Returns
     -------
     list of str
-        One sentence each, naming the notebook; empty when all is well.
+        One sentence per problem, with the name of the notebook; empty when nothing is wrong.
     """
     path = built_path(source)
     if not path.is_file():
@@ -108,7 +119,23 @@ def exercise_problems(source: Path) -> list[str]:
 
 
 def course_problems(folder: Path = NOTEBOOKS) -> list[str]:
-    """List all that is wrong with the lectures, companions and students' exercises in a folder of notebooks."""
+    """List everything that is wrong with the lectures, companions and students' exercises in a folder of notebooks.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder of notebooks, with their sources in `src`.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem, with the name of the notebook; empty when nothing is wrong.
+
+    Raises
+    ------
+    DataError
+        When the folder holds no lectures.
+    """
     problems = [problem for source in lecture_sources(folder) for problem in lecture_problems(source)]
     problems += [problem for source in companion_sources(folder) for problem in companion_problems(source)]
     problems += [problem for source in exercise_sources(folder) for problem in exercise_problems(source)]
@@ -124,8 +151,14 @@ def text_problems(notebook: NotebookNode, folder: Path) -> list[str]:
     Parameters
     ----------
     notebook : NotebookNode
+        The notebook, executed or not.
     folder : Path
-        Where the notebook lies; its links are relative to it.
+        The folder of the notebook, to which its links are relative.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem, with the first line of the cell.
     """
     problems = []
     for cell in notebook.cells:
@@ -159,7 +192,7 @@ def _problems(source: Path, parts: dict[str, str], rules: dict[str, Rule]) -> li
 
 
 def _run_problems(cell: NotebookNode, number: int) -> list[str]:
-    """List what shows that a code cell did not run, in its turn and without complaint."""
+    """List the signs that a code cell didn't run in its turn, or raised an error, or gave a warning."""
     problems = []
     if cell.execution_count != number:
         problems.append(f"has execution count {cell.execution_count}; execute the whole notebook in order")
@@ -180,11 +213,11 @@ def _printed(cell: NotebookNode) -> str:
 
 
 def _shown(cell: NotebookNode) -> str:
-    """Return what a cell shows as formatted text: its own, or what it displays."""
+    """Return the Markdown that a cell shows: its own text, or what its code displays."""
     displayed = [output.get("data", {}).get("text/markdown", "") for output in cell.get("outputs", [])]
     return cell.source if cell.cell_type == "markdown" else "\n".join(displayed)
 
 
 def _inputs(notebook: NotebookNode) -> list[tuple]:
-    """Return what the source of a notebook decides: kind, id, text and metadata of every cell."""
+    """Return what comes from the source of a notebook: kind, id, text and metadata of every cell."""
     return [(cell.cell_type, cell.id, cell.source, dict(cell.metadata)) for cell in notebook.cells]

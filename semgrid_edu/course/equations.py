@@ -14,13 +14,13 @@ class Equation:
     id : str
         "eq-N" for the paper's equation (N); a short name for a procedure.
     section : str
-        Of the paper.
+        Number of the paper's section, such as "3.2".
     title : str
         What it says, in a few words.
     literal : str
-        Dotted name of the code that reads like it.
+        Dotted name of the code that reads like the equation.
     fast : str or None
-        Dotted name of what the pipeline calls; None where the literal code is fast enough.
+        Dotted name of what the pipeline calls; None where there is only the literal code.
     lecture : str or None
         "NN_name#tag": the notebook and the tag of the cell that derives it; None while that is to come.
     exercise : str or None
@@ -45,7 +45,7 @@ EQUATIONS = (
     Equation(
         "segnet",
         "3.1",
-        "SegNet: up by the indices of max-pooling",
+        "SegNet: unpooling by the indices of max-pooling",
         literal="semgrid_edu.networks.SegNet",
         lecture="07_segmentation#unpool",
         exercise="07_segmentation#pool",
@@ -53,7 +53,7 @@ EQUATIONS = (
     Equation(
         "fcn",
         "3.1",
-        "FCN: scores of three depths, summed",
+        "FCN: sum of the scores from three depths",
         literal="semgrid_edu.networks.Fcn",
         lecture="07_segmentation#skips",
         exercise="07_segmentation#skip",
@@ -86,7 +86,7 @@ EQUATIONS = (
     Equation(
         "bof-predict",
         "3.2",
-        "BOF, what CMCDOT builds on: every velocity flies by itself",
+        "BOF, on which CMCDOT builds: predict, one velocity at a time",
         literal="semgrid_edu.occupancy.bof_predict_literal",
         fast="semgrid_edu.occupancy.bof_predict",
         lecture="03_bof#bof-predict",
@@ -95,7 +95,7 @@ EQUATIONS = (
     Equation(
         "bof-update",
         "3.2",
-        "BOF: a scan picks places, and places pick velocities",
+        "BOF: update by Bayes' rule",
         literal="semgrid_edu.occupancy.bof_update_literal",
         fast="semgrid_edu.occupancy.bof_update",
         lecture="03_bof#bof-update",
@@ -149,7 +149,7 @@ EQUATIONS = (
     Equation(
         "eq-2",
         "3.3",
-        "A plane takes its value from the scores there",
+        "A point of a plane takes the scores of its pixel",
         literal="semgrid_edu.planes.sample_planes_naive",
         fast="semgrid_edu.planes.PlaneSampler",
         lecture="06_planes#eq-2",
@@ -213,11 +213,11 @@ EQUATIONS = (
     ),
     Equation("fmiou", "4.2", "FmIoU", literal="semgrid_edu.metrics.frequency_weighted_iou"),
 )
-"""In the order of the paper."""
+"""All equations and procedures, in the order of the paper."""
 
 
 def equation_table() -> str:
-    """Return the register as a Markdown table, with links that work from the folder of notebooks."""
+    """Return the register as a Markdown table, whose links work in the folder of notebooks."""
     rows = ["| | paper | what | literal code | fast code | lecture | exercise |", "|---|---|---|---|---|---|---|"]
     for entry in EQUATIONS:
         number = f"({entry.id[3:]})" if entry.id.startswith("eq-") else ""

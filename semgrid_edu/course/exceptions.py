@@ -1,4 +1,4 @@
-"""Which lectures may break which rules until their second edition: one list, which only gets shorter."""
+"""Which lectures may break which rules until their second edition: a list that only gets shorter."""
 
 from collections.abc import Collection, Mapping
 
@@ -19,22 +19,27 @@ EXCEPTIONS: Mapping[str, frozenset[str]] = {
     "07_segmentation": NOT_YET | {"length"},
     "08_fusion": NOT_YET | {"length"},
 }
-"""For each lecture the names of rules, as in `RULES`. An exception that is no longer needed is a problem itself."""
+"""The rules that each lecture may break, by their names in `RULES`. An exception that isn't needed is a problem too."""
 
 
 def rule_problems(
     notebook: NotebookNode, rules: Mapping[str, Rule] = RULES, allowed: Collection[str] = ()
 ) -> list[str]:
-    """List what breaks a rule without an exception, and the exceptions that nothing needs.
+    """List where a notebook breaks a rule without having an exception, and the exceptions that it no longer needs.
 
     Parameters
     ----------
     notebook : NotebookNode
-        Executed.
+        An executed notebook.
     rules : mapping of str to Rule
-        Those to keep, by name.
+        The rules to check, by name.
     allowed : collection of str
-        The rules that this notebook may break.
+        Names of the rules that this notebook may break.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem; empty when there is none.
     """
     problems = []
     for name, rule in rules.items():

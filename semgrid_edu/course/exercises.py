@@ -27,11 +27,22 @@ RELEASE_STEPS = (LockCells, ClearSolutions, ClearOutput, ClearHiddenTests, Compu
 """What nbgrader's generate_assignment does to a notebook, without its gradebook."""
 
 MARKER = "semgrid_course.json"
-"""The file that says that a folder is a course that we laid out."""
+"""The file by which a folder is recognised as a course that `build_course` wrote."""
 
 
 def exercise_sources(folder: Path = NOTEBOOKS) -> list[Path]:
-    """Return the percent sources of all exercises: in the order of the course, then those of companions by name."""
+    """Return the percent sources of all exercises.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder of notebooks.
+
+    Returns
+    -------
+    list of Path
+        The lectures' exercises in the order of the course, then those of companions by name.
+    """
     return sorted((folder / "src" / "exercises").glob("*.py"))
 
 
@@ -41,7 +52,7 @@ def student_version(source: Path) -> NotebookNode:
     Parameters
     ----------
     source : Path
-        `notebooks/src/exercises/NAME.py`, with nbgrader's markers and metadata.
+        The source, `notebooks/src/exercises/NAME.py`, with nbgrader's markers and metadata.
 
     Returns
     -------
@@ -55,28 +66,39 @@ def student_version(source: Path) -> NotebookNode:
 
 
 def build_exercise(source: Path) -> Path:
-    """Write the student version of an exercise to `notebooks/exercises/NAME.ipynb`, and return that path."""
+    """Write the student version of an exercise.
+
+    Parameters
+    ----------
+    source : Path
+        The source, `notebooks/src/exercises/NAME.py`.
+
+    Returns
+    -------
+    Path
+        The file written, `notebooks/exercises/NAME.ipynb`.
+    """
     target = built_path(source)
     write_notebook(student_version(source), target)
     return target
 
 
 def build_course(directory: str | Path, folder: Path = NOTEBOOKS) -> list[str]:
-    """Lay out a complete nbgrader course: sources, settings, the instructor's module, gradebook and released versions.
+    """Write a complete nbgrader course: sources, settings, the instructor's module, gradebook and released versions.
 
-    Run again, it brings sources and settings up to date and leaves submissions and grades alone.
+    When it is run again, it brings sources and settings up to date, and leaves submissions and grades as they are.
 
     Parameters
     ----------
     directory : path-like
-        Missing, empty, or a course laid out before.
+        The folder of the course: missing, empty, or with a course that was written before.
     folder : Path
         The folder of notebooks.
 
     Returns
     -------
     list of str
-        The assignments.
+        Names of the assignments.
 
     Raises
     ------
@@ -104,12 +126,13 @@ def course_api(directory: Path) -> Iterator[NbGraderAPI]:
     Parameters
     ----------
     directory : Path
-        A folder that `build_course` laid out.
+        A course that `build_course` wrote.
 
     Yields
     ------
     NbGraderAPI
-        The settings put the instructor's module on the kernels' path; that is taken back when the block ends.
+        nbgrader's commands on that course. The settings put the instructor's module on the kernels' path; that is
+        undone when the block ends.
     """
     before = dict(os.environ)
     try:
@@ -123,7 +146,7 @@ def course_api(directory: Path) -> Iterator[NbGraderAPI]:
 
 
 def _refuse_what_is_not_ours(directory: Path) -> None:
-    """Raise when a folder holds anything but a course that we laid out."""
+    """Raise when a folder holds anything but a course that `build_course` wrote."""
     if directory.is_file():
         raise DataError(directory, "a folder", "a file")
     if directory.exists() and any(directory.iterdir()) and not (directory / MARKER).is_file():

@@ -1,4 +1,4 @@
-"""The figures in a notebook's outputs: small files, their resolution, their alternative texts."""
+"""The figures in a notebook's outputs: how large they are, their resolution, and their alternative texts."""
 
 import base64
 import io
@@ -17,23 +17,34 @@ JUST_NOTICEABLE = 2.3
 """The distance in CIELAB at which most people begin to tell two colours apart (Mahy et al., 1994)."""
 
 LARGEST_SHIFT = 10.0
-"""How far, in CIELAB, the mean colour of 3 x 3 pixels may move: a small marker keeps its colour."""
+"""How far the mean colour of 3 x 3 pixels may move in CIELAB, so that even a small marker keeps its colour."""
 
 
 def figures(cell: NotebookNode) -> Iterator[NotebookNode]:
-    """Yield the outputs of a cell that are images."""
+    """Yield the outputs of a cell that are images.
+
+    Parameters
+    ----------
+    cell : NotebookNode
+        A cell of an executed notebook.
+
+    Yields
+    ------
+    NotebookNode
+        An output with an image among its data.
+    """
     for output in cell.get("outputs", []):
         if any(kind.startswith("image/") for kind in output.get("data", {})):
             yield output
 
 
 def alternative_text(cell: NotebookNode, figure: NotebookNode) -> str:
-    """Return what a figure says to a reader who can't see it; "" when nobody has written that down.
+    """Return the text that stands for a figure when a reader can't see it; "" when it has none.
 
     Parameters
     ----------
     cell : NotebookNode
-        The code cell that draws the figure. The text is its metadata `alt`, as nbconvert has it.
+        The code cell that draws the figure. The text is the entry `alt` of its metadata, as in nbconvert.
     figure : NotebookNode
         One of the cell's outputs. It may carry its own text, as animations do.
     """
@@ -44,8 +55,18 @@ def alternative_text(cell: NotebookNode, figure: NotebookNode) -> str:
 def resolution(png: bytes) -> int | None:
     """Return the dots per inch that a PNG says it has; None when it doesn't say or is animated.
 
-    Matplotlib writes them into every figure. A picture that isn't matplotlib's has no size in inches, and an animation
-    has its limit in bytes instead.
+    Matplotlib writes them into every figure. Other pictures have no size in inches, and the size of an animation is
+    limited in bytes instead.
+
+    Parameters
+    ----------
+    png : bytes
+        A PNG file.
+
+    Returns
+    -------
+    int or None
+        Dots per inch along the x axis, rounded.
     """
     with Image.open(io.BytesIO(png)) as image:
         dots = image.info.get("dpi")
@@ -53,18 +74,30 @@ def resolution(png: bytes) -> int | None:
 
 
 def moves(png: bytes) -> bool:
-    """Return whether a PNG is animated."""
+    """Return whether a PNG is animated.
+
+    Parameters
+    ----------
+    png : bytes
+        A PNG file.
+
+    Returns
+    -------
+    bool
+        True when it has more than one frame.
+    """
     with Image.open(io.BytesIO(png)) as image:
         return getattr(image, "n_frames", 1) > 1
 
 
 def finish_figures(cell: NotebookNode) -> None:
-    """Make the PNGs in a cell's outputs small, and write their alternative texts beside them.
+    """Make the PNGs in a cell's outputs smaller, and store the alternative texts with the figures.
 
     Parameters
     ----------
     cell : NotebookNode
-        A code cell that has run; changed in place. nbconvert's classic template reads the text there.
+        A code cell that has run; changed in place. The texts go into the metadata of the outputs, where nbconvert's
+        classic template reads them.
     """
     for figure in figures(cell):
         if PNG in figure.data:
@@ -76,12 +109,23 @@ def finish_figures(cell: NotebookNode) -> None:
 
 
 def png_bytes(figure: NotebookNode) -> bytes:
-    """Return the PNG of an output."""
+    """Return the PNG of an output.
+
+    Parameters
+    ----------
+    figure : NotebookNode
+        An output with a PNG among its data.
+
+    Returns
+    -------
+    bytes
+        The PNG file.
+    """
     return base64.b64decode(figure.data[PNG])
 
 
 def palette_png(png: bytes) -> bytes:
-    """Store a PNG with at most 256 colours, about half as large, when the eye can't tell.
+    """Reduce a PNG to at most 256 colours, which makes it about half as large, when the eye can't tell the difference.
 
     Parameters
     ----------
@@ -91,9 +135,10 @@ def palette_png(png: bytes) -> bytes:
     Returns
     -------
     bytes
-        With 256 colours when 99 % of the pixels move by less than `JUST_NOTICEABLE` and the mean of 3 x 3 pixels
-        nowhere by more than `LARGEST_SHIFT`; else, as for photographs, with the colours that it had. Its dots per inch
-        stay. Animations and transparent pictures are returned as they are. The same bytes give the same bytes.
+        A PNG of 256 colours when the colours of 99 % of the pixels move by less than `JUST_NOTICEABLE`, and the mean
+        of 3 x 3 pixels moves by less than `LARGEST_SHIFT` everywhere. Otherwise, as for photographs, it keeps its
+        colours. Its dots per inch stay. Animations and transparent pictures are returned as they are. The result
+        depends on the bytes of the file alone.
     """
     with Image.open(io.BytesIO(png)) as image:
         if moves(png) or image.convert("RGBA").getextrema()[3][0] < 255:
@@ -121,6 +166,7 @@ def cielab(rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
     Parameters
     ----------
     rgb : (..., 3) uint8
+        Red, green and blue, 0..255.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Grading by nbgrader itself: notebooks in, scores and messages by test cell out."""
+"""Grading by nbgrader: it takes notebooks, and gives a score and a message for each test cell."""
 
 import copy
 from collections.abc import Mapping
@@ -18,14 +18,14 @@ from semgrid_edu.errors import ArgumentError, DataError
 
 @dataclass(frozen=True)
 class CellScore:
-    """What nbgrader made of one test cell.
+    """The result of one test cell.
 
     Parameters
     ----------
     points : float
         What the cell is worth.
     score : float or None
-        What the answer earned; None where a person has yet to read it.
+        What the answer earned; None until a person has read the answer.
     message : str
         The error that the student sees; "" without one.
     """
@@ -61,7 +61,18 @@ def tasks(source: Path) -> dict[str, tuple[str, ...]]:
 
 
 def reference_answers(source: Path) -> dict[str, str]:
-    """Return the solution of each task of an exercise, by the grade_id of its answer cell."""
+    """Return the solution of each task of an exercise.
+
+    Parameters
+    ----------
+    source : Path
+        The percent source of the exercise.
+
+    Returns
+    -------
+    dict of str to str
+        The text of each answer cell, by its grade_id.
+    """
     return {c.metadata.nbgrader.grade_id: c.source for c in read_percent(source).cells if is_solution(c)}
 
 
@@ -73,7 +84,12 @@ def submission(source: Path, answers: Mapping[str, str]) -> NotebookNode:
     source : Path
         The percent source of the exercise.
     answers : mapping of str to str
-        The new text of answer cells, by grade_id. Those not named stay as they were handed out.
+        The new text of answer cells, by grade_id. The other cells stay as students get them.
+
+    Returns
+    -------
+    NotebookNode
+        The notebook that a student would hand in, not executed.
 
     Raises
     ------
@@ -97,23 +113,23 @@ def autograde(
     Parameters
     ----------
     course : Path
-        A folder that `build_course` laid out.
+        The folder of a course that `build_course` wrote.
     assignment : str
         The exercise, such as "00_tour".
     submissions : mapping of str to NotebookNode
-        One notebook a student.
+        One notebook per student, by the student's name.
     timeout : int
-        Seconds that a cell may take.
+        The longest that a cell may take, seconds.
 
     Returns
     -------
     dict of str to dict of str to CellScore
-        For each student, for each test cell.
+        The result of each test cell, by student and by the cell's grade_id.
 
     Raises
     ------
     DataError
-        When nbgrader could not grade a submission to its end: then the gradebook's 0 is no score.
+        When nbgrader could not grade a submission completely: the 0 in its gradebook is then not a score.
     """
     for student, notebook in submissions.items():
         write_notebook(notebook, _place(course, "submitted", student, assignment))

@@ -1,4 +1,4 @@
-"""Links from the registers to code and notebooks, for tables that are shown in the folder of notebooks."""
+"""Links to code and notebooks, for the registers' tables, which are shown in the folder of notebooks."""
 
 from importlib import import_module
 
@@ -8,10 +8,20 @@ from semgrid_edu.errors import ArgumentError
 def find_code(name: str) -> object:
     """Return the function or class that a dotted name stands for.
 
+    Parameters
+    ----------
+    name : str
+        Such as "semgrid_edu.camera.project".
+
+    Returns
+    -------
+    object
+        The function or class.
+
     Raises
     ------
     ArgumentError
-        When there is none.
+        When nothing of that name can be imported.
     """
     module, _, attribute = name.rpartition(".")
     try:
@@ -21,20 +31,41 @@ def find_code(name: str) -> object:
 
 
 def code_link(name: str) -> str:
-    """Link a dotted name to the module that defines it."""
+    """Link a function or class to the module that defines it.
+
+    Parameters
+    ----------
+    name : str
+        Its dotted name, such as "semgrid_edu.camera.project".
+
+    Returns
+    -------
+    str
+        A link in Markdown.
+
+    Raises
+    ------
+    ArgumentError
+        When nothing of that name can be imported.
+    """
     module = find_code(name).__module__
     return f"[`{name.rpartition('.')[2]}`](../{module.replace('.', '/')}.py)"
 
 
 def notebook_link(place: str | None, folder: str = "") -> str:
-    """Link "notebook#part" to its notebook.
+    """Link a part of a notebook to the notebook.
 
     Parameters
     ----------
     place : str or None
         Such as "02_grids#log-odds", or "deeper/graphical_models#messages" for a companion; None while it is to come.
     folder : str
-        Where the notebook lies among the notebooks, such as "exercises/".
+        Folder of the notebook inside the folder of notebooks, such as "exercises/".
+
+    Returns
+    -------
+    str
+        A link in Markdown, and the name of the part; "to come" for None.
 
     Examples
     --------

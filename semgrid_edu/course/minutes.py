@@ -1,4 +1,4 @@
-"""How long a notebook takes a student, computed from what is in it, so that its header can be honest."""
+"""How long a student needs for a notebook, computed from its contents, so that its header can be honest."""
 
 import re
 from dataclasses import astuple, dataclass
@@ -30,21 +30,21 @@ SECTION = re.compile(r"^(?=## )", re.MULTILINE)
 
 @dataclass(frozen=True)
 class ReadingTime:
-    r"""What there is to read, look at and think about.
+    r"""How much a notebook, or a part of it, gives to read, to look at and to think about.
 
     Parameters
     ----------
     words : int
-        Of text, headings, tables and folded answers. A formula or a piece of code within a line is one word. The
-        targets of links, blocks of code in the text and all that cells print don't count.
+        Words of text, headings, tables and folded answers. A formula or a piece of code within a line is one word. The
+        targets of links, blocks of code in the text and everything that cells print don't count.
     equations : int
-        Displayed ones: `$$...$$`, `\[...\]` or an `align`, `equation`, `gather` or `multline` without dollars.
+        Displayed equations: `$$...$$`, `\[...\]` or an `align`, `equation`, `gather` or `multline` without dollars.
     figures : int
         Images below cells or in the text, animations too.
     predictions : int
-        Of the words `PREDICTION`.
+        How often the words `PREDICTION` occur.
     lines : int
-        Of code that isn't collapsed; comments count, blank lines don't.
+        Lines of code that isn't collapsed; comments count, blank lines don't.
 
     Examples
     --------
@@ -71,16 +71,27 @@ class ReadingTime:
 
     @property
     def minutes(self) -> float:
-        """All of them together."""
+        """The minutes of all kinds of work together."""
         return sum(self.parts.values())
 
     def __add__(self, other: "ReadingTime") -> "ReadingTime":
-        """Add up two pieces of a notebook."""
+        """Return what two pieces of a notebook give together."""
         return ReadingTime(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
 
 
 def reading_time(notebook: NotebookNode) -> ReadingTime:
-    """Return the reading time of a notebook; of one that hasn't run it misses the figures."""
+    """Return the reading time of a notebook.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        The notebook; as long as it hasn't run, the figures below its cells aren't counted.
+
+    Returns
+    -------
+    ReadingTime
+        The sum over its sections.
+    """
     return sum(section_times(notebook).values(), ReadingTime())
 
 
@@ -90,11 +101,12 @@ def section_times(notebook: NotebookNode) -> dict[str, ReadingTime]:
     Parameters
     ----------
     notebook : NotebookNode
+        The notebook; as long as it hasn't run, the figures below its cells aren't counted.
 
     Returns
     -------
     dict of str to ReadingTime
-        By the text of the section's heading (`## ...`), in order; what stands before the first is "(header)".
+        By the text of each section's heading (`## ...`), in order. What stands before the first has the key "(header)".
     """
     section = "(header)"
     times = {section: ReadingTime()}
@@ -111,6 +123,16 @@ def section_times(notebook: NotebookNode) -> dict[str, ReadingTime]:
 
 def time_of_text(text: str) -> ReadingTime:
     """Return the reading time of a text in Markdown.
+
+    Parameters
+    ----------
+    text : str
+        The text of a cell, or a part of it.
+
+    Returns
+    -------
+    ReadingTime
+        Its words, displayed equations, pictures and predictions.
 
     Examples
     --------
@@ -129,18 +151,29 @@ def time_of_text(text: str) -> ReadingTime:
 
 
 def stated_minutes(notebook: NotebookNode) -> int | None:
-    """Return the minutes in the header of a notebook; None without any."""
+    """Return the minutes that the header of a notebook states.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        The notebook, executed or not.
+
+    Returns
+    -------
+    int or None
+        The minutes; None when the notebook states none.
+    """
     found = STATED.search("\n".join(cell.source for cell in notebook.cells))
     return int(found[1]) if found else None
 
 
 def minutes_table(sources: list[Path]) -> str:
-    """Tell where the time goes: a line for each notebook, or for each section when there is one notebook only.
+    """Return a table of where the time goes: a line for each notebook, or for each section of a single notebook.
 
     Parameters
     ----------
     sources : list of Path
-        Percent sources of lectures and companions. Figures are counted in the executed notebooks, where there are any.
+        Percent sources of lectures and companions. Figures are counted in the executed notebooks, if there are any.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Notebooks from percent sources: stable cell ids, executed lectures, nothing of this machine in the file."""
+"""Notebooks from percent sources: stable cell ids, executed lectures, and no traces of a machine in the file."""
 
 import hashlib
 from pathlib import Path
@@ -19,10 +19,10 @@ METADATA = {
     "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
     "language_info": {"name": "python"},
 }
-"""All that a notebook says about where it ran: any Python 3."""
+"""What a notebook says about where it ran: on any Python 3."""
 
 LIVE = "application/vnd.jupyter.widget-view+json"
-"""The output of a widget: alive only with a kernel, and named at random."""
+"""The output of a widget. It works only with a kernel, and its name is random."""
 
 
 def lecture_sources(folder: Path = NOTEBOOKS) -> list[Path]:
@@ -33,10 +33,15 @@ def lecture_sources(folder: Path = NOTEBOOKS) -> list[Path]:
     folder : Path
         The folder of notebooks.
 
+    Returns
+    -------
+    list of Path
+        The files `src/NN_name.py`.
+
     Raises
     ------
     DataError
-        When there are none, as in an installed wheel.
+        When there are no lectures, as in an installed wheel.
     """
     sources = sorted((folder / "src").glob("[0-9][0-9]_*.py"))
     if not sources:
@@ -45,18 +50,50 @@ def lecture_sources(folder: Path = NOTEBOOKS) -> list[Path]:
 
 
 def companion_sources(folder: Path = NOTEBOOKS) -> list[Path]:
-    """Return the percent sources of all companion notebooks, by name; there may be none."""
+    """Return the percent sources of all companion notebooks.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder of notebooks.
+
+    Returns
+    -------
+    list of Path
+        The files `src/deeper/NAME.py`, sorted by name; there may be none.
+    """
     return sorted((folder / "src" / "deeper").glob("*.py"))
 
 
 def notebook_name(source: Path) -> str:
-    """Return the name of a source's notebook, such as "03_bof", "exercises/03_bof" or "deeper/graphical_models"."""
+    """Return the name of a source's notebook, such as "03_bof", "exercises/03_bof" or "deeper/graphical_models".
+
+    Parameters
+    ----------
+    source : Path
+        A percent source in the folder `src` or below it.
+
+    Returns
+    -------
+    str
+        The path of the source within `src`, without its suffix.
+    """
     sources = next(folder for folder in source.parents if folder.name == "src")
     return source.relative_to(sources).with_suffix("").as_posix()
 
 
 def built_path(source: Path) -> Path:
-    """Return where the notebook of a source belongs: the same place without `src`.
+    """Return the path of a source's notebook: that of the source without `src`.
+
+    Parameters
+    ----------
+    source : Path
+        A percent source in the folder `src` or below it.
+
+    Returns
+    -------
+    Path
+        The notebook; it needn't exist yet.
 
     Examples
     --------
@@ -68,19 +105,24 @@ def built_path(source: Path) -> Path:
 
 
 def named(sources: list[Path], names: list[str] | None) -> list[Path]:
-    """Keep the sources that are named; all of them when no name is given.
+    """Return the sources with the given names; all of them when no name is given.
 
     Parameters
     ----------
     sources : list of Path
-        A lecture and its exercise have the same name, and are chosen together.
+        The sources to choose from. A lecture and its exercise have the same name, and are chosen together.
     names : list of str, optional
-        Such as "03_bof" or "graphical_models".
+        The names to keep, such as "03_bof" or "graphical_models".
+
+    Returns
+    -------
+    list of Path
+        The chosen sources, in their order.
 
     Raises
     ------
     ArgumentError
-        When a name isn't that of any source.
+        When no source has one of the names.
     """
     known = sorted({source.stem for source in sources})
     for name in names or []:
@@ -100,7 +142,7 @@ def read_percent(path: Path) -> NotebookNode:
     Returns
     -------
     NotebookNode
-        Its cell ids depend on the cells' text alone, so two conversions are equal byte for byte.
+        The notebook. The ids of its cells depend on the cells' text alone, so two conversions are equal byte for byte.
 
     Raises
     ------
@@ -121,33 +163,41 @@ def read_percent(path: Path) -> NotebookNode:
 
 
 def write_notebook(notebook: NotebookNode, path: Path) -> None:
-    """Validate a notebook and write it atomically."""
+    """Validate a notebook and write it atomically.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        The notebook.
+    path : Path
+        The file to write; its folder is made when missing.
+    """
     nbformat.validate(notebook)
     write_text(path, nbformat.writes(notebook))
 
 
 def execute(notebook: NotebookNode, folder: Path, timeout: int = 300) -> NotebookNode:
-    """Run all cells, and keep only what every reader can see.
+    """Run all cells, and keep the outputs that can be seen without a kernel.
 
     Parameters
     ----------
     notebook : NotebookNode
-        Changed in place.
+        The notebook to run, changed in place.
     folder : Path
-        The kernel's working directory, where a student would run it.
+        The kernel's working directory: the folder in which a student would run the notebook.
     timeout : int
-        Seconds that one cell may take.
+        The longest that one cell may take, seconds.
 
     Returns
     -------
     NotebookNode
-        The same notebook, with outputs. The views of widgets are left out: without a kernel they show nothing. Figures
-        are made smaller where nobody sees the difference, and carry the alternative text of their cell.
+        The same notebook, with outputs. The views of widgets are left out, because they show nothing without a kernel.
+        Figures are made smaller where the eye can't tell the difference, and carry the alternative text of their cell.
 
     Raises
     ------
     nbclient.exceptions.CellExecutionError
-        When a cell raises; it names the cell.
+        When a cell raises an error; the message names the cell.
     """
     place = {"metadata": {"path": folder}}
     client = NotebookClient(notebook, timeout=timeout, record_timing=False, resources=place)
@@ -161,7 +211,18 @@ def execute(notebook: NotebookNode, folder: Path, timeout: int = 300) -> Noteboo
 
 
 def build_lecture(source: Path) -> Path:
-    """Execute a lecture or a companion, write it, and return where `built_path` puts it."""
+    """Execute a lecture or a companion and write it.
+
+    Parameters
+    ----------
+    source : Path
+        Its percent source.
+
+    Returns
+    -------
+    Path
+        The notebook written, at `built_path`.
+    """
     target = built_path(source)
     target.parent.mkdir(exist_ok=True)
     write_notebook(execute(read_percent(source), target.parent), target)

@@ -1,4 +1,4 @@
-"""Rules on how a notebook treats its reader: honest minutes, no answer in sight, figures that all can read."""
+"""Rules that protect the reader of a notebook: honest minutes, no answer in sight, figures that everybody can read."""
 
 import ast
 import re
@@ -14,13 +14,24 @@ MAX_MINUTES = 75
 """The longest that a lecture's main path may take."""
 
 MIN_ALT_WORDS = 4
-"""Fewer words than that don't describe a figure."""
+"""An alternative text with fewer words than this doesn't describe a figure."""
 
 HEADING = re.compile(r"^#{1,6} ", re.MULTILINE)
 
 
 def dishonest_minutes(notebook: NotebookNode) -> list[str]:
-    """Refuse a header that states fewer minutes than `reading_time` computes."""
+    """Report a header that states fewer minutes than `reading_time` computes.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        An executed notebook.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem; empty when there is none.
+    """
     needed, stated = round(reading_time(notebook).minutes), stated_minutes(notebook)
     if stated is None or stated >= needed:
         return []
@@ -28,7 +39,18 @@ def dishonest_minutes(notebook: NotebookNode) -> list[str]:
 
 
 def too_long(notebook: NotebookNode) -> list[str]:
-    """Refuse a lecture of more than `MAX_MINUTES` minutes."""
+    """Report a lecture of more than `MAX_MINUTES` minutes.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        An executed notebook.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem; empty when there is none.
+    """
     needed = round(reading_time(notebook).minutes)
     if needed <= MAX_MINUTES:
         return []
@@ -36,10 +58,20 @@ def too_long(notebook: NotebookNode) -> list[str]:
 
 
 def answers_in_sight(notebook: NotebookNode) -> list[str]:
-    """Refuse a cell that shows the answer to a prediction before the reader has asked for it.
+    """Report a cell that shows the answer to a prediction before the reader has asked for it.
 
-    It is the first code cell with output below a prediction, unless a heading comes between: then the folded answer is
-    the only one.
+    The answer is taken to be the first code cell with output below the prediction. If a heading comes before that
+    cell, the prediction has only its folded answer.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        An executed notebook.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem; empty when there is none.
     """
     problems, open_question = [], False
     for cell in notebook.cells:
@@ -55,7 +87,18 @@ def answers_in_sight(notebook: NotebookNode) -> list[str]:
 
 
 def plot_code_in_sight(notebook: NotebookNode) -> list[str]:
-    """Refuse plot code that isn't collapsed: a cell with a figure that defines, asserts and prints nothing."""
+    """Report plot code that isn't collapsed: a cell with a figure that defines, asserts and prints nothing.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        An executed notebook.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem; empty when there is none.
+    """
     return [
         f'cell {_first_line(cell)} only plots; give it jupyter={{"source_hidden": true}}'
         for cell in _cells_with_figures(notebook)
@@ -64,7 +107,18 @@ def plot_code_in_sight(notebook: NotebookNode) -> list[str]:
 
 
 def missing_alternative_texts(notebook: NotebookNode) -> list[str]:
-    """Refuse a figure that tells nothing to a reader who can't see it."""
+    """Report a figure whose alternative text is missing or too short to describe it.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        An executed notebook.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem; empty when there is none.
+    """
     problems = []
     for cell in _cells_with_figures(notebook):
         for figure in figures(cell):
@@ -78,7 +132,18 @@ def missing_alternative_texts(notebook: NotebookNode) -> list[str]:
 
 
 def coarse_figures(notebook: NotebookNode) -> list[str]:
-    """Refuse figures of fewer dots per inch than `FIGURE_DPI`."""
+    """Report figures of fewer dots per inch than `FIGURE_DPI`.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        An executed notebook.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem; empty when there is none.
+    """
     problems = []
     for cell in _cells_with_figures(notebook):
         for figure in figures(cell):
@@ -89,7 +154,18 @@ def coarse_figures(notebook: NotebookNode) -> list[str]:
 
 
 def unfit_animations(notebook: NotebookNode) -> list[str]:
-    """Refuse animations of more than `MAX_ANIMATION_BYTES`, and kinds of images that only JupyterLab shows."""
+    """Report animations of more than `MAX_ANIMATION_BYTES`, and kinds of images that only JupyterLab shows.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        An executed notebook.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem; empty when there is none.
+    """
     problems = []
     for cell in _cells_with_figures(notebook):
         for figure in figures(cell):
@@ -106,7 +182,7 @@ def unfit_animations(notebook: NotebookNode) -> list[str]:
 
 
 Rule = Callable[[NotebookNode], list[str]]
-"""Takes an executed notebook and returns what is wrong, one sentence each."""
+"""A function that takes an executed notebook and returns what is wrong, one sentence per problem."""
 
 RULES: dict[str, Rule] = {
     "minutes": dishonest_minutes,
@@ -131,7 +207,7 @@ def _collapsed(cell: NotebookNode, what: str) -> bool:
 
 
 def _only_plots(source: str) -> bool:
-    """Return whether code neither defines nor asserts nor prints anything; magics are no Python and don't only plot."""
+    """Return whether code neither defines nor asserts nor prints anything; False for magics, which aren't Python."""
     try:
         nodes = list(ast.walk(ast.parse(source)))
     except SyntaxError:

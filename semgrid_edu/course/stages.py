@@ -87,11 +87,11 @@ STAGES = (
         check="tests/graphical/stages/test_stage_system.py::test_who_knows_more_loses_less",
     ),
 )
-"""In the order of the pipeline, the whole system last."""
+"""All stages in the order of the pipeline, and the whole system last."""
 
 
 def stage_table() -> str:
-    """Return the stages as a Markdown table, with links that work from the folder of notebooks."""
+    """Return the stages as a Markdown table, whose links work in the folder of notebooks."""
     rows = ["| stage | its graphical model | its exact check | lecture |", "|---|---|---|---|"]
     for stage in STAGES:
         rows.append(f"| {stage.title} | {code_link(stage.model)} | {_check(stage)} | {notebook_link(stage.lecture)} |")

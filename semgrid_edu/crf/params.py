@@ -10,7 +10,7 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.occupancy import N_STATES
 
 PAPER_CELL = 0.2
-"""Metres: the side of a cell in the paper (section 4.1)."""
+"""Side of a cell in the paper, metres (section 4.1)."""
 
 
 @dataclass(frozen=True)
@@ -134,12 +134,26 @@ def unary_from_log_probability(log_probability: NDArray) -> NDArray:
 
 
 def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return unary (C, H, W) and values (4, H, W) as float64, after checking them.
+    """Check what the CRF is given, and return it as float64.
+
+    Parameters
+    ----------
+    unary : (C, H, W) float
+        phi_u of eq. (3), the cost of each class in each cell; infinite for an impossible class.
+    values : (4, H, W) float
+        o, the probability of FREE, STATIC, DYNAMIC and UNKNOWN in each cell.
+
+    Returns
+    -------
+    unary : (C, H, W) float64
+        The same costs.
+    values : (4, H, W) float64
+        The same probabilities.
 
     Raises
     ------
     ArgumentError
-        When shapes don't fit, a unary is NaN or -inf, a cell has no possible class, or states don't sum to one.
+        When the shapes don't fit, a cost is NaN or -inf, a cell has no possible class, or states don't sum to 1.
     """
     unary, values = np.asarray(unary, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if unary.ndim != 3 or 0 in unary.shape:
@@ -156,12 +170,17 @@ def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float6
 
 
 def check_iterations(iterations: int) -> None:
-    """Refuse a number of iterations that isn't a whole number of at least 0.
+    """Refuse a number of iterations that is impossible.
+
+    Parameters
+    ----------
+    iterations : int
+        How many times mean field updates all cells.
 
     Raises
     ------
     ArgumentError
-        When it is negative or no whole number.
+        When it is negative or not a whole number.
     """
     if not isinstance(iterations, int | np.integer) or iterations < 0:
         raise ArgumentError("iterations", "a whole number of at least 0", iterations)

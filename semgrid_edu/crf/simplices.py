@@ -13,10 +13,20 @@ _FORTH, _BACK = 0, 1
 
 
 def elevation(d: int) -> NDArray[np.float64]:
-    """Return the (d + 1, d) matrix from d features to the hyperplane of zero sum.
+    """Return the matrix that takes d features to the hyperplane of zero sum.
 
     It is scaled so that the whole filter has unit variance: splat and slice have variance (d + 1)^2 / 12 along each
     axis, the blur (d + 1)^2 / 2 (Adams 2010, section 3.1).
+
+    Parameters
+    ----------
+    d : int
+        Number of features of a point.
+
+    Returns
+    -------
+    (d + 1, d) float64
+        The matrix; its columns are orthogonal.
     """
     basis = np.zeros((d + 1, d))
     for j in range(d):
@@ -29,6 +39,16 @@ def peak(d: int) -> float:
     """Return the factor that gives the filter of d features the integral of the Gaussian, (2 pi)^(d/2).
 
     Without it the integral is the volume of feature space that belongs to one vertex, (3/2)^(d/2) / sqrt(d + 1).
+
+    Parameters
+    ----------
+    d : int
+        Number of features of a point.
+
+    Returns
+    -------
+    float
+        The factor.
     """
     return (4 * np.pi / 3) ** (d / 2) * np.sqrt(d + 1)
 
@@ -149,9 +169,19 @@ def number_vertices(origins, ranks):
 
 @njit(cache=True, parallel=True)
 def find_neighbours(keys, slots):
-    """Find the vertices one step forward and one step backward along each direction, (d + 1, 2, M) int32.
+    """Find the vertices one step forward and one step backward along each direction.
 
-    Where there is no vertex stands M. The arguments are two of the results of `number_vertices`.
+    Parameters
+    ----------
+    keys : (M, d + 1) int32
+        The coordinates of each vertex, from `number_vertices`.
+    slots : (2^k,) int32
+        The hash table from coordinates to numbers, from `number_vertices`.
+
+    Returns
+    -------
+    (d + 1, 2, M) int32
+        By direction, forward or backward, and vertex: the number of the neighbour, or M where there is none.
     """
     n_vertices, size = keys.shape
     neighbours = np.full((size, 2, n_vertices), n_vertices, np.int32)
@@ -220,10 +250,21 @@ def self_responses(corners, ranks, weights, neighbours):
 
 @njit(cache=True)
 def sort_by_vertex(vertices, n_vertices):
-    """Sort corners by their vertices (counting sort), given the vertex of each corner and the number M of vertices.
+    """Sort corners by their vertices (counting sort).
 
-    Returns where the corners of each vertex begin, and where the last ones end, (M + 1,) int32, and the indices of the
-    corners, vertex after vertex, (N (d + 1),) int32.
+    Parameters
+    ----------
+    vertices : (N (d + 1),) int32
+        The number of the vertex at each corner, see `number_vertices`.
+    n_vertices : int
+        Number of vertices, M.
+
+    Returns
+    -------
+    starts : (M + 1,) int32
+        Where the corners of each vertex begin in `members`, and where those of the last one end.
+    members : (N (d + 1),) int32
+        Indices of the corners, vertex after vertex.
     """
     starts = np.zeros(n_vertices + 1, np.int32)
     for v in vertices:

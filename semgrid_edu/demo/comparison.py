@@ -1,4 +1,4 @@
-"""A student's stages beside the package's own: what the page says of them, and which pictures they can change."""
+"""A student's stages beside the package's own: which pictures they can change, and what the page says of them."""
 
 from dataclasses import dataclass
 from html import escape
@@ -15,7 +15,7 @@ MADE_BY = {
 """The stages that a picture depends on."""
 
 ARROWS = dict(zip(ARGUMENTS, ("l → o", "i → s", "s → p", "(p, o) → g", "g → g"), strict=True))
-"""What each stage makes of what, in the symbols of the paper's Fig. 2."""
+"""Input and output of each stage, in the symbols of the paper's Fig. 2."""
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class Comparison:
     Parameters
     ----------
     file : str
-        The file's name.
+        Name of the student's file, without its folder.
     stages : tuple of str
-        Such as ("track", "refine").
+        Names of the stages that the file holds, such as ("track", "refine").
     """
 
     file: str
@@ -35,7 +35,7 @@ class Comparison:
 
     @property
     def changed(self) -> tuple[str, ...]:
-        """The pictures that these stages can change, which the page therefore shows twice."""
+        """The pictures that these stages can change. The page shows each of them twice."""
         return tuple(name for name, stages in MADE_BY.items() if set(stages) & set(self.stages))
 
     def lead(self) -> str:
@@ -48,12 +48,23 @@ class Comparison:
         )
 
     def made_with(self, picture: str) -> str:
-        """Say which of the file's stages a picture depends on, as HTML."""
+        """Say which of the file's stages a picture depends on.
+
+        Parameters
+        ----------
+        picture : str
+            Name of the picture, a key of `MADE_BY`.
+
+        Returns
+        -------
+        str
+            Two sentences, as HTML.
+        """
         stages = [f"<b>{name}</b>" for name in self.stages if name in MADE_BY[picture]]
         return f"Made with {_listed(stages)} of {escape(self.file)}. Where does it differ from the picture beside it?"
 
     def replaced(self) -> dict[str, str]:
-        """Return the names of the replaced stages by what they do, a key of `STAGES`."""
+        """Return the names of the replaced stages, by what each of them does, an entry of `STAGES`."""
         return {work: name for work, name in zip(STAGES, ARGUMENTS, strict=True) if name in self.stages}
 
 

@@ -29,24 +29,48 @@ WIDTH = 1.0
 
 
 def track(frames: Iterable[Frame], spec: GridSpec) -> Iterator[NDArray[np.float32]]:
-    """Call each cell by what this one scan says of it: a threshold in place of a filter, which remembers nothing.
+    """Give each cell the state that this one scan suggests: a threshold in place of a filter, without any memory.
 
     What does it lose? Look for things that move, and for cells that were seen a moment ago and are hidden now.
+
+    Parameters
+    ----------
+    frames : iterable of Frame
+        The frames of the drive in the order of time, taken one by one.
+    spec : GridSpec
+        The grid, (H, W) cells.
+
+    Yields
+    ------
+    (4, H, W) float32
+        o, the probability of FREE, STATIC, DYNAMIC and UNKNOWN; they sum to 1 in each cell.
     """
     for frame in frames:
         evidence = scan_evidence(frame.points_grid, spec, SensorModel())
         state = np.full(spec.shape, State.UNKNOWN)
         state[evidence.occupied > evidence.free] = State.STATIC  # an obstacle sent a return from here
-        state[evidence.free > evidence.occupied] = State.FREE  # so did the ground, or a beam passed on its way
+        state[evidence.free > evidence.occupied] = State.FREE  # the ground did, or a beam passed through
         o = np.full((len(State), *spec.shape), (1 - CERTAINTY) / 3, np.float32)
         np.put_along_axis(o, state[None], CERTAINTY, axis=0)
-        yield o  # then the loop takes the next frame: a filter must not look ahead
+        yield o  # only now take the next frame: a filter must not look ahead
 
 
 def refine(log_g: NDArray, o: NDArray) -> NDArray[np.float32]:
     """Blur the probability of each class over the neighbouring cells, whatever stands in them.
 
     What does it lose? Look at edges, and compare with the CRF, which asks whether two cells have similar occupancy.
+
+    Parameters
+    ----------
+    log_g : (C, H, W) float
+        Natural logarithms of the probabilities of the classes.
+    o : (4, H, W) float
+        The occupancy grid, which this stage doesn't use.
+
+    Returns
+    -------
+    (C, H, W) float32
+        The blurred probabilities; they sum to 1 in each cell.
     """
     g = np.exp(log_g)
     blurred = gaussian_filter(g, sigma=(0, WIDTH, WIDTH))  # not along the class axis

@@ -11,24 +11,26 @@ from semgrid_edu.plotting import velocity_arrows
 from semgrid_edu.plotting.grids import ARROW_SECONDS
 
 TICK = 10
-"""Metres between the marks of an axis."""
+"""Distance between the marks of an axis, metres."""
 
 
 def grid_svg(name: str, spec: GridSpec, camera: Camera, raster: str, text: str, arrows: bool = False) -> str:
-    """Frame a raster with axes in metres, the vehicle and the borders of what the camera sees.
+    """Draw axes in metres, the vehicle and the borders of what the camera sees around a raster.
 
-    SVG has x to the right and y down; the grid has y to the left and x up, so both change their signs.
+    SVG has x to the right and y down. The grid has y to the left and x up, so both coordinates change their signs.
 
     Parameters
     ----------
     name : str
-        By which the page's script finds the raster and its text.
+        Name by which the page's script finds the raster and its text.
     spec : GridSpec
+        The grid that the raster shows.
     camera : Camera
+        The camera, whose position and left and right borders are drawn.
     raster : str
-        Data URI; empty when there is nothing to show.
+        Data URI of the raster; empty when there is nothing to show.
     text : str
-        What a reader hears who doesn't see the picture.
+        Alternative text, for a reader who can't see the picture.
     arrows : bool
         Whether the script draws velocities over the raster.
 
@@ -53,19 +55,21 @@ def grid_svg(name: str, spec: GridSpec, camera: Camera, raster: str, text: str, 
 
 
 def arrows_path(spec: GridSpec, probability: NDArray, velocity: NDArray) -> str:
-    """Return the velocities of a belief as an SVG path in the panel's metres, each with its head.
+    """Return the velocities of a belief as an SVG path of arrows, in the panel's metres.
 
     Parameters
     ----------
     spec : GridSpec
+        The grid.
     probability : (4, H, W) float
+        Probability of FREE, STATIC, DYNAMIC and UNKNOWN.
     velocity : (2, H, W) float
-        Metres a second.
+        Velocity over ground along the grid's x and y axes, m/s; NaN where nothing moves.
 
     Returns
     -------
     str
-        The `d` of a path.
+        The attribute `d` of a path.
     """
     start, speed = velocity_arrows(spec, probability, velocity)
     way = speed * ARROW_SECONDS
@@ -83,7 +87,7 @@ def _svg(xy: NDArray) -> str:
 
 
 def _axes(spec: GridSpec) -> str:
-    """Draw marks and metres along the left side and below."""
+    """Draw marks, numbers and names of the axes, at the left side and at the bottom."""
     left, bottom = -spec.y_max, -spec.x_min
     marks = [
         f'<path class="tick" d="M{left:g} {-x}h-.7"/><text class="x" x="{left - 1.1:g}" y="{-x + 0.7:g}">{x}</text>'

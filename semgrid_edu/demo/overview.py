@@ -1,4 +1,4 @@
-"""One picture of one frame through every stage: the opening picture of README and page (paper, Fig. 2)."""
+"""One frame through every stage in one picture, such as the one that opens the README (paper, Fig. 2)."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,7 +21,7 @@ from semgrid_edu.plotting.legends import colour_patches
 from semgrid_edu.storage.files import atomic_path
 
 REACH = 50.0
-"""Metres ahead that the picture shows: beyond, few cells are seen."""
+"""How far ahead the picture shows the grids, metres: few cells are seen beyond."""
 
 
 def save_overview(
@@ -37,14 +37,17 @@ def save_overview(
     Parameters
     ----------
     package : FrameResult
-        With the package's own stages.
+        The frame's result with the package's own stages.
     yours : FrameResult or None
-        With a student's stages.
+        Its result with a student's stages, to be shown beside it.
     spec : GridSpec
+        The grid of both results.
     label_set : LabelSet
+        The classes, for colours and names.
     path : path-like
+        The file to write; its folder is made when missing.
     comparison : Comparison, optional
-        Says which stages are the student's; needed with `yours`.
+        Which stages are the student's; needed with `yours`.
     """
     with plt.rc_context({"font.size": 9, "axes.titlesize": 11, "axes.titlelocation": "left"}):
         figure = draw_overview(package, yours, spec, label_set, comparison)
@@ -62,8 +65,13 @@ def draw_overview(
 ) -> Figure:
     """Draw image and grids of one frame: (l, i), s, o, g, refined g and, where it is known, the truth.
 
-    In a comparison, below each grid that the student's stages can change stands the one that they make; arguments as
-    of `save_overview`.
+    In a comparison, each grid that the student's stages can change is followed, below it, by the student's own grid.
+    Parameters are those of `save_overview`, without the path.
+
+    Returns
+    -------
+    Figure
+        A new figure of matplotlib.
     """
     maps = {"semantic grid g": package.grid.argmax(axis=0), "g refined by the CRF": package.refined.argmax(axis=0)}
     if package.frame.labels is not None:
@@ -124,7 +132,7 @@ def _draw_grids(
 def _draw_yours(
     axes: Sequence[Axes], yours: FrameResult, spec: GridSpec, label_set: LabelSet, comparison: Comparison
 ) -> list[NDArray]:
-    """Draw a student's grids, each below the package's, and return the maps of classes; the same ones are left out."""
+    """Draw a student's grids, except those that can't differ from the package's, and return the maps of classes."""
     maps = {"semantic grid g": yours.grid.argmax(axis=0), "refined g": yours.refined.argmax(axis=0)}
     _draw_grids(axes, yours, maps, spec, label_set)
     for ax, picture in zip(axes, ("occupancy", "grid", "refined", "truth"), strict=False):

@@ -36,21 +36,23 @@ class Summary:
     title : str
         The drive's name.
     spec : GridSpec
+        The grid.
     camera : Camera
+        The camera at the size of the drive's images.
     network_size : (int, int)
         Height and width of the image that the network sees, pixels.
     classes : sequence of (str, (int, int, int))
         Names and colours of the classes that occur.
     metrics : dict of str to dict of str to float
-        Values, 0..1, by metric and row.
+        Value of each metric, 0..1, by the metric's name and the row of the table.
     labelled : int
-        Frames with truth; with none, the page shows no metrics and says what to expect.
+        Number of frames with truth. When it is 0, the page shows no metrics and says what to expect.
     milliseconds : dict of str to float
-        Time of each stage.
+        Median time of each stage per frame, ms.
     comparison : Comparison, optional
-        Says that a second run with a student's stages is shown beside the package's own.
+        Which stages come from a student's file, when a second run with them is shown beside the package's own.
     your_milliseconds : dict of str to float
-        Time of each stage in that run.
+        Median time of each stage in that run, ms.
     """
 
     title: str
@@ -71,8 +73,9 @@ def page_html(summary: Summary, frames: Sequence[FrameView]) -> str:
     Parameters
     ----------
     summary : Summary
+        What the page says of the drive as a whole.
     frames : sequence of FrameView
-        At least one.
+        The frames to show, at least one.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The figures of the page: bird's-eye panels, and what stands twice when stages are compared."""
+"""The figures of the page: bird's-eye panels, and those shown twice when stages are compared."""
 
 from html import escape
 from typing import NamedTuple
@@ -11,7 +11,19 @@ from semgrid_edu.grid import GridSpec
 
 
 class Panel(NamedTuple):
-    """A bird's-eye panel: its raster's name, its title, its symbol in Fig. 2 and what to see."""
+    """A bird's-eye panel of the page.
+
+    Parameters
+    ----------
+    name : str
+        Name of its raster among the images of a `FrameView`.
+    title : str
+        The first words of its caption.
+    symbol : str
+        Its symbol in the paper's Fig. 2; empty when it has none.
+    see : str
+        The rest of its caption: what to look for, as HTML.
+    """
 
     name: str
     title: str
@@ -58,8 +70,9 @@ class PanelFrame(NamedTuple):
     Parameters
     ----------
     spec : GridSpec
+        The grid.
     camera : Camera
-        For the borders of what it sees.
+        The camera, whose left and right borders are drawn.
     first : FrameView
         The frame that the page shows when it is opened.
     """
@@ -75,10 +88,11 @@ def panels_html(shared: PanelFrame, with_truth: bool, comparison: Comparison | N
     Parameters
     ----------
     shared : PanelFrame
+        What all panels share.
     with_truth : bool
         Whether any frame has truth.
     comparison : Comparison, optional
-        Then panels that can differ stand side by side.
+        Which stages come from a student's file. With it, panels that can differ are shown twice, side by side.
 
     Returns
     -------
@@ -113,7 +127,20 @@ def _figure(panel: Panel, shared: PanelFrame) -> str:
 
 
 def your_scores_html(first: FrameView, comparison: Comparison | None) -> str:
-    """Return the figure of the image scores of a student's own network; "" when the package's network made them."""
+    """Return the figure of the image scores of a student's own network.
+
+    Parameters
+    ----------
+    first : FrameView
+        The frame that the page shows when it is opened.
+    comparison : Comparison or None
+        Which stages come from a student's file.
+
+    Returns
+    -------
+    str
+        A figure element; "" when the package's own network made the scores.
+    """
     if comparison is None or "scores" not in comparison.changed:
         return ""
     name = f"{YOURS}scores"

@@ -13,27 +13,62 @@ from semgrid_edu.plotting import depth_colours
 from semgrid_edu.plotting.images import visible_points
 
 PHOTO_QUALITY = 72
-"""WebP's, 0..100: the least at which leaves and lattice fences keep their texture."""
+"""Quality of WebP, 0..100: the lowest at which leaves and lattice fences keep their texture."""
 
 DOTS_ACROSS = 414
-"""So many LIDAR dots side by side would fill the image's width: three pixels a dot on KITTI's images."""
+"""Number of LIDAR dots that fill the image's width side by side, so that each is 3 pixels wide on KITTI's images."""
 
 LEAST_OPACITY, MOST_OPACITY = 0.15, 0.8
 """How strongly the least and the most certain class covers its pixel."""
 
 
 def photo_uri(image: NDArray[np.uint8]) -> str:
-    """Return a photograph, (h, w, 3) uint8, as WebP."""
+    """Return a photograph as WebP.
+
+    Parameters
+    ----------
+    image : (h, w, 3) uint8
+        RGB.
+
+    Returns
+    -------
+    str
+        A data URI.
+    """
     return _uri(Image.fromarray(image), "webp", quality=PHOTO_QUALITY, method=2)
 
 
 def raster_uri(raster: NDArray[np.uint8]) -> str:
-    """Return a raster, (h, w, 3) or (h, w, 4) uint8, as PNG without loss."""
+    """Return a raster as PNG, without loss.
+
+    Parameters
+    ----------
+    raster : (h, w, 3) or (h, w, 4) uint8
+        RGB or RGBA.
+
+    Returns
+    -------
+    str
+        A data URI.
+    """
     return _uri(Image.fromarray(raster), "png", optimize=True)
 
 
 def classes_uri(labels: NDArray[np.uint8], label_set: LabelSet) -> str:
-    """Return a map of classes, (h, w) uint8, as PNG with the label set's palette."""
+    """Return a map of classes as PNG.
+
+    Parameters
+    ----------
+    labels : (h, w) uint8
+        The class of each pixel or cell.
+    label_set : LabelSet
+        The classes, whose colours become the palette of the PNG.
+
+    Returns
+    -------
+    str
+        A data URI.
+    """
     image = Image.fromarray(labels).convert("P")
     image.putpalette(label_set.colours(np.arange(256)).tobytes())
     return _uri(image, "png", optimize=True)
@@ -45,12 +80,12 @@ def points_layer(frame: Frame) -> NDArray[np.uint8]:
     Parameters
     ----------
     frame : Frame
-        With a camera.
+        The frame; it has to have a camera.
 
     Returns
     -------
     (h, w, 4) uint8
-        RGBA; a return is a square around its pixel, and near ones lie over far ones.
+        RGBA. Each return is a square around its pixel, and near returns cover far ones.
     """
     height, width = frame.camera.size
     side = max(1, round(width / DOTS_ACROSS))
@@ -64,13 +99,14 @@ def points_layer(frame: Frame) -> NDArray[np.uint8]:
 
 
 def scores_layer(scores: NDArray, label_set: LabelSet) -> NDArray[np.uint8]:
-    """Paint the best class of each pixel, the more opaque the surer the network is.
+    """Paint the best class of each pixel; the surer the network is, the more opaque is the colour.
 
     Parameters
     ----------
     scores : (C, h, w) float
-        Without soft-max.
+        s, the scores of each class, before the soft-max.
     label_set : LabelSet
+        The classes, for their colours.
 
     Returns
     -------

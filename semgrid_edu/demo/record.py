@@ -1,4 +1,4 @@
-"""What the demo keeps of a drive while it runs: encoded frames, counts and times."""
+"""What the demo records while a drive runs: encoded frames, confusion matrices and times."""
 
 from dataclasses import dataclass
 
@@ -18,10 +18,10 @@ from semgrid_edu.plotting import occupancy_colours
 from semgrid_edu.plotting.images import visible_points
 
 YOURS = "your_"
-"""What the names of pictures made with a student's stages begin with."""
+"""Prefix of the names of pictures that are made with a student's stages."""
 
 ESTIMATES = ("grid", "refined")
-"""The grids of a result that are scored."""
+"""The grids of a result that are compared with the truth."""
 
 
 @dataclass(frozen=True)
@@ -31,12 +31,12 @@ class FrameView:
     Parameters
     ----------
     clock : str
-        Which frame, and when.
+        Number and time of the frame, such as "frame 3, 0.3 s".
     images : dict of str to str
-        Data URIs of photo, points, scores, occupancy, grid, refined and, where it is known, truth; those made with a
-        student's stages under names that begin with `YOURS`.
+        Data URIs of photo, points, scores, occupancy, grid, refined and, where it is known, truth. The names of those
+        made with a student's stages begin with `YOURS`.
     texts : dict of str to str
-        What a reader hears who doesn't see them.
+        Alternative texts of the images, by the same names; the photo has none.
     arrows : dict of str to str
         Velocities as an SVG path, for each occupancy grid among the images.
     """
@@ -48,17 +48,18 @@ class FrameView:
 
 
 class Record:
-    """The drive as far as it has run.
+    """What has been recorded of a drive so far.
 
     Parameters
     ----------
     spec : GridSpec
+        The grid.
     label_set : LabelSet
         The network's classes.
     every : int
-        Of so many frames one is shown.
+        The page shows one frame in this many.
     comparison : Comparison, optional
-        Says that each frame has two results, the package's and one with a student's stages.
+        Which stages come from a student's file. With it, each frame has two results, the package's and the student's.
 
     Attributes
     ----------
@@ -85,14 +86,15 @@ class Record:
         self._your_seconds: list[list[float]] = []
 
     def add(self, package: FrameResult, yours: FrameResult | None = None) -> None:
-        """Take in the next frame.
+        """Record the next frame.
 
         Parameters
         ----------
         package : FrameResult
-            With the package's own stages. Its occupancy grid names the unknown cells of the truth, for both results.
+            The frame's result with the package's own stages. Its occupancy grid names the unknown cells of the truth,
+            for both results.
         yours : FrameResult, optional
-            With a student's stages.
+            Its result with a student's stages.
         """
         maps = {name: _best(getattr(package, name)) for name in ESTIMATES}
         self._seconds.append([package.seconds[stage] for stage in STAGES])
@@ -107,11 +109,11 @@ class Record:
         self._frames += 1
 
     def milliseconds(self) -> dict[str, float]:
-        """Return the median time of each of the package's stages: the first frames also load compiled code."""
+        """Return the median time of each of the package's own stages; the first frames also load compiled code."""
         return _medians(self._seconds)
 
     def your_milliseconds(self) -> dict[str, float]:
-        """Return the same for the results with a student's stages; empty without them."""
+        """Return the median time of each stage with a student's stages; empty when there are none."""
         return _medians(self._your_seconds) if self._your_seconds else {}
 
     def metrics(self) -> dict[str, dict[str, float]]:
@@ -122,7 +124,7 @@ class Record:
         return {metric: {row: of(matrix) for row, matrix in rows.items()} for metric, of in METRICS.items()}
 
     def classes(self) -> list[tuple[str, tuple[int, int, int]]]:
-        """Return names and colours of the classes that any shown picture holds."""
+        """Return names and colours of the classes that occur in a shown picture."""
         both = zip(self.label_set.names, self.label_set.rgb, strict=True)
         return [entry for entry, occurs in zip(both, self._occurs, strict=False) if occurs]
 
@@ -166,7 +168,7 @@ class Record:
 
 
 def _rows(comparison: Comparison | None) -> dict[str, str]:
-    """Return which map each row of the table of metrics scores, by the words of the row."""
+    """Return, for each row of the table of metrics, the name of the map that is compared with the truth."""
     if comparison is None:
         return {"network": "grid", "network + CRF": "refined"}
     words = {"grid": "semantic grid", "refined": "refined grid"}

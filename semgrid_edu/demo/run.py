@@ -1,4 +1,4 @@
-"""The demo's way through a drive: every stage over every frame, then the page and its picture."""
+"""The demo: run every stage over every frame of a drive, then write the page and its picture."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from semgrid_edu.pipeline import Stages, load_stages, run_side_by_side
 from semgrid_edu.storage.files import write_text
 
 SHOWN = 40
-"""The page holds no more frames than this, evenly spaced, so that it stays near 10 MB."""
+"""Most frames that the page shows, evenly spaced, so that its size stays near 10 MB."""
 
 
 def write_demo(drive: KittiRawDrive, weights: str | Path, out: str | Path, stages: str | Path | None = None) -> Path:
@@ -25,18 +25,19 @@ def write_demo(drive: KittiRawDrive, weights: str | Path, out: str | Path, stage
     Parameters
     ----------
     drive : KittiRawDrive
-        With camera images.
+        The drive; it has to have camera images.
     weights : path-like
-        Of the network, as `save_net` wrote them.
+        The network's weights, as `save_net` wrote them.
     out : path-like
         The folder to write index.html and overview.png to; made when missing.
     stages : path-like, optional
-        A file with stages of one's own, as `load_stages` reads them: the page then shows them beside the package's.
+        A Python file with a student's stages, as `load_stages` reads it. The page then shows a second run with these
+        stages beside the package's.
 
     Returns
     -------
     Path
-        The page.
+        The page, index.html.
 
     Raises
     ------
@@ -52,7 +53,7 @@ def write_demo(drive: KittiRawDrive, weights: str | Path, out: str | Path, stage
     if stages is not None:
         mine = load_stages(stages)
         yours, comparison = (_beside(own, mine),), Comparison(Path(stages).name, mine.given)
-    Path(out).mkdir(parents=True, exist_ok=True)  # before the work, so that nobody waits to learn that it can't be made
+    Path(out).mkdir(parents=True, exist_ok=True)  # before the work, to refuse a bad folder at once
     label_set = LABEL_SETS[net.architecture.label_set]
     record = Record(net.architecture.grid, label_set, every=-(-len(drive) // SHOWN), comparison=comparison)
     results = run_side_by_side(drive, own, *yours)

@@ -6,7 +6,7 @@ from semgrid_edu.demo.comparison import Comparison
 from semgrid_edu.occupancy.tracking import LIDAR_PERIOD
 
 SCAN_MILLISECONDS = 1000 * LIDAR_PERIOD
-"""From one scan of KITTI's LIDAR to the next."""
+"""Time from one scan of KITTI's LIDAR to the next, ms."""
 
 STAGE_WORDS = {
     "occupancy": ("l → o", "Bayes filter, CMCDOT"),
@@ -16,7 +16,6 @@ STAGE_WORDS = {
     "crf": ("g → g", "CRF, mean field"),
 }
 """Symbols and words of each stage of the pipeline."""
-
 
 COMPARED = " The package's occupancy grid names the unknown cells of the truth, so that both runs have the same truth."
 
@@ -29,9 +28,14 @@ def metrics_table(metrics: dict[str, dict[str, float]], labelled: int, compariso
     metrics : dict of str to dict of str to float
         Values, 0..1, by column and row.
     labelled : int
-        Frames with truth.
+        Number of frames with truth.
     comparison : Comparison, optional
-        Says that rows of a second run are among them.
+        Which stages come from a student's file, when some rows are about a second run with them.
+
+    Returns
+    -------
+    str
+        A div element.
     """
     head = "".join(f"<th>{escape(column)}</th>" for column in metrics)
     rows = "".join(_metrics_row(row, metrics) for row in next(iter(metrics.values())))
@@ -61,10 +65,16 @@ def times_table(
     Parameters
     ----------
     milliseconds : dict of str to float
-        By stage.
+        Median time of each stage per frame, ms, by the names in `pipeline.STAGES`.
     yours : dict of str to float, optional
-        The same in a second run, whose stages `comparison` names.
+        The same for a second run with a student's stages.
     comparison : Comparison, optional
+        Which stages come from the student's file; needed with `yours`.
+
+    Returns
+    -------
+    str
+        A div element.
     """
     runs = [milliseconds, yours] if comparison else [milliseconds]
     replaced = comparison.replaced() if comparison else {}
@@ -81,7 +91,7 @@ def times_table(
 
 
 def _words(stage: str, replaced: dict[str, str]) -> tuple[str, str]:
-    """Return symbols and words of a stage, and what replaces it."""
+    """Return symbols and words of a stage; the words also name the student's stage that replaces it, if one does."""
     symbols, words = STAGE_WORDS[stage]
     return symbols, f"{words}; replaced by <b>{replaced[stage]}</b>" if stage in replaced else words
 

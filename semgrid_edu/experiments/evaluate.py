@@ -1,4 +1,4 @@
-"""The trained network against what learns next to nothing, on frames that none has seen (sections 4.2 and 4.3)."""
+"""The trained network compared with simple baselines, on frames kept for testing (sections 4.2 and 4.3)."""
 
 from collections.abc import Callable
 from datetime import UTC, datetime
@@ -23,11 +23,11 @@ from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import versions
 
 Scores = dict[str, dict[str, dict[str, float]]]
-"""By method, by cells ("all" or "semantic"), by metric; 0..1."""
+"""Values of the metrics, 0..1: by method, by cells ("all" or "semantic"), by metric."""
 
 
 Refine = Callable[[NDArray, NDArray], NDArray]
-"""(log_g (C, H, W), o (4, H, W)) -> g (C, H, W), as `semgrid_edu.pipeline.Stages` describes it."""
+"""A stage (log_g (C, H, W), o (4, H, W)) -> g (C, H, W), as `semgrid_edu.pipeline.Stages` describes it."""
 
 
 def evaluate(dataset_dir: str | Path, weights: str | Path, refine: Refine | None = None) -> dict[str, object]:
@@ -38,16 +38,17 @@ def evaluate(dataset_dir: str | Path, weights: str | Path, refine: Refine | None
     dataset_dir : path-like
         A data set with the splits "train" and "test", such as data/minikitti.
     weights : path-like
-        A network that learned from the training split. Where `image_stage.safetensors` lies beside it, its image
-        labels are carried to the grid as well: those that learned from images alone, not yet from grids.
+        A network that learned from the training split. If `image_stage.safetensors`, the network after the first stage
+        of training, lies in the same folder, its image labels are carried to the grid as well: that network has
+        learned from images alone, not yet from grids.
     refine : callable, optional
         Refines the network's grids, as in `Stages`, and is named in the row "network + ..."; the CRF when left out.
 
     Returns
     -------
     dict
-        "scores" (see `Scores`), "confusion" (row: truth) and how often each class is true, with all that
-        made them: it can be written as JSON.
+        "scores" (see `Scores`), "confusion" (a matrix for each method, one row per true class), and what they were
+        computed from; it can be written as JSON.
 
     Raises
     ------
@@ -91,24 +92,25 @@ def confusion_matrices(
     majority: NDArray,
     refine: Refine | None = None,
 ) -> dict[str, NDArray[np.int64]]:
-    """Count what each method makes of every frame.
+    """Compare the grids of each method with the truth of every frame.
 
     Parameters
     ----------
     net : SemanticGridNet
+        The network, for the grid and the images of the test set.
     segmenters : dict of str to Module
-        Image networks by name, whose labels geometry carries to the grid.
+        Image networks by name, i -> s. Geometry carries their labels from the image to the grid.
     test : TrainingSet
-        The frames.
+        The frames, with truth.
     majority : (H, W) int
         The majority class of each cell.
     refine : callable, optional
-        As for `evaluate`.
+        Refines the network's grids, as in `evaluate`.
 
     Returns
     -------
     dict of str to (C, C) int64
-        By method; row: truth.
+        Number of cells by method: one row per true class, one column per class that the method gives.
 
     Raises
     ------
@@ -140,17 +142,18 @@ def learned_grids(
     Parameters
     ----------
     net : SemanticGridNet
+        The network, for the sizes of the frame.
     sample : Sample
         A frame of a data set.
     refine : callable, optional
-        As for `evaluate`.
+        Refines the network's grids, as in `evaluate`.
     number : int
-        Of the frame, for error messages.
+        Number of the frame, for error messages.
 
     Returns
     -------
     dict of str to (H, W) int64
-        "network", and "network + " with the name of what refined it.
+        The classes under "network", and the refined ones under "network + " and the name of the refinement.
 
     Raises
     ------
@@ -169,18 +172,57 @@ def _name(refine: Refine | None) -> str:
 
 @torch.inference_mode()
 def learned_log_g(net: SemanticGridNet, sample: Sample) -> NDArray[np.float32]:
-    """Return the network's semantic grid of a frame as log-probabilities, (C, H, W)."""
+    """Return the network's semantic grid of a frame as log-probabilities.
+
+    Parameters
+    ----------
+    net : SemanticGridNet
+        The network, for the sizes of the frame.
+    sample : Sample
+        A frame of a data set.
+
+    Returns
+    -------
+    (C, H, W) float32
+        log g, natural logarithms.
+    """
     return net(unit_image(sample.image)[None], sample.occupancy[None])[0].log_softmax(dim=0).numpy()
 
 
 @torch.inference_mode()
 def best_labels(segmenter: nn.Module, sample: Sample) -> NDArray[np.int64]:
-    """Return the arg-max of an image network's scores, (h, w)."""
+    """Return the class with the highest score at each pixel.
+
+    Parameters
+    ----------
+    segmenter : Module
+        An image network, i -> s: (1, 3, h, w) RGB in 0..1 -> (1, C, h, w) scores.
+    sample : Sample
+        A frame of a data set.
+
+    Returns
+    -------
+    (h, w) int64
+        Classes.
+    """
     return segmenter(unit_image(sample.image)[None])[0].argmax(dim=0).numpy()
 
 
 def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:
-    """Return the three metrics of each method, over all labelled cells and over those with a semantic truth."""
+    """Return the three metrics of each method, over all labelled cells and over those with a semantic class.
+
+    Parameters
+    ----------
+    confusions : dict of str to (C, C) int
+        Confusion matrix of each method, from `confusion_matrices`.
+    label_set : LabelSet
+        The classes, of which it says which are semantic.
+
+    Returns
+    -------
+    Scores
+        Values from 0 to 1.
+    """
     return {
         method: {
             cells: {name: metric(matrix) for name, metric in METRICS.items()}
@@ -191,7 +233,18 @@ def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:
 
 
 def scores_table(result: Scores) -> str:
-    """Return the scores as a table to print, in per cent."""
+    """Return the scores as a table to print, in per cent.
+
+    Parameters
+    ----------
+    result : Scores
+        From `scores`.
+
+    Returns
+    -------
+    str
+        One line per method under two lines of headings.
+    """
     width = max(map(len, result))
     group = " ".join(f"{name:>14}" for name in METRICS)
     lines = [f"{'':{width}}  {'all labelled cells':^{len(group)}}   {'cells with a semantic class':^{len(group)}}"]

@@ -80,7 +80,21 @@ class Calibration:
 
     @classmethod
     def of(cls, grid: GridSpec, heights: ArrayLike, camera: Camera) -> "Calibration":
-        """Return the calibration of a grid, of heights in metres, and of a camera at the size of the image.
+        """Return the calibration of a grid, its planes and a camera.
+
+        Parameters
+        ----------
+        grid : GridSpec
+            The cells, (H, W) of them.
+        heights : (D,) float
+            delta_i, metres above the ground.
+        camera : Camera
+            The camera at the size of the image that the network sees, see `Camera.resized`.
+
+        Returns
+        -------
+        Calibration
+            The same as plain numbers.
 
         Raises
         ------
@@ -92,7 +106,7 @@ class Calibration:
         return cls(grid, *numbers, tuple(camera.size), camera.lidar_height)
 
     def camera(self) -> Camera:
-        """Return the camera, put together again."""
+        """Return the camera that these numbers describe."""
         K, T = np.reshape(self.K, (3, 3)), np.reshape(self.T_camera_from_lidar, (4, 4))
         return Camera(K, T, self.image_size, self.lidar_height)
 
@@ -100,6 +114,17 @@ class Calibration:
 # Four calibrations: an operator at the paper's scale holds 67 MB.
 @lru_cache(maxsize=4)
 def plane_operator(calibration: Calibration) -> PlaneOperator:
-    """Return the operator of a calibration, equations (1) and (2); the last four are remembered."""
+    """Return the operator of a calibration, equations (1) and (2); the last four are remembered.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        The grid, the heights of the planes, and the camera.
+
+    Returns
+    -------
+    PlaneOperator
+        The operator for one image; it is shared by all that ask for the same calibration.
+    """
     pixels, visible = plane_pixels(calibration.grid, calibration.heights, calibration.camera())
     return PlaneOperator.build(pixels, visible, calibration.image_size)

@@ -12,7 +12,18 @@ from semgrid_edu.errors import ArgumentError
 
 
 def conv_bn_relu(n_in: int, n_out: int) -> nn.Sequential:
-    """Return one layer of Fig. 5: 3x3 convolution, batch normalisation, ReLU; the size of the map stays."""
+    """Return one layer of Fig. 5: 3x3 convolution, batch normalisation, ReLU; the size of the map stays.
+
+    Parameters
+    ----------
+    n_in, n_out : int
+        Number of channels of the input and of the result.
+
+    Returns
+    -------
+    Sequential
+        The three layers, with fresh weights.
+    """
     return nn.Sequential(nn.Conv2d(n_in, n_out, 3, padding=1), nn.BatchNorm2d(n_out), nn.ReLU(inplace=True))
 
 
@@ -55,7 +66,17 @@ class ConvDeconv(nn.Module):
         )
 
     def forward(self, x: Tensor) -> Tensor:
-        """Return the result at the size of the input, (B, n_in, H, W) -> (B, n_out, H, W).
+        """Return the result at the size of the input.
+
+        Parameters
+        ----------
+        x : (B, n_in, H, W) float
+            The map to encode.
+
+        Returns
+        -------
+        (B, n_out, H, W) float
+            The result of the last layer.
 
         Raises
         ------

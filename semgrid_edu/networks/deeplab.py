@@ -50,7 +50,21 @@ class DeepLab(Segmenter):
     IMAGENET = "resnet101"
 
     def build(self, n_classes: int, width: int, depths: tuple[int, ...], rates: tuple[int, ...], scale: float) -> None:
-        """Make the ResNet and one classifier per rate."""
+        """Make the ResNet and one classifier per rate.
+
+        Parameters
+        ----------
+        n_classes : int
+            C, the number of classes that are scored.
+        width : int
+            Number of channels of the ResNet's stem.
+        depths : (4,) int
+            Number of bottlenecks in each stage of the ResNet.
+        rates : tuple of int
+            Dilation rate of each classifier.
+        scale : float
+            Factor of the summed scores.
+        """
         self.scale = scale
         self.backbone = ResNet(width, depths, OUTPUT_STRIDE)
         self.aspp = nn.ModuleList(
@@ -58,7 +72,7 @@ class DeepLab(Segmenter):
         )
 
     def scores(self, x: Tensor) -> Tensor:
-        """Return the scores, (B, 3, h, w) -> (B, C, h, w)."""
+        """Return the scores. Parameters and result are those of `Segmenter.scores`."""
         features = self.backbone(x)
         summed = sum(classify(features) for classify in self.aspp)
         return interpolate(self.scale * summed, OUTPUT_STRIDE, x.shape[2:])

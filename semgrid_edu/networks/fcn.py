@@ -46,7 +46,19 @@ class Fcn(Segmenter):
     IMAGENET = "vgg16"
 
     def build(self, n_classes: int, widths: tuple[int, ...], hidden: int, batch_norm: bool) -> None:
-        """Make VGG16, the hidden layers and the three score layers."""
+        """Make VGG16, the hidden layers and the three score layers.
+
+        Parameters
+        ----------
+        n_classes : int
+            C, the number of classes that are scored.
+        widths : (5,) int
+            Number of channels in each stage of VGG16.
+        hidden : int
+            Number of channels of conv6 and conv7.
+        batch_norm : bool
+            Whether each convolution is followed by batch normalisation.
+        """
         self.backbone = Vgg(widths, batch_norm)
         self.conv6 = nn.Sequential(*conv_relu(widths[-1], hidden, 7, batch_norm))
         self.conv7 = nn.Sequential(*conv_relu(hidden, hidden, 1, batch_norm))
@@ -55,7 +67,7 @@ class Fcn(Segmenter):
         self.score_pool3 = nn.Conv2d(widths[2], n_classes, 1)
 
     def scores(self, x: Tensor) -> Tensor:
-        """Return the scores, (B, 3, h, w) -> (B, C, h, w)."""
+        """Return the scores. Parameters and result are those of `Segmenter.scores`."""
         _, _, pool3, pool4, pool5 = self.backbone(x)
         at_32 = self.score_conv7(self.conv7(self.conv6(pool5)))
         at_16 = enlarge(at_32, 2, pool4.shape[2:]) + self.score_pool4(pool4)

@@ -59,6 +59,19 @@ class FusionNet(nn.Module):
         return self.fuse(self.reduce(planes), occupancy)
 
     def fuse(self, reduced: Tensor, occupancy: Tensor) -> Tensor:
-        """Return the logits, as `forward` does, from the planes after `reduce`, (B, n_reduced, 1, H, W)."""
+        """Return the logits, as `forward` does, from planes that have been reduced already.
+
+        Parameters
+        ----------
+        reduced : (B, n_reduced, 1, H, W) float
+            The result of `reduce`.
+        occupancy : (B, 4, H, W) float
+            o, the probabilities of the four states; they sum to 1 in each cell.
+
+        Returns
+        -------
+        (B, C, H, W) float
+            g before the soft-max.
+        """
         occupancy = occupancy.contiguous(memory_format=torch.channels_last)
         return self.conv_deconv(torch.cat([reduced.squeeze(2), occupancy], dim=1))

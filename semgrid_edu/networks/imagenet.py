@@ -54,7 +54,17 @@ def load_imagenet(segmenter: Segmenter, path: str | Path) -> None:
 
 
 def imagenet_tensors(segmenter: Segmenter) -> dict[str, Tensor]:
-    """Return the network's own tensors that the file fills, by their names in the file.
+    """Return the network's own tensors that the file fills.
+
+    Parameters
+    ----------
+    segmenter : Segmenter
+        An image network.
+
+    Returns
+    -------
+    dict of str to Tensor
+        The tensors by their names in the file; they are the network's own, not copies.
 
     Raises
     ------

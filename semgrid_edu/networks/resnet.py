@@ -55,9 +55,17 @@ class ResNet(nn.Module):
         self.n_out = n_in
 
     def forward(self, x: Tensor) -> Tensor:
-        """Return the last stage's map, (B, 3, h, w) -> (B, n_out, ceil(h / stride), ceil(w / stride)).
+        """Return the map of the last stage.
 
-        Cell i of the result lies on pixel stride x i, because all strides start at the first pixel.
+        Parameters
+        ----------
+        x : (B, 3, h, w) float
+            Normalised images.
+
+        Returns
+        -------
+        (B, n_out, ceil(h / s), ceil(w / s)) float
+            The map, with s the output stride. Cell i lies on pixel s i, because all strides start at the first pixel.
         """
         x = F.max_pool2d(F.relu(self.bn1(self.conv1(x)), inplace=True), 3, stride=2, padding=1)
         return self.layer4(self.layer3(self.layer2(self.layer1(x))))
@@ -88,7 +96,18 @@ class Bottleneck(nn.Module):
             self.downsample = nn.Sequential(nn.Conv2d(n_in, n_out, 1, stride, bias=False), nn.BatchNorm2d(n_out))
 
     def forward(self, x: Tensor) -> Tensor:
-        """Return the sum, (B, n_in, H, W) -> (B, 4 width, H, W); H and W are halved when the stride is 2."""
+        """Return the sum of the map and its residual.
+
+        Parameters
+        ----------
+        x : (B, n_in, H, W) float
+            The map.
+
+        Returns
+        -------
+        (B, 4 width, H, W) float
+            The sum; H and W are halved, and rounded up, when the stride is 2.
+        """
         residual = F.relu(self.bn1(self.conv1(x)), inplace=True)
         residual = F.relu(self.bn2(self.conv2(residual)), inplace=True)
         residual = self.bn3(self.conv3(residual))

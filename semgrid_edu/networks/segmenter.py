@@ -86,12 +86,23 @@ class Segmenter(nn.Module, ABC):
         n_classes : int
             C, the number of classes that are scored.
         **preset
-            The entry of `PRESETS`.
+            The keyword arguments that the preset has in `PRESETS`.
         """
 
     @abstractmethod
     def scores(self, x: Tensor) -> Tensor:
-        """Return the scores, (B, C, h, w), of images normalised to zero mean and unit deviation, (B, 3, h, w)."""
+        """Return the scores of normalised images.
+
+        Parameters
+        ----------
+        x : (B, 3, h, w) float
+            RGB, normalised to zero mean and unit deviation over ImageNet's images.
+
+        Returns
+        -------
+        (B, C, h, w) float
+            One score per class and pixel, before any soft-max.
+        """
 
     def imagenet_tensors(self) -> dict[str, Tensor]:
         """Return the tensors of the encoder that ImageNet weights fill, by their names in torchvision's `IMAGENET`."""

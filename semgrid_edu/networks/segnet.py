@@ -41,11 +41,21 @@ class SegNet(Segmenter):
     IMAGENET = "vgg16"
 
     def build(self, n_classes: int, widths: tuple[int, ...], depths: tuple[int, ...]) -> None:
-        """Make the encoder and its mirror image, see `ConvDeconv`."""
+        """Make the encoder and its mirror image, see `ConvDeconv`.
+
+        Parameters
+        ----------
+        n_classes : int
+            C, the number of classes that are scored.
+        widths : (S,) int
+            Number of channels in each stage.
+        depths : (S,) int
+            Number of convolutions in each stage, on the way down and again on the way up.
+        """
         self.conv_deconv = ConvDeconv(3, n_classes, widths, depths)
 
     def scores(self, x: Tensor) -> Tensor:
-        """Return the scores, (B, 3, h, w) -> (B, C, h, w)."""
+        """Return the scores. Parameters and result are those of `Segmenter.scores`."""
         return self.conv_deconv(x)
 
     def imagenet_tensors(self) -> dict[str, Tensor]:

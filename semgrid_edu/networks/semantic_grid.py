@@ -116,11 +116,23 @@ class SemanticGridNet(nn.Module):
         return NetOutputs(scores, planes, _flip(self.fusion.fuse(reduced, occupancy), mirrored))
 
     def image_scores(self, image: Tensor, mirrored: bool = False) -> Tensor:
-        """Return s, the image network's scores, (B, C, h, w), before any soft-max; arguments as in `stages`."""
+        """Return s, the image network's scores. Parameters are those of `SemanticGridNet.stages`.
+
+        Returns
+        -------
+        (B, C, h, w) float
+            One score per class and pixel, before any soft-max.
+        """
         return _flip(self.segmenter(_flip(image, mirrored)), mirrored)
 
     def forward(self, image: Tensor, occupancy: Tensor) -> Tensor:
-        """Return the logits of the semantic grid, (B, C, H, W); arguments as in `stages`."""
+        """Return the logits of the semantic grid. Parameters and errors are those of `SemanticGridNet.stages`.
+
+        Returns
+        -------
+        (B, C, H, W) float
+            g before the soft-max.
+        """
         return self.stages(image, occupancy).logits
 
 

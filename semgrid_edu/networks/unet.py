@@ -48,14 +48,28 @@ class UNet(Segmenter):
     }
 
     def build(self, n_classes: int, widths: tuple[int, ...]) -> None:
-        """Make encoder, up-convolutions, decoder (its finest stage first) and the final 1x1 convolution."""
+        """Make encoder, up-convolutions, decoder (its finest stage first) and the final 1x1 convolution.
+
+        Parameters
+        ----------
+        n_classes : int
+            C, the number of classes that are scored.
+        widths : (S,) int
+            Number of channels in each stage.
+        """
         self.encoder = nn.ModuleList(_double(n_in, n_out) for n_in, n_out in pairwise((3, *widths)))
         self.up = nn.ModuleList(nn.ConvTranspose2d(below, width, 2, stride=2) for width, below in pairwise(widths))
         self.decoder = nn.ModuleList(_double(2 * width, width) for width in widths[:-1])
         self.score = nn.Conv2d(widths[0], n_classes, 1)
 
     def scores(self, x: Tensor) -> Tensor:
-        """Return the scores, (B, 3, h, w) -> (B, C, h, w)."""
+        """Return the scores. Parameters and result are those of `Segmenter.scores`.
+
+        Raises
+        ------
+        ArgumentError
+            When a side of the image is too small to be halved S - 1 times.
+        """
         smallest = 2 ** len(self.up)
         if min(x.shape[2:]) < smallest:
             raise ArgumentError("image", f"{smallest} x {smallest} pixels or more", tuple(x.shape))

@@ -32,7 +32,18 @@ class Vgg(nn.Module):
         )
 
     def forward(self, x: Tensor) -> list[Tensor]:
-        """Return the map after each stage's pooling, (B, 3, h, w) -> five maps at 1/2, 1/4, ... 1/32 of the size."""
+        """Return the map after the pooling of each stage.
+
+        Parameters
+        ----------
+        x : (B, 3, h, w) float
+            Normalised images.
+
+        Returns
+        -------
+        list of (B, width, H, W) float
+            Five maps, at 1/2, 1/4, ... 1/32 of the size, rounded up.
+        """
         pooled = []
         for layer in self.features:
             x = layer(x)

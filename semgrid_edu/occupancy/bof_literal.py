@@ -109,8 +109,8 @@ def bof_update_literal(state: BofState, spec: GridSpec, evidence: Evidence, para
         P(occupied, v | z) = P(z | occupied) P(occupied, v) / P(z),   P(free | z) = P(z | free) P(free) / P(z)
 
     All velocities share P(z | occupied), so a scan picks cells, and says nothing of velocities. First the UNKNOWN mass
-    of cells that are seen is shared out, as in `update`; what becomes DYNAMIC takes the lattice's prior velocities. The
-    literal twin of `bof_update`, with its parameters, result and errors.
+    of cells that are seen is shared out, as in `update`; what becomes DYNAMIC takes the lattice's prior velocities.
+    This is the literal twin of `bof_update`. Parameters, result and errors are those of `bof_update`.
     """
     check_shape("state", state.occupied, (len(params.lattice), *spec.shape))
     check_shape("evidence", evidence.free, spec.shape)

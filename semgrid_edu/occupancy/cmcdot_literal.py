@@ -1,4 +1,4 @@
-"""CMCDOT's four steps in plain numpy, a line of the formulas at a time: the literal twins of `steps` (section 3.2).
+"""CMCDOT's four steps in plain numpy, formula by formula: the literal twins of `steps` (section 3.2).
 
 All arrays over cells are (H, W), or (4, H, W) in the order of `State`, in double precision. The fast twins do the same
 in compiled loops and single precision; property tests hold the two equal.
@@ -129,7 +129,7 @@ def meet_literal(
     newborn : (H, W) float64
         Scaled like everything that was in the cell.
     own, arrival : (H, W) float64
-        By which the weights of particles change that have stayed in the cell, and that have arrived in it.
+        Factors of the weights of the particles that have stayed in the cell, and of those that have arrived in it.
     """
     own, arrived = strike_out(mixed[STATIC], arrives)
     probability = own * mixed

@@ -11,13 +11,19 @@ from semgrid_edu.occupancy.state import Particles
 
 
 def cells_of_literal(position: NDArray, spec: GridSpec) -> NDArray[np.int64]:
-    """Return the cell that each particle is in: the literal twin of `cells_of`, with its parameters and result."""
+    """Return the cell that each particle is in: the literal twin of `cells_of`.
+
+    Parameters and result are those of `cells_of`.
+    """
     rows, cols, inside = spec.cells(position)
     return np.where(inside, rows * spec.shape[1] + cols, OUTSIDE)
 
 
 def weight_in_cells_literal(weight: NDArray, cells: NDArray, shape: tuple[int, int]) -> NDArray[np.float64]:
-    """Add up the weights in each cell: the literal twin of `weight_in_cells`, with its parameters and result."""
+    """Add up the weights in each cell: the literal twin of `weight_in_cells`.
+
+    Parameters and result are those of `weight_in_cells`.
+    """
     total = np.zeros(shape)
     inside = cells != OUTSIDE
     np.add.at(total, np.unravel_index(cells[inside], shape), weight[inside])
@@ -25,21 +31,27 @@ def weight_in_cells_literal(weight: NDArray, cells: NDArray, shape: tuple[int, i
 
 
 def scale_in_cells_literal(weight: NDArray, cells: NDArray, factor: NDArray) -> NDArray[np.float64]:
-    """Multiply each weight by the factor of its cell, (H, W): the literal twin of `scale_in_cells`."""
+    """Multiply each weight by the factor of its cell: the literal twin of `scale_in_cells`.
+
+    Parameters and result are those of `scale_in_cells`.
+    """
     return np.where(cells == OUTSIDE, 0, weight * factor.ravel()[cells])
 
 
 def transform_literal(particles: Particles, motion: PlanarMotion) -> Particles:
-    """Express particles in a new frame: the literal twin of `transform`, with its parameters and result."""
+    """Express particles in a new frame: the literal twin of `transform`.
+
+    Parameters and result are those of `transform`.
+    """
     position = motion.to_now(particles.position.astype(np.float64))
     return Particles(position, particles.velocity @ motion.rotation, particles.weight.astype(np.float64))
 
 
 def slow_down_literal(particles: Particles, stop_rate: float, stop_speed: float, dt: float) -> Particles:
-    """Keep of each weight what does not stop: the literal twin of `slow_down`, with its parameters and result.
+    """Keep of each weight what goes on moving: the literal twin of `slow_down`.
 
     A particle of speed v stops at the rate stop_rate exp(-v^2 / (2 stop_speed^2)), so after `dt` the share
-    exp(-rate dt) of it still moves.
+    exp(-rate dt) of it still moves. Parameters and result are those of `slow_down`.
     """
     speed = np.linalg.norm(particles.velocity.astype(np.float64), axis=1)
     rate = stop_rate * np.exp(-(speed**2) / (2 * stop_speed**2))
@@ -47,7 +59,10 @@ def slow_down_literal(particles: Particles, stop_rate: float, stop_speed: float,
 
 
 def fly_literal(particles: Particles, max_acceleration: float, dt: float, rng: np.random.Generator) -> Particles:
-    """Let particles fly: the literal twin of `fly`, with its parameters and result, and the same random numbers."""
+    """Let particles fly for a while, at constant velocity plus noise: the literal twin of `fly`.
+
+    Parameters and result are those of `fly`, and so are the random numbers that are drawn.
+    """
     a = max_acceleration * (2 * rng.random((len(particles), 2), np.float32).astype(np.float64) - 1)
     v = particles.velocity.astype(np.float64)
     return Particles(particles.position + v * dt + a * dt**2 / 2, v + a * dt, particles.weight)
@@ -57,7 +72,7 @@ def systematic_resample_literal(weight: NDArray, count: int, offset: float) -> N
     """Draw indices in proportion to the weights: the literal twin of `systematic_resample`.
 
     The weights lie end to end, so that index i covers the interval between two partial sums. Of `count` points, equally
-    spaced, each draws the index whose interval it falls into. Parameters and result are those of the fast twin.
+    spaced, each draws the index whose interval it falls into. Parameters and result are those of `systematic_resample`.
     """
     ends = np.cumsum(weight, dtype=np.float64)
     points = (np.arange(count) + offset) / count * ends[-1]
@@ -65,7 +80,10 @@ def systematic_resample_literal(weight: NDArray, count: int, offset: float) -> N
 
 
 def draw_again_literal(particles: Particles, count: int, rng: np.random.Generator) -> Particles:
-    """Draw particles by weight: the literal twin of `draw_again`, with its parameters, result and random numbers."""
+    """Draw particles in proportion to their weights: the literal twin of `draw_again`.
+
+    Parameters and result are those of `draw_again`, and so are the random numbers that are drawn.
+    """
     total = particles.weight.sum(dtype=np.float64)
     if total == 0 or count == 0:
         return Particles.none()
@@ -76,9 +94,10 @@ def draw_again_literal(particles: Particles, count: int, rng: np.random.Generato
 def draw_newborn_literal(
     newborn: NDArray, spec: GridSpec, count: int, max_speed: float, rng: np.random.Generator
 ) -> Particles:
-    """Draw new particles by newborn mass: the literal twin of `draw_newborn`, with its random numbers.
+    """Draw new particles in proportion to each cell's newborn mass: the literal twin of `draw_newborn`.
 
-    Each is anywhere in its cell, with a velocity from the prior. Parameters and result are those of the fast twin.
+    Each lies anywhere in its cell, with a velocity from the prior. Parameters and result are those of `draw_newborn`,
+    and so are the random numbers that are drawn.
     """
     total = newborn.sum(dtype=np.float64)
     if total == 0 or count == 0:

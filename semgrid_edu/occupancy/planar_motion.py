@@ -73,14 +73,47 @@ class PlanarMotion:
         return np.array([[cos, -sin], [sin, cos]])
 
     def to_previous(self, xy: NDArray) -> NDArray:
-        """Return the coordinates in the previous frame, (..., 2) metres, of points given in the frame of now."""
+        """Return the coordinates in the previous frame of points given in the frame of now.
+
+        Parameters
+        ----------
+        xy : (..., 2) float
+            x and y in the grid frame of now, metres.
+
+        Returns
+        -------
+        (..., 2) float
+            x and y in the grid frame of the previous instant, metres.
+        """
         return xy @ self.rotation.T + (self.dx, self.dy)
 
     def to_now(self, xy: NDArray) -> NDArray:
-        """Return the coordinates in the frame of now, (..., 2) metres, of points given in the previous frame."""
+        """Return the coordinates in the frame of now of points given in the previous frame.
+
+        Parameters
+        ----------
+        xy : (..., 2) float
+            x and y in the grid frame of the previous instant, metres.
+
+        Returns
+        -------
+        (..., 2) float
+            x and y in the grid frame of now, metres.
+        """
         return (xy - (self.dx, self.dy)) @ self.rotation
 
     def then(self, motion: "PlanarMotion") -> "PlanarMotion":
-        """Return this motion followed by another one, as a single motion."""
+        """Return this motion followed by another one, as a single motion.
+
+        Parameters
+        ----------
+        motion : PlanarMotion
+            The motion that follows, in the frame to which this one leads.
+
+        Returns
+        -------
+        PlanarMotion
+            The pose after both motions, in the frame before them.
+        """
         dx, dy = self.to_previous(np.array([motion.dx, motion.dy]))
         return PlanarMotion(float(dx), float(dy), self.dyaw + motion.dyaw)

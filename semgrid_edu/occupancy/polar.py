@@ -43,7 +43,20 @@ def polar_profile(points, low, high, beams):
 
 @njit(cache=True, inline="always")
 def beam_of(x, y, beams):
-    """Return the beam, from 0 to beams - 1, in whose sector x, y lies."""
+    """Return the beam in whose sector a point lies.
+
+    Parameters
+    ----------
+    x, y : float
+        The point in the grid frame of the vehicle, metres.
+    beams : int
+        Number of beams in a turn, B.
+
+    Returns
+    -------
+    int
+        The beam, from 0 to B - 1. Beam 0 begins straight behind the vehicle, and the beams go counter-clockwise.
+    """
     return min(int((np.arctan2(y, x) + np.pi) * (beams / (2 * np.pi))), beams - 1)
 
 

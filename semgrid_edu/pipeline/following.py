@@ -17,12 +17,15 @@ _END = object()
 
 
 class Follower:
-    """Run `track(frames, spec)` in step with whoever reads the frames.
+    """Run a tracker in step with the other stages: it gets a frame only when they need its belief.
+
+    A tracker is a generator that reads the frames itself. This class hands it one frame at a time, and takes one belief
+    for each.
 
     Parameters
     ----------
     track : callable
-        l -> o, as `Stages` describes it.
+        `track(frames, spec)`, l -> o, as `Stages` describes it.
     spec : GridSpec
         The grid of the beliefs.
     """
@@ -40,13 +43,15 @@ class Follower:
         Parameters
         ----------
         frame : Frame
+            The next frame of the drive.
         number : int
-            Of the frame, for error messages.
+            Number of the frame, for error messages.
 
         Returns
         -------
         belief : Belief
-            Checked; without velocities, which are then NaN, when the tracker yields the probabilities alone.
+            What the tracker yields, after it has been checked. The velocities are NaN when the tracker yields only
+            probabilities.
         seconds : float
             How long the tracker took.
 
@@ -72,7 +77,7 @@ class Follower:
         Raises
         ------
         StageError
-            When it still yields.
+            When it yields another belief.
         """
         self._over = True
         if self._beliefs is not None and self._next() is not _END:
@@ -88,7 +93,7 @@ class Follower:
             return next(self._beliefs, _END)
 
     def _frames(self) -> Iterator[Frame]:
-        """Hand out the frame that waits, until there are no more."""
+        """Yield the frame that waits for the tracker, until there are no more."""
         while not self._over:
             if self._waiting is None:
                 raise self._seam.error(TAKES_TURNS, "one that takes another frame before it yields this one's belief")

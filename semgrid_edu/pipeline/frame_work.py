@@ -1,4 +1,4 @@
-"""One frame on its way through the stages (paper, Fig. 2)."""
+"""What the stages do with one frame, from its belief to the refined grid (paper, Fig. 2)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -27,17 +27,17 @@ class FrameResult:
     Parameters
     ----------
     frame : Frame
-        What came in: l, the LIDAR points, and i, the image.
+        The frame, with l, the LIDAR points, and i, the image.
     belief : Belief
-        o, the occupancy grid, and velocities.
+        o, the occupancy grid, with velocities.
     scores : (C, h, w) float32
-        s, the image network's scores, no soft-max, at the size that the network sees.
+        s, the image network's scores before the soft-max, at the size that the network sees.
     grid : (C, H, W) float32
-        g, the semantic grid: probabilities of the classes, summing to 1 in each cell.
+        g, the semantic grid: probabilities of the classes, which sum to 1 in each cell.
     refined : (C, H, W) float32
-        The same after refinement.
+        The semantic grid after refinement.
     seconds : dict of str to float
-        How long each of `STAGES` took, without the checks between them.
+        How long each of `STAGES` took, seconds, without the checks between them.
     """
 
     frame: Frame
@@ -49,14 +49,14 @@ class FrameResult:
 
 
 class FrameWork:
-    """The stages at work on one frame; what several sets of stages would do alike is done once.
+    """Run one or several sets of stages on a frame; a call that several sets have in common is made only once.
 
     Parameters
     ----------
     number : int
-        Of the frame, for error messages.
+        Number of the frame, for error messages.
     frame : Frame
-        With an image.
+        The frame; it has to have an image.
     """
 
     def __init__(self, number: int, frame: Frame) -> None:
@@ -65,21 +65,38 @@ class FrameWork:
         self._done: dict[tuple[int, ...], tuple[NDArray[np.float32], float]] = {}
 
     def image(self, size: tuple[int, int]) -> NDArray[np.float32]:
-        """Return what `network_image` makes of the frame, as an array."""
+        """Return the image of the frame as a network takes it, see `network_image`.
+
+        Parameters
+        ----------
+        size : (int, int)
+            Height h and width w, pixels.
+
+        Returns
+        -------
+        (3, h, w) float32
+            RGB, 0..1.
+        """
         if size not in self._images:
             self._images[size] = network_image(self._frame, size).numpy()
         return self._images[size]
 
     def result(self, stages: Stages, belief: Belief, seconds: float) -> FrameResult:
-        """Send the frame through a complete set of stages, of which the filter has done its part.
+        """Send the frame through the stages that follow the filter.
 
         Parameters
         ----------
         stages : Stages
+            A complete set: five functions and their architecture.
         belief : Belief
             What `stages.track` yields for the frame.
         seconds : float
             How long that took.
+
+        Returns
+        -------
+        FrameResult
+            What every stage made of the frame.
 
         Raises
         ------
@@ -92,7 +109,7 @@ class FrameWork:
         try:
             log_g, t_fuse = self._call("fuse", stages.fuse, shapes, p, o)
         except StageError:
-            # Millions of numbers: they are searched for NaN when something is wrong, not at each frame.
+            # The planes hold millions of numbers, so they are searched for NaN after an error, not at each frame.
             Seam("sample", stages.sample, self._number).finite(p)
             raise
         refined, t_refine = self._call("refine", stages.refine, shapes, log_g, o)
@@ -102,7 +119,7 @@ class FrameWork:
     def _call(
         self, stage: str, function: Callable, shapes: dict[str, tuple[int, ...]], *inputs: NDArray
     ) -> tuple[NDArray[np.float32], float]:
-        """Return a stage's result and its time; those of the same function on the same arrays are known already."""
+        """Return a stage's result and its time; the same function isn't called again on the same arrays."""
         key = (id(function), *map(id, inputs))
         if key not in self._done:
             self._done[key] = Seam(stage, function, self._number).call(shapes[stage], *inputs)
@@ -115,6 +132,12 @@ def result_shapes(architecture: Architecture) -> dict[str, tuple[int, ...]]:
     Parameters
     ----------
     architecture : Architecture
+        The grid, the image size, the planes and the classes.
+
+    Returns
+    -------
+    dict of str to tuple of int
+        By the names "track", "segment", "sample", "fuse" and "refine".
 
     Examples
     --------
@@ -132,12 +155,12 @@ def result_shapes(architecture: Architecture) -> dict[str, tuple[int, ...]]:
 
 
 def network_image(frame: Frame, size: tuple[int, int]) -> Tensor:
-    """Scale a frame's image to what a network takes.
+    """Turn a frame's image into what a network takes.
 
     Parameters
     ----------
     frame : Frame
-        With an image.
+        The frame; it has to have an image.
     size : (int, int)
         Height and width, pixels; `frame.camera.resized(size)` is the camera of the result.
 

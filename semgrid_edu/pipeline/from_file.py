@@ -13,25 +13,25 @@ NAMES = ", ".join(ARGUMENTS)
 
 
 def load_stages(path: str | Path) -> Stages:
-    """Read stages from a Python file: those of track, segment, sample, fuse and refine that it has as functions.
+    """Read stages from a Python file: its functions named track, segment, sample, fuse and refine.
 
-    A file can also make its stages itself: where it has a `Stages` named `stages`, that one counts alone.
+    A file can also make a `Stages` itself, under the name `stages`. Then nothing else in the file counts.
 
     Parameters
     ----------
     path : path-like
-        The file, which is executed. It may import other files of its folder.
+        The file, which is executed. It may import other files in its folder.
 
     Returns
     -------
     Stages
-        Those of the file; the others are left out.
+        The stages of the file; the others are left out.
 
     Raises
     ------
     DataError
-        When there is no such file, Python can't import it, it has none of these names, or what has such a name isn't a
-        function of the right number of arguments.
+        When there is no such file, Python can't import it, it has none of these functions, or one of them doesn't
+        take the right number of arguments.
 
     Examples
     --------
@@ -63,10 +63,10 @@ def _from_functions(path: Path, module: ModuleType) -> Stages:
 
 
 def _imported(path: Path) -> ModuleType:
-    """Execute a file as a module, while its folder is searched for what it imports."""
+    """Execute a file as a module; meanwhile its own folder is searched for imports too."""
     spec = spec_from_file_location(f"_stages_in_{path.stem}", path)
     module = module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses in the file look themselves up there
+    sys.modules[spec.name] = module  # a dataclass in the file looks up its module there
     searched = sys.path[:]
     sys.path.insert(0, str(path.resolve().parent))
     try:

@@ -1,4 +1,4 @@
-"""What an error about a stage says beyond the fact: where the function is written, and what is probably wrong."""
+"""What error messages about stages add: where the function is written, and what is probably wrong with it."""
 
 import inspect
 import traceback
@@ -15,11 +15,12 @@ from semgrid_edu.occupancy import N_STATES
 
 
 def where(function: Callable) -> str:
-    """Say where a function was written.
+    """Say where a function is written.
 
     Parameters
     ----------
     function : callable
+        A function, or an object that can be called.
 
     Returns
     -------
@@ -33,13 +34,37 @@ def where(function: Callable) -> str:
 
 
 def file_of(function: Callable) -> str:
-    """Return the file that a function was written in; "" when nothing tells."""
+    """Return the file that a function is written in.
+
+    Parameters
+    ----------
+    function : callable
+        A function, or an object that can be called.
+
+    Returns
+    -------
+    str
+        The file's path; "" when it can't be known, as for an object that isn't a function.
+    """
     code = _code(function)
     return code.co_filename if code else ""
 
 
 def in_short(error: BaseException, file: str) -> str:
-    """Return an exception in one line, with the last line of a file that it passed through."""
+    """Describe an exception in one line.
+
+    Parameters
+    ----------
+    error : BaseException
+        The exception.
+    file : str
+        The file of interest.
+
+    Returns
+    -------
+    str
+        Class and first line of the message, and the last line of the file that the exception passed through, if any.
+    """
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
     first_line = str(error).strip().partition("\n")[0]
     message = f"{type(error).__name__}: {first_line}" if first_line else type(error).__name__
@@ -53,12 +78,23 @@ def _code(function: Callable) -> CodeType | None:
 
 
 def _place(file: str, line: int) -> str:
-    """Name a line of a file; the file that stands for a notebook's cell has a name that helps nobody."""
+    """Name a line of a file, or of a cell of a notebook, whose file has a name that means nothing to a student."""
     return f"{'a cell of the notebook' if 'ipykernel' in file else Path(file).name}, line {line}"
 
 
 def kind_of(value: object) -> str:
-    """Name what was returned in place of an array, and the usual cause."""
+    """Name what a stage returned in place of an array, and the usual cause.
+
+    Parameters
+    ----------
+    value : object
+        Anything but an array.
+
+    Returns
+    -------
+    str
+        The end of the sentence "found ...".
+    """
     if value is None:
         return "None: is the `return` missing?"
     if isinstance(value, Tensor):
@@ -69,11 +105,17 @@ def kind_of(value: object) -> str:
 
 
 def shape_hint(found: tuple[int, ...], expected: tuple[int, ...]) -> str:
-    """Return the probable cause of a wrong shape, as the end of a sentence; "" when none comes to mind.
+    """Return the probable cause of a wrong shape, as the end of a sentence; "" when there is no guess.
 
     Parameters
     ----------
     found, expected : tuple of int
+        The shape of the array that a stage returned, and the shape that it should have.
+
+    Returns
+    -------
+    str
+        Begins with a colon.
 
     Examples
     --------
@@ -95,16 +137,21 @@ def shape_hint(found: tuple[int, ...], expected: tuple[int, ...]) -> str:
 
 
 def sum_hint(values: NDArray, total: float, axis: str) -> str:
-    """Return the probable cause of probabilities, (K, H, W), that don't sum to 1.
+    """Return the probable cause of probabilities that don't sum to 1.
 
     Parameters
     ----------
     values : (K, H, W) float
-        All of them.
+        The values of all cells.
     total : float
-        What a wrong cell sums to.
+        The sum in a cell where it is wrong; may be NaN.
     axis : str
-        "class" or "state".
+        What the first axis stands for: "class" or "state".
+
+    Returns
+    -------
+    str
+        A question to the student, and sometimes the remedy.
     """
     if np.isnan(total):
         return "was something divided by a sum of 0?"
@@ -114,7 +161,20 @@ def sum_hint(values: NDArray, total: float, axis: str) -> str:
 
 
 def log_sum_hint(values: NDArray, total: float) -> str:
-    """Return the probable cause of log-probabilities, (C, H, W), whose exponentials sum to `total`, not to 1."""
+    """Return the probable cause of log-probabilities whose exponentials don't sum to 1.
+
+    Parameters
+    ----------
+    values : (C, H, W) float
+        The values of all cells.
+    total : float
+        The sum of the exponentials in a cell where it is wrong; may be NaN.
+
+    Returns
+    -------
+    str
+        A question to the student, and sometimes the remedy.
+    """
     if np.isnan(total):
         return "is there a logarithm of a negative number?"
     if (values >= 0).all() and _sums_to_one(values):

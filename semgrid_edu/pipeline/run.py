@@ -23,29 +23,30 @@ def run_pipeline(
     Parameters
     ----------
     frames : iterable of Frame
-        In the order of time, each with an image of any size; read one at a time.
+        The frames in the order of time, each with an image of any size. They are read one at a time.
     stages : Stages or SemanticGridNet
-        Five functions; the package's own stand in for those that are left out (`Stages.completed`). Or a network of
-        `build_net` or `load_net`, for the camera of the drive and in evaluation mode: then all five are the package's.
+        A set of stages, in which the package's own replace those that are left out (`Stages.completed`). Or a network
+        from `build_net` or `load_net`, for the camera of the drive and in evaluation mode: then all five stages are the
+        package's own.
     occupancy : CmcdotParams, optional
-        What the package's filter assumes.
+        Parameters of the package's filter.
     crf : CrfParams, optional
-        Of the package's refinement; `CrfParams.for_cells` when left out.
+        Parameters of the package's refinement; `CrfParams.for_cells` when left out.
     seed : int
         Seed for the particles of the package's filter.
 
     Yields
     ------
     FrameResult
-        One for each frame.
+        What every stage made of the frame; one result for each frame.
 
     Raises
     ------
     ArgumentError
         When a frame has no image.
     StageError
-        When a stage raises an error, or returns what the next one can't use: which stage, where it is written, at
-        which frame, and what is probably wrong.
+        When a stage raises an error, or returns what the next one can't use. It says which stage, where it is written,
+        at which frame, and what is probably wrong.
 
     Examples
     --------
@@ -66,7 +67,7 @@ def run_side_by_side(
 ) -> Iterator[tuple[FrameResult, ...]]:
     """Send each frame through several sets of stages, to compare them.
 
-    Where the same function would get the same arrays in two sets, it is called once: sets that differ in `refine` alone
+    A function that would get the same arrays in two sets is called only once. So sets that differ only in `refine`
     share everything before it.
 
     Parameters
@@ -74,12 +75,12 @@ def run_side_by_side(
     frames, occupancy, crf, seed
         As for `run_pipeline`.
     *several : Stages or SemanticGridNet
-        The sets of stages.
+        The sets of stages, each as in `run_pipeline`.
 
     Yields
     ------
     tuple of FrameResult
-        One for each set of stages.
+        One result for each set of stages, in their order.
 
     Raises
     ------
@@ -100,7 +101,7 @@ def run_side_by_side(
 
 
 def _filter_of(stages: Stages) -> tuple:
-    """Return by what a filter is told apart: sets that have it in common share its beliefs."""
+    """Return a key for the filter of a set of stages and for its grid: sets with the same key share its beliefs."""
     return id(stages.track), stages.architecture.grid
 
 

@@ -1,4 +1,4 @@
-"""What a stage may hand to the next one, checked for everyone's functions; errors say what is probably wrong."""
+"""Checks of what each stage hands to the next one; the errors say what is probably wrong."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -12,31 +12,31 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.pipeline.hints import file_of, in_short, kind_of, log_sum_hint, shape_hint, sum_hint, where
 
 TOLERANCE = 1e-3
-"""By how much the probabilities of a cell may miss a sum of 1: what the CRF allows as well."""
+"""The most by which the probabilities of a cell may miss a sum of 1; the CRF allows the same."""
 
 OWN = __name__.rpartition(".")[0]
-"""Where the package's own stages are written."""
+"""The package in which the package's own stages are written."""
 
 
 class StageError(ArgumentError):
-    """A stage raised an error, or returned what the next stage can't use: which stage, where, at which frame."""
+    """A stage raised an error, or returned what the next one can't use; it says which stage, where, at which frame."""
 
 
 @dataclass(frozen=True)
 class Seam:
     """One call of a stage, and what its result must look like.
 
-    What goes into a function that isn't the package's own, and what comes out of it, is copied: so it may change its
-    arguments, and return the same array again and again.
+    A function that isn't the package's own gets copies of its arguments, and its result is copied too. So it may change
+    its arguments, and return the same array at each frame.
 
     Parameters
     ----------
     stage : str
-        "track", "segment", "sample", "fuse" or "refine".
+        Name of the stage: "track", "segment", "sample", "fuse" or "refine".
     function : callable
-        Whoever wrote it.
+        The stage, the package's own or a student's.
     frame : int
-        The number of the frame.
+        Number of the frame.
     """
 
     stage: str
@@ -53,26 +53,27 @@ class Seam:
         return str(getattr(self.function, "__module__", "")).startswith(OWN)
 
     def call(self, shape: tuple[int, ...], *inputs: NDArray) -> tuple[NDArray[np.float32], float]:
-        """Call a stage between arrays, and check what it returns.
+        """Call a stage that takes arrays and returns one, and check what it returns.
 
         Parameters
         ----------
         shape : tuple of int
-            That of the result.
+            Shape that the result must have.
         *inputs : array
             What the stage takes.
 
         Returns
         -------
         result : (*shape) float32
+            What the stage returned.
         seconds : float
             How long the function took, without checks and copies.
 
         Raises
         ------
         StageError
-            When it raises, or its result isn't an array of floats of that shape; when scores aren't finite, or
-            probabilities don't sum to 1 in a cell.
+            When the function raises an error, its result isn't an array of floats of that shape, scores aren't finite,
+            or probabilities don't sum to 1 in a cell.
         """
         given = inputs if self.own else [np.copy(array) for array in inputs]
         start = time.perf_counter()
@@ -85,7 +86,18 @@ class Seam:
         return result, seconds
 
     def error(self, expected: object, found: object) -> StageError:
-        """Return the error that names this call."""
+        """Return an error that names this call.
+
+        Parameters
+        ----------
+        expected, found : object
+            What was expected of the stage, and what was found instead.
+
+        Returns
+        -------
+        StageError
+            The error, to be raised.
+        """
         return StageError(str(self), expected, found)
 
     @contextmanager
@@ -103,6 +115,18 @@ class Seam:
     def array(self, value: object, shape: tuple[int, ...]) -> NDArray[np.float32]:
         """Return a result as float32 in its own memory layout, or refuse it.
 
+        Parameters
+        ----------
+        value : object
+            What the stage returned.
+        shape : tuple of int
+            The shape that it must have.
+
+        Returns
+        -------
+        (*shape) float32
+            The same numbers.
+
         Raises
         ------
         StageError
@@ -118,13 +142,37 @@ class Seam:
             return value.astype(np.float32, order="K", copy=not self.own)
 
     def finite(self, values: NDArray) -> None:
-        """Refuse NaN and infinity."""
+        """Refuse NaN and infinity.
+
+        Parameters
+        ----------
+        values : array
+            What the stage returned.
+
+        Raises
+        ------
+        StageError
+            When one of the values isn't finite.
+        """
         if not np.isfinite(values).all():
             place = _first(~np.isfinite(values))
             raise self.error("finite numbers", f"{values[place]} at index {place}")
 
     def probabilities(self, values: NDArray, axis: str = "class") -> None:
-        """Refuse what aren't distributions over the first axis, the "class" or "state" axis of (K, H, W)."""
+        """Refuse arrays that don't hold a distribution over the first axis in each cell.
+
+        Parameters
+        ----------
+        values : (K, H, W) float32
+            What the stage returned.
+        axis : str
+            What the first axis stands for: "class" or "state".
+
+        Raises
+        ------
+        StageError
+            When the values of a cell don't sum to 1, or one of them is negative.
+        """
         wrong, total = _wrong_sums(values)
         if wrong is not None:
             found = f"that the {len(values)} {_PLURAL[axis]} of cell {wrong} sum to {total:.4g}"
@@ -134,7 +182,18 @@ class Seam:
             raise self.error("probabilities from 0 to 1", f"{values[:, *cell].min():.4g} in cell {cell}")
 
     def log_probabilities(self, values: NDArray) -> None:
-        """Refuse what aren't logarithms of distributions over the first axis, (C, H, W)."""
+        """Refuse arrays that don't hold the logarithms of a distribution over the first axis in each cell.
+
+        Parameters
+        ----------
+        values : (C, H, W) float32
+            What the stage returned, natural logarithms.
+
+        Raises
+        ------
+        StageError
+            When the exponentials of a cell don't sum to 1.
+        """
         with np.errstate(over="ignore"):
             wrong, total = _wrong_sums(np.exp(values))
         if wrong is not None:
@@ -145,13 +204,13 @@ class Seam:
 
 
 _VALUES = {"segment": Seam.finite, "fuse": Seam.log_probabilities, "refine": Seam.probabilities}
-"""What is checked beyond the shape. The planes hold too many numbers for each frame: see `FrameWork.result`."""
+"""What is checked beyond the shape. The planes hold too many numbers to check them at each frame: see `FrameWork`."""
 
 _PLURAL = {"class": "classes", "state": "states"}
 
 
 def _wrong_sums(values: NDArray) -> tuple[tuple[int, int] | None, float]:
-    """Return the first cell of (K, H, W) that doesn't sum to 1, if there is one, and its sum."""
+    """Return the first cell of (K, H, W) whose values don't sum to 1, or None, and its sum."""
     with np.errstate(invalid="ignore"):
         total = values.sum(axis=0)
     right = np.abs(total - 1) <= TOLERANCE  # NaN isn't

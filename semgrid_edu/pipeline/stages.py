@@ -25,21 +25,22 @@ ARGUMENTS = {
     "fuse": ("p", "o"),
     "refine": ("log_g", "o"),
 }
-"""The stages in their order, and what each of them takes."""
+"""The names of the stages, in their order, and of the arguments that each of them takes."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stages:
     """The five stages as functions on numpy arrays, one frame at a time.
 
-    A stage that is left out is the package's own. C is the number of classes, D that of planes.
+    The package's own stages replace those that are left out. C is the number of classes, D the number of planes.
 
     Parameters
     ----------
     track : callable, optional
-        l -> o: `track(frames, spec)` yields a `Belief`, or an array (4, H, W) float, for each frame: the probability of
-        FREE, STATIC, DYNAMIC and UNKNOWN, which sum to 1 in each cell. A generator function like `track_drive`: it
-        takes a frame, yields its belief, and only then takes the next one, so it can remember what it saw.
+        l -> o: `track(frames, spec)` yields a `Belief`, or an array (4, H, W) float, for each frame: the probabilities
+        of FREE, STATIC, DYNAMIC and UNKNOWN, which sum to 1 in each cell. It is a generator function, so it can
+        remember what it saw: it takes a frame, yields its belief, and only then takes the next one, as `track_drive`
+        does.
     segment : callable, optional
         i -> s: `segment(image (3, h, w))` returns scores (C, h, w) float without soft-max; the image is RGB, 0..1.
     sample : callable, optional
@@ -51,13 +52,13 @@ class Stages:
         g -> g: `refine(log_g (C, H, W), o (4, H, W))` returns g (C, H, W) float, probabilities that sum to 1 in each
         cell.
     architecture : Architecture, optional
-        The grid, the image size, the planes and the classes that all of them work with. When left out, those of the
-        package's own stages.
+        The grid, the image size, the planes and the classes that all stages work with; those of the package's own
+        stages when left out.
 
     Raises
     ------
     ArgumentError
-        When a stage isn't a function of so many arguments.
+        When a stage isn't a function of the right number of arguments.
 
     Examples
     --------
@@ -75,7 +76,7 @@ class Stages:
     architecture: Architecture | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what can't be called as a stage is called."""
+        """Refuse what isn't a function of the stage's arguments."""
         for name in self.given:
             _check_function(name, getattr(self, name))
 
@@ -93,18 +94,23 @@ class Stages:
         Parameters
         ----------
         net : SemanticGridNet
-            Of `build_net` or `load_net`, for the camera of the drive; in evaluation mode.
+            A network from `build_net` or `load_net`, for the camera of the drive and in evaluation mode.
         occupancy : CmcdotParams, optional
-            What the filter assumes.
+            Parameters of the filter.
         crf : CrfParams, optional
-            Of the refinement; `CrfParams.for_cells` when left out.
+            Parameters of the refinement; `CrfParams.for_cells` when left out.
         seed : int
             Seed for the particles of the filter.
+
+        Returns
+        -------
+        Stages
+            Five functions, and the network's architecture.
 
         Raises
         ------
         ArgumentError
-            When the network was put together by hand, so that nothing tells its grid.
+            When the network was put together by hand, so that its grid isn't known.
 
         Examples
         --------
@@ -121,7 +127,12 @@ class Stages:
         Parameters
         ----------
         other : Stages
-            Such as `Stages.of(net)`.
+            The stages that fill the gaps, such as `Stages.of(net)`.
+
+        Returns
+        -------
+        Stages
+            The mixed set.
 
         Raises
         ------
@@ -139,15 +150,20 @@ class Stages:
     ) -> "Stages":
         """Return these stages, and the package's own where one was left out.
 
-        The filter and the CRF need no network. Where `segment`, `sample` or `fuse` is left out, that of the shipped
-        SegNet stands in, fitted to the camera.
+        The filter and the CRF need no network. Where `segment`, `sample` or `fuse` is left out, the shipped SegNet,
+        fitted to the camera, provides it.
 
         Parameters
         ----------
         camera : Camera
-            As it took the images of the drive.
+            The camera as it took the images of the drive.
         occupancy, crf, seed
-            Of the package's own filter and refinement, as in `of`.
+            Parameters of the package's own filter and refinement, and seed of the filter, as in `of`.
+
+        Returns
+        -------
+        Stages
+            Five functions and their architecture.
 
         Raises
         ------

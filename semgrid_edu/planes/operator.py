@@ -42,7 +42,14 @@ class PlaneOperator:
 
     @classmethod
     def build(cls, pixels: ArrayLike, visible: ArrayLike, image_size: tuple[int, int]) -> "PlaneOperator":
-        """Work out the operator of points whose pixels are known, for one image; arguments as for `PlaneSampler`.
+        """Work out the operator of points whose pixels are known, for one image.
+
+        Parameters are those of `PlaneSampler`.
+
+        Returns
+        -------
+        PlaneOperator
+            The operator of D planes of H x W points.
 
         Raises
         ------
@@ -78,7 +85,18 @@ class PlaneOperator:
         )
 
     def map(self, change: Callable[[Tensor], Tensor]) -> "PlaneOperator":
-        """Return an operator each of whose tensors is what `change` makes of the one here, such as a copy on a GPU."""
+        """Return an operator with changed tensors, such as copies of them on a GPU.
+
+        Parameters
+        ----------
+        change : callable
+            Takes each tensor of the two matrices, and returns the one to take its place.
+
+        Returns
+        -------
+        PlaneOperator
+            A new operator; this one stays as it is.
+        """
         matrix, transpose = (SparseMatrix(*map(change, part)) for part in (self.matrix, self.transpose))
         return replace(self, matrix=matrix, transpose=transpose)
 

@@ -80,7 +80,17 @@ def plane_pixels(spec: GridSpec, heights: ArrayLike, camera: Camera) -> tuple[ND
 
 
 def check_heights(heights: ArrayLike) -> NDArray[np.float64]:
-    """Return the heights of planes as an array of metres, (D,) float64, after checking them.
+    """Check the heights of planes, and return them as an array.
+
+    Parameters
+    ----------
+    heights : (D,) float
+        delta_i, metres above the ground.
+
+    Returns
+    -------
+    (D,) float64
+        The same heights.
 
     Raises
     ------
@@ -94,7 +104,16 @@ def check_heights(heights: ArrayLike) -> NDArray[np.float64]:
 
 
 def check_plane_points(pixels: NDArray, visible: NDArray, image_size: tuple[int, int]) -> None:
-    """Refuse pixels (D, H, W, 2) and visible (D, H, W) that don't fit each other or an image of (h, w) pixels.
+    """Refuse points of planes whose pixels don't fit each other or the image.
+
+    Parameters
+    ----------
+    pixels : (D, H, W, 2) float
+        u, v of each point in pixels.
+    visible : (D, H, W) bool
+        The points that take a value.
+    image_size : (int, int)
+        Height h and width w of the image, pixels.
 
     Raises
     ------

@@ -84,7 +84,18 @@ class SparseMatrix(NamedTuple):
 
     @classmethod
     def from_scipy(cls, matrix: csr_array) -> "SparseMatrix":
-        """Return SciPy's matrix, (rows, columns), as tensors that share its memory."""
+        """Return a matrix of SciPy as tensors that share its memory.
+
+        Parameters
+        ----------
+        matrix : csr_array
+            The matrix, (rows, columns).
+
+        Returns
+        -------
+        SparseMatrix
+            The same weights.
+        """
         return cls(*map(torch.from_numpy, (matrix.indices, matrix.indptr, matrix.data)))
 
     def multiply(self, rows: Tensor) -> Tensor:
@@ -144,12 +155,40 @@ class SparseProduct(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx, rows: Tensor, matrix: SparseMatrix, transpose: SparseMatrix) -> Tensor:
-        """Return A x, (rows, C); the argument `rows` is x, (columns, C)."""
+        """Return the product A x.
+
+        Parameters
+        ----------
+        ctx
+            PyTorch's store for what the backward pass needs.
+        rows : (columns, C) float
+            x, one row per column of A.
+        matrix, transpose : SparseMatrix
+            A and its transpose.
+
+        Returns
+        -------
+        (rows, C) float
+            A x.
+        """
         ctx.matrices = matrix, transpose
         return matrix.multiply(rows.contiguous())
 
     @staticmethod
     def backward(ctx, grad: Tensor) -> tuple[Tensor, None, None]:
-        """Return A^T dL/dy, (columns, C), which can be differentiated again; the matrices have no gradient."""
+        """Return the gradient with respect to x, which can be differentiated again; the matrices have none.
+
+        Parameters
+        ----------
+        ctx
+            PyTorch's store, filled by `forward`.
+        grad : (rows, C) float
+            dL/dy, the gradient of the loss with respect to the product.
+
+        Returns
+        -------
+        (columns, C) float, None, None
+            A^T dL/dy, and nothing for the two matrices.
+        """
         matrix, transpose = ctx.matrices
         return SparseProduct.apply(grad, transpose, matrix), None, None

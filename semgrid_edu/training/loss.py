@@ -235,6 +235,17 @@ class Objective(nn.Module):
         self.net, self.stage, self.alpha = net, stage, alpha
 
     def forward(self, batch: Batch) -> tuple[Tensor, Tensor]:
-        """Return the sum of the weighted losses and the sum of the weights of a batch, see `cross_entropy_sums`."""
+        """Return the two sums whose quotient is the loss of a batch, see `cross_entropy_sums`.
+
+        Parameters
+        ----------
+        batch : Batch
+            The frames of a step, on the device of the network.
+
+        Returns
+        -------
+        losses, weights : () float
+            The sum of the weighted losses, nats, and the sum of the weights.
+        """
         scores = (image_scores if self.stage == "image" else grid_logits)(self.net, batch)
         return cross_entropy_sums(scores, getattr(batch.frames, TRUTH[self.stage]), self.alpha)

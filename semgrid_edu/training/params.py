@@ -73,7 +73,20 @@ class TrainingParams:
         return self.image_iterations + self.grid_iterations
 
     def stage(self, iteration: int) -> tuple[str, float]:
-        """Return the stage that an iteration, counted from 0, belongs to ("image" or "grid"), and its learning rate."""
+        """Return the stage that an iteration belongs to, and the learning rate of its step.
+
+        Parameters
+        ----------
+        iteration : int
+            Number of the iteration, counted from 0 over both stages.
+
+        Returns
+        -------
+        stage : str
+            "image" or "grid".
+        learning_rate : float
+            The rate, which falls to zero along half a cosine in each stage.
+        """
         if iteration < self.image_iterations:
             stage, done = "image", iteration / self.image_iterations
         else:

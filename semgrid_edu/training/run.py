@@ -165,6 +165,17 @@ def _name(path: str | Path) -> str:
 
 
 def how_to_go_on(folder: str | Path) -> str:
-    """Return a sentence on how to go on after an interruption, which loses the steps since the last checkpoint."""
+    """Return a sentence on how to go on after an interruption, which loses the steps since the last checkpoint.
+
+    Parameters
+    ----------
+    folder : path-like
+        The folder of the training run.
+
+    Returns
+    -------
+    str
+        The sentence, without a full stop.
+    """
     path = Path(folder) / CHECKPOINT
     return f"--resume goes on from {path}" if path.exists() else f"start again: there is no {path} yet"

@@ -1,4 +1,4 @@
-"""The model of each stage of the paper, at toy size, built from the functions that the pipeline itself calls."""
+"""Each stage of the paper as a model of toy size, built from the functions that the pipeline itself calls."""
 
 from semgrid_edu.graphical.stages.beam import BeamWorld, beam_over_cells
 from semgrid_edu.graphical.stages.beam_beliefs import beam_beliefs

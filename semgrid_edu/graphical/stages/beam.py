@@ -1,7 +1,7 @@
 """A beam over several cells: the forward model that an occupancy grid cuts into single cells (lecture 02).
 
-A beam is reflected by the first cell that reflects, so a range tells of all cells up to there at once. Thrun, "Learning
-occupancy grid maps with forward sensor models", Autonomous Robots 15, 2003.
+A beam passes cells until one reflects it, so a single range says something about all the cells up to that one. See
+Thrun, "Learning occupancy grid maps with forward sensor models", Autonomous Robots 15, 2003.
 """
 
 from dataclasses import dataclass
@@ -17,16 +17,16 @@ from semgrid_edu.graphical.model import GraphicalModel
 from semgrid_edu.graphical.stages.stage_graph import CutEdge, StageGraph
 
 BINS_PER_CELL = 10
-"""Ranges are read to a tenth of a cell: 2 cm where cells have 0.2 m."""
+"""Number of ranges that can be read per cell: a range is read to a tenth of a cell, 2 cm for cells of 0.2 m."""
 
 MARGIN = 6
-"""Ranges may be so many standard deviations before the first and behind the last cell: no probability is cut off."""
+"""Number of standard deviations by which a range may lie before the first or behind the last cell."""
 
 CUT = (
     CutEdge(
         "m4 - m5, once z is known",
-        "The grid keeps one number per cell, so it forgets that one of the two explains the return already, and a "
-        "noisy return raises the cell behind a wall again and again.",
+        "The grid keeps one number per cell, so it forgets that one of the two cells already explains the return, and "
+        "noisy returns raise the cell behind a wall again and again.",
     ),
 )
 """The edge that an occupancy grid cuts: explaining away."""
@@ -43,16 +43,16 @@ class BeamWorld:
     noise : float
         Standard deviation of a range, in cells; 0 for an exact range.
     width : int
-        So many neighbouring cells stand side by side in the beam, at one range; divides K.
+        Number of neighbouring cells that stand side by side in the beam, at the same range; it divides K.
     prior : float
         P(occupied) of each cell.
     hit, clutter : float
-        P(an occupied cell reflects the beam that reaches it), and a free one.
+        Probability that an occupied cell, or a free one, reflects a beam that reaches it.
 
     Raises
     ------
     ArgumentError
-        When a parameter can't be one.
+        When a parameter has a value that is impossible.
     """
 
     n_cells: int = 8
@@ -63,7 +63,7 @@ class BeamWorld:
     clutter: float = 0.01
 
     def __post_init__(self) -> None:
-        """Refuse what is no beam."""
+        """Refuse values that are impossible, and ranges too fine to be read."""
         if not 1 <= self.n_cells <= 12:
             raise ArgumentError("n_cells", "from 1 to 12", self.n_cells)
         if not 1 <= self.width <= self.n_cells or self.n_cells % self.width:
@@ -81,35 +81,35 @@ class BeamWorld:
 
     @property
     def n_ranges(self) -> int:
-        """How many ranges can reflect: K / width."""
+        """Number of ranges at which the beam can be reflected: K / width."""
         return self.n_cells // self.width
 
     @property
     def maps(self) -> NDArray[np.int64]:
-        """Every map, (2^K, K): 1 is occupied; in the order of a table over `cells`."""
+        """(2^K, K): every map, 1 for occupied cells, in the order of a table over `cells`."""
         return np.array(list(every_combination((0, 1), repeat=self.n_cells)))
 
 
 def beam_over_cells(world: BeamWorld | None = None, beams: int = 1) -> StageGraph:
-    """Build the graph of beams along the same cells: every cell points to r, the place that reflects; r to the range z.
+    """Build the graph of beams along the same cells: every cell -> r, where the beam is reflected -> z, the range.
 
     Parameters
     ----------
     world : BeamWorld, optional
         Eight cells and a noise of one cell when left out.
     beams : int
-        How many, each with its own r and z.
+        Number of beams, each with its own r and z.
 
     Returns
     -------
     StageGraph
-        Variables m1 ... mK (0 free, 1 occupied); r1, r2, ...: the range that reflects, from 0, its last state is
-        "none"; z1, z2, ...: see `range_state`.
+        Variables m1 ... mK (0 free, 1 occupied); r1, r2, ..., the range at which each beam is reflected, counted from
+        0, whose last state is "none"; and z1, z2, ..., see `range_state`.
 
     Raises
     ------
     ArgumentError
-        When there is no beam.
+        When `beams` is below 1.
     """
     if beams < 1:
         raise ArgumentError("beams", "at least 1", beams)
@@ -136,13 +136,14 @@ def reflection(world: BeamWorld, name: str = "r") -> Factor:
     Parameters
     ----------
     world : BeamWorld
+        The cells, and how the beam is reflected and measured.
     name : str
-        What r is called.
+        Name of the variable r.
 
     Returns
     -------
     Factor
-        Over the cells and r. The last state of r is "none": the beam passes all.
+        A table over the cells and r. The last state of r is "none": the beam passes all cells.
     """
     passes = np.where(world.maps == 1, 1 - world.hit, 1 - world.clutter)
     passes = passes.reshape(-1, world.n_ranges, world.width).prod(axis=2)
@@ -157,11 +158,12 @@ def range_bins(world: BeamWorld) -> NDArray[np.float64]:
     Parameters
     ----------
     world : BeamWorld
+        The cells, and how the beam is reflected and measured.
 
     Returns
     -------
     (B,) float64
-        Tenths of a cell; whole cells when the range is exact.
+        The ranges in ascending order: every tenth of a cell, or whole cells when the range is exact.
     """
     if world.noise == 0:
         return np.arange(world.n_ranges, dtype=float)
@@ -171,16 +173,18 @@ def range_bins(world: BeamWorld) -> NDArray[np.float64]:
 
 
 def measurement(world: BeamWorld) -> NDArray[np.float64]:
-    """Return P(z | r): normal around the range that reflects.
+    """Return P(z | r): normal around the range at which the beam is reflected.
 
     Parameters
     ----------
     world : BeamWorld
+        The cells, and how the beam is reflected and measured.
 
     Returns
     -------
     (R + 1, B + 1) float64
-        The last row and column are "none": without a reflection there is no range.
+        One row per state of r, one column per state of z. The last row and column are "none": without a reflection
+        there is no range.
     """
     bins, places = range_bins(world), np.arange(world.n_ranges)[:, None]
     density = np.exp(-0.5 * ((bins - places) / world.noise) ** 2) if world.noise else (bins == places).astype(float)
@@ -191,18 +195,19 @@ def measurement(world: BeamWorld) -> NDArray[np.float64]:
 
 
 def range_state(world: BeamWorld, z: float | None) -> int:
-    """Return the state of z for a range.
+    """Return the state of the variable z that stands for a range.
 
     Parameters
     ----------
     world : BeamWorld
+        The cells, and how the beam is reflected and measured.
     z : float or None
-        In cells, 0 for the middle of the nearest; None when nothing came back.
+        The range in cells, 0 for the middle of the nearest cell; None when nothing came back.
 
     Returns
     -------
     int
-        The nearest of `range_bins`.
+        Index of the nearest of `range_bins`, or of the state "none", which follows them.
 
     Raises
     ------
@@ -224,12 +229,18 @@ def beam_likelihood(world: BeamWorld, z: float | None) -> Factor:
     Parameters
     ----------
     world : BeamWorld
+        The cells, and how the beam is reflected and measured.
     z : float or None
-        In cells; None when nothing came back.
+        The range in cells, 0 for the middle of the nearest cell; None when nothing came back.
 
     Returns
     -------
     Factor
-        Over `world.cells`.
+        A table over `world.cells`.
+
+    Raises
+    ------
+    ArgumentError
+        When no reflection can give that range.
     """
     return (reflection(world) * Factor("r", measurement(world)[:, range_state(world, z)])).sum("r")

@@ -1,7 +1,8 @@
 """BOF as a graphical model: joint inference over four cells, and what is lost when each cell is filtered by itself.
 
-The package's BOF keeps one distribution per cell and combines what may arrive from antecedents by two rules: arrivals
-add up, as if at most one of them could happen; and what arrives is independent of what stands in the cell already.
+The antecedents of a cell are the cells from which something may come into it. The package's BOF keeps one distribution
+per cell, and combines what may arrive from the antecedents by two rules. The probabilities of arrivals add up, as if at
+most one of them could happen. And whatever arrives is taken as independent of what stands in the cell already.
 """
 
 import numpy as np
@@ -16,46 +17,47 @@ from semgrid_edu.occupancy import BofState, bof_predict_literal, bof_update
 AT_THE_EDGE = CellsInARow(({"left": 0.3, "right": 0.5}, {}, {}, {"static": 0.4}), (".x..", "..x.", "...x"))
 """Something in cell 1 either leaves the row at once or crosses it, towards something that may stand in cell 4.
 
-BOF is exact here at all three steps: cells are independent at first, what moves can arrive in one cell of the row only,
-and the cell that it leaves is free whether it was there or not."""
+BOF is exact here at all three steps: the cells are independent at first, what moves can arrive in only one cell of the
+row, and the cell that it leaves is free whether it was there or not."""
 
 STANDING_OR_DRIVING = CellsInARow(({"static": 0.5, "right": 0.5}, {}, {}, {}), (".x..", "..x.", "...x"))
-"""One thing in cell 1, of which nobody knows whether it stands: after a step it is either in cell 1 or in cell 2.
+"""One thing in cell 1, which either stands or drives: after a step it is either in cell 1 or in cell 2.
 
-The scans follow it to the right. After the first one, joint inference gives cell 1 a probability of 0.97 of being
-free. BOF, for which the two cells are independent, says 0.70 and expects 1.24 things in the row."""
+The scans show it driving to the right. After the first one, joint inference gives cell 1 a probability of 0.97 of being
+free. BOF takes the two cells as independent, so it says 0.70, and expects 1.24 things in the row."""
 
 HEAD_ON = CellsInARow(({"right": 0.5}, {}, {"left": 0.5}, {}), ("????", "????", "????"))
-"""Two things, each there with probability 1/2, of which both would arrive in cell 2: at most one of them is there.
+"""Two things, each there with probability 1/2. Both would arrive in cell 2 at once, so at most one of them is there.
 
 Of the four combinations three are left, so cell 2 is occupied with probability 2/3. BOF adds 1/2 and 1/2, and is
-certain (0.999, the most it admits)."""
+certain that the cell is occupied (0.999, the most that it allows)."""
 
 TOWARDS_A_FENCE = CellsInARow(({}, {"static": 0.3, "right": 0.6}, {"static": 0.5}, {}), ("????", "????", "????"))
-"""Cell 2 holds something that stands or drives into cell 3, where a fence may stand.
+"""Cell 2 holds something that stands, or drives into cell 3, where a fence may stand.
 
-The two can't share cell 3, so that driving becomes less probable, and standing in cell 2 rises from 0.3 to 3/7. BOF
-strikes the combination out of cell 3, correctly, but cell 2 doesn't hear of it and keeps 0.3."""
+The thing and the fence can't share cell 3. So it is less probable that the thing drives, and the probability that it
+stands in cell 2 rises from 0.3 to 3/7. BOF strikes the impossible combination out of cell 3, which is right, but
+doesn't pass on to cell 2 what follows, so that cell 2 keeps 0.3."""
 
 
 CUT = (
     CutEdge(
         "c1,t - c2,t",
-        "BOF keeps each cell's marginal, so cells that share an antecedent count as independent: a thing that stands "
-        "or drives is then believed in both places, 1.24 things instead of 1.",
+        "BOF keeps each cell's marginal, so cells that share an antecedent count as independent, and a thing that "
+        "either stands or drives is believed to be in both places: 1.24 things instead of 1.",
     ),
     CutEdge(
         "one2,t -> c1,t-1",
-        "What may not share cell 2 changes what was in cell 1, but BOF strikes combinations out of cell 2 alone: "
-        "standing before a fence keeps 0.30 instead of 0.43.",
+        "That two things can't share cell 2 also says something of what was in cell 1, but BOF strikes combinations "
+        "out of cell 2 alone, so the probability that a thing stands before a fence stays at 0.30 instead of 0.43.",
     ),
     CutEdge(
         "c1,t-1 - c3,t-1",
-        "BOF adds what two antecedents send, as if only one of them could; two that are independent, each with "
-        "probability 1/2, make it certain of cell 2, where 2/3 is right.",
+        "BOF adds what two antecedents send, as if only one of them could send something, so two independent ones "
+        "with probability 1/2 each make it certain that cell 2 is occupied, where 2/3 is right.",
     ),
 )
-"""What BOF leaves out of the joint model, with the prices measured in the three worlds above."""
+"""What BOF leaves out of the joint model, and what that costs in the last three worlds above."""
 
 
 def bof_beliefs(world: CellsInARow) -> NDArray[np.float64]:
@@ -64,7 +66,7 @@ def bof_beliefs(world: CellsInARow) -> NDArray[np.float64]:
     Parameters
     ----------
     world : CellsInARow
-        Of K cells with T scans.
+        A row of K cells with T scans.
 
     Returns
     -------
@@ -87,7 +89,7 @@ def bof_errors(world: CellsInARow) -> NDArray[np.float64]:
     Parameters
     ----------
     world : CellsInARow
-        Of K cells with T scans.
+        A row of K cells with T scans.
 
     Returns
     -------
@@ -110,22 +112,23 @@ def expected_things(beliefs: NDArray) -> NDArray[np.float64]:
     Parameters
     ----------
     beliefs : (T, K, 5) float
-        From `bof_beliefs` or `exact_beliefs`.
+        Each cell's distribution, from `bof_beliefs` or `exact_beliefs`.
 
     Returns
     -------
     (T,) float64
+        The expected number of things after each step.
     """
     return beliefs[..., [Cell.STATIC, Cell.LEFT, Cell.RIGHT]].sum(axis=(1, 2))
 
 
 def bof_stage(world: CellsInARow = STANDING_OR_DRIVING) -> StageGraph:
-    """Return the graph of two slices: each cell now with its antecedents, the cells from which something may come.
+    """Return the graph of two time slices: each cell now, and its antecedents before.
 
     Parameters
     ----------
     world : CellsInARow
-        For its first belief and its first scan.
+        The row, of which the first belief and the first scan are used.
 
     Returns
     -------

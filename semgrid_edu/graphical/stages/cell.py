@@ -29,13 +29,13 @@ from semgrid_edu.occupancy import (
 )
 
 UNKNOWN = (0.0, 0.0, 0.0, 1.0)
-"""The belief of a cell that nobody has seen: FREE, STATIC, DYNAMIC, UNKNOWN."""
+"""The belief of a cell that no scan has seen: FREE, STATIC, DYNAMIC, UNKNOWN."""
 
 CUT = (
     CutEdge(
         "x1 - x1 of the next cell",
-        "Cells are updated apart, and only particles carry anything from one to another, so a gap that no beam hits "
-        "stays a gap, however sure the filter is of the wall on both sides.",
+        "Each cell is updated by itself, and only particles carry anything from one cell to another, so a gap that no "
+        "beam hits stays a gap, however sure the filter is of the wall on both sides.",
     ),
     CutEdge(
         "x1 of the cells in front -> v1",
@@ -44,8 +44,8 @@ CUT = (
     ),
     CutEdge(
         "z1 - z2",
-        "Given the state, the filter takes scans as independent, so an error that lasts from scan to scan is counted "
-        "again with each.",
+        "The filter takes the scans as independent given the state, so an error that lasts for several scans is "
+        "counted again with each of them.",
     ),
 )
 """What the filter leaves out when it treats a cell by itself."""
@@ -54,22 +54,22 @@ CUT = (
 def one_cell(
     scans: ArrayLike, dt: float = 0.1, world: WorldModel | None = None, start: Sequence[float] = UNKNOWN
 ) -> StageGraph:
-    """Build the chain of one cell of CMCDOT: predict, look, read the scan, and again.
+    """Build the chain of one cell of CMCDOT, which repeats three steps: predict, look, read the scan.
 
     Between two scans the state changes by `transition_matrix`. v_t says whether scan t sees the cell. If it does,
-    UNKNOWN turns into one of the other states as `first_sight` says, because UNKNOWN means that nobody has looked.
+    UNKNOWN turns into one of the other states as `first_sight` says, because UNKNOWN means that no scan has seen it.
     STATIC and DYNAMIC share P(z | occupied), FREE and UNKNOWN share P(z | free).
 
     Parameters
     ----------
     scans : (T, 2) float
-        P(z | occupied) and P(z | free) of each scan, such as `read_scans` gives; equal where it says nothing.
+        P(z | occupied) and P(z | free) of each scan, such as `read_scans` gives; equal where a scan says nothing.
     dt : float
-        Seconds before each scan.
+        Time before each scan, seconds.
     world : WorldModel, optional
-        Rates and first sight.
+        The rates of change, and what UNKNOWN turns out to be at first sight; the defaults when left out.
     start : (4,) float
-        The belief at time 0.
+        The belief at time 0: FREE, STATIC, DYNAMIC, UNKNOWN.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def one_cell(
     Raises
     ------
     ArgumentError
-        When a scan is no pair of likelihoods, or leaves nothing possible.
+        When a scan isn't a pair of likelihoods, or both are 0, so that nothing would be possible.
     """
     world, scans = world or WorldModel(), check_scans(scans)
     steps = range(1, len(scans) + 1)
@@ -112,12 +112,12 @@ def one_cell(
 
 
 def looking(world: WorldModel) -> NDArray[np.float64]:
-    """Return P(x | v, prior): unchanged when nobody looks; when somebody does, UNKNOWN turns out to be something.
+    """Return P(x | v, prior): the state stays as it is, but UNKNOWN becomes another state when a scan sees the cell.
 
     Parameters
     ----------
     world : WorldModel
-        For `first_sight`.
+        Its `first_sight` says what UNKNOWN becomes.
 
     Returns
     -------
@@ -130,29 +130,29 @@ def looking(world: WorldModel) -> NDArray[np.float64]:
 
 
 def cell_given(scans: ArrayLike) -> dict[str, int]:
-    """Return what is observed of one cell: whether each scan sees it, and that the scans are these.
+    """Return what is observed of one cell: whether each scan sees it, and that it was these scans.
 
     Parameters
     ----------
     scans : (T, 2) float
-        P(z | occupied) and P(z | free) of each.
+        P(z | occupied) and P(z | free) of each scan.
 
     Returns
     -------
     dict of str to int
-        A scan whose two likelihoods are equal doesn't see the cell.
+        The states of v1, v2, ... and z1, z2, .... A scan whose two likelihoods are equal doesn't see the cell.
     """
     seen = {f"v{t}": int(occupied != free) for t, (occupied, free) in enumerate(check_scans(scans), start=1)}
     return seen | {f"z{t}": 1 for t in range(1, len(seen) + 1)}
 
 
 class CellBeliefs(NamedTuple):
-    """What is believed of one cell at each scan.
+    """What is believed of one cell at each of T scans.
 
     Parameters
     ----------
     predicted, updated : (T, 4) float
-        Before and after the scan; FREE, STATIC, DYNAMIC, UNKNOWN.
+        The belief before and after each scan: FREE, STATIC, DYNAMIC, UNKNOWN.
     """
 
     predicted: NDArray
@@ -162,12 +162,14 @@ class CellBeliefs(NamedTuple):
 def exact_cell(
     scans: ArrayLike, dt: float = 0.1, world: WorldModel | None = None, start: Sequence[float] = UNKNOWN
 ) -> CellBeliefs:
-    """Filter one cell by the forward messages of sum-product on its chain; parameters as for `one_cell`.
+    """Filter one cell by the forward messages of sum-product on its chain.
+
+    Parameters and errors are those of `one_cell`.
 
     Returns
     -------
     CellBeliefs
-        Messages from P(prior t | x t-1), and of x t to what follows it.
+        The messages from P(prior t | x t-1) to prior t, and from x t to what follows it.
     """
     beliefs = sum_product(one_cell(scans, dt, world, start).model, cell_given(scans))
     steps = range(1, len(check_scans(scans)) + 1)
@@ -179,9 +181,10 @@ def exact_cell(
 def package_cell(
     scans: ArrayLike, dt: float = 0.1, world: WorldModel | None = None, start: Sequence[float] = UNKNOWN
 ) -> CellBeliefs:
-    """Filter one cell by the package's `predict` and `update`, nothing moving; parameters as for `one_cell`.
+    """Filter one cell by the package's `predict` and `update`, without particles.
 
-    Its dynamic mass is all newborn, without particles: so none of it flies away, and none stops.
+    All of its dynamic mass is newborn, so none of it flies away, and none stops. Parameters and errors are those of
+    `one_cell`.
 
     Returns
     -------

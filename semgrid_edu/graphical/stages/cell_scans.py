@@ -14,9 +14,9 @@ def read_scans(says: str, sensor: SensorModel | None = None) -> NDArray[np.float
     Parameters
     ----------
     says : str
-        One letter per scan: "." a beam passes, "#" an obstacle return, " " nothing.
+        One letter per scan: "." for a beam that passes the cell, "#" for an obstacle return, " " for nothing.
     sensor : SensorModel, optional
-        How the scanner errs.
+        How the scanner errs; the package's default when left out.
 
     Returns
     -------
@@ -26,7 +26,7 @@ def read_scans(says: str, sensor: SensorModel | None = None) -> NDArray[np.float
     Raises
     ------
     ArgumentError
-        When there is another letter.
+        When `says` holds another letter.
 
     Examples
     --------
@@ -46,16 +46,17 @@ def check_scans(scans: ArrayLike) -> NDArray[np.float64]:
     Parameters
     ----------
     scans : (T, 2) float
-        P(z | occupied) and P(z | free) of each, not both 0.
+        P(z | occupied) and P(z | free) of each scan, not both 0.
 
     Returns
     -------
     (T, 2) float64
+        The same numbers.
 
     Raises
     ------
     ArgumentError
-        When they are anything else.
+        When `scans` isn't such a table.
     """
     table = np.asarray(scans, dtype=np.float64)
     if table.ndim != 2 or table.shape[1] != 2 or len(table) == 0:

@@ -1,4 +1,4 @@
-"""A few cells in a row in front of the sensor, seen by both filters: the world of the graphs of BOF and CMCDOT."""
+"""A few cells in a row in front of the sensor: a world in which BOF and CMCDOT are compared with exact answers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,19 +13,19 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import BofParams, Evidence, State, VelocityLattice, WorldModel, transition_matrix
 
 SPEED = 5.0
-"""Of all that moves, m/s: exactly one cell a step."""
+"""Speed of everything that moves, m/s: exactly one cell per step."""
 
 CELL = 0.5
-"""Metres."""
+"""Side of a cell, metres."""
 
 DT = 0.1
-"""Seconds from step to step."""
+"""Time from one step to the next, seconds."""
 
 NO_CHANGE = ((0.0,) * 4,) * 4
 """Rates of a world in which what stands goes on standing and what moves goes on moving."""
 
 HIT, PASS, NOT_SEEN = "x.?"
-"""How a scan is written: a return from the cell, a beam through it, neither."""
+"""The letters of a scan: a return from the cell, a beam that passes it, neither."""
 
 
 class Cell(IntEnum):
@@ -44,11 +44,11 @@ STATE_OF = (State.FREE, State.STATIC, State.DYNAMIC, State.DYNAMIC, State.UNKNOW
 
 @dataclass(frozen=True, eq=False)
 class CellsInARow:
-    """What is believed of a row of cells at first, each independent of the others, and what is then seen of it.
+    """What is believed of a row of cells at first, each independent of the others, and what scans then see of it.
 
-    The row is a grid of one row that lies across the view: cell 1 is the leftmost. What moves has one of two
-    velocities, one cell per step to the left or to the right; what stands has the third, zero. What leaves the row
-    is gone, and nothing comes in. Nothing is born moving: its velocity could point out of the row.
+    The row is a grid of one row that lies across the view: cell 1 is the leftmost. Things that move have one of two
+    velocities, one cell per step to the left or to the right; things that stand have velocity zero. What leaves the row
+    is gone, and nothing comes in. Nothing is born moving, because its velocity could point out of the row.
 
     Parameters
     ----------
@@ -57,14 +57,14 @@ class CellsInARow:
     scans : tuple of str
         One per step, one letter per cell: "x" for a return, "." for a beam that passes, "?" for an unseen cell.
     rates : 4 x 4 floats
-        As `WorldModel` takes them; nothing becomes DYNAMIC.
+        Rates of change, 1/s, as in `WorldModel`; nothing becomes DYNAMIC.
     first_sight : (float, float, float)
         What UNKNOWN cells turn out to be when they are first seen: FREE, STATIC and DYNAMIC, the last 0.
 
     Raises
     ------
     ArgumentError
-        When a cell's probabilities are none, a scan doesn't fit the row, or something would be born moving.
+        When a cell's numbers aren't probabilities, a scan doesn't fit the row, or something would be born moving.
     """
 
     cells: tuple[Mapping[str, float], ...]
@@ -119,12 +119,12 @@ class CellsInARow:
         Parameters
         ----------
         step : int
-            From 1.
+            Number of the scan, from 1.
 
         Returns
         -------
         Evidence
-            Over `spec`, in float64.
+            The likelihoods of the scan in the cells of `spec`, float64.
         """
         sensor = self.params.world.sensor
         said = {

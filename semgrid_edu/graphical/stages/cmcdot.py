@@ -1,7 +1,8 @@
 """CMCDOT as a graphical model: cells of four states given what moves, and what moves sampled by particles.
 
-Given where the moving things are, cells change by themselves: so only motion needs sampling. That is the "conditional
-Monte Carlo" in the filter's name, and its sampling error falls like N^-1/2. What remains is BOF's own error.
+Given where the moving things are, each cell changes independently of the others, so only motion has to be sampled. That
+is the "conditional Monte Carlo" in the filter's name. The sampling error falls like N^-1/2 with the number N of
+particles. What remains is BOF's own error.
 """
 
 from collections.abc import Sequence
@@ -23,14 +24,15 @@ FORGETTING = tuple(
 """The filter's default rates, but nothing is born moving."""
 
 NO_BIRTHS = 1e-9
-"""Share of the particles that is kept for births: in these worlds there are none."""
+"""Share of the particles that is kept for births; as good as none, because nothing is born in these worlds."""
 
 LEFT_OR_RIGHT = CellsInARow(
     ({}, {"left": 0.5, "right": 0.5}, {"unknown": 0.5}, {"unknown": 1.0}), ("..x.", "...x"), FORGETTING
 )
 """One thing that moves to the left or to the right, beside cells of which little is known; the scans see it go right.
 
-The velocity is in doubt, so particles have something to sample. BOF isn't exact: cells 1 and 3 hold the same thing."""
+The velocity is in doubt, so particles have something to sample. BOF isn't exact, because it takes cells 1 and 3 as
+independent, although they may hold the same thing."""
 
 
 class SamplingError(NamedTuple):
@@ -41,11 +43,11 @@ class SamplingError(NamedTuple):
     Parameters
     ----------
     numbers : (n,) int64
-        Of particles.
+        Numbers of particles, N.
     to_exact, to_bof : (n,) float64
-        Of CMCDOT's probabilities.
+        Error of CMCDOT's probabilities against the exact ones, and against BOF's.
     bias : float
-        Of BOF's probabilities, from the exact ones.
+        Error of BOF's probabilities against the exact ones.
     """
 
     numbers: NDArray[np.int64]
@@ -55,7 +57,7 @@ class SamplingError(NamedTuple):
 
     @property
     def slope(self) -> float:
-        """The exponent of N in the error to BOF, fitted in log-log: about -1/2 by the central limit theorem."""
+        """The exponent of N in the error to BOF, fitted to the logarithms; about -1/2 by the central limit theorem."""
         return float(np.polyfit(np.log(self.numbers), np.log(self.to_bof), 1)[0])
 
 
@@ -69,15 +71,17 @@ def sampling_error(world: CellsInARow, numbers: Sequence[int], seeds: Sequence[i
     Parameters
     ----------
     world : CellsInARow
-        Some velocity must be in doubt: particles of one velocity per cell carry BOF's probabilities exactly.
+        The row. Some velocity must be in doubt, because particles with one velocity per cell carry BOF's probabilities
+        exactly.
     numbers : sequence of int
-        Of particles.
+        Numbers of particles, N.
     seeds : sequence of int
-        The errors are taken over all of them.
+        Seeds of the runs; the errors are averaged over them.
 
     Returns
     -------
     SamplingError
+        The errors for each number of particles.
 
     Examples
     --------
@@ -97,12 +101,12 @@ def particle_beliefs(world: CellsInARow, number: int, seed: int) -> NDArray[np.f
     Parameters
     ----------
     world : CellsInARow
-        Of K cells with T scans.
+        A row of K cells with T scans.
     number : int
-        Of particles. At first each cell in which something may move gets about as many; they lie anywhere in
-        their cell and go left or right as the cell believes.
+        Number of particles, N. At first they are shared out evenly among the cells in which something may move. Each
+        lies anywhere in its cell, and goes left or right with the probabilities that the cell believes.
     seed : int
-        Decides everything that is drawn.
+        Seed for everything that is drawn.
 
     Returns
     -------
@@ -135,7 +139,7 @@ def _first_state(world: CellsInARow, number: int, rng: np.random.Generator) -> F
 
 
 def _by_cell(state: FilterState, world: CellsInARow) -> NDArray[np.float64]:
-    """Return (K, 5): the four states of each cell, DYNAMIC split by where its particles go."""
+    """Return (K, 5): the states of each cell, DYNAMIC split into LEFT and RIGHT by the velocities of its particles."""
     cells, goes_left = cells_of(state.particles.position, world.spec), state.particles.velocity[:, 1] > 0
     left, right = (
         weight_in_cells(state.particles.weight * part, cells, world.spec.shape) for part in (goes_left, ~goes_left)

@@ -1,4 +1,4 @@
-"""The graph of CMCDOT: one cell in four states over two slices, and the moving thing that may arrive in it."""
+"""The graph of CMCDOT: one cell of four states in two time slices, and the moving thing that may arrive in it."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,42 +18,43 @@ FROM_BOTH_SIDES = CellsInARow(({"right": 0.5}, {"static": 0.3, "unknown": 0.4}, 
 """Something may come into cell 2 from the left or from the right, and something may stand there already."""
 
 ELSEWHERE = 0
-"""The moving thing's state when it is no antecedent of the cell: far away, gone, or moving no more."""
+"""State of the moving thing when it is neither in the cell nor beside it: far away, gone, or no longer moving."""
 
 PLACES = [(place, velocity) for place in (-1, 0, 1) for velocity in (-1, 1)]
-"""Its other states, from 1: place relative to the cell (cells) and velocity (cells per step), positive to the right."""
+"""Its other states, from 1: place relative to the cell, cells, and velocity, cells per step; positive to the right."""
 
 HERE = np.array([False, *(place == 0 for place, _ in PLACES)])
-"""In which of its states it is in the cell."""
+"""For each of its states, whether it is then in the cell."""
 
 CUT = (
     CutEdge(
         "c1,t - c2,t",
-        "As in BOF, each cell is updated by itself: where a thing goes left or right, that leaves a root mean square "
-        "error of 0.051, however many particles there are.",
+        "As in BOF, each cell is updated by itself, which leaves a root mean square error of 0.051 in a world where a "
+        "thing goes left or right, however many particles there are.",
     ),
     CutEdge(
         "x,t-1 -> x,t",
-        "N samples stand for the distribution over places and velocities; in the same world their error is 0.010 with "
-        "100 of them and 0.001 with 6400.",
+        "N particles stand for the distribution over places and velocities; in the same world their sampling error is "
+        "0.010 with 100 particles and 0.001 with 6400.",
     ),
 )
 """What CMCDOT leaves out of the joint model."""
 
 
 def cmcdot_stage(world: CellsInARow = FROM_BOTH_SIDES, cell: int = 2) -> StageGraph:
-    """Return the graph of two slices: a cell in four states (c), and a moving thing with place and velocity (x).
+    """Return the graph of two time slices: a cell of four states (c), and a moving thing with place and velocity (x).
 
-    There is at most one moving thing here, so what may arrive from the left excludes what may arrive from the right:
-    the filter makes the same assumption when it adds up the weights of arriving particles. When the cell itself holds
-    nothing that moves, inference in this model is `predict` and `update` for this cell, without sampling error.
+    There is at most one moving thing here, so if something arrives from the left, nothing arrives from the right. The
+    filter makes the same assumption when it adds up the weights of arriving particles. When the cell itself holds
+    nothing that moves, inference in this model gives what `predict` and `update` give for this cell, without sampling
+    error.
 
     Parameters
     ----------
     world : CellsInARow
-        For its first belief, its rates and its first scan.
+        The row, of which the first belief, the rates and the first scan are used.
     cell : int
-        Which cell, from 1.
+        Number of the cell, from 1.
 
     Returns
     -------
@@ -119,7 +120,7 @@ def _first_cell(belief: NDArray) -> NDArray[np.float64]:
 
 
 def _flight(goes_on: float) -> NDArray[np.float64]:
-    """P(x1 | x0): one cell on, unless it moves no more; ELSEWHERE also when it is two cells away."""
+    """P(x1 | x0): one cell further, or ELSEWHERE when it stops moving or would be two cells away."""
     flight = np.zeros((1 + len(PLACES),) * 2)
     for before, (place, velocity) in enumerate(PLACES, start=1):
         after = (place + velocity, velocity)
@@ -130,13 +131,13 @@ def _flight(goes_on: float) -> NDArray[np.float64]:
 
 
 def _alone(M: NDArray) -> NDArray[np.float64]:
-    """P(one1 | c0, x1): what arrives must not meet something that stands there by now."""
+    """P(one1 | c0, x1): 0 where a thing arrives and something stands in the cell by now."""
     meets = M[:, STATIC, None] * HERE
     return np.stack([meets, 1 - meets], axis=-1)
 
 
 def _next_cell(M: NDArray) -> NDArray[np.float64]:
-    """P(c1 | c0, x1), before anybody looks: DYNAMIC where the thing arrives, FREE where it left, else by the matrix."""
+    """P(c1 | c0, x1), before the scan: DYNAMIC where the thing arrives, FREE where it has left, else by the matrix."""
     following = np.repeat(M[:, None], len(HERE), axis=1)
     following[DYNAMIC] = np.eye(N_STATES)[FREE]
     if M[DYNAMIC, DYNAMIC] < 1:

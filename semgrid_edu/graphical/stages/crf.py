@@ -13,13 +13,13 @@ from semgrid_edu.graphical.stages.stage_graph import CutEdge, StageGraph
 from semgrid_edu.occupancy import N_STATES, State
 
 UNDECIDED = np.array([[0.6, 0.4, 0.6], [0.4, 0.52, 0.4], [0.6, 0.4, 0.6]])
-"""The network's probability of class 0: four cells vote for it, four against it, and the centre leans towards it."""
+"""The network's probability of class 0: four cells are for it, four against it, and the centre is slightly for it."""
 
 CUT = (
     CutEdge(
         "x1 - x2",
-        "Mean field lets each cell hear the mean of the others, not what they would do if it changed: beyond a "
-        "coupling of about 1.3 it picks a side, 0.998 for class 0 at the default weights, where 0.52 is right.",
+        "Mean field shows each cell only the average of the others, not how they would react to it, so beyond a "
+        "coupling of about 1.3 it picks a side: 0.998 for class 0 at the default weights, where 0.52 is right.",
     ),
 )
 """What the package's inference leaves out of the model; every pair has such an edge."""
@@ -31,11 +31,12 @@ def coupled(coupling: float) -> CrfParams:
     Parameters
     ----------
     coupling : float
-        w_bilateral: 0 for no pair term, 4 for the package's default.
+        The weight w_bilateral: 0 for no pair term, 4 for the package's default.
 
     Returns
     -------
     CrfParams
+        The scaled parameters.
     """
     default = CrfParams()
     return CrfParams(w_bilateral=coupling, w_spatial=coupling * default.w_spatial / default.w_bilateral)
@@ -47,7 +48,7 @@ def two_classes(probability: ArrayLike) -> NDArray[np.float64]:
     Parameters
     ----------
     probability : (H, W) float
-        Of class 0.
+        Probability of class 0 in each cell.
 
     Returns
     -------
@@ -59,16 +60,17 @@ def two_classes(probability: ArrayLike) -> NDArray[np.float64]:
 
 
 def all_free(shape: tuple[int, int]) -> NDArray[np.float64]:
-    """Return occupancy values with which every pair of cells talks: all of them certainly free.
+    """Return occupancy values that couple every pair of cells: all cells are certainly free.
 
     Parameters
     ----------
     shape : (int, int)
-        H, W.
+        H, W of the grid.
 
     Returns
     -------
     (4, H, W) float64
+        Probability of FREE, STATIC, DYNAMIC and UNKNOWN.
     """
     values = np.zeros((N_STATES, *shape))
     values[State.FREE] = 1
@@ -81,17 +83,17 @@ def crf_model(unary: NDArray, values: NDArray, params: CrfParams) -> GraphicalMo
     Parameters
     ----------
     unary : (C, H, W) float
-        phi_u.
+        phi_u, the unary term.
     values : (4, H, W) float
         o_i, the occupancy probabilities of each cell.
     params : CrfParams
-        For the pair weights.
+        Parameters of the pair weights.
 
     Returns
     -------
     GraphicalModel
-        Undirected, over x1, x2, ..., cells counted row by row: a factor exp(-phi_u) per cell, and one per pair that
-        is exp(-k_ij) where the two labels differ and 1 where they agree.
+        An undirected model over x1, x2, ..., with the cells counted row by row. It has a factor exp(-phi_u) per cell,
+        and one per pair, which is exp(-k_ij) where the two labels differ and 1 where they agree.
     """
     cells, weights = unary.reshape(len(unary), -1).T, pair_weights(values, params)
     names, differ = _names(len(cells)), 1 - np.eye(len(unary))
@@ -106,8 +108,8 @@ def exact_marginals(model: GraphicalModel) -> NDArray[np.float64]:
     Parameters
     ----------
     model : GraphicalModel
-        Over N cells of C classes, from `crf_model`. Every cell is coupled to every other, so no order of elimination
-        avoids the table of all C^N labellings; it may have 10^7 entries.
+        A model of N cells with C classes, from `crf_model`. Every cell is coupled to every other, so no order of
+        elimination avoids the table of all C^N labellings, which may have at most 10^7 entries.
 
     Returns
     -------
@@ -124,16 +126,16 @@ def crf_stage(coupling: float = 4.0, unary: NDArray | None = None, values: NDArr
     Parameters
     ----------
     coupling : float
-        See `coupled`.
+        The weight of the pair term, see `coupled`.
     unary : (C, H, W) float, optional
-        phi_u; that of `UNDECIDED`, 3 x 3 cells, when left out.
+        phi_u, the unary term; that of `UNDECIDED`, 3 x 3 cells, when left out.
     values : (4, H, W) float, optional
         Occupancy of each cell; all free when left out.
 
     Returns
     -------
     StageGraph
-        Variables as in `crf_model`, drawn on a circle, so that every pair has a line of its own.
+        The variables are those of `crf_model`, drawn on a circle, so that every pair has a line of its own.
     """
     unary = two_classes(UNDECIDED) if unary is None else unary
     values = all_free(unary.shape[1:]) if values is None else values
@@ -152,7 +154,7 @@ def _names(count: int) -> list[str]:
 
 
 def _circle(model: GraphicalModel) -> dict[str, tuple[float, float]]:
-    """Place cells on a circle, each one's own factor outside it, and factors of opposite cells clear of its centre."""
+    """Place cells on a circle, their own factors outside it, and the factors of opposite cells away from its centre."""
     names = model.names
     angles = np.pi / 2 - 2 * np.pi * np.arange(len(names)) / len(names)
     directions = dict(zip(names, np.stack([np.cos(angles), np.sin(angles)], axis=1), strict=True))

@@ -1,10 +1,10 @@
-"""Exact inference in the dense CRF against mean field and loopy sum-product, as the cells couple (eq. (3), (4)).
+"""Exact inference in the dense CRF against mean field and loopy sum-product, as the coupling grows (eq. (3), (4)).
 
-As the pair weights grow, all labels become equal, but which of the two classes they take stays open: the exact
-probability of class 0 in the centre of `UNDECIDED` is 0.52 at all couplings from 0 to 4. Mean field and loopy
-sum-product say so too at first, and turn it into near certainty within a small range of couplings: a phase transition.
-Below it, at 1, loopy sum-product errs about half as much as mean field. Just above it, at 1.5, ten updates err less
-than converged mean field, because they stop before it has picked its side.
+As the pair weights grow, all cells take the same label, but which of the two classes that is stays open: the exact
+probability of class 0 in the centre of `UNDECIDED` is 0.52 at each of the `COUPLINGS`. Mean field and loopy sum-product
+agree with that at first. Then, within a small range of couplings, they become almost certain of one class: this is a
+phase transition. Below it, at 1, the error of loopy sum-product is about half that of mean field. Just above it, at
+1.5, ten updates have a smaller error than converged mean field, because they stop before it has picked a side.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ from semgrid_edu.graphical.model import GraphicalModel
 from semgrid_edu.graphical.stages.crf import UNDECIDED, all_free, coupled, crf_model, exact_marginals, two_classes
 
 COUPLINGS = (0.0, 0.5, 1.0, 1.25, 1.5, 1.75, 2.0, 3.0, 4.0)
-"""From no pair term to the package's default."""
+"""Values of w_bilateral, from no pair term to the package's default."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,14 +31,14 @@ class CouplingSweep:
     Parameters
     ----------
     couplings : (n,) float64
-        w_bilateral.
+        Values of w_bilateral.
     marginals : dict of str to (n, C, N) float64
-        By method: "exact", "mean field" (to convergence, one cell after the other), "naive" and "fast" (the
-        package's two, ten updates), "loopy" (sum-product).
+        Distribution of each cell by method: "exact"; "mean field", one cell after the other until it converges;
+        "naive" and "fast", the package's two functions with ten updates; "loopy", sum-product.
     labelling : (n, N) int64
-        The most likely labelling of all cells, exactly.
+        The most likely labelling of all cells together, by exact inference.
     converged : (n,) bool
-        Whether loopy sum-product did.
+        Whether loopy sum-product converged.
     """
 
     couplings: NDArray[np.float64]
@@ -48,7 +48,7 @@ class CouplingSweep:
 
     @property
     def errors(self) -> dict[str, NDArray[np.float64]]:
-        """By approximate method, (n,): the largest total variation of a cell's distribution from the exact one."""
+        """(n,) for each approximate method: the largest total variation of a cell's distribution from the exact one."""
         exact = self.marginals["exact"]
         return {
             method: np.abs(found - exact).sum(axis=1).max(axis=1) / 2
@@ -58,7 +58,7 @@ class CouplingSweep:
 
     @property
     def wrong_labels(self) -> dict[str, NDArray[np.int64]]:
-        """By method, (n,): in how many cells its most probable class isn't that of the most likely labelling."""
+        """(n,) for each method: number of cells whose most probable class isn't that of the most likely labelling."""
         return {m: (found.argmax(axis=1) != self.labelling).sum(axis=1) for m, found in self.marginals.items()}
 
 
@@ -70,20 +70,21 @@ def coupling_sweep(
     Parameters
     ----------
     couplings : sequence of float
-        See `coupled`.
+        Weights of the pair term, see `coupled`.
     unary : (C, H, W) float, optional
-        phi_u; that of `UNDECIDED` when left out.
+        phi_u, the unary term; that of `UNDECIDED` when left out.
     values : (4, H, W) float, optional
         Occupancy of each cell; all free when left out.
 
     Returns
     -------
     CouplingSweep
+        Distributions and labellings at each coupling.
 
     Notes
     -----
-    Loopy sum-product takes nearly all of the time, most of it near the transition, where it settles slowly or not in
-    its fifty iterations.
+    Loopy sum-product takes nearly all of the time, most of it near the transition, where it converges slowly, or not
+    at all in its fifty iterations.
 
     Examples
     --------
@@ -100,7 +101,7 @@ def coupling_sweep(
 
 
 def critical_coupling(classes: int, values: NDArray) -> float:
-    """Return the coupling beyond which mean field leaves the uniform distribution though no cell prefers a class.
+    """Return the coupling beyond which mean field leaves the uniform distribution, although no cell prefers a class.
 
     Near the uniform distribution an update multiplies deviations by K / C, with K the matrix of pair weights. They
     grow when its largest eigenvalue exceeds C. By symmetry the exact marginals stay uniform at every coupling.
@@ -108,13 +109,15 @@ def critical_coupling(classes: int, values: NDArray) -> float:
     Parameters
     ----------
     classes : int
-        C. With two classes mean field stays uniform below; with more it may leave earlier, from a start far away.
+        C, the number of classes. Below the critical coupling, mean field with two classes stays uniform. With more
+        classes it may leave the uniform distribution earlier, if it starts far from it.
     values : (4, H, W) float
         Occupancy of each cell.
 
     Returns
     -------
     float
+        The critical value of w_bilateral.
 
     Examples
     --------

@@ -15,23 +15,23 @@ from semgrid_edu.occupancy import SensorModel
 def row_model(world: CellsInARow, steps: int | None = None) -> GraphicalModel:
     """Build the joint model of all cells over time.
 
-    At each step a cell first changes by the transition matrix (m, left out where nothing changes). Then what
-    moves flies: the next state c of a cell follows from its own m and that of its two neighbours, its antecedents. A
-    binary variable, always observed to be 1, says that at most one thing claims the cell: so histories in which two
-    things share a cell are struck out. Two that swap cells are let pass, as BOF does. The scan z depends on the cell
-    alone.
+    At each step a cell first changes by the transition matrix (m, left out where nothing changes). Then everything that
+    moves flies: the next state c of a cell follows from its own m and those of its two neighbours, its antecedents. A
+    binary variable, always observed to be 1, says that at most one thing claims the cell, which strikes out all
+    histories in which two things share a cell. Two things that swap their cells are allowed, as in BOF. The scan z
+    depends on the cell alone.
 
     Parameters
     ----------
     world : CellsInARow
-        Of K cells.
+        A row of K cells.
     steps : int, optional
-        How many; as many as there are scans when left out.
+        Number of steps; that of the scans when left out.
 
     Returns
     -------
     GraphicalModel
-        Directed. Cell k at step t has the variables "ck,t" (states as in `Cell`; t from 0) and, from step 1 on,
+        A directed model. Cell k at step t has the variables "ck,t" (states as in `Cell`; t from 0) and, from step 1 on,
         "mk,t" (if anything changes), "onek,t" (0: several things, 1: at most one) and "zk,t" (0: pass, 1: hit).
     """
     steps = len(world.scans) if steps is None else steps
@@ -49,14 +49,14 @@ def row_evidence(world: CellsInARow, steps: int) -> dict[str, int]:
     Parameters
     ----------
     world : CellsInARow
-        For its scans.
+        The row, of which the scans are used.
     steps : int
-        How many.
+        Number of steps.
 
     Returns
     -------
     dict of str to int
-        For `eliminate(row_model(world, steps), ..., given=...)`.
+        The observed states, for `eliminate(row_model(world, steps), ..., given=...)`.
     """
     given = {}
     for step, scan in enumerate(world.scans[:steps], start=1):
@@ -73,14 +73,14 @@ def joint_belief(world: CellsInARow, step: int) -> Factor:
     Parameters
     ----------
     world : CellsInARow
-        Of K cells.
+        A row of K cells.
     step : int
-        From 0.
+        Number of the step, from 0.
 
     Returns
     -------
     Factor
-        Over "c1,t" ... "cK,t", normalised: 5^K entries.
+        A normalised table over "c1,t" ... "cK,t", of 5^K entries.
     """
     names = [f"c{k},{step}" for k in range(1, len(world.cells) + 1)]
     return eliminate(row_model(world, step), names, row_evidence(world, step)).normalised()
@@ -92,27 +92,27 @@ def exact_beliefs(world: CellsInARow) -> NDArray[np.float64]:
     Parameters
     ----------
     world : CellsInARow
-        Of K cells with T scans.
+        A row of K cells with T scans.
 
     Returns
     -------
     (T, K, 5) float64
-        States in the order of `Cell`.
+        The distributions, with states in the order of `Cell`.
     """
     joints = [joint_belief(world, step) for step in range(1, len(world.scans) + 1)]
     return np.array([[_marginal(joint, name) for name in joint.names] for joint in joints])
 
 
 def flight() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what becomes of a cell when all that moves flies one cell on, for each state of it and its neighbours.
+    """Return what becomes of a cell when everything that moves flies one cell further.
 
     Returns
     -------
     next : (5, 5, 5, 5) float64
-        P(state now | left neighbour, the cell itself, right neighbour before), 0 or 1. What leaves or never was
-        leaves FREE behind; an UNKNOWN cell in which nothing arrives stays UNKNOWN.
+        P(state now | states before of the left neighbour, the cell itself, the right neighbour), 0 or 1. A cell that
+        something has left is FREE; an UNKNOWN cell in which nothing arrives stays UNKNOWN.
     alone : (5, 5, 5, 2) float64
-        P(at most one thing claims the cell | the same); where several do, `next` doesn't matter.
+        P(at most one thing claims the cell | the same states). Where several things do, `next` doesn't matter.
     """
     states = len(Cell)
     following, alone = np.zeros((states,) * 4), np.zeros((states,) * 3 + (2,))
@@ -128,18 +128,18 @@ def flight() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def hit_probability(sensor: SensorModel) -> NDArray[np.float64]:
     """Return P(z | cell), z = 0 for a beam that passes and 1 for a return, from the package's sensor model.
 
-    The package gives hit and pass a pair of likelihoods each, of which Bayes' rule uses only the ratio. There is
-    one way to scale both pairs so that hit and pass exclude each other, and that is taken here.
+    The package has one pair of likelihoods for a hit and one for a pass, and Bayes' rule uses only the ratio of each
+    pair. There is exactly one way to scale the two pairs so that P(hit) + P(pass) = 1 in each state. It is used here.
 
     Parameters
     ----------
     sensor : SensorModel
-        For its four probabilities.
+        The sensor, of which four probabilities are used: of a hit and of a pass, in an occupied and in a free cell.
 
     Returns
     -------
     (5, 2) float64
-        Rows in the order of `Cell`; UNKNOWN is like FREE.
+        One row per state, in the order of `Cell`; UNKNOWN is like FREE.
     """
     likelihood = np.array([[sensor.p_pass_occupied, sensor.p_hit_occupied], [sensor.p_pass_free, sensor.p_hit_free]])
     occupied, free = likelihood * np.linalg.solve(likelihood, [1, 1])

@@ -1,4 +1,4 @@
-"""Bayes on a line: the place of a vehicle on a ring road as a hidden Markov model (lecture 01; paper, section 3.2).
+"""Bayes on a line: a vehicle's place on a ring road as a hidden Markov model (lecture 01; paper, section 3.2).
 
 A filter is half of message passing on a chain: its beliefs are the messages that run forward in time. The messages
 that run backward carry what later readings say about earlier places.
@@ -22,8 +22,8 @@ from semgrid_edu.graphical.stages.stage_graph import CutEdge, StageGraph
 CUT = (
     CutEdge(
         "n1 <- n2",
-        "The filter passes messages forward in time and none back, so a later reading never corrects what was believed "
-        "of an earlier place; for the present place nothing is lost.",
+        "The filter passes messages forward in time and none backward, so a later reading never corrects what was "
+        "believed of an earlier place; for the present place nothing is lost.",
     ),
 )
 """The filter's graph keeps every edge, but uses each in one direction."""
@@ -42,15 +42,15 @@ def bayes_on_a_line(
     Parameters
     ----------
     steps : int
-        Readings, at least 1; the vehicle moves between them.
+        Number of readings, at least 1; the vehicle moves between them.
     n_cells : int
-        Cells of the ring; after the last comes cell 0 again.
+        Number of cells of the ring; after the last comes cell 0 again.
     poles : sequence of int
         The cells beside which a pole stands.
     moved : sequence of float
-        P(the vehicle has moved on by d cells) for d = 0, 1, 2, ...; sums to 1.
+        Probability that the vehicle moves by d cells from one reading to the next, for d = 0, 1, 2, ...; sums to 1.
     hit, false_alarm : float
-        P("pole") beside a pole and elsewhere.
+        Probability that the sensor says "pole" beside a pole, and elsewhere.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def bayes_on_a_line(
     Raises
     ------
     ArgumentError
-        When `steps` is below 1, or the probabilities aren't any.
+        When `steps` is below 1, or a probability isn't one.
     """
     if steps < 1:
         raise ArgumentError("steps", "at least 1", steps)
@@ -108,7 +108,7 @@ def filtered(stage: StageGraph, readings: Sequence[int]) -> NDArray[np.float64]:
 
 
 def smoothed(stage: StageGraph, readings: Sequence[int]) -> NDArray[np.float64]:
-    """Return P(n_t | all readings), past and future: forward times backward message.
+    """Return P(n_t | all readings), past and future: the product of forward and backward messages.
 
     Parameters
     ----------
@@ -139,19 +139,19 @@ def most_likely_path(stage: StageGraph, readings: Sequence[int]) -> list[int]:
     Returns
     -------
     list of int
-        A cell per step.
+        One cell per step.
     """
     best = max_product(stage.model, _given(stage, readings))
     return [best[f"n{t}"] for t in range(len(readings))]
 
 
 class FutureGain(NamedTuple):
-    """How uncertain the places are, on average over all readings that the model may give.
+    """How uncertain the places are, on average over all sequences of readings.
 
     Parameters
     ----------
     filtered, smoothed : (T,) float64
-        Mean entropy in bits of P(n_t | readings up to t) and of P(n_t | all readings).
+        Mean entropy of P(n_t | readings up to t), and of P(n_t | all readings), bits.
     """
 
     filtered: NDArray[np.float64]
@@ -161,17 +161,18 @@ class FutureGain(NamedTuple):
 def future_gain(stage: StageGraph) -> FutureGain:
     """Measure what backward messages add: mean entropy of each place with and without later readings.
 
-    With the defaults of `bayes_on_a_line` the first of four places has 2.97 bits when filtered and 2.51 when smoothed.
-    The last place has no later readings, so both are the same there, 2.51.
+    With the defaults of `bayes_on_a_line`, the first of four places has an entropy of 2.97 bits when filtered and 2.51
+    bits when smoothed. The last place has no later readings, so it has 2.51 bits either way.
 
     Parameters
     ----------
     stage : StageGraph
-        From `bayes_on_a_line`; 2^T sequences of readings are enumerated.
+        From `bayes_on_a_line`, with T steps: all 2^T sequences of readings are enumerated.
 
     Returns
     -------
     FutureGain
+        The mean entropies, with and without later readings.
     """
     total = np.zeros((2, len(stage.observed)))
     for readings in product((0, 1), repeat=len(stage.observed)):
@@ -187,5 +188,5 @@ def _given(stage: StageGraph, readings: Sequence[int]) -> dict[str, int]:
 
 
 def _bits(beliefs: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the entropy of each row; what is impossible adds nothing."""
+    """Return the entropy of each row in bits, with 0 log 0 = 0."""
     return -(beliefs * np.log2(np.where(beliefs > 0, beliefs, 1))).sum(axis=1)

@@ -19,18 +19,18 @@ LOG_ODDS_CUT = (
     ),
     *CUT[1:],
 )
-"""What the log-odds grid leaves out in a cell."""
+"""What the log-odds grid leaves out when it treats a cell by itself."""
 
 
 def one_log_odds_cell(scans: ArrayLike, prior: float = 0.5) -> StageGraph:
-    """Build one cell of the log-odds grid: free or occupied for ever, with scans that are independent given that.
+    """Build one cell of the log-odds grid: free or occupied for ever, and scans that are independent given its state.
 
     Parameters
     ----------
     scans : (T, 2) float
         P(z | occupied) and P(z | free) of each scan.
     prior : float
-        P(occupied) before the first.
+        P(occupied) before the first scan.
 
     Returns
     -------
@@ -59,11 +59,12 @@ def package_log_odds_cell(scans: ArrayLike, params: LogOddsParams | None = None)
     scans : (T, 2) float
         P(z | occupied) and P(z | free) of each scan.
     params : LogOddsParams, optional
-        Prior and bounds. Within the bounds the result is exact; at a bound it is held back.
+        Prior and bounds; the defaults when left out. The result is exact until it reaches a bound, where it stops.
 
     Returns
     -------
     (T,) float64
+        P(occupied) after each scan.
     """
     params = params or LogOddsParams()
     L, history = log_odds(np.array([[params.prior]])), []

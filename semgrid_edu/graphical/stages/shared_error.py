@@ -1,7 +1,7 @@
-"""One pose error in all returns of a scan: the error that evidence cell by cell counts twice.
+"""One pose error in all returns of a scan: an error that evidence cell by cell takes for two independent ones.
 
-The rings of a LIDAR hit a wall in the same scan, so a wrong pose shifts all their returns together. Evidence cell by
-cell takes them for independent witnesses, up to `SensorModel.max_returns`.
+Several rings of a LIDAR hit a wall in the same scan, so a wrong pose shifts all their returns together. Evidence cell
+by cell takes these returns as independent, up to `SensorModel.max_returns` of them.
 """
 
 from typing import NamedTuple
@@ -23,7 +23,7 @@ CUT = (
     CutEdge(
         "e -> z1, z2",
         "Evidence cell by cell has no pose error, so returns that are wrong together count as if each were wrong by "
-        "itself, and a second ring makes the grid surer of a cell that is no better known.",
+        "itself, and a second ring makes the grid much surer of a cell than it should be.",
     ),
 )
 """The variable that the grid leaves out."""
@@ -35,9 +35,10 @@ def scan_with_pose_error(world: BeamWorld | None = None, rings: int = 2) -> Stag
     Parameters
     ----------
     world : BeamWorld, optional
-        Its `noise` is the standard deviation of the pose along the beams, in cells; the rings' own noise is left out.
+        The cells and the beam; eight cells with the package's sensor and a noise of one cell when left out. Its `noise`
+        is the standard deviation of the pose along the beams, in cells; the rings' own noise is left out.
     rings : int
-        Returns in the scan, at least 1.
+        Number of rings, each with one return in the scan; at least 1.
 
     Returns
     -------
@@ -47,7 +48,7 @@ def scan_with_pose_error(world: BeamWorld | None = None, rings: int = 2) -> Stag
     Raises
     ------
     ArgumentError
-        When there is no ring, or no noise.
+        When `rings` is below 1, or the noise is 0.
     """
     world = world or same_sensor(1.0)
     if rings < 1:
@@ -83,7 +84,7 @@ def _pose_error(world: BeamWorld) -> NDArray[np.float64]:
 
 
 def _shifted(world: BeamWorld) -> NDArray[np.float64]:
-    """Return P(z | r, e): certainly r + e; the last row of r and the last column of z are "none"."""
+    """Return P(z | r, e): 1 for z = r + e, otherwise 0; the last state of r and of z is "none"."""
     ranges = np.arange(world.n_ranges)[:, None] * BINS_PER_CELL + _offsets(world)
     first = _offsets(world)[0]
     table = np.zeros((world.n_ranges + 1, len(_offsets(world)), len(range_bins(world)) + 1))
@@ -93,13 +94,16 @@ def _shifted(world: BeamWorld) -> NDArray[np.float64]:
 
 
 class Counted(NamedTuple):
-    """P(occupied) of the cell in which the returns of one scan lie.
+    """P(occupied) of the cell in which all returns of a scan lie, for one ring, two rings, and so on.
 
     Parameters
     ----------
-    exact, independent, package : (rings,) float64
-        Given the first ring alone, the first two, ...: exactly, with one pose error for all; exactly, if each ring had
-        an error of its own; and by the package's grid.
+    exact : (rings,) float64
+        The exact probability, when all rings share one pose error.
+    independent : (rings,) float64
+        The exact probability if each ring had an error of its own.
+    package : (rings,) float64
+        The probability in the package's log-odds grid.
     """
 
     exact: NDArray[np.float64]
@@ -108,24 +112,25 @@ class Counted(NamedTuple):
 
 
 def count_rings(noise: float = 1.0, rings: int = 3, z: int = 4) -> Counted:
-    """Measure how sure one scan makes exact inference and the package's grid of the cell of its returns.
+    """Measure how sure one scan makes exact inference, and the package's grid, of the cell of its returns.
 
-    With a pose error of one cell, 20 cm, one ring makes the package's grid believe in the cell with 0.80 and two with
-    0.97, its upper bound. Exactly it is 0.40, then 0.46, and a third ring adds nothing more. If each ring had an error
-    of its own, two would make it 0.57 and three 0.69.
+    With a pose error of one cell, 20 cm, the package's grid gives the cell P(occupied) = 0.80 after one ring and 0.97,
+    its upper bound, after two. The exact probability is 0.40 after one ring and 0.46 after two, and a third ring adds
+    nothing more. If each ring had an error of its own, it would be 0.57 after two rings and 0.69 after three.
 
     Parameters
     ----------
     noise : float
         Standard deviation of the pose along the beams, in cells.
     rings : int
-        How many rings return from the same range.
+        Largest number of rings, which all have a return at the same range.
     z : int
-        Their range, in cells.
+        That range, in cells, 0 for the middle of the nearest cell.
 
     Returns
     -------
     Counted
+        P(occupied) for each number of rings.
     """
     world = same_sensor(noise)
     exact, package = [], []

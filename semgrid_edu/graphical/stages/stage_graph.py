@@ -1,4 +1,4 @@
-"""What belongs to the graph of a stage: its model, how it is drawn, and the edges that the real system cuts."""
+"""The graph of a stage: its model, how it is drawn, and the edges that the real system cuts."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -36,15 +36,15 @@ class StageGraph:
     model : GraphicalModel
         Built from the package's own functions, small enough for exact inference.
     observed : tuple of str
-        The variables that the sensors give; drawn shaded.
+        The variables that are observed; drawn shaded.
     positions : dict of str to (float, float), optional
-        Where `draw` puts each node.
+        Place of each node: x to the right and y upwards, neighbours about 1 apart. Placed automatically when left out.
     labels, equations : dict of str to str
-        As `draw` takes them.
+        Text in each node and to the right of it, as `drawing.draw` takes them.
     plates : dict of str to tuple of str
-        As `draw` takes them: what is repeated for every cell, beam or step.
+        The nodes that are repeated for every cell, beam or step, by the text of the box around them.
     cut : tuple of CutEdge
-        The edges that the real system cuts, each with a sentence.
+        The edges that the real system cuts, and what that costs.
     """
 
     title: str
@@ -64,11 +64,12 @@ class StageGraph:
         ax : Axes, optional
             Axes to draw into; new ones when left out.
         highlight : iterable of str
-            The nodes that a lecture is about.
+            The nodes that the text is about; drawn with a thick coloured outline.
 
         Returns
         -------
         Axes
+            The axes with the drawing, and the title above it.
         """
         ax = draw(
             self.model,

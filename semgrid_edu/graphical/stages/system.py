@@ -1,7 +1,7 @@
 """The whole system as a graph: from the world to LIDAR and image, and from those to the semantic grid (paper, Fig. 2).
 
-Above the sensors stands the world, as it is; below them what the paper computes: l -> o, i -> s -> p, (p, o) -> g.
-Information flows down, never up, and from one instant to the next only inside o.
+In the drawing, the world stands above the sensors, and what the paper computes below them: l -> o, i -> s -> p,
+(p, o) -> g. Information flows down, never up, and from one instant to the next only inside o.
 """
 
 import numpy as np
@@ -21,12 +21,12 @@ CUT = (
     ),
     CutEdge(
         "l1 -> s1",
-        "The segmentation network gets the image alone, so measured depth can't help it where a picture is ambiguous.",
+        "The segmentation network gets the image alone, so measured depth can't help it where an image is ambiguous.",
     ),
     CutEdge(
         "s1 -> p1, the distance",
-        "A pixel's scores are sampled wherever its ray crosses a plane, so in several cells, whichever of them the "
-        "camera saw; the fusion has to find that out from o.",
+        "A pixel's scores are sampled into every cell in which its ray crosses a plane, although the camera saw only "
+        "one of them, and the fusion has to find out from o which one.",
     ),
     CutEdge(
         "near1 - far1 in o1",
@@ -34,8 +34,8 @@ CUT = (
     ),
     CutEdge(
         "g0 -> g1",
-        "Only o remembers: classes aren't carried from frame to frame, so a class that an earlier image showed is "
-        "forgotten once the cell is hidden.",
+        "Only o remembers, while classes aren't carried from frame to frame, so a class that an earlier image showed "
+        "is forgotten once the cell is hidden.",
     ),
     CutEdge(
         "g0 -> o1",
@@ -52,14 +52,14 @@ def whole_system(world: SystemWorld | None = None) -> StageGraph:
     Parameters
     ----------
     world : SystemWorld, optional
-        Two instants when left out.
+        The toy street and its sensors; the defaults, with two instants, when left out.
 
     Returns
     -------
     StageGraph
-        For t = 0, 1, ...: near t, far t (5 contents), l t (near, far, passes), i t (4 classes); o t (one state per
-        sequence of scans, which stands for what the filter believes then), s t and p t (4, as i), and g t (16: the
-        labels of near and far, 4 near + far).
+        Variables for t = 0, 1, ...: near t and far t (5 contents), l t (a return from near, from far, or none), i t (4
+        classes), o t (one state per sequence of scans, which stands for what the filter then believes), s t and p t (4
+        classes, as i), and g t (16 states: 4 times the label of near, plus the label of far).
     """
     world = world or SystemWorld()
     factors, parents = list(street(world).factors), dict(street(world).parents or {})
@@ -91,11 +91,12 @@ def street(world: SystemWorld) -> GraphicalModel:
     Parameters
     ----------
     world : SystemWorld
+        The toy street and its sensors.
 
     Returns
     -------
     GraphicalModel
-        Directed; variables near t, far t, l t, i t.
+        A directed model with the variables near t, far t, l t and i t.
     """
     factors, parents = [], {}
     for t in range(world.steps):
@@ -114,13 +115,15 @@ def class_and_sensors(world: SystemWorld, t: int) -> NDArray[np.float64]:
     Parameters
     ----------
     world : SystemWorld
+        The toy street and its sensors.
     t : int
-        Now.
+        The instant that is now, from 0.
 
     Returns
     -------
     (2, 4, 3^(t+1), 4^(t+1)) float64
-        Near and far; class; sequence of scans; sequence of images, the last of each changes fastest.
+        Axes: near and far cell; class; sequence of scans; sequence of images. In a sequence, the last reading changes
+        fastest.
     """
     model, instants = street(world), range(t + 1)
     readings = *(f"l{k}" for k in instants), *(f"i{k}" for k in instants)
@@ -129,16 +132,17 @@ def class_and_sensors(world: SystemWorld, t: int) -> NDArray[np.float64]:
 
 
 def same_belief(o: NDArray) -> NDArray[np.int64]:
-    """Give each sequence of scans a number, the same to those after which the filter believes the same.
+    """Give each sequence of scans a number; two get the same when the filter believes the same after both.
 
     Parameters
     ----------
     o : (N, ...) float
-        What the filter believes after each.
+        What the filter believes after each of N sequences.
 
     Returns
     -------
     (N,) int
+        The number of each sequence, from 0.
     """
     return np.unique(o.reshape(len(o), -1).round(6), axis=0, return_inverse=True)[1].reshape(-1)
 

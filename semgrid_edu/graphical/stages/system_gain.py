@@ -11,14 +11,14 @@ from semgrid_edu.graphical.stages.system_world import CLASS_OF, STATE_OF, System
 
 
 class Score(NamedTuple):
-    """How well the class of each cell is known on average over all that the street and the sensors may do.
+    """How well the class of each cell is known, on average over everything that street and sensors may do.
 
     Parameters
     ----------
     log_loss : (2,) float64
-        Mean of -log P(true class) in nats, near and far cell.
+        Mean of -log P(true class) of the near and the far cell, nats.
     right : (2,) float64
-        How often the most probable class is the true one.
+        Share of cases in which the most probable class is the true one.
     """
 
     log_loss: NDArray[np.float64]
@@ -26,17 +26,17 @@ class Score(NamedTuple):
 
 
 class SystemGain(NamedTuple):
-    """From the least to the most that is known of a cell's class at the last instant.
+    """How well the class of a cell is known at the last instant, from the least information to the most.
 
     Parameters
     ----------
     image : Score
         The best that can be made of the scores s alone.
     multiplied : Score
-        s times o in each cell, as if they were independent given the class: no rule is learned.
+        The product of s and o in each cell, as if they were independent given the class: nothing is learned.
     cell_by_cell : Score
-        The best function of s and of the cell's own column of o: what a perfectly trained fusion without neighbours
-        gives.
+        The best function of s and of the cell's own state probabilities in o: what a perfectly trained fusion gives
+        that doesn't look at neighbours.
     neighbours : Score
         The best function of s and of o in both cells: a perfectly trained fusion that sees the whole grid.
     scans : Score
@@ -56,20 +56,22 @@ class SystemGain(NamedTuple):
 def system_gain(world: SystemWorld | None = None) -> SystemGain:
     """Measure what is lost on the way from the sensors to the semantic grid, by exact sums over all readings.
 
-    By default the paper's chain, trained perfectly, has 0.743 nats for the near cell and 0.720 for the far one
-    (`cell_by_cell`; 69.9 and 72.6 % right); joint inference has 0.682 and 0.618 (71.3 and 76.0 %). Most of the
-    gain comes from the earlier image: with one instant (`steps=1`) joint inference equals `neighbours`. o itself
-    loses nothing here (`neighbours` equals `scans`), for its values tell all nine sequences of scans apart. Multiplying
-    s and o as if they were independent costs 1.201 and 1.059 nats, more than s alone, 1.008 and 0.938.
+    With the defaults, the paper's chain, trained perfectly (`cell_by_cell`), has a log loss of 0.743 nats for the near
+    cell and 0.720 for the far one, and is right in 69.9 and 72.6 % of the cases. Joint inference has 0.682 and 0.618
+    nats, and is right in 71.3 and 76.0 %. Most of this gain comes from the earlier image: with one instant (`steps=1`),
+    joint inference equals `neighbours`. o itself loses nothing here (`neighbours` equals `scans`), because its values
+    tell all nine sequences of scans apart. Multiplying s and o as if they were independent gives 1.201 and 1.059 nats,
+    which is worse than s alone, with 1.008 and 0.938.
 
     Parameters
     ----------
     world : SystemWorld, optional
-        Two instants when left out.
+        The toy street and its sensors; the defaults, with two instants, when left out.
 
     Returns
     -------
     SystemGain
+        The scores.
     """
     world = world or SystemWorld()
     joint = class_and_sensors(world, world.steps - 1)
@@ -90,7 +92,7 @@ def system_gain(world: SystemWorld | None = None) -> SystemGain:
 
 
 def _best(joint: NDArray, keys: list[NDArray]) -> Score:
-    """Score P(class | key): of all readings that share a key only the key is known."""
+    """Score P(class | key), the best rule when nothing but a key of the readings is known."""
     rules = []
     for cell, key in zip(joint, keys, strict=True):
         pooled = np.stack([np.bincount(key, weights) for weights in cell])[:, key]
@@ -99,7 +101,7 @@ def _best(joint: NDArray, keys: list[NDArray]) -> Score:
 
 
 def _score(joint: NDArray, rule: NDArray) -> Score:
-    """Score any rule (2, 4, N): what it says of each class, against how probable class and readings are."""
+    """Score a rule P(class | readings), (2, 4, N), under the joint distribution of class and readings."""
     surprise = -np.log(np.where(joint > 0, rule, 1))
     chosen = np.take_along_axis(joint, rule.argmax(axis=1)[:, None], axis=1)
     return Score((joint * surprise).sum(axis=(1, 2)), chosen.sum(axis=(1, 2)))

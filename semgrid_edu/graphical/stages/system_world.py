@@ -1,7 +1,7 @@
 """A toy street for the whole system: two cells on one ray, which a LIDAR beam and one pixel of the camera share.
 
-The near cell hides the far one from the camera when something stands in it, and from the LIDAR when it reflects.
-Where neither cell holds a thing, the pixel sees the ground of the far one.
+The near cell hides the far one from the camera when a thing is in it, and from the LIDAR when it reflects the beam.
+When neither cell holds a thing, the pixel sees the ground of the far one.
 """
 
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ STATE_OF = np.array([State.FREE, State.FREE, State.STATIC, State.DYNAMIC, State.
 """The occupancy state of each content."""
 
 STREET = (0.5, 0.2, 0.1, 0.1, 0.1)
-"""How frequent each content is."""
+"""Share of the street's cells with each content."""
 
 RATES = (
     # to FREE, STATIC, DYNAMIC, UNKNOWN, 1/s: lecture 01's, by which a moving thing has left its cell after a second
@@ -46,7 +46,7 @@ RATES = (
 )
 
 PARAMS = WorldModel(rates=RATES, first_sight=(0.7, 0.2, 0.1))
-"""The filter knows the street: its rates, and how frequent the states are."""
+"""What the filter assumes, which is right for this street: the rates, and how frequent the states are."""
 
 
 @dataclass(frozen=True)
@@ -56,20 +56,21 @@ class SystemWorld:
     Parameters
     ----------
     steps : int
-        Instants, 1 to 3; each has a scan and an image.
+        Number of instants, 1 to 3; each has a scan and an image.
     dt : float
-        Seconds from one to the next.
+        Time from one instant to the next, seconds.
     range_error : float
-        P(a return from one of the cells is measured in the other).
+        Probability that a return from one of the cells is measured in the other.
     pixel_right : float
-        P(the segmentation network names the class that the pixel sees); its errors are spread evenly.
+        Probability that the segmentation network names the class that the pixel sees. Its errors are spread evenly over
+        the other classes.
     params : WorldModel
         Rates of the street and of the filter, first sight, and p_hit of the scanner.
 
     Raises
     ------
     ArgumentError
-        When there is no such world.
+        When a parameter has a value that is impossible.
     """
 
     steps: int = 2
@@ -79,7 +80,7 @@ class SystemWorld:
     params: WorldModel = PARAMS
 
     def __post_init__(self) -> None:
-        """Refuse what can't be."""
+        """Refuse values that are impossible."""
         if self.steps not in (1, 2, 3):
             raise ArgumentError("steps", "1, 2 or 3", self.steps)
         for name in ("range_error", "pixel_right"):
@@ -89,9 +90,9 @@ class SystemWorld:
     def change(self) -> NDArray[np.float64]:
         """Return P(content now | content before), (5, 5), by the filter's rates, but without any towards UNKNOWN.
 
-        The street doesn't forget. What is in the same state at both instants stays what it is. Newly FREE cells are
-        road or sidewalk, as frequent as in the street; what comes to stand is a parked car, what comes to move a
-        moving car.
+        The street itself forgets nothing, so there is no UNKNOWN. A cell that keeps its state keeps its content. A cell
+        that becomes FREE is road or sidewalk, in the proportions of the street; one that becomes STATIC holds a parked
+        car, and one that becomes DYNAMIC a moving car.
         """
         rates = np.array(self.params.rates)
         rates[:, State.UNKNOWN] = 0
@@ -111,7 +112,7 @@ class SystemWorld:
         return reflection(beam).table[np.ix_(stands, stands)] @ measured
 
     def sees(self) -> NDArray[np.float64]:
-        """Return P(class that the pixel sees | near, far), (5, 5, 4): near if something stands there, else far."""
+        """Return P(class that the pixel sees | near, far), (5, 5, 4): near's if a thing is there, else far's."""
         near, far = (np.broadcast_to(CLASS_OF[axes], (5, 5, 4)) for axes in (np.s_[:, None], np.s_[None, :]))
         return np.where((STATE_OF != State.FREE)[:, None, None], near, far)
 
@@ -129,7 +130,7 @@ class SystemWorld:
         Returns
         -------
         list of (3^(t+1), 2, 4) float32
-            For t = 0, 1, ...: by sequence of scans (the last one changes fastest), by cell (near, far), by state.
+            One array for each t = 0, 1, .... Axes: sequence of scans (the last changes fastest), cell (near, far), state.
         """
         spec, histories = GridSpec(0, 1, 0, 2, 1), []
         states = [FilterState.unknown(spec)]
@@ -141,7 +142,7 @@ class SystemWorld:
 
 
 def _after(state: FilterState, scan: int, spec: GridSpec, params: WorldModel, dt: float) -> FilterState:
-    """Predict, then update each cell with what the scan says of it: a return, passed, or nothing behind a return."""
+    """Predict, then update each cell: it has the return, or the beam passes it, or it lies behind the return."""
     obstacles = np.array([[scan == 0, scan == 1]]).astype(int)
     passed = np.array([[scan != 0, scan == 2]])
     evidence = likelihoods(obstacles, passed, params.sensor)

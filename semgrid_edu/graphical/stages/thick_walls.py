@@ -1,7 +1,8 @@
 """Walls in the package's own log-odds grid, against exact inference with the same sensor on one row of cells.
 
-Evidence cell by cell calls the cell of a return occupied and those before it free. When range or pose are off by half a
-cell, some returns of a wall fall into the cell behind it. Exact inference knows that one wall explains them all.
+Evidence cell by cell takes the cell of a return as occupied and the cells before it as free. When range or pose are off
+by half a cell, some returns of a wall fall into the cell behind it. Exact inference knows that one wall explains all of
+these returns.
 """
 
 from collections.abc import Sequence
@@ -23,27 +24,28 @@ from semgrid_edu.occupancy import (
 )
 
 CELL, NEAREST = 0.2, 3.0
-"""The paper's cells, and where the row begins ahead of the LIDAR, metres."""
+"""Side of the paper's cells, and distance from the LIDAR to the beginning of the row, metres."""
 
 PARAMS = LogOddsParams(prior=0.2, sensor=SensorModel(ground=None))
-"""The package's defaults on flat ground, with a prior under which free space is the rule."""
+"""The package's defaults on flat ground, with a prior by which most cells are free."""
 
 
 def same_sensor(noise: float, params: LogOddsParams = PARAMS, n_cells: int = 8) -> BeamWorld:
-    """Return the beam whose cells reflect as often as the package's sensor model says.
+    """Return a beam whose cells reflect as often as the package's sensor model says.
 
     Parameters
     ----------
     noise : float
         Standard deviation of range and pose together along the beam, in cells.
     params : LogOddsParams
-        Its prior and p_hit.
+        Parameters of the grid, of which the prior and the sensor's p_hit are used.
     n_cells : int
-        Cells in the row.
+        Number of cells in the row.
 
     Returns
     -------
     BeamWorld
+        The cells, and how the beam is reflected and measured.
     """
     sensor = params.sensor
     return BeamWorld(n_cells, noise, prior=params.prior, hit=sensor.p_hit_occupied, clutter=sensor.p_hit_free)
@@ -57,13 +59,14 @@ def package_row(
     Parameters
     ----------
     ranges : (n,) float or None
-        In cells, 0 for the middle of the nearest. None: the beam passes the row and meets the ground behind it.
+        The ranges in cells, 0 for the middle of the nearest cell. None when the beam passes the row and meets the
+        ground behind it.
     params : LogOddsParams
-        Prior, bounds and sensor.
+        Prior, bounds and sensor of the grid.
     n_cells : int
-        Cells in the row, 0.2 m each, from 3 m ahead on.
+        Number of cells in the row, each 0.2 m long; the row begins 3 m ahead of the LIDAR.
     rings : int
-        Returns of each scan, all at the same range.
+        Number of returns in each scan, all at the same range.
 
     Returns
     -------
@@ -86,17 +89,18 @@ def draw_ranges(world: BeamWorld, occupied: Sequence[int], scans: int, rng: np.r
     Parameters
     ----------
     world : BeamWorld
-        With one cell at each range.
+        The cells, one at each range, and how the beam is reflected and measured.
     occupied : (K,) int
-        1 where something stands.
+        1 where something stands, 0 elsewhere.
     scans : int
-        How many ranges.
+        Number of ranges.
     rng : numpy.random.Generator
+        Source of reflections and noise.
 
     Returns
     -------
     list of float or None
-        In cells, to a tenth; None when nothing reflects.
+        Ranges in cells, rounded to a tenth; None when nothing reflects.
     """
     reflects = rng.random((scans, world.n_cells)) < np.where(occupied, world.hit, world.clutter)
     measured = reflects.argmax(axis=1) + world.noise * rng.normal(size=scans)
@@ -105,14 +109,14 @@ def draw_ranges(world: BeamWorld, occupied: Sequence[int], scans: int, rng: np.r
 
 
 class Walls(NamedTuple):
-    """Mean over many draws of what is believed after each scan.
+    """What is believed after each scan, as a mean over many random sequences of scans.
 
     Parameters
     ----------
     exact, cell_by_cell, package : (scans, K) float64
-        P(occupied) by exact inference, by the same beam model cell by cell, and by the package's grid.
+        P(occupied) of each cell by exact inference, by the same beam model cell by cell, and by the package's grid.
     thickness : (3, scans) float64
-        How many cells have P(occupied) > 1/2, in the same order.
+        Number of cells with P(occupied) > 1/2, by the three ways in the same order.
     """
 
     exact: NDArray[np.float64]
@@ -122,30 +126,32 @@ class Walls(NamedTuple):
 
 
 def thick_walls(noise: float = 0.5, scans: int = 20, draws: int = 50, wall: int = 4, seed: int = 0) -> Walls:
-    """Measure how thick a wall of one cell becomes, free space before and behind it.
+    """Measure how thick a wall becomes that is one cell thick, with free space before and behind it.
 
-    Range and pose are off by half a cell, 10 cm, by default. After 20 scans exact inference believes 1.1 cells
-    occupied and gives the cell behind the wall 0.12. The package's grid believes 2.5 and gives it 0.78.
-    Of that, the cut between cells is the smaller part: with the right beam model, but cell by cell, it is 1.2 cells and
-    0.24. The rest comes from where the package's evidence differs from that model: it takes every range as exact, lets
-    a pass weigh less (0.3 / 0.7 instead of 0.2 / 0.95), and keeps its log-odds within bounds.
+    By default, the error of range and pose has a standard deviation of half a cell, 10 cm. After 20 scans, exact
+    inference finds 1.1 cells occupied, and gives the cell behind the wall P(occupied) = 0.12. The package's grid finds
+    2.5 cells occupied, and gives that cell 0.78. The smaller part of the difference comes from the cut between cells:
+    with the same beam model as exact inference, but cell by cell, the two numbers are 1.2 cells and 0.24. The rest
+    comes from the package's evidence, which differs from that beam model: it takes every range as exact, gives a pass
+    less weight (0.3 / 0.7 instead of 0.2 / 0.95), and keeps the log-odds within bounds.
 
     Parameters
     ----------
     noise : float
         Standard deviation of range and pose together along the beam, in cells.
     scans : int
-        Scans of one beam each.
+        Number of scans, of one beam each.
     draws : int
-        Over how many sequences of scans to take the mean.
+        Number of random sequences of scans over which the mean is taken.
     wall : int
-        The only occupied cell of eight, from 0.
+        The only occupied cell of eight, counted from 0.
     seed : int
-        For the noise.
+        Seed for reflections and noise.
 
     Returns
     -------
     Walls
+        The mean beliefs and thicknesses.
     """
     world, rng = same_sensor(noise), np.random.default_rng(seed)
     row = np.arange(world.n_cells) == wall
