@@ -46,7 +46,7 @@ def tasks(source: Path) -> dict[str, tuple[str, ...]]:
     Returns
     -------
     dict of str to tuple of str
-        For each answer cell, by its grade_id, the test cells between it and the next answer. A written answer is
+        The test cells between each answer cell and the next, by the grade_id of the answer cell. A written answer is
         its own test.
     """
     found: dict[str, tuple[str, ...]] = {}

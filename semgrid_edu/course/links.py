@@ -11,7 +11,7 @@ def find_code(name: str) -> object:
     Parameters
     ----------
     name : str
-        Such as "semgrid_edu.camera.project".
+        A dotted name, such as "semgrid_edu.camera.project".
 
     Returns
     -------
@@ -58,7 +58,8 @@ def notebook_link(place: str | None, folder: str = "") -> str:
     Parameters
     ----------
     place : str or None
-        Such as "02_grids#log-odds", or "deeper/graphical_models#messages" for a companion; None while it is to come.
+        Notebook and part, such as "02_grids#log-odds" or, for a companion, "deeper/graphical_models#messages"; None
+        while it is to come.
     folder : str
         Folder of the notebook inside the folder of notebooks, such as "exercises/".
 

@@ -106,7 +106,8 @@ def section_times(notebook: NotebookNode) -> dict[str, ReadingTime]:
     Returns
     -------
     dict of str to ReadingTime
-        By the text of each section's heading (`## ...`), in order. What stands before the first has the key "(header)".
+        Reading times by the text of each section's heading (`## ...`), in order. The part before the first heading is
+        "(header)".
     """
     section = "(header)"
     times = {section: ReadingTime()}

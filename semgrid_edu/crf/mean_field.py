@@ -44,7 +44,7 @@ def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice
     Returns
     -------
     PermutohedralLattice
-        Of H W points in five dimensions: two for the place, three for the state.
+        A lattice around H W points in five dimensions: two for the place, three for the state.
     """
     place = np.indices(values.shape[1:]) / params.sigma_alpha
     state = np.einsum("ks,shw->khw", _ZERO_SUM_STATES, values) / params.sigma_beta

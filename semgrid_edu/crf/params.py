@@ -63,7 +63,7 @@ class CrfParams:
         Returns
         -------
         CrfParams
-            Its sigmas in cells of that size.
+            The defaults, with sigmas in cells of that size.
 
         Examples
         --------

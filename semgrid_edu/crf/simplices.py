@@ -181,7 +181,7 @@ def find_neighbours(keys, slots):
     Returns
     -------
     (d + 1, 2, M) int32
-        By direction, forward or backward, and vertex: the number of the neighbour, or M where there is none.
+        Number of the neighbour by direction, forward or backward, and vertex; M where there is none.
     """
     n_vertices, size = keys.shape
     neighbours = np.full((size, 2, n_vertices), n_vertices, np.int32)

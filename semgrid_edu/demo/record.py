@@ -66,7 +66,7 @@ class Record:
     views : list of FrameView
         The frames to show.
     labelled : int
-        How many frames have had truth.
+        Number of frames with truth so far.
     liveliest : (FrameResult, FrameResult or None), or None
         The results of the shown frame with the most moving cells.
     """

@@ -238,7 +238,7 @@ def scores_table(result: Scores) -> str:
     Parameters
     ----------
     result : Scores
-        From `scores`.
+        What `scores` returns.
 
     Returns
     -------

@@ -34,7 +34,7 @@ def build_net(architecture: Architecture, camera: Camera, seed: int = 0) -> Sema
     Returns
     -------
     SemanticGridNet
-        In training mode, as PyTorch's modules are when they are new.
+        The network, in training mode, as PyTorch's modules are when they are new.
 
     Raises
     ------
@@ -94,7 +94,7 @@ class Calibration:
         Returns
         -------
         Calibration
-            The same as plain numbers.
+            The grid, the heights and the camera as plain numbers.
 
         Raises
         ------

@@ -85,7 +85,7 @@ def vgg16_tensors(layers: Iterable[nn.Module]) -> dict[str, Tensor]:
     Returns
     -------
     dict of str to Tensor
-        Such as "features.0.weight"; the tensors are the layers' own.
+        The layers' own tensors under names such as "features.0.weight".
     """
     named = zip(_layer_names(), layers, strict=False)
     return {f"{name}.{part}": own for name, layer in named for part, own in layer.named_parameters()}

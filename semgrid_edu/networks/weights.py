@@ -52,7 +52,7 @@ def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:
     Returns
     -------
     SemanticGridNet
-        In evaluation mode.
+        The network, in evaluation mode.
 
     Raises
     ------

@@ -78,7 +78,7 @@ def accelerate(state: BofState, params: BofParams, dt: float) -> NDArray[np.floa
 
 
 def meet_in_cell(own: NDArray, stays: NDArray, arrives: NDArray) -> tuple[NDArray, NDArray]:
-    """Let the mass that arrives in one cell meet what the cell holds, as `predict` says.
+    """Let the mass that arrives in one cell meet what the cell holds, by the rule of `predict`.
 
     Parameters
     ----------

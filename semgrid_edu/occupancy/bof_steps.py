@@ -61,7 +61,8 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -
 
     Some mass changes to neighbouring velocities, slow mass becomes STATIC, and the states mix by the transition matrix.
     Mass that leaves a cell leaves FREE behind. Where mass arrives, "something arrives" and "a standing thing is here"
-    can't both be right. What becomes DYNAMIC takes the lattice's prior velocities, and moves from the next step on.
+    can't both be true, so this combination is struck out. What becomes DYNAMIC takes the lattice's prior velocities. It
+    moves from the next step on.
 
     Parameters
     ----------

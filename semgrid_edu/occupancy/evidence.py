@@ -1,7 +1,7 @@
 """What one scan says of each cell, P(z | occupied) and P(z | free), and what a sensor must offer (paper, section 3.2).
 
-A filter needs two things of a sensor: that it takes a scan in, `Sensor.scan`, and that the result can say what the
-scan tells of the cells of any grid, `Measurement.evidence`. Any two classes with these methods will do.
+A filter needs two things: a sensor that takes in a scan (`Sensor.scan`), and a result that can say what the scan tells
+about the cells of any grid (`Measurement.evidence`). Any two classes with these methods will do.
 """
 
 from dataclasses import dataclass

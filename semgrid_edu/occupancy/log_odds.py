@@ -14,7 +14,7 @@ from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.sensor import SensorModel
 
 TINY = np.float32(1e-30)
-"""Stands for a likelihood of 0, whose logarithm is infinite. The bounds on P(occupied) hide the difference."""
+"""Stands for a likelihood of 0, whose logarithm is infinite. The bounds on P(occupied) make the difference vanish."""
 
 
 @dataclass(frozen=True)

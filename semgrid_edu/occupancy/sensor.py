@@ -190,7 +190,7 @@ def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray:
     points : (N, 3+) float
         Returns: x forward, y left, z above the ground on which the vehicle stands (m), in its grid frame; N may be 0.
     sensor : SensorModel
-        Its vehicle's outline, and how the ground is found.
+        The sensor, with the outline of its vehicle, and how the ground is found.
 
     Returns
     -------
@@ -219,7 +219,7 @@ def likelihoods(obstacles: NDArray, free: NDArray, sensor: SensorModel) -> Evide
         Whether the cell was seen to be free: then P(z | .) = p_pass. Obstacle returns overrule it, because an object
         may fill a cell only in part.
     sensor : SensorModel
-        Its probabilities of errors.
+        The sensor, with its probabilities of errors.
 
     Returns
     -------

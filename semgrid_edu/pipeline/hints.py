@@ -25,7 +25,7 @@ def where(function: Callable) -> str:
     Returns
     -------
     str
-        Such as "my_stages.py, line 12"; the class of an object when no line of Python is known.
+        A place such as "my_stages.py, line 12", or the class of an object when no line of Python is known.
     """
     code = _code(function)
     if code is None:

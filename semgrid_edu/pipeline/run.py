@@ -75,7 +75,7 @@ def run_side_by_side(frames: Iterable[Frame], *several: Stages) -> Iterator[tupl
     Parameters
     ----------
     frames : iterable of Frame
-        As for `run_pipeline`.
+        What `run_pipeline` takes.
     *several : Stages
         Complete sets of stages with the same architecture, such as `own = Stages.of(net)` and `mine.over(own)`.
 

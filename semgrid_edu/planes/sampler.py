@@ -32,6 +32,8 @@ class PlaneSampler(nn.Module):
 
     Examples
     --------
+    >>> import numpy as np
+    >>> import torch
     >>> sampler = PlaneSampler(np.full((1, 1, 1, 2), 0.5), np.ones((1, 1, 1), bool), image_size=(2, 2))
     >>> sampler(torch.tensor([[[[0.0, 1.0], [2.0, 3.0]]]]))
     tensor([[[[[1.5000]]]]])
@@ -48,7 +50,7 @@ class PlaneSampler(nn.Module):
         Parameters
         ----------
         operator : PlaneOperator
-            For one image.
+            The operator for one image.
 
         Returns
         -------

@@ -189,7 +189,7 @@ def package_cell(
     Returns
     -------
     CellBeliefs
-        In float32, as the package computes.
+        What the package believes, float32.
     """
     world, spec, rng = world or WorldModel(), GridSpec(0, 1, 0, 1, 1), np.random.default_rng(0)
     first = np.reshape(np.asarray(start, np.float32), (4, 1, 1))

@@ -92,9 +92,9 @@ def filtered(stage: StageGraph, readings: Sequence[int]) -> NDArray[np.float64]:
     Parameters
     ----------
     stage : StageGraph
-        From `bayes_on_a_line`.
+        A graph from `bayes_on_a_line`.
     readings : (T,) int
-        What the sensor said at each step.
+        What the sensor said at each step: 0 for "nothing", 1 for "pole".
 
     Returns
     -------
@@ -113,9 +113,9 @@ def smoothed(stage: StageGraph, readings: Sequence[int]) -> NDArray[np.float64]:
     Parameters
     ----------
     stage : StageGraph
-        From `bayes_on_a_line`.
+        A graph from `bayes_on_a_line`.
     readings : (T,) int
-        What the sensor said at each step.
+        What the sensor said at each step: 0 for "nothing", 1 for "pole".
 
     Returns
     -------
@@ -132,9 +132,9 @@ def most_likely_path(stage: StageGraph, readings: Sequence[int]) -> list[int]:
     Parameters
     ----------
     stage : StageGraph
-        From `bayes_on_a_line`.
+        A graph from `bayes_on_a_line`.
     readings : (T,) int
-        What the sensor said at each step.
+        What the sensor said at each step: 0 for "nothing", 1 for "pole".
 
     Returns
     -------
@@ -167,7 +167,7 @@ def future_gain(stage: StageGraph) -> FutureGain:
     Parameters
     ----------
     stage : StageGraph
-        From `bayes_on_a_line`, with T steps: all 2^T sequences of readings are enumerated.
+        A graph from `bayes_on_a_line` with T steps: all 2^T sequences of readings are enumerated.
 
     Returns
     -------

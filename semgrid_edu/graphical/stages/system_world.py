@@ -130,7 +130,7 @@ class SystemWorld:
         Returns
         -------
         list of (3^(t+1), 2, 4) float32
-            One array for each t = 0, 1, .... Axes: sequence of scans (the last changes fastest), cell (near, far), state.
+            For each t = 0, 1, ...: by sequence of scans (the last one changes fastest), by cell (near, far), by state.
         """
         spec, histories = GridSpec(0, 1, 0, 2, 1), []
         states = [FilterState.unknown(spec)]
