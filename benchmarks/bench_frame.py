@@ -39,9 +39,9 @@ def frame_times(frames: list[Frame], net: SemanticGridNet) -> np.ndarray:
         for result in run_pipeline(frames, net):
             took = result.seconds
             evidence = sum(spent[part] for part in EVIDENCE)
-            row = [scaling_time(result.frame, net), evidence, took["occupancy"] - evidence]
-            row += [took[stage] for stage in ("segmentation", "planes", "fusion")]
-            table.append([*row, sum(row), took["crf"]])
+            row = [scaling_time(result.frame, net), evidence, took["track"] - evidence]
+            row += [took[stage] for stage in ("segment", "sample", "fuse")]
+            table.append([*row, sum(row), took["refine"]])
             spent.clear()
     return 1e3 * np.array(table)
 

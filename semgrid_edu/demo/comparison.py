@@ -4,18 +4,23 @@ from dataclasses import dataclass
 from html import escape
 
 from semgrid_edu.pipeline import STAGES
-from semgrid_edu.pipeline.stages import ARGUMENTS
 
 MADE_BY = {
     "scores": ("segment",),
     "occupancy": ("track",),
     "grid": ("track", "segment", "sample", "fuse"),
-    "refined": tuple(ARGUMENTS),
+    "refined": tuple(STAGES),
 }
 """The stages that a picture depends on."""
 
-ARROWS = dict(zip(ARGUMENTS, ("l → o", "i → s", "s → p", "(p, o) → g", "g → g"), strict=True))
-"""Input and output of each stage, in the symbols of the paper's Fig. 2."""
+STAGE_WORDS = {
+    "track": ("l → o", "Bayes filter, CMCDOT"),
+    "segment": ("i → s", "image network"),
+    "sample": ("s → p", "sampling on planes"),
+    "fuse": ("(p, o) → g", "reduction and fusion"),
+    "refine": ("g → g", "CRF, mean field"),
+}
+"""Input and output of each stage, in the symbols of the paper's Fig. 2, and what the package's own stage does."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +45,7 @@ class Comparison:
 
     def lead(self) -> str:
         """Return the sentences that open the page, as HTML."""
-        named = _listed([f"<b>{name}</b> ({ARROWS[name]})" for name in self.stages])
+        named = _listed([f"<b>{name}</b> ({STAGE_WORDS[name][0]})" for name in self.stages])
         return (
             f"This page compares two runs over the same frames. The first is the package's own. In the second, {named} "
             f"{'comes' if len(self.stages) == 1 else 'come'} from <b>{escape(self.file)}</b>, and the other stages are "
@@ -61,11 +66,7 @@ class Comparison:
             Two sentences, as HTML.
         """
         stages = [f"<b>{name}</b>" for name in self.stages if name in MADE_BY[picture]]
-        return f"Made with {_listed(stages)} of {escape(self.file)}. Where does it differ from the picture beside it?"
-
-    def replaced(self) -> dict[str, str]:
-        """Return the names of the replaced stages, by what each of them does, an entry of `STAGES`."""
-        return {work: name for work, name in zip(STAGES, ARGUMENTS, strict=True) if name in self.stages}
+        return f"Made with {_listed(stages)} of {escape(self.file)}. Where does it differ from the package's picture?"
 
 
 def _listed(words: list[str]) -> str:

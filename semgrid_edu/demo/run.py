@@ -9,7 +9,6 @@ from semgrid_edu.demo.comparison import Comparison
 from semgrid_edu.demo.overview import save_overview
 from semgrid_edu.demo.page import Summary, page_html
 from semgrid_edu.demo.record import Record
-from semgrid_edu.errors import ArgumentError
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.networks import load_net
 from semgrid_edu.pipeline import Stages, load_stages, run_side_by_side
@@ -42,7 +41,7 @@ def write_demo(drive: KittiRawDrive, weights: str | Path, out: str | Path, stage
     Raises
     ------
     ArgumentError
-        When the drive has no images, or the stages of the file work on another grid or with other classes.
+        When the drive has no images.
     DataError
         When a file of the drive, the weights or the stages can't be read.
     StageError
@@ -52,7 +51,7 @@ def write_demo(drive: KittiRawDrive, weights: str | Path, out: str | Path, stage
     own, yours, comparison = Stages.of(net), (), None
     if stages is not None:
         mine = load_stages(stages)
-        yours, comparison = (_beside(own, mine),), Comparison(Path(stages).name, mine.given)
+        yours, comparison = (mine.over(own),), Comparison(Path(stages).name, mine.given)
     Path(out).mkdir(parents=True, exist_ok=True)  # before the work, to refuse a bad folder at once
     label_set = LABEL_SETS[net.architecture.label_set]
     record = Record(net.architecture.grid, label_set, every=-(-len(drive) // SHOWN), comparison=comparison)
@@ -75,13 +74,3 @@ def write_demo(drive: KittiRawDrive, weights: str | Path, out: str | Path, stage
     page = Path(out) / "index.html"
     write_text(page, page_html(summary, record.views))
     return page
-
-
-def _beside(own: Stages, mine: Stages) -> Stages:
-    """Return a complete set of stages that can be compared with the package's own."""
-    complete = mine.over(own)
-    for name in ("grid", "label_set"):
-        ours, theirs = getattr(own.architecture, name), getattr(complete.architecture, name)
-        if ours != theirs:
-            raise ArgumentError(f"the {name} of the stages", f"{ours}, to compare them with the package's", theirs)
-    return complete

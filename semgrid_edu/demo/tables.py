@@ -2,22 +2,14 @@
 
 from html import escape
 
-from semgrid_edu.demo.comparison import Comparison
+from semgrid_edu.demo.comparison import STAGE_WORDS, Comparison
 from semgrid_edu.occupancy.tracking import LIDAR_PERIOD
 
 SCAN_MILLISECONDS = 1000 * LIDAR_PERIOD
 """Time from one scan of KITTI's LIDAR to the next, ms."""
 
-STAGE_WORDS = {
-    "occupancy": ("l → o", "Bayes filter, CMCDOT"),
-    "segmentation": ("i → s", "image network"),
-    "planes": ("s → p", "sampling on planes"),
-    "fusion": ("(p, o) → g", "reduction and fusion"),
-    "crf": ("g → g", "CRF, mean field"),
-}
-"""Symbols and words of each stage of the pipeline."""
-
 COMPARED = " The package's occupancy grid names the unknown cells of the truth, so that both runs have the same truth."
+UPPER_BAR = " The upper bar is the package's."
 
 
 def metrics_table(metrics: dict[str, dict[str, float]], labelled: int, comparison: Comparison | None = None) -> str:
@@ -77,23 +69,23 @@ def times_table(
         A div element.
     """
     runs = [milliseconds, yours] if comparison else [milliseconds]
-    replaced = comparison.replaced() if comparison else {}
+    replaced = comparison.stages if comparison else ()
     rows = "".join(_time_row(*_words(stage, replaced), [run[stage] for run in runs]) for stage in milliseconds)
     total = _time_row("", "all stages", [sum(run.values()) for run in runs], "total")
     heads = ["the package's, ms", f"{escape(comparison.file)}, ms"] if comparison else ["ms"]
     return (
         "<div><table><caption><b>How long it takes</b>Median time for a frame on the computer that made this page, "
-        f"without a GPU. A full bar is {SCAN_MILLISECONDS:g} ms, the time from one scan of KITTI's LIDAR to the next."
-        "</caption>"
+        f"without a GPU. A full bar is at least {SCAN_MILLISECONDS:g} ms, the time from one scan of KITTI's LIDAR to "
+        f"the next.{UPPER_BAR if comparison else ''}</caption>"
         f"<thead><tr><th></th><th></th>{''.join(f'<th>{head}</th>' for head in heads)}<th></th></tr></thead>"
         f"<tbody>{rows}{total}</tbody></table></div>"
     )
 
 
-def _words(stage: str, replaced: dict[str, str]) -> tuple[str, str]:
+def _words(stage: str, replaced: tuple[str, ...]) -> tuple[str, str]:
     """Return symbols and words of a stage; the words also name the student's stage that replaces it, if one does."""
     symbols, words = STAGE_WORDS[stage]
-    return symbols, f"{words}; replaced by <b>{replaced[stage]}</b>" if stage in replaced else words
+    return symbols, f"{words}; replaced by <b>{stage}</b>" if stage in replaced else words
 
 
 def _time_row(symbols: str, words: str, values: list[float], kind: str = "stage") -> str:

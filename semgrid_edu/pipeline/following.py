@@ -96,7 +96,10 @@ class Follower:
         """Yield the frame that waits for the tracker, until there are no more."""
         while not self._over:
             if self._waiting is None:
-                raise self._seam.error(TAKES_TURNS, "one that takes another frame before it yields this one's belief")
+                cause = "is the `yield` missing?" if self._beliefs is None else "does it make a list of them?"
+                raise self._seam.error(
+                    TAKES_TURNS, f"one that takes another frame before it yields this one's belief: {cause}"
+                )
             frame, self._waiting = self._waiting, None
             yield frame
 

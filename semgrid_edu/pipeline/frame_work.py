@@ -12,12 +12,9 @@ from semgrid_edu.datasets.resizing import resize_image
 from semgrid_edu.frame import Frame
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.networks import Architecture, unit_image
-from semgrid_edu.occupancy import N_STATES, Belief
+from semgrid_edu.occupancy import Belief
 from semgrid_edu.pipeline.seams import Seam, StageError
-from semgrid_edu.pipeline.stages import Stages
-
-STAGES = ("occupancy", "segmentation", "planes", "fusion", "crf")
-"""What the five stages do, in their order: l -> o, i -> s, s -> p, (p, o) -> g, g -> refined g."""
+from semgrid_edu.pipeline.stages import STAGES, Stages
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +34,8 @@ class FrameResult:
     refined : (C, H, W) float32
         The semantic grid after refinement.
     seconds : dict of str to float
-        How long each of `STAGES` took, seconds, without the checks between them.
+        How long each stage took, seconds, without the checks between them; by the names "track", "segment", "sample",
+        "fuse" and "refine".
     """
 
     frame: Frame
@@ -57,29 +55,15 @@ class FrameWork:
         Number of the frame, for error messages.
     frame : Frame
         The frame; it has to have an image.
+    architecture : Architecture
+        What all sets work with: the grid, the image size, the planes and the classes.
     """
 
-    def __init__(self, number: int, frame: Frame) -> None:
+    def __init__(self, number: int, frame: Frame, architecture: Architecture) -> None:
         self._number, self._frame = number, frame
-        self._images: dict[tuple[int, int], NDArray[np.float32]] = {}
+        self._image = network_image(frame, architecture.image_size).numpy()
+        self._shapes = _result_shapes(architecture)
         self._done: dict[tuple[int, ...], tuple[NDArray[np.float32], float]] = {}
-
-    def image(self, size: tuple[int, int]) -> NDArray[np.float32]:
-        """Return the image of the frame as a network takes it, see `network_image`.
-
-        Parameters
-        ----------
-        size : (int, int)
-            Height h and width w, pixels.
-
-        Returns
-        -------
-        (3, h, w) float32
-            RGB, 0..1.
-        """
-        if size not in self._images:
-            self._images[size] = network_image(self._frame, size).numpy()
-        return self._images[size]
 
     def result(self, stages: Stages, belief: Belief, seconds: float) -> FrameResult:
         """Send the frame through the stages that follow the filter.
@@ -87,7 +71,7 @@ class FrameWork:
         Parameters
         ----------
         stages : Stages
-            A complete set: five functions and their architecture.
+            A complete set: five functions.
         belief : Belief
             What `stages.track` yields for the frame.
         seconds : float
@@ -103,50 +87,31 @@ class FrameWork:
         StageError
             When a stage raises an error, or returns what the next one can't use.
         """
-        shapes, o = result_shapes(stages.architecture), belief.probability
-        s, t_segment = self._call("segment", stages.segment, shapes, self.image(stages.architecture.image_size))
-        p, t_sample = self._call("sample", stages.sample, shapes, s)
+        o = belief.probability
+        s, t_segment = self._call("segment", stages.segment, self._image)
+        p, t_sample = self._call("sample", stages.sample, s)
         try:
-            log_g, t_fuse = self._call("fuse", stages.fuse, shapes, p, o)
+            log_g, t_fuse = self._call("fuse", stages.fuse, p, o)
         except StageError:
             # The planes hold millions of numbers, so they are searched for NaN after an error, not at each frame.
             Seam("sample", stages.sample, self._number).finite(p)
             raise
-        refined, t_refine = self._call("refine", stages.refine, shapes, log_g, o)
+        refined, t_refine = self._call("refine", stages.refine, log_g, o)
         times = dict(zip(STAGES, (seconds, t_segment, t_sample, t_fuse, t_refine), strict=True))
         return FrameResult(self._frame, belief, s, np.exp(log_g), refined, times)
 
-    def _call(
-        self, stage: str, function: Callable, shapes: dict[str, tuple[int, ...]], *inputs: NDArray
-    ) -> tuple[NDArray[np.float32], float]:
+    def _call(self, stage: str, function: Callable, *inputs: NDArray) -> tuple[NDArray[np.float32], float]:
         """Return a stage's result and its time; the same function isn't called again on the same arrays."""
         key = (id(function), *map(id, inputs))
         if key not in self._done:
-            self._done[key] = Seam(stage, function, self._number).call(shapes[stage], *inputs)
+            self._done[key] = Seam(stage, function, self._number).call(self._shapes[stage], *inputs)
         return self._done[key]
 
 
-def result_shapes(architecture: Architecture) -> dict[str, tuple[int, ...]]:
-    """Return the shape of what each stage returns, by the name of the stage.
-
-    Parameters
-    ----------
-    architecture : Architecture
-        The grid, the image size, the planes and the classes.
-
-    Returns
-    -------
-    dict of str to tuple of int
-        Shapes by the names "track", "segment", "sample", "fuse" and "refine".
-
-    Examples
-    --------
-    >>> result_shapes(Architecture())["sample"]
-    (14, 20, 142, 62)
-    """
+def _result_shapes(architecture: Architecture) -> dict[str, tuple[int, ...]]:
+    """Return the shape of what each stage after the filter returns, by the name of the stage."""
     n_classes, grid = len(LABEL_SETS[architecture.label_set]), architecture.grid.shape
     return {
-        "track": (N_STATES, *grid),
         "segment": (n_classes, *architecture.image_size),
         "sample": (n_classes, len(architecture.heights), *grid),
         "fuse": (n_classes, *grid),

@@ -7,20 +7,19 @@ from types import ModuleType
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.pipeline.hints import in_short
-from semgrid_edu.pipeline.stages import ARGUMENTS, Stages
+from semgrid_edu.pipeline.stages import STAGES, Stages
 
-NAMES = ", ".join(ARGUMENTS)
+NAMES = ", ".join(STAGES)
 
 
 def load_stages(path: str | Path) -> Stages:
     """Read stages from a Python file: its functions named track, segment, sample, fuse and refine.
 
-    A file can also make a `Stages` itself, under the name `stages`. Then nothing else in the file counts.
-
     Parameters
     ----------
     path : path-like
-        The file, which is executed. It may import other files in its folder.
+        The file, which is executed. While it is, Python also looks for imports in its folder, so the file can import
+        others that lie beside it.
 
     Returns
     -------
@@ -42,16 +41,7 @@ def load_stages(path: str | Path) -> Stages:
         found = "another file" if path.is_file() else "a folder" if path.is_dir() else "no such file"
         raise DataError(path, f"a Python file with functions named {NAMES}", found)
     module = _imported(path)
-    stages = getattr(module, "stages", None)
-    if stages is None:
-        return _from_functions(path, module)
-    if not isinstance(stages, Stages):
-        raise DataError(path, "a semgrid_edu.pipeline.Stages under the name `stages`", type(stages).__name__)
-    return stages
-
-
-def _from_functions(path: Path, module: ModuleType) -> Stages:
-    found = {name: getattr(module, name) for name in ARGUMENTS if hasattr(module, name)}
+    found = {name: getattr(module, name) for name in STAGES if hasattr(module, name)}
     if not found:
         others = [name for name, value in vars(module).items() if callable(value) and not name.startswith("_")]
         raise DataError(path, f"at least one function named {NAMES}", ", ".join(others) or "no function at all")

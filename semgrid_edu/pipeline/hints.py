@@ -25,7 +25,7 @@ def where(function: Callable) -> str:
     Returns
     -------
     str
-        A place such as "my_stages.py, line 12", or the class of an object that isn't a function.
+        A place such as "my_stages.py, line 12", or the class of an object when no line of Python is known.
     """
     code = _code(function)
     if code is None:
@@ -44,7 +44,7 @@ def file_of(function: Callable) -> str:
     Returns
     -------
     str
-        The file's path; "" when it can't be known, as for an object that isn't a function.
+        The file's path; "" when it can't be known, as for a function written in C.
     """
     code = _code(function)
     return code.co_filename if code else ""
@@ -74,7 +74,8 @@ def in_short(error: BaseException, file: str) -> str:
 def _code(function: Callable) -> CodeType | None:
     while isinstance(function, partial):
         function = function.func
-    return getattr(inspect.unwrap(function), "__code__", None)
+    function = inspect.unwrap(function)
+    return getattr(function, "__code__", None) or getattr(type(function).__call__, "__code__", None)
 
 
 def _place(file: str, line: int) -> str:

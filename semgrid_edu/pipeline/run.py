@@ -1,14 +1,17 @@
 """A drive through every stage, from LIDAR scans and images to refined semantic grids (paper, Fig. 2)."""
 
 from collections.abc import Iterable, Iterator
+from itertools import chain
 
+from semgrid_edu.camera import Camera
 from semgrid_edu.crf import CrfParams
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
 from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.occupancy import CmcdotParams
 from semgrid_edu.pipeline.following import Follower
 from semgrid_edu.pipeline.frame_work import FrameResult, FrameWork
-from semgrid_edu.pipeline.stages import Stages
+from semgrid_edu.pipeline.stages import STAGES, Stages
 
 
 def run_pipeline(
@@ -43,7 +46,7 @@ def run_pipeline(
     Raises
     ------
     ArgumentError
-        When a frame has no image.
+        When `stages` is neither, or a frame has no image.
     StageError
         When a stage raises an error, or returns what the next one can't use. It says which stage, where it is written,
         at which frame, and what is probably wrong.
@@ -54,17 +57,16 @@ def run_pipeline(
     >>> [result.refined.argmax(axis=0) for result in run_pipeline(drive, net)]          # doctest: +SKIP
     >>> [result.grid for result in run_pipeline(drive, Stages(track=my_filter))]        # doctest: +SKIP
     """
-    for (result,) in run_side_by_side(frames, stages, occupancy=occupancy, crf=crf, seed=seed):
+    frames = iter(frames)
+    first = next(frames, None)
+    if first is None:
+        return
+    complete = _complete(stages, first.camera, occupancy, crf, seed)
+    for (result,) in run_side_by_side(chain([first], frames), complete):
         yield result
 
 
-def run_side_by_side(
-    frames: Iterable[Frame],
-    *several: Stages | SemanticGridNet,
-    occupancy: CmcdotParams | None = None,
-    crf: CrfParams | None = None,
-    seed: int = 0,
-) -> Iterator[tuple[FrameResult, ...]]:
+def run_side_by_side(frames: Iterable[Frame], *several: Stages) -> Iterator[tuple[FrameResult, ...]]:
     """Send each frame through several sets of stages, to compare them.
 
     A function that would get the same arrays in two sets is called only once. So sets that differ only in `refine`
@@ -72,10 +74,10 @@ def run_side_by_side(
 
     Parameters
     ----------
-    frames, occupancy, crf, seed
+    frames : iterable of Frame
         What `run_pipeline` takes.
-    *several : Stages or SemanticGridNet
-        The sets of stages, each as in `run_pipeline`.
+    *several : Stages
+        Complete sets of stages with the same architecture, such as `own = Stages.of(net)` and `mine.over(own)`.
 
     Yields
     ------
@@ -84,30 +86,31 @@ def run_side_by_side(
 
     Raises
     ------
-    ArgumentError, StageError
+    ArgumentError
+        When a set isn't complete, two have different architectures, or a frame has no image.
+    StageError
         As for `run_pipeline`.
     """
-    sets: list[Stages] = []
-    followers: dict[tuple, Follower] = {}
+    architecture = several[0].architecture
+    for stages in several:
+        if stages.given != tuple(STAGES):
+            raise ArgumentError("several", "complete sets of stages, see `Stages.over`", f"only {stages.given}")
+        if stages.architecture is None or stages.architecture != architecture:
+            raise ArgumentError("several", f"one architecture, such as {architecture}", stages.architecture)
+    trackers = {id(stages.track): Follower(stages.track, architecture.grid) for stages in several}
     for number, frame in enumerate(frames):
-        if not sets:
-            sets = [_complete(stages, frame, occupancy, crf, seed) for stages in several]
-            followers = {_filter_of(s): Follower(s.track, s.architecture.grid) for s in sets}
-        work = FrameWork(number, frame)
-        beliefs = {key: follower.belief(frame, number) for key, follower in followers.items()}
-        yield tuple(work.result(stages, *beliefs[_filter_of(stages)]) for stages in sets)
-    for follower in followers.values():
-        follower.finish()
-
-
-def _filter_of(stages: Stages) -> tuple:
-    """Return a key for the filter of a set of stages and for its grid: sets with the same key share its beliefs."""
-    return id(stages.track), stages.architecture.grid
+        work = FrameWork(number, frame, architecture)
+        beliefs = {key: tracker.belief(frame, number) for key, tracker in trackers.items()}
+        yield tuple(work.result(stages, *beliefs[id(stages.track)]) for stages in several)
+    for tracker in trackers.values():
+        tracker.finish()
 
 
 def _complete(
-    stages: Stages | SemanticGridNet, frame: Frame, occupancy: CmcdotParams | None, crf: CrfParams | None, seed: int
+    stages: Stages | SemanticGridNet, camera: Camera, occupancy: CmcdotParams | None, crf: CrfParams | None, seed: int
 ) -> Stages:
     if isinstance(stages, Stages):
-        return stages.completed(frame.camera, occupancy, crf, seed)
-    return Stages.of(stages, occupancy, crf, seed)
+        return stages.completed(camera, occupancy, crf, seed)
+    if isinstance(stages, SemanticGridNet):
+        return Stages.of(stages, occupancy, crf, seed)
+    raise ArgumentError("stages", "a network, or Stages(...) with functions in it", type(stages).__name__)

@@ -18,7 +18,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture, SemanticGridNet, load_net
 from semgrid_edu.occupancy import Belief, CmcdotParams, track_drive
 
-ARGUMENTS = {
+STAGES = {
     "track": ("frames", "spec"),
     "segment": ("image",),
     "sample": ("s",),
@@ -83,7 +83,7 @@ class Stages:
     @property
     def given(self) -> tuple[str, ...]:
         """The names of the stages that weren't left out, in their order."""
-        return tuple(name for name in ARGUMENTS if getattr(self, name) is not None)
+        return tuple(name for name in STAGES if getattr(self, name) is not None)
 
     @classmethod
     def of(
@@ -139,8 +139,6 @@ class Stages:
         ArgumentError
             When both have an architecture and the two differ, so that they can't be mixed.
         """
-        if self.given == tuple(ARGUMENTS) and self.architecture:
-            return self
         if self.architecture not in (None, other.architecture):
             raise ArgumentError("architecture", f"that of the other stages, {other.architecture}", self.architecture)
         return replace(other, **{name: getattr(self, name) for name in self.given})
@@ -182,15 +180,17 @@ class Stages:
 
 
 def _check_function(name: str, function: object) -> None:
-    usage = f"a function {name}({', '.join(ARGUMENTS[name])})"
+    usage = f"a function {name}({', '.join(STAGES[name])})"
     if not callable(function):
         raise ArgumentError(name, usage, f"a {type(function).__name__}")
+    if isinstance(function, type):
+        raise ArgumentError(name, usage, f"the class {function.__name__} itself: write {name} = {function.__name__}()")
     try:
         signature = inspect.signature(function)
     except ValueError:  # some functions written in C don't say what they take
         return
     try:
-        signature.bind(*ARGUMENTS[name])
+        signature.bind(*STAGES[name])
     except TypeError as error:
         raise ArgumentError(name, usage, f"{name}{signature}") from error
 

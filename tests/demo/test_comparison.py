@@ -18,7 +18,6 @@ from semgrid_edu.datasets.samples import sample_drive, sample_weights
 from semgrid_edu.datasets.truth import grid_truth
 from semgrid_edu.demo import example_stages, write_demo
 from semgrid_edu.demo.comparison import MADE_BY, Comparison
-from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
@@ -218,19 +217,6 @@ class TestMistakes:
         with pytest.raises(StageError, match=r"^refine \(my_stages.py, line 2\), frame 0: .* IndexError"):
             write_demo(drive, sample_weights(), tmp_path / "out", stages)
         assert list((tmp_path / "out").iterdir()) == []
-
-    def test_stages_for_another_grid_are_refused_before_the_work(self, drive, tmp_path):
-        text = (
-            "from semgrid_edu.grid import GridSpec\n"
-            "from semgrid_edu.networks import Architecture\n"
-            "from semgrid_edu.pipeline import Stages\n"
-            "def one(s): return s\n"
-            "def two(a, b): return a\n"
-            "stages = Stages(two, one, one, two, two, Architecture(grid=GridSpec.paper()))\n"
-        )
-        with pytest.raises(ArgumentError, match="the grid of the stages"):
-            write_demo(drive, sample_weights(), tmp_path / "out", write(tmp_path, text))
-        assert not (tmp_path / "out").exists()
 
     def test_names_are_escaped(self):
         comparison = Comparison("<b>.py", ("track",))

@@ -12,7 +12,7 @@ from semgrid_edu.camera import KITTI_LIDAR_HEIGHT
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.illustrations.boxes import Box, scan_boxes
-from semgrid_edu.occupancy import Evidence, PlanarMotion, SensorModel, scan_evidence, scan_evidence_literal
+from semgrid_edu.occupancy import Evidence, PlanarMotion, Scan, SensorModel, scan_evidence, scan_evidence_literal
 from semgrid_edu.occupancy.evidence_literal import walk_ray
 from semgrid_edu.occupancy.polar import fill_gaps
 from semgrid_edu.simulation.sensors.rig import HDL64E_ELEVATIONS
@@ -112,6 +112,19 @@ def test_an_empty_scan_says_nothing(evidence_of):
     assert (evidence.free == 1).all()
 
 
+def crossed(scan: Scan, spec: GridSpec, pose: PlanarMotion, cell: tuple[int, int]) -> bool:
+    """Say whether the sight of a beam ends inside the circle around a cell, or between two beams that cross it.
+
+    Sight ends at a beam's reach, and what may come from under an obstacle ends `under` behind it.
+    """
+    x, y = pose.to_now(spec.centers()[cell][None])[0]
+    distance, radius, width = np.hypot(x, y), spec.cell / np.sqrt(2), 2 * np.pi / len(scan.reach)
+    azimuth = (np.arange(len(scan.reach)) + 0.5) * width - np.pi - np.arctan2(y, x)
+    beside = np.abs(np.angle(np.exp(1j * azimuth))) <= np.arcsin(min(1, radius / distance)) + width
+    ends = scan.reach[beside] + np.array([[0], [scan.sensor.under]])
+    return bool(((ends.min(axis=1) < distance + radius) & (ends.max(axis=1) >= distance - radius)).any())
+
+
 @settings(max_examples=8, deadline=None)
 @given(
     st.lists(st.tuples(st.floats(4, 30), st.floats(-9, 7), st.floats(0.3, 4), st.floats(0.3, 4)), max_size=6),
@@ -120,14 +133,19 @@ def test_an_empty_scan_says_nothing(evidence_of):
     st.floats(-0.05, 0.05),
 )
 def test_the_twins_differ_in_thin_lines_only(corners, dx, dy, dyaw):
-    """Obstacles are counted alike; where one ends what is free half a cell before the other, no 3 x 3 cells differ."""
+    """Obstacles are counted alike. What is free differs only in cells that the border of what is seen runs through.
+
+    There one twin asks whether any beam passes the whole cell, and the other whether the beam of its centre does. How
+    many such cells there are depends on the length of the border, so on the boxes: up to 7 % in the worst scene found.
+    """
     spec, pose = GridSpec(0, 30, -10, 10, 0.5), PlanarMotion(dx, dy, dyaw)
     points = scan_boxes([Box(x, x + long, y, y + wide, 1.6) for x, y, long, wide in corners], columns=360, rings=24)
     fast, literal = (f(points, spec, SENSOR, pose) for f in (scan_evidence, scan_evidence_literal))
     assert np.array_equal(fast.occupied > fast.free, literal.occupied > literal.free)
     differ = (fast.free > fast.occupied) != (literal.free > literal.occupied)
     assert not minimum_filter(differ, 3).any()
-    assert differ.mean() < 0.1
+    scan = SENSOR.scan(points)
+    assert all(crossed(scan, spec, pose, (row, col)) for row, col in np.argwhere(differ))
 
 
 @given(st.floats(-40, 40), st.floats(-40, 40), st.floats(-3.1, 3.1), st.floats(0.1, 80))

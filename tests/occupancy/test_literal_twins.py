@@ -5,10 +5,13 @@ The fast twins keep their numbers in single precision, which rounds probabilitie
 divides by as little as 1e-3 (`CERTAIN`), and a rounded number counts a thousandfold. Predictions agree to 1e-4.
 """
 
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from numba.extending import is_jitted
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
@@ -23,6 +26,7 @@ from semgrid_edu.occupancy import (
     State,
     VelocityLattice,
     WorldModel,
+    bof_predict_literal,
     bof_update,
     bof_update_literal,
     move,
@@ -62,7 +66,8 @@ def states(draw) -> FilterState:
     newborn = probability[State.DYNAMIC] * (rng.random(GRID.shape) * (rng.random(GRID.shape) < 0.5)).astype(np.float32)
     position = rng.uniform((-1, -3), (7, 3), (n, 2)).astype(np.float32)
     velocity = draw(st.sampled_from([0.0, 0.4, 5.0, 60.0])) * rng.normal(0, 1, (n, 2)).astype(np.float32)
-    weight = draw(st.sampled_from([0.0, 0.01, 0.5])) * rng.random(n, np.float32)
+    weight = draw(st.sampled_from([0.0, 0.01, 0.5, 5.0])) * rng.random(n, np.float32)  # 5: one alone overcrowds a cell
+    weight = weight.astype(np.float32)
     return FilterState(probability, Particles(position, velocity.astype(np.float32), weight), newborn)
 
 
@@ -151,6 +156,33 @@ def test_systematic_resampling_draws_the_same_indices(weights, count, offset):
     weights = np.array(weights, np.float32)
     drawn = systematic_resample_literal(weights, count, offset)
     assert np.array_equal(drawn, systematic_resample(weights, count, offset))
+
+
+@pytest.fixture
+def nothing_compiled(monkeypatch):
+    """Let every compiled function of the package raise an error."""
+
+    def refuse(*arguments):
+        raise AssertionError("a literal twin calls a compiled function")
+
+    for module in [module for name, module in sys.modules.items() if name.startswith("semgrid_edu.")]:
+        for name in [name for name, value in vars(module).items() if is_jitted(value)]:
+            monkeypatch.setattr(module, name, refuse)
+
+
+@pytest.mark.usefixtures("nothing_compiled")
+def test_the_literal_twins_call_nothing_compiled():
+    rng, evidence = np.random.default_rng(0), Evidence(np.full(GRID.shape, 0.8), np.full(GRID.shape, 0.05))
+    state, params = FilterState.unknown(GRID), CmcdotParams(n_particles=50)
+    with pytest.raises(AssertionError, match="a literal twin calls"):
+        update(state, GRID, evidence, params)
+    for _ in range(2):
+        state = predict_literal(move_literal(state, GRID, PlanarMotion(0.5, 0, 0.1)), GRID, params, 0.1, rng)
+        state = resample_literal(update_literal(state, GRID, evidence, params), GRID, params, rng)
+    assert len(state.particles)
+    lattice = BofParams(LATTICE)
+    bof = BofState.nothing_known(GRID, LATTICE)
+    bof_update_literal(bof_predict_literal(bof, GRID, lattice, 0.1), GRID, evidence, lattice)
 
 
 OTHER = GridSpec(0, 12, -4, 4, 1)

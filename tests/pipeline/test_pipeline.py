@@ -41,7 +41,7 @@ def test_every_frame_comes_out_with_every_stage_timed(drive, results):
     assert len(results) == len(drive)
     for frame, result in zip(drive, results, strict=True):
         np.testing.assert_array_equal(result.frame.points, frame.points)
-        assert tuple(result.seconds) == STAGES
+        assert tuple(result.seconds) == tuple(STAGES)
         assert min(result.seconds.values()) > 0
 
 
@@ -114,6 +114,26 @@ def test_sets_of_stages_side_by_side_give_what_each_gives_alone_and_share_the_sa
         assert_equal_results(a, expected)
         assert_equal_results(b, replace(expected, refined=expected.grid))
     assert len(calls) == len(drive)
+
+
+def test_only_complete_sets_of_one_architecture_run_side_by_side(drive, net):
+    own = Stages.of(net)
+    for other, message in (
+        (Stages(refine=lambda log_g, o: np.exp(log_g)), r"complete sets of stages, .* found only \('refine',\)"),
+        (replace(own, architecture=Architecture(heights=(0.0,))), "one architecture"),
+    ):
+        with pytest.raises(ArgumentError, match=f"^several: expected {message}"):
+            next(run_side_by_side(drive, own, other))
+
+
+@pytest.mark.parametrize("stages", [lambda log_g, o: np.exp(log_g), {"refine": None}, Stages, None])
+def test_what_is_neither_stages_nor_a_network_is_refused(drive, stages):
+    with pytest.raises(ArgumentError, match=r"^stages: expected a network, or Stages\(\.\.\.\)"):
+        next(run_pipeline(drive, stages))
+
+
+def test_no_frames_give_no_results(net):
+    assert list(run_pipeline([], net)) == []
 
 
 def test_both_grids_are_distributions(results):

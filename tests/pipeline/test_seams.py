@@ -157,7 +157,15 @@ class TestTracker:
             for _ in list(frames):
                 yield EVENLY
 
-        self.fails(frames, track, "frame 0: .*found one that takes another frame before it yields this one's belief")
+        self.fails(
+            frames, track, "frame 0: .*found one that takes another frame before it yields .* make a list of them"
+        )
+
+    def test_that_returns_a_list(self, frames):
+        def track(frames, spec):
+            return [EVENLY for _ in frames]
+
+        self.fails(frames, track, "frame 0: .*found one that takes another frame before .*: is the `yield` missing")
 
     def test_that_ends_early(self, frames):
         def track(frames, spec):
@@ -264,9 +272,22 @@ class TestFunctions:
         assert where(evenly) == where(partial(evenly, spec=None)) == f"test_seams.py, line {line}"
         assert where(Stages()) == "an object of class Stages"
 
+    def test_and_so_are_objects_that_can_be_called(self, frames):
+        class Refine:
+            def __call__(self, log_g, o):
+                raise KeyError("car")
+
+        line = Refine.__call__.__code__.co_firstlineno
+        message = rf"^refine \(test_seams.py, line {line}\), .* KeyError: 'car' \(test_seams.py, line {line + 1}\)$"
+        with pytest.raises(StageError, match=message):
+            next(run_pipeline(frames, stages_with(refine=Refine())))
+
+    def test_classes_are_no_functions(self):
+        with pytest.raises(ArgumentError, match=r"found the class Refine itself: write refine = Refine\(\)"):
+            Stages(refine=type("Refine", (), {}))
+
 
 def test_stages_of_different_architectures_are_not_mixed():
     other = Stages(architecture=Architecture())
     with pytest.raises(ArgumentError, match=r"^architecture: expected that of the other stages, .*\(96, 320\)"):
         Stages(track=evenly, architecture=ARCHITECTURE).over(other)
-    assert stages_with().over(other).architecture == ARCHITECTURE

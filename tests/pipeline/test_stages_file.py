@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from semgrid_edu.errors import DataError
-from semgrid_edu.pipeline import Stages, load_stages
+from semgrid_edu.pipeline import load_stages
 
 
 def write(folder, text, name="my_stages.py"):
@@ -19,18 +19,6 @@ def test_functions_with_the_names_of_stages_count_and_others_do_not(tmp_path):
     stages = load_stages(write(tmp_path, "def refine(log_g, o): return 7\ndef blur(g): return g\nwidth = 3\n"))
     assert stages.given == ("refine",)
     assert stages.refine(None, None) == 7
-
-
-def test_an_object_named_stages_counts_alone(tmp_path):
-    text = (
-        "from semgrid_edu.pipeline import Stages\n"
-        "def sample(s): return s\n"
-        "def refine(log_g, o): return log_g\n"
-        "stages = Stages(refine=refine)\n"
-    )
-    stages = load_stages(write(tmp_path, text))
-    assert isinstance(stages, Stages)
-    assert stages.given == ("refine",)
 
 
 def test_a_file_may_import_its_neighbours_and_have_dataclasses(tmp_path):
@@ -56,7 +44,10 @@ def test_a_file_may_import_its_neighbours_and_have_dataclasses(tmp_path):
         ("x = 1", "found no function at all"),
         ("refine = [1]", r"expected refine to be a function refine\(log_g, o\), found a list"),
         ("def refine(g): pass", r"expected refine to be a function refine\(log_g, o\), found refine\(g\)"),
-        ("stages = 'refine'", "expected a semgrid_edu.pipeline.Stages under the name `stages`, found str"),
+        (
+            "class refine:\n    def __call__(self, log_g, o): return log_g",
+            r"found the class refine itself: write refine = ",
+        ),
         ("def refine(log_g, o)", r"a file that Python can import, found SyntaxError: .* \(my_stages.py, line 1\)"),
         ("x = 1\ny = [][x]", r"found IndexError: list index out of range \(my_stages.py, line 2\)"),
         ("import sys\nsys.exit(2)", r"found SystemExit: 2 \(my_stages.py, line 2\)"),
