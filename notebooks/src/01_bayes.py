@@ -13,7 +13,7 @@
 # **Prerequisites.** Lecture [00](00_tour.ipynb), its first stage; a row of numbers times a matrix; the exponential
 # function.
 #
-# **Time.** 40 minutes, of which the computer needs a few seconds.
+# **Time.** 75 minutes, of which the computer needs a few seconds.
 #
 # **Paper.** Section 3.2, steps 1 to 3, for a single cell: prediction by a transition matrix, update by a sensor
 # model, estimate.
@@ -25,7 +25,7 @@
 #       how things move     what was seen
 # ```
 
-# %%
+# %% jupyter={"source_hidden": true}
 from dataclasses import replace
 
 import matplotlib.pyplot as plt
@@ -42,7 +42,7 @@ from semgrid_edu.occupancy import CmcdotParams, Evidence, FilterState, Particles
 from semgrid_edu.occupancy import scan_evidence, track_drive, transition_matrix
 from semgrid_edu.occupancy import update as update_grid
 
-plt.rcParams["figure.dpi"] = 80
+plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 
 # %% [markdown]
 # ## A road with three poles
@@ -78,7 +78,7 @@ N_CELLS = 10
 P_POLE = np.where(np.isin(np.arange(N_CELLS), POLES), 0.8, 0.1)  # P("pole" | cell), for each cell
 
 
-# %% tags=["update"]
+# %% tags=["update"] jupyter={"outputs_hidden": true}
 def update(likelihood, prior):
     """Return the posterior: multiply cell by cell, then divide by the sum."""
     product = [p * b for p, b in zip(likelihood, prior, strict=True)]
@@ -90,7 +90,7 @@ one_reading = update(P_POLE, nothing_known)
 np.testing.assert_allclose(one_reading, discrete_bayes.update(P_POLE, nothing_known))
 print("cell 3: {:.3f}   cell 5: {:.3f}".format(*one_reading[[3, 5]]))
 
-# %%
+# %% jupyter={"source_hidden": true}
 plotting.probability_lines({"prior": nothing_known, "likelihood of 'pole'": P_POLE, "posterior": one_reading})
 plt.show()
 
@@ -122,7 +122,7 @@ plt.show()
 #
 # A sum of this form is a *convolution*, and $m$ is its kernel. On the ring road $n - d$ goes round.
 
-# %% tags=["predict"]
+# %% tags=["predict"] jupyter={"outputs_hidden": true}
 MOVED = np.array([0.1, 0.8, 0.1])  # by 0, 1, 2 cells
 
 
@@ -144,7 +144,7 @@ print(f"cell 3: {moved_on[3]:.3f}   sum: {moved_on.sum():.3f}")
 #
 # After the move the sensor says *pole* again. Two poles in neighbouring cells: that fits only one place on this road.
 
-# %%
+# %% jupyter={"source_hidden": true}
 two_readings = update(P_POLE, moved_on)
 plotting.probability_lines(
     {"after one reading": one_reading, "after the move": moved_on, "after the second reading": two_readings}
@@ -189,7 +189,7 @@ def entropy(belief):
 # leaves you with two explanations instead of one. A surprise makes you less sure, and rightly so. (Where a road ends
 # at a wall, even prediction can lower the entropy: in time, everybody stands at the wall.)</details>
 
-# %%
+# %% jupyter={"outputs_hidden": true}
 places, says_pole = trip(25, np.random.default_rng(2))
 belief, history, bits, surprises = nothing_known, [], [], []
 for k, says in enumerate(says_pole):
@@ -264,7 +264,7 @@ np.testing.assert_allclose(one_way, update(P_POLE * (1 - P_POLE), nothing_known)
 # times, 0.001 seven times, sum 0.199. So 0.32 each: the poles have 96 % instead of 77 %. The filter is sure of
 # something that it has not seen.</details>
 
-# %%
+# %% jupyter={"outputs_hidden": true}
 twice = update(P_POLE, one_reading)
 np.testing.assert_allclose(twice, update(P_POLE**2, nothing_known))
 print(f"on the three cells with poles: once {one_reading[POLES].sum():.2f}, counted twice {twice[POLES].sum():.2f}")
@@ -289,7 +289,7 @@ print(f"cell 3: predict, then update {right[3]:.2f};  update, then predict {wron
 # the readings, certainty can't be corrected. With 0.999 against 0.001 each reading multiplies the odds of cell 7 by
 # 8, so 8⁴ = 4096 turns them round: four readings.</details>
 
-# %%
+# %% jupyter={"outputs_hidden": true}
 certain, nearly = np.eye(N_CELLS)[5], np.zeros(N_CELLS)
 nearly[[5, 7]] = 0.999, 0.001
 for reading in range(1, 11):
@@ -340,7 +340,7 @@ np.testing.assert_allclose(np.exp(log_update(np.log(P_POLE), np.log(moved_on))),
 # (0.3 and 0.8 sum to more than one. They needn't fit together: of each pair only the ratio counts, so a pair may be
 # scaled as you like.)
 
-# %%
+# %% jupyter={"outputs_hidden": true}
 PASS, HIT = np.array([0.7, 0.3]), np.array([0.05, 0.8])  # P(z | FREE), P(z | OCCUPIED)
 belief = np.array([0.5, 0.5])
 for name, likelihood in (("pass", PASS), ("pass", PASS), ("return", HIT)):
@@ -401,7 +401,7 @@ np.testing.assert_allclose(predict_states(one_reading, ring), predict(one_readin
 # The filter of this course has four states: FREE, STATIC and DYNAMIC (the two kinds of occupied), and UNKNOWN, for
 # what nobody has seen, or not for long. For this page:
 
-# %% tags=["transition-matrix"]
+# %% tags=["transition-matrix"] jupyter={"outputs_hidden": true}
 RATES = (  # to FREE, STATIC, DYNAMIC, UNKNOWN, 1/s
     (0.0, 0.02, 0.2, 0.2),
     (0.02, 0.0, 0.02, 0.1),
@@ -432,7 +432,7 @@ print(M.round(3))
 # The rates are *assumptions* about the world, like the sensor's numbers. What do they say of a cell that nobody looks
 # at any more? Start with one that is surely STATIC, and one that is surely DYNAMIC:
 
-# %%
+# %% jupyter={"source_hidden": true}
 times = np.linspace(0, 10, 51)
 fig, axes = plt.subplots(1, 2, figsize=(9, 2.4), sharey=True, layout="constrained")
 for ax, state in zip(axes, (State.STATIC, State.DYNAMIC), strict=True):
@@ -451,7 +451,7 @@ plt.show()
 #
 # Now the drive. Over its 20 frames we watch four spots on the ground, given by x and y in the first frame:
 
-# %%
+# %% jupyter={"source_hidden": true}
 SPOTS = {
     "road": (18.25, -0.75),
     "front of a house": (33.25, -13.25),
@@ -521,7 +521,7 @@ def step_of_package(belief, occupied, free):
     return update_grid(state, ONE_CELL, scan, params).probability[:, 0, 0]
 
 
-# %%
+# %% jupyter={"outputs_hidden": true}
 history = np.empty((len(frames), len(SPOTS), 4))
 belief = np.tile([0.0, 0.0, 0.0, 1.0], (len(SPOTS), 1))  # UNKNOWN
 for k, spot in np.ndindex(history.shape[:2]):

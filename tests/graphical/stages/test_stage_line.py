@@ -1,7 +1,6 @@
 """Bayes on a line: filterpy, lecture 01 and brute force are the messages on the chain."""
 
 import itertools
-import re
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyagrum_oracle import assert_oracle_agrees
 
-from semgrid_edu.course.notebooks import NOTEBOOKS
+from semgrid_edu.course.notebooks import NOTEBOOKS, read_percent
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals, sum_product, why_dependent
 from semgrid_edu.graphical.stages.line import bayes_on_a_line, filtered, future_gain, most_likely_path, smoothed
@@ -36,8 +35,8 @@ def recursion(readings, update, predict):
 
 def lecture_cell(tag):
     """The code of a tagged cell of lecture 01."""
-    source = (NOTEBOOKS / "src" / "01_bayes.py").read_text(encoding="utf-8")
-    return re.search(rf'^# %% tags=\["{tag}"\]\n(.*?)^# %%', source, flags=re.MULTILINE | re.DOTALL)[1]
+    cells = read_percent(NOTEBOOKS / "src" / "01_bayes.py").cells
+    return next(cell.source for cell in cells if tag in cell.metadata.get("tags", []))
 
 
 @settings(deadline=None, max_examples=30)
