@@ -80,11 +80,13 @@ class Cmcdot:
             doesn't turn the scan into evidence. The tracker then stays as it was.
         """
         seen = observe(self.params.sensor, points_grid, self._pose.then(motion), self.map_spec, self.spec)
-        moved = move(self._state, self.map_spec, seen.shift)
-        predicted = predict(moved, self.map_spec, self.params, dt, self._rng)
-        updated = update(predicted, self.map_spec, seen.on_map, self.params)
-        self._state, self._pose = resample(updated, self.map_spec, self.params, self._rng), seen.pose
-        return local_belief(predicted.probability, self._velocities(), seen, self.map_spec, self.spec, self.params)
+        # One name for what is between two steps: its memory, as large as what the filter keeps, is then used again
+        state = move(self._state, self.map_spec, seen.shift)
+        state = predict(state, self.map_spec, self.params, dt, self._rng)
+        predicted = state.probability
+        state = update(state, self.map_spec, seen.on_map, self.params)
+        self._state, self._pose = resample(state, self.map_spec, self.params, self._rng), seen.pose
+        return local_belief(predicted, self._velocities(), seen, self.map_spec, self.spec, self.params)
 
     def _velocities(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return mean and covariance of the particles' velocities in each cell of the map."""
