@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.occupancy.points import check_points
+from semgrid_edu.occupancy.polar import beams_of
 
 
 @dataclass(frozen=True)
@@ -119,11 +120,11 @@ def height_above_ground(points: NDArray, params: GroundParams) -> NDArray:
 @njit(cache=True)
 def _places(points, sectors, bin_, bins):
     """Find the place of each return, sector * bins + bin; returns beyond the last bin count to it."""
-    place = np.empty(len(points), np.int32)
-    for i in range(len(points)):
-        x, y = np.float64(points[i, 0]), np.float64(points[i, 1])
-        sector = min(int((np.arctan2(y, x) + np.pi) * (sectors / (2 * np.pi))), sectors - 1)
-        place[i] = sector * bins + int(min(np.sqrt(x * x + y * y) / bin_, bins - 1))
+    xy = points[:, :2].astype(np.float64).ravel()
+    place = beams_of(xy, sectors)
+    for i in range(len(place)):
+        distance = np.sqrt(xy[2 * i] * xy[2 * i] + xy[2 * i + 1] * xy[2 * i + 1])
+        place[i] = place[i] * bins + int(min(distance / bin_, bins - 1))
     return place
 
 
