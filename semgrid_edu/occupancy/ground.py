@@ -170,17 +170,18 @@ def _walk_all(points, lowest, low, high, sectors, bin_, step, slope, rise, grade
 def _median_of_neighbours(profile, seen, neighbours):
     """Take the median over each sector and its neighbours, leaving out sectors without returns."""
     sectors, bins = profile.shape
-    ground = np.zeros_like(profile)
+    ground, beside = np.zeros_like(profile), np.empty((2 * neighbours + 1, bins), np.float32)
     for s in range(sectors):
-        beside = np.empty((2 * neighbours + 1, bins), np.float32)
         n = 0
         for k in range(s - neighbours, s + neighbours + 1):
             if seen[k % sectors]:
-                beside[n] = profile[k % sectors]
+                for b in range(bins):  # loops over bins take less than half the time of whole rows
+                    beside[n, b] = profile[k % sectors, b]
                 n += 1
         if n > 0:
             _sort_each_bin(beside[:n])
-            ground[s] = (beside[(n - 1) // 2] + beside[n // 2]) / 2
+            for b in range(bins):
+                ground[s, b] = (beside[(n - 1) // 2, b] + beside[n // 2, b]) / 2
     return ground
 
 
