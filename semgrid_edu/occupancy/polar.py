@@ -221,7 +221,7 @@ def beyond_reach(reach, shape, x_max, y_max, cell, dx, dy, dyaw):
         for col in range(shape[1]):
             from_x = x_max - (row + 0.5) * cell - dx
             from_y = y_max - (col + 0.5) * cell - dy
-            xy[row, col] = cos * from_x + sin * from_y, cos * from_y - sin * from_x
+            xy[row, col, 0], xy[row, col, 1] = cos * from_x + sin * from_y, cos * from_y - sin * from_x
     xy, beyond = xy.ravel(), np.empty(shape[0] * shape[1], np.float32)
     beam = beams_of(xy, len(reach))
     for i in range(len(beam)):
