@@ -110,7 +110,8 @@ def height_above_ground(points: NDArray, params: GroundParams) -> NDArray:
         When `points` isn't a table of finite coordinates.
     """
     points = check_points(points)
-    place = _places(points, params.sectors, params.bin, params.bins)
+    x, y = points[:, 0].astype(np.float64), points[:, 1].astype(np.float64)
+    place = _places(x, y, beams_of(x, y, params.sectors), params.bin, params.bins)
     lowest = _lowest_returns(points, place, params.sectors * params.bins)
     limits = (params.step, params.slope, params.rise, params.grade, params.gap)
     profile, seen = _walk_all(points, *lowest, params.sectors, params.bin, *limits)
@@ -118,13 +119,11 @@ def height_above_ground(points: NDArray, params: GroundParams) -> NDArray:
 
 
 @njit(cache=True)
-def _places(points, sectors, bin_, bins):
+def _places(x, y, sector, bin_, bins):
     """Find the place of each return, sector * bins + bin; returns beyond the last bin count to it."""
-    xy = points[:, :2].astype(np.float64).ravel()
-    place = beams_of(xy, sectors)
-    for i in range(len(place)):
-        distance = np.sqrt(xy[2 * i] * xy[2 * i] + xy[2 * i + 1] * xy[2 * i + 1])
-        place[i] = place[i] * bins + int(min(distance / bin_, bins - 1))
+    place = np.empty(len(x), np.int32)
+    for i in range(len(x)):
+        place[i] = sector[i] * bins + int(min(np.sqrt(x[i] * x[i] + y[i] * y[i]) / bin_, bins - 1))
     return place
 
 

@@ -1,5 +1,7 @@
 """A scan in polar coordinates: how far each beam sees, and which cells it passes (paper, section 3.2, step 2)."""
 
+import math
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -10,7 +12,6 @@ ROUGH = 3e-5
 """Radians that `rough_azimuth` may err by; it errs by less than half of that (Abramowitz and Stegun, 4.4.47)."""
 
 
-@njit(cache=True)
 def polar_profile(points, low, high, beams):
     """Find the nearest obstacle and the farthest ground in each beam.
 
@@ -30,11 +31,15 @@ def polar_profile(points, low, high, beams):
     last_ground : (B,) float32
         Range of the farthest ground return, metres; zero without one.
     """
+    return _profile(points, beams_of(points[:, 0], points[:, 1], beams), low, high, beams)
+
+
+@njit(cache=True)
+def _profile(points, beam_of_point, low, high, beams):
     first_obstacle = np.full(beams, np.inf, np.float32)
     last_ground = np.zeros(beams, np.float32)
-    beam_at = beams_of(points[:, :2].ravel(), beams)
     for i in range(len(points)):
-        x, y, z, beam = points[i, 0], points[i, 1], points[i, 2], beam_at[i]
+        x, y, z, beam = points[i, 0], points[i, 1], points[i, 2], beam_of_point[i]
         if z <= high:
             distance = np.sqrt(x * x + y * y)
             if z >= low:
@@ -63,8 +68,7 @@ def beam_of(x, y, beams):
     return min(int((np.arctan2(y, x) + np.pi) * (beams / (2 * np.pi))), beams - 1)
 
 
-@njit(cache=True, error_model="numpy")
-def beams_of(xy, beams):
+def beams_of(x, y, beams):
     """Return the beam of each of many points: exactly that of `beam_of`, seven times as fast.
 
     Each azimuth is first computed roughly, which the compiler does for several points at a time. The arctangent itself
@@ -72,8 +76,8 @@ def beams_of(xy, beams):
 
     Parameters
     ----------
-    xy : (2 N,) float
-        x and y of each point in the grid frame of the vehicle, end to end, metres.
+    x, y : (N,) float
+        The points in the grid frame of the vehicle, metres.
     beams : int
         Number of beams in a turn, B.
 
@@ -82,15 +86,20 @@ def beams_of(xy, beams):
     (N,) int32
         The beam of each point, from 0 to B - 1.
     """
-    n, per_radian = len(xy) // 2, beams / (2 * np.pi)
-    beam, unsure, margin = np.empty(n, np.int32), np.empty(n, np.bool_), ROUGH * per_radian
-    for i in range(n):
-        place = (rough_azimuth(xy[2 * i], xy[2 * i + 1]) + np.pi) * per_radian
+    return _beams_of(np.ascontiguousarray(x), np.ascontiguousarray(y), beams)
+
+
+@njit(cache=True, error_model="numpy")
+def _beams_of(x, y, beams):
+    per_radian, unsure = beams / (2 * np.pi), np.empty(len(x), np.bool_)
+    beam, margin = np.empty(len(x), np.int32), ROUGH * per_radian
+    for i in range(len(x)):
+        place = (rough_azimuth(x[i], y[i]) + np.pi) * per_radian
         beam[i] = int(place)
         unsure[i] = not ((place - beam[i] > margin) & (place - beam[i] < 1 - margin))  # so is the NaN of x = y = 0
-    for i in range(n):
+    for i in range(len(x)):
         if unsure[i]:
-            beam[i] = beam_of(xy[2 * i], xy[2 * i + 1], beams)
+            beam[i] = beam_of(x[i], y[i], beams)
     return beam
 
 
@@ -200,7 +209,6 @@ def count_returns(points, low, high, shape, x_max, y_max, cell, dx, dy, dyaw):
     return obstacles, ground
 
 
-@njit(cache=True)
 def beyond_reach(reach, shape, x_max, y_max, cell, dx, dy, dyaw):
     """Return how far each cell's centre lies beyond the reach of its beam: look up its azimuth and range.
 
@@ -216,15 +224,9 @@ def beyond_reach(reach, shape, x_max, y_max, cell, dx, dy, dyaw):
     (H, W) float32
         Metres; negative for cells whose centre the beam passes.
     """
-    cos, sin, xy = np.cos(dyaw), np.sin(dyaw), np.empty((shape[0], shape[1], 2))
-    for row in range(shape[0]):
-        for col in range(shape[1]):
-            from_x = x_max - (row + 0.5) * cell - dx
-            from_y = y_max - (col + 0.5) * cell - dy
-            xy[row, col, 0], xy[row, col, 1] = cos * from_x + sin * from_y, cos * from_y - sin * from_x
-    xy, beyond = xy.ravel(), np.empty(shape[0] * shape[1], np.float32)
-    beam = beams_of(xy, len(reach))
-    for i in range(len(beam)):
-        distance = np.sqrt(xy[2 * i] * xy[2 * i] + xy[2 * i + 1] * xy[2 * i + 1])
-        beyond[i] = distance - reach[beam[i]]
-    return beyond.reshape(shape)
+    cos, sin = math.cos(dyaw), math.sin(dyaw)
+    from_x = x_max - (np.arange(shape[0])[:, None] + 0.5) * cell - dx
+    from_y = y_max - (np.arange(shape[1]) + 0.5) * cell - dy
+    x, y = cos * from_x + sin * from_y, cos * from_y - sin * from_x
+    beam = beams_of(x.ravel(), y.ravel(), len(reach)).reshape(shape)
+    return (np.sqrt(x * x + y * y) - reach[beam]).astype(np.float32)

@@ -11,7 +11,7 @@ BEAMS = st.sampled_from([1, 2, 7, 360, 1200, 36_000, 400_000])
 
 
 def both_ways(points: np.ndarray, beams: int) -> tuple[list[int], list[int]]:
-    return beams_of(points.ravel(), beams).tolist(), [beam_of(x, y, beams) for x, y in points]
+    return beams_of(*points.T, beams).tolist(), [beam_of(x, y, beams) for x, y in points]
 
 
 @settings(deadline=None)
@@ -42,8 +42,8 @@ def test_the_same_on_the_axes_and_at_the_origin(dtype):
 
 
 def test_beams_begin_behind_the_vehicle_and_go_counter_clockwise():
-    right_behind, right, ahead, left = [-1, -0.01], [0, -1], [1, 0], [0, 1]
-    assert beams_of(np.array([*right_behind, *right, *ahead, *left]), 4).tolist() == [0, 1, 2, 3]
+    right_behind, right, ahead, left = [-1, -0.01], [0.0, -1], [1, 0.0], [0.0, 1]
+    assert beams_of(*np.transpose([right_behind, right, ahead, left]), 4).tolist() == [0, 1, 2, 3]
 
 
 def test_rough_azimuths_err_by_less_than_half_of_what_they_may():
