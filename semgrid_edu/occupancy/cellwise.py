@@ -87,7 +87,7 @@ def mix(probability, newborn, going, M):
 
 
 @njit(cache=True, error_model="numpy")
-def meet(mixed, newborn, going, stays, arrives):
+def meet(mixed, newborn, going, stays, arrives, doubtful):
     """Let the dynamic mass that arrives in a cell meet what the cell holds, and strike out what can't both be true.
 
     Parameters
@@ -99,32 +99,68 @@ def meet(mixed, newborn, going, stays, arrives):
     going, stays, arrives : (H, W) float32
         Sums of weights in each cell: of the particles that were there before they flew, of those that are still there,
         and of those that have come in.
+    doubtful : (H, W) float32
+        The part of `arrives` that comes out of something that stands.
 
     Returns
     -------
     probability : (4, H, W) float32
-        With a = min(arrives, CERTAIN), s = P(STATIC) and d the mass that is newborn or stays, P(DYNAMIC) is
-        [a (1 - s) + (1 - a) d] / (1 - a s), and every other state (1 - a) P / (1 - a s). What has left is FREE.
+        With a = min(arrives, CERTAIN), b the doubtful part of it, s = P(STATIC), u = P(UNKNOWN) and d the mass that is
+        newborn or stays, P(DYNAMIC) is [a (1 - s) - b u + (1 - a) d] / (1 - a s - b u), and every other state
+        (1 - a) P / (1 - a s - b u). What has left is FREE.
     newborn : (H, W) float32
         Scaled like everything that was in the cell.
     factor : (2, H, W) float32
         Factors of the weights of the particles that stay, and of those that arrive.
+    doubt : (H, W) float32
+        What the factor of an arriving particle is less for each unit of its doubtful part.
     """
     probability, born = np.empty_like(mixed), np.empty_like(newborn)
-    factor = np.empty((2, *newborn.shape), np.float32)
+    factor, doubt = np.empty((2, *newborn.shape), np.float32), np.empty_like(newborn)
     for r in range(newborn.shape[0]):
         for c in range(newborn.shape[1]):
-            static, claim = mixed[STATIC, r, c], min(arrives[r, c], CERTAIN)
-            consistent = 1 - claim * static
-            own, arrived = (1 - claim) / consistent, claim * (1 - static) / consistent
+            static, unknown, claim = mixed[STATIC, r, c], mixed[UNKNOWN, r, c], min(arrives[r, c], CERTAIN)
+            share = claim / arrives[r, c] if arrives[r, c] > 0 else 0.0
+            struck = share * doubtful[r, c] * unknown
+            consistent = 1 - claim * static - struck
+            own, arrived = (1 - claim) / consistent, max(claim * (1 - static) - struck, 0.0) / consistent
             probability[FREE, r, c] = own * (mixed[FREE, r, c] + going[r, c] - stays[r, c])
             probability[STATIC, r, c] = own * static
             probability[DYNAMIC, r, c] = own * (newborn[r, c] + stays[r, c]) + arrived
-            probability[UNKNOWN, r, c] = own * mixed[UNKNOWN, r, c]
+            probability[UNKNOWN, r, c] = own * unknown
             born[r, c] = own * newborn[r, c]
             factor[0, r, c] = own
-            factor[1, r, c] = arrived / arrives[r, c] if arrives[r, c] > 0 else 0.0
-    return probability, born, factor
+            factor[1, r, c] = share * (1 - static) / consistent
+            doubt[r, c] = share * unknown / consistent
+    return probability, born, factor, doubt
+
+
+@njit(cache=True, error_model="numpy")
+def clear_wakes(probability, left, hidden):
+    """Strike out that something stands where a moving thing has been, in cells of which the scan says nothing.
+
+    Parameters
+    ----------
+    probability : (4, H, W) float32
+        The four states given the scan.
+    left : (H, W) float32
+        Sum of the weights of the particles that have left each cell.
+    hidden : (H, W) bool
+        Whether the scan says nothing of the cell.
+
+    Returns
+    -------
+    (4, H, W) float32
+        In hidden cells, with a = min(left, CERTAIN) and s = P(STATIC): STATIC is (1 - a) s / (1 - a s), and FREE gets
+        what it loses. All other cells are as they were.
+    """
+    cleared = probability.copy()
+    for r in range(left.shape[0]):
+        for c in range(left.shape[1]):
+            static, gone = probability[STATIC, r, c], min(left[r, c], CERTAIN) if hidden[r, c] else 0.0
+            cleared[STATIC, r, c] = (1 - gone) * static / (1 - gone * static)
+            cleared[FREE, r, c] += static - cleared[STATIC, r, c]
+    return cleared
 
 
 @njit(cache=True, error_model="numpy")

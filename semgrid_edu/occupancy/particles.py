@@ -131,6 +131,39 @@ def _by_origin(before, after, n_cells):
     return origin
 
 
+def left_cells(particles: Particles, cells: NDArray, spec: GridSpec, clearing_time: float) -> NDArray[np.int32]:
+    """Return the cell in which each particle was some time ago, if it isn't in it any more.
+
+    Parameters
+    ----------
+    particles : Particles
+        N particles.
+    cells : (N,) int32
+        The cell that each is in now, from `cells_of`.
+    spec : GridSpec
+        The cells, (H, W).
+    clearing_time : float
+        How long ago, seconds: x - v clearing_time is where a particle at x was, if its velocity v hasn't changed.
+
+    Returns
+    -------
+    (N,) int32
+        row * W + column; `OUTSIDE` for a particle that was outside the grid or is still in the same cell.
+    """
+    grid = (spec.shape, spec.x_max, spec.y_max, spec.cell)
+    return _left_cells(particles.position, particles.velocity, cells, np.float32(clearing_time), *grid)
+
+
+@njit(cache=True, error_model="numpy")
+def _left_cells(position, velocity, cells, time, shape, x_max, y_max, cell):
+    left = np.empty(len(cells), np.int32)
+    for i in range(len(cells)):
+        x, y = position[i, 0] - time * velocity[i, 0], position[i, 1] - time * velocity[i, 1]
+        was = cell_of(x, y, shape, x_max, y_max, cell)
+        left[i] = was if was != cells[i] else OUTSIDE
+    return left
+
+
 def fly(particles: Particles, max_acceleration: float, dt: float, rng: np.random.Generator) -> Particles:
     """Let particles fly for a while: constant velocity plus noise.
 

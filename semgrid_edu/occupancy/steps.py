@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.cellwise import bayes, make_room, meet, mix, represent
+from semgrid_edu.occupancy.cellwise import bayes, clear_wakes, make_room, meet, mix, represent
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.moving_map import look_up
 from semgrid_edu.occupancy.params import CmcdotParams
@@ -14,6 +14,7 @@ from semgrid_edu.occupancy.particles import (
     by_origin,
     cells_of,
     fly,
+    left_cells,
     scale_in_cells,
     slow_down,
     transform,
@@ -24,7 +25,7 @@ from semgrid_edu.occupancy.resampling import draw_again, draw_newborn
 from semgrid_edu.occupancy.state import FilterState, Particles, State, check_shape
 from semgrid_edu.occupancy.world import WorldModel, transition_matrix
 
-DYNAMIC, UNKNOWN = State.DYNAMIC, State.UNKNOWN
+STATIC, DYNAMIC, UNKNOWN = State.STATIC, State.DYNAMIC, State.UNKNOWN
 NOTHING_KNOWN = np.array([0, 0, 0, 1], dtype=np.float32)
 
 
@@ -68,13 +69,21 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
     First each cell mixes by the transition matrix, and particles near zero speed become STATIC. Then the particles fly,
     and dynamic mass with them. Where it leaves, it leaves FREE behind, because nothing stands where something has moved
     away. Where it arrives with probability a, two statements meet: "something arrives", and what the cell itself holds.
-    They can't both be true where the cell is STATIC, because two solid things can't share a cell. So that combination
-    is struck out of the joint distribution:
+    Some of their combinations can't be true, and are struck out of the joint distribution.
 
-        P(DYNAMIC) = [a (1 - s) + (1 - a) d] / (1 - a s),   others = (1 - a) others / (1 - a s)
+    - *It arrives, and the cell is STATIC.* Two solid things can't share a cell.
+    - *It comes out of something that stands, and the cell is UNKNOWN.* A particle's origin is where it was
+      `clearing_time` ago. If something stands there now, that thing didn't fly away. In a cell that was known to be
+      free, an arrival shows all the same that something has set out. In a cell that nobody has seen it shows nothing,
+      because walls go on: what comes into view beside a wall is the next piece of the wall.
 
-    with s and d the cell's own static and dynamic probability. So what arrives in free space is DYNAMIC, while a fence
-    that is known to stand stays STATIC although particles cross it.
+    With s, d and u the cell's own static, dynamic and unknown probability, and b the part of a that comes out of
+    something that stands, what is left is
+
+        P(DYNAMIC) = [a (1 - s) - b u + (1 - a) d] / (1 - a s - b u),   others = (1 - a) others / (1 - a s - b u)
+
+    So what arrives in free space is DYNAMIC, a fence that is known to stand stays STATIC although particles cross it,
+    and so does a wall that comes into view piece by piece.
 
     Parameters
     ----------
@@ -83,7 +92,7 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
     spec : GridSpec
         The cells, (H, W).
     world : WorldModel
-        Rates of change, how things stop, and how they accelerate.
+        Rates of change, how things stop, how they accelerate, and how soon they have left a place.
     dt : float
         Time since the previous instant, seconds, not negative.
     rng : numpy.random.Generator
@@ -108,11 +117,17 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
     mixed, newborn = mix(state.probability, state.newborn, going, M)
 
     particles = fly(particles, world.max_acceleration, dt, rng)
-    origin = by_origin(before, cells_of(particles.position, spec), going.size)
-    stays, arrives = weight_in_cells(particles.weight, origin, (2, *spec.shape))
-    probability, newborn, factor = meet(mixed, newborn, going, stays, arrives)
-    weight = scale_in_cells(particles.weight, origin, factor)
-    return FilterState(probability, replace(particles, weight=weight), newborn)
+    cells = cells_of(particles.position, spec)
+    came = by_origin(before, cells, going.size)
+    doubt = scale_in_cells(
+        particles.weight, left_cells(particles, cells, spec, world.clearing_time), mixed[STATIC]
+    )
+    stays, arrives = weight_in_cells(particles.weight, came, (2, *spec.shape))
+    doubtful = weight_in_cells(doubt, came, (2, *spec.shape))[1]
+    probability, newborn, factor, less = meet(mixed, newborn, going, stays, arrives, doubtful)
+    weight = scale_in_cells(particles.weight, came, factor)
+    weight -= scale_in_cells(doubt, came, np.stack([np.zeros_like(less), less]))
+    return FilterState(probability, replace(particles, weight=np.maximum(weight, 0)), newborn)
 
 
 def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldModel) -> FilterState:
@@ -120,6 +135,10 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
 
     STATIC and DYNAMIC share P(z | occupied), because one scan can't tell them apart. UNKNOWN means that no scan has
     said anything of the cell; as soon as one does, `reveal` first shares its UNKNOWN mass among the other states.
+
+    Of a cell that is hidden a scan says nothing, but what moves does: one thing can't be in two places. Where a thing
+    was `clearing_time` ago it isn't any more, so "it has come from there" and "it stands there" are struck out together
+    (`clear_wakes`). This is how a car that was taken for a standing one at first takes that belief along when it goes.
 
     Parameters
     ----------
@@ -131,7 +150,7 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
         What the scan says of each cell. However small the two likelihoods are, only their ratio counts. Where nothing
         that was held possible explains the scan, the cell becomes UNKNOWN.
     world : WorldModel
-        What UNKNOWN cells turn out to be, `first_sight`.
+        What UNKNOWN cells turn out to be, `first_sight`, and `clearing_time`.
 
     Returns
     -------
@@ -145,11 +164,14 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
     """
     check_shape("state", state.newborn, spec.shape)
     check_shape("evidence", evidence.free, spec.shape)
-    prior = reveal(state, evidence.occupied != evidence.free, world)
+    seen = evidence.occupied != evidence.free
+    prior = reveal(state, seen, world)
     posterior, factor = bayes(prior.probability, evidence.occupied, evidence.free)
-    particles = prior.particles
-    weight = scale_in_cells(particles.weight, cells_of(particles.position, spec), factor)
-    return FilterState(posterior, replace(particles, weight=weight), (prior.newborn * factor).astype(np.float32))
+    cells = cells_of(prior.particles.position, spec)
+    weight = scale_in_cells(prior.particles.weight, cells, factor)
+    left = weight_in_cells(weight, left_cells(prior.particles, cells, spec, world.clearing_time), spec.shape)
+    cleared, newborn = clear_wakes(posterior, left, ~seen), (prior.newborn * factor).astype(np.float32)
+    return FilterState(cleared, replace(prior.particles, weight=weight), newborn)
 
 
 def reveal(state: FilterState, seen: NDArray, world: WorldModel) -> FilterState:
