@@ -138,10 +138,10 @@ def walls_behind_gaps(builder: Builder, s0: float, s1: float, d: float) -> None:
     rng, sign = builder.rng, np.sign(d)
     s = s0
     while s < s1:
-        run, gap = rng.uniform(3, 9), rng.uniform(4, 9)
+        run, gap = rng.uniform(4, 10), rng.uniform(7, 15)
         _wall(builder, (s, d, 0.0, run), 2.2, _PLANK, Material.WOOD, Kind.FENCE)
-        start, yaw = s + run + rng.uniform(0, gap), sign * np.pi / 2 + rng.uniform(-0.5, 0.5)
-        across = (start, d + sign * rng.uniform(0.5, 3.0), yaw, rng.uniform(4, 8))
+        start, yaw = s + run + rng.uniform(0.3, 1.0) * gap, sign * np.pi / 2 + rng.uniform(-0.5, 0.5)
+        across = (start, d + sign * rng.uniform(0.5, 2.0), yaw, rng.uniform(5, 11))
         _wall(builder, across, rng.uniform(1.9, 3.0), _PLASTER, Material.PLASTER, Kind.BUILDING)
         s += run + gap
 
