@@ -13,7 +13,7 @@ from semgrid_edu.simulation.street.footprints import ROUND, outline
 from semgrid_edu.simulation.street.layout import to_road
 from semgrid_edu.simulation.things import see_through
 from semgrid_edu.simulation.things.materials import Kind, Material
-from semgrid_edu.simulation.things.primitives import box
+from semgrid_edu.simulation.things.primitives import box, tube
 from semgrid_edu.simulation.things.shapes import Shape
 
 _THIN_HALF = 0.08
@@ -71,7 +71,7 @@ def wire_mesh(builder: Builder, s0: float, s1: float, d: float) -> None:
     """
     rng = builder.rng
     opacity, step = rng.uniform(0.008, 0.02), rng.choice([2.0, 2.5, 3.0])
-    for piece in _pieces(s0, s1, d, 1.5, step, rng):
+    for piece in _pieces(s0, s1, d, 2.5, step, rng):
         frame, sheet = see_through.mesh_frame(piece[3]), see_through.mesh_sheet(piece[3])
         _stand(builder, piece, Kind.FENCE, _THIN_HALF, see_through.MESH_HEIGHT, frame, sheet, opacity)
 
@@ -152,6 +152,16 @@ def _wall(builder: Builder, piece: Piece, height: float, colour: tuple, material
     if foot := _fits(builder, s, d, yaw, kind, length, 0.13, height):
         body = box((length / 2, 0, height / 2 - 0.3), (length, 0.25, height + 0.6), colour, material, kind)
         builder.add(body, s, d, yaw, footprints=foot)
+
+
+def stand_pillars(builder: Builder, s0: float, s1: float, d: float) -> None:
+    """Stand thick pillars in front of a border, which hide it in part: clad trunks, advertising. Parameters: see `wire_mesh`."""
+    rng, s = builder.rng, s0
+    while s < s1:
+        radius = rng.uniform(0.3, 0.7)
+        pillar = tube((0, 0, -0.5), (0, 0, rng.uniform(1.9, 3.5)), (radius, radius), _PLASTER, Material.MATTE, Kind.POLE, 12)
+        builder.try_post(pillar, s, d, 0.0, Kind.POLE, radius)
+        s += rng.uniform(10, 30)
 
 
 YARD_BORDERS: dict[str, Callable[[Builder, float, float, float], None]] = {

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from semgrid_edu.simulation.street.borders import YARD_BORDERS
+from semgrid_edu.simulation.street.borders import YARD_BORDERS, stand_pillars
 from semgrid_edu.simulation.street.builder import Builder
 from semgrid_edu.simulation.street.footprints import ROUND, outline
 from semgrid_edu.simulation.street.layout import to_road
@@ -208,6 +208,7 @@ def _yard(builder: Builder, plan: Plan, sign: int) -> None:
     line = side.edge + side.strip + side.walk + 0.35
     border = YARD_BORDERS[plan.borders[0 if sign > 0 else 1]]
     border(builder, plan.extent.start, plan.extent.end - 60, sign * line)
+    stand_pillars(builder, plan.extent.start, plan.extent.end - 60, sign * (line - rng.uniform(0.4, 0.8)))
     for s in np.arange(plan.extent.start, plan.extent.end, 6.0):
         _bush(builder, plan, s + rng.uniform(0, 6), sign * (line + rng.uniform(3, 15)))
         _tree(builder, plan, s + rng.uniform(0, 6), sign * (line + rng.uniform(6, 30)))
