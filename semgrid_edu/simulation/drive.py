@@ -10,8 +10,8 @@ from semgrid_edu.frame import LABEL_GRID, Frame
 from semgrid_edu.simulation.frame import SimulatedFrame
 from semgrid_edu.simulation.sensors.camera import Picture, take_picture
 from semgrid_edu.simulation.sensors.gps import Geodesy
-from semgrid_edu.simulation.sensors.lidar import scan
 from semgrid_edu.simulation.sensors.instant import Instant
+from semgrid_edu.simulation.sensors.lidar import scan
 from semgrid_edu.simulation.sensors.porous import PorousMesh
 from semgrid_edu.simulation.sensors.raycast import RayMesh
 from semgrid_edu.simulation.sensors.rig import Rig

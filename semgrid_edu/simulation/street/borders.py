@@ -6,10 +6,9 @@ Each function runs one of them along a side of the road. Its measures are drawn,
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from semgrid_edu.simulation.street.builder import Builder
-from semgrid_edu.simulation.street.footprints import ROUND, outline
+from semgrid_edu.simulation.street.footprints import outline
 from semgrid_edu.simulation.street.layout import to_road
 from semgrid_edu.simulation.things import see_through
 from semgrid_edu.simulation.things.materials import Kind, Material
@@ -43,7 +42,14 @@ def _pieces(s0: float, s1: float, d: float, jog: float, step: float, rng: np.ran
 
 
 def _stand(
-    builder: Builder, piece: Piece, kind: Kind, half: float, top: float, solid: Shape | None, porous: Shape, opacity: float
+    builder: Builder,
+    piece: Piece,
+    kind: Kind,
+    half: float,
+    top: float,
+    solid: Shape | None,
+    porous: Shape,
+    opacity: float,
 ) -> None:
     """Put a piece of a border into the world, unless its place is taken."""
     s, d, yaw, length = piece
@@ -76,8 +82,8 @@ def wire_mesh(builder: Builder, s0: float, s1: float, d: float) -> None:
         _stand(builder, piece, Kind.FENCE, _THIN_HALF, see_through.MESH_HEIGHT, frame, sheet, opacity)
 
 
-def porous_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
-    """Run a hedge whose twigs let beams in, so that returns come from its depth. Parameters: see `wire_mesh`."""
+def twig_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
+    """Run a hedge whose twigs let beams in, so that it returns from its depth. Parameters are those of `wire_mesh`."""
     rng = builder.rng
     opacity, thickness, height = rng.uniform(2.0, 6.0), rng.uniform(0.6, 1.2), rng.uniform(1.4, 2.1)
     for piece in _pieces(s0, s1, d + np.sign(d) * thickness / 2, 0.6, 1.0, rng):
@@ -88,14 +94,14 @@ def porous_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
 
 
 def mesh_and_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
-    """Run wire mesh with hedges 0.5 to 1.5 m behind it, along it or in rows across. Parameters: see `wire_mesh`."""
+    """Run wire mesh with hedges behind it, along it or in rows across. Parameters are those of `wire_mesh`."""
     rng, sign = builder.rng, np.sign(d)
     wire_mesh(builder, s0, s1, d)
     s, behind = s0, d + sign * rng.uniform(0.5, 1.5)
     while s < s1:
         run = rng.uniform(15, 30)
         if rng.random() < 0.5:
-            porous_hedge(builder, s, s + run, behind)
+            twig_hedge(builder, s, s + run, behind)
         else:
             _rows(builder, s, s + run, behind)
         s += run + rng.uniform(0, 15)
@@ -112,7 +118,7 @@ def _rows(builder: Builder, s0: float, s1: float, d: float) -> None:
 
 
 def panes(builder: Builder, s0: float, s1: float, d: float) -> None:
-    """Run panes of glass between thin posts, as a bus shelter or a balustrade has. Parameters: see `wire_mesh`."""
+    """Run panes of glass between thin posts, as a bus shelter has. Parameters are those of `wire_mesh`."""
     rng = builder.rng
     opacity, step = rng.uniform(0.05, 0.15), rng.uniform(1.3, 2.2)
     for piece in _pieces(s0, s1, d, 0.8, step, rng):
@@ -122,7 +128,7 @@ def panes(builder: Builder, s0: float, s1: float, d: float) -> None:
 
 
 def post_row(builder: Builder, s0: float, s1: float, d: float) -> None:
-    """Stand bare posts in a regular row. Parameters: see `wire_mesh`."""
+    """Stand bare posts in a regular row. Parameters are those of `wire_mesh`."""
     rng = builder.rng
     step, height, radius = rng.uniform(1.4, 2.6), rng.uniform(1.0, 1.8), rng.uniform(0.04, 0.09)
     post = see_through.bollard(height, radius)
@@ -131,7 +137,7 @@ def post_row(builder: Builder, s0: float, s1: float, d: float) -> None:
 
 
 def walls_behind_gaps(builder: Builder, s0: float, s1: float, d: float) -> None:
-    """Run a high wall with gaps, and stand walls across behind them. Parameters: see `wire_mesh`.
+    """Run a high wall with gaps, and stand walls across behind them. Parameters are those of `wire_mesh`.
 
     As the recording car passes, the walls across come into view from behind the edges of the gaps.
     """
@@ -155,11 +161,16 @@ def _wall(builder: Builder, piece: Piece, height: float, colour: tuple, material
 
 
 def stand_pillars(builder: Builder, s0: float, s1: float, d: float) -> None:
-    """Stand thick pillars in front of a border, which hide it in part: clad trunks, advertising. Parameters: see `wire_mesh`."""
+    """Stand thick pillars in front of a border, such as overgrown trunks. Parameters are those of `wire_mesh`.
+
+    As the recording car passes, the edge of a pillar's shadow runs along the border behind it.
+    """
     rng, s = builder.rng, s0
     while s < s1:
         radius = rng.uniform(0.3, 0.7)
-        pillar = tube((0, 0, -0.5), (0, 0, rng.uniform(1.9, 3.5)), (radius, radius), _PLASTER, Material.MATTE, Kind.POLE, 12)
+        pillar = tube(
+            (0, 0, -0.5), (0, 0, rng.uniform(1.9, 3.5)), (radius, radius), _PLASTER, Material.MATTE, Kind.POLE, 12
+        )
         builder.try_post(pillar, s, d, 0.0, Kind.POLE, radius)
         s += rng.uniform(10, 30)
 
@@ -167,7 +178,7 @@ def stand_pillars(builder: Builder, s0: float, s1: float, d: float) -> None:
 YARD_BORDERS: dict[str, Callable[[Builder, float, float, float], None]] = {
     "wire": wire_mesh,
     "wire and hedge": mesh_and_hedge,
-    "twigs": porous_hedge,
+    "twigs": twig_hedge,
     "panes": panes,
     "posts": post_row,
     "gaps": walls_behind_gaps,

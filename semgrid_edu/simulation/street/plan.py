@@ -15,11 +15,11 @@ BORDERS = (*FENCES, "hedge", "none")
 STYLES = ("town", "suburb", "park")
 """What lines a side of the road: facades at the sidewalk; houses in gardens; grass banks and trees."""
 YARD = "yard"
-"""A style that is never drawn, only wished for: a border of `YARD_BORDERS`, behind it open ground with bushes and trees."""
+"""A style that is only wished for, never drawn: a border of `YARD_BORDERS`, and open ground behind it."""
 LAYOUTS = ("straight", "bend", "junction")
 """What a road may do."""
 CROSSING = "crossing"
-"""A layout that is never drawn, only wished for: a junction whose side road leaves on both sides."""
+"""A layout that is only wished for, never drawn: a junction whose side road leaves on both sides."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,9 @@ class Plan:
 def _side(style: str, lanes: int, lane: float, parking: bool, rng: np.random.Generator) -> Side:
     """Draw one side of the road."""
     edge = lanes * lane + (2.2 if parking else 0.35)
-    strip = rng.uniform(1.4, 2.6) if rng.random() < {"town": 0.25, "suburb": 0.5, "park": 0.7, YARD: 0.3}[style] else 0.0
+    strip = (
+        rng.uniform(1.4, 2.6) if rng.random() < {"town": 0.25, "suburb": 0.5, "park": 0.7, YARD: 0.3}[style] else 0.0
+    )
     walk = rng.uniform(*{"town": (2.6, 4.5), "suburb": (1.8, 2.6), "park": (1.6, 2.4), YARD: (1.2, 2.6)}[style])
     if style == "park" and rng.random() < 0.4:
         strip, walk = 0.0, 0.0
@@ -118,7 +120,9 @@ def _road(rng: np.random.Generator, length: float, layout: str, lanes: tuple, st
         start, curvature = rng.uniform(15, 40) + 0.5 * length, rng.choice([-1, 1]) / rng.uniform(75, 220)
         arc = rng.uniform(0.25, 0.9) / abs(curvature)
     junction = layout in ("junction", CROSSING)
-    leaves = (True, True) if rng.random() < 0.6 or layout == CROSSING else tuple(rng.permutation([True, False]).tolist())
+    leaves = (
+        (True, True) if rng.random() < 0.6 or layout == CROSSING else tuple(rng.permutation([True, False]).tolist())
+    )
     return Road(
         bend_start=float(start), bend_end=float(start + arc), curvature=float(curvature),
         lane=float(lane), lanes_left=lanes[0], lanes_right=lanes[1],

@@ -104,13 +104,13 @@ class Departure:
     acceleration: float
 
     def distance(self, t: float) -> float:
-        """Return the distance covered since t = 0, metres. Parameters: see `Pace.distance`."""
+        """Return the distance covered since t = 0, metres. Parameters are those of `Pace.distance`."""
         since = max(t - self.start, 0.0)
         rising = min(since, self.mean / self.acceleration)
         return 0.5 * self.acceleration * rising**2 + self.mean * (since - rising)
 
     def speed(self, t: float) -> float:
-        """Return the speed at one instant, m/s. Parameters: see `Pace.speed`."""
+        """Return the speed at one instant, m/s. Parameters are those of `Pace.speed`."""
         return min(self.acceleration * max(t - self.start, 0.0), self.mean)
 
 
