@@ -55,6 +55,8 @@ def measure_streets(
     began = datetime.now(UTC)
     if not grids or not set(grids) <= set(GRIDS):
         raise ArgumentError("grid", " or ".join(GRIDS), ", ".join(grids) or "none")
+    if not streets or not set(streets) <= set(TEST_STREETS):
+        raise ArgumentError("streets", " or ".join(TEST_STREETS), ", ".join(streets) or "none")
     if seed < 0:
         raise ArgumentError("seed", "a whole number from 0 up", seed)
     if min(drives, frames) < 1:

@@ -266,11 +266,12 @@ class SimulatedDrive:
         Returns
         -------
         Frame
-            Without image and labels.
+            Without image and labels; its pose is that of the nearest packet (`Rig.packet_interval`).
         """
-        t = index * PERIOD
+        t, half = index * PERIOD, self.rig.packet_interval / 2
         points = scan(self.instant(t), self.pose(t), self.rig.lidar, self.plan.road, self._noise(index, 1))
-        return Frame(None, points, self.rig.camera, self.pose(t), t)
+        nearest = t + float(self._noise(index, 2).uniform(-half, half)) if half else t
+        return Frame(None, points, self.rig.camera, self.pose(nearest), t)
 
     def _noise(self, *key: int) -> np.random.Generator:
         """Return the drive's own generator for a key, such as the number of a frame."""

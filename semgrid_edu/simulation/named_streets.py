@@ -11,7 +11,8 @@ from semgrid_edu.simulation.street import casts
 from semgrid_edu.simulation.street.plan import CROSSING, YARD, Wishes
 
 _NONE, _BOTH = (False, False), (True, True)
-_HDL64E = Rig(lidar=Lidar(azimuth_min=-180.0, azimuth_max=180.0, azimuth_step=0.18))
+KITTI_RIG = Rig(lidar=Lidar(azimuth_min=-180.0, azimuth_max=180.0, azimuth_step=0.18), packet_interval=0.01)
+"""An HDL-64E at 10 Hz, and poses from packets that come every 10 ms."""
 FRAMES = 36
 """Number of frames of a test street, 3.5 s."""
 
@@ -42,7 +43,7 @@ TEST_STREETS = tuple(_STREETS)
 """The names of the test streets."""
 
 
-def named_street(name: str, seed: int, frames: int = FRAMES, rig: Rig = _HDL64E) -> SimulatedDrive:
+def named_street(name: str, seed: int, frames: int = FRAMES, rig: Rig = KITTI_RIG) -> SimulatedDrive:
     """Return a drive through a test street.
 
     On the streets with a border the recording car drives at 12 to 14 m/s, 3 to 6 m to the left of it.
@@ -56,7 +57,7 @@ def named_street(name: str, seed: int, frames: int = FRAMES, rig: Rig = _HDL64E)
     frames : int
         Number of frames, ten a second.
     rig : Rig
-        The sensors on the recording car; an HDL-64E at 10 Hz when left out.
+        The sensors on the recording car.
 
     Returns
     -------

@@ -110,7 +110,7 @@ def mesh_and_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
 def _rows(builder: Builder, s0: float, s1: float, d: float) -> None:
     """Plant hedges across the road's direction, one behind the other, from `d` outwards."""
     rng = builder.rng
-    opacity, height, long = rng.uniform(3.0, 6.0), rng.uniform(1.3, 1.9), rng.uniform(2.5, 4.0)
+    opacity, height, long = rng.uniform(4.0, 8.0), rng.uniform(1.3, 1.9), rng.uniform(2.5, 4.0)
     for s in np.arange(s0, s1, rng.uniform(2.8, 4.0)):
         body = see_through.porous_hedge(round(long, 3), 0.7, height * rng.uniform(0.9, 1.1))
         piece = (s, d + np.sign(d) * 1.6, np.sign(d) * np.pi / 2, long)
