@@ -20,15 +20,16 @@ LEAST_CELLS = 60
 CARS_AFTER, OTHERS_AFTER = 0.8, 1.5
 """Time, seconds, after which a filter should have found a car that moves in view; and a pedestrian, or any speed."""
 _HEIGHTS = {"low": 0.7, "high": 1.6}
-_AHEAD = (2.0, 40.0)
+_AHEAD, _RIGHT = (2.0, 40.0), -2.0
 
 
 @dataclass(eq=False)
 class StreetScores:
     """Counts over the frames of a street's drives, for one filter.
 
-    What stands is scored from `SETTLED_AFTER` on, between 2 and 40 m ahead, in cells with two returns or more between
-    0.7 and 1.6 m above the flat ground. What moves is scored in the hit cells of the `KnownScene`, up to 50 m away.
+    What stands is scored from `SETTLED_AFTER` on, from 2 to 40 m ahead and from 2 m to the right, in cells with
+    two returns or more between 0.7 and 1.6 m above the flat ground. What moves is scored in the hit cells of the
+    `KnownScene`, up to 50 m away.
 
     Parameters
     ----------
@@ -92,9 +93,9 @@ class StreetScores:
 
     def _add_standing(self, scene: KnownScene, called: NDArray) -> None:
         """Count what stands, and what of it is a phantom."""
-        truth, x = scene.truth, self.spec.centers()[..., 0]
+        truth, (x, y) = scene.truth, np.moveaxis(self.spec.centers(), -1, 0)
         hit = hit_cells(scene.frame.points_grid, self.spec, least=2, **_HEIGHTS)
-        stands = hit & (truth.state == State.STATIC) & (x > _AHEAD[0]) & (x < _AHEAD[1])
+        stands = hit & (truth.state == State.STATIC) & (x > _AHEAD[0]) & (x < _AHEAD[1]) & (y < _RIGHT)
         scenery = stands & np.isin(truth.kind, list(SCENERY))
         self._count("scenery", scenery, called)
         self.frames.append((int(scenery.sum()), int((scenery & called).sum())))

@@ -22,7 +22,7 @@ from semgrid_edu.simulation.street.trajectories import Pace, Trajectory
 from semgrid_edu.simulation.things.materials import Kind
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
-ROW = GridSpec(2, 3, 0, 8, 1)
+ROW = GridSpec(2, 3, -11, -3, 1)
 """One row of eight cells ahead: road, two of a fence, a parked car, three of car 7, one of pedestrian 9."""
 STATES = [[FREE, STATIC, STATIC, STATIC, DYNAMIC, DYNAMIC, DYNAMIC, DYNAMIC]]
 KINDS = [[Kind.ROAD, Kind.FENCE, Kind.FENCE, Kind.CAR, Kind.CAR, Kind.CAR, Kind.CAR, Kind.PEDESTRIAN]]
@@ -40,7 +40,7 @@ MOVING = [actor(7, Kind.CAR, 20.0, Pace(10)), actor(9, Kind.PEDESTRIAN, 5.0, Pac
 
 def scene(time: float, frames_in_view: int = 20, height: float = 1.0) -> KnownScene:
     """Every cell is hit by two returns at one height."""
-    y, x = 7.5 - np.arange(8.0), np.full(8, 2.5)
+    y, x = -3.5 - np.arange(8.0), np.full(8, 2.5)
     points = np.column_stack([x, y, np.full(8, height - KITTI_LIDAR_HEIGHT), np.zeros(8)]).repeat(2, axis=0)
     velocity = np.zeros((2, 1, 8), np.float32)
     velocity[0, 0, 4:7] = 10.0
