@@ -2,6 +2,7 @@
 
 import os
 import sys
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
@@ -209,16 +210,8 @@ def evaluate(
 ) -> None:
     """Score a trained network and two simple baselines on the test frames."""
     from semgrid_edu.experiments.evaluate import evaluate, scores_table
-    from semgrid_edu.storage.files import check_writable
 
-    check_writable(out)
-    result = evaluate(data, weights)
-    _keep(result, scores_table(result["scores"]), out)
-
-
-@reproduce.callback()
-def experiments() -> None:
-    """Run the experiments of the lectures."""
+    _keep(out, lambda: evaluate(data, weights), lambda result: scores_table(result["scores"]))
 
 
 @reproduce.command()
@@ -230,11 +223,21 @@ def occupancy(
 ) -> None:
     """Score log-odds grid, BOF and CMCDOT on simulated drives (lecture 04)."""
     from semgrid_edu.experiments.occupancy import GRIDS, compare_filters, occupancy_tables
-    from semgrid_edu.storage.files import check_writable
 
-    check_writable(out)
-    result = compare_filters(seed, drives, (grid,) if grid else tuple(GRIDS))
-    _keep(result, occupancy_tables(result), out)
+    _keep(out, lambda: compare_filters(seed, drives, (grid,) if grid else tuple(GRIDS)), occupancy_tables)
+
+
+@reproduce.command()
+def streets(
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives and the particles.")] = 0,
+    drives: Annotated[int, typer.Option(min=1, help="Number of drives through each street.")] = 6,
+    grid: Annotated[str | None, typer.Option(help="paper or compact; both by default.")] = None,
+    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("streets.json"),
+) -> None:
+    """Score CMCDOT on streets with wire mesh, hedges, glass, walls that come into view, convoys (lecture 04)."""
+    from semgrid_edu.experiments.streets import GRIDS, measure_streets, streets_tables
+
+    _keep(out, lambda: measure_streets(seed, drives, (grid,) if grid else tuple(GRIDS)), streets_tables)
 
 
 @reproduce.command()
@@ -246,11 +249,8 @@ def two_stage(
 ) -> None:
     """Train end to end and in two stages, and score both kinds of networks (lecture 08)."""
     from semgrid_edu.experiments.two_stage import compare_training, two_stage_table
-    from semgrid_edu.storage.files import check_writable
 
-    check_writable(out)
-    result = compare_training(data, runs, seeds)
-    _keep(result, two_stage_table(result["scores"]), out)
+    _keep(out, lambda: compare_training(data, runs, seeds), lambda result: two_stage_table(result["scores"]))
 
 
 @reproduce.command()
@@ -260,19 +260,18 @@ def overfit(
 ) -> None:
     """Overfit four frames with each image network: learn them by heart (lecture 08)."""
     from semgrid_edu.experiments.overfit import overfit, overfit_table
-    from semgrid_edu.storage.files import check_writable
+
+    _keep(out, lambda: overfit(seed), lambda result: overfit_table(result["networks"]))
+
+
+def _keep(out: Path, compute: Callable[[], dict], table: Callable[[dict], str]) -> None:
+    """Compute an experiment's result, once it is known that the file can be written; write it, and print its table."""
+    from semgrid_edu.storage.files import check_writable, write_json
 
     check_writable(out)
-    result = overfit(seed)
-    _keep(result, overfit_table(result["networks"]), out)
-
-
-def _keep(result: dict[str, object], shown: str, out: Path) -> None:
-    """Write an experiment's result to a file, and print its table."""
-    from semgrid_edu.storage.files import write_json
-
+    result = compute()
     write_json(out, result)
-    typer.echo(f"{shown}\n\nwritten to {out}")
+    typer.echo(f"{table(result)}\n\nwritten to {out}")
 
 
 def _report(problems: list[str], sound: str) -> None:

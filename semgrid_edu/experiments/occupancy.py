@@ -158,19 +158,30 @@ def occupancy_table(result: dict, lidar: str = "HDL-64E", grid: str = "paper") -
     for k, state in enumerate(State):
         confusions = [one["confusion"][k] for one in scores]
         of = "never seen, called" if state == State.UNKNOWN else f"{state.name}, called"
-        rows.append([f"{of} {state.name}", *(_per_cent(share(row[k], sum(row))) for row in confusions)])
-    rows.append(["called DYNAMIC, is DYNAMIC", *(_per_cent(one["dynamic"]["precision"]) for one in scores)])
-    rows.append(["left, still occupied", *(_per_cent(one["smear"]["occupied"]) for one in scores)])
+        rows.append([f"{of} {state.name}", *(per_cent(share(row[k], sum(row))) for row in confusions)])
+    rows.append(["called DYNAMIC, is DYNAMIC", *(per_cent(one["dynamic"]["precision"]) for one in scores)])
+    rows.append(["left, still occupied", *(per_cent(one["smear"]["occupied"]) for one in scores)])
     for name in scores[0]["hit cells"]:
-        rows.append([f"{name}: DYNAMIC", *(_per_cent(one["hit cells"][name]["dynamic"]) for one in scores)])
-    rows.append(["free ground hit, held occupied", *(_per_cent(one["hit cells"][BANKS]["occupied"]) for one in scores)])
+        rows.append([f"{name}: DYNAMIC", *(per_cent(one["hit cells"][name]["dynamic"]) for one in scores)])
+    rows.append(["free ground hit, held occupied", *(per_cent(one["hit cells"][BANKS]["occupied"]) for one in scores)])
     rows.append(["**velocity error, m/s: median (RMS)**", "", "", ""])
     for name in scores[0]["velocity error"]:
         rows.append([name, *(_error(one["velocity error"][name]) for one in scores)])
-    return _markdown(rows)
+    return markdown_table(rows)
 
 
-def _per_cent(value: float | None) -> str:
+def per_cent(value: float | None) -> str:
+    """Write a share in per cent.
+
+    Parameters
+    ----------
+    value : float or None
+        A share, 0..1; None for a share of nothing.
+
+    Returns
+    -------
+    str
+    """
     return "-" if value is None else f"{100 * value:.1f}"
 
 
@@ -178,8 +189,18 @@ def _error(error: dict[str, float | None]) -> str:
     return "-" if error["median"] is None else f"{error['median']:.2f} ({error['rms']:.2f})"
 
 
-def _markdown(rows: list[list[str]]) -> str:
-    """Lay out rows, the header first, as a Markdown table whose columns also line up in plain text."""
+def markdown_table(rows: list[list[str]]) -> str:
+    """Lay out rows as a Markdown table whose columns also line up in plain text.
+
+    Parameters
+    ----------
+    rows : list of list of str
+        The cells of each row, the header first.
+
+    Returns
+    -------
+    str
+    """
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [
         "| "

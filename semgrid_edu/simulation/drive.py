@@ -10,8 +10,10 @@ from semgrid_edu.frame import LABEL_GRID, Frame
 from semgrid_edu.simulation.frame import SimulatedFrame
 from semgrid_edu.simulation.sensors.camera import Picture, take_picture
 from semgrid_edu.simulation.sensors.gps import Geodesy
+from semgrid_edu.simulation.sensors.instant import Instant
 from semgrid_edu.simulation.sensors.lidar import scan
-from semgrid_edu.simulation.sensors.raycast import Instant, RayMesh
+from semgrid_edu.simulation.sensors.porous import PorousMesh
+from semgrid_edu.simulation.sensors.raycast import RayMesh
 from semgrid_edu.simulation.sensors.rig import Rig
 from semgrid_edu.simulation.sensors.truth import BirdseyeTruth, birdseye_kinds, visible_cells, world_cells
 from semgrid_edu.simulation.street.actors import Actor
@@ -69,6 +71,7 @@ class SimulatedDrive:
         self.moving: list[Actor] = traffic.moving
         self.parked: list[Actor] = traffic.parked
         self.static = RayMesh.of(builder.shapes, builder.instances)
+        self.porous = PorousMesh.of(builder.porous, builder.opacities) if builder.porous else None
         self.static_footprints = footprint_table(builder.footprints)
         self.sensor_seed = rng.bit_generator.seed_seq.spawn(1)[0]
 
@@ -117,12 +120,12 @@ class SimulatedDrive:
         road, eye = self.plan.road, self.pose(t)[:2, 3]
         near = [a for a in self.moving if np.hypot(*(a.trajectory.pose(road, t)[0][:2] - eye)) < _VIEW]
         if not near:
-            return Instant(self.static, None, np.empty((0, 4)))
+            return Instant(self.static, None, np.empty((0, 4)), self.porous)
         shapes = [a.shape(road, t) for a in near]
         boxes = np.array([[shape.vertices.min(axis=0), shape.vertices.max(axis=0)] for shape in shapes], np.float64)
         radii = np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) / 2
         spheres = np.column_stack([boxes.mean(axis=1), radii])
-        return Instant(self.static, RayMesh.of(shapes, [a.instance for a in near]), spheres)
+        return Instant(self.static, RayMesh.of(shapes, [a.instance for a in near]), spheres, self.porous)
 
     def T_grid_from_world(self, t: float) -> NDArray[np.float64]:
         """Return the transform from the world to the grid frame of one instant.
@@ -263,11 +266,12 @@ class SimulatedDrive:
         Returns
         -------
         Frame
-            Without image and labels.
+            Without image and labels; its pose is that of the nearest packet (`Rig.packet_interval`).
         """
-        t = index * PERIOD
+        t, half = index * PERIOD, self.rig.packet_interval / 2
         points = scan(self.instant(t), self.pose(t), self.rig.lidar, self.plan.road, self._noise(index, 1))
-        return Frame(None, points, self.rig.camera, self.pose(t), t)
+        nearest = t + float(self._noise(index, 2).uniform(-half, half)) if half else t
+        return Frame(None, points, self.rig.camera, self.pose(nearest), t)
 
     def _noise(self, *key: int) -> np.random.Generator:
         """Return the drive's own generator for a key, such as the number of a frame."""

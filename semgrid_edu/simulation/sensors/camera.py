@@ -8,7 +8,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import transform_points
-from semgrid_edu.simulation.sensors.raycast import Hits, Instant, turned
+from semgrid_edu.simulation.sensors.instant import Instant
+from semgrid_edu.simulation.sensors.raycast import Hits, turned
 from semgrid_edu.simulation.sensors.rig import Rig
 from semgrid_edu.simulation.sensors.shading import shade
 from semgrid_edu.simulation.street.layout import Road
@@ -207,7 +208,7 @@ def take_picture(
     rotation = T_world_from_lidar[:3, :3].astype(np.float32)
     eye = transform_points(T_world_from_lidar @ rig.T_lidar_from_camera, np.zeros(3))
     rays = _rays(rig)
-    hits = instant.cast(eye, turned(rays, rotation))
+    hits = instant.cast(eye, turned(rays, rotation), rng)
     sunlit, open_sky = _sun_and_sky(hits, instant, light, shape, rng)
     pixel = 1.0 / rig.camera.K[0, 0]
     radiance, kind = shade(hits, instant, road, light, sunlit, open_sky, pixel)
@@ -215,7 +216,7 @@ def take_picture(
     triangles, distance = hits.triangle.reshape(shape), hits.distance.reshape(shape)
     edges = np.flatnonzero(_discontinuities(triangles, distance, instant.kind, instant.material))
     for du, dv in _SUBPIXELS:
-        beside = instant.cast(eye, turned(_rays(rig, du, dv)[edges], rotation))
+        beside = instant.cast(eye, turned(_rays(rig, du, dv)[edges], rotation), rng)
         radiance[edges] += shade(beside, instant, road, light, sunlit[edges], open_sky[edges], pixel)[0]
     radiance[edges] /= 1 + len(_SUBPIXELS)
 

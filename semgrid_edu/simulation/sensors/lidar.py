@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.simulation.sensors.raycast import MISS, Hits, Instant, turned
+from semgrid_edu.simulation.sensors.instant import Instant
+from semgrid_edu.simulation.sensors.raycast import MISS, Hits, turned
 from semgrid_edu.simulation.sensors.rig import Lidar
 from semgrid_edu.simulation.street.ground import ground_kinds
 from semgrid_edu.simulation.street.layout import Road
@@ -38,7 +39,7 @@ def scan(
     """
     rays = lidar.directions
     rotation = T_world_from_lidar[:3, :3].astype(np.float32)
-    hits = instant.cast(T_world_from_lidar[:3, 3], turned(rays, rotation))
+    hits = instant.cast(T_world_from_lidar[:3, 3], turned(rays, rotation), rng)
     luck, range_noise = rng.random(len(rays), dtype=np.float32), rng.standard_normal(len(rays), dtype=np.float32)
     glow = rng.standard_normal(len(rays), dtype=np.float32)
     near = np.flatnonzero(hits.distance < min(lidar.range_max, MISS))

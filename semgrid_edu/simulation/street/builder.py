@@ -33,6 +33,10 @@ class Builder:
         All that stands in the world so far, in its frame.
     instances : list of int
         For each shape the number of its object; 0 for scenery.
+    porous : list of Shape
+        What lets a part of the light through, in the frame of the world.
+    opacities : list of float
+        For each shape of `porous` its opacity, as `PorousMesh` takes it.
     footprints : list of Footprint
         The ground that is taken.
     next_instance : int
@@ -43,6 +47,8 @@ class Builder:
     rng: np.random.Generator
     shapes: list[Shape] = field(default_factory=list, init=False)
     instances: list[int] = field(default_factory=list, init=False)
+    porous: list[Shape] = field(default_factory=list, init=False)
+    opacities: list[float] = field(default_factory=list, init=False)
     footprints: list[Footprint] = field(default_factory=list, init=False)
     next_instance: int = field(default=1, init=False)
 
@@ -151,6 +157,24 @@ class Builder:
         self.shapes.append(shape.placed(position, angle, scale))
         self.instances.append(0)
         self.footprints.extend(footprints)
+
+    def add_porous(self, shape: Shape, opacity: float, s: float, d: float, yaw: float) -> None:
+        """Put something into the world that lets a part of the light through.
+
+        Parameters
+        ----------
+        shape : Shape
+            What it looks like, in its own frame, of one of `SEE_THROUGH`.
+        opacity : float
+            As `PorousMesh` takes it.
+        s, d : float
+            Where its origin goes: distance along the road and to the left of its centre line, metres.
+        yaw : float
+            Its direction, rad from that of the road.
+        """
+        position, angle = self.place(s, d, yaw)
+        self.porous.append(shape.placed(position, angle))
+        self.opacities.append(opacity)
 
     def try_post(self, shape: Shape, s: float, d: float, yaw: float, kind: Kind, radius: float, scale=1.0) -> bool:
         """Put something on a round foot, unless the place is asphalt or taken.

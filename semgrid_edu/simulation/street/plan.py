@@ -14,8 +14,12 @@ BORDERS = (*FENCES, "hedge", "none")
 """What may run along the gardens of a suburb."""
 STYLES = ("town", "suburb", "park")
 """What lines a side of the road: facades at the sidewalk; houses in gardens; grass banks and trees."""
+YARD = "yard"
+"""A style that is only wished for, never drawn: a border of `YARD_BORDERS`, and open ground behind it."""
 LAYOUTS = ("straight", "bend", "junction")
 """What a road may do."""
+CROSSING = "crossing"
+"""A layout that is only wished for, never drawn: a junction whose side road leaves on both sides."""
 
 
 @dataclass(frozen=True)
@@ -25,11 +29,11 @@ class Wishes:
     Parameters
     ----------
     layout : str or None
-        One of `LAYOUTS`.
+        One of `LAYOUTS`, or `CROSSING`.
     lanes : (int, int) or None
         Lanes of the oncoming traffic and of ours.
     styles, borders : (str, str) or None
-        Left and right, of `STYLES` and `BORDERS`.
+        Left and right, of `STYLES` and `BORDERS`; or `YARD` with one of `YARD_BORDERS`.
     parking : (bool, bool) or None
         Parking bays left and right.
     light : Light or None
@@ -71,9 +75,10 @@ class Plan:
     extent : Extent
         How far the world reaches along the street.
     styles : (str, str)
-        Left and right side, members of `STYLES`.
+        Left and right side, members of `STYLES`, or `YARD`.
     borders : (str, str)
-        What runs along the gardens of a suburb, left and right: a fence of `furniture.FENCES`, "hedge" or "none".
+        What runs along the gardens of a suburb, left and right: a fence of `furniture.FENCES`, "hedge" or "none"; along
+        a yard one of `YARD_BORDERS`.
     parking : (bool, bool)
         Whether there are parking bays left and right.
     light : Light
@@ -97,8 +102,10 @@ class Plan:
 def _side(style: str, lanes: int, lane: float, parking: bool, rng: np.random.Generator) -> Side:
     """Draw one side of the road."""
     edge = lanes * lane + (2.2 if parking else 0.35)
-    strip = rng.uniform(1.4, 2.6) if rng.random() < {"town": 0.25, "suburb": 0.5, "park": 0.7}[style] else 0.0
-    walk = rng.uniform(*{"town": (2.6, 4.5), "suburb": (1.8, 2.6), "park": (1.6, 2.4)}[style])
+    strip = (
+        rng.uniform(1.4, 2.6) if rng.random() < {"town": 0.25, "suburb": 0.5, "park": 0.7, YARD: 0.3}[style] else 0.0
+    )
+    walk = rng.uniform(*{"town": (2.6, 4.5), "suburb": (1.8, 2.6), "park": (1.6, 2.4), YARD: (1.2, 2.6)}[style])
     if style == "park" and rng.random() < 0.4:
         strip, walk = 0.0, 0.0
     rise = rng.uniform(0.35, 1.3) if style == "park" else rng.uniform(0.0, 0.25) if style == "suburb" else 0.0
@@ -112,8 +119,10 @@ def _road(rng: np.random.Generator, length: float, layout: str, lanes: tuple, st
     if layout == "bend":
         start, curvature = rng.uniform(15, 40) + 0.5 * length, rng.choice([-1, 1]) / rng.uniform(75, 220)
         arc = rng.uniform(0.25, 0.9) / abs(curvature)
-    junction = layout == "junction"
-    leaves = (True, True) if rng.random() < 0.6 else tuple(rng.permutation([True, False]).tolist())
+    junction = layout in ("junction", CROSSING)
+    leaves = (
+        (True, True) if rng.random() < 0.6 or layout == CROSSING else tuple(rng.permutation([True, False]).tolist())
+    )
     return Road(
         bend_start=float(start), bend_end=float(start + arc), curvature=float(curvature),
         lane=float(lane), lanes_left=lanes[0], lanes_right=lanes[1],

@@ -16,7 +16,7 @@ def fill_street(traffic: Traffic) -> None:
     traffic : Traffic
         Takes them; it knows the street and the plan.
     """
-    _park_cars(traffic)
+    park_cars(traffic)
     _park_bicycles(traffic)
     _lanes(traffic)
     if traffic.road.side_half:
@@ -25,8 +25,14 @@ def fill_street(traffic: Traffic) -> None:
     _pedestrians(traffic)
 
 
-def _park_cars(traffic: Traffic) -> None:
-    """Fill the parking bays."""
+def park_cars(traffic: Traffic) -> None:
+    """Fill the parking bays.
+
+    Parameters
+    ----------
+    traffic : Traffic
+        Takes the cars; its plan says on which sides there are bays.
+    """
     road, rng, extent = traffic.road, traffic.rng, traffic.plan.extent
     for sign, side, bays in ((1, road.left, traffic.plan.parking[0]), (-1, road.right, traffic.plan.parking[1])):
         if not bays:

@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from semgrid_edu.simulation.street.borders import YARD_BORDERS, stand_pillars
 from semgrid_edu.simulation.street.builder import Builder
 from semgrid_edu.simulation.street.footprints import ROUND, outline
 from semgrid_edu.simulation.street.layout import to_road
-from semgrid_edu.simulation.street.plan import Plan
+from semgrid_edu.simulation.street.plan import YARD, Plan
 from semgrid_edu.simulation.street.roadside import side_of, stand_lamps, stand_signals, stand_signs
 from semgrid_edu.simulation.street.terrain import ground_mesh
 from semgrid_edu.simulation.things import furniture, plants
@@ -41,6 +42,8 @@ def build_scenery(plan: Plan, rng: np.random.Generator) -> Builder:
         _street_trees(builder, plan, sign)
         if style == "park":
             _park(builder, plan, sign)
+        elif style == YARD:
+            _yard(builder, plan, sign)
         else:
             _house_row(builder, plan, sign, style)
         stand_signs(builder, plan, sign)
@@ -197,6 +200,18 @@ def _park(builder: Builder, plan: Plan, sign: int) -> None:
         if rng.random() < 0.5:
             house = _random_house("town", rng)
             _house(builder, house, s + rng.uniform(0, 30), sign * (line + rng.uniform(30, 40)), _facing(sign))
+
+
+def _yard(builder: Builder, plan: Plan, sign: int) -> None:
+    """Run a border along one side, and scatter bushes and trees behind it."""
+    rng, side = builder.rng, side_of(builder, sign)
+    line = side.edge + side.strip + side.walk + 0.35
+    border = YARD_BORDERS[plan.borders[0 if sign > 0 else 1]]
+    border(builder, plan.extent.start, plan.extent.end - 60, sign * line)
+    stand_pillars(builder, plan.extent.start, plan.extent.end - 60, sign * (line - rng.uniform(0.4, 0.8)))
+    for s in np.arange(plan.extent.start, plan.extent.end, 6.0):
+        _bush(builder, plan, s + rng.uniform(0, 6), sign * (line + rng.uniform(3, 15)))
+        _tree(builder, plan, s + rng.uniform(0, 6), sign * (line + rng.uniform(6, 30)))
 
 
 def _street_trees(builder: Builder, plan: Plan, sign: int) -> None:

@@ -86,6 +86,35 @@ STAND = Pace(0.0)
 
 
 @dataclass(frozen=True)
+class Departure:
+    """A pace that stands, sets off at a steady acceleration, and then keeps its speed.
+
+    Parameters
+    ----------
+    mean : float
+        The speed that it reaches, m/s.
+    start : float
+        When it sets off, seconds.
+    acceleration : float
+        How fast it speeds up, m/s^2.
+    """
+
+    mean: float
+    start: float
+    acceleration: float
+
+    def distance(self, t: float) -> float:
+        """Return the distance covered since t = 0, metres. Parameters are those of `Pace.distance`."""
+        since = max(t - self.start, 0.0)
+        rising = min(since, self.mean / self.acceleration)
+        return 0.5 * self.acceleration * rising**2 + self.mean * (since - rising)
+
+    def speed(self, t: float) -> float:
+        """Return the speed at one instant, m/s. Parameters are those of `Pace.speed`."""
+        return min(self.acceleration * max(t - self.start, 0.0), self.mean)
+
+
+@dataclass(frozen=True)
 class Trajectory:
     """A straight line in the coordinates of the road, followed at a pace.
 
@@ -95,7 +124,7 @@ class Trajectory:
         Where it begins at t = 0: distance along the road and to the left of its centre line, metres.
     along, across : float
         Direction in (s, d): (1, 0) with our traffic, (-1, 0) against it, (0, 1) across the road to the left.
-    pace : Pace
+    pace : Pace or Departure
         How fast the line is followed.
     turn : float
         Angle between this direction and the one that the thing points in, rad, for things that stand.
@@ -105,7 +134,7 @@ class Trajectory:
     d: float
     along: float
     across: float
-    pace: Pace
+    pace: Pace | Departure
     turn: float = 0.0
 
     def at(self, t: float) -> tuple[float, float]:

@@ -44,10 +44,17 @@ class Material(IntEnum):
     RUBBER = 12
     LAMP = 13
     RETRO = 14
+    WIRE = 15
+    PANE = 16
+    TWIGS = 17
+
+
+SEE_THROUGH = (Material.WIRE, Material.PANE, Material.TWIGS)
+"""Materials that stop only a part of the rays, by chance."""
 
 
 REFLECTANCE = np.array(
-    [0.35, 0.25, 0.45, 0.35, 0.3, 0.4, 0.08, 0.3, 0.4, 0.25, 0.4, 0.3, 0.06, 0.7, 1.0], dtype=np.float32
+    [0.35, 0.25, 0.45, 0.35, 0.3, 0.4, 0.08, 0.3, 0.4, 0.25, 0.4, 0.3, 0.06, 0.7, 1.0, 0.4, 0.01, 0.4], dtype=np.float32
 )
 """Share of 905 nm light that each `Material` sends back (1: retroreflective plates and signs)."""
 

@@ -1,0 +1,152 @@
+"""The named test streets: each has what its name says, where real streets have it."""
+
+import numpy as np
+import pytest
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.experiments.mover_times import convoy_pairs
+from semgrid_edu.frame import LABEL_GRID
+from semgrid_edu.simulation.drive import PERIOD
+from semgrid_edu.simulation.named_streets import TEST_STREETS, named_street
+from semgrid_edu.simulation.sensors.rig import Rig
+from semgrid_edu.simulation.street.plan import ANY, YARD, draw_plan
+from semgrid_edu.simulation.street.trajectories import Departure
+from semgrid_edu.simulation.things.materials import Kind, Material
+
+FENCED = ("mesh", "mesh and hedge", "hedge", "glass", "posts", "walls")
+SEEDS = (0, 1, 2)
+
+
+def materials(drive) -> set:
+    return set(drive.instant(0.0).material)
+
+
+def standing(drive, kind: Kind) -> np.ndarray:
+    """The places along and to the right of the lane of all that stands right of it and is of a kind."""
+    row = drive.static_footprints
+    x, y = row[:, 0], row[:, 1]
+    return np.column_stack([x, drive.ego.trajectory.d - y])[(row[:, 6] == kind) & (y < drive.ego.trajectory.d)]
+
+
+@pytest.mark.parametrize("name", FENCED)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_car_passes_a_border_at_12_to_14_metres_a_second(name, seed):
+    drive = named_street(name, seed, 2)
+    assert 12 <= drive.ego.trajectory.pace.mean <= 14
+    side = drive.plan.road.right
+    assert 3 < side.edge + side.strip + side.walk + 0.35 + drive.ego.trajectory.d < 8
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("mesh", {Material.WIRE}),
+        ("mesh and hedge", {Material.WIRE, Material.TWIGS}),
+        ("hedge", {Material.TWIGS}),
+        ("glass", {Material.PANE}),
+        ("posts", set()),
+        ("walls", set()),
+        ("convoy", set()),
+    ],
+)
+def test_what_can_be_seen_through_is_where_the_name_says_so(name, expected):
+    drive = named_street(name, 0, 2)
+    assert materials(drive) & {Material.WIRE, Material.TWIGS, Material.PANE} == expected
+
+
+def test_posts_stand_in_a_regular_row():
+    places = standing(named_street("posts", 0, 2), Kind.POLE)
+    offsets, counts = np.unique(places[:, 1].round(2), return_counts=True)
+    row = np.sort(places[np.isclose(places[:, 1], offsets[counts.argmax()], atol=0.01), 0])
+    steps = np.diff(row)
+    assert len(row) > 40
+    assert np.mean(np.abs(steps - np.median(steps)) < 0.01) > 0.8
+    assert 1.4 <= np.median(steps) <= 2.6
+
+
+def test_walls_stand_across_behind_gaps():
+    drive = named_street("walls", 0, 2)
+    walls = drive.static_footprints[drive.static_footprints[:, 6] == Kind.BUILDING]
+    across = walls[(np.abs(np.cos(walls[:, 4])) < np.sin(0.6)) & (walls[:, 3] < 0.2)]
+    assert len(across) > 5
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_cars_of_a_convoy_follow_at_8_to_20_metres(seed):
+    drive = named_street("convoy", seed)
+    actors = {actor.instance: actor for actor in drive.moving}
+    pairs = convoy_pairs(drive.moving)
+    assert pairs
+    for t in (0.0, 3.0):
+        for ahead, follower in pairs:
+            a, b = actors[ahead], actors[follower]
+            gap = np.linalg.norm(a.middle(drive.plan.road, t) - b.middle(drive.plan.road, t))
+            assert 8 <= gap - (a.size[0] + b.size[0]) / 2 + 0.5 <= 21
+
+
+def test_pedestrians_walk_along_and_across():
+    ways = {(a.trajectory.along, abs(a.trajectory.across)) for a in named_street("pedestrians", 0).moving}
+    assert {(1, 0), (-1, 0), (0, 1)} <= ways
+
+
+def test_slow_starters_stand_for_a_second_and_then_move():
+    drive = named_street("slow starters", 0)
+    kinds = {actor.kind for actor in drive.moving}
+    assert kinds == {Kind.CAR, Kind.PEDESTRIAN}
+    assert all(np.hypot(*velocity) < 1e-9 for velocity in drive.velocities(0.99).values())
+    assert all(np.hypot(*velocity) > 0.9 for velocity in drive.velocities(3.4).values())
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_cars_cross_in_both_directions_and_hit_nothing(seed):
+    drive = named_street("crossing cars", seed)
+    assert {actor.trajectory.across for actor in drive.moving} == {-1, 1}
+
+
+def test_the_seed_and_the_name_decide():
+    rig = Rig()
+    one, again, other, elsewhere = (
+        named_street(name, seed, 2, rig).scan(1).points
+        for name, seed in (("mesh", 0), ("mesh", 0), ("mesh", 1), ("glass", 0))
+    )
+    assert np.array_equal(one, again)
+    assert one.shape != other.shape or not np.array_equal(one, other)
+    assert one.shape != elsewhere.shape or not np.array_equal(one, elsewhere)
+
+
+def test_poses_come_from_packets_up_to_5_ms_away():
+    drive = named_street("mesh", 0, 8)
+    errors = [np.linalg.norm(drive.scan(k).T_world_from_lidar[:2, 3] - drive.pose(k * PERIOD)[:2, 3]) for k in range(8)]
+    assert 0 < max(errors) <= 0.005 * 14 * 1.15
+    assert len(set(errors)) == 8
+
+
+def test_returns_of_a_border_lie_on_what_stands():
+    """Beams that pass the mesh and the hedge change ranges, not the truth: what returns, stands there."""
+    drive = named_street("mesh and hedge", 0, 12)
+    points = drive.scan(11).points_grid
+    kinds = drive.birdseye(1.1)[0]
+    right = (points[:, 1] < -3) & (points[:, 0] > 2) & (points[:, 0] < 40) & (points[:, 2] > 0.7) & (points[:, 2] < 1.6)
+    rows, cols, inside = LABEL_GRID.cells(points[right])
+    ground = np.isin(kinds[rows[inside], cols[inside]], [Kind.ROAD, Kind.LANE, Kind.SIDEWALK, Kind.GRASS])
+    assert len(ground) > 1000
+    assert ground.mean() < 0.1
+
+
+def test_a_departure_covers_the_integral_of_its_speed():
+    pace, times = Departure(5.0, 1.0, 2.0), np.linspace(0, 6, 60_001)
+    covered = np.concatenate([[0], np.cumsum(np.diff(times) * [pace.speed(t) for t in (times[1:] + times[:-1]) / 2])])
+    assert [pace.distance(t) for t in times] == pytest.approx(covered, abs=1e-6)
+
+
+def test_a_yard_is_never_drawn():
+    assert not any(YARD in draw_plan(np.random.default_rng(seed), 30.0, ANY).styles for seed in range(200))
+
+
+def test_an_unknown_street_is_refused():
+    with pytest.raises(ArgumentError, match=r"mesh and hedge.*found alley"):
+        named_street("alley", 0)
+
+
+def test_every_street_has_a_name_of_its_own():
+    assert len(set(TEST_STREETS)) == len(TEST_STREETS) == 10
