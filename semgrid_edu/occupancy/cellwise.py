@@ -119,11 +119,9 @@ def meet(mixed, newborn, going, stays, arrives, doubtful):
     factor, doubt = np.empty((2, *newborn.shape), np.float32), np.empty_like(newborn)
     for r in range(newborn.shape[0]):
         for c in range(newborn.shape[1]):
-            static, claim = mixed[STATIC, r, c], min(arrives[r, c], CERTAIN)
-            unknown = mixed[UNKNOWN, r, c]
-            unseen = unknown + going[r, c] - stays[r, c]
+            static, unknown, claim = mixed[STATIC, r, c], mixed[UNKNOWN, r, c], min(arrives[r, c], CERTAIN)
             share = claim / arrives[r, c] if arrives[r, c] > 0 else 0.0
-            struck = share * doubtful[r, c] * unseen
+            struck = share * doubtful[r, c] * unknown
             consistent = 1 - claim * static - struck
             own, arrived = (1 - claim) / consistent, max(claim * (1 - static) - struck, 0.0) / consistent
             probability[FREE, r, c] = own * (mixed[FREE, r, c] + going[r, c] - stays[r, c])
@@ -133,7 +131,7 @@ def meet(mixed, newborn, going, stays, arrives, doubtful):
             born[r, c] = own * newborn[r, c]
             factor[0, r, c] = own
             factor[1, r, c] = share * (1 - static) / consistent
-            doubt[r, c] = share * unseen / consistent
+            doubt[r, c] = share * unknown / consistent
     return probability, born, factor, doubt
 
 
