@@ -16,7 +16,7 @@ from semgrid_edu.simulation.things.primitives import box, tube
 from semgrid_edu.simulation.things.shapes import Shape
 
 _THIN_HALF = 0.08
-_PLASTER, _STONE, _PLANK = (0.62, 0.6, 0.56), (0.36, 0.34, 0.31), (0.26, 0.16, 0.09)
+_PLASTER, _PLANK = (0.62, 0.6, 0.56), (0.26, 0.16, 0.09)
 Piece = tuple[float, float, float, float]
 """Where a piece of a border begins (s, d), its direction in the frame of the road, rad, and its length, metres."""
 
