@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
-from semgrid_edu.occupancy.bof_steps import whole_cells
+from semgrid_edu.occupancy.bof_steps import cells_ago, whole_cells
 from semgrid_edu.occupancy.cellwise import CERTAIN, ratio
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.particles_literal import slow_down_literal
@@ -43,9 +43,10 @@ def bof_predict_literal(state: BofState, spec: GridSpec, params: BofParams, dt: 
                 if 0 <= to[0] < spec.shape[0] and 0 <= to[1] < spec.shape[1]:
                     arrives[k, *to] += moving * kept[k]
     stays += params.lattice.prior[:, None, None] * newborn
+    standing = standing_at_origins(own[STATIC], spec, state.velocity, params.world.clearing_time)
     occupied = np.zeros(state.occupied.shape)
     for row, col in np.ndindex(spec.shape):
-        here = meet_in_cell(own[:, row, col], stays[:, row, col], arrives[:, row, col])
+        here = meet_in_cell(own[:, row, col], stays[:, row, col], arrives[:, row, col], standing[:, row, col])
         own[:, row, col], occupied[:, row, col] = here
     return BofState(own[FREE], own[UNKNOWN], occupied, state.velocity, remainder)
 
@@ -77,7 +78,35 @@ def accelerate(state: BofState, params: BofParams, dt: float) -> NDArray[np.floa
     return changed
 
 
-def meet_in_cell(own: NDArray, stays: NDArray, arrives: NDArray) -> tuple[NDArray, NDArray]:
+def standing_at_origins(static: NDArray, spec: GridSpec, velocity: NDArray, time: float) -> NDArray[np.float64]:
+    """Return, for each velocity and cell, P(STATIC) where mass of that velocity was some time ago.
+
+    Parameters
+    ----------
+    static : (H, W) float
+        P(STATIC) of each cell.
+    spec : GridSpec
+        The cells.
+    velocity : (V, 2) float
+        The velocities, m/s.
+    time : float
+        How long ago, seconds.
+
+    Returns
+    -------
+    (V, H, W) float64
+        Zero where the origin is the same cell or lies outside.
+    """
+    standing = np.zeros((len(velocity), *spec.shape))
+    for k, (up, left) in enumerate(cells_ago(velocity, spec, time)):
+        for row, col in np.ndindex(spec.shape):
+            was = row + up, col + left
+            if was != (row, col) and 0 <= was[0] < spec.shape[0] and 0 <= was[1] < spec.shape[1]:
+                standing[k, row, col] = static[was]
+    return standing
+
+
+def meet_in_cell(own: NDArray, stays: NDArray, arrives: NDArray, standing: NDArray) -> tuple[NDArray, NDArray]:
     """Let the mass that arrives in one cell meet what the cell holds, by the rule of `predict`.
 
     Parameters
@@ -86,6 +115,8 @@ def meet_in_cell(own: NDArray, stays: NDArray, arrives: NDArray) -> tuple[NDArra
         P(FREE), P(STATIC) and P(UNKNOWN) of the cell; its dynamic mass is in `stays`.
     stays, arrives : (V,) float
         Moving mass of each velocity that is in the cell already, and that comes into it.
+    standing : (V,) float
+        P(STATIC) where the mass of each velocity was `clearing_time` ago.
 
     Returns
     -------
@@ -94,11 +125,8 @@ def meet_in_cell(own: NDArray, stays: NDArray, arrives: NDArray) -> tuple[NDArra
     occupied : (V,) float
         P(occupied, velocity) of the cell now; the first velocity is zero, and its entry is P(STATIC).
     """
-    arrival = arrives.sum()
-    factor, arrived = strike_out(own[STATIC], arrival)
-    own, occupied = own * factor, stays * factor
-    if arrival > 0:
-        occupied += arrives / arrival * arrived
+    factor, sure, less = strike_out(own[STATIC], arrives.sum(), own[UNKNOWN], (standing * arrives).sum())
+    own, occupied = own * factor, stays * factor + arrives * (sure - standing * less)
     occupied[0] = own[STATIC]
     return own, occupied
 
@@ -110,7 +138,8 @@ def bof_update_literal(state: BofState, spec: GridSpec, evidence: Evidence, para
 
     All velocities share P(z | occupied), so a scan picks cells, and says nothing of velocities. First the UNKNOWN mass
     of cells that are seen is shared out, as in `update`; what becomes DYNAMIC takes the lattice's prior velocities.
-    This is the literal twin of `bof_update`. Parameters, result and errors are those of `bof_update`.
+    In hidden cells, what moves says that nothing stands where it was. This is the literal twin of `bof_update`.
+    Parameters, result and errors are those of `bof_update`.
     """
     check_shape("state", state.occupied, (len(params.lattice), *spec.shape))
     check_shape("evidence", evidence.free, spec.shape)
@@ -123,7 +152,39 @@ def bof_update_literal(state: BofState, spec: GridSpec, evidence: Evidence, para
     p_z = of_free * (free + unknown) + of_occupied * occupied.sum(axis=0)
     free, unknown = ratio(of_free * free, p_z), ratio(of_free * unknown, p_z)
     unknown += p_z == 0  # nothing that was held possible explains the scan
-    return BofState(free, unknown, ratio(of_occupied * occupied, p_z), state.velocity, state.remainder)
+    occupied = ratio(of_occupied * occupied, p_z)
+    left = mass_that_left(occupied, spec, state.velocity, params.world.clearing_time)
+    static = clear_wakes_literal(occupied[0], left, evidence.occupied == evidence.free)
+    free, occupied[0] = free + occupied[0] - static, static
+    return BofState(free, unknown, occupied, state.velocity, state.remainder)
+
+
+def mass_that_left(occupied: NDArray, spec: GridSpec, velocity: NDArray, time: float) -> NDArray[np.float64]:
+    """Add up in each cell the moving mass that was there some time ago and isn't any more.
+
+    Parameters
+    ----------
+    occupied : (V, H, W) float
+        P(occupied, velocity).
+    spec : GridSpec
+        The cells.
+    velocity : (V, 2) float
+        The velocities, m/s.
+    time : float
+        How long ago, seconds.
+
+    Returns
+    -------
+    (H, W) float64
+        The sums.
+    """
+    left = np.zeros(spec.shape)
+    for mass, (up, to_left) in zip(occupied, cells_ago(velocity, spec, time), strict=True):
+        for row, col in np.ndindex(spec.shape):
+            was = row + up, col + to_left
+            if was != (row, col) and 0 <= was[0] < spec.shape[0] and 0 <= was[1] < spec.shape[1]:
+                left[was] += mass[row, col]
+    return left
 
 
 def relative_likelihoods(evidence: Evidence) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -143,25 +204,59 @@ def relative_likelihoods(evidence: Evidence) -> tuple[NDArray[np.float64], NDArr
     return ratio(evidence.occupied, best), ratio(evidence.free, best)
 
 
-def strike_out(static: NDArray, arrival: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Combine "something arrives" with what a cell holds, and strike out the one combination that is impossible.
+def strike_out(
+    static: NDArray, arrival: NDArray, unknown: NDArray, doubtful: NDArray
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Combine "something arrives" with what a cell holds, and strike out the combinations that are impossible.
 
     With probability a something arrives, and with probability s the cell is STATIC. Both at once, a s, is impossible,
-    because two solid things can't share a cell. The rest, 1 - a s, is scaled to 1.
+    because two solid things can't share a cell. With probability b something arrives that comes out of something that
+    stands, and with probability u the cell is UNKNOWN: b u is struck out too, because walls go on. The rest,
+    1 - a s - b u, is scaled to 1.
 
     Parameters
     ----------
-    static : (...) float
-        P(STATIC) of the cell, s.
+    static, unknown : (...) float
+        P(STATIC) and P(UNKNOWN) of the cell, s and u.
     arrival : (...) float
         Dynamic mass that arrives in it; a is at most `CERTAIN`, so that no arrival is ever beyond doubt.
+    doubtful : (...) float
+        The part of it that comes out of something that stands; b is scaled as a is.
 
     Returns
     -------
     own : (...) float
-        Factor of everything that the cell held, (1 - a) / (1 - a s).
-    arrived : (...) float
-        P(DYNAMIC) that has arrived, a (1 - s) / (1 - a s).
+        Factor of everything that the cell held, (1 - a) / (1 - a s - b u).
+    sure : (...) float
+        Factor of arriving mass that comes out of nothing that stands, (a / arrival) (1 - s) / (1 - a s - b u).
+    less : (...) float
+        By how much the factor of doubtful mass is smaller, (a / arrival) u / (1 - a s - b u).
     """
     a = np.minimum(arrival, CERTAIN)
-    return (1 - a) / (1 - a * static), a * (1 - static) / (1 - a * static)
+    share = ratio(a, arrival)
+    consistent = 1 - a * static - share * doubtful * unknown
+    return (1 - a) / consistent, share * (1 - static) / consistent, share * unknown / consistent
+
+
+def clear_wakes_literal(static: NDArray, left: NDArray, hidden: NDArray) -> NDArray[np.float64]:
+    """Return how much of P(STATIC) remains where moving things have been: the literal twin of `clear_wakes`.
+
+    Of "a thing has gone from here", with probability a, and "it stands here", with probability s, both at once is
+    impossible. Struck out, that leaves (1 - a) s / (1 - a s).
+
+    Parameters
+    ----------
+    static : (H, W) float
+        P(STATIC) given the scan, s.
+    left : (H, W) float
+        Dynamic mass that has left each cell; a is at most `CERTAIN`.
+    hidden : (H, W) bool
+        Whether the scan says nothing of the cell; nothing changes where it does.
+
+    Returns
+    -------
+    (H, W) float64
+        P(STATIC) now; FREE gets what is missing.
+    """
+    a = np.where(hidden, np.minimum(left, CERTAIN), 0)
+    return (1 - a) * static / (1 - a * static)

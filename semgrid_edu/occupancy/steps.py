@@ -119,9 +119,7 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
     particles = fly(particles, world.max_acceleration, dt, rng)
     cells = cells_of(particles.position, spec)
     came = by_origin(before, cells, going.size)
-    doubt = scale_in_cells(
-        particles.weight, left_cells(particles, cells, spec, world.clearing_time), mixed[STATIC]
-    )
+    doubt = scale_in_cells(particles.weight, left_cells(particles, cells, spec, world.clearing_time), mixed[STATIC])
     stays, arrives = weight_in_cells(particles.weight, came, (2, *spec.shape))
     doubtful = weight_in_cells(doubt, came, (2, *spec.shape))[1]
     probability, newborn, factor, less = meet(mixed, newborn, going, stays, arrives, doubtful)
