@@ -104,7 +104,7 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -
         total += occupied[k]
 
     mixed, newborn = mix(state.probability, np.zeros(spec.shape, np.float32), going, M)
-    reach = cells_in(state.velocity, spec, params.world.clearing_time)
+    reach = flown_cells(state.velocity, spec, params.world.clearing_time)
     came = [k for k in range(1, len(occupied)) if cells[k].any()]
     doubtful = np.zeros(spec.shape, np.float32)
     for k in came:
@@ -165,7 +165,7 @@ def whole_cells(state: BofState, spec: GridSpec, dt: float) -> tuple[NDArray[np.
     return np.clip(cells, -farthest, farthest).astype(np.int64), remainder
 
 
-def cells_in(velocity: NDArray, spec: GridSpec, time: float) -> NDArray[np.int64]:
+def flown_cells(velocity: NDArray, spec: GridSpec, time: float) -> NDArray[np.int64]:
     """Return by how many whole cells mass of each velocity moves in some time.
 
     Parameters
@@ -223,7 +223,7 @@ def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofP
         np.multiply(state.occupied[k], factor, out=occupied[k])
         occupied[k] += np.float32(params.lattice.prior[k]) * given.newborn
     left = np.zeros(spec.shape, np.float32)
-    for mass, back in zip(occupied, cells_in(state.velocity, spec, -params.world.clearing_time), strict=True):
+    for mass, back in zip(occupied, flown_cells(state.velocity, spec, -params.world.clearing_time), strict=True):
         left += _moved(mass, back)
     cleared = clear_wakes(given.probability, left, evidence.occupied == evidence.free)
     occupied[0] = cleared[STATIC]
