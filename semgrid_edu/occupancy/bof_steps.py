@@ -61,8 +61,8 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -
 
     Some mass changes to neighbouring velocities, slow mass becomes STATIC, and the states mix by the transition matrix.
     Mass that leaves a cell leaves FREE behind. Where mass arrives, the combinations that can't be true are struck out:
-    something arrives where something stands, and something comes out of a standing thing into an UNKNOWN cell. What
-    becomes DYNAMIC takes the lattice's prior velocities. It moves from the next step on.
+    something arrives where something stands, or comes out of a wall and goes on along it where nothing was seen to be
+    free. What becomes DYNAMIC takes the lattice's prior velocities. It moves from the next step on.
 
     Parameters
     ----------
@@ -104,15 +104,15 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -
         total += occupied[k]
 
     mixed, newborn = mix(state.probability, np.zeros(spec.shape, np.float32), going, M)
-    ago = cells_ago(state.velocity, spec, params.world.clearing_time)
+    reach = flown_cells(state.velocity, spec, params.world.clearing_time)
     came = [k for k in range(1, len(occupied)) if cells[k].any()]
     doubtful = np.zeros(spec.shape, np.float32)
     for k in came:
-        doubtful += occupied[k] * _elsewhere(mixed[STATIC], ago[k])
-    probability, newborn, (own, arrival), less = meet(mixed, newborn, going, stays, arrives, doubtful)
+        doubtful += occupied[k] * _doubt(mixed, reach[k])
+    probability, newborn, (own, arrival), (_, less) = meet(mixed, newborn, going, stays, arrives, doubtful)
     occupied[0] = probability[STATIC]
     for k in range(1, len(occupied)):
-        occupied[k] *= arrival - less * _elsewhere(mixed[STATIC], ago[k]) if k in came else own
+        occupied[k] *= arrival - less * _doubt(mixed, reach[k]) if k in came else own
         occupied[k] += params.lattice.prior[k].astype(np.float32) * newborn
     return BofState(probability[FREE], probability[UNKNOWN], occupied, state.velocity, remainder)
 
@@ -165,8 +165,8 @@ def whole_cells(state: BofState, spec: GridSpec, dt: float) -> tuple[NDArray[np.
     return np.clip(cells, -farthest, farthest).astype(np.int64), remainder
 
 
-def cells_ago(velocity: NDArray, spec: GridSpec, time: float) -> NDArray[np.int64]:
-    """Return by how many whole cells mass of each velocity has moved in some time.
+def flown_cells(velocity: NDArray, spec: GridSpec, time: float) -> NDArray[np.int64]:
+    """Return by how many whole cells mass of each velocity moves in some time.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def cells_ago(velocity: NDArray, spec: GridSpec, time: float) -> NDArray[np.int6
     spec : GridSpec
         The cells.
     time : float
-        The time, seconds.
+        The time, seconds; negative for the way back.
 
     Returns
     -------
@@ -223,8 +223,8 @@ def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofP
         np.multiply(state.occupied[k], factor, out=occupied[k])
         occupied[k] += np.float32(params.lattice.prior[k]) * given.newborn
     left = np.zeros(spec.shape, np.float32)
-    for mass, ago in zip(occupied, cells_ago(state.velocity, spec, params.world.clearing_time), strict=True):
-        left += _elsewhere(mass, -ago)
+    for mass, back in zip(occupied, flown_cells(state.velocity, spec, -params.world.clearing_time), strict=True):
+        left += _moved(mass, back)
     cleared = clear_wakes(given.probability, left, evidence.occupied == evidence.free)
     occupied[0] = cleared[STATIC]
     return BofState(cleared[FREE], cleared[UNKNOWN], occupied, state.velocity, state.remainder)
@@ -256,7 +256,12 @@ def bof_velocity(state: BofState) -> tuple[NDArray[np.float32], NDArray[np.float
     return mean, covariance
 
 
-def _elsewhere(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:
+def _doubt(mixed: NDArray, reach: NDArray[np.int64]) -> NDArray[np.float32]:
+    """Return which part of the mass of one velocity comes out of a wall and goes on along it, cell by cell."""
+    return _moved(mixed[STATIC], reach) * (1 - _moved(mixed[FREE], -reach))
+
+
+def _moved(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:
     """Return a plane moved by whole cells along x and y; zeros where that is no way at all."""
     out = np.zeros_like(plane)
     if cells.any():

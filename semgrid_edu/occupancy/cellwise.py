@@ -100,39 +100,41 @@ def meet(mixed, newborn, going, stays, arrives, doubtful):
         Sums of weights in each cell: of the particles that were there before they flew, of those that are still there,
         and of those that have come in.
     doubtful : (H, W) float32
-        The part of `arrives` that comes out of something that stands.
+        The part of `arrives` that comes out of a wall and goes on along it.
 
     Returns
     -------
     probability : (4, H, W) float32
-        With a = min(arrives, CERTAIN), b the doubtful part of it, s = P(STATIC), u = P(UNKNOWN) and d the mass that is
-        newborn or stays, P(DYNAMIC) is [a (1 - s) - b u + (1 - a) d] / (1 - a s - b u), and every other state
-        (1 - a) P / (1 - a s - b u). What has left is FREE.
+        With a = min(arrives, CERTAIN), b the doubtful part of it, s = P(STATIC), u = P(UNKNOWN) plus what has left, and
+        d the mass that is newborn or stays, P(DYNAMIC) is [a (1 - s) - b u + (1 - a) d] / (1 - a s - b u), and every
+        other state (1 - a) P / (1 - a s - b u). What has left is FREE.
     newborn : (H, W) float32
         Scaled like everything that was in the cell.
     factor : (2, H, W) float32
         Factors of the weights of the particles that stay, and of those that arrive.
-    doubt : (H, W) float32
-        What the factor of an arriving particle is less for each unit of its doubtful part.
+    less : (2, H, W) float32
+        By how much these factors are smaller for the doubtful part of a weight; 0 for particles that stay.
     """
     probability, born = np.empty_like(mixed), np.empty_like(newborn)
-    factor, doubt = np.empty((2, *newborn.shape), np.float32), np.empty_like(newborn)
+    factor, less = np.empty((2, *newborn.shape), np.float32), np.zeros((2, *newborn.shape), np.float32)
     for r in range(newborn.shape[0]):
         for c in range(newborn.shape[1]):
-            static, unknown, claim = mixed[STATIC, r, c], mixed[UNKNOWN, r, c], min(arrives[r, c], CERTAIN)
+            static, claim = mixed[STATIC, r, c], min(arrives[r, c], CERTAIN)
+            vacated = going[r, c] - stays[r, c]
+            unseen = mixed[UNKNOWN, r, c] + vacated
             share = claim / arrives[r, c] if arrives[r, c] > 0 else 0.0
-            struck = share * doubtful[r, c] * unknown
+            struck = share * doubtful[r, c] * unseen
             consistent = 1 - claim * static - struck
             own, arrived = (1 - claim) / consistent, max(claim * (1 - static) - struck, 0.0) / consistent
-            probability[FREE, r, c] = own * (mixed[FREE, r, c] + going[r, c] - stays[r, c])
+            probability[FREE, r, c] = own * (mixed[FREE, r, c] + vacated)
             probability[STATIC, r, c] = own * static
             probability[DYNAMIC, r, c] = own * (newborn[r, c] + stays[r, c]) + arrived
-            probability[UNKNOWN, r, c] = own * unknown
+            probability[UNKNOWN, r, c] = own * mixed[UNKNOWN, r, c]
             born[r, c] = own * newborn[r, c]
             factor[0, r, c] = own
             factor[1, r, c] = share * (1 - static) / consistent
-            doubt[r, c] = share * unknown / consistent
-    return probability, born, factor, doubt
+            less[1, r, c] = share * unseen / consistent
+    return probability, born, factor, less
 
 
 @njit(cache=True, error_model="numpy")

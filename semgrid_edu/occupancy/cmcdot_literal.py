@@ -15,11 +15,11 @@ from semgrid_edu.occupancy.cellwise import ratio
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.particles_literal import (
+    cells_at_literal,
     cells_of_literal,
     draw_again_literal,
     draw_newborn_literal,
     fly_literal,
-    left_cells_literal,
     scale_in_cells_literal,
     slow_down_literal,
     transform_literal,
@@ -92,8 +92,10 @@ def predict_literal(
     particles = fly_literal(particles, world.max_acceleration, dt, rng)
     end = cells_of_literal(particles.position, spec)
     came = end != start
-    origin = left_cells_literal(particles, end, spec, world.clearing_time)
-    doubt = scale_in_cells_literal(particles.weight * came, origin, mixed[STATIC])
+    origin = cells_at_literal(particles, end, spec, -world.clearing_time)
+    ahead = cells_at_literal(particles, end, spec, world.clearing_time)
+    out_of_a_wall = scale_in_cells_literal(particles.weight * came, origin, mixed[STATIC])
+    doubt = out_of_a_wall - scale_in_cells_literal(out_of_a_wall, ahead, mixed[FREE])
     stays = weight_in_cells_literal(particles.weight * ~came, end, spec.shape)
     arrives = weight_in_cells_literal(particles.weight * came, end, spec.shape)
     doubtful = weight_in_cells_literal(doubt, end, spec.shape)
@@ -131,16 +133,17 @@ def meet_literal(
     -------
     probability : (4, H, W) float64
         The belief of each cell, with two combinations struck out: "something arrives in a cell that is STATIC", and
-        "something comes out of a standing thing into a cell that is UNKNOWN".
+        "something comes out of a wall and goes on along it, in a cell that hasn't been seen to be free".
     newborn : (H, W) float64
         Scaled like everything that was in the cell.
     own, sure, less : (H, W) float64
         Factors of the weights of the particles that have stayed in the cell, and of those that have arrived in it; and
-        by how much the latter is smaller for what comes out of a standing thing.
+        by how much the latter is smaller for what is doubtful.
     """
-    own, sure, less = strike_out(mixed[STATIC], arrives, mixed[UNKNOWN], doubtful)
+    vacated = going - stays
+    own, sure, less = strike_out(mixed[STATIC], arrives, mixed[UNKNOWN] + vacated, doubtful)
     probability = own * mixed
-    probability[FREE] += own * (going - stays)  # what flew away leaves free space behind
+    probability[FREE] += own * vacated  # what flew away leaves free space behind
     probability[DYNAMIC] = own * (newborn + stays) + sure * arrives - less * doubtful
     return probability, own * newborn, own, sure, less
 
@@ -161,7 +164,7 @@ def update_literal(state: FilterState, spec: GridSpec, evidence: Evidence, world
     factor = ratio(of_occupied, p_z)
     cells = cells_of_literal(state.particles.position, spec)
     weight = scale_in_cells_literal(state.particles.weight, cells, factor)
-    origin = left_cells_literal(state.particles, cells, spec, world.clearing_time)
+    origin = cells_at_literal(state.particles, cells, spec, -world.clearing_time)
     left = weight_in_cells_literal(weight, origin, spec.shape)
     static = clear_wakes_literal(posterior[STATIC], left, evidence.occupied == evidence.free)
     posterior[FREE], posterior[STATIC] = posterior[FREE] + posterior[STATIC] - static, static

@@ -131,8 +131,8 @@ def _by_origin(before, after, n_cells):
     return origin
 
 
-def left_cells(particles: Particles, cells: NDArray, spec: GridSpec, clearing_time: float) -> NDArray[np.int32]:
-    """Return the cell in which each particle was some time ago, if it isn't in it any more.
+def cells_at(particles: Particles, cells: NDArray, spec: GridSpec, time: float) -> NDArray[np.int32]:
+    """Return the cell in which each particle was or will be at another time, if it is another cell than now.
 
     Parameters
     ----------
@@ -142,26 +142,29 @@ def left_cells(particles: Particles, cells: NDArray, spec: GridSpec, clearing_ti
         The cell that each is in now, from `cells_of`.
     spec : GridSpec
         The cells, (H, W).
-    clearing_time : float
-        How long ago, seconds: x - v clearing_time is where a particle at x was, if its velocity v hasn't changed.
+    time : float
+        Seconds from now, negative for the past: a particle at x with velocity v is taken to be at x + v time.
 
     Returns
     -------
     (N,) int32
-        row * W + column; `OUTSIDE` for a particle that was outside the grid or is still in the same cell.
+        row * W + column; `OUTSIDE` for a particle that is outside the grid then, or in the same cell as now.
     """
-    grid = (spec.shape, spec.x_max, spec.y_max, spec.cell)
-    return _left_cells(particles.position, particles.velocity, cells, np.float32(clearing_time), *grid)
+    now, grid = (
+        (particles.position.ravel(), particles.velocity.ravel()),
+        (spec.shape, spec.x_max, spec.y_max, spec.cell),
+    )
+    return _cells_at(*now, cells, np.float32(time), *grid)
 
 
 @njit(cache=True, error_model="numpy")
-def _left_cells(position, velocity, cells, time, shape, x_max, y_max, cell):
-    left = np.empty(len(cells), np.int32)
+def _cells_at(xy, velocity, cells, time, shape, x_max, y_max, cell):
+    there = np.empty(len(cells), np.int32)
     for i in range(len(cells)):
-        x, y = position[i, 0] - time * velocity[i, 0], position[i, 1] - time * velocity[i, 1]
-        was = cell_of(x, y, shape, x_max, y_max, cell)
-        left[i] = was if was != cells[i] else OUTSIDE
-    return left
+        x, y = xy[2 * i] + time * velocity[2 * i], xy[2 * i + 1] + time * velocity[2 * i + 1]
+        then = cell_of(x, y, shape, x_max, y_max, cell)
+        there[i] = then if then != cells[i] else OUTSIDE
+    return there
 
 
 def fly(particles: Particles, max_acceleration: float, dt: float, rng: np.random.Generator) -> Particles:

@@ -38,13 +38,13 @@ def scale_in_cells_literal(weight: NDArray, cells: NDArray, factor: NDArray) -> 
     return np.where(cells == OUTSIDE, 0, weight * factor.ravel()[cells])
 
 
-def left_cells_literal(particles: Particles, cells: NDArray, spec: GridSpec, clearing_time: float) -> NDArray[np.int64]:
-    """Return the cell in which each particle was some time ago, if it isn't in it any more: the twin of `left_cells`.
+def cells_at_literal(particles: Particles, cells: NDArray, spec: GridSpec, time: float) -> NDArray[np.int64]:
+    """Return the cell in which each particle is at another time, if it is another one: the literal twin of `cells_at`.
 
-    Parameters and result are those of `left_cells`.
+    Parameters and result are those of `cells_at`.
     """
-    was = cells_of_literal(particles.position - clearing_time * particles.velocity, spec)
-    return np.where(was == cells, OUTSIDE, was)
+    then = cells_of_literal(particles.position + time * particles.velocity, spec)
+    return np.where(then == cells, OUTSIDE, then)
 
 
 def transform_literal(particles: Particles, motion: PlanarMotion) -> Particles:

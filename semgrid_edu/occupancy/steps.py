@@ -12,9 +12,9 @@ from semgrid_edu.occupancy.moving_map import look_up
 from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.particles import (
     by_origin,
+    cells_at,
     cells_of,
     fly,
-    left_cells,
     scale_in_cells,
     slow_down,
     transform,
@@ -25,7 +25,7 @@ from semgrid_edu.occupancy.resampling import draw_again, draw_newborn
 from semgrid_edu.occupancy.state import FilterState, Particles, State, check_shape
 from semgrid_edu.occupancy.world import WorldModel, transition_matrix
 
-STATIC, DYNAMIC, UNKNOWN = State.STATIC, State.DYNAMIC, State.UNKNOWN
+FREE, STATIC, DYNAMIC, UNKNOWN = State
 NOTHING_KNOWN = np.array([0, 0, 0, 1], dtype=np.float32)
 
 
@@ -72,13 +72,13 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
     Some of their combinations can't be true, and are struck out of the joint distribution.
 
     - *It arrives, and the cell is STATIC.* Two solid things can't share a cell.
-    - *It comes out of something that stands, and the cell is UNKNOWN.* A particle's origin is where it was
-      `clearing_time` ago. If something stands there now, that thing didn't fly away. In a cell that was known to be
-      free, an arrival shows all the same that something has set out. In a cell that nobody has seen it shows nothing,
-      because walls go on: what comes into view beside a wall is the next piece of the wall.
+    - *It comes out of a wall and goes on along it, and the cell hasn't been seen to be free.* Such a particle was in a
+      place that is STATIC now, `clearing_time` ago, and will be in one that isn't known to be free, as long from now.
+      It says no more than that the wall goes on, as walls do: what comes into view beside a wall is the next piece of
+      it. Somebody who sets off also comes out of a place where something stood, but walks into free space.
 
-    With s, d and u the cell's own static, dynamic and unknown probability, and b the part of a that comes out of
-    something that stands, what is left is
+    With s and d the cell's own static and dynamic probability, u the probability that it is UNKNOWN or has only been
+    left just now, and b the part of a that comes out of a wall and goes on along it, what is left is
 
         P(DYNAMIC) = [a (1 - s) - b u + (1 - a) d] / (1 - a s - b u),   others = (1 - a) others / (1 - a s - b u)
 
@@ -119,12 +119,12 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
     particles = fly(particles, world.max_acceleration, dt, rng)
     cells = cells_of(particles.position, spec)
     came = by_origin(before, cells, going.size)
-    doubt = scale_in_cells(particles.weight, left_cells(particles, cells, spec, world.clearing_time), mixed[STATIC])
+    doubt = scale_in_cells(particles.weight, cells_at(particles, cells, spec, -world.clearing_time), mixed[STATIC])
+    doubt -= scale_in_cells(doubt, cells_at(particles, cells, spec, world.clearing_time), mixed[FREE])
     stays, arrives = weight_in_cells(particles.weight, came, (2, *spec.shape))
     doubtful = weight_in_cells(doubt, came, (2, *spec.shape))[1]
     probability, newborn, factor, less = meet(mixed, newborn, going, stays, arrives, doubtful)
-    weight = scale_in_cells(particles.weight, came, factor)
-    weight -= scale_in_cells(doubt, came, np.stack([np.zeros_like(less), less]))
+    weight = scale_in_cells(particles.weight, came, factor) - scale_in_cells(doubt, came, less)
     return FilterState(probability, replace(particles, weight=np.maximum(weight, 0)), newborn)
 
 
@@ -167,7 +167,7 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
     posterior, factor = bayes(prior.probability, evidence.occupied, evidence.free)
     cells = cells_of(prior.particles.position, spec)
     weight = scale_in_cells(prior.particles.weight, cells, factor)
-    left = weight_in_cells(weight, left_cells(prior.particles, cells, spec, world.clearing_time), spec.shape)
+    left = weight_in_cells(weight, cells_at(prior.particles, cells, spec, -world.clearing_time), spec.shape)
     cleared, newborn = clear_wakes(posterior, left, ~seen), (prior.newborn * factor).astype(np.float32)
     return FilterState(cleared, replace(prior.particles, weight=weight), newborn)
 

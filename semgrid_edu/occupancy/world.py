@@ -38,7 +38,8 @@ class WorldModel:
         first scans of ten simulated drives, 95.4, 3.9 and 0.7 % of the cells that are seen.
     clearing_time : float
         Time, seconds, in which a moving thing leaves the place that it takes up: a car of 4.5 m at 9 m/s, a pedestrian
-        of 0.5 m at 1 m/s. So where it was that long ago, it can't be any more. With 0 the filters don't look back.
+        of 0.5 m at 1 m/s. So where it was that long ago, it can't be any more. With 0 the filters look neither back nor
+        ahead.
     sensor : Sensor
         Turns each scan into evidence. By default a `SensorModel`; any object will do whose `scan(points)` returns
         something with `evidence(spec, pose)`.
