@@ -22,7 +22,8 @@ FROM_BOTH_SIDES = CellsInARow(
 )
 """Something may come into cell 2 from the left or from the right, and something may stand there already.
 
-Something may also stand in cell 1, so what comes from there is doubtful: cell 2 may be the next piece of a wall."""
+Something may also stand in cell 1, and cell 3 isn't free for sure. So what comes from cell 1 is doubtful: cell 2 may be
+the next piece of a wall."""
 
 ELSEWHERE = 0
 """State of the moving thing when it is neither in the cell nor beside it: far away, gone, or no longer moving."""
@@ -47,8 +48,8 @@ CUT = (
     CutEdge(
         "x,t-1 -> o,t",
         "What stands at the origin counts as independent of the thing that has flown away from there, so where cell 1 "
-        "holds a thing that stands (0.3) or drives (0.5) into cell 2, which is UNKNOWN, the filter expects it there "
-        "with 0.41 instead of 0.50.",
+        "holds a thing that stands (0.3) or drives (0.5) towards cells 2 and 3, which are UNKNOWN, the filter expects "
+        "it in cell 2 with 0.41 instead of 0.50.",
     ),
 )
 """What CMCDOT leaves out of the joint model."""
@@ -57,10 +58,10 @@ CUT = (
 def cmcdot_stage(world: CellsInARow = FROM_BOTH_SIDES, cell: int = 2) -> StageGraph:
     """Return the graph of two time slices: a cell of four states (c), and a moving thing with place and velocity (x).
 
-    The edge from x1 to o1 says: the place and the velocity of a thing tell where it came from, its origin, and
-    something may stand there (o1). The edge from o1 to one1 says: what comes out of something that stands doesn't
-    arrive in a cell that is UNKNOWN. One rule of `update` isn't in the graph: in a hidden cell that something has left,
-    nothing stands.
+    The edge from x1 to o1 says: the place and the velocity of a thing tell where it came from and where it goes, and it
+    may come out of a wall and go on along it (o1). The edge from o1 to one1 says: such a thing doesn't arrive in a cell
+    that is UNKNOWN, because there it says only that the wall goes on. One rule of `update` isn't in the graph: in a
+    hidden cell that something has left, nothing stands.
 
     There is at most one moving thing here, so if something arrives from the left, nothing arrives from the right. The
     filter makes the same assumption when it adds up the weights of arriving particles. When the cell itself holds
@@ -77,9 +78,9 @@ def cmcdot_stage(world: CellsInARow = FROM_BOTH_SIDES, cell: int = 2) -> StageGr
     Returns
     -------
     StageGraph
-        Variables x0, x1 (`ELSEWHERE`, then `PLACES`), o1 (1: something stands at the origin), c0, c1 (`State`), one1
-        (1: nothing arrives where something stands, nor out of what stands where nobody has looked) and z1 (0: pass,
-        1: hit).
+        Variables x0, x1 (`ELSEWHERE`, then `PLACES`), o1 (1: comes out of a wall and goes on along it), c0, c1
+        (`State`), one1 (1: nothing arrives where something stands, nor along a wall where nobody has looked) and z1
+        (0: pass, 1: hit).
 
     Raises
     ------
@@ -116,7 +117,7 @@ def _two_slices(world: CellsInARow, cell: int) -> GraphicalModel:
         Factor("x0", _first_place(world.belief, cell)),
         Factor(("x0", "c0"), _first_cell(world.belief[cell - 1])),
         Factor(("x0", "x1"), _flight(M[DYNAMIC, DYNAMIC])),
-        Factor(("x1", "o1"), _origin(world, cell, M)),
+        Factor(("x1", "o1"), _along_a_wall(world, cell, M)),
         Factor(("c0", "x1", "o1", "one1"), _alone(M)),
         Factor(("c0", "x1", "c1"), _next_cell(M) @ np.vstack([np.eye(N_STATES)[:UNKNOWN], first_sight])),
         Factor(("c1", "z1"), read),
@@ -151,15 +152,16 @@ def _flight(goes_on: float) -> NDArray[np.float64]:
     return flight
 
 
-def _origin(world: CellsInARow, cell: int, M: NDArray) -> NDArray[np.float64]:
-    """P(o1 | x1): whether something stands by now where the thing in the cell was `clearing_time` ago."""
-    static = (world.belief @ np.eye(N_STATES)[list(STATE_OF)] @ M)[:, STATIC]
-    steps, stands = round(world.clearing_time / DT), np.zeros(len(HERE))
+def _along_a_wall(world: CellsInARow, cell: int, M: NDArray) -> NDArray[np.float64]:
+    """P(o1 | x1): something stands where the thing was `clearing_time` ago, and where it will be then isn't free."""
+    by_now, last = world.belief @ np.eye(N_STATES)[list(STATE_OF)] @ M, len(world.belief) - 1
+    steps, doubt = round(world.clearing_time / DT), np.zeros(len(HERE))
     for state, (place, velocity) in enumerate(PLACES, start=1):
-        origin = cell - 1 - velocity * steps
-        if place == 0 and steps > 0 and 0 <= origin < len(static):
-            stands[state] = static[origin]
-    return np.stack([1 - stands, stands], axis=-1)
+        origin, ahead = cell - 1 - velocity * steps, cell - 1 + velocity * steps
+        if place == 0 and steps > 0 and 0 <= origin <= last:
+            free = by_now[ahead, FREE] if 0 <= ahead <= last else 0.0
+            doubt[state] = by_now[origin, STATIC] * (1 - free)
+    return np.stack([1 - doubt, doubt], axis=-1)
 
 
 def _alone(M: NDArray) -> NDArray[np.float64]:

@@ -58,8 +58,9 @@ def test_the_same_seed_gives_the_same_bits():
     assert not np.array_equal(particle_beliefs(LEFT_OR_RIGHT, 50, seed=1), particle_beliefs(LEFT_OR_RIGHT, 50, seed=2))
 
 
-BESIDE_A_WALL = ({"static": 0.6, "right": 0.4}, {"unknown": 1.0}, {"static": 0.7, "left": 0.1})
-"""What comes into cell 2 comes out of something that probably stands."""
+UNSEEN = {"unknown": 1.0}
+BESIDE_A_WALL = ({"static": 0.6, "right": 0.4}, UNSEEN, {"static": 0.7, "left": 0.1})
+"""What comes into cell 2 comes out of something that probably stands, and goes on towards what isn't free."""
 
 
 @pytest.mark.parametrize("scan", [".x.", "...", ".?."])
@@ -86,17 +87,17 @@ def test_the_graph_is_joint_inference_where_only_the_cell_itself_may_hold_what_m
 
 
 def test_what_comes_out_of_a_wall_claims_no_cell_that_nobody_has_seen():
-    """By hand: 0.4 arrives from the left, 0.6 of it out of what stands; 0.1 from the right, 0.7 of it."""
+    """By hand: of 0.4 from the left 0.6 (1 - 0.2) is doubtful, of 0.1 from the right 0.7."""
     looks_back, does_not = (
         cell_2(CellsInARow(BESIDE_A_WALL, ("?" * 3,), clearing_time=seconds))[State.DYNAMIC] for seconds in (DT, 0.0)
     )
     assert does_not == pytest.approx(0.5)
-    assert looks_back == pytest.approx((0.4 * 0.4 + 0.1 * 0.3) / (1 - 0.4 * 0.6 - 0.1 * 0.7))
+    assert looks_back == pytest.approx((0.4 * 0.52 + 0.1 * 0.3) / (1 - 0.4 * 0.48 - 0.1 * 0.7))
 
 
 def test_the_price_of_taking_the_origin_as_independent():
     """The thing stands in cell 1 or drives into cell 2, never both: joint inference expects it there with 0.5."""
-    world = CellsInARow(({"static": 0.3, "right": 0.5}, {"unknown": 1.0}, {}), ("???",), clearing_time=DT)
+    world = CellsInARow(({"static": 0.3, "right": 0.5}, UNSEEN, UNSEEN), ("???",), clearing_time=DT)
     assert exact_beliefs(world)[0, 1, Cell.RIGHT] == pytest.approx(0.5)
     assert cell_2(world)[State.DYNAMIC] == pytest.approx(0.5 * 0.7 / (1 - 0.5 * 0.3)) == pytest.approx(0.41, abs=5e-3)
 
