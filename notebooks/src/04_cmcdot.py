@@ -161,7 +161,7 @@ plt.show()
 
 # %% [markdown]
 # Both show the same street: a car that overtakes us (orange, 8 m ahead), oncoming cars on the left, walls and parked
-# cars dark. The few dark cells among the oncoming cars, 13 to 18 m ahead, are a mistake that you know from lecture 03:
+# cars dark. The few dark cells among the oncoming cars, 12 to 18 m ahead, are a mistake that you know from lecture 03:
 # cars that came in one another's shadow. Where the two pictures differ, the loop lies up to half a cell beside the
 # vehicle; step 1 tells why. Now each step by itself.
 
@@ -1003,7 +1003,7 @@ assert 0.02 < called["beside", True] < called["beside", False]
 
 # %% [markdown]
 # The per cents are of the wall's cells with returns, from 0.5 s on. Look at the orange on the walls. Across the road
-# it is nearly gone when the filter looks back. Beside the road it has become shorter, but much of it is left. Why?
+# it is nearly gone when the filter looks back. Beside the road it has become shorter, but a part of it is left. Why?
 # There the edge of the shadow runs at 16 m/s, and the wall first comes into view more than 40 m ahead, under a flat
 # angle, where the scanner's columns lie farther apart than the cells. So the wall has gaps, cells that are still
 # UNKNOWN or were called FREE. A particle that comes out of a gap, or from beside the wall, isn't doubtful:
