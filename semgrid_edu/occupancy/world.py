@@ -60,7 +60,7 @@ class WorldModel:
     stop_rate: float = 5.0
     stop_speed: float = 0.4
     max_acceleration: float = 4.0
-    first_sight: tuple[float, float, float] = (0.947, 0.05, 0.003)
+    first_sight: tuple[float, float, float] = (0.952, 0.045, 0.003)
     clearing_time: float = 0.5
     sensor: Sensor = field(default_factory=SensorModel)
 
