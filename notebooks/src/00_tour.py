@@ -505,7 +505,7 @@ plt.show()
 # %% [markdown]
 # The first scans show that *something* is there, and nothing says that it moves: STATIC is the better bet. Only when it
 # arrives where free space was seen before does the filter change its mind: for the first car that takes a second.
-# The second drives in its wake, and takes half as long again and more. While the first still counted as standing, it
+# The second drives in its wake, and takes half as long again or more. While the first still counted as standing, it
 # left STATIC cells along its way, hidden in its shadow, and where something stands already, nothing is believed to
 # arrive. Those cells go only when the first has been seen to move for half a second (lecture 03). Until then, a planner
 # that trusts this map takes a moving car for a parked one.

@@ -614,11 +614,11 @@ assert ghosts[1] < 0.5 * ghosts[0]
 #
 # ## One thing, two places: looking back
 #
-# By now BOF is sure that the first car moves. So it could know that nothing of that car still stands where it has been.
-# Why doesn't it? Take the smallest world with this problem: six cells of half a
-# metre in a row. In cell 1 is one thing, which either stands or drives to the right at 5 m/s, one cell in a tenth of a
-# second, with probability 1/2 each. From now on cell 1 lies in a shadow. The five scans that follow find a return in
-# cell 2, then in cell 3, and so on up to cell 6, and pass all other cells that they see.
+# By now BOF is sure that the first car moves. So it could know that nothing of that car still stands where it has
+# been. Why doesn't it? Take the smallest world with this problem: six cells of half a metre in a row. In cell 1 is one
+# thing, which either stands or drives to the right at 5 m/s, one cell in a tenth of a second, with probability 1/2
+# each. From now on cell 1 lies in a shadow. The five scans that follow find a return in cell 2, then in cell 3, and so
+# on up to cell 6, and pass all other cells that they see.
 #
 # **Predict before you run.** What does BOF say of cell 1 after the five scans? And somebody who compares the two
 # stories, "it stands" and "it drives", as wholes?
@@ -706,9 +706,9 @@ print("P(STATIC) of cell 1 is wrong by {:.3f} without the rule and by {:.3f} wit
 # The same look back helps at the other end of the flight. Drive past a long wall: with each scan a little more of it
 # comes into view. BOF takes cells as independent, so each new cell that is hit is one more coincidence: in the package
 # a cell that nobody has seen turns out to be STATIC with probability 0.05, else it is almost surely FREE. But
-# something that runs along the wall, just as the wall comes into view, explains all of them at once. Take eight cells:
-# the first four stand with probability 0.97, the last three are UNKNOWN. About cell 5 there is a little doubt: it
-# stands with 0.95, and with 0.03 there is something in it that goes to the right.
+# something that runs along the wall, just as fast as the wall comes into view, explains all of them at once. Take
+# eight cells: the first four stand with probability 0.97, the last three are UNKNOWN. About cell 5 there is a little
+# doubt: it stands with 0.95, and with 0.03 there is something in it that goes to the right.
 #
 # **Predict before you run.** Cell 6 comes into view, and is hit. With what probability is it DYNAMIC? And cell 7, hit
 # by the next scan?
