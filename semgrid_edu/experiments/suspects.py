@@ -8,7 +8,8 @@ from unittest.mock import patch
 import numpy as np
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.scenes import KnownScene, known_scenes
+from semgrid_edu.experiments.cell_truth import true_cells
+from semgrid_edu.experiments.scenes import KnownScene, SceneHistory
 from semgrid_edu.experiments.street_scores import StreetScores
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Cmcdot, CmcdotParams, SensorModel, cellwise
@@ -134,7 +135,8 @@ def scenes_of(street: str, number: int, spec: GridSpec, suspect: Suspect) -> tup
     drive = named_street(street, number, rig=suspect.rig)
     if suspect.change:
         suspect.change(drive)
-    return drive, list(known_scenes(drive, spec, SensorModel(), street))
+    past = SceneHistory(spec, SensorModel())
+    return drive, [past.add(drive.scan(k), true_cells(drive, k * PERIOD, spec)) for k in range(drive.n_frames)]
 
 
 def run_filter(
