@@ -1440,6 +1440,8 @@ print(f"after the first second, {100 * np.nanmean(shares):.1f} % of its cells ar
 #
 # ## Further reading
 #
+# - [Phantoms on real streets](deeper/04_real_streets.ipynb), a companion to this lecture: why walls that come into view
+#   were called DYNAMIC, found by switching off one suspect at a time, and what was done about it.
 # - Rummelhard, Nègre, Laugier, *Conditional Monte Carlo Dense Occupancy Tracker*, ITSC 2015: the filter.
 # - Coué, Pradalier, Laugier, Fraichard, Bessière, *Bayesian occupancy filtering for multitarget tracking: an automotive
 #   application*, IJRR 25(1), 2006: the BOF.
