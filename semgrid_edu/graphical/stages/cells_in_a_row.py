@@ -61,8 +61,9 @@ class CellsInARow:
     first_sight : (float, float, float)
         What UNKNOWN cells turn out to be when they are first seen: FREE, STATIC and DYNAMIC, the last 0.
     clearing_time : float
-        How far back and ahead the filters look, seconds, as in `WorldModel`; exact inference doesn't need it. By default
-        that is five cells, so it makes no difference in a row of five cells or fewer; with `DT` it is the cell next door.
+        How far back and ahead the filters look, seconds, as in `WorldModel`; exact inference doesn't need it. By
+        default that is five cells, so it makes no difference in a row of at most five. With `DT` it is the cell next
+        door.
 
     Raises
     ------
