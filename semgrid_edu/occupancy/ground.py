@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.occupancy.points import check_points
+from semgrid_edu.occupancy.polar import beams_of
 
 
 @dataclass(frozen=True)
@@ -109,7 +110,8 @@ def height_above_ground(points: NDArray, params: GroundParams) -> NDArray:
         When `points` isn't a table of finite coordinates.
     """
     points = check_points(points)
-    place = _places(points, params.sectors, params.bin, params.bins)
+    x, y = points[:, 0].astype(np.float64), points[:, 1].astype(np.float64)
+    place = _places(x, y, beams_of(x, y, params.sectors), params.bin, params.bins)
     lowest = _lowest_returns(points, place, params.sectors * params.bins)
     limits = (params.step, params.slope, params.rise, params.grade, params.gap)
     profile, seen = _walk_all(points, *lowest, params.sectors, params.bin, *limits)
@@ -117,13 +119,11 @@ def height_above_ground(points: NDArray, params: GroundParams) -> NDArray:
 
 
 @njit(cache=True)
-def _places(points, sectors, bin_, bins):
+def _places(x, y, sector, bin_, bins):
     """Find the place of each return, sector * bins + bin; returns beyond the last bin count to it."""
-    place = np.empty(len(points), np.int32)
-    for i in range(len(points)):
-        x, y = np.float64(points[i, 0]), np.float64(points[i, 1])
-        sector = min(int((np.arctan2(y, x) + np.pi) * (sectors / (2 * np.pi))), sectors - 1)
-        place[i] = sector * bins + int(min(np.sqrt(x * x + y * y) / bin_, bins - 1))
+    place = np.empty(len(x), np.int32)
+    for i in range(len(x)):
+        place[i] = sector[i] * bins + int(min(np.sqrt(x[i] * x[i] + y[i] * y[i]) / bin_, bins - 1))
     return place
 
 
@@ -169,17 +169,18 @@ def _walk_all(points, lowest, low, high, sectors, bin_, step, slope, rise, grade
 def _median_of_neighbours(profile, seen, neighbours):
     """Take the median over each sector and its neighbours, leaving out sectors without returns."""
     sectors, bins = profile.shape
-    ground = np.zeros_like(profile)
+    ground, beside = np.zeros_like(profile), np.empty((2 * neighbours + 1, bins), np.float32)
     for s in range(sectors):
-        beside = np.empty((2 * neighbours + 1, bins), np.float32)
         n = 0
         for k in range(s - neighbours, s + neighbours + 1):
             if seen[k % sectors]:
-                beside[n] = profile[k % sectors]
+                for b in range(bins):  # loops over bins take less than half the time of whole rows
+                    beside[n, b] = profile[k % sectors, b]
                 n += 1
         if n > 0:
             _sort_each_bin(beside[:n])
-            ground[s] = (beside[(n - 1) // 2] + beside[n // 2]) / 2
+            for b in range(bins):
+                ground[s, b] = (beside[(n - 1) // 2, b] + beside[n // 2, b]) / 2
     return ground
 
 

@@ -2,6 +2,7 @@
 
 import bench_frame
 import bench_networks
+import bench_occupancy
 import bench_planes
 import numpy as np
 import torch
@@ -46,3 +47,13 @@ def test_each_part_of_a_frame_is_timed():
     assert times.shape == (2, len(bench_frame.ROWS) + 2)
     assert (times > 0).all()
     np.testing.assert_allclose(times[:, : len(bench_frame.ROWS)].sum(axis=1), times[:, -2])
+
+
+def test_every_step_and_each_of_its_parts_is_timed():
+    drive, spec = bench_occupancy.made_up_drive(scans=3, points=500), GridSpec(0, 20, -10, 10, 1.0)
+    waits = bench_occupancy.waiting_times(drive, spec, passes=2)
+    assert waits.shape == (2, 3)
+    assert (waits > 0).all()
+    times = bench_occupancy.step_times(drive, spec, particles=1000, passes=3)
+    assert set(times) == {bench_occupancy.WHOLE, *bench_occupancy.PARTS.values()}
+    assert all(milliseconds > 0 for milliseconds in times.values())

@@ -1,5 +1,8 @@
 """The whole filter on small worlds whose truth is known."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -203,3 +206,30 @@ def test_track_drive_takes_motion_and_time_from_the_frames():
 def test_track_drive_refuses_frames_out_of_order():
     with pytest.raises(ArgumentError, match="dt"):
         list(track_drive(frames(3)[::-1], SMALL, PARAMS))
+
+
+PAGES = """
+import resource
+import numpy as np
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import Cmcdot, PlanarMotion
+
+wall = np.array([[20.0 + x, y, 1.0] for x in range(30) for y in np.arange(-10, 10, 0.1)], np.float32)
+tracker = Cmcdot(GridSpec.paper())
+for step in range(36):
+    tracker.step(wall, PlanarMotion(0.9, 0.0, 0.001), 0.1)
+    if step == 15:
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems' allocators are left as they are")
+def test_the_memory_of_one_step_serves_the_next():
+    """What the filter keeps, 200,000 particles of 20 bytes and four states of 70,000 cells, is 1,250 pages of 4 kB.
+
+    Twenty steps that were lent only as much memory anew as that would touch 25,000 pages. In a process of its own, in
+    which nothing else has freed large buffers.
+    """
+    done = subprocess.run([sys.executable, "-c", PAGES], capture_output=True, text=True, check=True)
+    assert int(done.stdout) < 1250
