@@ -113,9 +113,13 @@ class MoverTimes:
         dict
             "found after" and "found after the car ahead"; JSON can hold it: an infinite time is None.
         """
-        finite = lambda times: [time if np.isfinite(time) else None for time in times]  # noqa: E731
-        waits = {name: finite(times) for name, times in self.waits.items()}
-        return {"found after": waits, "found after the car ahead": finite(self.delays)}
+        waits = {name: _for_json(times) for name, times in self.waits.items()}
+        return {"found after": waits, "found after the car ahead": _for_json(self.delays)}
+
+
+def _for_json(times: list[float]) -> list[float | None]:
+    """Write infinite times as None."""
+    return [time if np.isfinite(time) else None for time in times]
 
 
 def convoy_pairs(moving: list[Actor]) -> list[tuple[int, int]]:

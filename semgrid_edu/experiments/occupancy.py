@@ -6,21 +6,20 @@ from datetime import UTC, datetime
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.cell_scores import BANKS, CellScores, Estimate, share
 from semgrid_edu.experiments.scenes import known_scenes
+from semgrid_edu.experiments.simulated_runs import GRIDS, check_request, made_by
+from semgrid_edu.experiments.tables import markdown_table, per_cent
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Bof, Cmcdot, LogOddsGrid, PlanarMotion, SensorModel, State
 from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive
-from semgrid_edu.simulation.sensors.rig import Lidar, Rig
-from semgrid_edu.storage.provenance import versions
+from semgrid_edu.simulation.sensors.rig import HDL64E, Lidar, Rig
 
 LIDARS = {
-    "HDL-64E": Lidar(azimuth_min=-180.0, azimuth_max=180.0, azimuth_step=0.18),
+    "HDL-64E": HDL64E,
     "coarse": Lidar(),
 }
 """The real scanner at 10 Hz, and that of the simulated data sets, which looks ahead with a fifth of its columns."""
-GRIDS = {"paper": GridSpec.paper(), "compact": GridSpec.compact()}
 FRAMES = 30
 """Number of frames of a drive, 3 s."""
 HELD_OUT = 100
@@ -60,24 +59,12 @@ def compare_filters(
         When there is no such grid, or nothing to do.
     """
     began = datetime.now(UTC)
-    if not grids or not set(grids) <= set(GRIDS):
-        raise ArgumentError("grid", " or ".join(GRIDS), ", ".join(grids) or "none")
-    if seed < 0:
-        raise ArgumentError("seed", "a whole number from 0 up", seed)
-    if min(drives, frames) < 1:
-        raise ArgumentError("drives, frames", "at least one", f"{drives}, {frames}")
+    check_request(seed, drives, frames, grids)
     scores = {lidar: {grid: _score(seed, drives, frames, lidar, grid) for grid in grids} for lidar in LIDARS}
     return {
         "scores": scores,
         "states": [state.name for state in State],
-        "drives": drives,
-        "frames": frames,
-        "command": f"semgrid-edu reproduce occupancy --seed {seed} --drives {drives}"
-        + (f" --grid {grids[0]}" if len(grids) == 1 else ""),
-        "seed": seed,
-        "date": f"{began:%Y-%m-%d}",
-        "minutes": round((datetime.now(UTC) - began).total_seconds() / 60, 1),
-        "versions": versions("numpy", "scipy", "numba", "embreex", "trimesh"),
+        **made_by("occupancy", seed, drives, frames, grids, began),
     }
 
 
@@ -170,46 +157,5 @@ def occupancy_table(result: dict, lidar: str = "HDL-64E", grid: str = "paper") -
     return markdown_table(rows)
 
 
-def per_cent(value: float | None) -> str:
-    """Write a share in per cent.
-
-    Parameters
-    ----------
-    value : float or None
-        A share, 0..1; None for a share of nothing.
-
-    Returns
-    -------
-    str
-    """
-    return "-" if value is None else f"{100 * value:.1f}"
-
-
 def _error(error: dict[str, float | None]) -> str:
     return "-" if error["median"] is None else f"{error['median']:.2f} ({error['rms']:.2f})"
-
-
-def markdown_table(rows: list[list[str]]) -> str:
-    """Lay out rows as a Markdown table whose columns also line up in plain text.
-
-    Parameters
-    ----------
-    rows : list of list of str
-        The cells of each row, the header first.
-
-    Returns
-    -------
-    str
-    """
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = [
-        "| "
-        + " | ".join(
-            f"{row[0]:{widths[0]}}" if k == 0 else f"{text:>{w}}"
-            for k, (text, w) in enumerate(zip(row, widths, strict=True))
-        )
-        + " |"
-        for row in rows
-    ]
-    lines.insert(1, "|" + "|".join("-" * (w + 1) + ("-" if k == 0 else ":") for k, w in enumerate(widths)) + "|")
-    return "\n".join(lines)

@@ -6,13 +6,13 @@ import numpy as np
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.cell_scores import SCENERY
-from semgrid_edu.experiments.occupancy import GRIDS, markdown_table, per_cent
 from semgrid_edu.experiments.scenes import known_scenes
+from semgrid_edu.experiments.simulated_runs import GRIDS, check_request, made_by
 from semgrid_edu.experiments.street_scores import StreetScores
+from semgrid_edu.experiments.tables import markdown_table, per_cent
 from semgrid_edu.occupancy import Cmcdot, CmcdotParams, SensorModel
 from semgrid_edu.simulation.drive import PERIOD
 from semgrid_edu.simulation.named_streets import FRAMES, TEST_STREETS, named_street
-from semgrid_edu.storage.provenance import versions
 
 _EMPTY = {"cells": 0, "called": None}
 
@@ -53,29 +53,14 @@ def measure_streets(
         When there is no such grid or street, or nothing to do.
     """
     began = datetime.now(UTC)
-    if not grids or not set(grids) <= set(GRIDS):
-        raise ArgumentError("grid", " or ".join(GRIDS), ", ".join(grids) or "none")
+    check_request(seed, drives, frames, grids)
     if not streets or not set(streets) <= set(TEST_STREETS):
         raise ArgumentError("streets", " or ".join(TEST_STREETS), ", ".join(streets) or "none")
-    if seed < 0:
-        raise ArgumentError("seed", "a whole number from 0 up", seed)
-    if min(drives, frames) < 1:
-        raise ArgumentError("drives, frames", "at least one", f"{drives}, {frames}")
     params = params or CmcdotParams()
     scores = {
         grid: {street: _score(seed, drives, frames, grid, street, params) for street in streets} for grid in grids
     }
-    return {
-        "scores": scores,
-        "drives": drives,
-        "frames": frames,
-        "command": f"semgrid-edu reproduce streets --seed {seed} --drives {drives}"
-        + (f" --grid {grids[0]}" if len(grids) == 1 else ""),
-        "seed": seed,
-        "date": f"{began:%Y-%m-%d}",
-        "minutes": round((datetime.now(UTC) - began).total_seconds() / 60, 1),
-        "versions": versions("numpy", "scipy", "numba", "embreex", "trimesh"),
-    }
+    return {"scores": scores, **made_by("streets", seed, drives, frames, grids, began)}
 
 
 def _score(seed: int, drives: int, frames: int, grid: str, street: str, params: CmcdotParams) -> dict[str, object]:

@@ -6,12 +6,13 @@ import numpy as np
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.simulation.drive import SimulatedDrive
-from semgrid_edu.simulation.sensors.rig import Lidar, Rig
+from semgrid_edu.simulation.sensors.rig import HDL64E, Rig
 from semgrid_edu.simulation.street import casts
 from semgrid_edu.simulation.street.plan import CROSSING, YARD, Wishes
+from semgrid_edu.simulation.street.road_users import park_cars
 
 _NONE, _BOTH = (False, False), (True, True)
-KITTI_RIG = Rig(lidar=Lidar(azimuth_min=-180.0, azimuth_max=180.0, azimuth_step=0.18), packet_interval=0.01)
+KITTI_RIG = Rig(lidar=HDL64E, packet_interval=0.01)
 """An HDL-64E at 10 Hz, and poses from packets that come every 10 ms."""
 FRAMES = 36
 """Number of frames of a test street, 3.5 s."""
@@ -19,7 +20,7 @@ FRAMES = 36
 
 def _yard(border: str, lanes: tuple[int, int] = (1, 1)) -> Wishes:
     """Wish for a border on the right, along which nothing moves."""
-    return Wishes(lanes=lanes, styles=("park", YARD), borders=("none", border), parking=_NONE, cast=casts.parked)
+    return Wishes(lanes=lanes, styles=("park", YARD), borders=("none", border), parking=_NONE, cast=park_cars)
 
 
 def _town(cast, lanes: tuple[int, int] = (1, 1), ego_lane: int | None = None, layout: str = "straight") -> Wishes:
@@ -55,7 +56,8 @@ def named_street(name: str, seed: int, frames: int = FRAMES, rig: Rig = KITTI_RI
     seed : int
         Seed for the drive; streets of different names differ for the same seed.
     frames : int
-        Number of frames, ten a second.
+        Number of frames, ten a second. The street is as long as the way driven, so with the same seed another number
+        gives another street.
     rig : Rig
         The sensors on the recording car.
 

@@ -53,6 +53,10 @@ class Lidar:
         return np.stack([x, y, np.sin(elevation) + 0 * azimuth], axis=-1).reshape(-1, 3).astype(np.float32)
 
 
+HDL64E = Lidar(azimuth_min=-180.0, azimuth_max=180.0, azimuth_step=0.18)
+"""KITTI's scanner at 10 Hz: all around, with all its columns."""
+
+
 @dataclass(frozen=True)
 class Rig:
     """The sensors of the recording car, and where they stand on it.

@@ -11,21 +11,10 @@ from semgrid_edu.simulation.street.trajectories import Departure, Pace
 from semgrid_edu.simulation.things.cars import car_size
 
 
-def parked(traffic: Traffic) -> None:
-    """Park cars at the kerb, where there are bays.
-
-    Parameters
-    ----------
-    traffic : Traffic
-        Takes the road users.
-    """
-    park_cars(traffic)
-
-
 def convoys(traffic: Traffic) -> None:
     """Let two or three cars come one behind the other, and two overtake in the left one of our lanes.
 
-    The gaps are 8 to 20 m, so that the first car hides the next one at first. Parameters are those of `parked`.
+    The gaps are 8 to 20 m, so that the first car hides the next one at first. Parameters are those of `park_cars`.
     """
     park_cars(traffic)
     road, rng, ego = traffic.road, traffic.rng, traffic.ego
@@ -47,7 +36,7 @@ def _convoy(traffic: Traffic, s: float, d: float, along: int, pace: Pace, cars: 
 
 
 def pedestrians(traffic: Traffic) -> None:
-    """Let people walk along both sidewalks, and across the road. Parameters are those of `parked`."""
+    """Let people walk along both sidewalks, and across the road. Parameters are those of `park_cars`."""
     park_cars(traffic)
     road, rng = traffic.road, traffic.rng
     middle = traffic.ego.at(traffic.duration / 2)[0]
@@ -62,7 +51,7 @@ def pedestrians(traffic: Traffic) -> None:
 
 
 def slow_starters(traffic: Traffic) -> None:
-    """Let people and cars stand for 1 to 2 s, and then set off. Parameters are those of `parked`."""
+    """Let people and cars stand for 1 to 2 s, and then set off. Parameters are those of `park_cars`."""
     park_cars(traffic)
     road, rng, ego = traffic.road, traffic.rng, traffic.ego
     middle = ego.at(traffic.duration / 2)[0]
@@ -80,7 +69,7 @@ def slow_starters(traffic: Traffic) -> None:
 
 
 def crossing_cars(traffic: Traffic) -> None:
-    """Let cars cross at the junction, two from each side. Parameters are those of `parked`."""
+    """Let cars cross at the junction, two from each side. Parameters are those of `park_cars`."""
     park_cars(traffic)
     road, rng = traffic.road, traffic.rng
     for sign in (1, -1):
