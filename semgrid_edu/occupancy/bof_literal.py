@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
-from semgrid_edu.occupancy.bof_steps import flown_cells, whole_cells
+from semgrid_edu.occupancy.bof_steps import origins, whole_cells
 from semgrid_edu.occupancy.cellwise import CERTAIN, ratio
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.particles_literal import slow_down_literal
@@ -43,9 +43,9 @@ def bof_predict_literal(state: BofState, spec: GridSpec, params: BofParams, dt: 
                 if 0 <= to[0] < spec.shape[0] and 0 <= to[1] < spec.shape[1]:
                     arrives[k, *to] += moving * kept[k]
     stays += params.lattice.prior[:, None, None] * newborn
-    time = params.world.clearing_time
-    out_of_a_wall = elsewhere_literal(own[STATIC], flown_cells(state.velocity, spec, -time))
-    into_the_open = elsewhere_literal(own[FREE], flown_cells(state.velocity, spec, time))
+    back = origins(state.velocity, spec, params.world)
+    out_of_a_wall = elsewhere_literal(own[STATIC], back)
+    into_the_open = elsewhere_literal(own[FREE], -back)
     doubt, occupied = out_of_a_wall * (1 - into_the_open), np.zeros(state.occupied.shape)
     for row, col in np.ndindex(spec.shape):
         here = own[:, row, col], vacated[row, col], stays[:, row, col], arrives[:, row, col], doubt[:, row, col]
@@ -156,7 +156,7 @@ def bof_update_literal(state: BofState, spec: GridSpec, evidence: Evidence, para
     free, unknown = ratio(of_free * free, p_z), ratio(of_free * unknown, p_z)
     unknown += p_z == 0  # nothing that was held possible explains the scan
     occupied = ratio(of_occupied * occupied, p_z)
-    left = mass_that_left(occupied, flown_cells(state.velocity, spec, -params.world.clearing_time))
+    left = mass_that_left(occupied, origins(state.velocity, spec, params.world))
     static = clear_wakes_literal(occupied[0], left, evidence.occupied == evidence.free)
     free, occupied[0] = free + occupied[0] - static, static
     return BofState(free, unknown, occupied, state.velocity, state.remainder)

@@ -12,7 +12,7 @@ from semgrid_edu.occupancy.particles import slow_down
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import FilterState, Particles, State, check_shape
 from semgrid_edu.occupancy.steps import update
-from semgrid_edu.occupancy.world import transition_matrix
+from semgrid_edu.occupancy.world import WorldModel, transition_matrix
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
@@ -104,7 +104,7 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -
         total += occupied[k]
 
     mixed, newborn = mix(state.probability, np.zeros(spec.shape, np.float32), going, M)
-    reach = flown_cells(state.velocity, spec, params.world.clearing_time)
+    reach = -origins(state.velocity, spec, params.world)
     came = [k for k in range(1, len(occupied)) if cells[k].any()]
     doubtful = np.zeros(spec.shape, np.float32)
     for k in came:
@@ -165,8 +165,8 @@ def whole_cells(state: BofState, spec: GridSpec, dt: float) -> tuple[NDArray[np.
     return np.clip(cells, -farthest, farthest).astype(np.int64), remainder
 
 
-def flown_cells(velocity: NDArray, spec: GridSpec, time: float) -> NDArray[np.int64]:
-    """Return by how many whole cells mass of each velocity moves in some time.
+def origins(velocity: NDArray, spec: GridSpec, world: WorldModel) -> NDArray[np.int64]:
+    """Return how far from here mass of each velocity was when it still took up another place.
 
     Parameters
     ----------
@@ -174,15 +174,17 @@ def flown_cells(velocity: NDArray, spec: GridSpec, time: float) -> NDArray[np.in
         The velocities along the axes of the map, m/s.
     spec : GridSpec
         The cells.
-    time : float
-        The time, seconds; negative for the way back.
+    world : WorldModel
+        That was `clearing_time` ago, or for slow things as long as they need for `clearing_cells`.
 
     Returns
     -------
     (V, 2) int64
-        Number of cells along the x and y axes of the map.
+        Number of whole cells along the x and y axes of the map, to the place where it was.
     """
-    return np.rint(velocity * time / spec.cell).astype(np.int64)
+    way = -world.clearing_time * velocity / spec.cell
+    length = np.linalg.norm(way, axis=1, keepdims=True)
+    return np.rint(way * np.maximum(1, ratio(np.full_like(length, world.clearing_cells), length))).astype(np.int64)
 
 
 def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofParams) -> BofState:
@@ -223,7 +225,7 @@ def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofP
         np.multiply(state.occupied[k], factor, out=occupied[k])
         occupied[k] += np.float32(params.lattice.prior[k]) * given.newborn
     left = np.zeros(spec.shape, np.float32)
-    for mass, back in zip(occupied, flown_cells(state.velocity, spec, -params.world.clearing_time), strict=True):
+    for mass, back in zip(occupied, origins(state.velocity, spec, params.world), strict=True):
         left += _moved(mass, back)
     cleared = clear_wakes(given.probability, left, evidence.occupied == evidence.free)
     occupied[0] = cleared[STATIC]

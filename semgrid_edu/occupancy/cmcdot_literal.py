@@ -92,8 +92,8 @@ def predict_literal(
     particles = fly_literal(particles, world.max_acceleration, dt, rng)
     end = cells_of_literal(particles.position, spec)
     came = end != start
-    origin = cells_at_literal(particles, end, spec, -world.clearing_time)
-    ahead = cells_at_literal(particles, end, spec, world.clearing_time)
+    origin = cells_at_literal(particles, end, spec, -world.clearing_time, world.clearing_cells)
+    ahead = cells_at_literal(particles, end, spec, world.clearing_time, world.clearing_cells)
     out_of_a_wall = scale_in_cells_literal(particles.weight * came, origin, mixed[STATIC])
     doubt = out_of_a_wall - scale_in_cells_literal(out_of_a_wall, ahead, mixed[FREE])
     stays = weight_in_cells_literal(particles.weight * ~came, end, spec.shape)
@@ -164,7 +164,7 @@ def update_literal(state: FilterState, spec: GridSpec, evidence: Evidence, world
     factor = ratio(of_occupied, p_z)
     cells = cells_of_literal(state.particles.position, spec)
     weight = scale_in_cells_literal(state.particles.weight, cells, factor)
-    origin = cells_at_literal(state.particles, cells, spec, -world.clearing_time)
+    origin = cells_at_literal(state.particles, cells, spec, -world.clearing_time, world.clearing_cells)
     left = weight_in_cells_literal(weight, origin, spec.shape)
     static = clear_wakes_literal(posterior[STATIC], left, evidence.occupied == evidence.free)
     posterior[FREE], posterior[STATIC] = posterior[FREE] + posterior[STATIC] - static, static

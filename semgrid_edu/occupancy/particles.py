@@ -131,7 +131,7 @@ def _by_origin(before, after, n_cells):
     return origin
 
 
-def cells_at(particles: Particles, cells: NDArray, spec: GridSpec, time: float) -> NDArray[np.int32]:
+def cells_at(particles: Particles, cells: NDArray, spec: GridSpec, time: float, fewest: float) -> NDArray[np.int32]:
     """Return the cell in which each particle was or will be at another time, if it is another cell than now.
 
     Parameters
@@ -144,6 +144,8 @@ def cells_at(particles: Particles, cells: NDArray, spec: GridSpec, time: float) 
         The cells, (H, W).
     time : float
         Seconds from now, negative for the past: a particle at x with velocity v is taken to be at x + v time.
+    fewest : float
+        Number of cells that a particle covers at least; a slow one is given more time. When `time` is 0 it isn't.
 
     Returns
     -------
@@ -154,14 +156,17 @@ def cells_at(particles: Particles, cells: NDArray, spec: GridSpec, time: float) 
         (particles.position.ravel(), particles.velocity.ravel()),
         (spec.shape, spec.x_max, spec.y_max, spec.cell),
     )
-    return _cells_at(*now, cells, np.float32(time), *grid)
+    return _cells_at(*now, cells, np.float32(time), np.float32(fewest * spec.cell), *grid)
 
 
 @njit(cache=True, error_model="numpy")
-def _cells_at(xy, velocity, cells, time, shape, x_max, y_max, cell):
+def _cells_at(xy, velocity, cells, time, least, shape, x_max, y_max, cell):
     there = np.empty(len(cells), np.int32)
     for i in range(len(cells)):
-        x, y = xy[2 * i] + time * velocity[2 * i], xy[2 * i + 1] + time * velocity[2 * i + 1]
+        vx, vy = velocity[2 * i], velocity[2 * i + 1]
+        speed = math.sqrt(vx * vx + vy * vy)
+        stretch = max(np.float32(1), least / (abs(time) * speed)) if time * speed != 0 else np.float32(0)
+        x, y = xy[2 * i] + stretch * time * vx, xy[2 * i + 1] + stretch * time * vy
         then = cell_of(x, y, shape, x_max, y_max, cell)
         there[i] = then if then != cells[i] else OUTSIDE
     return there

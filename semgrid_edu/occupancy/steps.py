@@ -73,7 +73,8 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
 
     - *It arrives, and the cell is STATIC.* Two solid things can't share a cell.
     - *It comes out of a wall and goes on along it, and the cell hasn't been seen to be free.* Such a particle was in a
-      place that is STATIC now, `clearing_time` ago, and will be in one that isn't known to be free, as long from now.
+      place that is STATIC now, `clearing_time` ago, and will be in one that isn't known to be free, as long from now;
+      slow ones are followed for `clearing_cells` both ways.
       It says no more than that the wall goes on, as walls do: what comes into view beside a wall is the next piece of
       it. Somebody who sets off also comes out of a place where something stood, but walks into free space.
 
@@ -119,8 +120,12 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
     particles = fly(particles, world.max_acceleration, dt, rng)
     cells = cells_of(particles.position, spec)
     came = by_origin(before, cells, going.size)
-    doubt = scale_in_cells(particles.weight, cells_at(particles, cells, spec, -world.clearing_time), mixed[STATIC])
-    doubt -= scale_in_cells(doubt, cells_at(particles, cells, spec, world.clearing_time), mixed[FREE])
+    origin, ahead = (
+        cells_at(particles, cells, spec, time, world.clearing_cells)
+        for time in (-world.clearing_time, world.clearing_time)
+    )
+    doubt = scale_in_cells(particles.weight, origin, mixed[STATIC])
+    doubt -= scale_in_cells(doubt, ahead, mixed[FREE])
     stays, arrives = weight_in_cells(particles.weight, came, (2, *spec.shape))
     doubtful = weight_in_cells(doubt, came, (2, *spec.shape))[1]
     probability, newborn, factor, less = meet(mixed, newborn, going, stays, arrives, doubtful)
@@ -167,7 +172,8 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
     posterior, factor = bayes(prior.probability, evidence.occupied, evidence.free)
     cells = cells_of(prior.particles.position, spec)
     weight = scale_in_cells(prior.particles.weight, cells, factor)
-    left = weight_in_cells(weight, cells_at(prior.particles, cells, spec, -world.clearing_time), spec.shape)
+    origin = cells_at(prior.particles, cells, spec, -world.clearing_time, world.clearing_cells)
+    left = weight_in_cells(weight, origin, spec.shape)
     cleared, newborn = clear_wakes(posterior, left, ~seen), (prior.newborn * factor).astype(np.float32)
     return FilterState(cleared, replace(prior.particles, weight=weight), newborn)
 

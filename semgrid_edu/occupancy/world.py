@@ -40,6 +40,9 @@ class WorldModel:
         Time, seconds, in which a moving thing leaves the place that it takes up: a car of 4.5 m at 9 m/s, a pedestrian
         of 0.5 m at 1 m/s. So where it was that long ago, it can't be any more. With 0 the filters look neither back nor
         ahead.
+    clearing_cells : float
+        The fewest cells that count as having left, for things too slow to get so far in `clearing_time`. A thing shows
+        in more cells than it fills, and a pedestrian doesn't get out of two cells of 0.5 m in half a second.
     sensor : Sensor
         Turns each scan into evidence. By default a `SensorModel`; any object will do whose `scan(points)` returns
         something with `evidence(spec, pose)`.
@@ -62,6 +65,7 @@ class WorldModel:
     max_acceleration: float = 4.0
     first_sight: tuple[float, float, float] = (0.952, 0.045, 0.003)
     clearing_time: float = 0.5
+    clearing_cells: float = 3.0
     sensor: Sensor = field(default_factory=SensorModel)
 
     def __post_init__(self) -> None:
@@ -69,7 +73,7 @@ class WorldModel:
         rates = np.asarray(self.rates, dtype=float)
         if rates.shape != (4, 4) or not np.isfinite(rates).all() or (rates < 0).any():
             raise ArgumentError("rates", "4 x 4 finite rates, none negative", self.rates)
-        for name in ("stop_rate", "max_acceleration", "clearing_time"):
+        for name in ("stop_rate", "max_acceleration", "clearing_time", "clearing_cells"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
                 raise ArgumentError(name, "a finite number, not negative", getattr(self, name))
         if not (np.isfinite(self.stop_speed) and self.stop_speed > 0):

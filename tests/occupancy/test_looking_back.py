@@ -20,6 +20,9 @@ from semgrid_edu.occupancy import (
     update,
     update_literal,
 )
+from semgrid_edu.occupancy.bof_steps import origins
+from semgrid_edu.occupancy.particles import cells_at, cells_of
+from semgrid_edu.occupancy.particles_literal import cells_at_literal
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 ROW = GridSpec(0, 16, 0, 1, 1)
@@ -96,10 +99,25 @@ def test_nothing_stands_where_something_has_come_from_unless_it_is_seen(updated,
     np.testing.assert_allclose(given[[FREE, STATIC], ORIGIN, 0], [1 - static, static], atol=2e-6)
 
 
-def test_a_time_that_is_no_time_is_refused():
-    for time in (-0.1, np.nan, np.inf):
-        with pytest.raises(ArgumentError, match="clearing_time"):
-            WorldModel(clearing_time=time)
+@pytest.mark.parametrize("velocity", [(1.0, 0.0), (-3.0, 4.0), (0.0, -6.0), (1e-3, 0.0), (0.0, 0.0)])
+def test_particles_look_back_half_a_second_and_slow_ones_three_cells(velocity):
+    """By hand, from the middle of a cell of 1 m: at 1 m/s three cells, at 5 m/s as well, at 6 m/s half a second."""
+    spec, v = GridSpec(0, 11, -5, 6, 1), np.array([velocity])
+    particles = Particles(np.full((1, 2), [5.5, 0.5], np.float32), v.astype(np.float32), np.ones(1, np.float32))
+    speed = np.linalg.norm(v)
+    for time in (-0.5, 0.5, 0.0):
+        there = [5.5, 0.5] + np.sign(time) * max(3.0, 0.5 * speed) * v / max(speed, 1e-30)
+        expected = np.array([-1]) if speed * time == 0 else cells_of(there.astype(np.float32), spec)
+        for look in (cells_at, cells_at_literal):
+            assert look(particles, cells_of(particles.position, spec), spec, time, 3.0) == expected
+        assert (origins(v, spec, STILL) == np.rint(there - [5.5, 0.5])).all() or time >= 0
+
+
+@pytest.mark.parametrize("name", ["clearing_time", "clearing_cells"])
+@pytest.mark.parametrize("value", [-0.1, np.nan, np.inf])
+def test_what_is_no_time_and_no_number_of_cells_is_refused(name, value):
+    with pytest.raises(ArgumentError, match=name):
+        WorldModel(**{name: value})
 
 
 def test_walls_that_come_into_view_stay_static():

@@ -107,6 +107,7 @@ class CellsInARow:
             rates=self.rates,
             first_sight=self.first_sight,
             clearing_time=self.clearing_time,
+            clearing_cells=0.0,
             max_acceleration=0.0,
             stop_rate=0.0,
         )
