@@ -15,7 +15,7 @@ CERTAIN = 1 - 1e-3
 """The most that arriving particles may claim of a cell. It is below 1, so that a scan can still contradict them."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def make_room(probability, claimed):
     """Let its particles decide how much of a cell is DYNAMIC; the other states share the rest in their old proportions.
 
@@ -47,7 +47,7 @@ def make_room(probability, claimed):
     return shared, factor
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def mix(probability, newborn, going, M):
     """Mix the states of each cell by the transition matrix: P(j) = sum_i M[i, j] P(i).
 
@@ -86,7 +86,7 @@ def mix(probability, newborn, going, M):
     return mixed, born
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def meet(mixed, newborn, going, stays, arrives, doubtful):
     """Let the dynamic mass that arrives in a cell meet what the cell holds, and strike out what can't both be true.
 
@@ -137,7 +137,7 @@ def meet(mixed, newborn, going, stays, arrives, doubtful):
     return probability, born, factor, less
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def clear_wakes(probability, left, hidden):
     """Strike out that something stands where a moving thing has been, in cells of which the scan says nothing.
 
@@ -165,7 +165,7 @@ def clear_wakes(probability, left, hidden):
     return cleared
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def bayes(prior, occupied, free):
     """Multiply by the likelihoods and normalise: P(state | z) = P(z | state) P(state) / P(z).
 
@@ -202,7 +202,7 @@ def bayes(prior, occupied, free):
     return posterior, factor
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def represent(probability, carried):
     """Make the particles of each cell carry its dynamic probability; without particles it turns UNKNOWN.
 
