@@ -713,8 +713,8 @@ print("P(STATIC) of cell 1 is wrong by {:.3f} without the rule and by {:.3f} wit
 #
 # The same look back helps at the other end of the flight. Drive past a long wall: with each scan a little more of it
 # comes into view. BOF takes cells as independent, so each new cell that is hit is one more coincidence: in the package
-# a cell that nobody has seen turns out to be STATIC with probability 0.05, else it is almost surely FREE. But
-# something that runs along the wall, just as fast as the wall comes into view, explains all of them at once. Take
+# a cell that nobody has seen turns out to be STATIC with a probability of about 0.05, else it is almost surely FREE.
+# But something that runs along the wall, just as fast as the wall comes into view, explains all of them at once. Take
 # eight cells: the first four stand with probability 0.97, the last three are UNKNOWN. About cell 5 there is a little
 # doubt: it stands with 0.95, and with 0.03 there is something in it that goes to the right.
 #
@@ -734,11 +734,11 @@ print("P(STATIC) of cell 1 is wrong by {:.3f} without the rule and by {:.3f} wit
 #
 # $$ \sigma_v = P(O_{c - v\,\tau}, 0)\, \bigl(1 - P(F_{c + v\,\tau})\bigr) $$
 #
-# for its velocity $v$, and $d = \sum_{v \ne 0} \sigma_v\, P(O_{c - v\,\Delta t}, v)$ of all arrivals is. In a cell that
-# nobody has seen to be free, a doubtful arrival is struck out, because more likely it is a wall that goes on: on a real
-# drive (KITTI 0013), of the cells first seen beside a standing one 70 % were occupied, of those without a standing
-# neighbour about 2 %. Nobody has seen to be free what is UNKNOWN, nor what moving mass has left in this very step: call
-# both together $u$. With the names of above:
+# if its velocity is $v$. Of everything that arrives, $d = \sum_{v \ne 0} \sigma_v\, P(O_{c - v\,\Delta t}, v)$ is
+# doubtful. In a cell that nobody has seen to be free, a doubtful arrival is struck out, because more likely it is a wall
+# that goes on: on a real drive (KITTI 0013), of the cells first seen beside a standing one 70 % were occupied, of those
+# without a standing neighbour about 2 %. Call $u$ the probability that nobody has seen the cell to be free: that it is
+# UNKNOWN, or that something moving has left it in this very step. With the names of above:
 #
 # $$ P(O_c, v) \leftarrow \frac{(1 - b_S - \sigma_v\, u)\, P(O_{c - v\,\Delta t}, v)}{1 - a\, b_S - d\, u}
 #    \ \ (v \ne 0) $$

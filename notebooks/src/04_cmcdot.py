@@ -869,11 +869,11 @@ assert shares[:, 2].mean() > 0.7
 # What is wrong with the particle's story? Ask where it comes from. Its *origin* is where it was a time $\tau$ ago, and
 # $\tau$ is so long that a moving thing has left the place that it takes up. As in lecture 03 that is half a second, and
 # at least three cells: in half a second a car of 4.5 m clears its own length at 9 m/s, but a pedestrian at 1.4 m/s
-# covers only 0.7 m, and hasn't left the two cells of 0.5 m in which they show. They are followed for 1.5 m,
-# which takes them 1.1 s. If something stands at the origin now, that thing hasn't flown away. Somebody who sets out
-# also comes out of a place where something stood, but walks into free space. So ask where it goes, too: is the place
-# where it will be, $\tau$ from now, FREE? What comes out of a wall and goes on along it, through cells that nobody has
-# seen, says only that the wall goes on. So strike out a second combination:
+# covers only 0.7 m, and may still be in one of the two cells of 0.5 m in which they showed. They are followed for
+# 1.5 m, which takes them 1.1 s. If something stands at the origin now, that thing hasn't flown away. Somebody who sets
+# out also comes out of a place where something stood, but walks into free space. So ask where the particle goes, too:
+# is the place where it will be, $\tau$ from now, FREE? What comes out of a wall and goes on along it, through cells
+# that nobody has seen, says only that the wall goes on. So strike out a second combination:
 #
 # | | the cell is UNKNOWN |
 # |---|---|

@@ -435,8 +435,8 @@ plt.show()
 #
 # **A car goes into the open.** Somebody who sets off also comes out of a place where something stood, and so does the
 # front of a car whose rear has been taken for standing. But they go where it is free, while a phantom goes on along its
-# wall. So each particle is also asked where it will be, $x + v\,\tau$. If that place isn't known to be FREE either, the
-# particle's claim is doubtful: it says no more than that the wall goes on.
+# wall. So each particle is also asked where it will be, $x + v\,\tau$. If something stands at its origin and the place
+# ahead isn't known to be FREE, the particle's claim is doubtful: it says no more than that the wall goes on.
 #
 # ### Rule one: doubtful arrivals
 #
@@ -455,8 +455,8 @@ plt.show()
 #
 # **Predict before you run.** The same particle arrives in a cell that is surely FREE. How DYNAMIC is it, by the rule?
 #
-# <details><summary>Answer</summary>0.6, as without it: nothing is struck out there. So what moves through space that has
-# been seen to be free is never doubted.</details>
+# <details><summary>Answer</summary>0.6, as without it: nothing is struck out there. That matters for a person who sets
+# off into the open, because they come out of the very place where the filter knew them to stand.</details>
 #
 # $$ P(\text{DYNAMIC}) = \frac{a\,(1 - s) - b\,u + (1 - a)\,d}{1 - a\,s - b\,u}, \qquad
 #    P(\text{other}) = \frac{(1 - a)\,P(\text{other})}{1 - a\,s - b\,u} $$
@@ -620,7 +620,7 @@ print("worse, in per cent:", *lost, sep="\n  ")
 # **Predict before you run.** We let slow things look back over more and more cells. What becomes of the walkers that
 # are found? And what of the phantoms on our street with walls?
 #
-# <details><summary>Answer</summary>More cells, more walkers; but from three cells on, the phantoms come back.</details>
+# <details><summary>Answer</summary>More cells, more walkers; but beyond three cells the phantoms come back.</details>
 
 # %%
 people, crowd = scenes_of("pedestrians", 1, spec, Suspect())
