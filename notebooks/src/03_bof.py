@@ -735,10 +735,10 @@ print("P(STATIC) of cell 1 is wrong by {:.3f} without the rule and by {:.3f} wit
 # $$ \sigma_v = P(O_{c - v\,\tau}, 0)\, \bigl(1 - P(F_{c + v\,\tau})\bigr) $$
 #
 # if its velocity is $v$. Of everything that arrives, $d = \sum_{v \ne 0} \sigma_v\, P(O_{c - v\,\Delta t}, v)$ is
-# doubtful. In a cell that nobody has seen to be free, a doubtful arrival is struck out, because more likely it is a wall
-# that goes on: on a real drive (KITTI 0013), of the cells first seen beside a standing one 70 % were occupied, of those
-# without a standing neighbour about 2 %. Call $u$ the probability that nobody has seen the cell to be free: that it is
-# UNKNOWN, or that something moving has left it in this very step. With the names of above:
+# doubtful. In a cell that nobody has seen to be free, a doubtful arrival is struck out, because more likely it is a
+# wall that goes on: on a real drive (KITTI 0013), of the cells first seen beside a standing one 70 % were occupied, of
+# those without a standing neighbour about 2 %. Call $u$ the probability that nobody has seen the cell to be free: that
+# it is UNKNOWN, or that something moving has left it in this very step. With the names of above:
 #
 # $$ P(O_c, v) \leftarrow \frac{(1 - b_S - \sigma_v\, u)\, P(O_{c - v\,\Delta t}, v)}{1 - a\, b_S - d\, u}
 #    \ \ (v \ne 0) $$

@@ -141,7 +141,8 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
 
     Of a cell that is hidden a scan says nothing, but what moves does: one thing can't be in two places. Where a thing
     was `clearing_time` ago (a slow one, `clearing_cells` ago) it isn't any more, so "it has come from there" and "it
-    stands there" are struck out together (`clear_wakes`). This is how a car that was taken for a standing one at first takes that belief along when it goes.
+    stands there" are struck out together (`clear_wakes`). This is how a car that was taken for a standing one at first
+    takes that belief along when it goes.
 
     Parameters
     ----------
