@@ -12,7 +12,7 @@
 #
 # **Prerequisites.** Lectures 01 (Bayes' rule on a line) and 02 (evidence, the smear behind a moving car).
 #
-# **Time.** 115 minutes, of which the computer needs less than one.
+# **Time.** 120 minutes, of which the computer needs less than one.
 #
 # **Paper.** Section 3.2: the ancestor of its filter, the Bayesian occupancy filter (BOF) of Coué, Pradalier, Laugier,
 # Fraichard and Bessière, IJRR 2006. The paper prints no equation for it; those below bear no number.

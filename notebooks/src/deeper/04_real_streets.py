@@ -14,7 +14,7 @@
 # **Prerequisites.** Lecture [04](../04_cmcdot.ipynb); factors and d-separation, as in
 # [graphical models](graphical_models.ipynb).
 #
-# **Time.** 60 minutes, of which the computer needs less than one.
+# **Time.** 65 minutes, of which the computer needs less than one.
 
 # %% jupyter={"source_hidden": true}
 import json
@@ -720,8 +720,8 @@ plt.show()
 # ## Questions to try
 #
 # 1. Take `replace(AFTER, clearing_time=t, clearing_cells=0)` for $t$ of 0.1, 0.25, 1 and 2 s, and print `phantoms_left`
-#    and `walkers_found`. Why is a very short time of no use? And what becomes of the origin of a car that brakes if the
-#    time is very long?
+#    and `walkers_found`. Why does a short time cost walkers, and why does a long time bring phantoms back? And what
+#    becomes of the origin of a car that brakes if the time is very long?
 # 2. Set `first_sight=(0.3, 0.697, 0.003)`, as if each new cell were beside a wall, with `clearing_time=0`. Do the
 #    phantoms go? What happens on the street `"convoy"`, to cars that come out of a shadow?
 # 3. Compute `first_sights` for `scenes_of("pedestrians", 1, spec, Suspect())`. How much is DYNAMIC beside something
