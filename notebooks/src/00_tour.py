@@ -224,7 +224,7 @@ plt.show()
 # The vehicle is at the bottom, in the middle. A cell mixes the colours of its four states. On the left one scan: free
 # ground along the beams, dark where they end, grey behind. On the right the filter has seen the street for two
 # seconds: the beams have grown together, free is whiter and static darker, since each scan adds to the belief. What
-# moves is orange, with an arrow as long as its way in the next half second.
+# moves is orange, with an arrow as long as the distance that it covers in the next half second.
 
 # %% [markdown]
 # ## Stage 2, $i \to s$: what it looks like

@@ -12,7 +12,7 @@
 #
 # **Prerequisites.** Lectures 01 (Bayes' rule on a line) and 02 (evidence, the smear behind a moving car).
 #
-# **Time.** 115 minutes, of which the computer needs less than one.
+# **Time.** 120 minutes, of which the computer needs less than one.
 #
 # **Paper.** Section 3.2: the ancestor of its filter, the Bayesian occupancy filter (BOF) of Coué, Pradalier, Laugier,
 # Fraichard and Bessière, IJRR 2006. The paper prints no equation for it; those below bear no number.
@@ -39,6 +39,7 @@ from semgrid_edu.graphical.stages.cells_in_a_row import Cell, CellsInARow
 from semgrid_edu.graphical.stages.joint_row import row_evidence, row_model
 from semgrid_edu.illustrations.boxes import Box, cells_in, scan_boxes
 from semgrid_edu.occupancy.bof_literal import clear_wakes_literal, mass_that_left, strike_out
+from semgrid_edu.occupancy.bof_steps import origins
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 FREE, STATIC, DYNAMIC, UNKNOWN = State
@@ -125,7 +126,8 @@ for when in ("a second later", "cell 3 is hit"):
 line = GridSpec(x_min=0, x_max=6, y_min=0, y_max=1, cell=1)
 lattice = VelocityLattice(max_speed=1, spacing=1)
 on_line = [lattice.velocities.tolist().index([v, 0]) for v in V]
-steady = WorldModel(rates=((0.0,) * 4,) * 4, stop_rate=0, max_acceleration=0)  # things move, and that is all
+no_change = ((0.0,) * 4,) * 4
+steady = WorldModel(rates=no_change, stop_rate=0, max_acceleration=0, clearing_time=0)  # things move, and that is all
 nothing_else = BofParams(lattice, steady)
 
 
@@ -218,8 +220,8 @@ for _ in range(20):
 
 # %% [markdown]
 # `bof_predict_literal` is the same with two dimensions, any lattice and three things more, which come below: cells that
-# change by themselves, things that accelerate, and a look back at where things came from. `bof_predict` shifts whole
-# arrays.
+# change by themselves, things that accelerate, and a look back and ahead at where things came from and where they go.
+# `bof_predict` shifts whole arrays.
 
 # %%
 a = np.linspace(0, 0.999, 200)
@@ -654,10 +656,16 @@ print(f"BOF expects {expected_things(plain)[-1]:.2f} things in the row")
 # BOF keeps one distribution per cell, so it has forgotten that cell 1 and cell 6 tell of the same thing.
 #
 # It can't remember that for all pairs of cells, but it can look back. A thing that moves with velocity $v$ was at
-# $c - v\,\tau$ a time $\tau$ ago, and when $\tau$ is long enough, it has left the place that it takes up there. The
-# package takes $\tau$ = 0.5 s (`clearing_time`): in that time a car of 4.5 m clears its own length at 9 m/s, and a
-# pedestrian of half a metre at 1 m/s. So "something has gone from here" and "something stands here" exclude each
-# other, like arriving and standing before. Strike the pair out, in cells that the scan doesn't see:
+# $c - v\,\tau$ a time $\tau$ ago, and when $\tau$ is long enough, it has left the place that it takes up there. How
+# long is enough? In half a second a car of 4.5 m clears its own length at 9 m/s, and a pedestrian of half a metre at 1
+# m/s. But on a map a thing shows in more cells than it fills, because it hardly ever lies between two borders just so:
+# half a metre mostly lies across two cells of half a metre. Somebody who walks at 1 m/s has gone just one cell further
+# after half a second, and is still in one of the two. So the rule is **half a second, and at least three cells**
+# (`clearing_time` and `clearing_cells`): $\tau$ is 0.5 s, and for a slow thing the time that it needs for three cells.
+# With cells of 0.5 m that concerns what is slower than 3 m/s; in our row half a second is five cells.
+#
+# So "something has gone from here" and "something stands here" exclude each other, like arriving and standing before.
+# Strike the pair out, in cells that the scan doesn't see:
 #
 # $$ a^-_c = \sum_{v \ne 0} P(O_{c + v\,\tau}, v), \qquad
 #    P(O_c, 0) \leftarrow \frac{(1 - a^-_c)\, b_S}{1 - a^-_c\, b_S}, \qquad b_S = P(O_c, 0) $$
@@ -687,7 +695,7 @@ five = shadow.params.lattice.velocities  # (0, 0), and 5 m/s forward, back, left
 mass = np.zeros((len(five), 1, 6))
 for k, v in enumerate(V):
     mass[five.tolist().index([0, -5 * v]), 0] = at_end[k]  # y points to the left
-left = mass_that_left(mass, shadow.spec, five, time=0.5)
+left = mass_that_left(mass, origins(five, shadow.spec, replace(shadow, clearing_time=0.5).params.world))
 package = clear_wakes_literal(mass[0], left, np.array([[True] * 5 + [False]]))
 np.testing.assert_allclose(cleared[1], package[0], atol=1e-12)
 back = bof_beliefs(replace(shadow, clearing_time=0.5))
@@ -705,8 +713,8 @@ print("P(STATIC) of cell 1 is wrong by {:.3f} without the rule and by {:.3f} wit
 #
 # The same look back helps at the other end of the flight. Drive past a long wall: with each scan a little more of it
 # comes into view. BOF takes cells as independent, so each new cell that is hit is one more coincidence: in the package
-# a cell that nobody has seen turns out to be STATIC with probability 0.05, else it is almost surely FREE. But
-# something that runs along the wall, just as fast as the wall comes into view, explains all of them at once. Take
+# a cell that nobody has seen turns out to be STATIC with a probability of about 0.05, else it is almost surely FREE.
+# But something that runs along the wall, just as fast as the wall comes into view, explains all of them at once. Take
 # eight cells: the first four stand with probability 0.97, the last three are UNKNOWN. About cell 5 there is a little
 # doubt: it stands with 0.95, and with 0.03 there is something in it that goes to the right.
 #
@@ -718,29 +726,37 @@ print("P(STATIC) of cell 1 is wrong by {:.3f} without the rule and by {:.3f} wit
 # 0.72 for cell 7, and 0.96 for cell 8: a phantom that nothing has ever been.</details>
 #
 # Joint inference isn't fooled: if something had run out of cell 5, no beam could come back from there any more. That is
-# one thing in two places again. So look back when something arrives: call $\sigma_v$ the probability that something
-# stands where it came from, $\tau$ ago. That share of the arrivals is doubtful, $d = \sum_{v \ne 0} \sigma_v\, P(O_{c -
-# v\,\Delta t}, v)$. A doubtful arrival in a cell that nobody has seen yet (UNKNOWN, with probability $b_U$) is struck
-# out, because more likely it is a wall that goes on: on a real drive (KITTI 0013), of the cells first seen beside a
-# standing one 70 % were occupied, of those without a standing neighbour about 2 %. With the names of above:
+# one thing in two places again. So look back when something arrives: does something stand where it was $\tau$ ago? By
+# itself that isn't enough to doubt it. Somebody who sets off comes out of a place where something stood, and the front
+# of a car comes out of its rear, which BOF takes for standing at first. But they go into the open, while a phantom goes
+# on along its wall. So look ahead, too: is the place where it will be, $\tau$ from now, FREE? The arrival is doubtful
+# with probability
 #
-# $$ P(O_c, v) \leftarrow \frac{(1 - b_S - \sigma_v\, b_U)\, P(O_{c - v\,\Delta t}, v)}{1 - a\, b_S - d\, b_U}
+# $$ \sigma_v = P(O_{c - v\,\tau}, 0)\, \bigl(1 - P(F_{c + v\,\tau})\bigr) $$
+#
+# if its velocity is $v$. Of everything that arrives, $d = \sum_{v \ne 0} \sigma_v\, P(O_{c - v\,\Delta t}, v)$ is
+# doubtful. In a cell that nobody has seen to be free, a doubtful arrival is struck out, because more likely it is a
+# wall that goes on: on a real drive (KITTI 0013), of the cells first seen beside a standing one 70 % were occupied, of
+# those without a standing neighbour about 2 %. Call $u$ the probability that nobody has seen the cell to be free: that
+# it is UNKNOWN, or that something moving has left it in this very step. With the names of above:
+#
+# $$ P(O_c, v) \leftarrow \frac{(1 - b_S - \sigma_v\, u)\, P(O_{c - v\,\Delta t}, v)}{1 - a\, b_S - d\, u}
 #    \ \ (v \ne 0) $$
 #
-# In a cell known to be free a doubtful arrival still counts, because people do set off from where they stood.
+# In a cell that has been seen to be free every arrival counts, doubtful or not.
 
 
 # %% tags=["bof-origins"]
-def arrive_in_doubt(arrives, standing, static, unknown):
-    """Return what is left of arrivals (V,) in one cell, when P(STATIC) where each came from is `standing` (V,)."""
-    doubtful = (arrives * standing).sum()
-    possible = 1 - arrives.sum() * static - doubtful * unknown
-    return arrives * (1 - static - standing * unknown) / possible
+def arrive_in_doubt(arrives, doubt, static, unseen):
+    """Return what is left of arrivals (V,) in one cell, each of which comes along a wall with probability `doubt`."""
+    doubtful = (arrives * doubt).sum()
+    possible = 1 - arrives.sum() * static - doubtful * unseen
+    return arrives * (1 - static - doubt * unseen) / possible
 
 
-arrives, standing = np.array([0.02, 0.0, 0.01]), np.array([0.97, 0.0, 0.4])
-_, sure, less = strike_out(0.2, arrives.sum(), 0.5, (arrives * standing).sum())
-np.testing.assert_allclose(arrive_in_doubt(arrives, standing, 0.2, 0.5), arrives * (sure - standing * less))
+arrives, doubt = np.array([0.02, 0.0, 0.01]), np.array([0.97, 0.0, 0.4])
+_, sure, less = strike_out(0.2, arrives.sum(), 0.5, (arrives * doubt).sum())
+np.testing.assert_allclose(arrive_in_doubt(arrives, doubt, 0.2, 0.5), arrives * (sure - doubt * less))
 wall = CellsInARow(
     ({"static": 0.97},) * 4 + ({"static": 0.95, "right": 0.03},) + ({"unknown": 1.0},) * 3,
     ("xxxxxx??", "xxxxxxx?", "xxxxxxxx"),
@@ -770,10 +786,11 @@ plt.show()
 
 # %% [markdown]
 # Left, the line with squares drops to the exact answer at the fifth scan. Right, it stays with the exact answer near
-# zero, while the dotted one takes the wall for something that runs.
+# zero, while the dotted one takes the wall for something that runs. (Half a second ahead lies beyond the end of this
+# short row, so that place isn't known to be free.)
 #
-# **Where looking back goes wrong.** Joint inference weighs whole histories; the rule only presumes one, that the thing
-# has moved like this for half a second. Somebody who set off just now hasn't. Seven cells: in cell 1, hidden, stands
+# **Where looking back goes wrong.** Joint inference weighs whole histories; the rules only presume one, that the thing
+# has moved like this for a time $\tau$. Somebody who set off just now hasn't. Seven cells: in cell 1, hidden, stands
 # something with 0.9, and in cell 5 something begins to move to the right, this very moment.
 
 # %%
@@ -783,11 +800,11 @@ np.testing.assert_allclose(histories, [0.9, 0.009], atol=1e-3)
 print("P(STATIC) of cell 1: joint {:.3f}, BOF, looking back {:.3f}".format(*histories))
 
 # %% [markdown]
-# What stands is erased by something that has never been there, until a scan sees it again. Likewise a wall beside which
-# somebody sets off casts doubt on them. That is why the rules act only where nobody can look: the first in hidden
-# cells, the second in cells not seen before.
+# What stands is erased by something that has never been there, until a scan sees it again. Likewise somebody who sets
+# off beside something that stands, towards places that nobody has seen, is doubted. That is why the rules act only
+# where nobody has looked: the first in hidden cells, the second in cells that haven't been seen to be free.
 #
-# Back to the drive, now with the look back:
+# Back to the drive, now with the look back and ahead:
 
 # %%
 looking_back = follow_drive(WorldModel())  # clearing_time=0.5
@@ -800,7 +817,9 @@ assert ghosts_now[1] < 0.1 * streak
 
 # %% [markdown]
 # Of the stretch behind the first car less than one square metre is left in place of ten, and of all ghosts less than
-# half. The price is half a second: what a car left behind stays until the car has been seen to move for that long.
+# half. The price is the delay that you saw in the row: what a thing has left behind stays until the thing has been seen
+# to move for a time $\tau$, half a second for these cars. The companion
+# [phantoms on real streets](deeper/04_real_streets.ipynb) shows what the second rule costs.
 #
 # ## What it costs
 #

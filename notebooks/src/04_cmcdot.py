@@ -52,7 +52,9 @@ from semgrid_edu.occupancy import (
     Cmcdot, CmcdotParams, Evidence, FilterState, Particles, PlanarMotion, State, VelocityLattice,
     move, predict, resample, scan_evidence, track_drive, transition_matrix, update,
 )  # fmt: skip
+from semgrid_edu.occupancy.cells import OUTSIDE
 from semgrid_edu.occupancy.moving_map import scroll
+from semgrid_edu.occupancy.particles import cells_at, cells_of
 from semgrid_edu.occupancy.resampling import systematic_resample
 from semgrid_edu.occupancy.steps import reveal
 
@@ -71,7 +73,7 @@ FREE, STATIC, DYNAMIC, UNKNOWN = State
 # | $\omega_n$ | weight of particle $n$: the probability that it carries | `particles.weight` |
 # | $a$ | probability that something arrives in a cell | `arrives` |
 # | $a_w$ | the part of $a$ that comes out of a wall and goes on along it | `doubtful` |
-# | $\tau$ | how far the filter looks back and ahead along a particle's way, s | `params.clearing_time` |
+# | $\tau$ | how far it looks back and ahead, s (at least 3 cells) | `clearing_time`, `clearing_cells` of `params` |
 
 # %% [markdown]
 # ## Too many numbers
@@ -161,9 +163,9 @@ plt.show()
 
 # %% [markdown]
 # Both show the same street: a car that overtakes us (orange, 8 m ahead), oncoming cars on the left, walls and parked
-# cars dark. The few dark cells among the oncoming cars, 12 to 18 m ahead, are a mistake that you know from lecture 03:
-# cars that came in one another's shadow. Where the two pictures differ, the loop lies up to half a cell beside the
-# vehicle; step 1 tells why. Now each step by itself.
+# cars dark. The few darker cells among the oncoming cars, 15 to 21 m ahead, are what is left here of a mistake that you
+# know from lecture 03: cars that came in one another's shadow. Where the two pictures differ, the loop lies up to half
+# a cell beside the vehicle; step 1 tells why. Now each step by itself.
 
 # %% [markdown]
 # ## Step 1: move, or how not to blur
@@ -864,12 +866,14 @@ assert shares[:, 2].mean() > 0.7
 #
 # Three cells are enough, and a **phantom** runs along the wall.
 #
-# What is wrong with the particle's story? Ask where it comes from. Its *origin* is where it was $\tau$ = 0.5 s ago. In
-# that time a moving thing leaves the place that it takes up: a car of 4.5 m at 9 m/s does, and so does a pedestrian of
-# 0.5 m at 1 m/s. If something stands at the origin now, that thing hasn't flown away. Somebody who sets out also comes
-# out of a place where something stood, but walks into free space. So ask where it goes, too: is the place where it will
-# be 0.5 s from now FREE? What comes out of a wall and goes on along it, through cells that nobody has seen, says only
-# that the wall goes on. So strike out a second combination:
+# What is wrong with the particle's story? Ask where it comes from. Its *origin* is where it was a time $\tau$ ago, and
+# $\tau$ is so long that a moving thing has left the place that it takes up. As in lecture 03 that is half a second, and
+# at least three cells: in half a second a car of 4.5 m clears its own length at 9 m/s, but a pedestrian at 1.4 m/s
+# covers only 0.7 m, and may still be in one of the two cells of 0.5 m in which they showed. They are followed for
+# 1.5 m, which takes them 1.1 s. If something stands at the origin now, that thing hasn't flown away. Somebody who sets
+# out also comes out of a place where something stood, but walks into free space. So ask where the particle goes, too:
+# is the place where it will be, $\tau$ from now, FREE? What comes out of a wall and goes on along it, through cells
+# that nobody has seen, says only that the wall goes on. So strike out a second combination:
 #
 # | | the cell is UNKNOWN |
 # |---|---|
@@ -921,8 +925,8 @@ for origin_stands in (0.0, 0.8, 0.95):
 
 # %% [markdown]
 # The package's `predict` must say the same. A particle flies at 10 m/s from cell 4 into cell 5, which is partly
-# UNKNOWN. Half a second ago it was in cell 0, which is STATIC with probability 0.95. Where it will be in half a second
-# lies outside the map, so that isn't known to be free:
+# UNKNOWN. It is fast enough: half a second ago it was five cells further back, in cell 0, which is STATIC with
+# probability 0.95. Where it will be in half a second lies outside the map, so that isn't known to be free:
 
 # %%
 b = np.zeros((4, 6))
@@ -938,7 +942,7 @@ assert 0.04 < params.first_sight[STATIC] < 0.06  # about 5 %
 # **The same question in step 3.** A car comes into view, is called STATIC at first sight, drives on, and hides the
 # cells that it has left. No scan corrects them, so they stay dark for seconds. In lecture 03 the next car got caught in
 # such cells. But one thing can't be in two places. Say that a hidden cell is STATIC with probability 0.9, and that 0.9
-# of dynamic mass was there half a second ago. "It has gone from here" and "it stands here" can't both be true, so
+# of dynamic mass was there a time $\tau$ ago. "It has gone from here" and "it stands here" can't both be true, so
 # strike 0.81 out. Of STATIC is left $0.1 \cdot 0.9 / 0.19 = 0.47$; the cell is FREE otherwise.
 
 # %%
@@ -1013,11 +1017,12 @@ assert 0.02 < called["beside", True] < called["beside", False]
 # %% tags=["nbval-ignore-output"]
 def standing_at_origin(box, x, points, belief, particles):
     """Mean P(STATIC) at the origins of the moving particles in the cells of a box."""
-    rows, cols, inside = spec.cells(particles.position)
-    in_box = inside & (cells_in(box, spec, x, margin=0.3) & hit_cells(points, spec))[rows, cols]
+    cells = cells_of(particles.position, spec)
+    in_box = (cells_in(box, spec, x, margin=0.3) & hit_cells(points, spec)).ravel()[cells] & (cells != OUTSIDE)
     chosen = in_box & (np.hypot(*particles.velocity.T) > 1)
-    rows, cols, inside = spec.cells((particles.position - params.clearing_time * particles.velocity)[chosen])
-    return np.average(belief.probability[STATIC, rows, cols] * inside, weights=particles.weight[chosen])
+    origin = cells_at(particles, cells, spec, -params.clearing_time, params.clearing_cells)
+    stands = np.where(origin == OUTSIDE, 0, belief.probability[STATIC].ravel()[origin])
+    return np.average(stands[chosen], weights=particles.weight[chosen])
 
 
 wall = STREETS["beside"][0]
@@ -1027,7 +1032,9 @@ assert np.mean(early) < 0.5
 
 # %% [markdown]
 # The rule has a price too: when somebody sets out from where they stood and goes where nobody has seen, into a shadow
-# for instance, their arrival is struck out as well.
+# for instance, their arrival is struck out as well. The companion
+# [phantoms on real streets](deeper/04_real_streets.ipynb) measures the price, and another one comes in the section
+# "Where this breaks".
 
 # %% [markdown]
 # ## What a particle is worth
@@ -1283,6 +1290,7 @@ def bus(t):
 
 
 seen = list(watch(lambda t: [bus(t)], 3.0))
+blind = list(watch(lambda t: [bus(t)], 3.0, params=replace(params, clearing_time=0.0)))
 t, x, points, belief, _ = seen[15]
 fig, axes = plt.subplots(1, 3, figsize=(13, 3.4), layout="constrained", width_ratios=[1, 2, 2])
 plotting.occupancy(spec, belief.probability, ax=axes[0], legend=False)
@@ -1296,15 +1304,20 @@ for ax, ahead in zip(axes[1:], (3.2, 12.2), strict=True):
     ax.set_title(f"the ring {ahead:.0f} m ahead")
 axes[1].get_legend().remove()
 plt.show()
+standing = [run[-1][3].probability[STATIC, row[0], col[0]] for run in (blind, seen)]
+print("P(STATIC) at the ring 12 m ahead, at 2.9 s: doesn't look back {:.1f}, looks back {:.1f}".format(*standing))
+assert standing[0] < 0.2 < 0.8 < standing[1]
 
 # %% [markdown]
 # <details><summary>Answer</summary>3 m ahead: STATIC, for two seconds, and then surprisingly FREE. 12 m ahead: FREE,
-# then DYNAMIC when the front comes; but STATIC gains a little while the bus goes by.</details>
+# then DYNAMIC when the front comes. But from 2 s on STATIC takes over, although the bus still drives by.</details>
 #
-# This is the **aperture problem**: through the hole of one cell, a long smooth side that slides past looks like a
-# wall, and STATIC predicts a wall perfectly. The same rule keeps the fence beside a moving vehicle from moving, so
-# you can't have one without the other. You have seen its mirror image on the wall beside the road: the edge of what you
-# see of it runs along the wall, and looks like something that moves.
+# This is the **aperture problem**: through the hole of one cell, a long smooth side that slides past looks like a wall,
+# and STATIC predicts a wall perfectly. Looking back makes it worse, as the printed line says. Half a second ago, a
+# particle in the side of the bus was 4 m further back, in a piece of the side that is called STATIC already, and half a
+# second ahead is still the bus. So to the filter it comes out of a wall and goes on along it. The same rule keeps the
+# fence beside a moving vehicle from moving, so you can't have one without the other. You have seen its mirror image on
+# the wall beside the road: the edge of what you see of it runs along the wall, and looks like something that moves.
 #
 # **Somebody starts to walk.** A person stands for two seconds, then walks at 1.4 m/s. A car is hidden by a van: a
 # narrow one, for less than a second, and a wide one, for more than two. How long until the filter knows again?

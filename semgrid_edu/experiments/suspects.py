@@ -59,8 +59,8 @@ def without_pillars(drive: SimulatedDrive) -> None:
 def arrivals_barred() -> AbstractContextManager:
     """Return a context in which the filter takes each arrival for one that comes out of something that stands.
 
-    So nothing that arrives may claim an UNKNOWN cell. It replaces the compiled rule of `cellwise.meet`, because no
-    parameter of the filter goes as far.
+    So nothing that arrives may claim a cell that hasn't been seen to be free. It replaces the compiled rule of
+    `cellwise.meet`, because no parameter of the filter goes as far.
 
     Returns
     -------

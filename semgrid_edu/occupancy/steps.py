@@ -140,8 +140,9 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
     said anything of the cell; as soon as one does, `reveal` first shares its UNKNOWN mass among the other states.
 
     Of a cell that is hidden a scan says nothing, but what moves does: one thing can't be in two places. Where a thing
-    was `clearing_time` ago it isn't any more, so "it has come from there" and "it stands there" are struck out together
-    (`clear_wakes`). This is how a car that was taken for a standing one at first takes that belief along when it goes.
+    was `clearing_time` ago (a slow one, `clearing_cells` ago) it isn't any more, so "it has come from there" and "it
+    stands there" are struck out together (`clear_wakes`). This is how a car that was taken for a standing one at first
+    takes that belief along when it goes.
 
     Parameters
     ----------
@@ -153,7 +154,7 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
         What the scan says of each cell. However small the two likelihoods are, only their ratio counts. Where nothing
         that was held possible explains the scan, the cell becomes UNKNOWN.
     world : WorldModel
-        What UNKNOWN cells turn out to be, `first_sight`, and `clearing_time`.
+        What UNKNOWN cells turn out to be, `first_sight`, and how soon things have left a place.
 
     Returns
     -------

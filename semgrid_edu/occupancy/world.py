@@ -41,8 +41,9 @@ class WorldModel:
         of 0.5 m at 1 m/s. So where it was that long ago, it can't be any more. With 0 the filters look neither back nor
         ahead.
     clearing_cells : float
-        The fewest cells that count as having left, for things too slow to get so far in `clearing_time`. A thing shows
-        in more cells than it fills, and a pedestrian doesn't get out of two cells of 0.5 m in half a second.
+        Number of cells that a thing covers at least before it counts as having left a place. One that is too slow for
+        this in `clearing_time` is followed for longer, because a thing shows in more cells than it fills: a pedestrian
+        doesn't get out of two cells of 0.5 m in half a second.
     sensor : Sensor
         Turns each scan into evidence. By default a `SensorModel`; any object will do whose `scan(points)` returns
         something with `evidence(spec, pose)`.

@@ -63,7 +63,7 @@ class CellsInARow:
     clearing_time : float
         How far back and ahead the filters look, seconds, as in `WorldModel`; exact inference doesn't need it. By
         default that is five cells, so it makes no difference in a row of at most five. With `DT` it is the cell next
-        door.
+        door, because `clearing_cells` is 0 here: everything that moves is equally fast.
 
     Raises
     ------
