@@ -45,8 +45,8 @@ def bof_predict_literal(state: BofState, spec: GridSpec, params: BofParams, dt: 
     stays += params.lattice.prior[:, None, None] * newborn
     back = origins(state.velocity, spec, params.world)
     out_of_a_wall = elsewhere_literal(own[STATIC], back)
-    into_the_open = elsewhere_literal(own[FREE], -back)
-    doubt, occupied = out_of_a_wall * (1 - into_the_open), np.zeros(state.occupied.shape)
+    along_no_wall = elsewhere_literal(1 - own[STATIC] - own[UNKNOWN], -back)
+    doubt, occupied = out_of_a_wall * (1 - along_no_wall), np.zeros(state.occupied.shape)
     for row, col in np.ndindex(spec.shape):
         here = own[:, row, col], vacated[row, col], stays[:, row, col], arrives[:, row, col], doubt[:, row, col]
         own[:, row, col], occupied[:, row, col] = meet_in_cell(*here)

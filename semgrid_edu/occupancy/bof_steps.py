@@ -260,7 +260,7 @@ def bof_velocity(state: BofState) -> tuple[NDArray[np.float32], NDArray[np.float
 
 def _doubt(mixed: NDArray, reach: NDArray[np.int64]) -> NDArray[np.float32]:
     """Return which part of the mass of one velocity comes out of a wall and goes on along it, cell by cell."""
-    return _moved(mixed[STATIC], reach) * (1 - _moved(mixed[FREE], -reach))
+    return _moved(mixed[STATIC], reach) * (1 - _moved(mixed[FREE] + mixed[DYNAMIC], -reach))
 
 
 def _moved(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:

@@ -95,7 +95,7 @@ def predict_literal(
     origin = cells_at_literal(particles, end, spec, -world.clearing_time, world.clearing_cells)
     ahead = cells_at_literal(particles, end, spec, world.clearing_time, world.clearing_cells)
     out_of_a_wall = scale_in_cells_literal(particles.weight * came, origin, mixed[STATIC])
-    doubt = out_of_a_wall - scale_in_cells_literal(out_of_a_wall, ahead, mixed[FREE])
+    doubt = out_of_a_wall - scale_in_cells_literal(out_of_a_wall, ahead, mixed[FREE] + mixed[DYNAMIC])
     stays = weight_in_cells_literal(particles.weight * ~came, end, spec.shape)
     arrives = weight_in_cells_literal(particles.weight * came, end, spec.shape)
     doubtful = weight_in_cells_literal(doubt, end, spec.shape)

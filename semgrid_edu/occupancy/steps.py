@@ -73,10 +73,10 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
 
     - *It arrives, and the cell is STATIC.* Two solid things can't share a cell.
     - *It comes out of a wall and goes on along it, and the cell hasn't been seen to be free.* Such a particle was in a
-      place that is STATIC now, `clearing_time` ago, and will be in one that isn't known to be free, as long from now;
-      slow ones are followed for `clearing_cells` both ways.
-      It says no more than that the wall goes on, as walls do: what comes into view beside a wall is the next piece of
-      it. Somebody who sets off also comes out of a place where something stood, but walks into free space.
+      place that is STATIC now, `clearing_time` ago, and will be in one that is STATIC or UNKNOWN, as long from now;
+      slow ones are followed for `clearing_cells` both ways. It says no more than that the wall goes on, as walls do:
+      what comes into view beside a wall is the next piece of it. Somebody who sets off also comes out of a place where
+      something stood, but walks into free space; and before the side of a long vehicle something else is moving.
 
     With s and d the cell's own static and dynamic probability, u the probability that it is UNKNOWN or has only been
     left just now, and b the part of a that comes out of a wall and goes on along it, what is left is
@@ -125,7 +125,7 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
         for time in (-world.clearing_time, world.clearing_time)
     )
     doubt = scale_in_cells(particles.weight, origin, mixed[STATIC])
-    doubt -= scale_in_cells(doubt, ahead, mixed[FREE])
+    doubt -= scale_in_cells(doubt, ahead, mixed[FREE] + mixed[DYNAMIC])
     stays, arrives = weight_in_cells(particles.weight, came, (2, *spec.shape))
     doubtful = weight_in_cells(doubt, came, (2, *spec.shape))[1]
     probability, newborn, factor, less = meet(mixed, newborn, going, stays, arrives, doubtful)

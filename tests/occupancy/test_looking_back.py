@@ -47,6 +47,17 @@ def flying(static: float, target: State, ahead: State = UNKNOWN, weight: float =
     return FilterState(probability, particles, np.zeros(ROW.shape, np.float32))
 
 
+def with_another(state: FilterState, rows: int, weight: float) -> FilterState:
+    """Add a particle of the same velocity, some rows below."""
+    particles, shift = state.particles, np.array([[-rows, 0]], np.float32)
+    both = Particles(
+        np.concatenate([particles.position, particles.position + shift]),
+        np.repeat(particles.velocity, 2, axis=0),
+        np.append(particles.weight, np.float32(weight)),
+    )
+    return replace(state, particles=both)
+
+
 TWINS = pytest.mark.parametrize("predicted", [predict, predict_literal])
 
 
@@ -62,7 +73,8 @@ def test_along_a_wall_into_a_cell_nobody_has_seen_the_origin_counts(predicted, s
 
 @TWINS
 @pytest.mark.parametrize(
-    ("target", "ahead", "world"), [(UNKNOWN, FREE, STILL), (FREE, UNKNOWN, STILL), (UNKNOWN, UNKNOWN, BLIND)]
+    ("target", "ahead", "world"),
+    [(UNKNOWN, FREE, STILL), (FREE, UNKNOWN, STILL), (UNKNOWN, UNKNOWN, BLIND)],
 )
 def test_what_goes_out_into_the_open_is_believed(predicted, target, ahead, world):
     """Out of a wall, but with free space before it, or already in it; and by filters that don't look."""
@@ -71,17 +83,19 @@ def test_what_goes_out_into_the_open_is_believed(predicted, target, ahead, world
 
 
 @TWINS
+def test_what_follows_something_that_moves_is_believed(predicted):
+    """As the side of a long vehicle, of which the rear was taken for a standing thing: what moves ahead is no wall."""
+    state = with_another(flying(1.0, UNKNOWN, DYNAMIC), AHEAD - BEFORE, 1.0)
+    given = predicted(state, ROW, STILL, 0.1, np.random.default_rng(0))
+    np.testing.assert_allclose(given.probability[[UNKNOWN, DYNAMIC], TARGET, 0], 0.5, atol=1e-6)
+
+
+@TWINS
 def test_a_cell_that_has_only_been_left_counts_as_unseen(predicted):
     """By hand: what was there, 0.4, flies on, so u = 0.4 and P(DYNAMIC) = (a - b u) / (1 - b u) with a = b = 0.5."""
     state = flying(1.0, FREE)
     state.probability[:, TARGET, 0] = 0.6, 0, 0.4, 0
-    there = state.particles.position + np.array([[1, 0]], np.float32)
-    particles = Particles(
-        np.concatenate([state.particles.position, there]),
-        np.repeat(state.particles.velocity, 2, axis=0),
-        np.array([0.5, 0.4], np.float32),
-    )
-    given = predicted(replace(state, particles=particles), ROW, STILL, 0.1, np.random.default_rng(0))
+    given = predicted(with_another(state, TARGET - BEFORE, 0.4), ROW, STILL, 0.1, np.random.default_rng(0))
     np.testing.assert_allclose(given.probability[DYNAMIC, TARGET, 0], 0.3 / 0.8, atol=1e-6)
 
 

@@ -153,14 +153,14 @@ def _flight(goes_on: float) -> NDArray[np.float64]:
 
 
 def _along_a_wall(world: CellsInARow, cell: int, M: NDArray) -> NDArray[np.float64]:
-    """P(o1 | x1): something stands where the thing was `clearing_time` ago, and where it will be then isn't free."""
+    """P(o1 | x1): it came from where something stands, `clearing_time` ago, and will be where that may stand, too."""
     by_now, last = world.belief @ np.eye(N_STATES)[list(STATE_OF)] @ M, len(world.belief) - 1
     steps, doubt = round(world.clearing_time / DT), np.zeros(len(HERE))
     for state, (place, velocity) in enumerate(PLACES, start=1):
         origin, ahead = cell - 1 - velocity * steps, cell - 1 + velocity * steps
         if place == 0 and steps > 0 and 0 <= origin <= last:
-            free = by_now[ahead, FREE] if 0 <= ahead <= last else 0.0
-            doubt[state] = by_now[origin, STATIC] * (1 - free)
+            wall = by_now[ahead, [STATIC, UNKNOWN]].sum() if 0 <= ahead <= last else 1.0
+            doubt[state] = by_now[origin, STATIC] * wall
     return np.stack([1 - doubt, doubt], axis=-1)
 
 

@@ -87,12 +87,12 @@ def test_the_graph_is_joint_inference_where_only_the_cell_itself_may_hold_what_m
 
 
 def test_what_comes_out_of_a_wall_claims_no_cell_that_nobody_has_seen():
-    """By hand: of 0.4 from the left 0.6 (1 - 0.2) is doubtful, of 0.1 from the right 0.7."""
+    """By hand: of 0.4 from the left 0.6 0.7 is doubtful, of 0.1 from the right 0.7 0.6, so 0.42 of both."""
     looks_back, does_not = (
         cell_2(CellsInARow(BESIDE_A_WALL, ("?" * 3,), clearing_time=seconds))[State.DYNAMIC] for seconds in (DT, 0.0)
     )
     assert does_not == pytest.approx(0.5)
-    assert looks_back == pytest.approx((0.4 * 0.52 + 0.1 * 0.3) / (1 - 0.4 * 0.48 - 0.1 * 0.7))
+    assert looks_back == pytest.approx(0.5 * 0.58 / (1 - 0.5 * 0.42))
 
 
 def test_the_price_of_taking_the_origin_as_independent():
