@@ -728,13 +728,15 @@ print("P(STATIC) of cell 1 is wrong by {:.3f} without the rule and by {:.3f} wit
 # Joint inference isn't fooled: if something had run out of cell 5, no beam could come back from there any more. That is
 # one thing in two places again. So look back when something arrives: does something stand where it was $\tau$ ago? By
 # itself that isn't enough to doubt it. Somebody who sets off comes out of a place where something stood, and the front
-# of a car comes out of its rear, which BOF takes for standing at first. But they go into the open, while a phantom goes
-# on along its wall. So look ahead, too: is the place where it will be, $\tau$ from now, FREE? The arrival is doubtful
-# with probability
+# of a car comes out of its rear, which BOF takes for standing at first. But ahead of them the road is free. The side of
+# a long bus comes out of its rear, too, but ahead of it is the front of the bus, which moves. A phantom goes on along
+# its wall, and the wall ahead stands, or lies in the shadow still. So look ahead, too: is the place where it will be,
+# $\tau$ from now, STATIC or UNKNOWN? The arrival is doubtful with probability
 #
-# $$ \sigma_v = P(O_{c - v\,\tau}, 0)\, \bigl(1 - P(F_{c + v\,\tau})\bigr) $$
+# $$ \sigma_v = P(O_{c - v\,\tau}, 0)\, \bigl(P(O_{c + v\,\tau}, 0) + P(U_{c + v\,\tau})\bigr) $$
 #
-# if its velocity is $v$. Of everything that arrives, $d = \sum_{v \ne 0} \sigma_v\, P(O_{c - v\,\Delta t}, v)$ is
+# if its velocity is $v$; $P(U_c)$ is the probability that cell $c$ is UNKNOWN, and what lies outside the map counts as
+# UNKNOWN. Of everything that arrives, $d = \sum_{v \ne 0} \sigma_v\, P(O_{c - v\,\Delta t}, v)$ is
 # doubtful. In a cell that nobody has seen to be free, a doubtful arrival is struck out, because more likely it is a
 # wall that goes on: on a real drive (KITTI 0013), of the cells first seen beside a standing one 70 % were occupied, of
 # those without a standing neighbour about 2 %. Call $u$ the probability that nobody has seen the cell to be free: that
@@ -787,7 +789,7 @@ plt.show()
 # %% [markdown]
 # Left, the line with squares drops to the exact answer at the fifth scan. Right, it stays with the exact answer near
 # zero, while the dotted one takes the wall for something that runs. (Half a second ahead lies beyond the end of this
-# short row, so that place isn't known to be free.)
+# short row, so that place counts as UNKNOWN.)
 #
 # **Where looking back goes wrong.** Joint inference weighs whole histories; the rules only presume one, that the thing
 # has moved like this for a time $\tau$. Somebody who set off just now hasn't. Seven cells: in cell 1, hidden, stands

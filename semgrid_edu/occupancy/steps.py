@@ -76,7 +76,7 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
       place that is STATIC now, `clearing_time` ago, and will be in one that is STATIC or UNKNOWN, as long from now;
       slow ones are followed for `clearing_cells` both ways. It says no more than that the wall goes on, as walls do:
       what comes into view beside a wall is the next piece of it. Somebody who sets off also comes out of a place where
-      something stood, but walks into free space; and before the side of a long vehicle something else is moving.
+      something stood, but walks into free space; and the side of a long vehicle follows its front, which moves.
 
     With s and d the cell's own static and dynamic probability, u the probability that it is UNKNOWN or has only been
     left just now, and b the part of a that comes out of a wall and goes on along it, what is left is

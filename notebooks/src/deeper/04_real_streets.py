@@ -433,17 +433,21 @@ plt.show()
 # As in lectures 03 and 04, $\tau$ is half a second (`clearing_time`), and for slow things as long as they need for three
 # cells (`clearing_cells`); what each half of this rule is good for you will measure below.
 #
-# **A car goes into the open.** Somebody who sets off also comes out of a place where something stood, and so does the
-# front of a car whose rear has been taken for standing. But they go where it is free, while a phantom goes on along its
-# wall. So each particle is also asked where it will be, $x + v\,\tau$. If something stands at its origin and the place
-# ahead isn't known to be FREE, the particle's claim is doubtful: it says no more than that the wall goes on.
+# **Ahead of a car the wall ends.** Somebody who sets off also comes out of a place where something stood, and so does
+# the front of a car whose rear has been taken for standing. But they go where it is free, while a phantom goes on along
+# its wall. So each particle is also asked where it will be, $x + v\,\tau$. If something stands at its origin and the
+# place ahead is STATIC or UNKNOWN, the particle's claim is doubtful: it says no more than that the wall goes on.
+#
+# Why isn't it doubtful whenever the place ahead isn't FREE? Think of the side of a bus. It comes out of the rear of the
+# bus, which has been taken for standing, and ahead of it is the bus again. But the front of the bus is known to move,
+# and what follows something that moves is no wall. So DYNAMIC ahead speaks for a particle as FREE does.
 #
 # ### Rule one: doubtful arrivals
 #
 # As in lecture 04, "something arrives" and what the cell holds are taken as independent, all combinations are written
 # down, and the impossible ones are struck out. By hand: a particle arrives with $a = 0.6$, at its origin something
-# stands with probability 0.9, and nobody has seen the place ahead. So $b = 0.6 \cdot 0.9 \cdot (1 - 0) = 0.54$ is
-# doubtful. The cell is UNKNOWN with 0.8 and FREE with 0.2.
+# stands with probability 0.9, and nobody has seen the place ahead, so it is surely UNKNOWN.
+# So $b = 0.6 \cdot 0.9 \cdot (0 + 1) = 0.54$ is doubtful. The cell is UNKNOWN with 0.8 and FREE with 0.2.
 #
 # | | cell: UNKNOWN 0.8 | cell: FREE 0.2 |
 # |---|---|---|
@@ -539,8 +543,8 @@ print(*(f"{state.name} {p:.2f}" for state, p in zip(State, hidden, strict=True))
 # it needs a STATIC origin and a cell that hasn't been seen to be free.
 #
 # <details><summary>Answer</summary>B is gone: the wall behind the gap comes out of a deep shadow, so its cells are
-# UNKNOWN, and the piece before is known to stand. Of A two cells are left at this instant. The section on limits looks
-# at what such cells held before.</details>
+# UNKNOWN, and the piece before is known to stand. The two cells of A are still there at this instant. The section on
+# limits looks at what such cells held before.</details>
 
 # %% jupyter={"outputs_hidden": true}
 after = watch(scenes, AFTER)
@@ -659,7 +663,7 @@ Markdown(markdown_table(rows))
 
 # %% [markdown]
 # The first two lines don't look back at all. With the new `first_sight` alone, more walkers are found than before, and
-# there are more phantoms, too. The look back takes the phantoms away; with half a second alone, it takes nearly half of
+# there are more phantoms, too. The look back takes most phantoms away; with half a second alone, it takes about half of
 # the walkers with them. Three cells bring most of these walkers back, and leave about as few phantoms as half a second
 # does. With four cells and six the phantoms come back. A likely reason: the longer the way, the more often it ends
 # beside the wall or in a gap, and then the particle isn't doubted. So three cells are a compromise. These numbers are of
@@ -706,14 +710,12 @@ plt.show()
 # UNKNOWN is the smaller part of what these cells held, and in a FREE cell every arrival counts. A beam that passes
 # through one part of a cell before another hits the fence in it is one way to get there.
 #
-# Four more limits:
+# Three more limits:
 #
 # - **No past, no origin.** While the wall itself has just come into view, nothing is known at the origin yet. So single
 #   frames of phantoms remain at the far end of what we see.
 # - **Slow starters.** Whoever has just set off has an origin in which they stood a moment ago. So they are doubted when
 #   they go where nobody has looked.
-# - **Long vehicles.** The side of a bus also comes out of what stands and goes on along it. Lecture 04 shows how it turns
-#   STATIC sooner because of that.
 # - **A single return.** At first sight most cells are free, so one hit in a new cell isn't believed until a second
 #   scan confirms it.
 #

@@ -22,8 +22,8 @@ FROM_BOTH_SIDES = CellsInARow(
 )
 """Something may come into cell 2 from the left or from the right, and something may stand there already.
 
-Something may also stand in cell 1, and cell 3 isn't free for sure. So what comes from cell 1 is doubtful: cell 2 may be
-the next piece of a wall."""
+Something may also stand in cell 1, and cell 3 may be STATIC or UNKNOWN by now. So a little of what comes from cell 1
+is doubtful, a share of 0.011: cell 2 may be the next piece of a wall."""
 
 ELSEWHERE = 0
 """State of the moving thing when it is neither in the cell nor beside it: far away, gone, or no longer moving."""

@@ -60,7 +60,7 @@ def test_the_same_seed_gives_the_same_bits():
 
 UNSEEN = {"unknown": 1.0}
 BESIDE_A_WALL = ({"static": 0.6, "right": 0.4}, UNSEEN, {"static": 0.7, "left": 0.1})
-"""What comes into cell 2 comes out of something that probably stands, and goes on towards what isn't free."""
+"""What comes into cell 2 comes out of something that probably stands, and goes on towards what probably stands, too."""
 
 
 @pytest.mark.parametrize("scan", [".x.", "...", ".?."])
