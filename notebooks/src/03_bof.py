@@ -818,7 +818,7 @@ assert ghosts_now[0] < 0.5 * ghosts[1]
 assert ghosts_now[1] < 0.1 * streak
 
 # %% [markdown]
-# Of the stretch behind the first car less than one square metre is left in place of ten, and of all ghosts less than
+# In the stretch behind the first car less than one square metre is left in place of nine, and of all ghosts less than
 # half. The price is the delay that you saw in the row: what a thing has left behind stays until the thing has been seen
 # to move for a time $\tau$, half a second for these cars. The companion
 # [phantoms on real streets](deeper/04_real_streets.ipynb) shows what the second rule costs.

@@ -1256,10 +1256,9 @@ plt.show()
 
 # %% [markdown]
 # The numbers say how much of the car and of the person was called DYNAMIC, on average over the last second. Here 100
-# particles find little of the car and nothing of the person, 1000 find the car and miss the person, and 100,000 find
-# both. On the right everything
-# slower than about 2 m/s is declared to stand: the car drives on, the person is a lamp post. Is that luck? Try four
-# other seeds:
+# particles find little of the car and nothing of the person, 1000 find most of the car and little of the person, and
+# 100,000 find both. On the right most of what is slower than about 2 m/s is declared to stand: the car drives on, most
+# of the person is a lamp post. Is that luck? Try four other seeds:
 
 # %% tags=["nbval-ignore-output"]
 print("particles   car, person: called DYNAMIC [%], seeds 1 to 4")
