@@ -1117,7 +1117,7 @@ Markdown(occupancy_table(result, "HDL-64E", "paper"))
 # and what stands. Banks are free ground that is hit because it rises beside the road; the last row of per cents tells
 # how often they are held occupied.
 #
-# Three lessons.
+# Four lessons.
 #
 # 1. **A binary grid can't say DYNAMIC, and pays twice.** It also leaves the smear of lecture 02: of the cells that
 #    were left, several times as many are still occupied.
@@ -1127,8 +1127,12 @@ Markdown(occupancy_table(result, "HDL-64E", "paper"))
 #    pedestrians CMCDOT finds more. CMCDOT is right somewhat more often when it says DYNAMIC.
 # 3. **Time in view decides.** Of all observed cells that move, more than a third aren't called so by CMCDOT. Of those
 #    with returns, near and in view for 1.5 s, hardly any is missed. So nearly all that is missed is new in view, far
-#    away or without returns. What stands is hardly ever called DYNAMIC. Two in three of the cells that are so by
-#    mistake are FREE; among what is hit, banks are the worst.
+#    away or without returns. What stands is hardly ever called DYNAMIC. Nearly three in four of the cells that are so
+#    by mistake are FREE; among what is hit, banks are the worst.
+# 4. **A first hit isn't enough.** Of STATIC cells the log-odds grid finds 89 per cent, the others 82; nearly all that
+#    is missed they call FREE. A hit multiplies the odds of occupied to FREE by 0.8 / 0.05 = 16. In a cell that is seen
+#    for the first time they become 16 · 0.045 / 0.952 = 0.76 : 1, so the cell is still called FREE. The log-odds grid
+#    starts from even odds, and believes the first hit.
 
 # %%
 scores = result["scores"]["HDL-64E"]["paper"]
@@ -1144,7 +1148,11 @@ for cars, people in (("moving cars, to 25 m", "to 25 m"), ("moving cars, 25 to 5
 assert min(near[f"{mover}, to 25 m"]["dynamic"] for mover in ("moving cars", "cyclists", "walking pedestrians")) > 0.9
 assert max(near[thing]["dynamic"] for thing in ("standing cars", "walls", "fences", "foliage", "poles")) < 0.02
 mistakes = np.delete([row[DYNAMIC] for row in scores["CMCDOT"]["confusion"]], DYNAMIC)
-assert 0.6 < mistakes[FREE] / mistakes.sum() < 0.7
+assert 0.7 < mistakes[FREE] / mistakes.sum() < 0.75
+standing = np.array(scores["CMCDOT"]["confusion"][STATIC])
+assert standing[FREE] > 0.95 * (standing.sum() - standing[STATIC])
+hit = params.sensor.p_hit_occupied / params.sensor.p_hit_free
+assert round(hit * params.first_sight[STATIC] / params.first_sight[FREE], 2) == 0.76
 assert len(VelocityLattice()) + 2 == 799
 
 # %% [markdown]
