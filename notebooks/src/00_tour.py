@@ -240,12 +240,12 @@ plt.show()
 
 # %% [markdown]
 # Look for what is easy (road, sidewalk, near cars, walls, the fence) and what isn't: the cyclist is torn between
-# bicycle and pedestrian, the pedestrian behind him has the head of a car, and red crumbs of pedestrian lie along the
-# hedge on the left, where nobody walks. The network learnt in two steps: first from labelled images, then end to end,
-# when only the map counted: the map's mistakes travel back through fusion, planes and equation (2) into these scores.
-# So don't expect clean outlines. The scores are whatever helps the map, and as labels of pixels they got worse by it
-# (lectures 07 and 08). Many tree tops are yellow, *signage*: the map holds only what stands less than 2.5 m above the
-# ground, so hardly anything on it asks what a tree top is.
+# bicycle, pedestrian and car, the pedestrian behind him has the body of a car, and red crumbs of pedestrian lie along
+# the hedge on the left, behind the red car, where nobody walks. The network learnt in two steps: first from labelled
+# images, then end to end, when only the map counted: the map's mistakes travel back through fusion, planes and equation
+# (2) into these scores. So don't expect clean outlines. The scores are whatever helps the map, and as labels of pixels
+# they got worse by it (lectures 07 and 08). Many tree tops are yellow, *signage*: the map holds only what stands less
+# than 2.5 m above the ground, so hardly anything on it asks what a tree top is.
 
 # %% [markdown]
 # ## Stage 3, $s \to p$: from pixels to places
@@ -338,9 +338,10 @@ plt.show()
 # %% [markdown]
 # Road and sidewalk, both FREE in the occupancy grid, are told apart: that the LIDAR can't do. Fence and house, on the
 # right, stand where the LIDAR met them: that the camera can't do. In the truth, a cell that the camera doesn't see is
-# *unknown-free*, *-static*, *-dynamic* or *-unobserved*, by its occupancy state. Compare: of the cars on the left some
-# are missing, such as the one 14 m ahead, and the one 26 m ahead is half a bicycle. More bicycles lie on the sidewalk
-# 27 to 30 m ahead, and along the border of the road from 42 m on: behind the cyclists, on the rays that they block.
+# *unknown-free*, *-static*, *-dynamic* or *-unobserved*, by its occupancy state. Compare: of the cars on the left most
+# of those 40 to 50 m ahead are missing, and the one 26 m ahead has a corner of bicycle. On the right the cyclist 20 m
+# ahead is several times too large. And 60 m ahead, where a car stands on the right, the grid shows sidewalk, vegetation
+# and a crumb of bicycle.
 
 # %% [markdown]
 # ## Stage 5: refinement by a CRF
@@ -362,8 +363,8 @@ plt.show()
 
 # %% [markdown]
 # White cells on the right have kept their class: about nine in ten. The changes are crumbs, and thin lines along
-# borders. The road grows together on the left and swallows what was found of the cars 40 and 60 m ahead. The crumbs
-# of bicycle on the sidewalk go, but beyond 45 m they become one block with straight edges: tidy isn't true.
+# borders. The crumbs on the sidewalk go. The road grows together on the left and swallows what was found of the cars 40
+# to 50 m ahead: tidy isn't true.
 #
 # ## How good is it?
 #

@@ -312,8 +312,10 @@ road, sidewalk, vegetation, car, building = (
     KITTI_14.index(name) for name in ("road", "sidewalk", "vegetation", "car", "building")
 )
 lost = {name: shares["image and o"] - shares[name] for name in ("without o", "without image")}
-assert min(lost["without o"][[car, building]]) > max(lost["without o"][[road, sidewalk]])
-assert max(shares["without image"][[sidewalk, vegetation, car]]) < 40
+bicycle, fence, signage, pedestrian = (KITTI_14.index(name) for name in ("bicycle", "fence", "signage", "pedestrian"))
+assert max(shares["without o"][[building, fence, signage, pedestrian]]) < 5
+assert min(lost["without o"][[building, fence, bicycle]]) > max(lost["without o"][[road, sidewalk, car]])
+assert min(lost["without image"][[building, vegetation, sidewalk, bicycle]]) > lost["without image"][car]
 
 # %% tags=["nbval-ignore-output"]
 for name, points in lost.items():
@@ -321,14 +323,14 @@ for name, points in lost.items():
     print(f"{name:<14} loses, points:", ", ".join(f"{KITTI_14.names[c]} {points[c]:.0f}" for c in order))
 
 # %% [markdown]
-# Dark: what the network finds. Orange: without $o$ most of what stands goes. Building, fence and signage lose most and
-# keep next to nothing, cars and pedestrians come after them. Road stays, and half of the sidewalk; vegetation even
-# gains. Blue: without the image building, vegetation, bicycles and sidewalk lose most, cars half of what was found, and
-# the fence little; road stays as a good guess, for what is free in front of a car mostly is road; and the last four
-# classes stay, because $o$ says them. Two cautions. The network has never learnt with a silent input; one trained
-# without $o$ would make more of the image. And a high bar of a small class means little by itself: signage is found
-# more often without the image than with it, but look at the numbers above the figure. A network at a loss calls many
-# things so.
+# Dark: what the network finds. Orange: without $o$ most of what stands goes. Of buildings, fences, signage and
+# pedestrians next to nothing is left, of bicycles and cars less than half. Road stays, and half of the sidewalk;
+# vegetation even gains. Blue: without the image building, vegetation, sidewalk and bicycles lose most, cars and
+# pedestrians about half of what was found, and the fence a third; road stays as a good guess, for what is free in front
+# of a car mostly is road; and the last four classes stay, because $o$ says them. Two cautions. The network has never
+# learnt with a silent input; one trained without $o$ would make more of the image. And a high bar of a small class
+# means little by itself: signage is found more often without the image than with it, but look at the numbers above the
+# figure. A network at a loss calls many things so.
 #
 # The paper's strongest example is claim 6: an upside-down car, which no training image shows, is called a car, since
 # $o$ says that something stands there. Lecture 12 turns one over.
@@ -782,10 +784,10 @@ plt.show()
 
 # %%
 by_network = json.loads(Path("../docs/results/overfit.json").read_text(encoding="utf-8"))["networks"]
-lines = ["| image network | steps | cells right, of four frames [%] | minutes |", "|---|---|---|---|"]
+lines = ["| image network | steps | cells right, of four frames [%] |", "|---|---|---|"]
 for name, run in by_network.items():
     right = 100 * run["pixel accuracy"]["evaluation"]
-    lines.append(f"| {name} | {run['iterations']} | {right:.1f} | {run['minutes']:.1f} |")
+    lines.append(f"| {name} | {run['iterations']} | {right:.1f} |")
 Markdown("\n".join(lines))
 
 # %% [markdown]
@@ -803,8 +805,8 @@ with TemporaryDirectory() as folder:
 # %% [markdown]
 # ### Then load what a real training has learnt
 #
-# The shipped weights come from the same code (`semgrid-edu train`), a quarter of an hour on two cores. The log lies
-# beside them:
+# The shipped weights come from the same code (`semgrid-edu train`), in 23 minutes on two cores that others used too. The
+# log lies beside them:
 
 # %%
 plotting.training_curves(read_log(sample_weights("segnet").with_name("log.csv")))
@@ -855,7 +857,7 @@ assert scores["four frames by heart"][0][0] > scores["four frames by heart"][1][
 # Pixel accuracy and class accuracy over cells whose truth is a class with a meaning; the numbers of the first two rows
 # differ from machine to machine by some points. Learnt by heart: good at home, poor on the drive. Twenty seconds with
 # six frames are no match on the drive either, and know their own frames less well: large areas come first, small
-# classes last. With 142 frames and a quarter of an hour, class accuracy on the drive more than doubles. (The six frames
+# classes last. With 142 frames and 4000 steps, class accuracy on the drive more than doubles. (The six frames
 # are among the 142, so the first pair of its row is no test.)
 #
 # ## Which plane does the reduction listen to, and is it the right height?
@@ -895,7 +897,7 @@ def heard(keep, planes=planes, net=net):
 # %% tags=["nbval-ignore-output"]
 tops = (0, 1, 2, 3, 5, 7, 10, 19)
 up_to = np.array([found(heard(np.arange(20) <= top), truth) for top in tops])
-for c in (car, KITTI_14.index("bicycle")):
+for c in (car, bicycle):
     ground, metre, every = up_to[[0, tops.index(5), -1], c]
     print(f"{KITTI_14.names[c]:<8} ground {ground:.0f} %, up to 1 m {metre:.0f} %, all {every:.0f} %", end=": ")
     print(f"{100 * (metre - ground) / (every - ground):.0f} % of the gain up to 1 m")
@@ -906,7 +908,7 @@ fresh = build_net(net.architecture, drive.camera, seed=0).fusion.reduce[0].weigh
 fresh_size = np.linalg.norm(fresh[..., 0, 0], axis=0).mean(axis=0)
 fig, axes = plt.subplots(1, 3, figsize=(13, 3.6), layout="constrained")
 truly = right_heights()
-for c, style in ((road, "-"), (car, "--"), (KITTI_14.index("bicycle"), "-."), (building, ":")):
+for c, style in ((road, "-"), (car, "--"), (bicycle, "-."), (building, ":")):
     colour = np.divide(KITTI_14.rgb[c], 255)
     axes[0].plot(heights, truly[c], style, color=colour, label=KITTI_14.names[c])
     axes[2].plot(heights[list(tops)], up_to[:, c], style, color=colour)
@@ -922,18 +924,22 @@ for ax in axes[:2]:
 plt.show()
 assert truly[car, heights < 1.5].min() == truly[car, 0]
 assert truly[car, heights > 2.5].max() < 1
+at_foot, at_two, every = up_to[[tops.index(3), tops.index(10), -1], building]
+assert at_two < at_foot < every
+assert truly[building, :4].max() < 25
 
 # %% [markdown]
 # Left: where each class is right. Middle: the weights. From 1 m up they have hardly changed since they were drawn at
 # random: so a large weight there says nothing (nothing pulls unused weights to zero). The lowest two have learnt
 # most. Right: the class's cells that are found when all higher planes fall silent, as the image did above.
 #
-# So: is it the right height? For road, yes. Bicycles gain nearly all from the planes up to 1 m, and there they are
-# right. Of what cars gain over the ground plane alone, the planes up to 1 m give half, and those above it the other
-# half: up to 1.4 m they are as right for a car as the lower ones, above 2.4 m they never show one. And more than half
-# of the buildings' cells are found with the planes up to 1 m alone, where by the truth one of their points in five is
+# So: is it the right height? For road, yes. Bicycles gain all from the planes up to 1 m, and there they are right. Of
+# what cars gain over the ground plane alone, the planes up to 1 m give half, and those above it the other half: up to
+# 1.4 m they are as right for a car as the lower ones, above 2.4 m they never show one. Buildings are a surprise. With
+# the planes up to 0.6 m alone, half of their cells are found, where by the truth at most one of their points in four is
 # right! What there is to listen to, down there, is the foot of the wall, and fence, lawn and cars before it; $o$ knows
-# where the wall stands. Only the rest takes planes above 2 m, where building is right. In short: this network listens
+# where the wall stands. The planes from there up to 2 m make it worse, though between 1.4 and 2 m more and more
+# points are right; only those above 2 m, which are right, bring the share to 63 %. In short: this network listens
 # mostly to the ground and the first metre and reads much from context. Our guess in the toy, the roof at 1.4 m, is
 # right as geometry and wrong as a description of what was learnt.
 #
@@ -957,7 +963,7 @@ for name in ("segnet", "fcn", "deeplab"):
 # %% [markdown]
 # The third number is the share of the road that is found. All three do nearly as well with the six lowest planes: FCN's
 # map is even better without the others. The reverse isn't true, but differs. Without the first metre FCN loses the
-# road, SegNet keeps half of it and DeepLab nearly all. We don't know why: coarse scores, which blur the road upwards,
+# road, SegNet and DeepLab keep most of it. We don't know why: coarse scores, which blur the road upwards,
 # don't explain it, for FCN's are as coarse as DeepLab's. Would a network with six planes *learn* as much, and faster?
 # That takes new training runs, lecture 12.
 #
@@ -1070,17 +1076,18 @@ axes[0].set(xlabel="distance ahead [m]", ylabel="true cells called so [%]", ylim
 for c in present:
     place = (cells[c], shares["image and o"][c])
     axes[1].plot(*place, "o", color=np.divide(KITTI_14.rgb[c], 255), markeredgecolor="0.4")
-    offset = (4, -10 if c in (0, 2, 3, 4, 5, 11) else 4)
+    offset = (4, -10 if c in (2, 3, 4, 5, 9) else 4)
     axes[1].annotate(KITTI_14.names[c], place, offset, textcoords="offset points", fontsize=8)
 axes[1].set(xscale="log", xlim=(15, 3e5), xlabel="cells in six training frames", title="classes")
 plt.show()
 assert far[0] > far[2] > far[-1]
 
 # %% [markdown]
-# Left: the farther, the worse; 40 m ahead ten cells, one behind the other, share one row of pixels (lecture 05). Right:
-# of signage and pedestrians, which are rare to learn from, less than half is found. Unknown-dynamic is rarer still, but
-# it, unknown-static and building do better than their numbers, since $o$ helps them, and so do bicycles, which ride
-# near us on this drive. Cars do worse than theirs: most of them are far away or half hidden.
+# Left: from 20 m on, the farther, the worse; 40 m ahead ten cells, one behind the other, share one row of pixels
+# (lecture 05). Right: of signage and pedestrians, which are rare to learn from, less than half is found.
+# Unknown-dynamic is rarer still, but it, unknown-static and building do better than their numbers, since $o$ helps
+# them, and so do bicycles, which ride near us on this drive. Cars do worse than theirs: most of them are far away or
+# half hidden.
 #
 # **Outside of what it has learnt.** Less light, fog, red and blue swapped; and a camera that points one degree higher,
 # or lower, than its calibration says.
@@ -1091,7 +1098,7 @@ assert far[0] > far[2] > far[-1]
 # <details><summary>Answer</summary>It isn't the same. When the camera points too high, each cell reads the ground too
 # far ahead: the cell at 30 m that at 44 m (lecture 05). SegNet and FCN then lose more than in the dark, in both
 # numbers, DeepLab only in class accuracy. When it points too low, the cell at 30 m reads the ground at 23 m. That costs
-# less, for all three, and FCN's map even gets better.</details>
+# less, for all three, and FCN's and DeepLab's maps even get better.</details>
 
 
 # %% tags=["nbval-ignore-output"]
@@ -1124,15 +1131,15 @@ assert (too_high < too_low).all()
 assert (too_high[:2] < in_the_dark[:2]).all()  # SegNet and FCN, both numbers
 assert too_high[2, 1] < in_the_dark[2, 1]  # DeepLab's class accuracy
 assert too_high[2, 0] > in_the_dark[2, 0]  # but not its pixel accuracy
-assert (too_low[1] > usual[1]).all()  # FCN gets better
-assert min((usual - in_the_dark)[:, 0].min(), (usual - too_high)[:, 0].min()) > 9
+assert (too_low[1:] > usual[1:]).all()  # FCN and DeepLab get better
+assert min((usual - in_the_dark)[:, 0].min(), (usual - too_high)[:, 0].min()) > 6
 
 # %% [markdown]
 # Each pair is pixel accuracy and class accuracy; fog and swapped colours we tried with SegNet alone, where fog costs
-# little and swapped colours as much as the dark. The dark, and a camera that points too high, cost each network more
-# than 9 points of pixel accuracy. Why is too low so much better than too high? A cell that reads too near mostly reads
-# more of the same street; one that reads too far soon reads what stands on it. That is a guess, we haven't tested it.
-# Claim 9 says that learning repairs errors of calibration: those that were there in training.
+# little and swapped colours somewhat more than the dark. The dark, and a camera that points too high, cost each network
+# more than 6 points of pixel accuracy. Why is too low so much better than too high? A cell that reads too near mostly
+# reads more of the same street; one that reads too far soon reads what stands on it. That is a guess, we haven't tested
+# it. Claim 9 says that learning repairs errors of calibration: those that were there in training.
 #
 # Training varied brightness and contrast by a fifth and nothing else. What a network hasn't met, it can't be expected
 # to bear; and nothing in the map says that it is lost.

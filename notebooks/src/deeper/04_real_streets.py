@@ -643,6 +643,7 @@ def phantoms_left(params):
     return sum(phantoms(*pair).sum() for pair in zip(scenes, watch(scenes, params), strict=True))
 
 
+# %%
 settings = {"before": BEFORE, "new first_sight alone": replace(AFTER, clearing_time=0.0)}
 settings["half a second alone"] = replace(AFTER, clearing_cells=0.0)
 settings |= {f"and at least {k} cells": replace(AFTER, clearing_cells=k) for k in (2, 3, 4, 6)}
