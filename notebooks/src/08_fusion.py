@@ -805,8 +805,8 @@ with TemporaryDirectory() as folder:
 # %% [markdown]
 # ### Then load what a real training has learnt
 #
-# The shipped weights come from the same code (`semgrid-edu train`), in 23 minutes on two cores that others used too. The
-# log lies beside them:
+# The shipped weights come from the same code (`semgrid-edu train`), in 23 minutes on two cores that others used too.
+# The log lies beside them:
 
 # %%
 plotting.training_curves(read_log(sample_weights("segnet").with_name("log.csv")))
