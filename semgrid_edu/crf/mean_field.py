@@ -8,14 +8,12 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.crf.lattice import PermutohedralLattice
-from semgrid_edu.crf.params import CrfParams, check_inputs, check_iterations
+from semgrid_edu.crf.naive import NEVER, damping
+from semgrid_edu.crf.params import CrfParams, check_inputs, check_stop
 from semgrid_edu.crf.spatial import SeparableGaussian
 
 LANES = 16
 """The class axis is padded to a multiple of this number: 16 floats fill a cache line, and loops over them vectorise."""
-
-_NEVER = 1e30
-"""A unary in place of infinity: it avoids inf - inf, which is NaN, and exp(-1e30) is 0."""
 
 _ZERO_SUM_STATES = np.array([[1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1]]) / 2
 """An orthonormal basis of the space orthogonal to (1, 1, 1, 1). The four probabilities sum to one, so three numbers in
@@ -55,7 +53,9 @@ def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice
     return lattice.scaled(np.sqrt(params.w_bilateral / degree))
 
 
-def mean_field(unary: ArrayLike, values: ArrayLike, params: CrfParams, iterations: int = 10) -> NDArray[np.float32]:
+def mean_field(
+    unary: ArrayLike, values: ArrayLike, params: CrfParams, iterations: int = 10, tolerance: float = 0.0
+) -> NDArray[np.float32]:
     """Approximate the CRF's marginals by mean field, fast (eq. (3), (4)); the twin of `mean_field_naive`.
 
     The sum over all pairs becomes two filters: the spatial one is exact (`SeparableGaussian`), the bilateral one uses
@@ -71,8 +71,10 @@ def mean_field(unary: ArrayLike, values: ArrayLike, params: CrfParams, iteration
     params : CrfParams
         Weights, widths and normalisation.
     iterations : int
-        Number of updates of all cells at once. After ten the labels have settled; probabilities of single cells still
-        change later.
+        The largest number of updates of all cells. With the default parameters labels have settled after ten;
+        probabilities of single cells still change later.
+    tolerance : float
+        Stop as soon as an update changes no probability by more than this.
 
     Returns
     -------
@@ -85,14 +87,16 @@ def mean_field(unary: ArrayLike, values: ArrayLike, params: CrfParams, iteration
         When shapes don't fit or numbers aren't what they should be.
     """
     unary, values = check_inputs(unary, values)
-    check_iterations(iterations)
+    check_stop(iterations, tolerance)
     spatial = SeparableGaussian.build(unary.shape[1:], params.sigma_gamma, params.w_spatial, params.normalization)
-    Q = iterate(_in_lanes(unary), [bilateral_kernel(values, params), spatial], iterations)
+    Q = iterate(_in_lanes(unary), [bilateral_kernel(values, params), spatial], iterations, tolerance)
     return np.ascontiguousarray(Q[:, : len(unary)].T).reshape(unary.shape)
 
 
-def iterate(phi: NDArray[np.float32], kernels: Sequence[Kernel], iterations: int) -> NDArray[np.float32]:
-    """Run the mean-field update with any kernels.
+def iterate(
+    phi: NDArray[np.float32], kernels: Sequence[Kernel], iterations: int, tolerance: float = 0.0
+) -> NDArray[np.float32]:
+    """Run the mean-field update of `mean_field_naive` with any kernels.
 
     The cost of disagreeing, sum_j k_ij (1 - Q_j(l)), differs from the negative reward of agreeing,
     -sum_j k_ij Q_j(l), only by sum_j k_ij, which is the same for all classes and cancels in the soft-max.
@@ -104,45 +108,53 @@ def iterate(phi: NDArray[np.float32], kernels: Sequence[Kernel], iterations: int
     kernels : sequence of Kernel
         The terms of eq. (4).
     iterations : int
-        Number of updates of all cells at once.
+        The largest number of updates of all cells.
+    tolerance : float
+        Stop as soon as an update changes no probability by more than this.
 
     Returns
     -------
     (N, K) float32
         Q, the distribution over classes in each cell.
     """
-    self_weight = sum(kernel.diagonal for kernel in kernels)
-    Q = _softmax(-phi)
+    own = sum(kernel.diagonal for kernel in kernels)
+    part, logits = damping(own), -phi
+    Q = _softmax(logits)
     for _ in range(iterations):
         reward = sum(kernel(Q) for kernel in kernels)
-        Q = _softmax(_logits(reward, self_weight, Q, phi))
+        _update(logits, part, reward, own, Q, phi)
+        before, Q = Q, _softmax(logits)
+        if tolerance > 0 and np.abs(Q - before).max() <= tolerance:
+            break
     return Q
 
 
 def _in_lanes(unary: NDArray[np.float64]) -> NDArray[np.float32]:
     """Return the unary term as (N, K), 0 for the best class; the classes are padded with impossible ones."""
     n_classes = len(unary)
-    phi = np.full((unary[0].size, -(-n_classes // LANES) * LANES), _NEVER, np.float32)
-    phi[:, :n_classes] = np.minimum(unary - unary.min(axis=0), _NEVER).reshape(n_classes, -1).T
+    phi = np.full((unary[0].size, -(-n_classes // LANES) * LANES), NEVER, np.float32)
+    phi[:, :n_classes] = np.minimum(unary - unary.min(axis=0), NEVER).reshape(n_classes, -1).T
     return phi
 
 
 @njit(cache=True, parallel=True, fastmath=True)
-def _logits(reward, self_weight, Q, phi):
-    """Return log Q_i(l) up to one number per cell: the reward without the cell's own part, minus the unary term."""
-    out = np.empty_like(Q)
+def _update(logits, part, reward, own, Q, phi):
+    """Move log Q_i(l), which is known up to one number per cell, part of the way: to the reward minus the unary term.
+
+    The reward still contains the cell's own part.
+    """
     for i in prange(len(Q)):
         for k in range(Q.shape[1]):
-            out[i, k] = reward[i, k] - self_weight[i] * Q[i, k] - phi[i, k]
-    return out
+            target = reward[i, k] - own[i] * Q[i, k] - phi[i, k]
+            logits[i, k] += part[i] * (target - logits[i, k])
 
 
 def _softmax(logits: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the soft-max along the class axis, (N, K); overwrites its argument."""
+    """Return the soft-max along the class axis, (N, K); makes the largest logit of each cell 0."""
     _subtract_best(logits)
-    np.exp(logits, out=logits)  # numpy's exp is vectorised, numba's isn't
-    _normalise(logits)
-    return logits
+    Q = np.exp(logits)  # numpy's exp is vectorised, numba's isn't
+    _normalise(Q)
+    return Q
 
 
 @njit(cache=True, parallel=True, fastmath=True)

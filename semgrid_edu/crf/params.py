@@ -169,18 +169,22 @@ def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float6
     return unary, values
 
 
-def check_iterations(iterations: int) -> None:
-    """Refuse a number of iterations that is impossible.
+def check_stop(iterations: int, tolerance: float = 0.0) -> None:
+    """Refuse a number of iterations, or a change below which to stop, that is impossible.
 
     Parameters
     ----------
     iterations : int
         How many times mean field updates all cells.
+    tolerance : float
+        The change of probabilities below which it stops.
 
     Raises
     ------
     ArgumentError
-        When it is negative or not a whole number.
+        When either is negative, or the first isn't a whole number.
     """
     if not isinstance(iterations, int | np.integer) or iterations < 0:
         raise ArgumentError("iterations", "a whole number of at least 0", iterations)
+    if not tolerance >= 0:
+        raise ArgumentError("tolerance", "a change of at least 0", tolerance)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter
 from scipy.special import softmax
 
-from semgrid_edu.crf import CrfParams, mean_field, mean_field_naive, pair_weights, unary_from_probability
+from semgrid_edu.crf import CrfParams, gram_matrix, mean_field, mean_field_naive, unary_from_probability
 from semgrid_edu.crf.mean_field import iterate
 from semgrid_edu.errors import ArgumentError
 
@@ -31,10 +31,10 @@ def noisy_street(seed, shape=(40, 30), n_classes=14, structured=True):
 
 
 class DenseKernel:
-    """All pairs as one matrix, in single precision; a cell says nothing to itself."""
+    """All pairs as one matrix, in single precision."""
 
     def __init__(self, values, params):
-        self.matrix = pair_weights(values, params).astype(np.float32)
+        self.matrix = gram_matrix(values, params).astype(np.float32)
         self.diagonal = np.diag(self.matrix)
 
     def __call__(self, values):
