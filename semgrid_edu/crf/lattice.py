@@ -3,7 +3,7 @@
 Every point lies in one simplex of a lattice; where points are dense, many of them share its corners. The values of
 the points are splatted onto the d + 1 corners of their simplices, the values of the corners are blurred with
 (1/4, 1/2, 1/4) along each of the d + 1 lattice directions, and the result is sliced, that is interpolated, at the
-points. The module `simplices` holds the geometry.
+points. The module `simplices` holds the geometry, `vertices` the bookkeeping.
 """
 
 from dataclasses import dataclass, replace
@@ -12,15 +12,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from semgrid_edu.crf.simplices import (
-    elevation,
-    enclosing_simplices,
-    find_neighbours,
-    number_vertices,
-    peak,
-    self_responses,
-    sort_by_vertex,
-)
+from semgrid_edu.crf.simplices import elevation, enclosing_simplices, peak, responses, self_responses
+from semgrid_edu.crf.vertices import number_vertices, sort_by_vertex
 from semgrid_edu.errors import ArgumentError
 
 
@@ -84,18 +77,18 @@ class PermutohedralLattice:
         if np.abs(elevated).max() > 2**30:
             raise ArgumentError("features", "fewer standard deviations, or a larger sigma", np.abs(features).max())
         origins, ranks, weights = enclosing_simplices(elevated)
-        corners, keys, slots = number_vertices(origins, ranks)
-        neighbours = find_neighbours(keys, slots)
-        starts, members = sort_by_vertex(corners.ravel(), len(keys))
+        vertices = number_vertices(origins, ranks)
+        corners = vertices.simplices[vertices.members]
+        starts, members = sort_by_vertex(corners.ravel(), vertices.neighbours.shape[2])
         factor = peak(dimensions)
         return cls(
             corners=corners,
             slices=(factor * weights).astype(np.float32),
-            neighbours=neighbours,
+            neighbours=vertices.neighbours,
             starts=starts,
             points=members // np.int32(dimensions + 1),
             splats=weights.ravel()[members].astype(np.float32),
-            diagonal=np.float32(factor) * self_responses(corners, ranks, weights, neighbours),
+            diagonal=np.float32(factor) * self_responses(vertices.members, weights, responses(*vertices[1:])),
         )
 
     def scaled(self, scale: NDArray) -> "PermutohedralLattice":

@@ -1,4 +1,4 @@
-"""Points in the permutohedral lattice: their simplices, its vertices and their neighbours (Adams, Baek, Davis 2010).
+"""Points in the permutohedral lattice: the simplex around each, and what comes back to it (Adams, Baek, Davis 2010).
 
 The lattice lies in the hyperplane of d + 1 dimensions in which the coordinates sum to zero. A vertex is d + 1 integers
 that sum to zero and have the same remainder modulo d + 1; a step in direction j adds one to all of them except the
@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-_FORTH, _BACK = 0, 1
+FORTH, BACK = 0, 1
 
 
 def elevation(d: int) -> NDArray[np.float64]:
@@ -105,174 +105,80 @@ def enclosing_simplices(elevated):
     return origins, ranks, weights
 
 
-@njit(cache=True)
-def _differ(a, b):
-    """Whether two vectors differ; np.array_equal is several times slower on so few numbers."""
-    for j in range(len(a)):  # noqa: SIM110 - a generator would allocate
-        if a[j] != b[j]:
-            return True
-    return False
-
-
-@njit(cache=True)
-def _lookup(key, keys, slots):
-    """Return the slot of the hash table that holds this key, or the empty slot where the key belongs."""
-    code = np.uint64(0)
-    for j in range(len(key) - 1):  # the last coordinate follows from the others: they sum to zero
-        code = (code + np.uint64(key[j])) * np.uint64(0x9E3779B97F4A7C15)
-    mask = len(slots) - 1
-    slot = np.int64(code >> np.uint64(32)) & mask
-    while slots[slot] >= 0 and _differ(keys[slots[slot]], key):
-        slot = (slot + 1) & mask
-    return slot
-
-
-@njit(cache=True)
-def number_vertices(origins, ranks):
-    """Give a number to each distinct corner, which makes it a vertex.
-
-    Parameters
-    ----------
-    origins, ranks : (N, d + 1) int32
-        The simplex around each point, see `enclosing_simplices`.
-
-    Returns
-    -------
-    corners : (N, d + 1) int32
-        The numbers of the vertices at the corners of each simplex.
-    keys : (M, d + 1) int32
-        The coordinates of each vertex.
-    slots : (2^k,) int32
-        A hash table from coordinates to numbers; -1 in empty slots.
-    """
-    n_points, size = origins.shape
-    corners = np.empty((n_points, size), np.int32)
-    keys = np.empty((n_points * size, size), np.int32)
-    capacity = 1
-    while capacity < 2 * n_points * size:
-        capacity *= 2
-    slots = np.full(capacity, -1, np.int32)
-    key = np.empty(size, np.int32)
-    count = 0
-    for i in range(n_points):
-        for corner in range(size):
-            for j in range(size):
-                key[j] = origins[i, j] + corner - (size if ranks[i, j] >= size - corner else 0)
-            slot = _lookup(key, keys, slots)
-            if slots[slot] < 0:
-                keys[count] = key
-                slots[slot] = count
-                count += 1
-            corners[i, corner] = slots[slot]
-    return corners, keys[:count].copy(), slots
-
-
 @njit(cache=True, parallel=True)
-def find_neighbours(keys, slots):
-    """Find the vertices one step forward and one step backward along each direction.
+def responses(simplices, ranks, neighbours):
+    """Compute how much of a value that is put on one corner of a simplex the blur brings to each of its corners.
+
+    A value travels by one step forward, one step back, or none, along each direction in turn. Corner a + 1 of a simplex
+    lies one step from corner a, in the direction whose rank is d - a; after corner d follows corner 0 again. So a value
+    goes from corner a to corner b along the directions between them, forward or back. It is lost where a vertex on its
+    way doesn't exist.
 
     Parameters
     ----------
-    keys : (M, d + 1) int32
-        The coordinates of each vertex, from `number_vertices`.
-    slots : (2^k,) int32
-        The hash table from coordinates to numbers, from `number_vertices`.
+    simplices : (S, d + 1) int32
+        The vertices at the corners of each simplex, see `Vertices`.
+    ranks : (S, d + 1) int32
+        Order of the coordinates in each simplex, see `enclosing_simplices`.
+    neighbours : (d + 1, 2, M) int32
+        The vertices one step forward and back along each direction; M where there is none.
 
     Returns
     -------
-    (d + 1, 2, M) int32
-        Number of the neighbour by direction, forward or backward, and vertex; M where there is none.
+    (S, d + 1, d + 1) float32
+        From the corner of the row to that of the column.
     """
-    n_vertices, size = keys.shape
-    neighbours = np.full((size, 2, n_vertices), n_vertices, np.int32)
-    for v in prange(n_vertices):
-        key = keys[v] + 1
-        for direction in range(size):
-            key[direction] -= size
-            found = slots[_lookup(key, keys, slots)]
-            key[direction] += size
-            if found >= 0:
-                neighbours[direction, _FORTH, v] = found
-                neighbours[direction, _BACK, found] = v
-    return neighbours
+    n_simplices, size = simplices.shape
+    response = np.zeros((n_simplices, size, size), np.float32)
+    for s in prange(n_simplices):
+        direction = np.empty(size, np.int32)
+        for j in range(size):
+            direction[ranks[s, j]] = j
+        for a in range(size):
+            for sign in range(2):
+                ahead, taken = sign == FORTH, 0
+                for steps in range(size + 1):
+                    if steps > 0:
+                        rank = (2 * size - a - steps if ahead else size - a + steps - 1) % size
+                        taken |= 1 << direction[rank]
+                    b = (a + steps if ahead else a - steps) % size
+                    if steps > 0 or ahead:  # no step at all counts once
+                        response[s, a, b] += _survives(simplices[s, a], taken, sign, neighbours) * 0.5 ** (size + steps)
+    return response
 
 
 @njit(cache=True)
-def _walk(vertex, a, b, shift, ranks, neighbours):
-    """Return the weight of one path of the blur from corner a of a simplex, the given vertex, to its corner b."""
-    size = len(ranks)
-    weight = 1.0
-    for direction in range(size):
-        step = shift + int(ranks[direction] >= size - b) - int(ranks[direction] >= size - a)
-        if step == 0:
-            weight *= 0.5
-        else:
-            weight *= 0.25
-            vertex = neighbours[direction, _FORTH if step > 0 else _BACK, vertex]
+def _survives(vertex, taken, sign, neighbours):
+    """Return 1 if all vertices on the way exist, along the directions that are taken one after the other, else 0."""
+    for j in range(neighbours.shape[0]):
+        if taken >> j & 1:
+            vertex = neighbours[j, sign, vertex]
             if vertex == neighbours.shape[2]:
                 return 0.0
-    return weight
+    return 1.0
 
 
 @njit(cache=True, parallel=True)
-def self_responses(corners, ranks, weights, neighbours):
+def self_responses(members, weights, response):
     """Compute what share of its own value the filter gives back to each point, without the factor of `peak`.
-
-    A point's value reaches it again over the paths of the blur between corners of its simplex. The path from corner a
-    to b > a makes one step along each coordinate whose rank is d - a down to d - b + 1. One step along all d + 1
-    directions together leads back to where it began; so raising or lowering every step of a path by one gives a further
-    path to the same corner.
 
     Parameters
     ----------
-    corners : (N, d + 1) int32
-        The vertices around each point, see `number_vertices`.
-    ranks, weights : (N, d + 1) int32, float64
-        Order of the coordinates and barycentric weights, see `enclosing_simplices`.
-    neighbours : (d + 1, 2, M) int32
-        See `find_neighbours`.
+    members : (N,) int32
+        The simplex of each point, see `Vertices`.
+    weights : (N, d + 1) float64
+        Barycentric weights of its corners, see `enclosing_simplices`.
+    response : (S, d + 1, d + 1) float32
+        See `responses`.
 
     Returns
     -------
     (N,) float32
         The diagonal of the filter.
     """
-    n_points, size = corners.shape
-    diagonal = np.zeros(n_points, np.float32)
-    for i in prange(n_points):
-        for a in range(size):
-            for b in range(size):
-                for shift in range(-1 if a <= b else 0, 2 if a >= b else 1):
-                    path = _walk(corners[i, a], a, b, shift, ranks[i], neighbours)
-                    diagonal[i] += weights[i, a] * weights[i, b] * path
+    diagonal = np.zeros(len(members), np.float32)
+    for i in prange(len(members)):
+        for a in range(weights.shape[1]):
+            for b in range(weights.shape[1]):
+                diagonal[i] += weights[i, a] * weights[i, b] * response[members[i], a, b]
     return diagonal
-
-
-@njit(cache=True)
-def sort_by_vertex(vertices, n_vertices):
-    """Sort corners by their vertices (counting sort).
-
-    Parameters
-    ----------
-    vertices : (N (d + 1),) int32
-        The number of the vertex at each corner, see `number_vertices`.
-    n_vertices : int
-        Number of vertices, M.
-
-    Returns
-    -------
-    starts : (M + 1,) int32
-        Where the corners of each vertex begin in `members`, and where those of the last one end.
-    members : (N (d + 1),) int32
-        Indices of the corners, vertex after vertex.
-    """
-    starts = np.zeros(n_vertices + 1, np.int32)
-    for v in vertices:
-        starts[v + 1] += 1
-    starts = np.cumsum(starts).astype(np.int32)
-    members = np.empty(len(vertices), np.int32)
-    filled = starts.copy()
-    for corner, v in enumerate(vertices):
-        members[filled[v]] = corner
-        filled[v] += 1
-    return starts, members
