@@ -16,6 +16,9 @@ from semgrid_edu.crf.simplices import elevation, enclosing_simplices, peak, resp
 from semgrid_edu.crf.vertices import number_vertices, sort_by_vertex
 from semgrid_edu.errors import ArgumentError
 
+HALF = np.float32(0.5)
+"""A factor of 0.5 alone would make the compiler compute in double precision."""
+
 
 @dataclass(frozen=True)
 class PermutohedralLattice:
@@ -125,40 +128,49 @@ class PermutohedralLattice:
         (N, K) float32
             sum_j k(f_i, f_j) values_j, the point itself included.
         """
-        blurred = _splat(values, self.starts, self.points, self.splats)
+        out = np.zeros((len(self.corners), values.shape[1]), np.float32)
+        self.add(values, out)
+        return out
+
+    def add(self, values: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+        """Filter values at the points and add the result to an array, which saves memory.
+
+        Parameters
+        ----------
+        values : (N, K) float32
+            One row per point.
+        out : (N, K) float32
+            Gains sum_j k(f_i, f_j) values_j.
+        """
+        blurred, other = np.zeros((2, len(self.starts), values.shape[1]), np.float32)
+        _splat(values, self.starts, self.points, self.splats, blurred)
         for forth, back in self.neighbours:
-            blurred = _blur(blurred, forth, back)
-        return _slice(blurred, self.corners, self.slices)
+            _blur(blurred, forth, back, other)
+            blurred, other = other, blurred
+        _slice(blurred, self.corners, self.slices, out)
 
 
 @njit(cache=True, parallel=True, fastmath=True)
-def _splat(values, starts, points, weights):
-    """Sum at each vertex what its points add: (M + 1, K); the last row is zero and stands for missing neighbours."""
-    n_vertices = len(starts) - 1
-    out = np.zeros((n_vertices + 1, values.shape[1]), np.float32)
-    for v in prange(n_vertices):
+def _splat(values, starts, points, weights, out):
+    """Sum at each vertex what its points add, (M + 1, K); the last row stays zero, for missing neighbours."""
+    for v in prange(len(starts) - 1):
         for i in range(starts[v], starts[v + 1]):
             for k in range(values.shape[1]):
                 out[v, k] += weights[i] * values[points[i], k]
-    return out
 
 
 @njit(cache=True, parallel=True, fastmath=True)
-def _blur(values, forth, back):
+def _blur(values, forth, back, out):
     """Blur (M + 1, K) values along one direction with (1/4, 1/2, 1/4), given each vertex's two neighbours."""
-    out = np.zeros_like(values)
     for v in prange(len(forth)):
         for k in range(values.shape[1]):
-            out[v, k] = 0.5 * values[v, k] + 0.25 * (values[forth[v], k] + values[back[v], k])
-    return out
+            out[v, k] = HALF * (values[v, k] + HALF * (values[forth[v], k] + values[back[v], k]))
 
 
 @njit(cache=True, parallel=True, fastmath=True)
-def _slice(values, corners, weights):
-    """Interpolate the values at the N points from their corners: (M + 1, K) -> (N, K)."""
-    out = np.zeros((len(corners), values.shape[1]), np.float32)
+def _slice(values, corners, weights, out):
+    """Add to each point, (N, K), what lies between the values of its corners, (M + 1, K)."""
     for i in prange(len(corners)):
         for corner in range(corners.shape[1]):
-            for k in range(values.shape[1]):
+            for k in range(out.shape[1]):
                 out[i, k] += weights[i, corner] * values[corners[i, corner], k]
-    return out

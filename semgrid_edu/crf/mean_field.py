@@ -21,12 +21,12 @@ this basis keep every distance between the states of two cells."""
 
 
 class Kernel(Protocol):
-    """One term of eq. (4) as a filter over N cells: a call returns sum_j k_ij values_j; `diagonal` holds k_ii, (N,)."""
+    """One term of eq. (4) as a filter over N cells; `diagonal` holds k_ii, (N,)."""
 
     diagonal: NDArray[np.float32]
 
-    def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return sum_j k_ij values_j for each cell i, (N, K) -> (N, K)."""
+    def add(self, values: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+        """Add sum_j k_ij values_j to each cell i of an array, (N, K) both."""
 
 
 def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice:
@@ -89,8 +89,9 @@ def mean_field(
     unary, values = check_inputs(unary, values)
     check_stop(iterations, tolerance)
     spatial = SeparableGaussian.build(unary.shape[1:], params.sigma_gamma, params.w_spatial, params.normalization)
-    Q = iterate(_in_lanes(unary), [bilateral_kernel(values, params), spatial], iterations, tolerance)
-    return np.ascontiguousarray(Q[:, : len(unary)].T).reshape(unary.shape)
+    phi = _in_lanes(unary.reshape(len(unary), -1), LANES)
+    Q = iterate(phi, [bilateral_kernel(values, params), spatial], iterations, tolerance)
+    return _by_class(Q, len(unary)).reshape(unary.shape)
 
 
 def iterate(
@@ -118,62 +119,89 @@ def iterate(
         Q, the distribution over classes in each cell.
     """
     own = sum(kernel.diagonal for kernel in kernels)
-    part, logits = damping(own), -phi
-    Q = _softmax(logits)
+    part, logits, (Q, reward) = damping(own).astype(np.float32), -phi, np.zeros((2, *phi.shape), np.float32)
+    _softmax(logits, Q)
     for _ in range(iterations):
-        reward = sum(kernel(Q) for kernel in kernels)
-        _update(logits, part, reward, own, Q, phi)
-        before, Q = Q, _softmax(logits)
-        if tolerance > 0 and np.abs(Q - before).max() <= tolerance:
+        for kernel in kernels:
+            kernel.add(Q, reward)
+        change = _update(logits, Q, phi, reward, own, part)
+        if change <= tolerance:
             break
     return Q
 
 
-def _in_lanes(unary: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Return the unary term as (N, K), 0 for the best class; the classes are padded with impossible ones."""
-    n_classes = len(unary)
-    phi = np.full((unary[0].size, -(-n_classes // LANES) * LANES), NEVER, np.float32)
-    phi[:, :n_classes] = np.minimum(unary - unary.min(axis=0), NEVER).reshape(n_classes, -1).T
+@njit(cache=True, parallel=True)
+def _in_lanes(unary, lanes):
+    """Return the unary term (C, H W) as (N, K), 0 for the best class; classes are padded with impossible ones."""
+    n_classes, n_cells = unary.shape
+    phi = np.full((n_cells, -(-n_classes // lanes) * lanes), np.float32(NEVER))
+    for i in prange(n_cells):
+        best = unary[:, i].min()
+        for k in range(n_classes):
+            phi[i, k] = min(unary[k, i] - best, NEVER)
     return phi
 
 
-@njit(cache=True, parallel=True, fastmath=True)
-def _update(logits, part, reward, own, Q, phi):
-    """Move log Q_i(l), which is known up to one number per cell, part of the way: to the reward minus the unary term.
+@njit(cache=True, parallel=True)
+def _by_class(Q, n_classes):
+    """Return (N, K) as (C, N), without the padding."""
+    out = np.empty((n_classes, len(Q)), np.float32)
+    for i in prange(len(Q)):
+        for k in range(n_classes):
+            out[k, i] = Q[i, k]
+    return out
 
-    The reward still contains the cell's own part.
+
+@njit(cache=True, parallel=True, fastmath=True)
+def _update(logits, Q, phi, reward, own, part):
+    """Move log Q, known up to one number per cell, part of the way to the reward minus the unary term, in place.
+
+    The reward still contains what the cell says to itself, `own` times Q, and is 0 afterwards. Returns the largest
+    change of a probability.
     """
+    changes = np.zeros(len(Q), np.float32)
     for i in prange(len(Q)):
         for k in range(Q.shape[1]):
-            target = reward[i, k] - own[i] * Q[i, k] - phi[i, k]
-            logits[i, k] += part[i] * (target - logits[i, k])
-
-
-def _softmax(logits: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the soft-max along the class axis, (N, K); makes the largest logit of each cell 0."""
-    _subtract_best(logits)
-    Q = np.exp(logits)  # numpy's exp is vectorised, numba's isn't
-    _normalise(Q)
-    return Q
+            logits[i, k] += part[i] * (reward[i, k] - own[i] * Q[i, k] - phi[i, k] - logits[i, k])
+        _softmax_of_cell(logits, reward, i)
+        for k in range(Q.shape[1]):
+            changes[i] = max(changes[i], abs(Q[i, k] - reward[i, k]))
+            Q[i, k] = reward[i, k]
+            reward[i, k] = 0
+    return changes.max()
 
 
 @njit(cache=True, parallel=True, fastmath=True)
-def _subtract_best(logits):
-    """Make the largest logit of each cell 0, in place."""
-    for i in prange(len(logits)):
-        best = logits[i, 0]
-        for k in range(1, logits.shape[1]):
-            best = max(best, logits[i, k])
-        for k in range(logits.shape[1]):
-            logits[i, k] -= best
+def _softmax(logits, Q):
+    """Write the soft-max of each cell's logits to Q, and make its largest logit 0."""
+    for i in prange(len(Q)):
+        _softmax_of_cell(logits, Q, i)
 
 
-@njit(cache=True, parallel=True, fastmath=True)
-def _normalise(weights):
-    """Divide each row by its sum, in place."""
-    for i in prange(len(weights)):
-        total = np.float32(0)
-        for k in range(weights.shape[1]):
-            total += weights[i, k]
-        for k in range(weights.shape[1]):
-            weights[i, k] /= total
+@njit(cache=True, fastmath=True, inline="always")
+def _softmax_of_cell(logits, Q, i):
+    best, total = logits[i, 0], np.float32(0)
+    for k in range(1, Q.shape[1]):
+        best = max(best, logits[i, k])
+    for k in range(Q.shape[1]):
+        logits[i, k] -= best
+        Q[i, k] = _exp(logits[i, k])
+        total += Q[i, k]
+    share = np.float32(1) / total
+    for k in range(Q.shape[1]):
+        Q[i, k] *= share
+
+
+@njit(cache=True, fastmath=True, inline="always")
+def _exp(x):
+    """Return exp(x) of a number that isn't positive, to 6 digits: the 64th power of the series of exp(x / 64).
+
+    Unlike the exponential of the mathematical library, the compiler does this for many numbers at once.
+    """
+    y = max(x, np.float32(-80)) * np.float32(1 / 64)
+    power = np.float32(1 / 120)
+    for factorial in (24, 6, 2, 1, 1):
+        power = power * y + np.float32(1 / factorial)
+    for _ in range(6):
+        power *= power
+    return power if x > -80 else np.float32(0)

@@ -129,33 +129,50 @@ def responses(simplices, ranks, neighbours):
         From the corner of the row to that of the column.
     """
     n_simplices, size = simplices.shape
+    alive = survivors(neighbours, FORTH), survivors(neighbours, BACK)
     response = np.zeros((n_simplices, size, size), np.float32)
     for s in prange(n_simplices):
         direction = np.empty(size, np.int32)
         for j in range(size):
             direction[ranks[s, j]] = j
         for a in range(size):
-            for sign in range(2):
-                ahead, taken = sign == FORTH, 0
-                for steps in range(size + 1):
-                    if steps > 0:
-                        rank = (2 * size - a - steps if ahead else size - a + steps - 1) % size
-                        taken |= 1 << direction[rank]
-                    b = (a + steps if ahead else a - steps) % size
-                    if steps > 0 or ahead:  # no step at all counts once
-                        response[s, a, b] += _survives(simplices[s, a], taken, sign, neighbours) * 0.5 ** (size + steps)
+            forth, back = 0, 0
+            response[s, a, a] += np.float32(0.5) ** size  # no step at all
+            for steps in range(1, size + 1):
+                forth |= 1 << direction[(2 * size - a - steps) % size]
+                back |= 1 << direction[(size - a + steps - 1) % size]
+                weight = np.float32(0.5) ** (size + steps)
+                response[s, a, (a + steps) % size] += weight * alive[FORTH][simplices[s, a], forth]
+                response[s, a, (a - steps) % size] += weight * alive[BACK][simplices[s, a], back]
     return response
 
 
-@njit(cache=True)
-def _survives(vertex, taken, sign, neighbours):
-    """Return 1 if all vertices on the way exist, along the directions that are taken one after the other, else 0."""
-    for j in range(neighbours.shape[0]):
-        if taken >> j & 1:
-            vertex = neighbours[j, sign, vertex]
-            if vertex == neighbours.shape[2]:
-                return 0.0
-    return 1.0
+@njit(cache=True, parallel=True)
+def survivors(neighbours, sign):
+    """Tell for each vertex and each set of directions whether all vertices on the way along them exist.
+
+    Parameters
+    ----------
+    neighbours : (d + 1, 2, M) int32
+        The vertices one step forward and back along each direction; M where there is none.
+    sign : int
+        `FORTH` or `BACK`: steps forward or back.
+
+    Returns
+    -------
+    (M, 2^(d + 1)) bool
+        Bit j of the column says whether direction j is taken; steps are made in the order of the directions.
+    """
+    size, _, n_vertices = neighbours.shape
+    alive = np.zeros((n_vertices, 1 << size), np.bool_)
+    alive[:, 0] = True
+    for j in range(size - 1, -1, -1):
+        for v in prange(n_vertices):
+            following = neighbours[j, sign, v]
+            if following < n_vertices:
+                for later in range(0, 1 << size, 2 << j):  # sets of directions after j
+                    alive[v, later | 1 << j] = alive[following, later]
+    return alive
 
 
 @njit(cache=True, parallel=True)

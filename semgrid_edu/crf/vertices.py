@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from semgrid_edu.crf.simplices import BACK, FORTH
 from semgrid_edu.errors import ArgumentError
 
-MOST_DIMENSIONS = 14
-"""Of points: the order of 15 coordinates still fits into 64 bits."""
+MOST_DIMENSIONS = 8
+"""Of points: `survivors` holds 2^9 answers for each vertex."""
 
 
 class Vertices(NamedTuple):
@@ -62,8 +62,7 @@ def number_vertices(origins: NDArray[np.int32], ranks: NDArray[np.int32]) -> Ver
     if size > MOST_DIMENSIONS + 1:
         raise ArgumentError("features", f"at most {MOST_DIMENSIONS} dimensions", size - 1)
     lowest, units = _fields(origins)
-    keys = (origins[:, :-1] // size - lowest) @ units[:-1]
-    orders = ranks @ size ** np.arange(size)
+    keys, orders = _pack(origins, ranks, lowest, units)
     members, first = _number_simplices(keys, orders)
     simplices, keys, slots = _number_corners(keys[first], ranks[first], units)
     return Vertices(members, simplices, ranks[first], _find_neighbours(keys, slots, units))
@@ -76,12 +75,25 @@ def _fields(origins: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.i
     """
     size = origins.shape[1]
     # Of a corner q_j is up to 1 smaller than of the origin, and of a neighbour by 1 smaller or larger than that.
-    lowest, highest = origins[:, :-1].min(axis=0) // size - 2, origins[:, :-1].max(axis=0) // size + 1
+    lowest, highest = (f(origins, axis=0)[:-1] // size + margin for f, margin in ((np.min, -2), (np.max, 1)))
     bits = np.array([size - 1, *(highest - lowest).tolist()])
     bits = np.array([int(n).bit_length() for n in bits])
     if bits.sum() > 63:
         raise ArgumentError("features", "fewer standard deviations, or a larger sigma", f"{bits.sum()} bits")
     return lowest.astype(np.int64), np.append(1 << np.cumsum(bits)[:-1], 0)
+
+
+@njit(cache=True, parallel=True)
+def _pack(origins, ranks, lowest, units):
+    """Return two integers per point, which tell its simplex: its corner with remainder 0, and the order there."""
+    keys, orders = np.zeros(len(origins), np.int64), np.zeros(len(origins), np.int64)
+    size = origins.shape[1]
+    for i in prange(len(origins)):
+        for j in range(size - 1):
+            keys[i] += (origins[i, j] // size - lowest[j]) * units[j]
+        for j in range(size):
+            orders[i] = orders[i] * size + ranks[i, j]
+    return keys, orders
 
 
 @njit(cache=True)
