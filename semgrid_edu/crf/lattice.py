@@ -128,26 +128,27 @@ class PermutohedralLattice:
         (N, K) float32
             sum_j k(f_i, f_j) values_j, the point itself included.
         """
-        out = np.zeros((len(self.corners), values.shape[1]), np.float32)
-        self.add(values, out)
-        return out
+        return _slice(self.blurred(values), self.corners, self.slices)
 
-    def add(self, values: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-        """Filter values at the points and add the result to an array, which saves memory.
+    def blurred(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Splat values onto the vertices and blur them there: all of the filter but the slicing.
 
         Parameters
         ----------
         values : (N, K) float32
             One row per point.
-        out : (N, K) float32
-            Gains sum_j k(f_i, f_j) values_j.
+
+        Returns
+        -------
+        (M + 1, K) float32
+            What each vertex holds; the last row is zero.
         """
         blurred, other = np.zeros((2, len(self.starts), values.shape[1]), np.float32)
         _splat(values, self.starts, self.points, self.splats, blurred)
         for forth, back in self.neighbours:
             _blur(blurred, forth, back, other)
             blurred, other = other, blurred
-        _slice(blurred, self.corners, self.slices, out)
+        return blurred
 
 
 @njit(cache=True, parallel=True, fastmath=True)
@@ -168,9 +169,11 @@ def _blur(values, forth, back, out):
 
 
 @njit(cache=True, parallel=True, fastmath=True)
-def _slice(values, corners, weights, out):
-    """Add to each point, (N, K), what lies between the values of its corners, (M + 1, K)."""
+def _slice(values, corners, weights):
+    """Interpolate the values at the N points from their corners: (M + 1, K) -> (N, K)."""
+    out = np.zeros((len(corners), values.shape[1]), np.float32)
     for i in prange(len(corners)):
         for corner in range(corners.shape[1]):
-            for k in range(out.shape[1]):
+            for k in range(values.shape[1]):
                 out[i, k] += weights[i, corner] * values[corners[i, corner], k]
+    return out

@@ -1,8 +1,5 @@
 """Mean field on the whole grid in milliseconds: eq. (3), (4) with filters in place of the sum over all pairs."""
 
-from collections.abc import Sequence
-from typing import Protocol
-
 import numpy as np
 from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
@@ -10,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from semgrid_edu.crf.lattice import PermutohedralLattice
 from semgrid_edu.crf.naive import NEVER, damping
 from semgrid_edu.crf.params import CrfParams, check_inputs, check_stop
-from semgrid_edu.crf.spatial import SeparableGaussian
+from semgrid_edu.crf.spatial import SeparableGaussian, convolved_row
 
 LANES = 16
 """The class axis is padded to a multiple of this number: 16 floats fill a cache line, and loops over them vectorise."""
@@ -18,15 +15,6 @@ LANES = 16
 _ZERO_SUM_STATES = np.array([[1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1]]) / 2
 """An orthonormal basis of the space orthogonal to (1, 1, 1, 1). The four probabilities sum to one, so three numbers in
 this basis keep every distance between the states of two cells."""
-
-
-class Kernel(Protocol):
-    """One term of eq. (4) as a filter over N cells; `diagonal` holds k_ii, (N,)."""
-
-    diagonal: NDArray[np.float32]
-
-    def add(self, values: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-        """Add sum_j k_ij values_j to each cell i of an array, (N, K) both."""
 
 
 def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice:
@@ -90,14 +78,18 @@ def mean_field(
     check_stop(iterations, tolerance)
     spatial = SeparableGaussian.build(unary.shape[1:], params.sigma_gamma, params.w_spatial, params.normalization)
     phi = _in_lanes(unary.reshape(len(unary), -1), LANES)
-    Q = iterate(phi, [bilateral_kernel(values, params), spatial], iterations, tolerance)
+    Q = iterate(phi, bilateral_kernel(values, params), spatial, iterations, tolerance)
     return _by_class(Q, len(unary)).reshape(unary.shape)
 
 
 def iterate(
-    phi: NDArray[np.float32], kernels: Sequence[Kernel], iterations: int, tolerance: float = 0.0
+    phi: NDArray[np.float32],
+    bilateral: PermutohedralLattice,
+    spatial: SeparableGaussian,
+    iterations: int,
+    tolerance: float = 0.0,
 ) -> NDArray[np.float32]:
-    """Run the mean-field update of `mean_field_naive` with any kernels.
+    """Run the mean-field update of `mean_field_naive`, with filters for the sums over all cells.
 
     The cost of disagreeing, sum_j k_ij (1 - Q_j(l)), differs from the negative reward of agreeing,
     -sum_j k_ij Q_j(l), only by sum_j k_ij, which is the same for all classes and cancels in the soft-max.
@@ -106,8 +98,8 @@ def iterate(
     ----------
     phi : (N, K) float32
         The unary term, finite, at least 0, and 0 for the best class of each cell.
-    kernels : sequence of Kernel
-        The terms of eq. (4).
+    bilateral, spatial : PermutohedralLattice, SeparableGaussian
+        The two kernels of eq. (4), with their weights and normalisation.
     iterations : int
         The largest number of updates of all cells.
     tolerance : float
@@ -118,13 +110,14 @@ def iterate(
     (N, K) float32
         Q, the distribution over classes in each cell.
     """
-    own = sum(kernel.diagonal for kernel in kernels)
-    part, logits, (Q, reward) = damping(own).astype(np.float32), -phi, np.zeros((2, *phi.shape), np.float32)
+    own, logits, Q, updated = bilateral.diagonal + spatial.diagonal, -phi, np.empty_like(phi), np.empty_like(phi)
+    part, column_scale = damping(own).astype(np.float32), np.repeat(spatial.column_scale, phi.shape[1])
+    grid = spatial.taps, spatial.row_scale, column_scale
     _softmax(logits, Q)
     for _ in range(iterations):
-        for kernel in kernels:
-            kernel.add(Q, reward)
-        change = _update(logits, Q, phi, reward, own, part)
+        vertices = bilateral.blurred(Q)
+        change = _update(Q, updated, logits, phi, own, part, grid, vertices, bilateral.corners, bilateral.slices)
+        Q, updated = updated, Q
         if change <= tolerance:
             break
     return Q
@@ -153,22 +146,30 @@ def _by_class(Q, n_classes):
 
 
 @njit(cache=True, parallel=True, fastmath=True)
-def _update(logits, Q, phi, reward, own, part):
-    """Move log Q, known up to one number per cell, part of the way to the reward minus the unary term, in place.
+def _update(Q, updated, logits, phi, own, part, grid, vertices, corners, slices):
+    """Update all cells, row by row of the grid, and return the largest change of a probability.
 
-    The reward still contains what the cell says to itself, `own` times Q, and is 0 afterwards. Returns the largest
-    change of a probability.
+    The reward of a cell is what the spatial kernel says, plus what the lattice's vertices say, minus what both contain
+    of the cell itself. Its log Q, known up to one number, goes part of the way to the reward minus the unary term.
     """
-    changes = np.zeros(len(Q), np.float32)
-    for i in prange(len(Q)):
-        for k in range(Q.shape[1]):
-            logits[i, k] += part[i] * (reward[i, k] - own[i] * Q[i, k] - phi[i, k] - logits[i, k])
-        _softmax_of_cell(logits, reward, i)
-        for k in range(Q.shape[1]):
-            changes[i] = max(changes[i], abs(Q[i, k] - reward[i, k]))
-            Q[i, k] = reward[i, k]
-            reward[i, k] = 0
-    return changes.max()
+    taps, row_scale, column_scale = grid
+    height, lanes = len(row_scale), Q.shape[1]
+    width, rows, change = len(Q) // height, Q.reshape(height, -1), np.zeros(height, np.float32)
+    for r in prange(height):
+        reward = convolved_row(rows, r, lanes, taps, row_scale, column_scale)
+        for c in range(width):
+            i = r * width + c
+            for corner in range(corners.shape[1]):
+                weight, vertex = slices[i, corner], corners[i, corner]
+                for k in range(lanes):
+                    reward[c * lanes + k] += weight * vertices[vertex, k]
+            for k in range(lanes):
+                target = reward[c * lanes + k] - own[i] * Q[i, k] - phi[i, k]
+                logits[i, k] += part[i] * (target - logits[i, k])
+            _softmax_of_cell(logits, updated, i)
+            for k in range(lanes):
+                change[r] = max(change[r], abs(updated[i, k] - Q[i, k]))
+    return change.max()
 
 
 @njit(cache=True, parallel=True, fastmath=True)

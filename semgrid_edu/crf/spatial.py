@@ -72,23 +72,9 @@ class SeparableGaussian:
         (H W, K) float32
             sum_j k_ij values_j, the cell itself included.
         """
-        out = np.zeros_like(values)
-        self.add(values, out)
-        return out
-
-    def add(self, values: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-        """Filter values on the grid and add the result to an array, which saves memory.
-
-        Parameters
-        ----------
-        values : (H W, K) float32
-            One row per cell, cells counted row by row.
-        out : (H W, K) float32
-            Gains sum_j k_ij values_j.
-        """
-        grid, sums = (array.reshape(len(self.row_scale), -1) for array in (values, out))
+        grid = values.reshape(len(self.row_scale), -1)
         scale = np.repeat(self.column_scale, values.shape[1])
-        _convolve(grid, values.shape[1], self.taps, self.row_scale, scale, sums)
+        return _convolve(grid, values.shape[1], self.taps, self.row_scale, scale).reshape(values.shape)
 
 
 def _row_sums(size: int, sigma: float) -> NDArray[np.float64]:
@@ -99,23 +85,51 @@ def _row_sums(size: int, sigma: float) -> NDArray[np.float64]:
 
 # Loops, though BLAS has matrix products: its threads would compete with numba's for the same cores.
 @njit(cache=True, parallel=True, fastmath=True)
-def _convolve(values, lanes, taps, row_scale, column_scale, out):
+def _convolve(values, lanes, taps, row_scale, column_scale):
     """Convolve (H, W K) values, K per cell, along both axes; `column_scale` repeats each column's scale K times."""
+    out = np.empty_like(values)
+    for r in prange(len(values)):
+        out[r] = convolved_row(values, r, lanes, taps, row_scale, column_scale)
+    return out
+
+
+@njit(cache=True, fastmath=True, inline="always")
+def convolved_row(values, r, lanes, taps, row_scale, column_scale):
+    """Compute one row of the filtered grid: add up rows, then what lies left and right in the sum.
+
+    Parameters
+    ----------
+    values : (H, W K) float32
+        K values of each cell.
+    r : int
+        The row.
+    lanes : int
+        K.
+    taps, row_scale : (R + 1,), (H,) float32
+        See `SeparableGaussian`.
+    column_scale : (W K,) float32
+        The scale of each column, K times each.
+
+    Returns
+    -------
+    (W K,) float32
+        The row.
+    """
     height, length = values.shape
     reach = len(taps) - 1
-    for r in prange(height):
-        padded = np.zeros(length + 2 * reach * lanes, np.float32)  # zeros beyond the ends of the row
-        row, total = padded[reach * lanes : reach * lanes + length], np.empty(length, np.float32)
-        for s in range(max(r - reach, 0), min(r + reach + 1, height)):
-            weight = taps[abs(r - s)] * row_scale[s]
-            for n in range(length):
-                row[n] += weight * values[s, n]
+    padded = np.zeros(length + 2 * reach * lanes, np.float32)  # zeros beyond the ends of the row
+    row, total = padded[reach * lanes : reach * lanes + length], np.empty(length, np.float32)
+    for s in range(max(r - reach, 0), min(r + reach + 1, height)):
+        weight = taps[abs(r - s)] * row_scale[s]
         for n in range(length):
-            row[n] *= row_scale[r] * column_scale[n]
-            total[n] = taps[0] * row[n]
-        for t in range(1, reach + 1):
-            left, right = padded[(reach - t) * lanes :], padded[(reach + t) * lanes :]
-            for n in range(length):
-                total[n] += taps[t] * (left[n] + right[n])
+            row[n] += weight * values[s, n]
+    for n in range(length):
+        row[n] *= row_scale[r] * column_scale[n]
+        total[n] = taps[0] * row[n]
+    for t in range(1, reach + 1):
+        left, right = padded[(reach - t) * lanes :], padded[(reach + t) * lanes :]
         for n in range(length):
-            out[r, n] += column_scale[n] * total[n]
+            total[n] += taps[t] * (left[n] + right[n])
+    for n in range(length):
+        total[n] *= column_scale[n]
+    return total
