@@ -156,19 +156,23 @@ def _update(Q, updated, logits, phi, own, part, grid, vertices, corners, slices)
     height, lanes = len(row_scale), Q.shape[1]
     width, rows, change = len(Q) // height, Q.reshape(height, -1), np.zeros(height, np.float32)
     for r in prange(height):
-        reward = convolved_row(rows, r, lanes, taps, row_scale, column_scale)
+        reward, largest = convolved_row(rows, r, lanes, taps, row_scale, column_scale), np.float32(0)
         for c in range(width):
             i = r * width + c
-            for corner in range(corners.shape[1]):
-                weight, vertex = slices[i, corner], corners[i, corner]
-                for k in range(lanes):
-                    reward[c * lanes + k] += weight * vertices[vertex, k]
-            for k in range(lanes):
-                target = reward[c * lanes + k] - own[i] * Q[i, k] - phi[i, k]
-                logits[i, k] += part[i] * (target - logits[i, k])
+            self_weight, share = own[i], part[i]
+            for first in range(0, lanes, LANES):
+                for corner in range(corners.shape[1]):
+                    weight, vertex = slices[i, corner], corners[i, corner]
+                    for k in range(LANES):
+                        reward[c * lanes + first + k] += weight * vertices[vertex, first + k]
+                for k in range(LANES):
+                    target = reward[c * lanes + first + k] - self_weight * Q[i, first + k] - phi[i, first + k]
+                    logits[i, first + k] += share * (target - logits[i, first + k])
             _softmax_of_cell(logits, updated, i)
-            for k in range(lanes):
-                change[r] = max(change[r], abs(updated[i, k] - Q[i, k]))
+            for first in range(0, lanes, LANES):
+                for k in range(LANES):
+                    largest = max(largest, abs(updated[i, first + k] - Q[i, first + k]))
+        change[r] = largest
     return change.max()
 
 
@@ -182,15 +186,18 @@ def _softmax(logits, Q):
 @njit(cache=True, fastmath=True, inline="always")
 def _softmax_of_cell(logits, Q, i):
     best, total = logits[i, 0], np.float32(0)
-    for k in range(1, Q.shape[1]):
-        best = max(best, logits[i, k])
-    for k in range(Q.shape[1]):
-        logits[i, k] -= best
-        Q[i, k] = _exp(logits[i, k])
-        total += Q[i, k]
+    for first in range(0, Q.shape[1], LANES):
+        for k in range(LANES):
+            best = max(best, logits[i, first + k])
+    for first in range(0, Q.shape[1], LANES):
+        for k in range(LANES):
+            logits[i, first + k] -= best
+            Q[i, first + k] = _exp(logits[i, first + k])
+            total += Q[i, first + k]
     share = np.float32(1) / total
-    for k in range(Q.shape[1]):
-        Q[i, k] *= share
+    for first in range(0, Q.shape[1], LANES):
+        for k in range(LANES):
+            Q[i, first + k] *= share
 
 
 @njit(cache=True, fastmath=True, inline="always")
@@ -200,9 +207,9 @@ def _exp(x):
     Unlike the exponential of the mathematical library, the compiler does this for many numbers at once.
     """
     y = max(x, np.float32(-80)) * np.float32(1 / 64)
-    power = np.float32(1 / 120)
-    for factorial in (24, 6, 2, 1, 1):
-        power = power * y + np.float32(1 / factorial)
+    power = np.float32(1 / 120) * y + np.float32(1 / 24)
+    power = (power * y + np.float32(1 / 6)) * y + np.float32(1 / 2)
+    power = (power * y + np.float32(1)) * y + np.float32(1)
     for _ in range(6):
         power *= power
-    return power if x > -80 else np.float32(0)
+    return power if x > np.float32(-80) else np.float32(0)
