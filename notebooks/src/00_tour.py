@@ -224,7 +224,7 @@ plt.show()
 # The vehicle is at the bottom, in the middle. A cell mixes the colours of its four states. On the left one scan: free
 # ground along the beams, dark where they end, grey behind. On the right the filter has seen the street for two
 # seconds: the beams have grown together, free is whiter and static darker, since each scan adds to the belief. What
-# moves is orange, with an arrow as long as its way in the next half second.
+# moves is orange, with an arrow as long as the distance that it covers in the next half second.
 
 # %% [markdown]
 # ## Stage 2, $i \to s$: what it looks like
@@ -505,9 +505,10 @@ plt.show()
 # %% [markdown]
 # The first scans show that *something* is there, and nothing says that it moves: STATIC is the better bet. Only when it
 # arrives where free space was seen before does the filter change its mind: for the first car that takes a second.
-# The second drives in its wake. While the first still counted as standing, it left STATIC cells along its way; they lay
-# hidden in its shadow, where nobody could take them back, and there the second arrives. Where something stands already,
-# nothing is believed to arrive (lecture 03). A planner that trusts this map takes a moving car for a parked one.
+# The second drives in its wake, and takes half as long again or more. While the first still counted as standing, it
+# left STATIC cells along its way, hidden in its shadow, and where something stands already, nothing is believed to
+# arrive. Those cells go only when the first has been seen to move for half a second (lecture 03). Until then, a planner
+# that trusts this map takes a moving car for a parked one.
 #
 # **Far away everything is worse.** A cell of half a metre, 60 m ahead, is less than a pixel high in the network's
 # image, and the LIDAR's rings are metres apart there.

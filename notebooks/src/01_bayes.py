@@ -594,7 +594,7 @@ assert whole_filter[State.DYNAMIC] > 0.9
 
 # %% [markdown]
 # The verdict on the car rests on that rate. At 0.1 a second the two are level. With the package's defaults the same
-# returns say STATIC, 0.82 to 0.18. So prediction *can* tell moving from standing, but a single cell knows only what it
+# returns say STATIC, 0.80 to 0.20. So prediction *can* tell moving from standing, but a single cell knows only what it
 # was told: how often something moving appears out of nowhere. Why does the package take so small a rate, and still
 # call this cell DYNAMIC (last row)? Because its cells aren't alone: the car comes from a neighbouring cell, which
 # predicts it. Lectures 03 and 04 show how.

@@ -6,7 +6,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
 from semgrid_edu.occupancy.bof_steps import bof_move, bof_predict, bof_update, bof_velocity
 from semgrid_edu.occupancy.local_belief import local_belief
-from semgrid_edu.occupancy.moving_map import MAX_YAW, map_around
+from semgrid_edu.occupancy.moving_map import MAX_YAW, map_around, scroll
 from semgrid_edu.occupancy.observation import observe
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import Belief
@@ -74,8 +74,9 @@ class Bof:
             doesn't turn the scan into evidence. The tracker then stays as it was.
         """
         world = self.params.world
-        seen = observe(world.sensor, points_grid, self._pose.then(motion), self.map_spec, self.spec)
-        moved = bof_move(self._state, self.map_spec, seen.shift)
+        shift, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
+        seen = observe(world.sensor, points_grid, pose, self.map_spec, self.spec)
+        moved = bof_move(self._state, self.map_spec, shift)
         predicted = bof_predict(moved, self.map_spec, self.params, dt)
         self._state, self._pose = bof_update(predicted, self.map_spec, seen.on_map, self.params), seen.pose
         velocity = bof_velocity(self._state)

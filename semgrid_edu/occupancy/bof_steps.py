@@ -5,14 +5,14 @@ from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
-from semgrid_edu.occupancy.cellwise import meet, mix, ratio
+from semgrid_edu.occupancy.cellwise import clear_wakes, meet, mix, ratio
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.moving_map import look_up
 from semgrid_edu.occupancy.particles import slow_down
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import FilterState, Particles, State, check_shape
 from semgrid_edu.occupancy.steps import update
-from semgrid_edu.occupancy.world import transition_matrix
+from semgrid_edu.occupancy.world import WorldModel, transition_matrix
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
@@ -60,9 +60,9 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -
     """Predict: every velocity shifts its mass by its own displacement; all else is as in CMCDOT's `predict`.
 
     Some mass changes to neighbouring velocities, slow mass becomes STATIC, and the states mix by the transition matrix.
-    Mass that leaves a cell leaves FREE behind. Where mass arrives, "something arrives" and "a standing thing is here"
-    can't both be true, so this combination is struck out. What becomes DYNAMIC takes the lattice's prior velocities. It
-    moves from the next step on.
+    Mass that leaves a cell leaves FREE behind. Where mass arrives, the combinations that can't be true are struck out:
+    something arrives where something stands, or comes out of a wall and goes on along it where nothing was seen to be
+    free. What becomes DYNAMIC takes the lattice's prior velocities. It moves from the next step on.
 
     Parameters
     ----------
@@ -104,10 +104,15 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -
         total += occupied[k]
 
     mixed, newborn = mix(state.probability, np.zeros(spec.shape, np.float32), going, M)
-    probability, newborn, (own, arrival) = meet(mixed, newborn, going, stays, arrives)
+    reach = -origins(state.velocity, spec, params.world)
+    came = [k for k in range(1, len(occupied)) if cells[k].any()]
+    doubtful = np.zeros(spec.shape, np.float32)
+    for k in came:
+        doubtful += occupied[k] * _doubt(mixed, reach[k])
+    probability, newborn, (own, arrival), (_, less) = meet(mixed, newborn, going, stays, arrives, doubtful)
     occupied[0] = probability[STATIC]
     for k in range(1, len(occupied)):
-        occupied[k] *= arrival if cells[k].any() else own
+        occupied[k] *= arrival - less * _doubt(mixed, reach[k]) if k in came else own
         occupied[k] += params.lattice.prior[k].astype(np.float32) * newborn
     return BofState(probability[FREE], probability[UNKNOWN], occupied, state.velocity, remainder)
 
@@ -160,11 +165,34 @@ def whole_cells(state: BofState, spec: GridSpec, dt: float) -> tuple[NDArray[np.
     return np.clip(cells, -farthest, farthest).astype(np.int64), remainder
 
 
+def origins(velocity: NDArray, spec: GridSpec, world: WorldModel) -> NDArray[np.int64]:
+    """Return how far from here mass of each velocity was when it still took up another place.
+
+    Parameters
+    ----------
+    velocity : (V, 2) float
+        The velocities along the axes of the map, m/s.
+    spec : GridSpec
+        The cells.
+    world : WorldModel
+        That was `clearing_time` ago, or for slow things as long as they need for `clearing_cells`.
+
+    Returns
+    -------
+    (V, 2) int64
+        Number of whole cells along the x and y axes of the map, to the place where it was.
+    """
+    way = -world.clearing_time * velocity / spec.cell
+    length = np.linalg.norm(way, axis=1, keepdims=True)
+    return np.rint(way * np.maximum(1, ratio(np.full_like(length, world.clearing_cells), length))).astype(np.int64)
+
+
 def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofParams) -> BofState:
     """Update by Bayes' rule: that of CMCDOT's `update`, because a scan says nothing of velocities.
 
     All moving mass of a cell shares P(z | occupied), so it is scaled by one factor. The dynamic part of UNKNOWN cells
-    that are seen for the first time takes the lattice's prior velocities.
+    that are seen for the first time takes the lattice's prior velocities. In hidden cells, what moves says that nothing
+    stands where it was (`clear_wakes`).
 
     Parameters
     ----------
@@ -196,8 +224,12 @@ def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofP
     for k in range(1, len(occupied)):
         np.multiply(state.occupied[k], factor, out=occupied[k])
         occupied[k] += np.float32(params.lattice.prior[k]) * given.newborn
-    free, unknown = given.probability[[FREE, UNKNOWN]]
-    return BofState(free, unknown, occupied, state.velocity, state.remainder)
+    left = np.zeros(spec.shape, np.float32)
+    for mass, back in zip(occupied, origins(state.velocity, spec, params.world), strict=True):
+        left += _moved(mass, back)
+    cleared = clear_wakes(given.probability, left, evidence.occupied == evidence.free)
+    occupied[0] = cleared[STATIC]
+    return BofState(cleared[FREE], cleared[UNKNOWN], occupied, state.velocity, state.remainder)
 
 
 def bof_velocity(state: BofState) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -224,6 +256,19 @@ def bof_velocity(state: BofState) -> tuple[NDArray[np.float32], NDArray[np.float
     for axis in range(2):
         np.maximum(covariance[axis, axis], 0, out=covariance[axis, axis])
     return mean, covariance
+
+
+def _doubt(mixed: NDArray, reach: NDArray[np.int64]) -> NDArray[np.float32]:
+    """Return which part of the mass of one velocity comes out of a wall and goes on along it, cell by cell."""
+    return _moved(mixed[STATIC], reach) * (1 - _moved(mixed[FREE] + mixed[DYNAMIC], -reach))
+
+
+def _moved(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:
+    """Return a plane moved by whole cells along x and y; zeros where that is no way at all."""
+    out = np.zeros_like(plane)
+    if cells.any():
+        _shift(plane, cells, out)
+    return out
 
 
 def _shift(plane: NDArray, cells: NDArray[np.int64], out: NDArray) -> None:

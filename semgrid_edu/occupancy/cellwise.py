@@ -15,7 +15,7 @@ CERTAIN = 1 - 1e-3
 """The most that arriving particles may claim of a cell. It is below 1, so that a scan can still contradict them."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def make_room(probability, claimed):
     """Let its particles decide how much of a cell is DYNAMIC; the other states share the rest in their old proportions.
 
@@ -47,7 +47,7 @@ def make_room(probability, claimed):
     return shared, factor
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def mix(probability, newborn, going, M):
     """Mix the states of each cell by the transition matrix: P(j) = sum_i M[i, j] P(i).
 
@@ -86,8 +86,8 @@ def mix(probability, newborn, going, M):
     return mixed, born
 
 
-@njit(cache=True, error_model="numpy")
-def meet(mixed, newborn, going, stays, arrives):
+@njit(cache=True, nogil=True, error_model="numpy")
+def meet(mixed, newborn, going, stays, arrives, doubtful):
     """Let the dynamic mass that arrives in a cell meet what the cell holds, and strike out what can't both be true.
 
     Parameters
@@ -99,35 +99,73 @@ def meet(mixed, newborn, going, stays, arrives):
     going, stays, arrives : (H, W) float32
         Sums of weights in each cell: of the particles that were there before they flew, of those that are still there,
         and of those that have come in.
+    doubtful : (H, W) float32
+        The part of `arrives` that comes out of a wall and goes on along it.
 
     Returns
     -------
     probability : (4, H, W) float32
-        With a = min(arrives, CERTAIN), s = P(STATIC) and d the mass that is newborn or stays, P(DYNAMIC) is
-        [a (1 - s) + (1 - a) d] / (1 - a s), and every other state (1 - a) P / (1 - a s). What has left is FREE.
+        With a = min(arrives, CERTAIN), b the doubtful part of it, s = P(STATIC), u = P(UNKNOWN) plus what has left, and
+        d the mass that is newborn or stays, P(DYNAMIC) is [a (1 - s) - b u + (1 - a) d] / (1 - a s - b u), and every
+        other state (1 - a) P / (1 - a s - b u). What has left is FREE.
     newborn : (H, W) float32
         Scaled like everything that was in the cell.
     factor : (2, H, W) float32
         Factors of the weights of the particles that stay, and of those that arrive.
+    less : (2, H, W) float32
+        By how much these factors are smaller for the doubtful part of a weight; 0 for particles that stay.
     """
     probability, born = np.empty_like(mixed), np.empty_like(newborn)
-    factor = np.empty((2, *newborn.shape), np.float32)
+    factor, less = np.empty((2, *newborn.shape), np.float32), np.zeros((2, *newborn.shape), np.float32)
     for r in range(newborn.shape[0]):
         for c in range(newborn.shape[1]):
             static, claim = mixed[STATIC, r, c], min(arrives[r, c], CERTAIN)
-            consistent = 1 - claim * static
-            own, arrived = (1 - claim) / consistent, claim * (1 - static) / consistent
-            probability[FREE, r, c] = own * (mixed[FREE, r, c] + going[r, c] - stays[r, c])
+            vacated = going[r, c] - stays[r, c]
+            unseen = mixed[UNKNOWN, r, c] + vacated
+            share = claim / arrives[r, c] if arrives[r, c] > 0 else 0.0
+            struck = share * doubtful[r, c] * unseen
+            consistent = 1 - claim * static - struck
+            own, arrived = (1 - claim) / consistent, max(claim * (1 - static) - struck, 0.0) / consistent
+            probability[FREE, r, c] = own * (mixed[FREE, r, c] + vacated)
             probability[STATIC, r, c] = own * static
             probability[DYNAMIC, r, c] = own * (newborn[r, c] + stays[r, c]) + arrived
             probability[UNKNOWN, r, c] = own * mixed[UNKNOWN, r, c]
             born[r, c] = own * newborn[r, c]
             factor[0, r, c] = own
-            factor[1, r, c] = arrived / arrives[r, c] if arrives[r, c] > 0 else 0.0
-    return probability, born, factor
+            factor[1, r, c] = share * (1 - static) / consistent
+            less[1, r, c] = share * unseen / consistent
+    return probability, born, factor, less
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
+def clear_wakes(probability, left, hidden):
+    """Strike out that something stands where a moving thing has been, in cells of which the scan says nothing.
+
+    Parameters
+    ----------
+    probability : (4, H, W) float32
+        The four states given the scan.
+    left : (H, W) float32
+        Sum of the weights of the particles that have left each cell.
+    hidden : (H, W) bool
+        Whether the scan says nothing of the cell.
+
+    Returns
+    -------
+    (4, H, W) float32
+        In hidden cells, with a = min(left, CERTAIN) and s = P(STATIC): STATIC is (1 - a) s / (1 - a s), and FREE gets
+        what it loses. All other cells are as they were.
+    """
+    cleared = probability.copy()
+    for r in range(left.shape[0]):
+        for c in range(left.shape[1]):
+            static, gone = probability[STATIC, r, c], min(left[r, c], CERTAIN) if hidden[r, c] else 0.0
+            cleared[STATIC, r, c] = (1 - gone) * static / (1 - gone * static)
+            cleared[FREE, r, c] += static - cleared[STATIC, r, c]
+    return cleared
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def bayes(prior, occupied, free):
     """Multiply by the likelihoods and normalise: P(state | z) = P(z | state) P(state) / P(z).
 
@@ -164,7 +202,7 @@ def bayes(prior, occupied, free):
     return posterior, factor
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def represent(probability, carried):
     """Make the particles of each cell carry its dynamic probability; without particles it turns UNKNOWN.
 

@@ -1,11 +1,13 @@
 """CMCDOT, the Conditional Monte Carlo Dense Occupancy Tracker (paper, section 3.2; Rummelhard et al., ITSC 2015)."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.local_belief import local_belief
-from semgrid_edu.occupancy.moving_map import MAX_YAW, map_around
+from semgrid_edu.occupancy.moving_map import MAX_YAW, map_around, scroll
 from semgrid_edu.occupancy.observation import observe
 from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.particles import cells_of, transform
@@ -80,11 +82,16 @@ class Cmcdot:
             When the points aren't a table of finite coordinates, the time is negative or not finite, or the sensor
             doesn't turn the scan into evidence. The tracker then stays as it was.
         """
-        seen = observe(self.params.sensor, points_grid, self._pose.then(motion), self.map_spec, self.spec)
-        # One name for what is between two steps: its memory, as large as what the filter keeps, is then used again
-        state = move(self._state, self.map_spec, seen.shift)
-        state = predict(state, self.map_spec, self.params, dt, self._rng)
-        predicted = state.probability
+        shift, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
+        random = self._rng.bit_generator.state
+        with ThreadPoolExecutor(1) as another_core:
+            scan = another_core.submit(observe, self.params.sensor, points_grid, pose, self.map_spec, self.spec)
+            # One name for what is between two steps: its memory, as large as what the filter keeps, is then used again
+            state = move(self._state, self.map_spec, shift)
+            state = predict(state, self.map_spec, self.params, dt, self._rng)
+        if scan.exception():
+            self._rng.bit_generator.state = random
+        seen, predicted = scan.result(), state.probability
         state = update(state, self.map_spec, seen.on_map, self.params)
         self._state, self._pose = resample(state, self.map_spec, self.params, self._rng), seen.pose
         return local_belief(predicted, self._velocities(), seen, self.map_spec, self.spec, self.params)

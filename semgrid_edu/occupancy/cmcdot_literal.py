@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.bof_literal import relative_likelihoods, strike_out
+from semgrid_edu.occupancy.bof_literal import clear_wakes_literal, relative_likelihoods, strike_out
 from semgrid_edu.occupancy.cellwise import ratio
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.particles_literal import (
+    cells_at_literal,
     cells_of_literal,
     draw_again_literal,
     draw_newborn_literal,
@@ -91,11 +92,17 @@ def predict_literal(
     particles = fly_literal(particles, world.max_acceleration, dt, rng)
     end = cells_of_literal(particles.position, spec)
     came = end != start
+    origin = cells_at_literal(particles, end, spec, -world.clearing_time, world.clearing_cells)
+    ahead = cells_at_literal(particles, end, spec, world.clearing_time, world.clearing_cells)
+    out_of_a_wall = scale_in_cells_literal(particles.weight * came, origin, mixed[STATIC])
+    doubt = out_of_a_wall - scale_in_cells_literal(out_of_a_wall, ahead, mixed[FREE] + mixed[DYNAMIC])
     stays = weight_in_cells_literal(particles.weight * ~came, end, spec.shape)
     arrives = weight_in_cells_literal(particles.weight * came, end, spec.shape)
-    probability, newborn, own, arrival = meet_literal(mixed, newborn, going, stays, arrives)
+    doubtful = weight_in_cells_literal(doubt, end, spec.shape)
+    probability, newborn, own, sure, less = meet_literal(mixed, newborn, going, stays, arrives, doubtful)
     weight = scale_in_cells_literal(particles.weight, end, own)
-    weight[came] = scale_in_cells_literal(particles.weight, end, arrival)[came]
+    arrived = scale_in_cells_literal(particles.weight, end, sure) - scale_in_cells_literal(doubt, end, less)
+    weight[came] = arrived[came]
     return FilterState(probability, replace(particles, weight=weight), newborn)
 
 
@@ -116,8 +123,8 @@ def mix_literal(
 
 
 def meet_literal(
-    mixed: NDArray, newborn: NDArray, going: NDArray, stays: NDArray, arrives: NDArray
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    mixed: NDArray, newborn: NDArray, going: NDArray, stays: NDArray, arrives: NDArray, doubtful: NDArray
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Let the mass that arrives in a cell meet what the cell holds: the literal twin of `cellwise.meet`.
 
     Parameters are those of `meet`.
@@ -125,17 +132,20 @@ def meet_literal(
     Returns
     -------
     probability : (4, H, W) float64
-        The belief of each cell, with the combination "something arrives in a cell that is STATIC" struck out.
+        The belief of each cell, with two combinations struck out: "something arrives in a cell that is STATIC", and
+        "something comes out of a wall and goes on along it, in a cell that hasn't been seen to be free".
     newborn : (H, W) float64
         Scaled like everything that was in the cell.
-    own, arrival : (H, W) float64
-        Factors of the weights of the particles that have stayed in the cell, and of those that have arrived in it.
+    own, sure, less : (H, W) float64
+        Factors of the weights of the particles that have stayed in the cell, and of those that have arrived in it; and
+        by how much the latter is smaller for what is doubtful.
     """
-    own, arrived = strike_out(mixed[STATIC], arrives)
+    vacated = going - stays
+    own, sure, less = strike_out(mixed[STATIC], arrives, mixed[UNKNOWN] + vacated, doubtful)
     probability = own * mixed
-    probability[FREE] += own * (going - stays)  # what flew away leaves free space behind
-    probability[DYNAMIC] = own * (newborn + stays) + arrived
-    return probability, own * newborn, own, ratio(arrived, arrives)
+    probability[FREE] += own * vacated  # what flew away leaves free space behind
+    probability[DYNAMIC] = own * (newborn + stays) + sure * arrives - less * doubtful
+    return probability, own * newborn, own, sure, less
 
 
 def update_literal(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldModel) -> FilterState:
@@ -154,6 +164,10 @@ def update_literal(state: FilterState, spec: GridSpec, evidence: Evidence, world
     factor = ratio(of_occupied, p_z)
     cells = cells_of_literal(state.particles.position, spec)
     weight = scale_in_cells_literal(state.particles.weight, cells, factor)
+    origin = cells_at_literal(state.particles, cells, spec, -world.clearing_time, world.clearing_cells)
+    left = weight_in_cells_literal(weight, origin, spec.shape)
+    static = clear_wakes_literal(posterior[STATIC], left, evidence.occupied == evidence.free)
+    posterior[FREE], posterior[STATIC] = posterior[FREE] + posterior[STATIC] - static, static
     return FilterState(posterior, replace(state.particles, weight=weight), newborn * factor)
 
 

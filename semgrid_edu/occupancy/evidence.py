@@ -73,6 +73,8 @@ class Measurement(Protocol):
 class Sensor(Protocol):
     """A model of the sensor: it takes a scan in, and makes a measurement of it. The package's own is `SensorModel`.
 
+    `Cmcdot` calls it in a thread of its own, while it predicts.
+
     Examples
     --------
     A sensor that never says anything. With it, a filter believes UNKNOWN for ever:

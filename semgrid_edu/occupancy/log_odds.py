@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.evidence import Evidence, Sensor, check_sensor
-from semgrid_edu.occupancy.moving_map import MAX_YAW, look_up, map_around
+from semgrid_edu.occupancy.moving_map import MAX_YAW, look_up, map_around, scroll
 from semgrid_edu.occupancy.observation import observe
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.sensor import SensorModel
@@ -202,8 +202,9 @@ class LogOddsGrid:
         """
         if not (np.isfinite(dt) and dt >= 0):
             raise ArgumentError("dt", "seconds, not negative", dt)
-        seen = observe(self.params.sensor, points_grid, self._pose.then(motion), self.map_spec, self.spec)
-        moved = look_up(self._log_odds[None], self._prior, self.map_spec, self.map_spec, seen.shift)[0]
+        shift, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
+        seen = observe(self.params.sensor, points_grid, pose, self.map_spec, self.spec)
+        moved = look_up(self._log_odds[None], self._prior, self.map_spec, self.map_spec, shift)[0]
         before = look_up(moved[None], self._prior, self.map_spec, self.spec, seen.pose)[0]
         self._log_odds, self._pose = update_log_odds(moved, seen.on_map, self.params), seen.pose
         return probability(update_log_odds(before, seen.in_grid, self.params))

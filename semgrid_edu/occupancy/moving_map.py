@@ -91,7 +91,7 @@ def look_up(values: NDArray, outside: NDArray, source: GridSpec, target: GridSpe
     return _look_up(np.ascontiguousarray(values), outside, *corners, target.shape, pose.dx, pose.dy, pose.dyaw)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _look_up(values, outside, source_x, source_y, source_cell, x_max, y_max, cell, shape, dx, dy, dyaw):
     found = np.empty((len(values), *shape), np.float32)
     flat, place = values.reshape(len(values), -1), np.empty(shape[1], np.int32)

@@ -14,7 +14,7 @@ class CmcdotParams(WorldModel):
 
     Parameters
     ----------
-    rates, stop_rate, stop_speed, max_acceleration, first_sight, sensor
+    rates, stop_rate, stop_speed, max_acceleration, first_sight, clearing_time, clearing_cells, sensor
         What the filter assumes of the world and of its sensor: those of `WorldModel`.
     n_particles : int
         Number of particles that carry the dynamic mass of the whole map.

@@ -37,7 +37,7 @@ def cells_of(position: NDArray, spec: GridSpec) -> NDArray[np.int32]:
     return _cells_of(position.ravel(), spec.shape, spec.x_max, spec.y_max, spec.cell)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _cells_of(xy, shape, x_max, y_max, cell):
     cells = np.empty(len(xy) // 2, np.int32)
     for i in range(len(cells)):
@@ -65,7 +65,7 @@ def weight_in_cells(weight: NDArray, cells: NDArray, shape: tuple[int, ...]) -> 
     return _sum_in_cells(weight, cells, math.prod(shape)).reshape(shape).astype(np.float32)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _sum_in_cells(values, cells, n_cells):
     total = np.zeros(n_cells)
     for i in range(len(cells)):
@@ -94,7 +94,7 @@ def scale_in_cells(weight: NDArray, cells: NDArray, factor: NDArray) -> NDArray[
     return _scale_in_cells(weight, cells, factor.ravel())
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _scale_in_cells(weight, cells, factor):
     scaled = np.zeros(len(weight), np.float32)
     for i in range(len(weight)):
@@ -122,13 +122,54 @@ def by_origin(before: NDArray, after: NDArray, n_cells: int) -> NDArray[np.int32
     return _by_origin(before, after, np.int32(n_cells))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _by_origin(before, after, n_cells):
     origin = after.copy()
     for i in range(len(after)):
         if after[i] != before[i] and after[i] != OUTSIDE:
             origin[i] += n_cells
     return origin
+
+
+def cells_at(particles: Particles, cells: NDArray, spec: GridSpec, time: float, fewest: float) -> NDArray[np.int32]:
+    """Return the cell in which each particle was or will be at another time, if it is another cell than now.
+
+    Parameters
+    ----------
+    particles : Particles
+        N particles.
+    cells : (N,) int32
+        The cell that each is in now, from `cells_of`.
+    spec : GridSpec
+        The cells, (H, W).
+    time : float
+        Seconds from now, negative for the past: a particle at x with velocity v is taken to be at x + v time.
+    fewest : float
+        Number of cells that a particle covers at least; a slow one is given more time. When `time` is 0 it isn't.
+
+    Returns
+    -------
+    (N,) int32
+        row * W + column; `OUTSIDE` for a particle that is outside the grid then, or in the same cell as now.
+    """
+    now, grid = (
+        (particles.position.ravel(), particles.velocity.ravel()),
+        (spec.shape, spec.x_max, spec.y_max, spec.cell),
+    )
+    return _cells_at(*now, cells, np.float32(time), np.float32(fewest * spec.cell), *grid)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _cells_at(xy, velocity, cells, time, least, shape, x_max, y_max, cell):
+    there = np.empty(len(cells), np.int32)
+    for i in range(len(cells)):
+        vx, vy = velocity[2 * i], velocity[2 * i + 1]
+        speed = math.sqrt(vx * vx + vy * vy)
+        stretch = max(np.float32(1), least / (abs(time) * speed)) if time * speed != 0 else np.float32(0)
+        x, y = xy[2 * i] + stretch * time * vx, xy[2 * i + 1] + stretch * time * vy
+        then = cell_of(x, y, shape, x_max, y_max, cell)
+        there[i] = then if then != cells[i] else OUTSIDE
+    return there
 
 
 def fly(particles: Particles, max_acceleration: float, dt: float, rng: np.random.Generator) -> Particles:
@@ -158,7 +199,7 @@ def fly(particles: Particles, max_acceleration: float, dt: float, rng: np.random
     return Particles(position.reshape(-1, 2), velocity.reshape(-1, 2), particles.weight)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _fly(position, velocity, noise, max_change, dt):
     flown, faster = np.empty_like(position), np.empty_like(velocity)
     half, two = np.float32(0.5), np.float32(2)
@@ -191,7 +232,7 @@ def slow_down(particles: Particles, stop_rate: float, stop_speed: float, dt: flo
     return Particles(particles.position, particles.velocity, weight)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _slow_down(velocity, weight, stops, scale):
     kept = np.empty_like(weight)
     for i in range(len(weight)):
@@ -223,7 +264,7 @@ def transform(particles: Particles, motion: PlanarMotion) -> Particles:
     return Particles(position.reshape(-1, 2), velocity.reshape(-1, 2), particles.weight)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _transform(position, velocity, dx, dy, cos, sin):
     moved, turned = np.empty_like(position), np.empty_like(velocity)
     for i in range(0, len(position), 2):

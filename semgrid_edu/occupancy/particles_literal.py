@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.cells import OUTSIDE
+from semgrid_edu.occupancy.cellwise import ratio
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.resampling import draw_velocities
 from semgrid_edu.occupancy.state import Particles
@@ -36,6 +37,20 @@ def scale_in_cells_literal(weight: NDArray, cells: NDArray, factor: NDArray) -> 
     Parameters and result are those of `scale_in_cells`.
     """
     return np.where(cells == OUTSIDE, 0, weight * factor.ravel()[cells])
+
+
+def cells_at_literal(
+    particles: Particles, cells: NDArray, spec: GridSpec, time: float, fewest: float
+) -> NDArray[np.int64]:
+    """Return the cell in which each particle is at another time, if it is another one: the literal twin of `cells_at`.
+
+    Parameters and result are those of `cells_at`.
+    """
+    way = time * particles.velocity.astype(np.float64)
+    length = np.linalg.norm(way, axis=1, keepdims=True)
+    way *= np.maximum(1, ratio(np.full_like(length, fewest * spec.cell), length))
+    then = cells_of_literal(particles.position + way, spec)
+    return np.where(then == cells, OUTSIDE, then)
 
 
 def transform_literal(particles: Particles, motion: PlanarMotion) -> Particles:

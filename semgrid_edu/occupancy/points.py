@@ -38,7 +38,7 @@ def check_points(points: NDArray) -> NDArray:
     return points
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _all_finite(points):
     """Tell whether every x, y and z is finite; numpy, which makes arrays of the answers, takes five times as long."""
     finite = True
@@ -69,7 +69,7 @@ def without_own_returns(points: NDArray, vehicle: tuple[float, float, float, flo
     return _outside(points, *vehicle, low)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _outside(points, x_min, x_max, y_min, y_max, low):
     """Copy the points that don't lie in a box without a lid."""
     others, n = np.empty((len(points), 3), points.dtype), 0

@@ -34,7 +34,7 @@ def polar_profile(points, low, high, beams):
     return _profile(points, beams_of(points[:, 0], points[:, 1], beams), low, high, beams)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _profile(points, beam_of_point, low, high, beams):
     first_obstacle = np.full(beams, np.inf, np.float32)
     last_ground = np.zeros(beams, np.float32)
@@ -89,7 +89,7 @@ def beams_of(x, y, beams):
     return _beams_of(np.ascontiguousarray(x), np.ascontiguousarray(y), beams)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _beams_of(x, y, beams):
     per_radian, unsure = beams / (2 * np.pi), np.empty(len(x), np.bool_)
     beam, margin = np.empty(len(x), np.int32), ROUGH * per_radian
@@ -142,7 +142,7 @@ def reach(first_obstacle: NDArray, last_ground: NDArray) -> NDArray[np.float32]:
     return np.where(np.isfinite(first_obstacle), first_obstacle, last_ground)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def fill_gaps(reach, gap):
     """Give beams between two columns of returns the shorter reach of the two.
 
@@ -178,7 +178,7 @@ def fill_gaps(reach, gap):
     return filled
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def count_returns(points, low, high, shape, x_max, y_max, cell, dx, dy, dyaw):
     """Count the returns in each cell.
 

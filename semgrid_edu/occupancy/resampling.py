@@ -8,7 +8,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.state import Particles
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def systematic_resample(weight, count, offset):
     """Draw `count` indices in proportion to the weights, by systematic resampling.
 
@@ -74,7 +74,7 @@ def draw_again(particles: Particles, count: int, rng: np.random.Generator) -> Pa
     return Particles(*_take(particles.position, particles.velocity, chosen), np.full(count, total / count, np.float32))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _take(position, velocity, chosen):
     there, then = np.empty((len(chosen), 2), np.float32), np.empty((len(chosen), 2), np.float32)
     for m in range(len(chosen)):
@@ -112,7 +112,7 @@ def draw_newborn(newborn: NDArray, spec: GridSpec, count: int, max_speed: float,
     return Particles(position, draw_velocities(count, max_speed, rng), np.full(count, total / count, np.float32))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _anywhere(cells, part, width, x_max, y_max, cell):
     position = np.empty_like(part)
     for m in range(len(cells)):

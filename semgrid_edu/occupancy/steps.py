@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.cellwise import bayes, make_room, meet, mix, represent
+from semgrid_edu.occupancy.cellwise import bayes, clear_wakes, make_room, meet, mix, represent
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.moving_map import look_up
 from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.particles import (
     by_origin,
+    cells_at,
     cells_of,
     fly,
     scale_in_cells,
@@ -24,7 +25,7 @@ from semgrid_edu.occupancy.resampling import draw_again, draw_newborn
 from semgrid_edu.occupancy.state import FilterState, Particles, State, check_shape
 from semgrid_edu.occupancy.world import WorldModel, transition_matrix
 
-DYNAMIC, UNKNOWN = State.DYNAMIC, State.UNKNOWN
+FREE, STATIC, DYNAMIC, UNKNOWN = State
 NOTHING_KNOWN = np.array([0, 0, 0, 1], dtype=np.float32)
 
 
@@ -68,13 +69,22 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
     First each cell mixes by the transition matrix, and particles near zero speed become STATIC. Then the particles fly,
     and dynamic mass with them. Where it leaves, it leaves FREE behind, because nothing stands where something has moved
     away. Where it arrives with probability a, two statements meet: "something arrives", and what the cell itself holds.
-    They can't both be true where the cell is STATIC, because two solid things can't share a cell. So that combination
-    is struck out of the joint distribution:
+    Some of their combinations can't be true, and are struck out of the joint distribution.
 
-        P(DYNAMIC) = [a (1 - s) + (1 - a) d] / (1 - a s),   others = (1 - a) others / (1 - a s)
+    - *It arrives, and the cell is STATIC.* Two solid things can't share a cell.
+    - *It comes out of a wall and goes on along it, and the cell hasn't been seen to be free.* Such a particle was in a
+      place that is STATIC now, `clearing_time` ago, and will be in one that is STATIC or UNKNOWN, as long from now;
+      slow ones are followed for `clearing_cells` both ways. It says no more than that the wall goes on, as walls do:
+      what comes into view beside a wall is the next piece of it. Somebody who sets off also comes out of a place where
+      something stood, but walks into free space; and the side of a long vehicle follows its front, which moves.
 
-    with s and d the cell's own static and dynamic probability. So what arrives in free space is DYNAMIC, while a fence
-    that is known to stand stays STATIC although particles cross it.
+    With s and d the cell's own static and dynamic probability, u the probability that it is UNKNOWN or has only been
+    left just now, and b the part of a that comes out of a wall and goes on along it, what is left is
+
+        P(DYNAMIC) = [a (1 - s) - b u + (1 - a) d] / (1 - a s - b u),   others = (1 - a) others / (1 - a s - b u)
+
+    So what arrives in free space is DYNAMIC, a fence that is known to stand stays STATIC although particles cross it,
+    and so does a wall that comes into view piece by piece.
 
     Parameters
     ----------
@@ -83,7 +93,7 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
     spec : GridSpec
         The cells, (H, W).
     world : WorldModel
-        Rates of change, how things stop, and how they accelerate.
+        Rates of change, how things stop, how they accelerate, and how soon they have left a place.
     dt : float
         Time since the previous instant, seconds, not negative.
     rng : numpy.random.Generator
@@ -108,11 +118,19 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
     mixed, newborn = mix(state.probability, state.newborn, going, M)
 
     particles = fly(particles, world.max_acceleration, dt, rng)
-    origin = by_origin(before, cells_of(particles.position, spec), going.size)
-    stays, arrives = weight_in_cells(particles.weight, origin, (2, *spec.shape))
-    probability, newborn, factor = meet(mixed, newborn, going, stays, arrives)
-    weight = scale_in_cells(particles.weight, origin, factor)
-    return FilterState(probability, replace(particles, weight=weight), newborn)
+    cells = cells_of(particles.position, spec)
+    came = by_origin(before, cells, going.size)
+    origin, ahead = (
+        cells_at(particles, cells, spec, time, world.clearing_cells)
+        for time in (-world.clearing_time, world.clearing_time)
+    )
+    doubt = scale_in_cells(particles.weight, origin, mixed[STATIC])
+    doubt -= scale_in_cells(doubt, ahead, mixed[FREE] + mixed[DYNAMIC])
+    stays, arrives = weight_in_cells(particles.weight, came, (2, *spec.shape))
+    doubtful = weight_in_cells(doubt, came, (2, *spec.shape))[1]
+    probability, newborn, factor, less = meet(mixed, newborn, going, stays, arrives, doubtful)
+    weight = scale_in_cells(particles.weight, came, factor) - scale_in_cells(doubt, came, less)
+    return FilterState(probability, replace(particles, weight=np.maximum(weight, 0)), newborn)
 
 
 def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldModel) -> FilterState:
@@ -120,6 +138,11 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
 
     STATIC and DYNAMIC share P(z | occupied), because one scan can't tell them apart. UNKNOWN means that no scan has
     said anything of the cell; as soon as one does, `reveal` first shares its UNKNOWN mass among the other states.
+
+    Of a cell that is hidden a scan says nothing, but what moves does: one thing can't be in two places. Where a thing
+    was `clearing_time` ago (a slow one, `clearing_cells` ago) it isn't any more, so "it has come from there" and "it
+    stands there" are struck out together (`clear_wakes`). This is how a car that was taken for a standing one at first
+    takes that belief along when it goes.
 
     Parameters
     ----------
@@ -131,7 +154,7 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
         What the scan says of each cell. However small the two likelihoods are, only their ratio counts. Where nothing
         that was held possible explains the scan, the cell becomes UNKNOWN.
     world : WorldModel
-        What UNKNOWN cells turn out to be, `first_sight`.
+        What UNKNOWN cells turn out to be, `first_sight`, and how soon things have left a place.
 
     Returns
     -------
@@ -145,11 +168,15 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
     """
     check_shape("state", state.newborn, spec.shape)
     check_shape("evidence", evidence.free, spec.shape)
-    prior = reveal(state, evidence.occupied != evidence.free, world)
+    seen = evidence.occupied != evidence.free
+    prior = reveal(state, seen, world)
     posterior, factor = bayes(prior.probability, evidence.occupied, evidence.free)
-    particles = prior.particles
-    weight = scale_in_cells(particles.weight, cells_of(particles.position, spec), factor)
-    return FilterState(posterior, replace(particles, weight=weight), (prior.newborn * factor).astype(np.float32))
+    cells = cells_of(prior.particles.position, spec)
+    weight = scale_in_cells(prior.particles.weight, cells, factor)
+    origin = cells_at(prior.particles, cells, spec, -world.clearing_time, world.clearing_cells)
+    left = weight_in_cells(weight, origin, spec.shape)
+    cleared, newborn = clear_wakes(posterior, left, ~seen), (prior.newborn * factor).astype(np.float32)
+    return FilterState(cleared, replace(prior.particles, weight=weight), newborn)
 
 
 def reveal(state: FilterState, seen: NDArray, world: WorldModel) -> FilterState:

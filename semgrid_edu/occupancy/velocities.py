@@ -36,7 +36,7 @@ def velocity_moments(
     return mean.reshape(2, *shape), covariance.reshape(2, 2, *shape)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _moments(velocity, weight, cells, n_cells):
     first, second = np.zeros((n_cells, 3)), np.zeros((n_cells, 3))
     for i in range(len(cells)):

@@ -34,10 +34,16 @@ class WorldModel:
         Largest acceleration of moving things along each axis, m/s^2. The default is half of what tyres can do.
     first_sight : (float, float, float)
         What an UNKNOWN cell turns out to be when a scan first says something of it: the probabilities of FREE, STATIC
-        and DYNAMIC, which sum to 1. Most of a street is free, and of the area covered by obstacles little moves. The
-        static share also counts against particles that fly into cells nobody has seen yet. This is a compromise:
-        somebody who walks away from the sensor enters only such cells, so a large static share makes that person look
-        STATIC, and a small one makes the end of a wall that comes into view look DYNAMIC.
+        and DYNAMIC, which sum to 1. Most of a street is free, and of the area covered by obstacles little moves: in the
+        first scans of ten simulated drives, 95.4, 3.9 and 0.7 % of the cells that are seen.
+    clearing_time : float
+        Time, seconds, in which a moving thing leaves the place that it takes up: a car of 4.5 m at 9 m/s, a pedestrian
+        of 0.5 m at 1 m/s. So where it was that long ago, it can't be any more. With 0 the filters look neither back nor
+        ahead.
+    clearing_cells : float
+        Number of cells that a thing covers at least before it counts as having left a place. One that is too slow for
+        this in `clearing_time` is followed for longer, because a thing shows in more cells than it fills: a pedestrian
+        doesn't get out of two cells of 0.5 m in half a second.
     sensor : Sensor
         Turns each scan into evidence. By default a `SensorModel`; any object will do whose `scan(points)` returns
         something with `evidence(spec, pose)`.
@@ -58,7 +64,9 @@ class WorldModel:
     stop_rate: float = 5.0
     stop_speed: float = 0.4
     max_acceleration: float = 4.0
-    first_sight: tuple[float, float, float] = (0.93, 0.067, 0.003)
+    first_sight: tuple[float, float, float] = (0.952, 0.045, 0.003)
+    clearing_time: float = 0.5
+    clearing_cells: float = 3.0
     sensor: Sensor = field(default_factory=SensorModel)
 
     def __post_init__(self) -> None:
@@ -66,7 +74,7 @@ class WorldModel:
         rates = np.asarray(self.rates, dtype=float)
         if rates.shape != (4, 4) or not np.isfinite(rates).all() or (rates < 0).any():
             raise ArgumentError("rates", "4 x 4 finite rates, none negative", self.rates)
-        for name in ("stop_rate", "max_acceleration"):
+        for name in ("stop_rate", "max_acceleration", "clearing_time", "clearing_cells"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
                 raise ArgumentError(name, "a finite number, not negative", getattr(self, name))
         if not (np.isfinite(self.stop_speed) and self.stop_speed > 0):

@@ -72,7 +72,7 @@ def velocity(spec: GridSpec, probability: NDArray, velocity: NDArray, ax: Axes) 
     start, speed = velocity_arrows(spec, probability, velocity)
     (x, y), (vx, vy) = start.T, speed.T * ARROW_SECONDS
     ax.quiver(y, x, vy, vx, angles="xy", scale_units="xy", scale=1.0, color="#6a1b9a", width=0.007, zorder=3)
-    ax.set_xlabel(f"{ax.get_xlabel()}\narrows: way in {ARROW_SECONDS} s")
+    ax.set_xlabel(f"{ax.get_xlabel()}\narrows: distance covered in {ARROW_SECONDS} s")
     return ax
 
 

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from scipy.ndimage import minimum_filter
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT
 from semgrid_edu.errors import ArgumentError
@@ -126,13 +125,14 @@ def crossed(scan: Scan, spec: GridSpec, pose: PlanarMotion, cell: tuple[int, int
 
 
 @settings(max_examples=8, deadline=None)
+@example([(13.0, -2.75, 4.0, 1.25), (17.0, -1.25, 1.0, 0.5)], 0.0, 0.25, 0.0)  # differs in 3 x 3 cells
 @given(
     st.lists(st.tuples(st.floats(4, 30), st.floats(-9, 7), st.floats(0.3, 4), st.floats(0.3, 4)), max_size=6),
     st.floats(-0.5, 0.5),
     st.floats(-0.5, 0.5),
     st.floats(-0.05, 0.05),
 )
-def test_the_twins_differ_in_thin_lines_only(corners, dx, dy, dyaw):
+def test_the_twins_differ_only_along_the_border_of_what_is_seen(corners, dx, dy, dyaw):
     """Obstacles are counted alike. What is free differs only in cells that the border of what is seen runs through.
 
     There one twin asks whether any beam passes the whole cell, and the other whether the beam of its centre does. How
@@ -143,7 +143,6 @@ def test_the_twins_differ_in_thin_lines_only(corners, dx, dy, dyaw):
     fast, literal = (f(points, spec, SENSOR, pose) for f in (scan_evidence, scan_evidence_literal))
     assert np.array_equal(fast.occupied > fast.free, literal.occupied > literal.free)
     differ = (fast.free > fast.occupied) != (literal.free > literal.occupied)
-    assert not minimum_filter(differ, 3).any()
     scan = SENSOR.scan(points)
     assert all(crossed(scan, spec, pose, (row, col)) for row, col in np.argwhere(differ))
 

@@ -82,9 +82,12 @@ def test_returns_from_beyond_the_world_hide_nothing_and_hit_nothing(distance):
         assert (fresh.probability[[State.STATIC, State.DYNAMIC]].sum(axis=0) < 0.2).all()
 
 
-def test_a_single_return_is_an_obstacle_and_frees_its_beam():
-    belief = Cmcdot(SPEC, PARAMS).step(np.array([[20.25, 0.25, 1.0]]), STILL, 0.1)
+def test_a_single_return_that_comes_twice_is_an_obstacle_and_frees_its_beam():
+    """By hand, occupied against free after one return: 0.048 x 0.8 < 0.952 x 0.05. A second one decides."""
+    tracker, scan = Cmcdot(SPEC, PARAMS), np.array([[20.25, 0.25, 1.0]])
+    first, belief = tracker.step(scan, STILL, 0.1), tracker.step(scan, STILL, 0.1)
     assert_sound(belief)
+    assert first.probability[:, 39, 19].argmax() == State.FREE
     likeliest = belief.probability.argmax(axis=0)
     assert likeliest[39, 19] == State.STATIC
     assert (likeliest[40:45, 19] == State.FREE).all()

@@ -15,6 +15,9 @@ pytestmark = pytest.mark.real
 CAR_IN_IMAGE = (785, 1070, 195, 355)
 """u_min, u_max, v_min, v_max of the overtaking car in frame 12, read off the image by eye."""
 
+FRAMES_READ_BY_EYE = 24
+"""Length of the stretch that was looked at, the drive's first frames."""
+
 BY_EYE = 3
 """Pixels: nobody reads an edge off more exactly."""
 
@@ -25,6 +28,8 @@ def drive(kitti_root):
 
 
 def test_returns_from_the_overtaking_car_are_drawn_on_it(drive, kitti_root):
+    if len(drive) != FRAMES_READ_BY_EYE:
+        pytest.skip("needs the stretch whose frame 12 was read by eye")
     x_min, x_max, y_min, y_max, _ = json.loads((kitti_root / "moving_cars_0013.json").read_text())["car_1"]["12"]
     frame = drive[12]
     x, y, z = frame.points[:, :3].T

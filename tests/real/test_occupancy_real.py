@@ -1,4 +1,4 @@
-"""CMCDOT with its defaults on KITTI's drive 0013: what moves, what stands.
+"""CMCDOT with its defaults on the first 24 frames of KITTI's drive 0013: what moves, what stands.
 
 The car on the right overtakes; its boxes were found by hand. A fence stands beyond it. A second car follows it into the
 grid near the end, so cells there count for neither.
@@ -31,6 +31,8 @@ def drive(kitti_root):
     boxes = {int(frame): box for frame, box in json.loads(boxes_file.read_text())["car_1"].items()}
     drive = KittiRawDrive(kitti_root, "2011_09_26", "0013")
     frames = [drive[k] for k in range(len(drive))]
+    if min(boxes) != FIRST_BOX:
+        pytest.skip("places and boxes are those of frames 0 to 23")
     return frames, list(track_drive(frames, SPEC)), boxes
 
 

@@ -275,6 +275,9 @@ assert not complaint, complaint
 # One pair is impossible: nothing arrives where something STATIC stands. Strike it out. In the pairs that are left, what arrives makes the cell
 # DYNAMIC, whatever it was, and where nothing arrives the cell keeps its state.
 #
+# (The package strikes out one combination more, because it also asks where things come from and where they go: see *One thing, two places* in the
+# lecture. Leave that out here.)
+#
 # Complete `arrive`: it returns the belief (4, H, W) that is left, and leaves its arguments as they are.
 
 

@@ -271,6 +271,9 @@ assert not complaint, complaint
 # | arrives | DYNAMIC | impossible | DYNAMIC | DYNAMIC |
 # | doesn't | FREE | STATIC | DYNAMIC | UNKNOWN |
 #
+# This is a first version. The package's filter strikes out one combination more: something comes out of a wall and goes on along it, and nobody
+# has seen that the cell is free. Leave it out here.
+#
 # Complete `meet`: it returns the belief (4, H, W). For the last point: the weights of all that arrives may sum to more than 1, and a cell may be
 # STATIC for sure. So let particles claim 0.999 at most.
 

@@ -60,6 +60,10 @@ class CellsInARow:
         Rates of change, 1/s, as in `WorldModel`; nothing becomes DYNAMIC.
     first_sight : (float, float, float)
         What UNKNOWN cells turn out to be when they are first seen: FREE, STATIC and DYNAMIC, the last 0.
+    clearing_time : float
+        How far back and ahead the filters look, seconds, as in `WorldModel`; exact inference doesn't need it. By
+        default that is five cells, so it makes no difference in a row of at most five. With `DT` it is the cell next
+        door, because `clearing_cells` is 0 here: everything that moves is equally fast.
 
     Raises
     ------
@@ -71,6 +75,7 @@ class CellsInARow:
     scans: tuple[str, ...]
     rates: tuple[tuple[float, ...], ...] = NO_CHANGE
     first_sight: tuple[float, float, float] = (0.85, 0.15, 0.0)
+    clearing_time: float = WorldModel.clearing_time
 
     def __post_init__(self) -> None:
         """Refuse a world that the joint model doesn't describe."""
@@ -98,7 +103,14 @@ class CellsInARow:
     @property
     def params(self) -> BofParams:
         """What both filters assume: a lattice of zero and four velocities, of which the row uses left and right."""
-        world = WorldModel(rates=self.rates, first_sight=self.first_sight, max_acceleration=0.0, stop_rate=0.0)
+        world = WorldModel(
+            rates=self.rates,
+            first_sight=self.first_sight,
+            clearing_time=self.clearing_time,
+            clearing_cells=0.0,
+            max_acceleration=0.0,
+            stop_rate=0.0,
+        )
         return BofParams(VelocityLattice(max_speed=SPEED, spacing=SPEED), world)
 
     @property

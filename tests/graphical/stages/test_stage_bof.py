@@ -1,5 +1,6 @@
 """BOF against joint inference over all cells: where it is exact, where it isn't, and by how much."""
 
+from dataclasses import replace
 from itertools import product
 
 import matplotlib.pyplot as plt
@@ -8,7 +9,7 @@ import pytest
 from pyagrum_oracle import posteriors
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.graphical import d_separated, why_dependent
+from semgrid_edu.graphical import d_separated, eliminate, why_dependent
 from semgrid_edu.graphical.stages import bof_stage
 from semgrid_edu.graphical.stages.bof import (
     AT_THE_EDGE,
@@ -125,6 +126,55 @@ def test_what_cannot_share_a_cell_with_the_fence_does_not_come_back_to_where_it_
     assert bof[0, 1, Cell.STATIC] == pytest.approx(0.3, abs=1e-12)
     np.testing.assert_allclose(bof[0, 2], exact[0, 2], atol=1e-12)
     np.testing.assert_allclose(bof_errors(TOWARDS_A_FENCE).max(axis=1), 3 / 7 - 0.3, atol=1e-9)
+
+
+IN_ITS_SHADOW = CellsInARow(
+    ({"static": 0.5, "right": 0.5}, {}, {}, {}, {}, {}), ("?x....", "??x...", "???x..", "????x.", "?????x")
+)
+"""A thing stands or drives in a cell that nobody sees; the scans follow it for half a second."""
+
+WALL_IN_VIEW = CellsInARow(
+    ({"static": 0.97},) * 4 + ({"static": 0.95, "right": 0.03},) + ({"unknown": 1.0},) * 3,
+    ("xxxxxx??", "xxxxxxx?", "xxxxxxxx"),
+    first_sight=(0.95, 0.05, 0.0),
+)
+"""A wall of which each scan shows one cell more."""
+
+JUST_STARTED = CellsInARow(({"static": 0.9}, {}, {}, {}, {"right": 1.0}, {}, {}), ("?....x.", "?.....x"))
+"""Something begins to move; half a second ago at its velocity it would have been where something hidden stands."""
+
+
+def exactly(world, cell, step):
+    return eliminate(row_model(world, step), f"c{cell},{step}", row_evidence(world, step)).normalised().table
+
+
+def test_what_has_been_seen_to_move_for_half_a_second_stands_nowhere_in_its_shadow():
+    # Five returns from free cells, or one thing that drives: 0.05 against 0.8 each.
+    assert exactly(IN_ITS_SHADOW, 1, 5)[Cell.STATIC] == pytest.approx(1 / (1 + 16**5), abs=1e-12)
+    looking_back = bof_beliefs(IN_ITS_SHADOW)[:, 0, Cell.STATIC]
+    np.testing.assert_allclose(looking_back[:4], 0.5, atol=1e-6)
+    assert looking_back[4] == pytest.approx(0.001 * 0.5 / (1 - 0.999 * 0.5), rel=1e-3)
+    not_looking_back = bof_beliefs(replace(IN_ITS_SHADOW, clearing_time=0.0))[:, 0, Cell.STATIC]
+    np.testing.assert_allclose(not_looking_back, 0.5, atol=1e-6)
+
+
+def test_looking_back_keeps_a_phantom_off_a_wall_that_comes_into_view_as_joint_inference_does():
+    newest, phantom = (np.arange(3), np.arange(5, 8), Cell.RIGHT), [0.03]
+    for _ in range(3):  # it arrives, or a cell turns out to be STATIC or FREE at first sight; and the cell is hit
+        arrives = phantom[-1]
+        explained = [arrives * 0.8, (1 - arrives) * 0.05 * 0.8, (1 - arrives) * 0.95 * 0.05]
+        phantom.append(explained[0] / sum(explained))
+    assert phantom[-1] > 0.95
+    np.testing.assert_allclose(bof_beliefs(replace(WALL_IN_VIEW, clearing_time=0.0))[newest], phantom[1:], atol=1e-4)
+    exact = [exactly(WALL_IN_VIEW, step + 5, step)[Cell.RIGHT] for step in (1, 2, 3)]
+    assert max(exact) < 0.02
+    np.testing.assert_allclose(bof_beliefs(WALL_IN_VIEW)[newest], exact, atol=0.01)
+
+
+def test_looking_back_errs_about_what_has_just_begun_to_move():
+    assert exactly(JUST_STARTED, 1, 2)[Cell.STATIC] == pytest.approx(0.9, abs=1e-12)
+    assert bof_beliefs(JUST_STARTED)[-1, 0, Cell.STATIC] < 0.01
+    assert bof_beliefs(replace(JUST_STARTED, clearing_time=0.0))[-1, 0, Cell.STATIC] == pytest.approx(0.9, abs=1e-6)
 
 
 def test_a_scan_is_as_informative_as_the_sensor_model_says():

@@ -9,12 +9,20 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, why_dependent
 from semgrid_edu.graphical.stages import cmcdot_stage
 from semgrid_edu.graphical.stages.bof import AT_THE_EDGE, STANDING_OR_DRIVING, TOWARDS_A_FENCE, bof_beliefs, bof_errors
-from semgrid_edu.graphical.stages.cells_in_a_row import NO_CHANGE, Cell, CellsInARow
+from semgrid_edu.graphical.stages.cells_in_a_row import DT, HIT, NO_CHANGE, NOT_SEEN, Cell, CellsInARow
 from semgrid_edu.graphical.stages.cmcdot import FORGETTING, LEFT_OR_RIGHT, particle_beliefs, sampling_error
 from semgrid_edu.graphical.stages.cmcdot_graph import FROM_BOTH_SIDES
 from semgrid_edu.graphical.stages.joint_row import exact_beliefs
+from semgrid_edu.occupancy import State, WorldModel
 
 NUMBERS = [100, 400, 1600, 6400]
+
+
+def cell_2(world):
+    """Return the distribution of cell 2 after the first scan, by exact inference in the graph."""
+    seen = world.scans[0][1]
+    given = {"one1": 1} | ({"z1": int(seen == HIT)} if seen != NOT_SEEN else {})
+    return eliminate(cmcdot_stage(world).model, "c1", given).normalised().table
 
 
 def test_where_bof_is_exact_particles_tend_to_the_exact_answer():
@@ -50,13 +58,19 @@ def test_the_same_seed_gives_the_same_bits():
     assert not np.array_equal(particle_beliefs(LEFT_OR_RIGHT, 50, seed=1), particle_beliefs(LEFT_OR_RIGHT, 50, seed=2))
 
 
+UNSEEN = {"unknown": 1.0}
+BESIDE_A_WALL = ({"static": 0.6, "right": 0.4}, UNSEEN, {"static": 0.7, "left": 0.1})
+"""What comes into cell 2 comes out of something that probably stands, and goes on towards what probably stands, too."""
+
+
 @pytest.mark.parametrize("scan", [".x.", "...", ".?."])
-@pytest.mark.parametrize("cells", [FROM_BOTH_SIDES.cells, ({}, {"static": 0.5}, {"left": 0.9}), ({}, {}, {})])
-def test_the_graph_computes_what_predict_and_update_do_in_one_cell(cells, scan):
-    world = CellsInARow(cells, (scan,), FORGETTING)
-    stage, bof = cmcdot_stage(world), bof_beliefs(world)[0, 1]
-    given = {"one1": 1} | ({"z1": int(scan[1] == "x")} if scan[1] != "?" else {})
-    found = eliminate(stage.model, "c1", given).normalised().table
+@pytest.mark.parametrize("clearing_time", [0.0, DT, WorldModel.clearing_time])
+@pytest.mark.parametrize(
+    "cells", [FROM_BOTH_SIDES.cells, BESIDE_A_WALL, ({}, {"static": 0.5}, {"left": 0.9}), ({}, {}, {})]
+)
+def test_the_graph_computes_what_predict_and_update_do_in_one_cell(cells, clearing_time, scan):
+    world = CellsInARow(cells, (scan,), FORGETTING, clearing_time=clearing_time)
+    bof, found = bof_beliefs(world)[0, 1], cell_2(world)
     moving = bof[[Cell.LEFT, Cell.RIGHT]].sum()
     np.testing.assert_allclose(found, [*bof[[Cell.FREE, Cell.STATIC]], moving, bof[Cell.UNKNOWN]], atol=1e-12)
 
@@ -66,17 +80,32 @@ def test_the_graph_computes_what_predict_and_update_do_in_one_cell(cells, scan):
 def test_the_graph_is_joint_inference_where_only_the_cell_itself_may_hold_what_moves(own, scan):
     """FREE cells stay free, so that nothing stands up in a neighbour and is in the way there."""
     world = CellsInARow(({}, own, {}), (scan,), (NO_CHANGE[0], *FORGETTING[1:]))
-    given = {"one1": 1} | ({"z1": int(scan[1] == "x")} if scan[1] != "?" else {})
-    found = eliminate(cmcdot_stage(world).model, "c1", given).normalised().table
+    found = cell_2(world)
     exact = exact_beliefs(world)[0, 1]
     moving = exact[[Cell.LEFT, Cell.RIGHT]].sum()
     np.testing.assert_allclose(found, [*exact[[Cell.FREE, Cell.STATIC]], moving, exact[Cell.UNKNOWN]], atol=1e-12)
 
 
+def test_what_comes_out_of_a_wall_claims_no_cell_that_nobody_has_seen():
+    """By hand: of 0.4 from the left 0.6 0.7 is doubtful, of 0.1 from the right 0.7 0.6, so 0.42 of both."""
+    looks_back, does_not = (
+        cell_2(CellsInARow(BESIDE_A_WALL, ("?" * 3,), clearing_time=seconds))[State.DYNAMIC] for seconds in (DT, 0.0)
+    )
+    assert does_not == pytest.approx(0.5)
+    assert looks_back == pytest.approx(0.5 * 0.58 / (1 - 0.5 * 0.42))
+
+
+def test_the_price_of_taking_the_origin_as_independent():
+    """The thing stands in cell 1 or drives into cell 2, never both: joint inference expects it there with 0.5."""
+    world = CellsInARow(({"static": 0.3, "right": 0.5}, UNSEEN, UNSEEN), ("???",), clearing_time=DT)
+    assert exact_beliefs(world)[0, 1, Cell.RIGHT] == pytest.approx(0.5)
+    assert cell_2(world)[State.DYNAMIC] == pytest.approx(0.5 * 0.7 / (1 - 0.5 * 0.3)) == pytest.approx(0.41, abs=5e-3)
+
+
 def test_inference_in_the_graph_is_pyagrums():
     world = CellsInARow(({"right": 0.3}, {"static": 0.3, "left": 0.2, "unknown": 0.1}, {}), (".x.",), FORGETTING)
-    stage = cmcdot_stage(world)
-    assert_oracle_agrees(stage.model, {"one1": 1, "z1": 1})
+    for stage in (cmcdot_stage(world), cmcdot_stage()):
+        assert_oracle_agrees(stage.model, {"one1": 1, "z1": 1})
 
 
 def test_the_graph_separates_the_scan_from_the_past():
@@ -84,6 +113,7 @@ def test_the_graph_separates_the_scan_from_the_past():
     assert d_separated(stage.model, "z1", ["c0", "x0", "x1"], given="c1")
     assert d_separated(stage.model, "c0", "x1", given="x0")
     assert why_dependent(stage.model, "c0", "x1", given=["x0", "one1"]) == ("c0", "one1", "x1")
+    assert why_dependent(stage.model, "c0", "o1", given=["x1", "one1"]) == ("c0", "one1", "o1")
 
 
 def test_the_drawing_has_a_plate_for_particles_and_one_for_cells():

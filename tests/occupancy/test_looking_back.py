@@ -1,0 +1,144 @@
+"""Where a particle was `clearing_time` ago: what comes out of a standing thing, and what moving things leave behind."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.experiments.streets import measure_streets
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import (
+    CmcdotParams,
+    Evidence,
+    FilterState,
+    Particles,
+    State,
+    WorldModel,
+    predict,
+    predict_literal,
+    update,
+    update_literal,
+)
+from semgrid_edu.occupancy.bof_steps import origins
+from semgrid_edu.occupancy.particles import cells_at, cells_of
+from semgrid_edu.occupancy.particles_literal import cells_at_literal
+
+FREE, STATIC, DYNAMIC, UNKNOWN = State
+ROW = GridSpec(0, 16, 0, 1, 1)
+"""Sixteen cells ahead of the vehicle; row 0 is the farthest."""
+STILL = WorldModel(rates=((0.0,) * 4,) * 4, stop_rate=0.0, max_acceleration=0.0)
+"""Nothing changes its state or its velocity."""
+BLIND = replace(STILL, clearing_time=0.0)
+"""The same for filters that look neither back nor ahead."""
+ORIGIN, BEFORE, TARGET, AHEAD = 13, 9, 8, 3
+"""Rows: where something at 10 m/s was half a second before it gets into the third; the second; and half a second on."""
+
+
+def flying(static: float, target: State, ahead: State = UNKNOWN, weight: float = 0.5) -> FilterState:
+    """Return a particle that flies ahead, out of a cell that is STATIC with this probability, into one of a state."""
+    probability = np.zeros((4, *ROW.shape), np.float32)
+    probability[FREE] = 1
+    probability[:, ORIGIN, 0] = 1 - static, static, 0, 0
+    probability[:, BEFORE, 0] = 1 - weight, 0, weight, 0
+    probability[:, TARGET, 0], probability[:, AHEAD, 0] = np.eye(4)[target], np.eye(4)[ahead]
+    position, velocity = np.array([[15.5 - BEFORE, 0.5]]), np.array([[10.0, 0.0]])
+    particles = Particles(*(a.astype(np.float32) for a in (position, velocity)), np.array([weight], np.float32))
+    return FilterState(probability, particles, np.zeros(ROW.shape, np.float32))
+
+
+def with_another(state: FilterState, rows: int, weight: float) -> FilterState:
+    """Add a particle of the same velocity, some rows below."""
+    particles, shift = state.particles, np.array([[-rows, 0]], np.float32)
+    both = Particles(
+        np.concatenate([particles.position, particles.position + shift]),
+        np.repeat(particles.velocity, 2, axis=0),
+        np.append(particles.weight, np.float32(weight)),
+    )
+    return replace(state, particles=both)
+
+
+TWINS = pytest.mark.parametrize("predicted", [predict, predict_literal])
+
+
+@TWINS
+@pytest.mark.parametrize("ahead", [UNKNOWN, STATIC])
+@pytest.mark.parametrize(("static", "dynamic"), [(0.0, 0.5), (0.6, 0.2 / 0.7), (1.0, 0.0)])
+def test_along_a_wall_into_a_cell_nobody_has_seen_the_origin_counts(predicted, static, dynamic, ahead):
+    """By hand: a = 0.5, b = 0.5 static, u = 1, so P(DYNAMIC) = (a - b) / (1 - b)."""
+    state = predicted(flying(static, UNKNOWN, ahead), ROW, STILL, 0.1, np.random.default_rng(0))
+    np.testing.assert_allclose(state.probability[:, TARGET, 0], [0, 0, dynamic, 1 - dynamic], atol=1e-6)
+    np.testing.assert_allclose(state.particles.weight, [dynamic], atol=1e-6)
+
+
+@TWINS
+@pytest.mark.parametrize(
+    ("target", "ahead", "world"),
+    [(UNKNOWN, FREE, STILL), (FREE, UNKNOWN, STILL), (UNKNOWN, UNKNOWN, BLIND)],
+)
+def test_what_goes_out_into_the_open_is_believed(predicted, target, ahead, world):
+    """Out of a wall, but with free space before it, or already in it; and by filters that don't look."""
+    state = predicted(flying(1.0, target, ahead), ROW, world, 0.1, np.random.default_rng(0))
+    np.testing.assert_allclose(state.probability[[target, DYNAMIC], TARGET, 0], 0.5, atol=1e-6)
+
+
+@TWINS
+def test_what_follows_something_that_moves_is_believed(predicted):
+    """As the side of a long vehicle, of which the rear was taken for a standing thing: what moves ahead is no wall."""
+    state = with_another(flying(1.0, UNKNOWN, DYNAMIC), AHEAD - BEFORE, 1.0)
+    given = predicted(state, ROW, STILL, 0.1, np.random.default_rng(0))
+    np.testing.assert_allclose(given.probability[[UNKNOWN, DYNAMIC], TARGET, 0], 0.5, atol=1e-6)
+
+
+@TWINS
+def test_a_cell_that_has_only_been_left_counts_as_unseen(predicted):
+    """By hand: what was there, 0.4, flies on, so u = 0.4 and P(DYNAMIC) = (a - b u) / (1 - b u) with a = b = 0.5."""
+    state = flying(1.0, FREE)
+    state.probability[:, TARGET, 0] = 0.6, 0, 0.4, 0
+    given = predicted(with_another(state, TARGET - BEFORE, 0.4), ROW, STILL, 0.1, np.random.default_rng(0))
+    np.testing.assert_allclose(given.probability[DYNAMIC, TARGET, 0], 0.3 / 0.8, atol=1e-6)
+
+
+@pytest.mark.parametrize("updated", [update, update_literal])
+@pytest.mark.parametrize(("world", "seen", "static"), [(STILL, False, 2 / 3), (STILL, True, 0.8), (BLIND, False, 0.8)])
+def test_nothing_stands_where_something_has_come_from_unless_it_is_seen(updated, world, seen, static):
+    """By hand: a = 0.5 and s = 0.8 leave (1 - a) s / (1 - a s). A scan that all but says nothing has still seen."""
+    state = flying(0.8, FREE)
+    state.particles.position[0, 0] += 1
+    state.probability[:, TARGET, 0], state.probability[:, BEFORE, 0] = [0.5, 0, 0.5, 0], [1, 0, 0, 0]
+    occupied, free = np.ones((2, *ROW.shape), np.float32)
+    if seen:
+        free[ORIGIN] = 1 - 1e-6
+    given = updated(state, ROW, Evidence(occupied, free), world).probability
+    np.testing.assert_allclose(given[[FREE, STATIC], ORIGIN, 0], [1 - static, static], atol=2e-6)
+
+
+@pytest.mark.parametrize("velocity", [(1.0, 0.0), (-3.0, 4.0), (0.0, -6.0), (1e-3, 0.0), (0.0, 0.0)])
+def test_particles_look_back_half_a_second_and_slow_ones_three_cells(velocity):
+    """By hand, from the middle of a cell of 1 m: at 1 m/s three cells, at 5 m/s as well, at 6 m/s half a second."""
+    spec, v = GridSpec(0, 11, -5, 6, 1), np.array([velocity])
+    particles = Particles(np.full((1, 2), [5.5, 0.5], np.float32), v.astype(np.float32), np.ones(1, np.float32))
+    speed = np.linalg.norm(v)
+    for time in (-0.5, 0.5, 0.0):
+        there = [5.5, 0.5] + np.sign(time) * max(3.0, 0.5 * speed) * v / max(speed, 1e-30)
+        expected = np.array([-1]) if speed * time == 0 else cells_of(there.astype(np.float32), spec)
+        for look in (cells_at, cells_at_literal):
+            assert look(particles, cells_of(particles.position, spec), spec, time, 3.0) == expected
+        assert (origins(v, spec, STILL) == np.rint(there - [5.5, 0.5])).all() or time >= 0
+
+
+@pytest.mark.parametrize("name", ["clearing_time", "clearing_cells"])
+@pytest.mark.parametrize("value", [-0.1, np.nan, np.inf])
+def test_what_is_no_time_and_no_number_of_cells_is_refused(name, value):
+    with pytest.raises(ArgumentError, match=name):
+        WorldModel(**{name: value})
+
+
+def test_walls_that_come_into_view_stay_static():
+    """On a street of walls that come into view, half a second makes less than half as many phantoms as none."""
+    arguments = {"drives": 2, "grids": ("compact",), "streets": ("walls",), "frames": 30}
+    looks, blind = (
+        measure_streets(seed=7, params=CmcdotParams(clearing_time=time), **arguments)["scores"]["compact"]["walls"]
+        for time in (0.5, 0.0)
+    )
+    assert looks["cells"]["scenery"]["called"] < blind["cells"]["scenery"]["called"] / 2
