@@ -1,8 +1,10 @@
-"""The fully connected CRF that refines the semantic grid: energy, naive and fast mean field (eq. (3), (4))."""
+"""The fully connected CRF that refines the semantic grid: energy, exact inference, mean field, naive and fast."""
 
-from semgrid_edu.crf.dense import energy, mean_field_naive, pair_weights
+from semgrid_edu.crf.dense import energy, free_energy, gram_matrix, pair_weights
+from semgrid_edu.crf.exact import crf_model, exact_marginals, log_partition, most_likely
 from semgrid_edu.crf.lattice import PermutohedralLattice
 from semgrid_edu.crf.mean_field import mean_field
+from semgrid_edu.crf.naive import damping, mean_field_naive, mean_field_sequential, mean_field_updates
 from semgrid_edu.crf.params import CrfParams, unary_from_log_probability, unary_from_probability
 from semgrid_edu.crf.spatial import SeparableGaussian
 
@@ -10,9 +12,18 @@ __all__ = [
     "CrfParams",
     "PermutohedralLattice",
     "SeparableGaussian",
+    "crf_model",
+    "damping",
     "energy",
+    "exact_marginals",
+    "free_energy",
+    "gram_matrix",
+    "log_partition",
     "mean_field",
     "mean_field_naive",
+    "mean_field_sequential",
+    "mean_field_updates",
+    "most_likely",
     "pair_weights",
     "unary_from_log_probability",
     "unary_from_probability",

@@ -1,11 +1,11 @@
-"""The CRF written out: every pair of cells, its energy, and mean field by hand (eq. (3), (4)); for small grids."""
+"""The CRF written out: every pair of cells, and what a labelling or a distribution costs (eq. (3), (4))."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.distance import cdist
-from scipy.special import softmax
+from scipy.special import xlogy
 
-from semgrid_edu.crf.params import CrfParams, check_inputs, check_iterations
+from semgrid_edu.crf.params import CrfParams, check_inputs
 from semgrid_edu.errors import ArgumentError
 
 MAX_CELLS = 10_000
@@ -33,6 +33,34 @@ def pair_weights(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
     ArgumentError
         When `values` has another shape or the grid more than `MAX_CELLS` cells.
     """
+    weights = gram_matrix(values, params)
+    np.fill_diagonal(weights, 0)
+    return weights
+
+
+def gram_matrix(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
+    """Compute both kernels of eq. (4) for every two cells, a cell and itself included.
+
+    Gaussians of distances are inner products in some space, so this matrix has no negative eigenvalue, whatever the
+    weights, widths and normalisation. It is this property that keeps mean field from oscillating (`damping`).
+
+    Parameters
+    ----------
+    values : (4, H, W) float
+        o_i, the occupancy probabilities of each cell.
+    params : CrfParams
+        Weights, widths and normalisation.
+
+    Returns
+    -------
+    (H W, H W) float64
+        Symmetric and positive semidefinite; `pair_weights` everywhere but on the diagonal.
+
+    Raises
+    ------
+    ArgumentError
+        When `values` has another shape or the grid more than `MAX_CELLS` cells.
+    """
     values = np.asarray(values, dtype=np.float64)
     if values.ndim != 3:
         raise ArgumentError("values", "shape (4, H, W)", f"shape {values.shape}")
@@ -44,7 +72,6 @@ def pair_weights(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
     bilateral = np.hstack([place / params.sigma_alpha, state / params.sigma_beta])
     weights = params.w_bilateral * _gaussian(bilateral, params.normalization)
     weights += params.w_spatial * _gaussian(place / params.sigma_gamma, params.normalization)
-    np.fill_diagonal(weights, 0)
     return weights
 
 
@@ -107,48 +134,48 @@ def energy(labels: ArrayLike, unary: ArrayLike, values: ArrayLike, params: CrfPa
     return float(own + np.triu(pair_weights(values, params) * differ).sum())
 
 
-def mean_field_naive(
-    unary: ArrayLike, values: ArrayLike, params: CrfParams, iterations: int = 10
-) -> NDArray[np.float64]:
-    """Approximate the CRF's marginals by mean field, every pair of cells written out (eq. (3), (4)).
+def free_energy(Q: ArrayLike, unary: ArrayLike, values: ArrayLike, params: CrfParams) -> float:
+    """Compute the free energy of independent cells, F(Q) = E_Q[E(x)] - H(Q), which mean field makes small.
 
-    Among all distributions in which cells are independent, mean field looks for the one closest to exp(-E(x)) / Z.
-    Each cell's share of it must satisfy, with k_ij the bracket of eq. (4),
-
-        Q_i(l) = exp(-phi_u(l) - sum_{j != i} k_ij (1 - Q_j(l))) / Z_i
-
-    which is iterated from Q_i(l) = exp(-phi_u(l)) / Z_i, all cells at once (Kraehenbuehl and Koltun 2011, algorithm 1).
-    If the cells were updated one after the other, no update could raise the free energy. Updating all at once usually
-    lowers it as well, but two cells that strongly attract each other can swap their labels for ever.
+    It is an upper bound of -log Z, and F(Q) + log Z = KL(Q || P) says how far Q is from P(x) = exp(-E(x)) / Z. Each
+    pair of cells counts once.
 
     Parameters
     ----------
+    Q : (C, H, W) float
+        A distribution over the classes in each cell.
     unary : (C, H, W) float
-        phi_u, see `unary_from_probability`; inf where a class is impossible.
+        phi_u, see `unary_from_probability`.
     values : (4, H, W) float
-        o_i, the occupancy probabilities of each cell: they sum to one.
+        o_i, the occupancy probabilities of each cell.
     params : CrfParams
         Weights, widths and normalisation.
-    iterations : int
-        Number of updates of all cells at once. After ten the labels have settled; probabilities of single cells still
-        change later.
 
     Returns
     -------
-    (C, H, W) float64
-        Q, the distribution over classes in each cell.
+    float
+        F(Q) in nats; infinite when Q gives an impossible class a probability.
 
     Raises
     ------
     ArgumentError
-        When shapes don't fit, numbers aren't what they should be, or the grid has more than `MAX_CELLS` cells.
+        When shapes don't fit, Q holds no distributions, or the grid has more than `MAX_CELLS` cells.
+
+    Examples
+    --------
+    Two cells that don't care, each undecided between two classes. Without pairs F is -log Z = -2 log 2. A pair weight
+    of w2 exp(-1/2) adds itself half the time:
+
+    >>> values, undecided = np.full((4, 1, 2), 0.25), np.full((2, 1, 2), 0.5)
+    >>> params = CrfParams(w_bilateral=0, w_spatial=1, sigma_gamma=1, normalization="none")
+    >>> round(free_energy(undecided, np.zeros((2, 1, 2)), values, params) + 2 * np.log(2), 3)
+    0.303
     """
     unary, values = check_inputs(unary, values)
-    check_iterations(iterations)
-    weights = pair_weights(values, params)
-    phi = unary.reshape(len(unary), -1)
-    Q = softmax(-phi, axis=0)
-    for _ in range(iterations):
-        disagreement = (1 - Q) @ weights
-        Q = softmax(-phi - disagreement, axis=0)
-    return Q.reshape(unary.shape)
+    Q = np.asarray(Q, dtype=np.float64)
+    if Q.shape != unary.shape or not (Q >= 0).all() or not np.allclose(Q.sum(axis=0), 1, atol=1e-3):
+        raise ArgumentError("Q", f"distributions over axis 0, shape {unary.shape}", f"an array of shape {Q.shape}")
+    q = Q.reshape(len(Q), -1)
+    own = (q * np.where(q > 0, unary.reshape(q.shape), 0)).sum()
+    disagree = 1 - q.T @ q
+    return float(own + np.triu(pair_weights(values, params) * disagree).sum() + xlogy(q, q).sum())

@@ -3,7 +3,7 @@
 Every point lies in one simplex of a lattice; where points are dense, many of them share its corners. The values of
 the points are splatted onto the d + 1 corners of their simplices, the values of the corners are blurred with
 (1/4, 1/2, 1/4) along each of the d + 1 lattice directions, and the result is sliced, that is interpolated, at the
-points. The module `simplices` holds the geometry.
+points. The module `simplices` holds the geometry, `vertices` the bookkeeping.
 """
 
 from dataclasses import dataclass, replace
@@ -12,15 +12,9 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from semgrid_edu.crf.simplices import (
-    elevation,
-    enclosing_simplices,
-    find_neighbours,
-    number_vertices,
-    peak,
-    self_responses,
-    sort_by_vertex,
-)
+from semgrid_edu.crf.arithmetic import FAST, HALF
+from semgrid_edu.crf.simplices import elevation, enclosing_simplices, peak, responses, self_responses
+from semgrid_edu.crf.vertices import number_vertices, sort_by_vertex
 from semgrid_edu.errors import ArgumentError
 
 
@@ -84,18 +78,18 @@ class PermutohedralLattice:
         if np.abs(elevated).max() > 2**30:
             raise ArgumentError("features", "fewer standard deviations, or a larger sigma", np.abs(features).max())
         origins, ranks, weights = enclosing_simplices(elevated)
-        corners, keys, slots = number_vertices(origins, ranks)
-        neighbours = find_neighbours(keys, slots)
-        starts, members = sort_by_vertex(corners.ravel(), len(keys))
+        vertices = number_vertices(origins, ranks)
+        corners = vertices.simplices[vertices.members]
+        starts, members = sort_by_vertex(corners.ravel(), vertices.neighbours.shape[2])
         factor = peak(dimensions)
         return cls(
             corners=corners,
             slices=(factor * weights).astype(np.float32),
-            neighbours=neighbours,
+            neighbours=vertices.neighbours,
             starts=starts,
             points=members // np.int32(dimensions + 1),
             splats=weights.ravel()[members].astype(np.float32),
-            diagonal=np.float32(factor) * self_responses(corners, ranks, weights, neighbours),
+            diagonal=np.float32(factor) * self_responses(vertices.members, weights, responses(*vertices[1:])),
         )
 
     def scaled(self, scale: NDArray) -> "PermutohedralLattice":
@@ -132,40 +126,62 @@ class PermutohedralLattice:
         (N, K) float32
             sum_j k(f_i, f_j) values_j, the point itself included.
         """
-        blurred = _splat(values, self.starts, self.points, self.splats)
+        out = np.zeros_like(values)
+        self.add(values, out)
+        return out
+
+    def add(self, values: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+        """Filter values at the points, and add the result to an array.
+
+        Parameters
+        ----------
+        values, out : (N, K) float32
+            One row per point.
+        """
+        _slice(self.blurred(values), self.corners, self.slices, out)
+
+    def blurred(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Splat values onto the vertices and blur them there: all of the filter but the slicing.
+
+        Parameters
+        ----------
+        values : (N, K) float32
+            One row per point.
+
+        Returns
+        -------
+        (M + 1, K) float32
+            What each vertex holds; the last row is zero.
+        """
+        blurred, other = np.zeros((2, len(self.starts), values.shape[1]), np.float32)
+        _splat(values, self.starts, self.points, self.splats, blurred)
         for forth, back in self.neighbours:
-            blurred = _blur(blurred, forth, back)
-        return _slice(blurred, self.corners, self.slices)
+            _blur(blurred, forth, back, other)
+            blurred, other = other, blurred
+        return blurred
 
 
-@njit(cache=True, parallel=True, fastmath=True)
-def _splat(values, starts, points, weights):
-    """Sum at each vertex what its points add: (M + 1, K); the last row is zero and stands for missing neighbours."""
-    n_vertices = len(starts) - 1
-    out = np.zeros((n_vertices + 1, values.shape[1]), np.float32)
-    for v in prange(n_vertices):
+@njit(cache=True, parallel=True, fastmath=FAST)
+def _splat(values, starts, points, weights, out):
+    """Sum at each vertex what its points add, (M + 1, K); the last row stays zero, for missing neighbours."""
+    for v in prange(len(starts) - 1):
         for i in range(starts[v], starts[v + 1]):
             for k in range(values.shape[1]):
                 out[v, k] += weights[i] * values[points[i], k]
-    return out
 
 
-@njit(cache=True, parallel=True, fastmath=True)
-def _blur(values, forth, back):
+@njit(cache=True, parallel=True, fastmath=FAST)
+def _blur(values, forth, back, out):
     """Blur (M + 1, K) values along one direction with (1/4, 1/2, 1/4), given each vertex's two neighbours."""
-    out = np.zeros_like(values)
     for v in prange(len(forth)):
         for k in range(values.shape[1]):
-            out[v, k] = 0.5 * values[v, k] + 0.25 * (values[forth[v], k] + values[back[v], k])
-    return out
+            out[v, k] = HALF * (values[v, k] + HALF * (values[forth[v], k] + values[back[v], k]))
 
 
-@njit(cache=True, parallel=True, fastmath=True)
-def _slice(values, corners, weights):
-    """Interpolate the values at the N points from their corners: (M + 1, K) -> (N, K)."""
-    out = np.zeros((len(corners), values.shape[1]), np.float32)
+@njit(cache=True, parallel=True, fastmath=FAST)
+def _slice(values, corners, weights, out):
+    """Interpolate the values at the N points from their corners, and add them: (M + 1, K) -> (N, K)."""
     for i in prange(len(corners)):
         for corner in range(corners.shape[1]):
             for k in range(values.shape[1]):
                 out[i, k] += weights[i, corner] * values[corners[i, corner], k]
-    return out

@@ -1,34 +1,21 @@
 """Mean field on the whole grid in milliseconds: eq. (3), (4) with filters in place of the sum over all pairs."""
 
-from collections.abc import Sequence
-from typing import Protocol
-
 import numpy as np
 from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
+from semgrid_edu.crf.arithmetic import FAST, exponential
 from semgrid_edu.crf.lattice import PermutohedralLattice
-from semgrid_edu.crf.params import CrfParams, check_inputs, check_iterations
+from semgrid_edu.crf.naive import NEVER, damping
+from semgrid_edu.crf.params import CrfParams, check_inputs, check_stop
 from semgrid_edu.crf.spatial import SeparableGaussian
 
 LANES = 16
-"""The class axis is padded to a multiple of this number: 16 floats fill a cache line, and loops over them vectorise."""
-
-_NEVER = 1e30
-"""A unary in place of infinity: it avoids inf - inf, which is NaN, and exp(-1e30) is 0."""
+"""Filters take a cell's classes side by side, padded to a multiple of this number: 16 floats fill a cache line."""
 
 _ZERO_SUM_STATES = np.array([[1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1]]) / 2
 """An orthonormal basis of the space orthogonal to (1, 1, 1, 1). The four probabilities sum to one, so three numbers in
 this basis keep every distance between the states of two cells."""
-
-
-class Kernel(Protocol):
-    """One term of eq. (4) as a filter over N cells: a call returns sum_j k_ij values_j; `diagonal` holds k_ii, (N,)."""
-
-    diagonal: NDArray[np.float32]
-
-    def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return sum_j k_ij values_j for each cell i, (N, K) -> (N, K)."""
 
 
 def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice:
@@ -55,7 +42,9 @@ def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice
     return lattice.scaled(np.sqrt(params.w_bilateral / degree))
 
 
-def mean_field(unary: ArrayLike, values: ArrayLike, params: CrfParams, iterations: int = 10) -> NDArray[np.float32]:
+def mean_field(
+    unary: ArrayLike, values: ArrayLike, params: CrfParams, iterations: int = 10, tolerance: float = 0.0
+) -> NDArray[np.float32]:
     """Approximate the CRF's marginals by mean field, fast (eq. (3), (4)); the twin of `mean_field_naive`.
 
     The sum over all pairs becomes two filters: the spatial one is exact (`SeparableGaussian`), the bilateral one uses
@@ -71,8 +60,10 @@ def mean_field(unary: ArrayLike, values: ArrayLike, params: CrfParams, iteration
     params : CrfParams
         Weights, widths and normalisation.
     iterations : int
-        Number of updates of all cells at once. After ten the labels have settled; probabilities of single cells still
-        change later.
+        The largest number of updates of all cells. With the default parameters labels have settled after ten;
+        probabilities of single cells still change later.
+    tolerance : float
+        Stop as soon as an update changes no probability by more than this.
 
     Returns
     -------
@@ -85,83 +76,137 @@ def mean_field(unary: ArrayLike, values: ArrayLike, params: CrfParams, iteration
         When shapes don't fit or numbers aren't what they should be.
     """
     unary, values = check_inputs(unary, values)
-    check_iterations(iterations)
+    check_stop(iterations, tolerance)
     spatial = SeparableGaussian.build(unary.shape[1:], params.sigma_gamma, params.w_spatial, params.normalization)
-    Q = iterate(_in_lanes(unary), [bilateral_kernel(values, params), spatial], iterations)
-    return np.ascontiguousarray(Q[:, : len(unary)].T).reshape(unary.shape)
+    return iterate(_above_best(unary), bilateral_kernel(values, params), spatial, iterations, tolerance)
 
 
-def iterate(phi: NDArray[np.float32], kernels: Sequence[Kernel], iterations: int) -> NDArray[np.float32]:
-    """Run the mean-field update with any kernels.
+def iterate(
+    phi: NDArray[np.float32],
+    bilateral: PermutohedralLattice,
+    spatial: SeparableGaussian,
+    iterations: int,
+    tolerance: float = 0.0,
+) -> NDArray[np.float32]:
+    """Run the mean-field update of `mean_field_naive`, with filters for the sums over all cells.
 
     The cost of disagreeing, sum_j k_ij (1 - Q_j(l)), differs from the negative reward of agreeing,
     -sum_j k_ij Q_j(l), only by sum_j k_ij, which is the same for all classes and cancels in the soft-max.
 
     Parameters
     ----------
-    phi : (N, K) float32
+    phi : (C, H, W) float32
         The unary term, finite, at least 0, and 0 for the best class of each cell.
-    kernels : sequence of Kernel
-        The terms of eq. (4).
+    bilateral, spatial : PermutohedralLattice, SeparableGaussian
+        The two kernels of eq. (4), with their weights and normalisation.
     iterations : int
-        Number of updates of all cells at once.
+        The largest number of updates of all cells.
+    tolerance : float
+        Stop as soon as an update changes no probability by more than this.
 
     Returns
     -------
-    (N, K) float32
+    (C, H, W) float32
         Q, the distribution over classes in each cell.
     """
-    self_weight = sum(kernel.diagonal for kernel in kernels)
-    Q = _softmax(-phi)
+    n_classes, height, width = phi.shape
+    cells = np.zeros((height * width, -(-n_classes // LANES) * LANES), np.float32)
+    rewards, own = np.zeros_like(cells), (bilateral.diagonal + spatial.diagonal).reshape(height, width)
+    part, logits, Q = damping(own).astype(np.float32), -phi, np.zeros_like(phi)
+    _update(rewards, phi, own, np.ones_like(part), logits, Q, cells)  # without rewards: the soft-max of the unary term
     for _ in range(iterations):
-        reward = sum(kernel(Q) for kernel in kernels)
-        Q = _softmax(_logits(reward, self_weight, Q, phi))
+        spatial.filter(cells, rewards)
+        bilateral.add(cells, rewards)
+        change = _update(rewards, phi, own, part, logits, Q, cells)
+        if change <= tolerance:
+            break
     return Q
 
 
-def _in_lanes(unary: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Return the unary term as (N, K), 0 for the best class; the classes are padded with impossible ones."""
-    n_classes = len(unary)
-    phi = np.full((unary[0].size, -(-n_classes // LANES) * LANES), _NEVER, np.float32)
-    phi[:, :n_classes] = np.minimum(unary - unary.min(axis=0), _NEVER).reshape(n_classes, -1).T
+@njit(cache=True, parallel=True)
+def _above_best(unary):
+    """Return how far each cost lies above that of the cell's best class, as float32 and at most `NEVER`."""
+    n_classes, height, width = unary.shape
+    phi = np.empty(unary.shape, np.float32)
+    for r in prange(height):
+        best = unary[0, r].copy()
+        for k in range(1, n_classes):
+            for c in range(width):
+                best[c] = min(best[c], unary[k, r, c])
+        for k in range(n_classes):
+            for c in range(width):
+                phi[k, r, c] = min(unary[k, r, c] - best[c], NEVER)
     return phi
 
 
-@njit(cache=True, parallel=True, fastmath=True)
-def _logits(reward, self_weight, Q, phi):
-    """Return log Q_i(l) up to one number per cell: the reward without the cell's own part, minus the unary term."""
-    out = np.empty_like(Q)
-    for i in prange(len(Q)):
-        for k in range(Q.shape[1]):
-            out[i, k] = reward[i, k] - self_weight[i] * Q[i, k] - phi[i, k]
-    return out
+# Classes, rows and columns lie in this order wherever cells don't add up: all loops then run along a row of the grid,
+# and the compiler takes many cells at once.
+@njit(cache=True, parallel=True, fastmath=FAST)
+def _update(rewards, phi, own, part, logits, Q, cells):
+    """Update all cells, and return the largest change of a probability; `cells` gets a copy of Q in the filters' order.
+
+    The reward of a cell contains what it says itself; this is subtracted. Its log Q, known up to one number, goes part of
+    the way to the reward minus the unary term.
+    """
+    n_classes, height, width = phi.shape
+    lanes, change = cells.shape[1], np.zeros(height, np.float32)
+    rewards, cells = rewards.reshape(height, -1), cells.reshape(height, -1)
+    for r in prange(height):
+        fresh, moved = np.empty((n_classes, width), np.float32), np.zeros(width, np.float32)
+        for k in range(n_classes):
+            _take_lane(rewards[r], k, lanes, fresh[k])
+            _approach(logits[k, r], fresh[k], own[r], Q[k, r], phi[k, r], part[r])
+        _softmax(logits, r, fresh)
+        for k in range(n_classes):
+            _replace(Q[k, r], fresh[k], moved)
+            _put_lane(cells[r], k, lanes, fresh[k])
+        change[r] = moved.max()
+    return change.max()
 
 
-def _softmax(logits: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the soft-max along the class axis, (N, K); overwrites its argument."""
-    _subtract_best(logits)
-    np.exp(logits, out=logits)  # numpy's exp is vectorised, numba's isn't
-    _normalise(logits)
-    return logits
+@njit(cache=True, inline="always")
+def _take_lane(row, lane, lanes, out):
+    for c in range(len(out)):
+        out[c] = row[c * lanes + lane]
 
 
-@njit(cache=True, parallel=True, fastmath=True)
-def _subtract_best(logits):
-    """Make the largest logit of each cell 0, in place."""
-    for i in prange(len(logits)):
-        best = logits[i, 0]
-        for k in range(1, logits.shape[1]):
-            best = max(best, logits[i, k])
-        for k in range(logits.shape[1]):
-            logits[i, k] -= best
+@njit(cache=True, inline="always")
+def _put_lane(row, lane, lanes, values):
+    for c in range(len(values)):
+        row[c * lanes + lane] = values[c]
 
 
-@njit(cache=True, parallel=True, fastmath=True)
-def _normalise(weights):
-    """Divide each row by its sum, in place."""
-    for i in prange(len(weights)):
-        total = np.float32(0)
-        for k in range(weights.shape[1]):
-            total += weights[i, k]
-        for k in range(weights.shape[1]):
-            weights[i, k] /= total
+@njit(cache=True, fastmath=FAST, inline="always")
+def _approach(logits, reward, own, Q, phi, part):
+    for c in range(len(logits)):
+        logits[c] += part[c] * (reward[c] - own[c] * Q[c] - phi[c] - logits[c])
+
+
+@njit(cache=True, fastmath=FAST, inline="always")
+def _softmax(logits, r, out):
+    """Write the soft-max of row r of the logits to `out`, (C, W), and make the largest logit of each cell 0."""
+    best, total = logits[0, r].copy(), np.zeros(out.shape[1], np.float32)
+    for k in range(1, len(out)):
+        row = logits[k, r]
+        for c in range(len(best)):
+            best[c] = max(best[c], row[c])
+    for k in range(len(out)):
+        row = logits[k, r]
+        for c in range(len(best)):
+            row[c] -= best[c]
+            out[k, c] = exponential(row[c])
+        for c in range(len(best)):
+            total[c] += out[k, c]
+    for c in range(len(best)):
+        total[c] = np.float32(1) / total[c]
+    for k in range(len(out)):
+        for c in range(len(best)):
+            out[k, c] *= total[c]
+
+
+@njit(cache=True, fastmath=FAST, inline="always")
+def _replace(old, new, largest):
+    """Overwrite old numbers; each largest change is kept."""
+    for c in range(len(old)):
+        largest[c] = max(largest[c], abs(new[c] - old[c]))
+        old[c] = new[c]

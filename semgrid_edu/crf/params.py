@@ -134,7 +134,7 @@ def unary_from_log_probability(log_probability: NDArray) -> NDArray:
 
 
 def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Check what the CRF is given, and return it as float64.
+    """Check what the CRF is given, and return it as float32 or float64.
 
     Parameters
     ----------
@@ -145,9 +145,9 @@ def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float6
 
     Returns
     -------
-    unary : (C, H, W) float64
+    unary : (C, H, W) float32 or float64
         The same costs.
-    values : (4, H, W) float64
+    values : (4, H, W) float32 or float64
         The same probabilities.
 
     Raises
@@ -155,32 +155,43 @@ def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float6
     ArgumentError
         When the shapes don't fit, a cost is NaN or -inf, a cell has no possible class, or states don't sum to 1.
     """
-    unary, values = np.asarray(unary, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    unary, values = _floats(unary), _floats(values)
     if unary.ndim != 3 or 0 in unary.shape:
         raise ArgumentError("unary", "shape (C, H, W), nothing empty", f"shape {unary.shape}")
     if values.shape != (N_STATES, *unary.shape[1:]):
         raise ArgumentError("values", f"shape {(N_STATES, *unary.shape[1:])}", f"shape {values.shape}")
-    if np.isnan(unary).any() or np.isneginf(unary).any():
+    best = unary.min(axis=0)  # NaN where any cost is NaN
+    if np.isnan(best).any() or np.isneginf(best).any():
         raise ArgumentError("unary", "numbers, or inf for an impossible class", "NaN or -inf")
-    if np.isinf(unary).all(axis=0).any():
+    if np.isinf(best).any():
         raise ArgumentError("unary", "a possible class in each cell", "a cell where every class is inf")
-    if not (values >= -1e-3).all() or not np.allclose(values.sum(axis=0), 1, atol=1e-3):
+    if not (values.min() >= -1e-3 and np.abs(values.sum(axis=0) - 1).max() <= 1e-3):
         raise ArgumentError("values", "four probabilities that sum to 1 in each cell", "a cell where they don't")
     return unary, values
 
 
-def check_iterations(iterations: int) -> None:
-    """Refuse a number of iterations that is impossible.
+def _floats(array: ArrayLike) -> NDArray[np.floating]:
+    """Return an array of float32 or float64; what is neither becomes float64."""
+    array = np.asarray(array)
+    return array if array.dtype in (np.float32, np.float64) else array.astype(np.float64)
+
+
+def check_stop(iterations: int, tolerance: float = 0.0) -> None:
+    """Refuse a number of iterations, or a change below which to stop, that is impossible.
 
     Parameters
     ----------
     iterations : int
         How many times mean field updates all cells.
+    tolerance : float
+        The change of probabilities below which it stops.
 
     Raises
     ------
     ArgumentError
-        When it is negative or not a whole number.
+        When either is negative, or the first isn't a whole number.
     """
     if not isinstance(iterations, int | np.integer) or iterations < 0:
         raise ArgumentError("iterations", "a whole number of at least 0", iterations)
+    if not tolerance >= 0:
+        raise ArgumentError("tolerance", "a change of at least 0", tolerance)

@@ -1,13 +1,9 @@
 """The dense CRF on a few cells as an undirected model, built from the package's pair weights (eq. (3), (4))."""
 
-from itertools import combinations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.crf import CrfParams, pair_weights, unary_from_probability
-from semgrid_edu.graphical.exact import eliminate
-from semgrid_edu.graphical.factor import Factor
+from semgrid_edu.crf import CrfParams, crf_model, unary_from_probability
 from semgrid_edu.graphical.model import GraphicalModel
 from semgrid_edu.graphical.stages.stage_graph import CutEdge, StageGraph
 from semgrid_edu.occupancy import N_STATES, State
@@ -77,49 +73,6 @@ def all_free(shape: tuple[int, int]) -> NDArray[np.float64]:
     return values
 
 
-def crf_model(unary: NDArray, values: NDArray, params: CrfParams) -> GraphicalModel:
-    """Build the CRF as a product of factors: P(x) = exp(-E(x)) / Z, with the energy of eq. (3) and (4).
-
-    Parameters
-    ----------
-    unary : (C, H, W) float
-        phi_u, the unary term.
-    values : (4, H, W) float
-        o_i, the occupancy probabilities of each cell.
-    params : CrfParams
-        Parameters of the pair weights.
-
-    Returns
-    -------
-    GraphicalModel
-        An undirected model over x1, x2, ..., with the cells counted row by row. It has a factor exp(-phi_u) per cell,
-        and one per pair, which is exp(-k_ij) where the two labels differ and 1 where they agree.
-    """
-    cells, weights = unary.reshape(len(unary), -1).T, pair_weights(values, params)
-    names, differ = _names(len(cells)), 1 - np.eye(len(unary))
-    own = [Factor(name, np.exp(-phi)) for name, phi in zip(names, cells, strict=True)]
-    pairs = combinations(range(len(cells)), 2)
-    return GraphicalModel([*own, *(Factor((names[i], names[j]), np.exp(-weights[i, j] * differ)) for i, j in pairs)])
-
-
-def exact_marginals(model: GraphicalModel) -> NDArray[np.float64]:
-    """Return the exact distribution of every cell of a CRF.
-
-    Parameters
-    ----------
-    model : GraphicalModel
-        A model of N cells with C classes, from `crf_model`. Every cell is coupled to every other, so no order of
-        elimination avoids the table of all C^N labellings, which may have at most 10^7 entries.
-
-    Returns
-    -------
-    (C, N) float64
-    """
-    joint = eliminate(model, model.names).normalised().table
-    cells = range(joint.ndim)
-    return np.stack([joint.sum(axis=tuple(other for other in cells if other != cell)) for cell in cells], axis=1)
-
-
 def crf_stage(coupling: float = 4.0, unary: NDArray | None = None, values: NDArray | None = None) -> StageGraph:
     """Return the graph of a fully connected CRF: a factor for each cell and one for each pair of cells.
 
@@ -147,10 +100,6 @@ def crf_stage(coupling: float = 4.0, unary: NDArray | None = None, values: NDArr
         equations={"f(x1)": r"$e^{-\phi_u(x_1)}$", "f(x1, x2)": r"$e^{-k_{12} [x_1 \neq x_2]}$"},
         cut=CUT,
     )
-
-
-def _names(count: int) -> list[str]:
-    return [f"x{number}" for number in range(1, count + 1)]
 
 
 def _circle(model: GraphicalModel) -> dict[str, tuple[float, float]]:

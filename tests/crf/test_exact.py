@@ -1,0 +1,125 @@
+"""The CRF on tiny grids without approximation, against enumeration and pyagrum; and how far a Q is from it."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from pyagrum_oracle import as_directed, posteriors
+from scipy.special import logsumexp
+
+from semgrid_edu.crf import (
+    CrfParams,
+    crf_model,
+    energy,
+    exact_marginals,
+    free_energy,
+    log_partition,
+    mean_field,
+    mean_field_naive,
+    most_likely,
+    unary_from_probability,
+)
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.graphical import eliminate
+
+TINY = pytest.mark.parametrize(("classes", "height", "width"), [(2, 3, 3), (3, 2, 3), (5, 1, 1), (1, 2, 2)])
+
+
+def random_cells(seed, classes, height, width):
+    """Networks' scores and occupancy at random."""
+    rng = np.random.default_rng(seed)
+    unary = unary_from_probability(np.moveaxis(rng.dirichlet(np.ones(classes), (height, width)), -1, 0))
+    return unary, np.moveaxis(rng.dirichlet(np.ones(4) / 2, (height, width)), -1, 0)
+
+
+def enumerated(unary, values, params):
+    """Return all labellings, (n, H, W), and their energies."""
+    classes, height, width = unary.shape
+    labellings = np.array(list(product(range(classes), repeat=height * width))).reshape(-1, height, width)
+    return labellings, np.array([energy(x, unary, values, params) for x in labellings])
+
+
+@TINY
+@pytest.mark.parametrize("normalization", ["symmetric", "none"])
+def test_everything_exact_is_what_enumeration_says(classes, height, width, normalization):
+    unary, values = random_cells(0, classes, height, width)
+    params = CrfParams(sigma_beta=0.5, normalization=normalization)
+    labellings, energies = enumerated(unary, values, params)
+    assert log_partition(unary, values, params) == pytest.approx(logsumexp(-energies), abs=1e-10)
+    np.testing.assert_array_equal(most_likely(unary, values, params), labellings[energies.argmin()])
+    p = np.exp(-energies - logsumexp(-energies))
+    wanted = np.einsum("n,nkhw->khw", p, (labellings[:, None] == np.arange(classes)[:, None, None]).astype(float))
+    np.testing.assert_allclose(exact_marginals(unary, values, params), wanted, atol=1e-10)
+
+
+def test_marginals_are_pyagrums():
+    unary, values = random_cells(1, 3, 2, 3)
+    model = crf_model(unary, values, CrfParams())
+    wanted, _ = posteriors(*as_directed(model))
+    marginals = exact_marginals(unary, values, CrfParams()).reshape(3, -1)
+    for k, name in enumerate(model.names):
+        np.testing.assert_allclose(marginals[:, k], wanted[name], atol=1e-9)
+        np.testing.assert_allclose(eliminate(model, name).normalised().table, wanted[name], atol=1e-9)
+
+
+def test_sixteen_cells_are_still_exact():
+    unary, values = random_cells(2, 2, 4, 4)
+    labellings, energies = enumerated(unary, values, CrfParams())
+    weights = np.exp(-energies)
+    second = np.einsum("n,nhw->hw", weights, labellings) / weights.sum()
+    np.testing.assert_allclose(exact_marginals(unary, values, CrfParams()), [1 - second, second], atol=1e-10)
+    np.testing.assert_array_equal(most_likely(unary, values, CrfParams()), labellings[energies.argmin()])
+
+
+def test_an_impossible_class_has_no_part_in_it():
+    unary, values = random_cells(3, 3, 2, 2)
+    unary[1] = np.inf
+    without = np.delete(unary, 1, axis=0)
+    np.testing.assert_allclose(
+        exact_marginals(unary, values, CrfParams()),
+        np.insert(exact_marginals(without, values, CrfParams()), 1, 0, axis=0),
+        atol=1e-12,
+    )
+    assert log_partition(unary, values, CrfParams()) == pytest.approx(log_partition(without, values, CrfParams()))
+    assert free_energy(np.full(unary.shape, 1 / 3), unary, values, CrfParams()) == np.inf
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_free_energy_is_the_mean_energy_minus_the_entropy(seed):
+    """By enumeration, of any Q, with probabilities of 0 among them."""
+    unary, values = random_cells(seed, 3, 2, 2)
+    rng = np.random.default_rng(seed)
+    Q = np.moveaxis(rng.dirichlet(np.full(3, 0.3), (2, 2)), -1, 0)
+    Q[:, 0, 0] = 0, 1, 0
+    labellings, energies = enumerated(unary, values, CrfParams())
+    q = np.take_along_axis(Q[:, None], labellings[None], axis=0)[0].prod(axis=(1, 2))
+    log_q = np.log(np.where(q > 0, q, 1))
+    assert free_energy(Q, unary, values, CrfParams()) == pytest.approx(q @ (energies + log_q), abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_without_pairs_the_softmax_has_no_distance_from_the_exact_distribution(seed):
+    unary, values = random_cells(seed, 4, 2, 3)
+    params = CrfParams(w_bilateral=0, w_spatial=0)
+    Q = mean_field_naive(unary, values, params, 0)
+    assert free_energy(Q, unary, values, params) == pytest.approx(-log_partition(unary, values, params), abs=1e-10)
+    np.testing.assert_allclose(exact_marginals(unary, values, params), Q, atol=1e-12)
+
+
+@pytest.mark.parametrize("function", [exact_marginals, most_likely, log_partition])
+def test_a_grid_with_too_many_labellings_is_refused_by_name(function):
+    values = np.full((4, 5, 5), 0.25)
+    with pytest.raises(ArgumentError, match=r"at most 10,000,000 labellings; mean_field takes more.*2\^25"):
+        function(np.zeros((2, 5, 5)), values, CrfParams())
+
+
+@pytest.mark.parametrize("Q", [np.full((2, 1, 2), 0.4), np.full((2, 2, 1), 0.5), [[[2.0, 0.5]], [[-1.0, 0.5]]], np.nan])
+def test_free_energy_refuses_what_is_no_distribution(Q):
+    with pytest.raises(ArgumentError, match=r"^Q: expected distributions"):
+        free_energy(Q, np.zeros((2, 1, 2)), np.full((4, 1, 2), 0.25), CrfParams())
+
+
+def test_the_fast_filter_ends_near_the_exact_marginals_where_cells_hardly_couple():
+    unary, values = random_cells(4, 3, 2, 3)
+    params = CrfParams(w_bilateral=0.2, w_spatial=0.2)
+    np.testing.assert_allclose(mean_field(unary, values, params), exact_marginals(unary, values, params), atol=0.01)
