@@ -1,0 +1,281 @@
+"""Each fault put into correct input is found and named first; correct input is left alone."""
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+import pytest
+import torch
+from scipy.ndimage import gaussian_filter
+from scipy.special import log_softmax, softmax
+
+from semgrid_edu.crf import CrfParams, Finding, Findings, check, mean_field, unary_from_probability
+from semgrid_edu.crf.faults.scale import scale_of
+from semgrid_edu.datasets.samples import sample_drive, sample_weights, trained_segmenters
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.networks import build_net, load_net
+from semgrid_edu.pipeline import run_pipeline
+
+FRAMES = 2
+
+
+@dataclass(frozen=True)
+class Case:
+    """Correct input: scores of a network, states, and the size of a cell."""
+
+    scores: np.ndarray
+    values: np.ndarray
+    cell: float
+
+    @property
+    def g(self):
+        return softmax(self.scores, axis=0)
+
+    @property
+    def unary(self):
+        return -log_softmax(self.scores, axis=0)
+
+    @property
+    def params(self):
+        return CrfParams.for_cells(self.cell)
+
+    @property
+    def grid(self):
+        return self.values.shape[1:]
+
+
+def patches(shape, count, rng):
+    return np.argmax([gaussian_filter(rng.normal(size=shape), 4) for _ in range(count)], axis=0)
+
+
+def street(seed=0, shape=(142, 62), n_classes=14, cell=0.5):
+    """Classes and states in patches; scores like a network's, in which the right class stands out."""
+    rng = np.random.default_rng(seed)
+    scores = 4 * np.eye(n_classes)[patches(shape, n_classes, rng)] + rng.normal(size=(*shape, n_classes))
+    values = softmax(5 * np.eye(4)[patches(shape, 4, rng)] + 0.5 * rng.normal(size=(*shape, 4)), axis=-1)
+    level = 5 * rng.normal(size=shape)  # a network's scores have one; the soft-max doesn't see it
+    return Case(scores.transpose(2, 0, 1) + level, values.transpose(2, 0, 1), cell)
+
+
+def results(segmenter, grid, frames):
+    drive = sample_drive()
+    net = load_net(sample_weights(segmenter), drive[0].camera)
+    if grid != net.need_architecture().grid:
+        trained, net = net, build_net(replace(net.need_architecture(), grid=grid), drive[0].camera)
+        net.load_state_dict(trained.state_dict())
+    return list(run_pipeline([drive[k] for k in range(frames)], net.eval()))
+
+
+@pytest.fixture(scope="module")
+def sample():
+    """A frame of the shipped drive, as the shipped network sees it."""
+    shown = results("segnet", GridSpec.compact(), FRAMES)[-1]
+    level = 5 * np.random.default_rng(0).normal(size=shown.grid.shape[1:])
+    return Case(np.log(shown.grid) + level, shown.belief.probability, 0.5)
+
+
+@pytest.fixture(params=["sample", "street", "three classes"])
+def case(request):
+    if request.param == "sample":
+        return request.getfixturevalue("sample")
+    return street() if request.param == "street" else street(1, (50, 40), 3, 0.2)
+
+
+# --- correct input -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("grid", [GridSpec.compact(), GridSpec.paper()], ids=["compact", "paper"])
+@pytest.mark.parametrize("segmenter", trained_segmenters())
+def test_the_shipped_networks_on_the_shipped_drive_are_healthy(segmenter, grid):
+    for result in results(segmenter, grid, FRAMES if grid == GridSpec.compact() else 1):
+        params = CrfParams.for_cells(grid.cell)
+        unary, o = -np.log(result.grid), result.belief.probability
+        for cell, refined in product([None, grid.cell], [None, result.refined, result.refined.argmax(axis=0)]):
+            assert check(unary, o, params, refined, cell) == []
+
+
+@pytest.mark.parametrize("n_classes", [2, 3, 14, 40])
+@pytest.mark.parametrize("shape", [(142, 62), (30, 30), (4, 60), (60, 4), (4, 4), (1, 40), (40, 1), (2, 2), (1, 1)])
+def test_simulated_input_is_healthy(shape, n_classes):
+    case = street(n_classes, shape, n_classes)
+    for unary in (case.unary, case.unary.astype(np.float32), case.unary.astype(np.float16)):
+        assert check(unary, case.values, case.params) == []
+    refined = mean_field(case.unary, case.values, case.params)
+    assert [finding.name for finding in check(case.unary, case.values, case.params, refined)] in ([], ["one label"])
+
+
+def test_what_is_unusual_but_right_is_left_alone():
+    case = street()
+    impossible = case.g.copy()
+    impossible[3] = 0
+    impossible /= impossible.sum(axis=0)
+    certain = np.eye(14)[patches(case.grid, 13, np.random.default_rng(2))].transpose(2, 0, 1)  # one class is nowhere
+    labels = 0.9 * certain + 0.1 / 14
+    raised = case.g + 1e-3
+    for g in (impossible, certain, labels, raised / raised.sum(axis=0)):
+        assert check(unary_from_probability(g), case.values, case.params, cell=0.5) == []
+    assert check(-np.log(raised), case.values, case.params) == []
+    assert check(case.unary, np.full_like(case.values, 0.25), case.params) == []  # nothing observed yet
+    assert check(case.unary, np.eye(4)[case.values.argmax(axis=0)].transpose(2, 0, 1), case.params) == []
+    assert check(torch.tensor(case.unary), torch.tensor(case.values), case.params) == []
+    assert check(np.asfortranarray(case.unary), case.values[:, ::-1][:, ::-1], case.params) == []
+    assert check(np.ma.masked_array(case.unary), case.values.tolist(), case.params) == []
+
+
+# --- faults, one by one --------------------------------------------------------------------------
+
+
+def unary_faults(case):
+    g, phi, (height, width) = case.g, case.unary, case.grid
+    last, hole = np.moveaxis(g, 0, -1), np.zeros(case.grid, bool)
+    hole[3, 4] = True
+    whole = np.rint(255 * g)
+    yield "scores", case.scores
+    yield "log probabilities", -phi
+    yield "log probabilities", np.log(np.where(hole, np.eye(len(g))[0][:, None, None], g))
+    yield "probabilities", g
+    yield "probabilities", 100 * g
+    yield "probabilities", (whole + (np.arange(len(g))[:, None, None] == g.argmax(axis=0)) * (255 - whole.sum(axis=0)))
+    yield "classes on the wrong axis", np.moveaxis(phi, 0, -1)
+    yield "classes on the wrong axis", np.moveaxis(phi, 0, 1)
+    yield "classes on the wrong axis", phi.transpose(2, 1, 0)
+    yield "rows and columns swapped", phi.transpose(0, 2, 1)
+    yield "unary reshaped, not transposed", -np.log(last.reshape(g.shape))
+    yield "batch axis", phi[None]
+    yield "cells in one row", phi.reshape(len(phi), -1)
+    yield "cells in one row", phi.reshape(len(phi), -1).T
+    yield "grids differ", phi[:, :-2]
+    yield "grids differ", phi[None, None]
+    yield "labels for costs", g.argmax(axis=0)
+    yield "labels for costs", np.where(hole, 255, g.argmax(axis=0)).astype(np.uint8)
+    yield "labels for costs", np.where(hole, -1, g.argmax(axis=0))[None]
+    yield "one class", -np.log(g[:1])
+    yield "soft-max over the wrong axis", -log_softmax(case.scores, axis=1)
+    yield "soft-max over the wrong axis", -log_softmax(case.scores, axis=2)
+    yield "soft-max over the wrong axis", -log_softmax(case.scores, axis=(1, 2))
+    yield "ignore label", np.concatenate([phi, np.zeros((1, height, width))])
+    yield "ignore label", np.concatenate([np.full((1, height, width), -1.0), phi])
+    yield "ignore label", -np.log(0.9 * np.eye(256)[g.argmax(axis=0)].transpose(2, 0, 1) + 0.1 / 256)
+    yield "undecided network", -log_softmax(1e-3 * case.scores, axis=0)
+    yield "undecided network", np.zeros_like(phi)
+    yield "scaled costs", -np.log10(g)
+    yield "scaled costs", -np.log2(g)
+    yield "scaled costs", phi / 3
+    yield "no distribution", phi - case.scores.mean(axis=0)
+    yield "no distribution", -case.scores
+    yield "no distribution", np.where(hole, 0, phi)
+    yield "no distribution", np.rint(phi).astype(np.int64)
+    yield "NaN in the unary", np.where(hole, np.nan, phi)
+    yield "infinite costs", np.where(hole, np.inf, phi)
+    yield "infinite costs", np.where(hole & (np.arange(len(g)) == 1)[:, None, None], -np.inf, phi)
+    yield "float16 overflow", unary_of_half(case.scores)
+    yield "empty array", phi[:, :0]
+    yield "empty array", []
+    yield "masked cells", np.ma.masked_array(phi, np.broadcast_to(hole, phi.shape))
+    yield "no array of numbers", torch.tensor(phi, requires_grad=True)
+    yield "no array of numbers", None
+    yield "no array of numbers", "unary.npy"
+    yield "no array of numbers", phi.astype(complex)
+    yield "no array of numbers", [[1.0], [1.0, 2.0]]
+
+
+def unary_of_half(scores):
+    """The soft-max in half precision, then its logarithm: what is unlikely has probability 0."""
+    with np.errstate(divide="ignore"):
+        return -np.log(softmax(4 * scores, axis=0).astype(np.float16))
+
+
+def values_faults(case):
+    o, hole = case.values.astype(np.float64), np.zeros(case.grid, bool)
+    hole[3, 4] = True
+    with np.errstate(divide="ignore"):
+        log_o = np.log(o)
+    rng = np.random.default_rng(0)
+    yield "states on the wrong axis", np.moveaxis(o, 0, -1)
+    yield "states on the wrong axis", np.moveaxis(o, 0, 1)
+    yield "batch axis", o[None]
+    yield "not four states", o[:3]
+    yield "not four states", o.argmax(axis=0)
+    yield "not four states", o.reshape(4, -1)
+    yield "not four states", 1 - o[:1]
+    yield "values reshaped, not transposed", np.moveaxis(o, 0, -1).reshape(o.shape)
+    yield "states in other units", 100 * o
+    yield "states in other units", np.rint(100 * o).astype(int)
+    yield "states in other units", (255 * o).astype(np.uint8)
+    yield "counts of states", rng.poisson(3 * o) + (np.arange(4) == 0)[:, None, None] * rng.integers(0, 5, case.grid)
+    yield "cells without a state", np.where(hole, 0, o)
+    yield "logarithms of states", np.maximum(log_o, -1e9)
+    yield "logarithms of states", np.minimum(-log_o, 1e9)
+    yield "NaN in the states", np.where(hole, np.nan, o)
+    yield "states don't sum to one", np.where(hole, 0.3, o)
+    yield "states don't sum to one", o / 2
+    yield (
+        "states don't sum to one",
+        np.where(hole & (np.arange(4) < 2)[:, None, None], np.reshape([2, -1, 0, 0], (4, 1, 1)), o),
+    )
+    yield "no array of numbers", None
+
+
+def params_faults(case):
+    right = case.params
+    yield "no parameters", None
+    yield "no parameters", CrfParams
+    yield "no parameters", {"w_bilateral": 4}
+    yield "weights zero", replace(right, w_bilateral=0, w_spatial=0)
+    yield "widths in metres", replace(right, sigma_alpha=1.6, sigma_gamma=0.6)
+    yield "widths in metres", replace(right, sigma_gamma=0.6)
+    yield "widths in metres", replace(right, sigma_alpha=1.6)
+    yield "narrow kernel", replace(right, sigma_alpha=0.3)
+    yield "narrow kernel", replace(right, sigma_gamma=0.015)
+    yield "wide kernel", replace(right, sigma_gamma=1000)
+    yield "wide kernel", replace(right, sigma_alpha=160, w_spatial=0)
+    yield "blind to occupancy", replace(right, sigma_beta=13)
+    yield "pairs outweigh the network", replace(right, normalization="none")
+    yield "pairs outweigh the network", replace(right, w_bilateral=1000)
+
+
+def refined_faults(case):
+    Q = mean_field(case.unary, case.values, case.params)
+    labels, hole = Q.argmax(axis=0), np.zeros(case.grid, bool)
+    hole[3, 4] = True
+    opposite = mean_field(case.unary.max(axis=0) - case.unary, case.values, case.params)
+    yield "one label", np.zeros_like(labels)
+    yield "one label", np.broadcast_to(Q[:, :1, :1], Q.shape)
+    yield "ignore label", np.where(hole, 255, labels)
+    yield "ignore label", np.where(hole, -1, labels)
+    yield "refined prefers what costs most", opposite
+    yield "refined prefers what costs most", opposite.argmax(axis=0)
+    yield "refinement without effect", case.g
+    yield "refinement without effect", mean_field(case.unary, case.values, case.params, 0)
+    yield "refined has another shape", np.moveaxis(Q, 0, -1)
+    yield "refined has another shape", labels.T
+    yield "refined holds no probabilities", np.where(hole, np.nan, Q)
+    yield "refined holds no probabilities", np.log(Q + 1e-9)
+    yield "refined holds no probabilities", np.full_like(Q, np.nan)
+    yield "empty array", Q[:0]
+    yield "no array of numbers", "Q"
+
+
+def names(findings):
+    return [finding.name for finding in findings]
+
+
+def test_a_fault_of_the_unary_term_is_named_and_nothing_else(case):
+    for expected, unary in unary_faults(case):
+        if expected == "scores" or np.shape(unary)[:1] != (3,):
+            assert names(check(unary, case.values, case.params)) == [expected]
+
+
+def test_a_fault_of_the_states_is_named_and_nothing_else(case):
+    for expected, values in values_faults(case):
+        assert names(check(case.unary, values, case.params)) == [expected]
+
+
+def test_a_fault_of_the_parameters_is_named_first(case):
+    for expected, params in params_faults(case):
+        assert names(check(case.unary, case.values, params, cell=case.cell))[:1] == [expected]
+
+
+def test_a_fault_of_the_refined_map_is_named_and_nothing_else(case):
+    for expected, refined in refined_faults(case):
+        assert names(check(case.unary, case.values, case.params, refined)) == [expected]
