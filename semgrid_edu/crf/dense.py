@@ -128,7 +128,7 @@ def energy(labels: ArrayLike, unary: ArrayLike, values: ArrayLike, params: CrfPa
         raise ArgumentError("labels", f"integers of shape {unary.shape[1:]}", f"{labels.dtype} of {labels.shape}")
     if labels.min() < 0 or labels.max() >= len(unary):
         raise ArgumentError("labels", f"classes 0 to {len(unary) - 1}", f"{labels.min()} to {labels.max()}")
-    own = np.take_along_axis(unary, labels[None].astype(np.int64), axis=0).sum()
+    own = np.take_along_axis(unary, labels[None].astype(np.int64), axis=0).sum(dtype=np.float64)
     x = labels.ravel()
     differ = x[:, None] != x  # mu(x_i, x_j)
     return float(own + np.triu(pair_weights(values, params) * differ).sum())

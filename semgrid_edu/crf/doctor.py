@@ -102,7 +102,7 @@ def _result(refined: object, phi: NDArray | None) -> Iterator[Finding]:
 def _no_params(params: object) -> Finding:
     return Finding(
         "no parameters",
-        "The CRF stops with an AttributeError.",
+        "The CRF stops with an AttributeError, or takes the default parameters whatever you set.",
         f"`params` is {type(params).__name__}.",
         "Something else was handed over, or the class itself.",
         "CrfParams(), with its brackets, or CrfParams.for_cells(cell).",

@@ -162,7 +162,7 @@ def mean_field_sequential(
     """
     unary, values = check_inputs(unary, values)
     check_stop(iterations)
-    phi, weights = unary.reshape(len(unary), -1), pair_weights(values, params)
+    phi, weights = unary.reshape(len(unary), -1).astype(np.float64), pair_weights(values, params)
     Q = softmax(-phi, axis=0)
     for _ in range(iterations):
         for i in range(Q.shape[1]):

@@ -6,6 +6,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from semgrid_edu.crf.params import NARROWEST
+
 
 @dataclass(frozen=True)
 class SeparableGaussian:
@@ -46,6 +48,7 @@ class SeparableGaussian:
         SeparableGaussian
             Ready to filter values on such a grid.
         """
+        sigma = max(sigma, NARROWEST)
         reach = int(min(np.ceil(5 * sigma), max(shape) - 1))
         taps = np.exp(-0.5 * (np.arange(reach + 1) / sigma) ** 2)
         row_scale, column_scale = np.ones(shape[0]), np.ones(shape[1])

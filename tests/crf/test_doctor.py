@@ -101,7 +101,8 @@ def test_simulated_input_is_healthy(shape, n_classes):
     for unary in (case.unary, case.unary.astype(np.float32), case.unary.astype(np.float16)):
         assert check(unary, case.values, case.params) == []
     refined = mean_field(case.unary, case.values, case.params)
-    assert [finding.name for finding in check(case.unary, case.values, case.params, refined)] in ([], ["one label"])
+    one = np.ptp(refined.argmax(axis=0)) == 0 and refined[0].size >= 100
+    assert names(check(case.unary, case.values, case.params, refined)) == one * ["one label"]
 
 
 def test_what_is_unusual_but_right_is_left_alone():
@@ -132,7 +133,7 @@ def unary_faults(case):
     whole = np.rint(255 * g)
     yield "scores", case.scores
     yield "log probabilities", -phi
-    yield "log probabilities", np.log(np.where(hole, np.eye(len(g))[0][:, None, None], g))
+    yield "log probabilities", logarithm(np.where(hole, np.eye(len(g))[0][:, None, None], g))
     yield "probabilities", g
     yield "probabilities", 100 * g
     yield "probabilities", (whole + (np.arange(len(g))[:, None, None] == g.argmax(axis=0)) * (255 - whole.sum(axis=0)))
@@ -181,15 +182,18 @@ def unary_faults(case):
 
 def unary_of_half(scores):
     """The soft-max in half precision, then its logarithm: what is unlikely has probability 0."""
+    return -logarithm(softmax(4 * scores, axis=0).astype(np.float16))
+
+
+def logarithm(probability):
     with np.errstate(divide="ignore"):
-        return -np.log(softmax(4 * scores, axis=0).astype(np.float16))
+        return np.log(probability)
 
 
 def values_faults(case):
     o, hole = case.values.astype(np.float64), np.zeros(case.grid, bool)
     hole[3, 4] = True
-    with np.errstate(divide="ignore"):
-        log_o = np.log(o)
+    log_o = logarithm(o)
     rng = np.random.default_rng(0)
     yield "states on the wrong axis", np.moveaxis(o, 0, -1)
     yield "states on the wrong axis", np.moveaxis(o, 0, 1)
@@ -262,8 +266,7 @@ def names(findings):
 
 def test_a_fault_of_the_unary_term_is_named_and_nothing_else(case):
     for expected, unary in unary_faults(case):
-        if expected == "scores" or np.shape(unary)[:1] != (3,):
-            assert names(check(unary, case.values, case.params)) == [expected]
+        assert names(check(unary, case.values, case.params)) == [expected]
 
 
 def test_a_fault_of_the_states_is_named_and_nothing_else(case):

@@ -7,10 +7,9 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from semgrid_edu.crf.faults.finding import Finding
-from semgrid_edu.crf.faults.unary import ONE_COLOUR, spread_of
+from semgrid_edu.crf.faults.unary import spread_of
 from semgrid_edu.crf.params import PAPER_CELL, CrfParams
 
-UNCHANGED = "The CRF does nothing: the refined map is the map before it."
 REACH = {"sigma_alpha": "w_bilateral", "sigma_gamma": "w_spatial"}
 """The widths in cells, and the weights of their kernels."""
 
@@ -38,7 +37,7 @@ def kernel_faults(params: CrfParams, shape: tuple[int, int], cell: float | None)
     if params.w_bilateral == 0 and params.w_spatial == 0:
         yield Finding(
             "weights zero",
-            UNCHANGED,
+            "The CRF does nothing: the refined map is the map before it.",
             "Both weights of the kernels, w_bilateral and w_spatial, are 0.",
             "The cells don't know of each other, so each keeps its own distribution.",
             "Give the kernels a weight; the defaults are 4 and 3.",
@@ -57,7 +56,7 @@ def kernel_faults(params: CrfParams, shape: tuple[int, int], cell: float | None)
         yield _blind(params.sigma_beta)
 
 
-def _widths(params: CrfParams) -> NDArray[np.float64]:
+def _widths(params: CrfParams) -> tuple[float, ...]:
     return tuple(getattr(params, name) for name in REACH)
 
 
@@ -71,7 +70,7 @@ def _in_metres(params: CrfParams, shape: tuple[int, int], cell: float | None) ->
     widths = ", ".join(f"{name} = {getattr(params, name):g}" for name in same)
     return Finding(
         "widths in metres",
-        f"The CRF hardly changes anything: only specks of one or two cells disappear. {UNCHANGED[:19]}, nearly.",
+        "The CRF smooths less than elsewhere: single wrong cells disappear, larger specks stay.",
         f"{widths} cells: that is the default in metres, and right for cells of 1 m; but {world}.",
         "Widths are in cells. A width in metres is too small by the size of a cell, 0.2 m or 0.5 m.",
         f"CrfParams.for_cells({cell or 'cell'}), or divide your widths by the size of a cell.",
@@ -94,8 +93,8 @@ def _of_other_cells(params: CrfParams, cell: float) -> Finding:
 def _narrow(name: str, sigma: float) -> Finding:
     return Finding(
         "narrow kernel",
-        UNCHANGED,
-        f"{name} = {sigma:g} cells: the kernel is {np.exp(-0.5 / sigma**2):.1g} for the next cell, 1 for the cell itself.",
+        "The CRF smooths less than elsewhere, or does nothing: the refined map is the map before it.",
+        f"{name} = {sigma:g} cells: the kernel is 1 for a cell itself and {np.exp(-0.5 / sigma**2):.1g} for the next.",
         "The width may be in another unit, such as metres or parts of the grid. It is in cells.",
         "CrfParams.for_cells(cell) gives widths for cells of that many metres.",
     )
@@ -104,7 +103,7 @@ def _narrow(name: str, sigma: float) -> Finding:
 def _wide(name: str, sigma: float, shape: tuple[int, int]) -> Finding:
     return Finding(
         "wide kernel",
-        ONE_COLOUR,
+        "The CRF over-smooths: the commonest labels gain, small things vanish.",
         f"{name} = {sigma:g} cells, but the grid has only {shape[0]} rows and {shape[1]} columns.",
         "Each cell is near to every other. The width may be in another unit, such as pixels or centimetres.",
         "CrfParams.for_cells(cell) gives widths for cells of that many metres.",
@@ -115,7 +114,7 @@ def _blind(sigma_beta: float) -> Finding:
     certain = np.exp(-1 / sigma_beta**2)
     return Finding(
         "blind to occupancy",
-        "Borders between free and occupied cells aren't kept: labels bleed over the kerb and out of houses.",
+        "The CRF smooths across the borders of free and occupied space: labels bleed out of houses.",
         f"sigma_beta = {sigma_beta:g}: a cell that is certainly free and one that is certainly occupied still count "
         f"{certain:.2f} for each other.",
         "sigma_beta is in probability, from 0 to 1. Widths such as 13 are for the colours 0 to 255 of an image.",
@@ -146,7 +145,7 @@ def overwhelming(phi: NDArray, values: NDArray, params: CrfParams) -> Finding | 
     printed = params.normalization == "none"
     return Finding(
         "pairs outweigh the network",
-        f"{ONE_COLOUR} Small things, people and signs, vanish.",
+        "The CRF over-smooths: small things, people and signs, vanish; in the end the refined map is one colour.",
         f"The weights of all pairs of a cell sum to {pull:,.0f} (mean of a few cells); the network's costs of the best "
         f"and the worst class differ by {own:.3g} (median).",
         'normalization="none" is eq. (4) as printed: each of hundreds of neighbours counts with full weight.'

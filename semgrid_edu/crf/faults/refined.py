@@ -7,6 +7,9 @@ from scipy.special import softmax
 from semgrid_edu.crf.faults.finding import Finding
 from semgrid_edu.crf.faults.unary import CONVERT, WORSE
 
+FEW = 100
+"""Cells. The grids that are computed by hand may well get one label."""
+
 
 def refined_fault(refined: NDArray, phi: NDArray) -> Finding | None:
     """Find out what is wrong with a refined map.
@@ -47,14 +50,15 @@ def _no_distribution(Q: NDArray) -> Finding | None:
     return Finding(
         "refined holds no probabilities",
         "Labels look weird after the CRF, or every cell has label 0, which arg-max gives for NaN.",
-        f"`refined` lies between {np.nanmin(Q):.3g} and {np.nanmax(Q):.3g}; {np.isnan(Q).sum():,} numbers are NaN.",
+        f"`refined` lies between {np.fmin.reduce(Q, axis=None):.3g} and {np.fmax.reduce(Q, axis=None):.3g}, and "
+        f"{np.isnan(Q).sum():,} of its {Q.size:,} numbers are NaN.",
         "NaN, infinite costs or probabilities of 0 went into another implementation, or `refined` isn't Q.",
         "Check the unary term. mean_field refuses what it can't refine, and takes inf for an impossible class.",
     )
 
 
 def _unchanged(Q: NDArray, phi: NDArray) -> Finding | None:
-    if np.abs(Q - softmax(-phi, axis=0)).max() > 1e-6:
+    if phi[0].size == 1 or np.abs(Q - softmax(-phi, axis=0)).max() > 1e-6:
         return None
     return Finding(
         "refinement without effect",
@@ -75,14 +79,14 @@ def _no_class(labels: NDArray, n_classes: int) -> Finding | None:
         f"{outside.sum():,} of {outside.size:,} refined labels are none of the classes 0 to {n_classes - 1}: "
         f"{', '.join(f'{label:g}' for label in np.unique(labels[outside])[:5])}.",
         "A label for cells to ignore (255 or -1) is among them. The CRF gives every cell a class.",
-        "Mask cells after the refinement, where you count or draw; confusion_matrix has `ignore` for it.",
+        "Hide cells where you count or draw: confusion_matrix leaves out those whose truth is `ignore`.",
     )
 
 
 def _one_label(labels: NDArray, phi: NDArray) -> Finding | None:
-    before = np.unique(phi.argmin(axis=0))
-    if labels.size < 2 or np.ptp(labels) > 0:
+    if labels.size < FEW or np.ptp(labels) > 0:
         return None
+    before = np.unique(phi.argmin(axis=0))
     cause = "The pairs outweigh the network: weights too large, widths too wide, or no normalisation."
     if len(before) == 1:
         cause = "The network already gives every cell one label, so the CRF has nothing to refine."
@@ -97,7 +101,7 @@ def _one_label(labels: NDArray, phi: NDArray) -> Finding | None:
 
 def _opposite(labels: NDArray, phi: NDArray) -> Finding | None:
     best, worst = np.mean(labels == phi.argmin(axis=0)), np.mean(labels == phi.argmax(axis=0))
-    if worst <= best or labels.size < 16:
+    if worst <= best or labels.size < FEW:
         return None
     return Finding(
         "refined prefers what costs most",

@@ -200,7 +200,7 @@ def _from_two_axes(unary: NDArray, grid: tuple[int, int] | None) -> tuple[NDArra
         f"to {unary.max()}" + (f"; {ignored[0]} usually marks cells to ignore." if ignored else "."),
         "A map of labels was handed over, arg-max taken too early. The CRF needs to know how sure each label is.",
         "Hand over the cost of each class, (C, H, W): unary_from_probability(g). If labels are all there is, give the "
-        "labelled class a probability such as 0.9 and the others equal parts of the rest; else all the same.",
+        "labelled class a probability such as 0.9 and the others the rest; in cells to ignore, give all the same.",
     )
 
 

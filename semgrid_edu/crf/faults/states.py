@@ -72,8 +72,8 @@ def _logarithms(values: NDArray, total: NDArray) -> Finding | None:
 
 def _in_other_units(values: NDArray, total: NDArray) -> Finding | None:
     units = {100: "per cent", 255: "255ths, the grey levels of an image"}
-    # Three rounded numbers of four may all be half a unit off.
-    unit = next((unit for unit in units if np.abs(total - unit).max() <= 2), None)
+    # Cut off to whole numbers, four of them may lack almost one unit each.
+    unit = next((unit for unit in units if np.abs(total - unit).max() < 4), None)
     if unit is None or values.min() < 0:
         return None
     return Finding(

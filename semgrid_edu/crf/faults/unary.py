@@ -85,7 +85,7 @@ def _many_classes(phi: NDArray) -> Finding | None:
         return None
     return Finding(
         "ignore label",
-        "The CRF is slow, and cells that should be ignored spread a class of their own.",
+        "The CRF is slow, most classes never occur, and cells that should be ignored have a class of their own.",
         f"`unary` has {len(phi)} classes, {len(phi) - len(np.unique(phi.argmin(axis=0)))} of them the best of no cell.",
         "Labels up to 255 were turned into one-hot vectors; 255 usually means that a cell is unlabelled.",
         "Leave out the label 255, and give unlabelled cells the same cost for every class.",
@@ -98,7 +98,7 @@ def _undecided(phi: NDArray) -> Finding | None:
         return None
     return Finding(
         "undecided network",
-        f"{ONE_COLOUR} Which colour it has changes with the seed.",
+        f"{ONE_COLOUR} Or it has patches that aren't in the scene.",
         f"In {in_cells(spread < 0.05)} all possible classes cost the same within 0.05.",
         "The network isn't trained, its weights weren't loaded, or its scores are far too small.",
         "Look at the labels before the CRF: g.argmax(axis=0). The CRF can't find what the network doesn't see.",
@@ -156,7 +156,7 @@ def _constant_class(phi: NDArray) -> Finding | None:
     rest = np.mean(np.abs(logsumexp(-phi[~constant], axis=0)) <= CLOSE) >= 0.99
     return Finding(
         "ignore label",
-        "A class that nobody has labelled fills whole regions, above all those where the network is unsure.",
+        f"{ONE_COLOUR} Its colour is that of a class that nobody has labelled.",
         f"Class {constant.argmax()} costs {phi[constant.argmax(), 0, 0]:.3g} in every cell"
         + (", and the probabilities of the other classes already sum to one." if rest else "."),
         "A plane for unlabelled cells (255, -1 or void) was kept among the classes.",
@@ -182,10 +182,10 @@ def _elsewhere(phi: NDArray) -> Finding | None:
 
 def _scaled(phi: NDArray) -> Finding | None:
     factor = scale_of(phi)
-    if factor is None:
+    if factor is None or abs(factor - 1) < CLOSE:
         return None
     base = next((base for base in (10, 2) if abs(factor / np.log(base) - 1) < CLOSE), None)
-    cause = f"The logarithm was taken to base {base}." if base else "The costs were divided by a temperature."
+    cause = f"The logarithm was taken to base {base}." if base else f"Costs, not scores, were divided by {factor:.4g}."
     return Finding(
         "scaled costs",
         "The CRF smooths more, or less, than the same weights do elsewhere.",
@@ -193,8 +193,8 @@ def _scaled(phi: NDArray) -> Finding | None:
         cause,
         "Natural logarithms: -np.log(g)."
         if base
-        else "Divide the scores and normalise afterwards, -log_softmax(scores / T, axis=0). This keeps the marginals, "
-        "and makes energies and log Z comparable.",
+        else "If that is a temperature, normalise after it: -log_softmax(scores / T, axis=0). The marginals stay the "
+        "same, and energies and log Z become comparable.",
     )
 
 
@@ -219,6 +219,10 @@ def _scores(phi: NDArray) -> Finding | None:
 def _no_distribution(total: NDArray, dtype: np.dtype) -> Finding:
     off = ~(np.abs(np.log(total)) <= CLOSE)
     cause = "These may be scores, with or without a minus sign, or costs to which something was added."
+    if off.mean() < 0.5:
+        cause = (
+            "In the other cells it does, so these cells were overwritten, padded, or put together from several grids."
+        )
     if dtype.kind in "iub":
         cause = f"The costs are whole numbers ({dtype}): they were rounded, or these are labels or pixels."
     return Finding(
