@@ -56,7 +56,8 @@ def check(
     >>> check(-np.log(p), np.full((4, 20, 20), 0.25), CrfParams())
     Nothing wrong was found in shapes, numbers and parameters.
     """
-    return Findings(_all(unary, values, params, refined, cell))
+    with np.errstate(all="ignore"):  # numbers too large to add up are a finding, not a warning
+        return Findings(_all(unary, values, params, refined, cell))
 
 
 def _all(unary: object, values: object, params: object, refined: object, cell: float | None) -> Iterator[Finding]:

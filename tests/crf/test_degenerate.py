@@ -96,7 +96,7 @@ def test_a_width_below_the_narrowest_changes_nothing():
 def test_states_too_far_apart_for_the_lattice_are_an_error_that_names_the_width():
     unary, values = crf()
     params = CrfParams(sigma_beta=1e-6)
-    with pytest.raises(ArgumentError, match="sigma_beta above 1e-3.*found 1e-06"):
+    with pytest.raises(ArgumentError, match=r"sigma_beta above 1e-3.*found 1e-06"):
         mean_field(unary, values, params)
     without = replace(params, w_bilateral=0)
     fast, naive = (infer(unary, values, without) for infer in (mean_field, mean_field_naive))
@@ -174,7 +174,7 @@ def test_a_row_and_a_column_are_treated_alike(infer, normalization):
 @pytest.mark.parametrize("shape", [(0, 2, 3), (3, 0, 3), (3, 2, 0), (0,), (3, 2), (1, 3, 2, 3)])
 @pytest.mark.parametrize("infer", EVERY)
 def test_arrays_of_another_shape_are_refused(infer, shape):
-    with pytest.raises(ArgumentError, match="^unary: expected shape"):
+    with pytest.raises(ArgumentError, match=r"^unary: expected shape"):
         infer(np.zeros(shape), np.full((4, *shape[1:]), 0.25), CrfParams())
 
 
@@ -295,7 +295,7 @@ def test_numbers_of_fewer_digits_are_taken_for_what_they_are(infer, dtype):
 )
 def test_what_holds_no_real_numbers_is_refused_by_name(infer, wrong):
     unary, values = crf()
-    with pytest.raises(ArgumentError, match="^unary: expected"):
+    with pytest.raises(ArgumentError, match=r"^unary: expected"):
         infer(wrong(unary), values, CrfParams())
 
 
@@ -322,7 +322,7 @@ def test_what_holds_no_real_numbers_is_refused_by_name(infer, wrong):
 )
 def test_what_is_no_distribution_of_states_is_refused_by_name(infer, wrong):
     unary, values = crf()
-    with pytest.raises(ArgumentError, match="^values: expected"):
+    with pytest.raises(ArgumentError, match=r"^values: expected"):
         infer(unary, wrong(values), CrfParams())
 
 

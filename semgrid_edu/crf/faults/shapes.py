@@ -32,7 +32,7 @@ def as_numbers(name: str, argument: object) -> tuple[NDArray | None, Finding | N
         array = np.asarray(argument)
     except Exception as error:  # a tensor may raise any of its own
         return None, _no_array(name, f"{type(argument).__name__}, which numpy refuses: {error}")
-    if array.dtype.kind not in "fiub":
+    if array.dtype.kind not in "fiub" or array.ndim == 0:
         return None, _no_array(name, f"{type(argument).__name__}, as an array of {array.dtype}")
     if array.size == 0:
         return None, Finding(

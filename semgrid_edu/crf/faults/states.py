@@ -56,8 +56,7 @@ def _not_finite(values: NDArray) -> Finding:
 
 
 def _logarithms(values: NDArray, total: NDArray) -> Finding | None:
-    with np.errstate(over="ignore"):
-        signs = [sign for sign in (1, -1) if np.abs(logsumexp(sign * values, axis=0)).max() < 0.02]
+    signs = [sign for sign in (1, -1) if np.abs(logsumexp(sign * values, axis=0)).max() < 0.02]
     if not signs:
         return None
     exp = "np.exp(values)" if signs[0] > 0 else "np.exp(-values)"

@@ -30,16 +30,15 @@ def unary_fault(unary: NDArray) -> Finding | None:
         The first fault, which may explain others; None when sum_l exp(-phi(l)) is 1 in each cell, as it should be.
     """
     phi = unary.astype(np.float64)
-    with np.errstate(all="ignore"):
-        for fault in (_float16, _nan, _one_class, _many_classes, _undecided, _log_probability, _never_or_always):
-            if finding := fault(unary if fault is _float16 else phi):
-                return finding
-        total = logsumexp(-phi, axis=0)
-        if (np.abs(total) <= CLOSE).all():
-            return None
-        for fault in (_probability, _constant_class, _elsewhere, _scaled, _scores):
-            if finding := fault(phi):
-                return finding
+    for fault in (_float16, _nan, _one_class, _many_classes, _undecided, _log_probability, _never_or_always):
+        if finding := fault(unary if fault is _float16 else phi):
+            return finding
+    total = logsumexp(-phi, axis=0)
+    if (np.abs(total) <= CLOSE).all():
+        return None
+    for fault in (_probability, _constant_class, _elsewhere, _scaled, _scores):
+        if finding := fault(phi):
+            return finding
     return _no_distribution(np.exp(total), unary.dtype)
 
 
@@ -166,8 +165,6 @@ def _constant_class(phi: NDArray) -> Finding | None:
 
 def _elsewhere(phi: NDArray) -> Finding | None:
     """Look for distributions along another axis, or in the order of memory."""
-    if np.mean(np.abs(logsumexp(-phi.reshape(*phi.shape[1:], -1), axis=-1)) <= CLOSE) >= 0.99:
-        return reshaped("unary", phi.shape)
     for axes in (1, 2, (1, 2), (0, 1, 2)):
         if np.mean(np.abs(logsumexp(-phi, axis=axes)) <= CLOSE) >= 0.99:
             return Finding(
@@ -177,7 +174,8 @@ def _elsewhere(phi: NDArray) -> Finding | None:
                 "The soft-max was taken over rows or columns, or the classes lie on that axis.",
                 "Take it over the axis of the classes, and bring that axis to the front: (C, H, W).",
             )
-    return None
+    in_memory = phi.reshape(*phi.shape[1:], -1)
+    return reshaped("unary", phi.shape) if np.mean(np.abs(logsumexp(-in_memory, axis=-1)) <= CLOSE) >= 0.99 else None
 
 
 def _scaled(phi: NDArray) -> Finding | None:
@@ -246,6 +244,8 @@ def spread_of(phi: NDArray) -> NDArray[np.float64]:
     Returns
     -------
     (H, W) float64
-        The difference.
+        The difference; infinite where only one class is possible.
     """
-    return np.where(np.isfinite(phi), phi, -np.inf).max(axis=0) - phi.min(axis=0)
+    possible = np.isfinite(phi)
+    spread = np.where(possible, phi, -np.inf).max(axis=0) - phi.min(axis=0)
+    return np.where(possible.sum(axis=0) > 1, spread, np.inf)
