@@ -31,7 +31,7 @@ def pair_weights(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
     Raises
     ------
     ArgumentError
-        When `values` has another shape or the grid more than `MAX_CELLS` cells.
+        When `values` has another shape or isn't finite, or the grid has more than `MAX_CELLS` cells.
     """
     weights = gram_matrix(values, params)
     np.fill_diagonal(weights, 0)
@@ -59,11 +59,13 @@ def gram_matrix(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
     Raises
     ------
     ArgumentError
-        When `values` has another shape or the grid more than `MAX_CELLS` cells.
+        When `values` has another shape or isn't finite, or the grid has more than `MAX_CELLS` cells.
     """
     values = np.asarray(values, dtype=np.float64)
     if values.ndim != 3:
         raise ArgumentError("values", "shape (4, H, W)", f"shape {values.shape}")
+    if not np.isfinite(values).all():
+        raise ArgumentError("values", "probabilities", "NaN or infinity")
     _, height, width = values.shape
     if height * width > MAX_CELLS:
         raise ArgumentError("values", f"at most {MAX_CELLS} cells; mean_field takes more", height * width)
@@ -168,7 +170,7 @@ def free_energy(Q: ArrayLike, unary: ArrayLike, values: ArrayLike, params: CrfPa
 
     >>> values, undecided = np.full((4, 1, 2), 0.25), np.full((2, 1, 2), 0.5)
     >>> params = CrfParams(w_bilateral=0, w_spatial=1, sigma_gamma=1, normalization="none")
-    >>> round(free_energy(undecided, np.zeros((2, 1, 2)), values, params) + 2 * np.log(2), 3)
+    >>> round(float(free_energy(undecided, np.zeros((2, 1, 2)), values, params) + 2 * np.log(2)), 3)
     0.303
     """
     unary, values = check_inputs(unary, values)

@@ -70,6 +70,7 @@ def exact_marginals(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> N
     --------
     Two cells that attract each other, one of them for class 0, the other undecided:
 
+    >>> from semgrid_edu.crf import unary_from_probability
     >>> unary = unary_from_probability([[[0.8, 0.5]], [[0.2, 0.5]]])
     >>> exact_marginals(unary, np.full((4, 1, 2), 0.25), CrfParams())[0].round(2)
     array([[0.8 , 0.78]])

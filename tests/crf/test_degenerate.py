@@ -142,6 +142,12 @@ def test_exact_inference_refuses_contradictions_whose_probability_is_below_every
     np.testing.assert_allclose(infer(contradiction, values, CrfParams()), expected.get(infer.__name__, -weight))
 
 
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_pairs_of_states_that_are_no_numbers_are_refused(wrong):
+    with pytest.raises(ArgumentError, match=r"^values: expected probabilities"):
+        pair_weights(np.full((4, 2, 3), wrong), CrfParams())
+
+
 # --- sizes ---------------------------------------------------------------------------------------
 
 
