@@ -12,12 +12,10 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from semgrid_edu.crf.arithmetic import FAST, HALF
 from semgrid_edu.crf.simplices import elevation, enclosing_simplices, peak, responses, self_responses
 from semgrid_edu.crf.vertices import number_vertices, sort_by_vertex
 from semgrid_edu.errors import ArgumentError
-
-HALF = np.float32(0.5)
-"""A factor of 0.5 alone would make the compiler compute in double precision."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +126,19 @@ class PermutohedralLattice:
         (N, K) float32
             sum_j k(f_i, f_j) values_j, the point itself included.
         """
-        return _slice(self.blurred(values), self.corners, self.slices)
+        out = np.zeros_like(values)
+        self.add(values, out)
+        return out
+
+    def add(self, values: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+        """Filter values at the points, and add the result to an array.
+
+        Parameters
+        ----------
+        values, out : (N, K) float32
+            One row per point.
+        """
+        _slice(self.blurred(values), self.corners, self.slices, out)
 
     def blurred(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """Splat values onto the vertices and blur them there: all of the filter but the slicing.
@@ -151,7 +161,7 @@ class PermutohedralLattice:
         return blurred
 
 
-@njit(cache=True, parallel=True, fastmath=True)
+@njit(cache=True, parallel=True, fastmath=FAST)
 def _splat(values, starts, points, weights, out):
     """Sum at each vertex what its points add, (M + 1, K); the last row stays zero, for missing neighbours."""
     for v in prange(len(starts) - 1):
@@ -160,7 +170,7 @@ def _splat(values, starts, points, weights, out):
                 out[v, k] += weights[i] * values[points[i], k]
 
 
-@njit(cache=True, parallel=True, fastmath=True)
+@njit(cache=True, parallel=True, fastmath=FAST)
 def _blur(values, forth, back, out):
     """Blur (M + 1, K) values along one direction with (1/4, 1/2, 1/4), given each vertex's two neighbours."""
     for v in prange(len(forth)):
@@ -168,12 +178,10 @@ def _blur(values, forth, back, out):
             out[v, k] = HALF * (values[v, k] + HALF * (values[forth[v], k] + values[back[v], k]))
 
 
-@njit(cache=True, parallel=True, fastmath=True)
-def _slice(values, corners, weights):
-    """Interpolate the values at the N points from their corners: (M + 1, K) -> (N, K)."""
-    out = np.zeros((len(corners), values.shape[1]), np.float32)
+@njit(cache=True, parallel=True, fastmath=FAST)
+def _slice(values, corners, weights, out):
+    """Interpolate the values at the N points from their corners, and add them: (M + 1, K) -> (N, K)."""
     for i in prange(len(corners)):
         for corner in range(corners.shape[1]):
             for k in range(values.shape[1]):
                 out[i, k] += weights[i, corner] * values[corners[i, corner], k]
-    return out

@@ -4,14 +4,15 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
+from semgrid_edu.crf.arithmetic import FAST, exponential
 from semgrid_edu.crf.lattice import PermutohedralLattice
 from semgrid_edu.crf.naive import NEVER, damping
 from semgrid_edu.crf.params import NARROWEST, CrfParams, check_inputs, check_stop
-from semgrid_edu.crf.spatial import SeparableGaussian, convolved_row
+from semgrid_edu.crf.spatial import SeparableGaussian
 from semgrid_edu.errors import ArgumentError
 
 LANES = 16
-"""The class axis is padded to a multiple of this number: 16 floats fill a cache line, and loops over them vectorise."""
+"""Filters take a cell's classes side by side, padded to a multiple of this number: 16 floats fill a cache line."""
 
 _ZERO_SUM_STATES = np.array([[1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1]]) / 2
 """An orthonormal basis of the space orthogonal to (1, 1, 1, 1). The four probabilities sum to one, so three numbers in
@@ -88,9 +89,7 @@ def mean_field(
     unary, values = check_inputs(unary, values)
     check_stop(iterations, tolerance)
     spatial = SeparableGaussian.build(unary.shape[1:], params.sigma_gamma, params.w_spatial, params.normalization)
-    phi = _in_lanes(unary.reshape(len(unary), -1), LANES)
-    Q = iterate(phi, bilateral_kernel(values, params), spatial, iterations, tolerance)
-    return _by_class(Q, len(unary)).reshape(unary.shape)
+    return iterate(_above_best(unary), bilateral_kernel(values, params), spatial, iterations, tolerance)
 
 
 def iterate(
@@ -107,7 +106,7 @@ def iterate(
 
     Parameters
     ----------
-    phi : (N, K) float32
+    phi : (C, H, W) float32
         The unary term, finite, at least 0, and 0 for the best class of each cell.
     bilateral, spatial : PermutohedralLattice, SeparableGaussian
         The two kernels of eq. (4), with their weights and normalisation.
@@ -118,109 +117,107 @@ def iterate(
 
     Returns
     -------
-    (N, K) float32
+    (C, H, W) float32
         Q, the distribution over classes in each cell.
     """
-    own, logits, Q, updated = bilateral.diagonal + spatial.diagonal, -phi, np.empty_like(phi), np.empty_like(phi)
-    part, column_scale = damping(own).astype(np.float32), np.repeat(spatial.column_scale, phi.shape[1])
-    grid = spatial.taps, spatial.row_scale, column_scale
-    _softmax(logits, Q)
+    n_classes, height, width = phi.shape
+    cells = np.zeros((height * width, -(-n_classes // LANES) * LANES), np.float32)
+    rewards, own = np.zeros_like(cells), (bilateral.diagonal + spatial.diagonal).reshape(height, width)
+    part, logits, Q = damping(own).astype(np.float32), -phi, np.zeros_like(phi)
+    _update(rewards, phi, own, np.ones_like(part), logits, Q, cells)  # without rewards: the soft-max of the unary term
     for _ in range(iterations):
-        vertices = bilateral.blurred(Q)
-        change = _update(Q, updated, logits, phi, own, part, grid, vertices, bilateral.corners, bilateral.slices)
-        Q, updated = updated, Q
+        spatial.filter(cells, rewards)
+        bilateral.add(cells, rewards)
+        change = _update(rewards, phi, own, part, logits, Q, cells)
         if change <= tolerance:
             break
     return Q
 
 
 @njit(cache=True, parallel=True)
-def _in_lanes(unary, lanes):
-    """Return the unary term (C, H W) as (N, K), 0 for the best class; classes are padded with impossible ones."""
-    n_classes, n_cells = unary.shape
-    phi = np.full((n_cells, -(-n_classes // lanes) * lanes), np.float32(NEVER))
-    for i in prange(n_cells):
-        best = unary[:, i].min()
+def _above_best(unary):
+    """Return how far each cost lies above that of the cell's best class, as float32 and at most `NEVER`."""
+    n_classes, height, width = unary.shape
+    phi = np.empty(unary.shape, np.float32)
+    for r in prange(height):
+        best = unary[0, r].copy()
+        for k in range(1, n_classes):
+            for c in range(width):
+                best[c] = min(best[c], unary[k, r, c])
         for k in range(n_classes):
-            phi[i, k] = min(unary[k, i] - best, NEVER)
+            for c in range(width):
+                phi[k, r, c] = min(unary[k, r, c] - best[c], NEVER)
     return phi
 
 
-@njit(cache=True, parallel=True)
-def _by_class(Q, n_classes):
-    """Return (N, K) as (C, N), without the padding."""
-    out = np.empty((n_classes, len(Q)), np.float32)
-    for i in prange(len(Q)):
-        for k in range(n_classes):
-            out[k, i] = Q[i, k]
-    return out
+# Classes, rows and columns lie in this order wherever cells don't add up: all loops then run along a row of the grid,
+# and the compiler takes many cells at once.
+@njit(cache=True, parallel=True, fastmath=FAST)
+def _update(rewards, phi, own, part, logits, Q, cells):
+    """Update all cells, and return the largest change of a probability; `cells` gets a copy of Q in the filters' order.
 
-
-@njit(cache=True, parallel=True, fastmath=True)
-def _update(Q, updated, logits, phi, own, part, grid, vertices, corners, slices):
-    """Update all cells, row by row of the grid, and return the largest change of a probability.
-
-    The reward of a cell is what the spatial kernel says, plus what the lattice's vertices say, minus what both contain
-    of the cell itself. Its log Q, known up to one number, goes part of the way to the reward minus the unary term.
+    The reward of a cell contains what it says itself; this is subtracted. Its log Q, known up to one number, goes part of
+    the way to the reward minus the unary term.
     """
-    taps, row_scale, column_scale = grid
-    height, lanes = len(row_scale), Q.shape[1]
-    width, rows, change = len(Q) // height, Q.reshape(height, -1), np.zeros(height, np.float32)
+    n_classes, height, width = phi.shape
+    lanes, change = cells.shape[1], np.zeros(height, np.float32)
+    rewards, cells = rewards.reshape(height, -1), cells.reshape(height, -1)
     for r in prange(height):
-        reward, largest = convolved_row(rows, r, lanes, taps, row_scale, column_scale), np.float32(0)
-        for c in range(width):
-            i = r * width + c
-            self_weight, share = own[i], part[i]
-            for first in range(0, lanes, LANES):
-                for corner in range(corners.shape[1]):
-                    weight, vertex = slices[i, corner], corners[i, corner]
-                    for k in range(LANES):
-                        reward[c * lanes + first + k] += weight * vertices[vertex, first + k]
-                for k in range(LANES):
-                    target = reward[c * lanes + first + k] - self_weight * Q[i, first + k] - phi[i, first + k]
-                    logits[i, first + k] += share * (target - logits[i, first + k])
-            _softmax_of_cell(logits, updated, i)
-            for first in range(0, lanes, LANES):
-                for k in range(LANES):
-                    largest = max(largest, abs(updated[i, first + k] - Q[i, first + k]))
-        change[r] = largest
+        fresh, moved = np.empty((n_classes, width), np.float32), np.zeros(width, np.float32)
+        for k in range(n_classes):
+            _take_lane(rewards[r], k, lanes, fresh[k])
+            _approach(logits[k, r], fresh[k], own[r], Q[k, r], phi[k, r], part[r])
+        _softmax(logits, r, fresh)
+        for k in range(n_classes):
+            _replace(Q[k, r], fresh[k], moved)
+            _put_lane(cells[r], k, lanes, fresh[k])
+        change[r] = moved.max()
     return change.max()
 
 
-@njit(cache=True, parallel=True, fastmath=True)
-def _softmax(logits, Q):
-    """Write the soft-max of each cell's logits to Q, and make its largest logit 0."""
-    for i in prange(len(Q)):
-        _softmax_of_cell(logits, Q, i)
+@njit(cache=True, inline="always")
+def _take_lane(row, lane, lanes, out):
+    for c in range(len(out)):
+        out[c] = row[c * lanes + lane]
 
 
-@njit(cache=True, fastmath=True, inline="always")
-def _softmax_of_cell(logits, Q, i):
-    best, total = logits[i, 0], np.float32(0)
-    for first in range(0, Q.shape[1], LANES):
-        for k in range(LANES):
-            best = max(best, logits[i, first + k])
-    for first in range(0, Q.shape[1], LANES):
-        for k in range(LANES):
-            logits[i, first + k] -= best
-            Q[i, first + k] = _exp(logits[i, first + k])
-            total += Q[i, first + k]
-    share = np.float32(1) / total
-    for first in range(0, Q.shape[1], LANES):
-        for k in range(LANES):
-            Q[i, first + k] *= share
+@njit(cache=True, inline="always")
+def _put_lane(row, lane, lanes, values):
+    for c in range(len(values)):
+        row[c * lanes + lane] = values[c]
 
 
-@njit(cache=True, fastmath=True, inline="always")
-def _exp(x):
-    """Return exp(x) of a number that isn't positive, to 6 digits: the 64th power of the series of exp(x / 64).
+@njit(cache=True, fastmath=FAST, inline="always")
+def _approach(logits, reward, own, Q, phi, part):
+    for c in range(len(logits)):
+        logits[c] += part[c] * (reward[c] - own[c] * Q[c] - phi[c] - logits[c])
 
-    Unlike the exponential of the mathematical library, the compiler does this for many numbers at once.
-    """
-    y = max(x, np.float32(-80)) * np.float32(1 / 64)
-    power = np.float32(1 / 120) * y + np.float32(1 / 24)
-    power = (power * y + np.float32(1 / 6)) * y + np.float32(1 / 2)
-    power = (power * y + np.float32(1)) * y + np.float32(1)
-    for _ in range(6):
-        power *= power
-    return power if x > np.float32(-80) else np.float32(0)
+
+@njit(cache=True, fastmath=FAST, inline="always")
+def _softmax(logits, r, out):
+    """Write the soft-max of row r of the logits to `out`, (C, W), and make the largest logit of each cell 0."""
+    best, total = logits[0, r].copy(), np.zeros(out.shape[1], np.float32)
+    for k in range(1, len(out)):
+        row = logits[k, r]
+        for c in range(len(best)):
+            best[c] = max(best[c], row[c])
+    for k in range(len(out)):
+        row = logits[k, r]
+        for c in range(len(best)):
+            row[c] -= best[c]
+            out[k, c] = exponential(row[c])
+        for c in range(len(best)):
+            total[c] += out[k, c]
+    for c in range(len(best)):
+        total[c] = np.float32(1) / total[c]
+    for k in range(len(out)):
+        for c in range(len(best)):
+            out[k, c] *= total[c]
+
+
+@njit(cache=True, fastmath=FAST, inline="always")
+def _replace(old, new, largest):
+    """Overwrite old numbers; each largest change is kept."""
+    for c in range(len(old)):
+        largest[c] = max(largest[c], abs(new[c] - old[c]))
+        old[c] = new[c]

@@ -9,6 +9,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from semgrid_edu.crf.arithmetic import HALF
+
 FORTH, BACK = 0, 1
 
 
@@ -72,36 +74,33 @@ def enclosing_simplices(elevated):
         The barycentric weights of the corners with remainders 0 .. d; they sum to 1.
     """
     n_points, size = elevated.shape
-    origins = np.empty((n_points, size), np.int32)
-    ranks = np.zeros((n_points, size), np.int32)
-    weights = np.zeros((n_points, size), np.float64)
+    origins, ranks = np.empty((n_points, size), np.int32), np.empty((n_points, size), np.int32)
+    weights = np.empty((n_points, size), np.float64)
     for i in prange(n_points):
+        distances, rank, weight = np.empty(size), np.zeros(size, np.int32), np.zeros(size + 1)
         excess = 0
         for j in range(size):
-            steps = int(np.rint(elevated[i, j] / size))
+            steps = np.rint(elevated[i, j] * (1 / size))
             origins[i, j] = steps * size
-            excess += steps
+            distances[j] = elevated[i, j] - steps * size
+            excess += int(steps)
         for j in range(size):
             for k in range(j):
-                if elevated[i, k] - origins[i, k] < elevated[i, j] - origins[i, j]:
-                    ranks[i, k] += 1
-                else:
-                    ranks[i, j] += 1
+                later = distances[k] < distances[j]
+                rank[k] += later
+                rank[j] += not later
         # Rounding left the hyperplane of zero sum: move the coordinates that were rounded the farthest.
         for j in range(size):
-            ranks[i, j] += excess
-            if ranks[i, j] < 0:
-                ranks[i, j] += size
-                origins[i, j] += size
-            elif ranks[i, j] >= size:
-                ranks[i, j] -= size
-                origins[i, j] -= size
-        for j in range(size):
-            delta = (elevated[i, j] - origins[i, j]) / size
-            rank = size - 1 - ranks[i, j]
-            weights[i, rank] += delta
-            weights[i, (rank + 1) % size] -= delta
-        weights[i, 0] += 1
+            rank[j] += excess
+            moved = size if rank[j] < 0 else -size if rank[j] >= size else 0
+            rank[j] += moved
+            origins[i, j] += moved
+            delta = (distances[j] - moved) * (1 / size)
+            weight[size - 1 - rank[j]] += delta
+            weight[size - rank[j]] -= delta
+        ranks[i] = rank
+        weights[i] = weight[:size]
+        weights[i, 0] += 1 + weight[size]
     return origins, ranks, weights
 
 
@@ -132,18 +131,20 @@ def responses(simplices, ranks, neighbours):
     alive = survivors(neighbours, FORTH), survivors(neighbours, BACK)
     response = np.zeros((n_simplices, size, size), np.float32)
     for s in prange(n_simplices):
-        direction = np.empty(size, np.int32)
+        direction = np.empty(2 * size, np.int32)  # twice, since corner 0 follows corner d
         for j in range(size):
-            direction[ranks[s, j]] = j
+            direction[ranks[s, j]] = direction[ranks[s, j] + size] = j
         for a in range(size):
-            forth, back = 0, 0
-            response[s, a, a] += np.float32(0.5) ** size  # no step at all
+            forth, back, weight = alive[FORTH][simplices[s, a]], alive[BACK][simplices[s, a]], np.float32(0.5) ** size
+            response[s, a, a] += weight  # no step at all
+            above, below, steps_forth, steps_back = a, a, 0, 0
             for steps in range(1, size + 1):
-                forth |= 1 << direction[(2 * size - a - steps) % size]
-                back |= 1 << direction[(size - a + steps - 1) % size]
-                weight = np.float32(0.5) ** (size + steps)
-                response[s, a, (a + steps) % size] += weight * alive[FORTH][simplices[s, a], forth]
-                response[s, a, (a - steps) % size] += weight * alive[BACK][simplices[s, a], back]
+                above, below = (above + 1 if above < size - 1 else 0), (below - 1 if below > 0 else size - 1)
+                steps_forth |= 1 << direction[2 * size - a - steps]
+                steps_back |= 1 << direction[size - a + steps - 1]
+                weight *= HALF
+                response[s, a, above] += weight * forth[steps_forth]
+                response[s, a, below] += weight * back[steps_back]
     return response
 
 
@@ -193,9 +194,13 @@ def self_responses(members, weights, response):
     (N,) float32
         The diagonal of the filter.
     """
-    diagonal = np.zeros(len(members), np.float32)
+    diagonal = np.empty(len(members), np.float32)
     for i in prange(len(members)):
-        for a in range(weights.shape[1]):
-            for b in range(weights.shape[1]):
-                diagonal[i] += weights[i, a] * weights[i, b] * response[members[i], a, b]
+        weight, returned = weights[i], 0.0
+        for a in range(len(weight)):
+            reached = 0.0
+            for b in range(len(weight)):
+                reached += response[members[i], a, b] * weight[b]
+            returned += weight[a] * reached
+        diagonal[i] = returned
     return diagonal

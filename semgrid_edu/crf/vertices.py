@@ -75,12 +75,23 @@ def _fields(origins: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.i
     """
     size = origins.shape[1]
     # Of a corner q_j is up to 1 smaller than of the origin, and of a neighbour by 1 smaller or larger than that.
-    lowest, highest = (f(origins, axis=0)[:-1] // size + margin for f, margin in ((np.min, -2), (np.max, 1)))
+    lowest, highest = _extent(origins)
+    lowest, highest = lowest[:-1] // size - 2, highest[:-1] // size + 1
     bits = np.array([size - 1, *(highest - lowest).tolist()])
     bits = np.array([int(n).bit_length() for n in bits])
     if bits.sum() > 63:
         raise ArgumentError("features", "fewer standard deviations, or a larger sigma", f"{bits.sum()} bits")
     return lowest.astype(np.int64), np.append(1 << np.cumsum(bits)[:-1], 0)
+
+
+@njit(cache=True)
+def _extent(origins):
+    """Return the smallest and the largest of each coordinate."""
+    lowest, highest = origins[0].copy(), origins[0].copy()
+    for i in range(len(origins)):
+        for j in range(len(lowest)):
+            lowest[j], highest[j] = min(lowest[j], origins[i, j]), max(highest[j], origins[i, j])
+    return lowest, highest
 
 
 @njit(cache=True, parallel=True)
