@@ -1,7 +1,9 @@
 """The fully connected CRF that refines the semantic grid: energy, exact inference, mean field, naive and fast."""
 
 from semgrid_edu.crf.dense import energy, free_energy, gram_matrix, pair_weights
+from semgrid_edu.crf.doctor import check
 from semgrid_edu.crf.exact import crf_model, exact_marginals, log_partition, most_likely
+from semgrid_edu.crf.faults.finding import Finding, Findings
 from semgrid_edu.crf.lattice import PermutohedralLattice
 from semgrid_edu.crf.mean_field import mean_field
 from semgrid_edu.crf.naive import damping, mean_field_naive, mean_field_sequential, mean_field_updates
@@ -10,8 +12,11 @@ from semgrid_edu.crf.spatial import SeparableGaussian
 
 __all__ = [
     "CrfParams",
+    "Finding",
+    "Findings",
     "PermutohedralLattice",
     "SeparableGaussian",
+    "check",
     "crf_model",
     "damping",
     "energy",

@@ -31,7 +31,7 @@ def pair_weights(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
     Raises
     ------
     ArgumentError
-        When `values` has another shape or the grid more than `MAX_CELLS` cells.
+        When `values` has another shape or isn't finite, or the grid has more than `MAX_CELLS` cells.
     """
     weights = gram_matrix(values, params)
     np.fill_diagonal(weights, 0)
@@ -59,11 +59,13 @@ def gram_matrix(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
     Raises
     ------
     ArgumentError
-        When `values` has another shape or the grid more than `MAX_CELLS` cells.
+        When `values` has another shape or isn't finite, or the grid has more than `MAX_CELLS` cells.
     """
     values = np.asarray(values, dtype=np.float64)
     if values.ndim != 3:
         raise ArgumentError("values", "shape (4, H, W)", f"shape {values.shape}")
+    if not np.isfinite(values).all():
+        raise ArgumentError("values", "probabilities", "NaN or infinity")
     _, height, width = values.shape
     if height * width > MAX_CELLS:
         raise ArgumentError("values", f"at most {MAX_CELLS} cells; mean_field takes more", height * width)
@@ -128,7 +130,7 @@ def energy(labels: ArrayLike, unary: ArrayLike, values: ArrayLike, params: CrfPa
         raise ArgumentError("labels", f"integers of shape {unary.shape[1:]}", f"{labels.dtype} of {labels.shape}")
     if labels.min() < 0 or labels.max() >= len(unary):
         raise ArgumentError("labels", f"classes 0 to {len(unary) - 1}", f"{labels.min()} to {labels.max()}")
-    own = np.take_along_axis(unary, labels[None].astype(np.int64), axis=0).sum()
+    own = np.take_along_axis(unary, labels[None].astype(np.int64), axis=0).sum(dtype=np.float64)
     x = labels.ravel()
     differ = x[:, None] != x  # mu(x_i, x_j)
     return float(own + np.triu(pair_weights(values, params) * differ).sum())
@@ -168,7 +170,7 @@ def free_energy(Q: ArrayLike, unary: ArrayLike, values: ArrayLike, params: CrfPa
 
     >>> values, undecided = np.full((4, 1, 2), 0.25), np.full((2, 1, 2), 0.5)
     >>> params = CrfParams(w_bilateral=0, w_spatial=1, sigma_gamma=1, normalization="none")
-    >>> round(free_energy(undecided, np.zeros((2, 1, 2)), values, params) + 2 * np.log(2), 3)
+    >>> round(float(free_energy(undecided, np.zeros((2, 1, 2)), values, params) + 2 * np.log(2)), 3)
     0.303
     """
     unary, values = check_inputs(unary, values)

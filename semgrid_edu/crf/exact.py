@@ -5,10 +5,13 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.crf.dense import pair_weights
+from semgrid_edu.crf.dense import energy, pair_weights
 from semgrid_edu.crf.params import CrfParams, check_inputs
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import Factor, GraphicalModel, eliminate, log_total, max_product
+
+MAX_ENERGY = 700
+"""exp(-745) is 0. If the best labelling of all had no probability, all would look impossible."""
 
 MAX_LABELLINGS = 10**7
 """Every cell is coupled to every other, so no order of elimination avoids a table of all labellings."""
@@ -60,12 +63,14 @@ def exact_marginals(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> N
     Raises
     ------
     ArgumentError
-        When shapes don't fit, numbers aren't what they should be, or there are more than `MAX_LABELLINGS` labellings.
+        When shapes don't fit, numbers aren't what they should be, there are more than `MAX_LABELLINGS` labellings, or
+        weights and costs contradict each other by more than `MAX_ENERGY`.
 
     Examples
     --------
     Two cells that attract each other, one of them for class 0, the other undecided:
 
+    >>> from semgrid_edu.crf import unary_from_probability
     >>> unary = unary_from_probability([[[0.8, 0.5]], [[0.2, 0.5]]])
     >>> exact_marginals(unary, np.full((4, 1, 2), 0.25), CrfParams())[0].round(2)
     array([[0.8 , 0.78]])
@@ -96,7 +101,8 @@ def most_likely(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> NDArr
     Raises
     ------
     ArgumentError
-        When shapes don't fit, numbers aren't what they should be, or there are more than `MAX_LABELLINGS` labellings.
+        When shapes don't fit, numbers aren't what they should be, there are more than `MAX_LABELLINGS` labellings, or
+        weights and costs contradict each other by more than `MAX_ENERGY`.
     """
     model, shape = _tiny_model(unary, values, params)
     best = max_product(model)
@@ -123,17 +129,28 @@ def log_partition(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> flo
     Raises
     ------
     ArgumentError
-        When shapes don't fit, numbers aren't what they should be, or there are more than `MAX_LABELLINGS` labellings.
+        When shapes don't fit, numbers aren't what they should be, there are more than `MAX_LABELLINGS` labellings, or
+        weights and costs contradict each other by more than `MAX_ENERGY`.
     """
+    unary, _ = check_inputs(unary, values)
     model, _ = _tiny_model(unary, values, params)
-    return log_total(model)
+    return float(log_total(model) - unary.min(axis=0).sum(dtype=np.float64))
 
 
 def _tiny_model(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> tuple[GraphicalModel, tuple[int, ...]]:
-    """Return the model and the shape (C, H, W); refuse a grid with too many labellings."""
+    """Return the model, the cheapest class of each cell taken as 0, and (C, H, W); refuse too many labellings."""
     unary, values = check_inputs(unary, values)
     classes, cells = len(unary), unary[0].size
     if cells * np.log10(classes) > np.log10(MAX_LABELLINGS):
         expected = f"at most {MAX_LABELLINGS:,} labellings; mean_field takes more"
         raise ArgumentError("unary", expected, f"{classes} classes in {cells} cells, {classes}^{cells}")
-    return crf_model(unary, values, params), unary.shape
+    own = unary.astype(np.float64)
+    own -= own.min(axis=0)  # so exp(-phi) neither overflows nor vanishes
+    candidates = [np.full(own.shape[1:], label) for label in range(classes)] + [own.argmin(axis=0)]
+    least = min(energy(labels, own, values, params) for labels in candidates)
+    if least > MAX_ENERGY:
+        expected = (
+            f"weights and costs for which a labelling costs at most {MAX_ENERGY} more than the cells' best classes"
+        )
+        raise ArgumentError("params", expected, f"{least:.4g}")
+    return crf_model(own, values, params), unary.shape

@@ -7,8 +7,9 @@ from numpy.typing import ArrayLike, NDArray
 from semgrid_edu.crf.arithmetic import FAST, exponential
 from semgrid_edu.crf.lattice import PermutohedralLattice
 from semgrid_edu.crf.naive import NEVER, damping
-from semgrid_edu.crf.params import CrfParams, check_inputs, check_stop
+from semgrid_edu.crf.params import NARROWEST, CrfParams, check_inputs, check_stop
 from semgrid_edu.crf.spatial import SeparableGaussian
+from semgrid_edu.errors import ArgumentError
 
 LANES = 16
 """Filters take a cell's classes side by side, padded to a multiple of this number: 16 floats fill a cache line."""
@@ -32,10 +33,20 @@ def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice
     -------
     PermutohedralLattice
         A lattice around H W points in five dimensions: two for the place, three for the state.
+
+    Raises
+    ------
+    ArgumentError
+        When states differ by, or the grid measures, more widths than the lattice can count: some 3,000 together.
     """
-    place = np.indices(values.shape[1:]) / params.sigma_alpha
+    place = np.indices(values.shape[1:]) / max(params.sigma_alpha, NARROWEST)
     state = np.einsum("ks,shw->khw", _ZERO_SUM_STATES, values) / params.sigma_beta
-    lattice = PermutohedralLattice.build(np.concatenate([place, state]).reshape(5, -1).T)
+    features = np.concatenate([place, state]) * (params.w_bilateral > 0)  # a kernel without weight can have any
+    try:
+        lattice = PermutohedralLattice.build(features.reshape(5, -1).T)
+    except ArgumentError as error:
+        found = f"{params.sigma_beta:g} and {params.sigma_alpha:g}: the lattice can't count so many widths"
+        raise ArgumentError("params", "sigma_beta above 1e-3, or a larger sigma_alpha", found) from error
     degree = np.ones(values[0].size)
     if params.normalization == "symmetric":
         degree = lattice(np.ones((values[0].size, 1), np.float32))[:, 0]

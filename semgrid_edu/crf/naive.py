@@ -87,7 +87,7 @@ def mean_field_updates(unary: ArrayLike, values: ArrayLike, params: CrfParams) -
     >>> unary, values = np.array([[[0.0, 2.0]], [[1.0, 0.0]]]), np.full((4, 1, 2), 0.25)
     >>> updates = mean_field_updates(unary, values, CrfParams())
     >>> [round(free_energy(next(updates), unary, values, CrfParams()), 2) for _ in range(4)]
-    [1.57, 0.9, 0.81, 0.76]
+    [1.89, 1.44, 1.31, 1.19]
     """
     unary, values = check_inputs(unary, values)
     gram = gram_matrix(values, params)
@@ -162,7 +162,7 @@ def mean_field_sequential(
     """
     unary, values = check_inputs(unary, values)
     check_stop(iterations)
-    phi, weights = unary.reshape(len(unary), -1), pair_weights(values, params)
+    phi, weights = unary.reshape(len(unary), -1).astype(np.float64), pair_weights(values, params)
     Q = softmax(-phi, axis=0)
     for _ in range(iterations):
         for i in range(Q.shape[1]):

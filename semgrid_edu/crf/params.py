@@ -9,6 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.occupancy import N_STATES
 
+LARGEST_WEIGHT = 1e30
+"""Of a kernel: the fast mean field computes in float32, which ends at 3e38."""
+
+NARROWEST = 0.15
+"""Width of a kernel, cells. At this width neighbours lie 6.7 widths apart, out of the lattice's reach; the Gaussian is
+2e-10 there. So narrower kernels couple nobody either, and filters may take this width for theirs."""
+
 PAPER_CELL = 0.2
 """Side of a cell in the paper, metres (section 4.1)."""
 
@@ -41,7 +48,7 @@ class CrfParams:
     Raises
     ------
     ArgumentError
-        When a weight is negative, a sigma isn't positive, or the normalisation is unknown.
+        When a weight is negative or above `LARGEST_WEIGHT`, a sigma isn't positive, or the normalisation is unknown.
     """
 
     w_bilateral: float = 4.0
@@ -77,8 +84,8 @@ class CrfParams:
         """Refuse numbers for which eq. (4) has no meaning."""
         for name in ("w_bilateral", "w_spatial"):
             weight = getattr(self, name)
-            if not (np.isfinite(weight) and weight >= 0):
-                raise ArgumentError(name, "a weight of at least 0", weight)
+            if not 0 <= weight <= LARGEST_WEIGHT:
+                raise ArgumentError(name, f"a weight of at least 0 and at most {LARGEST_WEIGHT:g}", weight)
         for name in ("sigma_alpha", "sigma_beta", "sigma_gamma"):
             sigma = getattr(self, name)
             if not (np.isfinite(sigma) and sigma > 0):
@@ -153,9 +160,10 @@ def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float6
     Raises
     ------
     ArgumentError
-        When the shapes don't fit, a cost is NaN or -inf, a cell has no possible class, or states don't sum to 1.
+        When the shapes don't fit, a cost is NaN or -inf, a cell has no possible class, states don't sum to 1, or an
+        argument holds no real numbers or masked ones. `semgrid_edu.crf.check` tells what may have gone wrong before.
     """
-    unary, values = _floats(unary), _floats(values)
+    unary, values = _floats("unary", unary), _floats("values", values)
     if unary.ndim != 3 or 0 in unary.shape:
         raise ArgumentError("unary", "shape (C, H, W), nothing empty", f"shape {unary.shape}")
     if values.shape != (N_STATES, *unary.shape[1:]):
@@ -170,10 +178,17 @@ def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float6
     return unary, values
 
 
-def _floats(array: ArrayLike) -> NDArray[np.floating]:
+def _floats(name: str, argument: ArrayLike) -> NDArray[np.floating]:
     """Return an array of float32 or float64; what is neither becomes float64."""
-    array = np.asarray(array)
-    return array if array.dtype in (np.float32, np.float64) else array.astype(np.float64)
+    if np.ma.is_masked(argument):
+        raise ArgumentError(name, "an array without masked numbers", f"{np.ma.count_masked(argument)} masked")
+    try:
+        array = np.asarray(argument)
+        if array.dtype in (np.float32, np.float64):
+            return array
+        return array.astype(np.float64, casting="unsafe" if array.dtype == object else "same_kind")
+    except (RuntimeError, TypeError, ValueError) as error:  # RuntimeError: a tensor that carries gradients
+        raise ArgumentError(name, "an array of real numbers", error) from error
 
 
 def check_stop(iterations: int, tolerance: float = 0.0) -> None:

@@ -7,6 +7,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from semgrid_edu.crf.arithmetic import FAST
+from semgrid_edu.crf.params import NARROWEST
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,7 @@ class SeparableGaussian:
         SeparableGaussian
             Ready to filter values on such a grid.
         """
+        sigma = max(sigma, NARROWEST)
         reach = int(min(np.ceil(5 * sigma), max(shape) - 1))
         taps = np.exp(-0.5 * (np.arange(reach + 1) / sigma) ** 2)
         row_scale, column_scale = np.ones(shape[0]), np.ones(shape[1])
