@@ -54,7 +54,7 @@ def demo(
 @data.command()
 def make(
     name: Annotated[
-        str, typer.Argument(help="minikitti, minichroma, minisynthia, sample, or all for the first three.")
+        str, typer.Argument(help="minikitti, minichroma, minisynthia, validation, sample, or all for the first three.")
     ],
     folder: Annotated[Path, typer.Argument(help="Takes the data set's own folder.")],
     seed: Annotated[int, typer.Option(help="Seed for the drives; the same seed gives the same bytes.")] = 0,
