@@ -79,14 +79,16 @@ def compare_on_test(
         "scores": scores(confusions, test.label_set),
         "ECE": ece,
         "gains": {
-            method: {
-                name: gain_interval(confusion, per_drive["network"], metric, seed) for name, metric in METRICS.items()
-            }
+            method: _gains(confusion, per_drive["network"], seed)
             for method, confusion in per_drive.items()
             if method != "network"
         },
         "confusion": {method: confusion.tolist() for method, confusion in confusions.items()},
     }
+
+
+def _gains(a: NDArray, b: NDArray, seed: int) -> dict[str, list[float]]:
+    return {name: list(gain_interval(a, b, metric, seed)) for name, metric in METRICS.items()}
 
 
 def gain_interval(
