@@ -128,8 +128,13 @@ def search_table(result: dict) -> str:
     before, after = (result["calibration"][when]["ECE"] for when in ("before", "after"))
     lines = [f"temperature {result['temperature']:.3f}: calibration error {before:.1%} before, {after:.1%} after", ""]
     for objective, trial in result["chosen"].items():
-        named = ", ".join(f"{name} {value:g}" for name, value in trial["params"].items())
-        lines.append(f"best {objective}, trial {trial['trial']}: {named}")
+        params = ", ".join(f"{name} {value:g}" for name, value in trial["params"].items())
+        accuracies = (
+            f"{name} {100 * trial['scores']['all'][name]:.2f} ({100 * result['unrefined']['all'][name]:.2f} without CRF)"
+            for name in OBJECTIVES[:2]
+        )
+        lines.append(f"best {objective}: trial {trial['trial']}, {params}")
+        lines.append(f"    on the validation drives {', '.join(accuracies)}")
     lines += ["", scores_table(result["test"]["scores"]), "", "gain over the network without CRF, points:"]
     for method, gains in result["test"]["gains"].items():
         shown = (

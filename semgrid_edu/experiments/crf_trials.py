@@ -20,7 +20,7 @@ OBJECTIVES = ("pixel accuracy", "class accuracy", "pixel accuracy, class accurac
 """What a CRF is chosen for, over all labelled cells. The last asks for the best pixel accuracy among the CRFs whose
 class accuracy is at least that of the network without one."""
 
-Trial = dict[str, dict]
+Trial = dict[str, object]
 """One trial: "params" by name, "scores" by cells and metric as in `Scores`, and the "seconds" that it took."""
 
 
