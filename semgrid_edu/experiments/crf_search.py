@@ -129,10 +129,8 @@ def search_table(result: dict) -> str:
     lines = [f"temperature {result['temperature']:.3f}: calibration error {before:.1%} before, {after:.1%} after", ""]
     for objective, trial in result["chosen"].items():
         params = ", ".join(f"{name} {value:g}" for name, value in trial["params"].items())
-        accuracies = (
-            f"{name} {100 * trial['scores']['all'][name]:.2f} ({100 * result['unrefined']['all'][name]:.2f} without CRF)"
-            for name in OBJECTIVES[:2]
-        )
+        pairs = {name: (trial["scores"]["all"][name], result["unrefined"]["all"][name]) for name in OBJECTIVES[:2]}
+        accuracies = (f"{name} {100 * crf:.2f} ({100 * net:.2f} without CRF)" for name, (crf, net) in pairs.items())
         lines.append(f"best {objective}: trial {trial['trial']}, {params}")
         lines.append(f"    on the validation drives {', '.join(accuracies)}")
     lines += ["", scores_table(result["test"]["scores"]), "", "gain over the network without CRF, points:"]
