@@ -1,7 +1,5 @@
 """A search for the CRF's parameters: which to try next, and which of those that were tried are best (section 3.5)."""
 
-from dataclasses import asdict
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import qmc
@@ -9,16 +7,21 @@ from scipy.stats import qmc
 from semgrid_edu.crf.params import CrfParams
 from semgrid_edu.errors import ArgumentError
 
-SEARCHED = ("w_bilateral", "w_spatial", "sigma_alpha", "sigma_beta", "sigma_gamma")
-"""The parameters that are searched: fields of `CrfParams`, the axes of a point, in this order."""
-
-REACH = 10.0
-"""The search goes from a tenth of each default to ten times it, evenly in the logarithm."""
+FACTORS = {
+    "w_bilateral": (0.02, 10.0),
+    "w_spatial": (0.02, 10.0),
+    "sigma_alpha": (0.25, 10.0),
+    "sigma_beta": (0.25, 10.0),
+    "sigma_gamma": (0.25, 10.0),
+}
+"""The parameters that are searched, the axes of a point, and the ends of each axis as factors of the default; between
+them an axis is logarithmic. Weights of a fiftieth leave a grid nearly as it is. So do kernels narrower than a cell, but
+they take the permutohedral lattice much longer."""
 
 EXPLORED = 64
 """After this number of trials, three of four refine what is best so far."""
 
-FIRST_STEP, SHRINK = 0.2, 0.99
+FIRST_STEP, SHRINK = 0.2, 0.98
 """Standard deviation of the first refining steps, as a part of the box's side, and its factor from trial to trial."""
 
 
@@ -28,7 +31,7 @@ def params_at(point: ArrayLike, cell: float) -> CrfParams:
     Parameters
     ----------
     point : (5,) float
-        One number from 0 to 1 for each of `SEARCHED`: 0 is a tenth of the default, 1/2 the default, 1 ten times it.
+        One number for each of `FACTORS`: 0 and 1 are the ends of its axis.
     cell : float
         Side of a cell, metres; the defaults are those of `CrfParams.for_cells`.
 
@@ -44,14 +47,15 @@ def params_at(point: ArrayLike, cell: float) -> CrfParams:
 
     Examples
     --------
-    >>> params_at([0.5, 0.5, 0.5, 1.0, 0.0], cell=0.5).sigma_beta
-    2.0
+    >>> params_at([0.5, 0.5, 0.5, 0.0, 1.0], cell=0.2).sigma_beta
+    0.05
     """
     point = np.asarray(point, dtype=float)
-    if point.shape != (len(SEARCHED),) or not ((point >= 0) & (point <= 1)).all():
-        raise ArgumentError("point", f"{len(SEARCHED)} numbers from 0 to 1", point)
-    values = _defaults(cell) * REACH ** (2 * point - 1)
-    return CrfParams(**{name: float(f"{value:.3g}") for name, value in zip(SEARCHED, values, strict=True)})
+    if point.shape != (len(FACTORS),) or not ((point >= 0) & (point <= 1)).all():
+        raise ArgumentError("point", f"{len(FACTORS)} numbers from 0 to 1", point)
+    low, high = _ends(cell)
+    values = np.exp(low + point * (high - low))
+    return CrfParams(**{name: float(f"{value:.3g}") for name, value in zip(FACTORS, values, strict=True)})
 
 
 def point_of(params: CrfParams, cell: float) -> NDArray[np.float64]:
@@ -69,16 +73,16 @@ def point_of(params: CrfParams, cell: float) -> NDArray[np.float64]:
     (5,) float64
         Between 0 and 1 for parameters that the search reaches.
     """
-    values = np.array([asdict(params)[name] for name in SEARCHED])
-    return (np.log(values / _defaults(cell)) / np.log(REACH) + 1) / 2
+    low, high = _ends(cell)
+    return (np.log([getattr(params, name) for name in FACTORS]) - low) / (high - low)
 
 
 def next_point(points: ArrayLike, values: ArrayLike, seed: int) -> NDArray[np.float64]:
     """Return the point to try next.
 
-    The first is the centre, the defaults. Then the points of a scrambled Halton sequence fill the cube evenly. After
-    `EXPLORED` trials only each fourth goes on with the sequence. The others make a Gaussian step from the point that is
-    best so far by one of the objectives, each in turn, and the steps become shorter from trial to trial.
+    At first the points of a scrambled Halton sequence fill the cube evenly. After `EXPLORED` trials only each fourth
+    goes on with the sequence. The others make a Gaussian step from the point that is best so far by one of the
+    objectives, each in turn, and the steps become shorter from trial to trial.
 
     A trial depends on the seed and on the trials before it alone, not on how many there will be. So a search can be
     interrupted, resumed, and later prolonged, and ends as if it had never stopped.
@@ -99,8 +103,6 @@ def next_point(points: ArrayLike, values: ArrayLike, seed: int) -> NDArray[np.fl
     """
     points, values = np.asarray(points, dtype=float), np.asarray(values, dtype=float)
     n, refined = len(points), len(points) - EXPLORED
-    if n == 0:
-        return np.full(len(SEARCHED), 0.5)
     if refined < 0 or refined % 4 == 0:
         return _halton(n if refined < 0 else EXPLORED + refined // 4, seed)
     best = points[values[:, n % values.shape[1]].argmax()]
@@ -134,11 +136,13 @@ def pareto_front(values: ArrayLike) -> NDArray[np.int64]:
     return front[np.argsort(-values[front, 0], kind="stable")]
 
 
-def _defaults(cell: float) -> NDArray[np.float64]:
-    return np.array([getattr(CrfParams.for_cells(cell), name) for name in SEARCHED])
+def _ends(cell: float) -> NDArray[np.float64]:
+    """Return the logarithms of the lowest and of the highest value of each parameter."""
+    defaults = np.array([getattr(CrfParams.for_cells(cell), name) for name in FACTORS])
+    return np.log(defaults * np.transpose(list(FACTORS.values())))
 
 
 def _halton(index: int, seed: int) -> NDArray[np.float64]:
     """Return one point of the scrambled sequence."""
-    sequence = qmc.Halton(len(SEARCHED), scramble=True, seed=seed)
+    sequence = qmc.Halton(len(FACTORS), scramble=True, seed=seed)
     return sequence.fast_forward(index).random(1)[0]

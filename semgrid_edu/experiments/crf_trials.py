@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.crf import CrfParams, next_point, params_at, point_of
-from semgrid_edu.crf.search import SEARCHED
+from semgrid_edu.crf.search import FACTORS
 from semgrid_edu.errors import DataError
 from semgrid_edu.experiments.crf_outputs import GridOutputs, frame_confusions, refined_grids
 from semgrid_edu.experiments.evaluate import scores
@@ -25,7 +25,7 @@ Trial = dict[str, object]
 
 
 def next_params(trials: Sequence[Trial], unrefined: dict, cell: float, seed: int) -> CrfParams:
-    """Return the parameters to try next, see `next_point`.
+    """Return the parameters to try next: the defaults first, then those of `next_point`.
 
     Parameters
     ----------
@@ -42,6 +42,8 @@ def next_params(trials: Sequence[Trial], unrefined: dict, cell: float, seed: int
     -------
     CrfParams
     """
+    if not trials:
+        return CrfParams.for_cells(cell)
     points = [point_of(CrfParams(**trial["params"]), cell) for trial in trials]
     return params_at(next_point(points, objective_values(trials, unrefined), seed), cell)
 
@@ -65,7 +67,7 @@ def run_trial(calibrated: GridOutputs, params: CrfParams, label_set: LabelSet) -
     """
     began = perf_counter()
     found = validation_scores(calibrated, params, label_set)
-    chosen = {name: value for name, value in asdict(params).items() if name in SEARCHED}
+    chosen = {name: value for name, value in asdict(params).items() if name in FACTORS}
     return {"params": chosen, "scores": found, "seconds": round(perf_counter() - began, 2)}
 
 

@@ -25,10 +25,21 @@ def closeness(point):
     return [-np.linalg.norm(point - OPTIMUM), -np.linalg.norm(point - (1 - OPTIMUM))]
 
 
-def test_the_box_goes_from_a_tenth_to_ten_times_the_defaults():
+def test_the_ends_of_each_axis_are_the_stated_factors_of_the_defaults():
     default = np.array(astuple(CrfParams.for_cells(0.5))[:5])
-    for side, factor in ((0.0, 0.1), (0.5, 1.0), (1.0, 10.0)):
-        np.testing.assert_allclose(astuple(params_at([side] * 5, 0.5))[:5], factor * default, rtol=1e-12)
+    for side, factors in enumerate(zip(*rules.FACTORS.values(), strict=True)):
+        np.testing.assert_allclose(astuple(params_at([side] * 5, 0.5))[:5], factors * default, rtol=1e-12)
+
+
+def test_the_middle_of_an_axis_is_the_geometric_mean_of_its_ends():
+    low, middle, high = (params_at([side] * 5, 0.2).w_spatial for side in (0, 0.5, 1))
+    assert middle == pytest.approx((low * high) ** 0.5, rel=0.005)
+
+
+def test_the_defaults_lie_inside():
+    point = point_of(CrfParams(), 0.2)
+    assert ((point > 0.3) & (point < 0.8)).all()
+    assert params_at(point, 0.2) == CrfParams()
 
 
 def test_a_point_is_found_again_from_its_rounded_parameters():
@@ -44,18 +55,16 @@ def test_a_point_outside_the_box_is_refused(point):
         params_at(point, 0.2)
 
 
-def test_the_first_trials_are_the_defaults_and_an_even_sequence():
+def test_the_first_trials_fill_the_box_evenly():
     points, _ = searched(rules.EXPLORED, 0, closeness)
-    np.testing.assert_array_equal(points[0], 0.5)
-    quarters = [np.bincount((column * 4).astype(int), minlength=4) for column in points[1:].T]
-    assert np.min(quarters) >= 12  # of 63 points, in each quarter of each axis
+    quarters = [np.bincount((column * 4).astype(int), minlength=4) for column in points.T]
+    assert np.min(quarters) >= 12  # of 64 points, in each quarter of each axis
 
 
 def test_the_same_seed_gives_the_same_trials_however_many_follow_and_another_gives_others():
     few, many, others = (searched(*run, closeness)[0] for run in ((80, 3), (100, 3), (80, 4)))
     np.testing.assert_array_equal(few, many[:80])
-    explored = slice(1, rules.EXPLORED)
-    assert not np.isin(few[explored], others[explored]).any()
+    assert not np.isin(few[: rules.EXPLORED], others[: rules.EXPLORED]).any()
 
 
 def test_refinement_comes_close_to_the_optimum_of_each_objective():
