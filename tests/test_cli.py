@@ -19,6 +19,7 @@ from semgrid_edu.cli import run
         (["reproduce", "occupancy", "--out", "FOLDER"], r"FOLDER: expected a file to write, found a folder"),
         (["reproduce", "occupancy", "--out", "FILE/scores.json"], r"FILE: File exists"),
         (["evaluate", "--data", ".", "--weights", ".", "--out", "FOLDER"], r"FOLDER: expected a file to write"),
+        (["search-crf", "--data", ".", "--test", ".", "--weights", ".", "--out", "FOLDER"], r"FOLDER: expected a file"),
     ],
 )
 def test_a_mistake_ends_in_one_line(tmp_path, monkeypatch, arguments, message):
