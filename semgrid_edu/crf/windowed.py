@@ -10,8 +10,6 @@ from semgrid_edu.crf.params import CrfParams
 
 RADIUS = 4.0
 """Reach of the window, in widths `sigma_alpha`: cells further up, down, left or right are left out."""
-BLOCK = 16
-"""The values of a cell are padded to a multiple of this number: loops of fixed length vectorise."""
 _SHARPEST = np.float32(1e15)
 """The largest 1 / sigma_beta: its square still is a float32, and equal states stay equal."""
 
@@ -30,7 +28,7 @@ class WindowedGaussian:
     Parameters
     ----------
     state : (H, 4, W) float32
-        o_i in units of sigma_beta, in each row state by state.
+        o_i in units of sigma_beta.
     taps : (R + 1,) float32
         The Gaussian at distances of 0 to R cells along one axis; R cells is the reach of the window.
     scale : (H, W) float32
@@ -88,49 +86,52 @@ class WindowedGaussian:
         (H W, K) float32
             sum_j k_ij values_j over the window, the cell itself included.
         """
-        columns = values.shape[1]
-        padded = np.zeros((*self.scale.shape, -(-columns // BLOCK) * BLOCK), np.float32)
-        padded[:, :, :columns] = values.reshape(*self.scale.shape, columns) * self.scale[:, :, None]
-        sums = _window_sums(self.state, self.taps, padded)[:, :, :columns] * self.scale[:, :, None]
-        return sums.reshape(values.shape)
+        height, width = self.scale.shape
+        rows = values.reshape(height, width, -1).transpose(0, 2, 1) * self.scale[:, None]
+        sums = _window_sums(self.state, self.taps, rows) * self.scale[:, None]
+        return sums.transpose(0, 2, 1).reshape(values.shape)
 
 
 # Threads share out rows; each cell's sum is computed by one of them, in one order, so their number changes nothing.
+# The inner loops run along slices of rows, because these vectorise.
 @njit(cache=True, parallel=True, fastmath=True)
 def _window_sums(state, taps, values):
-    """Return the sum over the window of each cell, (H, W, K), of Gaussian times values."""
-    height, width, columns = values.shape
-    reach, sums = len(taps) - 1, np.zeros((height, width, columns), np.float32)
+    """Return for each cell the sum over the window of Gaussian times values; (H, K, W) like the values."""
+    height, columns, width = values.shape
+    reach, sums = len(taps) - 1, np.zeros(values.shape, np.float32)
     for r in prange(height):
-        weights, mirrored = np.empty(width, np.float32), np.empty(2 * reach + 1, np.float32)
-        for t in range(-reach, reach + 1):
-            mirrored[t + reach] = taps[abs(t)]
-        for c in range(width):
-            first, last = max(c - reach, 0), min(c + reach + 1, width)
-            for s in range(max(r - reach, 0), min(r + reach + 1, height)):
-                _weigh(
-                    state[r, :, c], state[s, :, first:last], taps[abs(r - s)], mirrored[first - c + reach :], weights
-                )
-                for block in range(0, columns, BLOCK):
-                    _add(weights, values[s, first:last, block : block + BLOCK], sums[r, c, block : block + BLOCK])
+        weights = np.empty(width, np.float32)
+        for s in range(max(r - reach, 0), min(r + reach + 1, height)):
+            for shift in range(max(-reach, 1 - width), min(reach, width - 1) + 1):
+                first, last = max(-shift, 0), min(width - shift, width)
+                own, other = _states(state[r], first, last), _states(state[s], first + shift, last + shift)
+                _weigh(own, other, taps[abs(r - s)] * taps[abs(shift)], weights[first:last])
+                for k in range(columns):
+                    _add(weights[first:last], values[s, k, first + shift : last + shift], sums[r, k, first:last])
     return sums
 
 
-@njit(cache=True, fastmath=True, inline="always")
-def _weigh(own, others, tap, taps, weights):
-    """Write the Gaussian between one cell and the cells of a stretch of a row."""
-    for d in range(others.shape[1]):
-        square = np.float32(0)
-        for k in range(4):
-            difference = others[k, d] - own[k]
-            square += difference * difference
-        weights[d] = tap * taps[d] * _gaussian(square)
+@njit(cache=True)
+def _states(rows, first, last):
+    """Return the four states of the cells of a stretch of a row."""
+    return rows[0, first:last], rows[1, first:last], rows[2, first:last], rows[3, first:last]
+
+
+@njit(cache=True, fastmath=True)
+def _weigh(own, other, tap, weights):
+    """Write the Gaussian between each cell of a stretch and a cell of another stretch; `tap` is its part in place."""
+    own_free, own_static, own_dynamic, own_unknown = own
+    free, static, dynamic, unknown = other
+    for c in range(len(weights)):
+        square = (free[c] - own_free[c]) ** 2 + (static[c] - own_static[c]) ** 2
+        square += (dynamic[c] - own_dynamic[c]) ** 2 + (unknown[c] - own_unknown[c]) ** 2
+        weights[c] = tap * _gaussian(square)
 
 
 @njit(cache=True, fastmath=True, inline="always")
 def _gaussian(square):
-    """Return exp(-square / 2) to 6 digits: the 64th power of the series of exp(-square / 128), which vectorises."""
-    y = max(-np.float32(1 / 128) * square, np.float32(-1))
+    """Return exp(-square / 2) to 5 digits: the 64th power of the series of exp(-square / 128), which vectorises."""
+    y = max(np.float32(-1 / 128) * square, np.float32(-1))
     power = np.float32(1 / 120) * y + np.float32(1 / 24)
     power = (power * y + np.float32(1 / 6)) * y + np.float32(1 / 2)
     power = (power * y + np.float32(1)) * y + np.float32(1)
@@ -139,9 +140,8 @@ def _gaussian(square):
     return power
 
 
-@njit(cache=True, fastmath=True, inline="always")
+@njit(cache=True, fastmath=True)
 def _add(weights, values, total):
-    """Add up one block of values of a stretch of a row, weighted."""
-    for d in range(len(values)):
-        for k in range(BLOCK):
-            total[k] += weights[d] * values[d, k]
+    """Add weighted values."""
+    for c in range(len(total)):
+        total[c] += weights[c] * values[c]
