@@ -22,8 +22,8 @@ class WindowedGaussian:
     the number of pairs. What is left out is small. A pair outside the window has less than exp(-radius^2 / 2) of the
     weight of a cell with itself, 0.00034 at the default radius of 4. Where all cells have the same state, all pairs
     outside together have 0.00013 of a cell's row sum. That share can only be larger where a cell differs from its
-    surroundings and is like cells beyond the window. Even then they sum to at most 2 pi sigma_alpha^2 * 0.00013, which
-    is 0.05 of what the cell would tell itself at a width of 8 cells.
+    surroundings and is like cells beyond the window. Even then they sum to at most 2 pi sigma_alpha^2 * 0.00013 for
+    widths of at least a cell: at a width of 8 cells, 0.05 of what the cell has for itself.
 
     Parameters
     ----------
@@ -59,7 +59,8 @@ class WindowedGaussian:
         """
         _, height, width = values.shape
         reach = int(min(np.ceil(radius * params.sigma_alpha), max(height, width) - 1))
-        taps = np.exp(-0.5 * (np.arange(reach + 1) / params.sigma_alpha) ** 2)
+        with np.errstate(over="ignore"):  # exp(-inf) is 0, the right limit of a width near 0
+            taps = np.exp(-0.5 * (np.arange(reach + 1) / params.sigma_alpha) ** 2)
         sharpness = min(np.float32(1 / max(params.sigma_beta, 1e-30)), _SHARPEST)
         state = np.ascontiguousarray(values.transpose(1, 0, 2), np.float32) * sharpness
         kernel = cls(state, taps.astype(np.float32), np.ones((height, width), np.float32))
