@@ -26,6 +26,8 @@ from semgrid_edu.storage.provenance import versions
 
 COUPLINGS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
 """From no pairs to the default weights."""
+FINE = tuple(k / 8 for k in range(33))
+"""The same range for the symmetric case."""
 GRIDS = ((3, 3), (4, 4))
 """Rows and columns."""
 CLASSES = (2, 3)
@@ -75,6 +77,7 @@ def crf_coupling(
     grids: Sequence[tuple[int, int]] = GRIDS,
     classes: Sequence[int] = CLASSES,
     couplings: Sequence[float] = COUPLINGS,
+    fine: Sequence[float] = FINE,
 ) -> dict:
     """Compare every way with exact inference on random tiny grids, coupling by coupling, and in a symmetric case.
 
@@ -90,8 +93,8 @@ def crf_coupling(
         Rows and columns.
     classes : sequence of int
         Numbers of classes.
-    couplings : sequence of float
-        Weights w1.
+    couplings, fine : sequence of float
+        Weights w1, for the random grids and for the symmetric case.
 
     Returns
     -------
@@ -118,7 +121,7 @@ def crf_coupling(
             write_json(log, identity | {"cases": done})
     return identity | {
         "cases": done,
-        "symmetric": symmetric_case(),
+        "symmetric": symmetric_case(fine),
         "command": f"semgrid-edu reproduce crf-coupling --seed {seed} --draws {draws}",
         "date": f"{datetime.now(UTC):%Y-%m-%d}",
         "versions": versions("numpy", "scipy", "numba"),
@@ -192,21 +195,19 @@ def measure_coupling(
     }
 
 
-def symmetric_case(
-    shape: tuple[int, int] = (3, 3), tilt: float = TILT, couplings: Sequence[float] | None = None
-) -> dict:
+def symmetric_case(couplings: Sequence[float] = FINE, shape: tuple[int, int] = (3, 3), tilt: float = TILT) -> dict:
     """Let all cells be free and (almost) undecided between two classes, and watch which of them each way takes.
 
     With a tilt of exactly 1/2, the exact marginals are 1/2 by symmetry, at every coupling.
 
     Parameters
     ----------
+    couplings : sequence of float
+        Weights w1.
     shape : (int, int)
         H, W.
     tilt : float
         The network's probability of class 0 in every cell.
-    couplings : sequence of float, optional
-        Weights w1; 0 to 4 in steps of 1/8 when left out.
 
     Returns
     -------
@@ -214,7 +215,6 @@ def symmetric_case(
         "tilt"; "couplings" (n,); "probability": for each way the probability of class 0 in the middle cell, (n,), with
         "exact" first, and as "mean field, other side" and so on with the tilt towards class 1.
     """
-    couplings = np.linspace(0, 4, 33).tolist() if couplings is None else list(couplings)
     middle, values = (shape[0] // 2, shape[1] // 2), all_free(shape)
     ways: dict[str, Inference] = {
         "exact": lambda *crf: visit_labellings(*crf).marginals,
@@ -230,7 +230,7 @@ def symmetric_case(
         for side, p in (("", tilt), (", other side", 1 - tilt))
         for way, infer in ways.items()
     }
-    return {"shape": list(shape), "tilt": tilt, "couplings": couplings, "probability": probability}
+    return {"shape": list(shape), "tilt": tilt, "couplings": list(couplings), "probability": probability}
 
 
 def crf_coupling_tables(result: dict) -> str:

@@ -14,7 +14,7 @@ from semgrid_edu.experiments import crf_coupling as study
 from semgrid_edu.experiments.all_labellings import visit_labellings
 from semgrid_edu.graphical.stages.crf import all_free, coupled, two_classes
 
-QUICK = {"draws": 2, "grids": [(1, 2), (2, 2)], "classes": [2], "couplings": [0.0, 2.0]}
+QUICK = {"draws": 2, "grids": [(1, 2), (2, 2)], "classes": [2], "couplings": [0.0, 2.0], "fine": [0.0, 1.0]}
 
 
 @pytest.mark.parametrize("shape", [(2, 1, 1), (3, 1, 2), (2, 3, 3), (3, 2, 3), (4, 2, 2), (1, 2, 2)])
@@ -72,7 +72,7 @@ def test_what_is_done_is_not_measured_again_and_another_log_is_refused(result, m
 
 
 def test_mean_field_picks_a_side_where_the_exact_marginal_stays_undecided():
-    found = study.symmetric_case(couplings=[0.5, 4.0])["probability"]
+    found = study.symmetric_case([0.5, 4.0])["probability"]
     for side, sure in (("", 0.99), (", other side", 0.01)):
         exact, settled = found[f"exact{side}"], found[f"mean field, converged{side}"]
         np.testing.assert_allclose([*exact, settled[0]], 0.5, atol=0.01)
@@ -87,7 +87,7 @@ def test_the_figures_show_each_way_once_per_size(result):
     assert [len(ax.get_lines()) for ax in (above, below)] == [4, 6]
     assert len(figure.axes) == 4
     ax = plotting.picks_a_side(result[1]["symmetric"])
-    assert [text.get_text() for text in ax.get_legend().get_texts()][0] == "exact"
+    assert ax.get_legend().get_texts()[0].get_text() == "exact"
     assert len(ax.get_lines()) == 8
     plt.close("all")
 
