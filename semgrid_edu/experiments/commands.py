@@ -74,7 +74,7 @@ def crf_error(
 @reproduce.command()
 def crf_coupling(
     seed: Annotated[int, typer.Option(min=0, help="Seed for the random grids.")] = 0,
-    draws: Annotated[int, typer.Option(min=1, help="Number of random grids of each size.")] = 8,
+    draws: Annotated[int, typer.Option(min=1, help="Number of random grids of each size.")] = 20,
     out: Annotated[Path, typer.Option(help="Takes each size; the same command goes on.")] = Path("crf_coupling.json"),
 ) -> None:
     """Compare approximate with exact inference in the CRF on tiny grids, as the coupling grows (lecture 10)."""

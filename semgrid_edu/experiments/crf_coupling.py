@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from scipy.special import softmax
 from tqdm.auto import tqdm
 
-from semgrid_edu.crf import CrfParams, crf_model, mean_field, mean_field_naive, unary_from_probability
+from semgrid_edu.crf import CrfParams, mean_field, mean_field_naive, unary_from_probability
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.all_labellings import visit_labellings
 from semgrid_edu.experiments.kept_parts import read_parts
+from semgrid_edu.experiments.potts_messages import potts_max_product, potts_sum_product
 from semgrid_edu.experiments.tables import markdown_table
-from semgrid_edu.graphical import Beliefs, GraphicalModel, loopy_max_product, sum_product
 from semgrid_edu.graphical.stages.crf import all_free, coupled, two_classes
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import versions
@@ -32,26 +32,12 @@ GRIDS = ((3, 3), (4, 4))
 """Rows and columns."""
 CLASSES = (2, 3)
 """Numbers of classes."""
-N_DRAWS = 8
+N_DRAWS = 20
 """Number of random CRFs of each size."""
 TILT = 0.501
 """Probability of class 0 in every cell of the symmetric case: as good as undecided."""
-MESSAGES = 200
-"""The largest number of iterations of both message-passing methods, which keep half of each old message."""
-
 Inference = Callable[[NDArray, NDArray, CrfParams], NDArray]
 """Takes unary, values and params, and returns a distribution over the classes in each cell, (C, H, W)."""
-
-
-def _messages(pass_messages: Callable[..., Beliefs]) -> Inference:
-    """Return inference by messages between the cells and the factors of the CRF."""
-
-    def infer(unary: NDArray, values: NDArray, params: CrfParams) -> NDArray:
-        model: GraphicalModel = crf_model(unary, values, params)
-        beliefs = pass_messages(model, iterations=MESSAGES, damping=0.5)
-        return np.stack([beliefs.marginals[name] for name in model.names], axis=1).reshape(unary.shape)
-
-    return infer
 
 
 def _settled(unary: NDArray, values: NDArray, params: CrfParams) -> NDArray:
@@ -62,8 +48,8 @@ WAYS: Mapping[str, Inference] = {
     "mean field, 10 updates": mean_field_naive,
     "mean field, converged": _settled,
     "fast mean field, 10 updates": mean_field,
-    "loopy sum-product": _messages(sum_product),
-    "loopy max-product": _messages(loopy_max_product),
+    "loopy sum-product": potts_sum_product,
+    "loopy max-product": potts_max_product,
 }
 """What is compared with exact inference."""
 ONLY_LABELS = ("loopy max-product",)
@@ -212,15 +198,15 @@ def symmetric_case(couplings: Sequence[float] = FINE, shape: tuple[int, int] = (
     Returns
     -------
     dict
-        "tilt"; "couplings" (n,); "probability": for each way the probability of class 0 in the middle cell, (n,), with
-        "exact" first, and as "mean field, other side" and so on with the tilt towards class 1.
+        "shape" (H, W); "tilt"; "couplings" (n,); "probability": for each way the probability of class 0 in the middle
+        cell, (n,), with "exact" first, and as "mean field, other side" and so on with the tilt towards class 1.
     """
     middle, values = (shape[0] // 2, shape[1] // 2), all_free(shape)
     ways: dict[str, Inference] = {
         "exact": lambda *crf: visit_labellings(*crf).marginals,
         "mean field, 10 updates": mean_field_naive,
         "mean field, converged": _settled,
-        "loopy sum-product": WAYS["loopy sum-product"],
+        "loopy sum-product": potts_sum_product,
     }
     probability = {
         way + side: [

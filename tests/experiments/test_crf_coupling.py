@@ -8,10 +8,12 @@ import pytest
 
 from semgrid_edu import plotting
 from semgrid_edu.cli import run
-from semgrid_edu.crf import exact_marginals, log_partition, mean_field_naive, most_likely
+from semgrid_edu.crf import crf_model, exact_marginals, log_partition, mean_field_naive, most_likely
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.experiments import crf_coupling as study
 from semgrid_edu.experiments.all_labellings import visit_labellings
+from semgrid_edu.experiments.potts_messages import potts_max_product, potts_sum_product
+from semgrid_edu.graphical import loopy_max_product, sum_product
 from semgrid_edu.graphical.stages.crf import all_free, coupled, two_classes
 
 QUICK = {"draws": 2, "grids": [(1, 2), (2, 2)], "classes": [2], "couplings": [0.0, 2.0], "fine": [0.0, 1.0]}
@@ -24,6 +26,20 @@ def test_every_labelling_says_what_elimination_says(shape):
     np.testing.assert_allclose(found.marginals, exact_marginals(*crf), atol=1e-12)
     np.testing.assert_array_equal(found.labels, most_likely(*crf))
     assert found.log_partition == pytest.approx(log_partition(*crf), abs=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("fast", "literal"), [(potts_sum_product, sum_product), (potts_max_product, loopy_max_product)]
+)
+@pytest.mark.parametrize(
+    ("shape", "coupling"), [((2, 2, 2), 0.0), ((3, 2, 2), 1.0), ((2, 2, 3), 4.0), ((3, 1, 2), 4.0)]
+)
+def test_messages_from_cell_to_cell_are_those_through_factors(fast, literal, shape, coupling):
+    crf = *study.random_crf(shape, 1), coupled(coupling)
+    model = crf_model(*crf)
+    beliefs = literal(model, iterations=200, damping=0.5).marginals
+    found = np.stack([beliefs[name] for name in model.names], axis=1).reshape(shape)
+    np.testing.assert_allclose(fast(*crf), found, atol=1e-6)
 
 
 def test_too_many_labellings_and_impossible_classes_are_refused():
