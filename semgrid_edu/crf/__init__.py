@@ -1,5 +1,6 @@
 """The fully connected CRF that refines the semantic grid: energy, exact inference, mean field, naive and fast."""
 
+from semgrid_edu.crf.accurate import mean_field_accurate
 from semgrid_edu.crf.dense import energy, free_energy, gram_matrix, pair_weights
 from semgrid_edu.crf.doctor import check
 from semgrid_edu.crf.exact import crf_model, exact_marginals, log_partition, most_likely
@@ -18,6 +19,7 @@ from semgrid_edu.crf.temperature import (
     negative_log_likelihood,
     reliability,
 )
+from semgrid_edu.crf.windowed import WindowedGaussian
 
 __all__ = [
     "CrfParams",
@@ -26,6 +28,7 @@ __all__ = [
     "PermutohedralLattice",
     "Reliability",
     "SeparableGaussian",
+    "WindowedGaussian",
     "at_temperature",
     "check",
     "crf_model",
@@ -38,6 +41,7 @@ __all__ = [
     "gram_matrix",
     "log_partition",
     "mean_field",
+    "mean_field_accurate",
     "mean_field_naive",
     "mean_field_sequential",
     "mean_field_updates",

@@ -60,6 +60,29 @@ def overfit(
     keep_result(out, lambda: overfit(seed), lambda result: overfit_table(result["networks"]))
 
 
+@reproduce.command()
+def crf_error(
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the filter's particles and for the landmarks.")] = 0,
+    out: Annotated[Path, typer.Option(help="Takes each scene; the same command goes on.")] = Path("crf_error.json"),
+) -> None:
+    """Measure error against time of every way to run the CRF, kernel and convergence apart (lecture 11)."""
+    from semgrid_edu.experiments.crf_error import crf_error, crf_error_tables
+
+    keep_result(out, lambda: crf_error(out, seed), crf_error_tables)
+
+
+@reproduce.command()
+def crf_coupling(
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the random grids.")] = 0,
+    draws: Annotated[int, typer.Option(min=1, help="Number of random grids of each size.")] = 20,
+    out: Annotated[Path, typer.Option(help="Takes each size; the same command goes on.")] = Path("crf_coupling.json"),
+) -> None:
+    """Compare approximate with exact inference in the CRF on tiny grids, as the coupling grows (lecture 10)."""
+    from semgrid_edu.experiments.crf_coupling import crf_coupling, crf_coupling_tables
+
+    keep_result(out, lambda: crf_coupling(out, seed, draws), crf_coupling_tables)
+
+
 def keep_result(out: Path, compute: Callable[[], dict], table: Callable[[dict], str]) -> None:
     """Compute an experiment's result, once it is known that the file can be written; write it, and print its table.
 

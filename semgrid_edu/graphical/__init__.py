@@ -13,7 +13,7 @@ from semgrid_edu.graphical.exact import eliminate, enumerate_marginals, log_tota
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.layout import in_rows
 from semgrid_edu.graphical.mean_field import mean_field_graph
-from semgrid_edu.graphical.messages import sum_product
+from semgrid_edu.graphical.messages import loopy_max_product, sum_product
 from semgrid_edu.graphical.model import GraphicalModel
 from semgrid_edu.graphical.products import product
 from semgrid_edu.graphical.separation import d_separated, why_dependent
@@ -28,6 +28,7 @@ __all__ = [
     "enumerate_marginals",
     "in_rows",
     "log_total",
+    "loopy_max_product",
     "max_product",
     "mean_field_graph",
     "min_fill_order",

@@ -1,4 +1,4 @@
-"""Sum-product message passing on a factor graph: exact on trees, "loopy" elsewhere (Kschischang 2001, section II)."""
+"""Messages on a factor graph, sum-product and max-product: exact on trees, "loopy" elsewhere (Kschischang 2001)."""
 
 from collections.abc import Iterable, Mapping
 
@@ -57,6 +57,44 @@ def sum_product(
     >>> beliefs.marginals["rain"].round(2), beliefs.exact, beliefs.messages["P(wet | rain)", "rain"].round(2)
     (array([0.33, 0.67]), True, array([0.11, 0.89]))
     """
+    return _passed(model, given, iterations, damping, best=False)
+
+
+def loopy_max_product(
+    model: GraphicalModel, given: Mapping[str, int] = NOTHING, iterations: int = 50, damping: float = 0.0
+) -> Beliefs:
+    """Pass the messages of `sum_product` with the maximum in place of the sum.
+
+    On a tree a belief is then a max-marginal: how probable the best assignment is in which a variable has this state.
+    The best states of all variables together are a most likely assignment, if no two of them tie. With loops that is
+    an approximation; `max_product` eliminates instead, and is exact on every graph.
+
+    Parameters
+    ----------
+    model, given, iterations, damping
+        Those of `sum_product`.
+
+    Returns
+    -------
+    Beliefs
+        `.marginals` holds max-marginals, each divided by its sum; `.exact` is that of `sum_product`.
+
+    Raises
+    ------
+    ArgumentError
+        When no assignment agrees with what is given, or an argument is out of range.
+
+    Examples
+    --------
+    >>> rain, wet = Factor("rain", [0.8, 0.2]), Factor(("rain", "wet"), [[0.9, 0.1], [0.2, 0.8]])
+    >>> loopy_max_product(GraphicalModel([rain, wet], {"wet": ("rain",)})).marginals["rain"].round(2)
+    array([0.82, 0.18])
+    """
+    return _passed(model, given, iterations, damping, best=True)
+
+
+def _passed(model: GraphicalModel, given: Mapping[str, int], iterations: int, damping: float, best: bool) -> Beliefs:
+    """Pass messages until they stop changing; `best` says whether factors take the maximum, or the sum."""
     if iterations < 1:
         raise ArgumentError("iterations", "at least 1", iterations)
     if not 0 <= damping < 1:
@@ -74,7 +112,7 @@ def sum_product(
         before = dict(messages)
         for source in (*reversed(outwards), *outwards):
             for target in links[source]:
-                message = _message(source, target, links, factors, messages)
+                message = _message(source, target, links, factors, messages, best)
                 messages[source, target] = (1 - damping) * message + damping * messages[source, target]
         converged = all(abs(messages[link] - before[link]).max() <= TOLERANCE for link in messages)
     arrived = {name: [messages[label, name] for label in links[name]] for name in sliced.names}
@@ -127,21 +165,27 @@ def _first_messages(factors: Mapping[str, Factor], states: Mapping[str, int]) ->
 
 
 def _message(
-    source: str, target: str, links: Mapping[str, list[str]], factors: Mapping[str, Factor], messages: Messages
+    source: str,
+    target: str,
+    links: Mapping[str, list[str]],
+    factors: Mapping[str, Factor],
+    messages: Messages,
+    best: bool,
 ) -> NDArray[np.float64]:
     """Return what a node tells a neighbour, from what all its other neighbours told it."""
     heard = {node: messages[node, source] for node in links[source] if node != target}
     if source in factors:
-        return _from_factor(factors[source], heard)
+        return _from_factor(factors[source], heard, best)
     return _product(heard.values(), states=messages[source, target].size)
 
 
-def _from_factor(factor: Factor, heard: Mapping[str, NDArray]) -> NDArray[np.float64]:
-    """Return the table times what all variables but one say, summed over them."""
+def _from_factor(factor: Factor, heard: Mapping[str, NDArray], best: bool) -> NDArray[np.float64]:
+    """Return the table times what all variables but one say, summed over them, or the largest of it."""
     told = factor.table
     for axis, name in reversed(list(enumerate(factor.names))):
         if name in heard:  # behind its axis at most that of the target is left, which takes its place
-            told = _normalised(told.swapaxes(axis, -1) @ heard[name])
+            told = told.swapaxes(axis, -1)
+            told = _normalised((told * heard[name]).max(axis=-1) if best else told @ heard[name])
     return _normalised(told)
 
 

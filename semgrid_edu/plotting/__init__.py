@@ -19,6 +19,7 @@ from semgrid_edu.plotting.colours import (
 )
 from semgrid_edu.plotting.grids import grid_labels, grid_values, label_maps, occupancy, velocity, velocity_arrows
 from semgrid_edu.plotting.images import image_labels, image_values, plane_on_image, points_on_image
+from semgrid_edu.plotting.inference import coupling_errors, error_against_time, picks_a_side
 from semgrid_edu.plotting.legends import class_legend
 from semgrid_edu.plotting.lines import belief_history, probability_line, probability_lines, state_history
 from semgrid_edu.plotting.moving import animate_occupancy, particles, velocity_wheel
@@ -41,7 +42,9 @@ __all__ = [
     "belief_history",
     "class_legend",
     "confusion",
+    "coupling_errors",
     "depth_colours",
+    "error_against_time",
     "grid_labels",
     "grid_values",
     "image_labels",
@@ -50,6 +53,7 @@ __all__ = [
     "occupancy",
     "occupancy_colours",
     "particles",
+    "picks_a_side",
     "plane_on_image",
     "points_on_image",
     "probability_line",

@@ -7,11 +7,18 @@ from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter
 from scipy.special import log_softmax, softmax
 
-from semgrid_edu.crf import CrfParams, SeparableGaussian, mean_field, mean_field_naive, unary_from_probability
+from semgrid_edu.crf import (
+    CrfParams,
+    SeparableGaussian,
+    mean_field,
+    mean_field_accurate,
+    mean_field_naive,
+    unary_from_probability,
+)
 from semgrid_edu.crf.mean_field import bilateral_kernel
 from semgrid_edu.errors import ArgumentError
 
-TWINS = pytest.mark.parametrize("infer", [mean_field_naive, mean_field])
+TWINS = pytest.mark.parametrize("infer", [mean_field_naive, mean_field, mean_field_accurate])
 
 
 def patches(shape, count, rng):

@@ -1,0 +1,146 @@
+"""Charts of approximate inference in the CRF: error against time, and error as the coupling grows (section 3.5)."""
+
+from collections.abc import Mapping, Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from semgrid_edu.errors import ArgumentError
+
+PANELS = {
+    "total": "total error:\nagainst the exact kernel, converged",
+    "kernel": "kernel error: against the exact kernel\nafter the same number of updates",
+    "convergence": "convergence error:\nagainst the same kernel, converged",
+}
+"""The errors that `crf_error` tells apart, and what each compares."""
+_MARKERS = "osD^vP*X"
+_FLOOR = 1e-7
+"""Errors below are rounding errors of single precision, and drawn here."""
+_NUMBERED = (1, 10, 100)
+"""Numbers of updates that are written beside the points."""
+
+
+def error_against_time(result: Mapping, scene: str, of: str = "mean") -> Figure:
+    """Draw what each way of running mean field takes and how far it is off, in three panels that share their axes.
+
+    A line is one way; its points are numbers of updates.
+
+    Parameters
+    ----------
+    result : mapping
+        From `crf_error`, or from its JSON file.
+    scene : str
+        One of the scenes of the result.
+    of : str
+        "mean" or "max" over the cells of the total variation, or "labels", the share of labels that differ.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    ArgumentError
+        When the result has no such scene.
+    """
+    if scene not in result["scenes"]:
+        raise ArgumentError("scene", " or ".join(result["scenes"]), repr(scene))
+    figure, axes = plt.subplots(1, 3, figsize=(11, 4.4), sharex=True, sharey=True, layout="constrained")
+    for ax, (error, title) in zip(axes, PANELS.items(), strict=True):
+        for number, (way, found) in enumerate(result["scenes"][scene]["ways"].items()):
+            values = np.maximum([one[of] for one in found[error]], _FLOOR)
+            _points(ax, found["seconds"], values, way, number, result["iterations"])
+        ax.set(xscale="log", yscale="log", xlabel="time [s]")
+        ax.set_title(title, loc="left", fontsize="medium")
+        ax.grid(alpha=0.3)
+    whole = {"labels": "share of labels that differ"}.get(of, f"{of} total variation of a cell")
+    axes[0].set_ylabel(whole)
+    shape = " x ".join(map(str, result["scenes"][scene]["shape"][1:]))
+    figure.suptitle(f"{scene}, {shape} cells; the numbers beside points count updates", fontsize="medium")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=8, fontsize="small")
+    return figure
+
+
+def _points(ax: Axes, x: Sequence[float], y: Sequence[float], name: str, number: int, counts: Sequence[int]) -> None:
+    """Draw one way, with its numbers of updates beside some points."""
+    ax.plot(x, y, color=f"C{number}", marker=_MARKERS[number], markersize=4, linewidth=1, label=name)
+    for count, left, up in zip(counts, x, y, strict=True):
+        if count in _NUMBERED and up > _FLOOR:
+            ax.annotate(f"{count}", (left, up), (3, 3), textcoords="offset points", fontsize=8, color=f"C{number}")
+
+
+def coupling_errors(result: Mapping) -> Figure:
+    """Draw the errors of approximate inference on tiny grids against the coupling, one column per size.
+
+    Lines are means over the random grids; bands reach from the first to the third quartile.
+
+    Parameters
+    ----------
+    result : mapping
+        From `crf_coupling`, or from its JSON file.
+
+    Returns
+    -------
+    Figure
+    """
+    cases = result["cases"]
+    size = (2.9 * len(cases), 5.6)
+    figure, axes = plt.subplots(
+        2, len(cases), figsize=size, sharex=True, sharey="row", squeeze=False, layout="constrained"
+    )
+    numbers = {way: number for number, way in enumerate(next(iter(cases.values()))["labels"])}
+    for column, (name, case) in zip(axes.T, cases.items(), strict=True):
+        for ax, part in zip(column, ("variation", "labels"), strict=True):
+            for way, errors in case[part].items():
+                _band(ax, result["couplings"], 100 * np.asarray(errors), way, numbers[way])
+            ax.grid(alpha=0.3)
+        column[0].set_title(name, loc="left", fontsize="medium")
+        column[1].set_xlabel("coupling $w_1$")
+    axes[0, 0].set_ylabel("total variation from\nthe exact marginals [%]")
+    axes[1, 0].set_ylabel("labels unlike the most\nlikely labelling [% of cells]")
+    figure.legend(*axes[1, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize="small")
+    return figure
+
+
+def _band(ax: Axes, x: Sequence[float], errors: np.ndarray, name: str, number: int) -> None:
+    ax.plot(
+        x, errors.mean(axis=1), color=f"C{number}", marker=_MARKERS[number], markersize=4, linewidth=1.2, label=name
+    )
+    low, high = np.quantile(errors, (0.25, 0.75), axis=1)
+    ax.fill_between(x, low, high, color=f"C{number}", alpha=0.1, linewidth=0)
+
+
+def picks_a_side(symmetric: Mapping, ax: Axes | None = None) -> Axes:
+    """Draw what each way says of a cell that the exact marginal leaves undecided, against the coupling.
+
+    Solid lines: every cell leans a little towards class 0. Dashed ones: as little towards class 1.
+
+    Parameters
+    ----------
+    symmetric : mapping
+        The "symmetric" part of a result of `crf_coupling`, or what `symmetric_case` returns.
+    ax : Axes, optional
+        Axes to draw into.
+
+    Returns
+    -------
+    Axes
+    """
+    if ax is None:
+        _, ax = plt.subplots(figsize=(6.4, 3.8), layout="constrained")
+    both = symmetric["probability"]
+    solid = [way for way in both if not way.endswith(", other side")]
+    for number, way in enumerate(solid):
+        style = {"color": f"C{number}", "marker": _MARKERS[number], "markersize": 3, "linewidth": 1.4, "markevery": 4}
+        ax.plot(symmetric["couplings"], both[way], label=way, **style)
+        ax.plot(symmetric["couplings"], both[f"{way}, other side"], linestyle="--", **style)
+    height, width = symmetric["shape"]
+    tilt = symmetric["tilt"]
+    ax.set(ylim=(-0.03, 1.03), xlabel="coupling $w_1$", ylabel="probability of class 0 in the middle cell")
+    title = f"{height} x {width} cells, the network says {tilt:g} for class 0 (solid) or for class 1 (dashed) in each"
+    ax.set_title(title, loc="left", fontsize="medium")
+    ax.grid(alpha=0.3)
+    ax.legend(loc="upper left", fontsize="small")
+    return ax
