@@ -2,7 +2,6 @@
 
 import os
 import sys
-from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
@@ -11,11 +10,11 @@ import typer
 from typer.core import TyperCommand
 
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.experiments.commands import keep_result, reproduce
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 data = typer.Typer(no_args_is_help=True, help="Make and check data.")
 course = typer.Typer(no_args_is_help=True, help="Build the notebooks and the exercises.")
-reproduce = typer.Typer(no_args_is_help=True, help="Run the experiments of the lectures.")
 app.add_typer(data, name="data")
 app.add_typer(course, name="course")
 app.add_typer(reproduce, name="reproduce")
@@ -54,7 +53,7 @@ def demo(
 @data.command()
 def make(
     name: Annotated[
-        str, typer.Argument(help="minikitti, minichroma, minisynthia, sample, or all for the first three.")
+        str, typer.Argument(help="minikitti, minichroma, minisynthia, validation, sample, or all for the first three.")
     ],
     folder: Annotated[Path, typer.Argument(help="Takes the data set's own folder.")],
     seed: Annotated[int, typer.Option(help="Seed for the drives; the same seed gives the same bytes.")] = 0,
@@ -211,67 +210,25 @@ def evaluate(
     """Score a trained network and two simple baselines on the test frames."""
     from semgrid_edu.experiments.evaluate import evaluate, scores_table
 
-    _keep(out, lambda: evaluate(data, weights), lambda result: scores_table(result["scores"]))
+    keep_result(out, lambda: evaluate(data, weights), lambda result: scores_table(result["scores"]))
 
 
-@reproduce.command()
-def occupancy(
-    seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives and the particles.")] = 0,
-    drives: Annotated[int, typer.Option(min=1, help="Number of drives, of three seconds each.")] = 20,
-    grid: Annotated[str | None, typer.Option(help="paper or compact; both by default.")] = None,
-    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("occupancy.json"),
+@app.command()
+def search_crf(
+    data: Annotated[Path, typer.Option(help="A data set with validation frames, such as data/validation.")],
+    test: Annotated[Path, typer.Option(help="The data set that the network was trained on, with test frames.")],
+    weights: Annotated[Path, typer.Option(help="A network trained on its train frames.")],
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the parameters that are tried.")] = 0,
+    trials: Annotated[int, typer.Option(min=1, help="Number of trials in all; a search that ended can go on.")] = 200,
+    out: Annotated[Path, typer.Option(help="Takes each trial, then all scores.")] = Path("crf_search.json"),
 ) -> None:
-    """Score log-odds grid, BOF and CMCDOT on simulated drives (lecture 04)."""
-    from semgrid_edu.experiments.occupancy import GRIDS, compare_filters, occupancy_tables
+    """Calibrate a network, search the CRF's parameters on validation frames, and score the best on test frames."""
+    from semgrid_edu.experiments.crf_search import search_crf, search_table
 
-    _keep(out, lambda: compare_filters(seed, drives, (grid,) if grid else tuple(GRIDS)), occupancy_tables)
-
-
-@reproduce.command()
-def streets(
-    seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives and the particles.")] = 0,
-    drives: Annotated[int, typer.Option(min=1, help="Number of drives through each street.")] = 6,
-    grid: Annotated[str | None, typer.Option(help="paper or compact; both by default.")] = None,
-    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("streets.json"),
-) -> None:
-    """Score CMCDOT on streets with wire mesh, hedges, glass, walls that come into view, convoys (lecture 04)."""
-    from semgrid_edu.experiments.streets import GRIDS, measure_streets, streets_tables
-
-    _keep(out, lambda: measure_streets(seed, drives, (grid,) if grid else tuple(GRIDS)), streets_tables)
-
-
-@reproduce.command()
-def two_stage(
-    data: Annotated[Path, typer.Option(help="A data set with train and test frames, such as data/minikitti.")],
-    runs: Annotated[Path, typer.Option(help="Takes one folder per training run; a run that has ended isn't repeated.")],
-    seeds: Annotated[int, typer.Option(min=1, help="Number of training runs of each kind.")] = 3,
-    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("two_stage.json"),
-) -> None:
-    """Train end to end and in two stages, and score both kinds of networks (lecture 08)."""
-    from semgrid_edu.experiments.two_stage import compare_training, two_stage_table
-
-    _keep(out, lambda: compare_training(data, runs, seeds), lambda result: two_stage_table(result["scores"]))
-
-
-@reproduce.command()
-def overfit(
-    seed: Annotated[int, typer.Option(min=0, help="Seed for the initial weights.")] = 0,
-    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("overfit.json"),
-) -> None:
-    """Overfit four frames with each image network: learn them by heart (lecture 08)."""
-    from semgrid_edu.experiments.overfit import overfit, overfit_table
-
-    _keep(out, lambda: overfit(seed), lambda result: overfit_table(result["networks"]))
-
-
-def _keep(out: Path, compute: Callable[[], dict], table: Callable[[dict], str]) -> None:
-    """Compute an experiment's result, once it is known that the file can be written; write it, and print its table."""
-    from semgrid_edu.storage.files import check_writable, write_json
-
-    check_writable(out)
-    result = compute()
-    write_json(out, result)
-    typer.echo(f"{table(result)}\n\nwritten to {out}")
+    try:
+        keep_result(out, lambda: search_crf(data, test, weights, out, seed, trials), search_table)
+    except KeyboardInterrupt:
+        sys.exit(f"semgrid-edu: interrupted; the same command goes on from {out}")
 
 
 def _report(problems: list[str], sound: str) -> None:

@@ -6,16 +6,29 @@ from semgrid_edu.crf.lattice import PermutohedralLattice
 from semgrid_edu.crf.mean_field import mean_field
 from semgrid_edu.crf.naive import damping, mean_field_naive, mean_field_sequential, mean_field_updates
 from semgrid_edu.crf.params import CrfParams, unary_from_log_probability, unary_from_probability
+from semgrid_edu.crf.search import next_point, params_at, pareto_front, point_of
 from semgrid_edu.crf.spatial import SeparableGaussian
+from semgrid_edu.crf.temperature import (
+    Reliability,
+    at_temperature,
+    expected_calibration_error,
+    fit_temperature,
+    negative_log_likelihood,
+    reliability,
+)
 
 __all__ = [
     "CrfParams",
     "PermutohedralLattice",
+    "Reliability",
     "SeparableGaussian",
+    "at_temperature",
     "crf_model",
     "damping",
     "energy",
     "exact_marginals",
+    "expected_calibration_error",
+    "fit_temperature",
     "free_energy",
     "gram_matrix",
     "log_partition",
@@ -24,7 +37,13 @@ __all__ = [
     "mean_field_sequential",
     "mean_field_updates",
     "most_likely",
+    "negative_log_likelihood",
+    "next_point",
     "pair_weights",
+    "params_at",
+    "pareto_front",
+    "point_of",
+    "reliability",
     "unary_from_log_probability",
     "unary_from_probability",
 ]

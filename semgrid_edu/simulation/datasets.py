@@ -108,10 +108,13 @@ RECIPES = {
             (_long("train", 60, 10.0, "junction"), _long("test", 60, 10.0, "junction")),
             dense=True,
         ),
+        DatasetRecipe("validation", "KITTI-14", (Route("validation", 10, False),) * 72),
         DatasetRecipe("sample", "KITTI-14", (Route("drive", 20, True, SAMPLE_WISHES),)),
     )
 }
-"""Numbers of frames as in the paper: KITTI 142 + 110 labelled frames, INRIA-Chroma 146 + 130 in 3 + 2 routes."""
+"""Numbers of frames as in the paper: KITTI 142 + 110 labelled frames, INRIA-Chroma 146 + 130 in 3 + 2 routes.
+"validation" has drives like minikitti's, half as many as its training split, for parameters that are chosen when the
+network is trained already. The name of a data set is part of its seed, so no seed gives a drive of minikitti."""
 
 DATA_SETS = ("minikitti", "minichroma", "minisynthia")
 """What `semgrid-edu data make all` makes."""

@@ -1,0 +1,207 @@
+"""Calibration: the temperature at which a network's probabilities mean what they say, before eq. (3) uses them."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+from scipy.special import log_softmax, softmax
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.labels import IGNORE
+
+COLDEST, HOTTEST = 0.01, 100.0
+"""The temperatures between which `fit_temperature` looks."""
+
+
+class Reliability(NamedTuple):
+    """How often a classifier is right when it is so and so sure: the columns of a reliability diagram.
+
+    Parameters
+    ----------
+    confidence : (B,) float64
+        Mean probability of the most probable class, over the cells of each bin; 0 in an empty bin.
+    accuracy : (B,) float64
+        Share of these cells in which that class is right; 0 in an empty bin.
+    cells : (B,) int64
+        Number of cells in each bin.
+    """
+
+    confidence: NDArray[np.float64]
+    accuracy: NDArray[np.float64]
+    cells: NDArray[np.int64]
+
+
+def at_temperature(log_probability: ArrayLike, temperature: float) -> NDArray:
+    """Make a distribution less sure (temperature above 1) or surer (below 1): soft-max of log p / T.
+
+    The order of the classes stays as it is, so the most probable class does too.
+
+    Parameters
+    ----------
+    log_probability : (C, ...) float
+        log p, natural logarithms.
+    temperature : float
+        T, positive.
+
+    Returns
+    -------
+    (C, ...) float
+        Logarithms of the new distribution, in the type of the argument.
+
+    Raises
+    ------
+    ArgumentError
+        When the temperature isn't a positive number.
+
+    Examples
+    --------
+    >>> np.exp(at_temperature(np.log([0.8, 0.2]), 2.0)).round(3)
+    array([0.667, 0.333])
+    """
+    if not (np.isfinite(temperature) and temperature > 0):
+        raise ArgumentError("temperature", "a positive number", temperature)
+    return log_softmax(np.asarray(log_probability) / float(temperature), axis=0)
+
+
+def negative_log_likelihood(log_probability: ArrayLike, truth: ArrayLike, ignore: int = IGNORE) -> float:
+    """Return the mean of -log p(truth) over all labelled cells: the smaller, the better the probabilities.
+
+    Parameters
+    ----------
+    log_probability : (C, ...) float
+        log p, natural logarithms.
+    truth : (...) int
+        The class of each cell.
+    ignore : int
+        Class number of what is unlabelled, which counts nowhere.
+
+    Returns
+    -------
+    float
+        Nats per cell.
+
+    Raises
+    ------
+    ArgumentError
+        When the shapes don't fit, a label is no class, or no cell is labelled.
+    """
+    columns, classes = _labelled("log_probability", log_probability, truth, ignore)
+    return -float(columns[classes, np.arange(len(classes))].mean(dtype=np.float64))
+
+
+def fit_temperature(log_probability: ArrayLike, truth: ArrayLike, ignore: int = IGNORE) -> float:
+    """Return the temperature that makes the truth most likely (Guo et al. 2017, "temperature scaling").
+
+    With b = 1 / T, the loss logsumexp(b log p) - b log p(truth) is convex in b, and its derivative is the mean of log p
+    under the scaled distribution minus log p(truth). The best b is where the mean of this over all cells crosses zero.
+
+    Parameters
+    ----------
+    log_probability : (C, ...) float
+        log p, natural logarithms, of cells that the classifier has not learned from. (On its own training data a
+        classifier is right more often than elsewhere, and the temperature comes out too low.)
+    truth : (...) int
+        The class of each cell.
+    ignore : int
+        Class number of what is unlabelled, which counts nowhere.
+
+    Returns
+    -------
+    float
+        T, between 0.01 and 100.
+
+    Raises
+    ------
+    ArgumentError
+        When the shapes don't fit, a label is no class, no cell is labelled, a probability is 0, or the best
+        temperature lies outside: when every cell is right, or log p tells nothing about the truth.
+
+    Examples
+    --------
+    Four cells at 99 % of which one is wrong: at the right temperature they are at 75 %.
+
+    >>> log_p = np.log([[0.99] * 4, [0.01] * 4])
+    >>> T = fit_temperature(log_p, [0, 0, 0, 1])
+    >>> np.exp(at_temperature(log_p, T))[0].round(4)
+    array([0.75, 0.75, 0.75, 0.75])
+    """
+    columns, classes = _labelled("log_probability", log_probability, truth, ignore)
+    if not np.isfinite(columns).all():
+        raise ArgumentError("log_probability", "finite logarithms", "infinity or NaN: a class of probability 0?")
+    columns = columns.astype(np.float64)
+    of_truth = columns[classes, np.arange(len(classes))].mean()
+
+    def slope(b: float) -> float:
+        return (softmax(b * columns, axis=0) * columns).sum(axis=0).mean() - of_truth
+
+    ends = 1 / HOTTEST, 1 / COLDEST
+    if not slope(ends[0]) < 0 < slope(ends[1]):
+        found = "every cell right" if slope(ends[0]) < 0 else "log p that tells nothing about the truth"
+        raise ArgumentError("truth", f"a best temperature between {COLDEST} and {HOTTEST}", found)
+    return float(1 / brentq(slope, *ends, xtol=1e-9, rtol=1e-9))
+
+
+def reliability(probability: ArrayLike, truth: ArrayLike, n_bins: int = 15, ignore: int = IGNORE) -> Reliability:
+    """Sort cells by the probability of their most probable class, and count how often it is right.
+
+    Parameters
+    ----------
+    probability : (C, ...) float
+        The distribution over the classes in each cell.
+    truth : (...) int
+        The class of each cell.
+    n_bins : int
+        B, the number of bins, equally wide between 0 and 1; each contains its upper end.
+    ignore : int
+        Class number of what is unlabelled, which counts nowhere.
+
+    Returns
+    -------
+    Reliability
+        Confidence, accuracy and number of cells of each bin. For a calibrated classifier the first two are equal.
+
+    Raises
+    ------
+    ArgumentError
+        When the shapes don't fit, a label is no class, no cell is labelled, or there is no bin.
+    """
+    columns, classes = _labelled("probability", probability, truth, ignore)
+    if n_bins < 1:
+        raise ArgumentError("n_bins", "at least one bin", n_bins)
+    sure = columns.max(axis=0).astype(np.float64)
+    bins = np.clip(np.ceil(sure * n_bins).astype(int) - 1, 0, n_bins - 1)
+    right = columns.argmax(axis=0) == classes
+    cells, confidence, accuracy = (np.bincount(bins, weights, n_bins) for weights in (None, sure, right))
+    shared = np.maximum(cells, 1)
+    return Reliability(confidence / shared, accuracy / shared, cells)
+
+
+def expected_calibration_error(diagram: Reliability) -> float:
+    """Return the mean gap between confidence and accuracy over all cells, 0..1 (Naeini et al. 2015).
+
+    Parameters
+    ----------
+    diagram : Reliability
+        From `reliability`.
+
+    Returns
+    -------
+    float
+        ECE; 0 for a calibrated classifier.
+    """
+    return float(diagram.cells @ np.abs(diagram.confidence - diagram.accuracy) / diagram.cells.sum())
+
+
+def _labelled(name: str, columns: ArrayLike, truth: ArrayLike, ignore: int) -> tuple[NDArray, NDArray[np.int64]]:
+    """Return the columns (C, N) and the classes (N,) of the labelled cells, once they are known to fit."""
+    columns, truth = np.asarray(columns), np.asarray(truth)
+    if columns.ndim == 0 or columns.shape[1:] != truth.shape:
+        raise ArgumentError(name, f"shape (C, {', '.join(map(str, truth.shape))})", f"shape {columns.shape}")
+    kept = truth != ignore
+    classes = truth[kept].astype(np.int64)
+    if not len(classes):
+        raise ArgumentError("truth", "at least one labelled cell", f"{ignore} everywhere")
+    if not (classes.min() >= 0 and classes.max() < len(columns)):
+        raise ArgumentError("truth", f"classes 0..{len(columns) - 1}", f"{classes.min()}..{classes.max()}")
+    return columns[:, kept], classes

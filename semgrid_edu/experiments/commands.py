@@ -1,0 +1,80 @@
+"""The commands of `semgrid-edu reproduce`: each runs an experiment, keeps its result and prints its table."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+reproduce = typer.Typer(no_args_is_help=True, help="Run the experiments of the lectures.")
+"""What `semgrid-edu` adds to its commands."""
+
+
+@reproduce.command()
+def occupancy(
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives and the particles.")] = 0,
+    drives: Annotated[int, typer.Option(min=1, help="Number of drives, of three seconds each.")] = 20,
+    grid: Annotated[str | None, typer.Option(help="paper or compact; both by default.")] = None,
+    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("occupancy.json"),
+) -> None:
+    """Score log-odds grid, BOF and CMCDOT on simulated drives (lecture 04)."""
+    from semgrid_edu.experiments.occupancy import GRIDS, compare_filters, occupancy_tables
+
+    keep_result(out, lambda: compare_filters(seed, drives, (grid,) if grid else tuple(GRIDS)), occupancy_tables)
+
+
+@reproduce.command()
+def streets(
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives and the particles.")] = 0,
+    drives: Annotated[int, typer.Option(min=1, help="Number of drives through each street.")] = 6,
+    grid: Annotated[str | None, typer.Option(help="paper or compact; both by default.")] = None,
+    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("streets.json"),
+) -> None:
+    """Score CMCDOT on streets with wire mesh, hedges, glass, walls that come into view, convoys (lecture 04)."""
+    from semgrid_edu.experiments.streets import GRIDS, measure_streets, streets_tables
+
+    keep_result(out, lambda: measure_streets(seed, drives, (grid,) if grid else tuple(GRIDS)), streets_tables)
+
+
+@reproduce.command()
+def two_stage(
+    data: Annotated[Path, typer.Option(help="A data set with train and test frames, such as data/minikitti.")],
+    runs: Annotated[Path, typer.Option(help="Takes one folder per training run; a run that has ended isn't repeated.")],
+    seeds: Annotated[int, typer.Option(min=1, help="Number of training runs of each kind.")] = 3,
+    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("two_stage.json"),
+) -> None:
+    """Train end to end and in two stages, and score both kinds of networks (lecture 08)."""
+    from semgrid_edu.experiments.two_stage import compare_training, two_stage_table
+
+    keep_result(out, lambda: compare_training(data, runs, seeds), lambda result: two_stage_table(result["scores"]))
+
+
+@reproduce.command()
+def overfit(
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the initial weights.")] = 0,
+    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("overfit.json"),
+) -> None:
+    """Overfit four frames with each image network: learn them by heart (lecture 08)."""
+    from semgrid_edu.experiments.overfit import overfit, overfit_table
+
+    keep_result(out, lambda: overfit(seed), lambda result: overfit_table(result["networks"]))
+
+
+def keep_result(out: Path, compute: Callable[[], dict], table: Callable[[dict], str]) -> None:
+    """Compute an experiment's result, once it is known that the file can be written; write it, and print its table.
+
+    Parameters
+    ----------
+    out : Path
+        The file to write, as JSON.
+    compute : callable
+        Returns the result.
+    table : callable
+        Turns the result into text to print.
+    """
+    from semgrid_edu.storage.files import check_writable, write_json
+
+    check_writable(out)
+    result = compute()
+    write_json(out, result)
+    typer.echo(f"{table(result)}\n\nwritten to {out}")

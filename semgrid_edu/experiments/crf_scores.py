@@ -1,0 +1,117 @@
+"""What the chosen CRFs are worth on the test split, and how well calibrated the grids are (sections 3.5 and 4.2)."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.crf import CrfParams, expected_calibration_error, negative_log_likelihood, reliability
+from semgrid_edu.datasets.index import load_index
+from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.experiments.crf_outputs import GridOutputs, frame_confusions, grid_outputs, outputs_at, refined_grids
+from semgrid_edu.experiments.evaluate import scores
+from semgrid_edu.metrics import METRICS
+from semgrid_edu.networks import load_net
+
+DRAWS = 1000
+"""Number of bootstrap samples of the test drives behind an interval."""
+
+
+def calibration(outputs: GridOutputs) -> dict[str, object]:
+    """Return how far a network's probabilities can be believed.
+
+    Parameters
+    ----------
+    outputs : GridOutputs
+        The network's grids.
+
+    Returns
+    -------
+    dict
+        "NLL", nats per cell; "ECE", 0..1; and the columns of the reliability diagram.
+    """
+    diagram = reliability(np.exp(outputs.columns), outputs.truth)
+    columns = {name: column.tolist() for name, column in diagram._asdict().items()}
+    nll = negative_log_likelihood(outputs.columns, outputs.truth)
+    return {"NLL": nll, "ECE": expected_calibration_error(diagram), "reliability": columns}
+
+
+def compare_on_test(
+    dataset_dir: str | Path, weights: str | Path, temperature: float, chosen: dict[str, CrfParams], seed: int = 0
+) -> dict[str, object]:
+    """Score the network, the default CRF, and the chosen CRFs on the test split.
+
+    Parameters
+    ----------
+    dataset_dir : path-like
+        A data set with the split "test".
+    weights : path-like
+        The network.
+    temperature : float
+        T of the calibrated network.
+    chosen : dict of str to CrfParams
+        What was chosen, by objective.
+    seed : int
+        Seed for the bootstrap samples.
+
+    Returns
+    -------
+    dict
+        "frames"; "calibration" "before" and "after"; by method "scores" (see `Scores`), "ECE" of the refined
+        probabilities, "gains" over the network by metric (low, gain, high), and "confusion". JSON can hold it.
+    """
+    test = TrainingSet(dataset_dir, "test")
+    network, default = grid_outputs(load_net(weights, test.camera), test), CrfParams.for_cells(test.spec.cell)
+    calibrated = outputs_at(network, temperature)
+    methods = {"network": (network, None), "CRF": (network, default), "calibrated, CRF": (calibrated, default)}
+    methods |= {f"calibrated, CRF for {objective}": (calibrated, params) for objective, params in chosen.items()}
+    per_drive, ece = {}, {}
+    frames = list(map(len, load_index(dataset_dir).frames_by_drive("test").values()))
+    for method, (outputs, params) in methods.items():
+        refined = refined_grids(outputs, params)
+        ece[method] = expected_calibration_error(reliability(refined.swapaxes(0, 1), outputs.truth))
+        per_drive[method] = np.add.reduceat(frame_confusions(outputs, refined), np.cumsum([0, *frames[:-1]]))
+    confusions = {method: confusion.sum(axis=0) for method, confusion in per_drive.items()}
+    return {
+        "frames": len(test),
+        "calibration": {"before": calibration(network), "after": calibration(calibrated)},
+        "scores": scores(confusions, test.label_set),
+        "ECE": ece,
+        "gains": {
+            method: {
+                name: gain_interval(confusion, per_drive["network"], metric, seed) for name, metric in METRICS.items()
+            }
+            for method, confusion in per_drive.items()
+            if method != "network"
+        },
+        "confusion": {method: confusion.tolist() for method, confusion in confusions.items()},
+    }
+
+
+def gain_interval(
+    a: NDArray, b: NDArray, metric: Callable[[NDArray], float], seed: int = 0
+) -> tuple[float, float, float]:
+    """Return by how much one method beats another on the same drives, and how much of that is the choice of drives.
+
+    Drives are drawn anew, with replacement, a thousand times, the same ones for both methods (paired bootstrap).
+
+    Parameters
+    ----------
+    a, b : (V, C, C) int
+        Confusion matrices of the two methods, drive by drive.
+    metric : callable
+        Takes the sum of some drives' matrices.
+    seed : int
+        Seed for the draws.
+
+    Returns
+    -------
+    low, gain, high : float
+        metric(a) - metric(b) over all drives, and the middle 95 % of it over the draws.
+    """
+    drives = len(a)
+    times = np.random.default_rng(seed).multinomial(drives, np.full(drives, 1 / drives), size=DRAWS)
+    draws = zip(np.tensordot(times, a, 1), np.tensordot(times, b, 1), strict=True)
+    low, high = np.quantile([metric(of_a) - metric(of_b) for of_a, of_b in draws], [0.025, 0.975])
+    return float(low), metric(a.sum(axis=0)) - metric(b.sum(axis=0)), float(high)

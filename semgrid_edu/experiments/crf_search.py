@@ -1,0 +1,161 @@
+"""A search for the CRF's parameters on drives that neither training nor test has seen (section 3.5, claim of 4.3)."""
+
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+
+from tqdm.auto import tqdm
+
+from semgrid_edu.crf import CrfParams, fit_temperature, pareto_front
+from semgrid_edu.datasets.index import INDEX_FILE, load_index
+from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.experiments.crf_outputs import grid_outputs, outputs_at, refuse_known_drives
+from semgrid_edu.experiments.crf_scores import calibration, compare_on_test
+from semgrid_edu.experiments.crf_trials import (
+    OBJECTIVES,
+    next_params,
+    objective_values,
+    read_trials,
+    run_trial,
+    validation_scores,
+)
+from semgrid_edu.experiments.evaluate import scores_table
+from semgrid_edu.networks import load_net
+from semgrid_edu.storage.files import sha256, write_json
+from semgrid_edu.storage.provenance import FILE_NAME, versions
+
+
+def search_crf(
+    validation_dir: str | Path,
+    dataset_dir: str | Path,
+    weights: str | Path,
+    log: str | Path,
+    seed: int = 0,
+    n_trials: int = 200,
+) -> dict[str, object]:
+    """Calibrate a network, search the CRF's parameters, and score what was chosen on the test split.
+
+    Temperature and parameters are chosen on drives of their own. On the drives that it was trained on a network is
+    surer, and more often right, than anywhere else: a temperature fitted there would be too low, and a CRF chosen there
+    would have little to repair. Holding drives back from training would mean to train each network anew on fewer. New
+    drives of the same simulator cost minutes (`semgrid-edu data make validation`) and leave the networks, and all
+    scores in docs/results, as they are. A data set that has a split "validation" of its own serves as well.
+
+    The temperature comes first, by likelihood alone (`fit_temperature`), and stays. Then the two weights and three
+    widths are searched (`next_point`). Test frames are looked at once, at the end.
+
+    Parameters
+    ----------
+    validation_dir : path-like
+        A data set with the split "validation".
+    dataset_dir : path-like
+        The data set that the network was trained on, such as data/minikitti, with the splits "train" and "test".
+    weights : path-like
+        A network trained on the split "train".
+    log : path-like
+        Takes every trial as soon as it has ended, as JSON. If the file holds trials of the same search, they aren't
+        repeated.
+    seed : int
+        Seed for the parameters that are tried, and for the confidence intervals; not negative.
+    n_trials : int
+        Number of trials in all, at least one.
+
+    Returns
+    -------
+    dict
+        "temperature", "calibration", "unrefined" (validation scores without CRF), "chosen" (a trial for each of
+        `OBJECTIVES`), "pareto" (numbers of the trials that no other one beats in both accuracies), "test" (from
+        `compare_on_test`), "trials", and all that made them. JSON can hold it.
+
+    Raises
+    ------
+    ArgumentError
+        When a split is missing, there is no trial, or the seed is negative.
+    DataError
+        When a file is missing or damaged, a drive of "validation" is one of "train" or "test", or the log is that of
+        another search.
+    """
+    if n_trials < 1 or seed < 0:
+        name, value = ("n_trials", n_trials) if n_trials < 1 else ("seed", seed)
+        raise ArgumentError(name, "a whole number from 0 up, and one trial at least", value)
+    refuse_known_drives(validation_dir, dataset_dir)
+    validation = TrainingSet(validation_dir, "validation")
+    identity = _identity(validation_dir, dataset_dir, weights, seed)
+    trials, network = read_trials(log, identity), grid_outputs(load_net(weights, validation.camera), validation)
+    temperature = fit_temperature(network.columns, network.truth)
+    calibrated, cell = outputs_at(network, temperature), validation.spec.cell
+    unrefined = validation_scores(calibrated, None, validation.label_set)
+    with tqdm(total=n_trials, initial=len(trials), desc="search", unit="trial") as bar:
+        while len(trials) < n_trials:
+            params = next_params(trials, unrefined, cell, seed)
+            trials.append(run_trial(calibrated, params, validation.label_set))
+            write_json(log, identity | {"trials": trials})
+            bar.update()
+    values = objective_values(trials, unrefined)
+    chosen = {name: int(k) for name, k in zip(OBJECTIVES, values.argmax(axis=0), strict=True)}
+    params = {name: CrfParams(**trials[k]["params"]) for name, k in chosen.items()}
+    return identity | {
+        "temperature": temperature,
+        "cell": cell,
+        "frames": len(validation),
+        "calibration": {"before": calibration(network), "after": calibration(calibrated)},
+        "unrefined": unrefined,
+        "chosen": {name: {"trial": k, **trials[k]} for name, k in chosen.items()},
+        "pareto": pareto_front(values[:, :2]).tolist(),
+        "test": compare_on_test(dataset_dir, weights, temperature, params, seed),
+        "command": _command(validation_dir, dataset_dir, weights, seed, n_trials),
+        "date": f"{datetime.now(UTC):%Y-%m-%d}",
+        "minutes": round(sum(trial["seconds"] for trial in trials) / 60, 1),
+        "versions": versions("numpy", "torch", "numba", "scipy"),
+        "trials": trials,
+    }
+
+
+def search_table(result: dict) -> str:
+    """Return the temperature, what was chosen, and the scores on the test split as text to print.
+
+    Parameters
+    ----------
+    result : dict
+        From `search_crf`.
+
+    Returns
+    -------
+    str
+        Scores in per cent; gains over the network without CRF in points, with their 95 % intervals over test drives.
+    """
+    before, after = (result["calibration"][when]["ECE"] for when in ("before", "after"))
+    lines = [f"temperature {result['temperature']:.3f}: calibration error {before:.1%} before, {after:.1%} after", ""]
+    for objective, trial in result["chosen"].items():
+        named = ", ".join(f"{name} {value:g}" for name, value in trial["params"].items())
+        lines.append(f"best {objective}, trial {trial['trial']}: {named}")
+    lines += ["", scores_table(result["test"]["scores"]), "", "gain over the network without CRF, points:"]
+    for method, gains in result["test"]["gains"].items():
+        shown = (
+            f"{name} {100 * g:+.2f} ({100 * low:+.2f} to {100 * high:+.2f})" for name, (low, g, high) in gains.items()
+        )
+        lines.append(f"{method}: {', '.join(shown)}")
+    return "\n".join(lines)
+
+
+def _identity(validation_dir: str | Path, dataset_dir: str | Path, weights: str | Path, seed: int) -> dict:
+    """Return what makes the search: data by the SHA-256 of their index, weights, seed."""
+    data = {name: Path(folder) for name, folder in (("validation", validation_dir), ("dataset", dataset_dir))}
+    named = {
+        name: {"name": load_index(folder).name, "sha256": sha256(folder / INDEX_FILE)} for name, folder in data.items()
+    }
+    record = Path(weights).with_name(FILE_NAME)
+    trained_on = json.loads(record.read_text(encoding="utf-8")).get("dataset") if record.exists() else None
+    used = {"file": _short(weights), "sha256": sha256(weights), "trained on": trained_on}
+    return named | {"weights": used, "seed": seed}
+
+
+def _command(validation_dir: str | Path, dataset_dir: str | Path, weights: str | Path, seed: int, n_trials: int) -> str:
+    data = f"--data {Path(validation_dir).resolve().name} --test {Path(dataset_dir).resolve().name}"
+    return f"semgrid-edu search-crf {data} --weights {_short(weights)} --seed {seed} --trials {n_trials}"
+
+
+def _short(weights: str | Path) -> str:
+    """Return the last two parts of a path: the folder that names the network, and the file."""
+    return "/".join(Path(weights).resolve().parts[-2:])
