@@ -1,14 +1,12 @@
 """The CRF as a layer of a network: mean field unrolled in torch, with weights, widths and label costs that learn."""
 
 import math
-from collections.abc import Callable
-from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
 
 from semgrid_edu.crf.naive import NEVER
-from semgrid_edu.crf.pair_window import PairSum, PairWindow
+from semgrid_edu.crf.pair_kernels import Pairs, bilateral_pairs, spatial_pairs
 from semgrid_edu.crf.params import CrfParams, check_stop
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.occupancy import N_STATES
@@ -84,6 +82,22 @@ class CrfLayer(nn.Module):
         """mu, (C, C): symmetric, since a pair of cells has no first and second one."""
         return (self.label_costs + self.label_costs.T) / 2
 
+    @property
+    def n_classes(self) -> int:
+        """C, the number of classes."""
+        return len(self.label_costs)
+
+    def description(self) -> dict[str, object]:
+        """Return what a layer is made from beside its weights and widths, by name of the constructor's arguments.
+
+        Returns
+        -------
+        dict
+            "normalization", and all arguments but `params`; JSON can hold it.
+        """
+        names = ("normalization", "n_classes", "radius", "iterations")
+        return {name: getattr(self, name) for name in names} | {"learn_compatibility": self.label_costs.requires_grad}
+
     def params(self) -> CrfParams:
         """Return the weights and widths as they are now, for `mean_field` and all else that takes parameters.
 
@@ -97,7 +111,7 @@ class CrfLayer(nn.Module):
         ArgumentError
             When mu has learnt, since no other function of the package has one.
         """
-        if not torch.equal(self.label_costs.detach().cpu(), 1 - torch.eye(len(self.label_costs))):
+        if not torch.equal(self.label_costs.detach().cpu(), 1 - torch.eye(self.n_classes)):
             raise ArgumentError("compatibility", "the Potts model; only the layer itself has another", "a learnt one")
         return CrfParams(*self.log_weights.exp().tolist(), *self.log_sigmas.exp().tolist(), self.normalization)
 
@@ -131,7 +145,7 @@ class CrfLayer(nn.Module):
             log_Q = ((1 - step) * log_Q + step * (-phi - cost)).log_softmax(dim=1)
         return log_Q
 
-    def pairs(self, occupancy: Tensor) -> "Pairs":
+    def pairs(self, occupancy: Tensor) -> Pairs:
         """Return the bracket of eq. (4) for all pairs of cells of a batch.
 
         Parameters
@@ -145,8 +159,8 @@ class CrfLayer(nn.Module):
             Both kernels together.
         """
         (w1, w2), (sigma_alpha, sigma_beta, sigma_gamma) = self.log_weights.exp(), self.log_sigmas.exp()
-        bilateral = _bilateral(occupancy, self.radius, sigma_alpha, sigma_beta)
-        both = [bilateral, _spatial(occupancy, sigma_gamma)]
+        bilateral = bilateral_pairs(occupancy, self.radius, sigma_alpha, sigma_beta)
+        both = [bilateral, spatial_pairs(occupancy, sigma_gamma)]
         if self.normalization == "symmetric":
             both = [kernel.normalised(occupancy) for kernel in both]
         first, second = both
@@ -154,9 +168,8 @@ class CrfLayer(nn.Module):
 
     def _check(self, log_g: Tensor, occupancy: Tensor) -> None:
         """Refuse what `mean_field` refuses."""
-        n_classes = len(self.label_costs)
-        if log_g.ndim != 4 or log_g.shape[1] != n_classes:
-            raise ArgumentError("log_g", f"shape (B, {n_classes}, H, W)", tuple(log_g.shape))
+        if log_g.ndim != 4 or log_g.shape[1] != self.n_classes:
+            raise ArgumentError("log_g", f"shape (B, {self.n_classes}, H, W)", tuple(log_g.shape))
         expected = (len(log_g), N_STATES, *log_g.shape[2:])
         if tuple(occupancy.shape) != expected:
             raise ArgumentError("occupancy", f"shape {expected}", tuple(occupancy.shape))
@@ -164,37 +177,6 @@ class CrfLayer(nn.Module):
             raise ArgumentError("log_g", "numbers, and a possible class in each cell", "NaN, inf or a cell without any")
         if not (occupancy.sum(dim=1) - 1).abs().le(1e-3).all():
             raise ArgumentError("occupancy", "four probabilities that sum to 1 in each cell", "a cell where they don't")
-
-
-class Pairs(NamedTuple):
-    """A kernel between the cells of a batch of grids.
-
-    Parameters
-    ----------
-    sums : callable
-        x (B, K, H, W) -> y (B, K, H, W), y_i = sum_{j != i} k_ij x_j.
-    own : (B or 1, 1, H, W) float
-        k_ii.
-    """
-
-    sums: Callable[[Tensor], Tensor]
-    own: Tensor
-
-    def normalised(self, occupancy: Tensor) -> "Pairs":
-        """Return D^-1/2 K D^-1/2 with D the row sums of the kernel K, its diagonal included.
-
-        Parameters
-        ----------
-        occupancy : (B, 4, H, W) float
-            Any array of the batch: it gives shape and type.
-
-        Returns
-        -------
-        Pairs
-            The normalised kernel.
-        """
-        root = (self.own + self.sums(torch.ones_like(occupancy[:, :1]))).sqrt()
-        return Pairs(lambda x: self.sums(x / root) / root, self.own / root**2)
 
 
 def step_size(pairs: Pairs, compatibility: Tensor) -> Tensor:
@@ -228,19 +210,3 @@ def step_size(pairs: Pairs, compatibility: Tensor) -> Tensor:
     eigenvalues = torch.linalg.eigvalsh(differences @ compatibility @ differences)
     rows = pairs.sums(torch.ones_like(pairs.own))
     return 1 / (1 + (eigenvalues[0].neg().relu() * pairs.own + eigenvalues[-1].relu() * rows) / 2)
-
-
-def _bilateral(occupancy: Tensor, radius: int, sigma_alpha: Tensor, sigma_beta: Tensor) -> Pairs:
-    """Return the first kernel of eq. (4), on place and occupancy, for the pairs of a window."""
-    window = PairWindow(*occupancy.shape[2:], radius)
-    places = torch.tensor(window.offsets).reshape(-1, 2).to(occupancy).square().sum(dim=1, keepdim=True)
-    states = window.squared_distances(occupancy)
-    weights = torch.exp(-0.5 * (places / sigma_alpha**2 + states / sigma_beta**2))
-    return Pairs(lambda x: PairSum.apply(weights, x, window), torch.ones_like(occupancy[:, :1]))
-
-
-def _spatial(occupancy: Tensor, sigma_gamma: Tensor) -> Pairs:
-    """Return the second kernel of eq. (4), on place alone: the product of a Gaussian of rows and one of columns."""
-    axes = (torch.arange(size).to(occupancy) for size in occupancy.shape[2:])
-    rows, columns = (torch.exp(-0.5 * ((axis[:, None] - axis) / sigma_gamma) ** 2) for axis in axes)
-    return Pairs(lambda x: rows @ x @ columns - x, torch.ones_like(occupancy[:, :1]))
