@@ -182,7 +182,7 @@ def test_weights_can_be_learnt_back():
     log_g, occupancy = random_grids(4, classes=3, shape=(7, 7))
     truth = refined(CrfLayer(CrfParams(2, 1, 2, 0.5, 1.2), 3, COVERING, 3), log_g, occupancy)
     layer = CrfLayer(CrfParams(3, 0.7, 3, 0.4, 0.9), 3, COVERING, 3)
-    optimiser = torch.optim.LBFGS(layer.parameters(), max_iter=200, line_search_fn="strong_wolfe")
+    optimiser = torch.optim.LBFGS(layer.parameters(), max_iter=100, line_search_fn="strong_wolfe")
 
     def divergence():
         optimiser.zero_grad()
