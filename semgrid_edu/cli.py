@@ -183,6 +183,32 @@ def train(
 
 
 @app.command()
+def train_crf(
+    data: Annotated[Path, typer.Option(help="A data set; best one that the network has never seen.")],
+    weights: Annotated[Path, typer.Option(help="A trained network, which stays as it is.")],
+    out: Annotated[Path, typer.Option(help="A folder for the weights, the log and their provenance.")],
+    split: Annotated[str, typer.Option(help="The frames of the data set to learn from.")] = "validation",
+    label_costs: Annotated[bool, typer.Option("--label-costs", help="Learn a cost for every two labels.")] = False,
+    weight_limit: Annotated[float, typer.Option(help="Limit of the class weights; 1: all cells count the same.")] = 4.0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the order of the frames.")] = 0,
+    iterations: Annotated[int, typer.Option(min=1, help="Steps of two frames each.")] = 150,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was interrupted.")] = False,
+) -> None:
+    """Train a CRF on the grids of a trained network: its weights, widths, and costs of labels."""
+    from dataclasses import replace
+
+    from semgrid_edu.experiments.learned_crf import CrfVariant, train_crf_on
+    from semgrid_edu.training.crf import CRF_TRAINING
+    from semgrid_edu.training.run import how_to_go_on
+
+    params = replace(CRF_TRAINING, grid_iterations=iterations)
+    try:
+        train_crf_on(data, weights, out, CrfVariant(split, label_costs, weight_limit), params, seed, resume)
+    except KeyboardInterrupt:
+        sys.exit(f"semgrid-edu: interrupted; {how_to_go_on(out)}")
+
+
+@app.command()
 def curves(
     runs: Annotated[list[Path], typer.Argument(help="Folders that `semgrid-edu train` writes, finished or not.")],
     out: Annotated[Path, typer.Option(help="Where to write the picture.")] = Path("curves.png"),

@@ -83,6 +83,21 @@ def crf_coupling(
     keep_result(out, lambda: crf_coupling(out, seed, draws), crf_coupling_tables)
 
 
+@reproduce.command()
+def learned_crf(
+    data: Annotated[Path, typer.Option(help="The data set that the network learned from, such as data/minikitti.")],
+    validation: Annotated[Path, typer.Option(help="A data set with validation frames, such as data/validation.")],
+    weights: Annotated[Path, typer.Option(help="A network trained on the train frames of --data.")],
+    runs: Annotated[Path, typer.Option(help="Takes one folder per training run; a run that has ended isn't repeated.")],
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the order of the frames.")] = 0,
+    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("learned_crf.json"),
+) -> None:
+    """Learn a CRF's weights, widths and label costs in eight ways, and score them on test frames (lecture 11)."""
+    from semgrid_edu.experiments.learned_crf_scores import compare_learned_crfs, learned_crf_table
+
+    keep_result(out, lambda: compare_learned_crfs(data, validation, weights, runs, seed=seed), learned_crf_table)
+
+
 def keep_result(out: Path, compute: Callable[[], dict], table: Callable[[dict], str]) -> None:
     """Compute an experiment's result, once it is known that the file can be written; write it, and print its table.
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from semgrid_edu.datasets.training_set import Sample
@@ -55,14 +56,36 @@ def draw_batch(
     Batch
         B frames.
     """
-    epoch, k = divmod(iteration, len(dataset) // size)
-    order = np.random.default_rng((seed, 0, epoch)).permutation(len(dataset))
-    chosen = order[k * size : (k + 1) * size]
+    chosen = frames_of_step(len(dataset), size, iteration, seed)
     frames = Sample(*map(torch.stack, zip(*(dataset[i] for i in chosen.tolist()), strict=True)))
     rng = np.random.default_rng((seed, 1, iteration))
     contrast, brightness = rng.uniform(-jitter, jitter, (2, size, 1, 1, 1)).astype(np.float32)
     image = (unit_image(frames.image) - 0.5) * (1 + torch.from_numpy(contrast)) + 0.5 + torch.from_numpy(brightness)
     return Batch(frames._replace(image=image.clamp(0, 1)), mirrored=mirror and bool(rng.random() < 0.5))
+
+
+def frames_of_step(n_frames: int, size: int, iteration: int, seed: int) -> NDArray[np.int64]:
+    """Return which frames the batch of a step holds: each pass over the data takes them in a new order.
+
+    Parameters
+    ----------
+    n_frames : int
+        Number of frames of the data.
+    size : int
+        B, the number of frames in a batch.
+    iteration : int
+        Number of the step.
+    seed : int
+        Seed for the order.
+
+    Returns
+    -------
+    (B,) int
+        Numbers of frames.
+    """
+    epoch, k = divmod(iteration, n_frames // size)
+    order = np.random.default_rng((seed, 0, epoch)).permutation(n_frames)
+    return order[k * size : (k + 1) * size]
 
 
 def share_of_batch(batch: Batch, process: int, n_processes: int, device: torch.device | str) -> Batch:

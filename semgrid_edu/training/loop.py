@@ -15,7 +15,7 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, save_net
 from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.training.allocator import keep_freed_memory
-from semgrid_edu.training.batches import Batch, draw_batch, share_of_batch
+from semgrid_edu.training.batches import draw_batch, share_of_batch
 from semgrid_edu.training.checkpoint import load_checkpoint, save_checkpoint
 from semgrid_edu.training.devices import mixed_precision
 from semgrid_edu.training.distributed import (
@@ -82,7 +82,7 @@ def train(
         network that a new run would overwrite.
     """
     params, folder, device = params or TrainingParams(), Path(folder), torch.device(device)
-    _check_folder(folder, resume)
+    check_folder(folder, resume)
     _check_dataset(net, dataset, params)
     stages = [stage for stage, n in (("image", params.image_iterations), ("grid", params.grid_iterations)) if n]
     alpha = {stage: class_weights(dataset, stage, net.n_classes, params.weight_limit) for stage in stages}
@@ -100,12 +100,12 @@ def train(
             if iteration in (start, params.image_iterations):
                 objective = _objective(net, stage, alpha[stage].to(device), params.end_to_end)
             batch = draw_batch(dataset, params.batch_size, params.jitter, iteration, seed, params.mirror)
-            loss = _learn(objective, optimiser, share_of_batch(batch, rank(), world_size(), device), device)
+            loss = learn(objective, optimiser, share_of_batch(batch, rank(), world_size(), device), device)
             step = Step(iteration, stage, optimiser.param_groups[0]["lr"], loss)
-            _check_finite(step, params.learning_rate)
+            check_finite(step, params.learning_rate)
             steps.set_postfix(stage=stage, loss=f"{loss:.3f}", refresh=False)
             if rank() == 0:
-                _write_down(step, folder, params.image_iterations, run, net, optimiser)
+                write_down(step, folder, params.image_iterations, run, net, optimiser)
     net.eval()
     if rank() == 0:
         save_net(net, folder / WEIGHTS)
@@ -119,8 +119,25 @@ def _objective(net: SemanticGridNet, stage: str, alpha: Tensor, end_to_end: bool
     return in_parallel(Objective(net, stage, alpha), some_unused=stage == "image")
 
 
-def _learn(objective: nn.Module, optimiser: torch.optim.SGD, batch: Batch, device: torch.device) -> float:
-    """Change the weights by one step of gradient descent and return the loss before it."""
+def learn(objective: nn.Module, optimiser: torch.optim.SGD, batch: tuple, device: torch.device) -> float:
+    """Change the weights by one step of gradient descent.
+
+    Parameters
+    ----------
+    objective : Module
+        batch -> the two sums whose quotient is the loss, as `Objective` returns them.
+    optimiser : SGD
+        The optimiser of the weights that learn.
+    batch : tuple
+        What the objective takes, on the device.
+    device : torch.device
+        The device that computes.
+
+    Returns
+    -------
+    float
+        The loss before the step, nats.
+    """
     optimiser.zero_grad()
     with mixed_precision(device):
         loss = shared_mean(*objective(batch))
@@ -129,10 +146,26 @@ def _learn(objective: nn.Module, optimiser: torch.optim.SGD, batch: Batch, devic
     return process_total(loss.detach()).item() / world_size()
 
 
-def _write_down(
-    step: Step, folder: Path, image_iterations: int, run: dict, net: SemanticGridNet, optimiser: torch.optim.SGD
+def write_down(
+    step: Step, folder: Path, image_iterations: int, run: dict, net: nn.Module, optimiser: torch.optim.SGD
 ) -> None:
-    """Log a step, and save the network or a checkpoint if it is time for one."""
+    """Log a step, and save the network or a checkpoint if it is time for one.
+
+    Parameters
+    ----------
+    step : Step
+        The step that was just made.
+    folder : Path
+        The folder of the training run.
+    image_iterations : int
+        Number of steps of the first stage, after which the network is saved; 0 without such a stage.
+    run : dict
+        What tells this run from others, as for `save_checkpoint`.
+    net : Module
+        What learns.
+    optimiser : SGD
+        Its optimiser.
+    """
     append_step(folder / LOG, step)
     done = step.iteration + 1
     if done == image_iterations:
@@ -152,8 +185,21 @@ def _gradients_as_found(net: nn.Module) -> Iterator[None]:
             parameter.requires_grad_(learns)
 
 
-def _check_folder(folder: Path, resume: bool) -> None:
-    """Refuse to overwrite a finished or an interrupted run."""
+def check_folder(folder: Path, resume: bool) -> None:
+    """Refuse to overwrite a finished or an interrupted run.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder of the training run to come.
+    resume : bool
+        Whether it continues an interrupted one.
+
+    Raises
+    ------
+    DataError
+        When the folder holds a run that would be lost.
+    """
     if (folder / WEIGHTS).exists():
         raise DataError(folder, "a folder without a trained network, which would be lost", WEIGHTS)
     if (folder / CHECKPOINT).exists() and not resume:
@@ -175,8 +221,21 @@ def _check_dataset(net: SemanticGridNet, dataset: Sequence[Sample], params: Trai
                 raise ArgumentError("dataset", f"{name} of shape {want}", f"{tuple(part.shape)} in frame {k}")
 
 
-def _check_finite(step: Step, learning_rate: float) -> None:
-    """Refuse to go on after a loss that is infinite or NaN, from which nothing can be learnt any more."""
+def check_finite(step: Step, learning_rate: float) -> None:
+    """Refuse to go on after a loss that is infinite or NaN, from which nothing can be learnt any more.
+
+    Parameters
+    ----------
+    step : Step
+        The step that was just made.
+    learning_rate : float
+        The rate at the start of the run, which the error names.
+
+    Raises
+    ------
+    ArgumentError
+        When its loss isn't finite.
+    """
     if not math.isfinite(step.loss):
         found = f"{learning_rate}, with which it is {step.loss} in iteration {step.iteration}"
         raise ArgumentError("learning_rate", "a rate that keeps the loss finite", found)

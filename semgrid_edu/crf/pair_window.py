@@ -1,0 +1,178 @@
+"""Sums over all pairs of cells in a window, in torch and with gradients: what the trainable CRF rests on (eq. (4))."""
+
+from dataclasses import dataclass
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class PairWindow:
+    """All pairs of cells of a grid that are at most `radius` rows and `radius` columns apart, each pair once.
+
+    The pairs are sorted by their offset (rows, columns): P offsets, and for each of them one number per cell, which
+    belongs to that cell and the one an offset further on. In memory, as many empty columns follow each row as an offset
+    can have. So the cells of the whole grid form one long line of L numbers, on which an offset is a shift, and what is
+    shifted beyond the end of a row meets an empty cell.
+
+    Parameters
+    ----------
+    height, width : int
+        H and W, the number of rows and columns of the grid.
+    radius : int
+        The largest distance of two cells, in rows and in columns.
+    """
+
+    height: int
+    width: int
+    radius: int
+
+    @property
+    def margin(self) -> int:
+        """Number of empty columns behind each row."""
+        return min(self.radius, self.width - 1)
+
+    @property
+    def offsets(self) -> list[tuple[int, int]]:
+        """Rows and columns from the first cell of a pair to the second, (P, 2)."""
+        rows = range(min(self.radius, self.height - 1) + 1)
+        columns = range(-self.margin, self.margin + 1)
+        return [(r, c) for r in rows for c in columns if r > 0 or c > 0]
+
+    @property
+    def shifts(self) -> list[int]:
+        """The same steps along the line, (P,)."""
+        return [r * (self.width + self.margin) + c for r, c in self.offsets]
+
+    def line(self, grid: Tensor) -> Tensor:
+        """Lay grids out as lines.
+
+        Parameters
+        ----------
+        grid : (B, K, H, W) float
+            K numbers for each cell.
+
+        Returns
+        -------
+        (B, K, L) float
+            The same with zeros in the empty columns, L = H (W + margin).
+        """
+        return F.pad(grid, (0, self.margin)).flatten(2)
+
+    def grid(self, line: Tensor) -> Tensor:
+        """Undo `line`, and drop what stands in the empty columns.
+
+        Parameters
+        ----------
+        line : (B, K, L) float
+            K numbers for each cell.
+
+        Returns
+        -------
+        (B, K, H, W) float
+            Grids.
+        """
+        return line.unflatten(2, (self.height, self.width + self.margin))[..., : self.width]
+
+    @torch.no_grad()
+    def squared_distances(self, features: Tensor) -> Tensor:
+        """Return the squared distance between the features of the two cells of each pair.
+
+        Parameters
+        ----------
+        features : (B, K, H, W) float
+            A vector of K numbers for each cell.
+
+        Returns
+        -------
+        (B, P, L) float
+            Without a gradient; meaningless for a pair whose second cell doesn't exist.
+        """
+        line = self.line(features)
+        distances = line.new_zeros(len(line), len(self.shifts), line.shape[2])
+        for k, shift in enumerate(self.shifts):
+            first, second = line[..., :-shift], line[..., shift:]
+            torch.sum((first - second) ** 2, dim=1, out=distances[:, k, :-shift])
+        return distances
+
+
+class PairSum(torch.autograd.Function):
+    """y_i = sum over the cells j that form a pair with i of k_ij x_j, with gradients for k and x (eq. (4)).
+
+    `PairSum.apply(pairs, x, window)` takes the weights (B, P, L) of a window's pairs and values (B, K, H, W), and
+    returns sums (B, K, H, W). Automatic differentiation would keep several arrays for each of the P offsets; written
+    out, the gradient is two sums of the same kind:
+
+        dE/dx_j = sum_i k_ij dE/dy_i,        dE/dk_ij = sum over the K values of (dE/dy_i x_j + dE/dy_j x_i)
+    """
+
+    @staticmethod
+    def forward(ctx: torch.autograd.function.FunctionCtx, pairs: Tensor, x: Tensor, window: PairWindow) -> Tensor:
+        """Sum over all pairs.
+
+        Parameters
+        ----------
+        ctx : FunctionCtx
+            Keeps what the gradient needs.
+        pairs : (B, P, L) float
+            k_ij, in the order of the window's pairs.
+        x : (B, K, H, W) float
+            K values for each cell.
+        window : PairWindow
+            Which cells form pairs.
+
+        Returns
+        -------
+        (B, K, H, W) float
+            y.
+        """
+        ctx.save_for_backward(pairs, x)
+        ctx.window = window
+        return window.grid(_sums(pairs, window.line(x), window.shifts))
+
+    @staticmethod
+    def backward(ctx: torch.autograd.function.FunctionCtx, grad: Tensor) -> tuple[Tensor | None, Tensor | None, None]:
+        """Return the gradients with respect to the weights and to the values.
+
+        Parameters
+        ----------
+        ctx : FunctionCtx
+            What `forward` kept.
+        grad : (B, K, H, W) float
+            dE/dy.
+
+        Returns
+        -------
+        pairs : (B, P, L) float or None
+            dE/dk, None when nothing asks for it.
+        x : (B, K, H, W) float or None
+            dE/dx, None when nothing asks for it.
+        window : None
+            A window has no gradient.
+        """
+        (pairs, x), window = ctx.saved_tensors, ctx.window
+        grad = window.line(grad)
+        of_pairs = _products(grad, window.line(x), window.shifts) if ctx.needs_input_grad[0] else None
+        of_x = window.grid(_sums(pairs, grad, window.shifts)) if ctx.needs_input_grad[1] else None
+        return of_pairs, of_x, None
+
+
+def _sums(pairs: Tensor, x: Tensor, shifts: list[int]) -> Tensor:
+    """Give both cells of each pair the other one's value, times the weight; values and sums are lines (B, K, L)."""
+    sums = torch.zeros_like(x)
+    for k, shift in enumerate(shifts):
+        weight = pairs[:, k : k + 1, :-shift]
+        sums[..., :-shift].addcmul_(weight, x[..., shift:])
+        sums[..., shift:].addcmul_(weight, x[..., :-shift])
+    return sums
+
+
+def _products(a: Tensor, b: Tensor, shifts: list[int]) -> Tensor:
+    """Return a_i . b_j + a_j . b_i for each pair (i, j), (B, P, L); a and b are lines (B, K, L)."""
+    products = a.new_zeros(len(a), len(shifts), a.shape[2])
+    for k, shift in enumerate(shifts):
+        both = a[..., :-shift] * b[..., shift:]
+        both.addcmul_(a[..., shift:], b[..., :-shift])
+        torch.sum(both, dim=1, out=products[:, k, :-shift])
+    return products
