@@ -32,7 +32,7 @@ from ipywidgets import FloatLogSlider, interact
 from scipy.special import rel_entr, softmax, xlogy
 
 from semgrid_edu import plotting
-from semgrid_edu.crf import CrfParams, crf_model, damping, energy, exact_marginals, free_energy, gram_matrix
+from semgrid_edu.crf import CrfParams, damping, energy, exact_marginals, free_energy, gram_matrix
 from semgrid_edu.crf import log_partition, mean_field, mean_field_naive, mean_field_sequential, mean_field_updates
 from semgrid_edu.crf import most_likely, pair_weights, unary_from_probability
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
@@ -255,9 +255,9 @@ plt.show()
 
 # %% [markdown]
 # In the middle, the spot of cells that are tied to the cross has the shape of a Gaussian with a piece missing on the
-# left. There the cells are STATIC or UNKNOWN: the parked car and what it hides. So labels can change at the car's outline
-# without paying the first term. On the right, the spatial term ignores the car, but it reaches less far. The cross itself
-# has price 0, because a cell is no pair with itself.
+# left. There the cells are STATIC or UNKNOWN: the parked car and what it hides. So labels can change at the car's
+# outline without paying the first term. On the right, the spatial term ignores the car, but it reaches less far. The
+# cross itself has price 0, because a cell is no pair with itself.
 #
 # ## Four cells: every labelling written out
 #
@@ -366,8 +366,8 @@ Q = mean_field_literal(two.reshape(2, 2), k_two, sweeps=100)
 print("two cells, P(road):  mean field", Q[0].round(3), "  exact", exact_marginals(two, free, priced(1))[0, 0].round(3))
 
 # %% [markdown]
-# `k` has zeros on its diagonal, because a cell is no pair with itself. On two cells with a moderate price, mean field is
-# nearly right. To see what it does on other prices we need a measure of how good a $Q$ is.
+# `k` has zeros on its diagonal, because a cell is no pair with itself. On two cells with a moderate price, mean field
+# is nearly right. To see what it does on other prices we need a measure of how good a $Q$ is.
 #
 # ## The free energy: a score that we can compute
 #
@@ -379,9 +379,10 @@ print("two cells, P(road):  mean field", Q[0].round(3), "  exact", exact_margina
 # $$ F(Q) = \underbrace{\sum_x Q(x)\,E(x)}_{\text{mean energy}} - \underbrace{\Big(\!-\sum_x Q(x) \log Q(x)\Big)}_{\text{entropy}} = \text{KL}(Q \,\|\, P) - \log Z $$
 #
 # $F$ is called the **free energy**. It asks for two things at once: cheap labellings on average, and as much
-# uncertainty as the prices allow. Since KL is never negative, $F$ is never below $-\log Z$, and the difference is exactly
-# KL. For independent cells, $F$ needs no sum over labellings: the entropy is the sum of the cells' entropies, and a
-# pair disagrees with probability $1 - \sum_l Q_i(l)\,Q_j(l)$. Check this, and print $F$ before and after each update:
+# uncertainty as the prices allow. Since KL is never negative, $F$ is never below $-\log Z$, and the difference is
+# exactly KL. For independent cells, $F$ needs no sum over labellings: the entropy is the sum of the cells' entropies,
+# and a pair disagrees with probability $1 - \sum_l Q_i(l)\,Q_j(l)$. Check this, and print $F$ before and after each
+# update:
 
 
 # %% tags=["free-energy"]
@@ -404,8 +405,8 @@ for n, Q in enumerate(islice(mean_field_updates(four, values, params), 6)):
 
 # %% [markdown]
 # $F$ falls from update to update, and KL with it: from 0.135 to 0.112 nats. What is left is the price of assuming
-# independent cells, because in $P$ they aren't independent. If a program prints a negative "KL", it has left out $\log Z$ or counted
-# pairs twice.
+# independent cells, because in $P$ they aren't independent. If a program prints a negative "KL", it has left out $\log
+# Z$ or counted pairs twice.
 #
 # ### When all cells update at once
 #
@@ -473,20 +474,21 @@ plt.show()
 
 # %% [markdown]
 # Left: updated all at once, the two rivals swap for ever and $F$ jumps up and down, far above where it began. The other
-# two ways fall. They end in different valleys of $F$: one after the other, cell 1 moved first and both became car; damped,
-# both became road. Mean field finds *a* minimum, and the way there decides which.
+# two ways fall. They end in different valleys of $F$: one after the other, cell 1 moved first and both became car;
+# damped, both became road. Mean field finds *a* minimum, and the way there decides which.
 #
 # The right picture shows why, for two rivals of equal strength (0.7 and 0.3). The update treats the pair term as if it
 # changed along its **tangent** at the present $Q$ (dotted). Here the true pair term bends upwards, because both cells
 # move at once, so the tangent lies below the true $F$ (solid). It promises a gain on the far side that isn't there: at
-# the dotted curve's minimum the solid curve is higher than at the star. The remedy is a penalty for moving away from the
-# present $Q$, just large enough that tangent and penalty together (dashed) lie above $F$ everywhere. The dashed curve
-# touches $F$ at the star. So where it is lower than there, $F$ is lower too, and $F$ can't rise.
+# the dotted curve's minimum the solid curve is higher than at the star. The remedy is a penalty for moving away from
+# the present $Q$, just large enough that tangent and penalty together (dashed) lie above $F$ everywhere. The dashed
+# curve touches $F$ at the star. So where it is lower than there, $F$ is lower too, and $F$ can't rise.
 #
-# How large must the penalty be? Give each cell a price with itself too, by putting $i = j$ into the formula of $k_{ij}$;
-# call it $k_{ii}$. A matrix of sums of Gaussians has no negative eigenvalue, and therefore the pair term bends upwards
-# only as much as these $k_{ii}$ allow. The penalty $k_{ii}/2 \cdot \text{KL}(Q_i' \,\|\, Q_i)$ is enough, whatever the
-# weights and widths (the docstring of `damping` has the proof). With it, $\log Q_i$ moves only a part of the way:
+# How large must the penalty be? Give each cell a price with itself too, by putting $i = j$ into the formula of
+# $k_{ij}$; call it $k_{ii}$. A matrix of sums of Gaussians has no negative eigenvalue, and therefore the pair term
+# bends upwards only as much as these $k_{ii}$ allow. The penalty $k_{ii}/2 \cdot \text{KL}(Q_i' \,\|\, Q_i)$ is enough,
+# whatever the weights and widths (the docstring of `damping` has the proof). With it, $\log Q_i$ moves only a part of
+# the way:
 #
 # $$ \log Q_i' = (1 - p_i) \log Q_i + p_i \log Q_i^\text{undamped} + \text{constant}, \qquad p_i = \frac{1}{1 + k_{ii} / 2} $$
 
@@ -523,9 +525,9 @@ assert 0.005 < (states[10].argmax(axis=0) != final).mean() < 0.02
 #
 # ## How wrong is mean field when cells pull hard?
 #
-# On four cells with a price of 0.5 mean field was 0.11 nats away. Prices on the drive are larger, and every cell has many
-# neighbours. A grid of 3 x 3 cells is still small enough for the exact answer, and a hard case is one in which opinions
-# are split: four cells say 0.6 for class 0, four say 0.4, and the centre says 0.52.
+# On four cells with a price of 0.5 mean field was 0.11 nats away. Prices on the drive are larger, and every cell has
+# many neighbours. A grid of 3 x 3 cells is still small enough for the exact answer, and a hard case is one in which
+# opinions are split: four cells say 0.6 for class 0, four say 0.4, and the centre says 0.52.
 #
 # **Predict before you run.** With very large prices, all nine cells must agree. Then there are two labellings left:
 # all 0 or all 1. How probable is "all 0" by exact computation? The eight votes cancel each other.
@@ -567,9 +569,9 @@ plt.show()
 
 # %% [markdown]
 # Left: up to a coupling of 1, all three agree within about 0.01. Beyond the **critical coupling** of 1.30, mean field
-# **picks a side**: at 4, the package's default, it says 0.998 where 0.52 is right. Move the centre's opinion from 0.52 to
-# 0.48 and mean field jumps to the other side, while the exact answer moves by 0.04. Messages (loopy sum-product, from
-# [graphical models](deeper/graphical_models.ipynb)) have half the error at small couplings, on the right, but
+# **picks a side**: at 4, the package's default, it says 0.998 where 0.52 is right. Move the centre's opinion from 0.52
+# to 0.48 and mean field jumps to the other side, while the exact answer moves by 0.04. Messages (loopy sum-product,
+# from [graphical models](deeper/graphical_models.ipynb)) have half the error at small couplings, on the right, but
 # above the critical coupling they pick a side too. So a probability of 0.998 from mean field doesn't mean that one can
 # be 99.8 % sure.
 #
@@ -592,11 +594,11 @@ print("cells that count fully in the first term, about: {:.0f} here, {:.0f} in t
 assert np.median(printed_sum) > 10 * surest
 
 # %% [markdown]
-# The neighbours' prices add up to more than ten times the price of a label that the network calls nearly impossible. So the network
-# has no say any more: every cell takes the label of the majority around it. And the sum depends on the widths: a
-# Gaussian of width $\sigma$ covers about $2\pi\sigma^2$ cells, so with the finer cells of the paper's grid hundreds of
-# neighbours would count. Krähenbühl and Koltun's code therefore divides each kernel $K$ (cells with themselves included,
-# $K_{ii} = 1$) by the root of its row sums on both sides:
+# The neighbours' prices add up to more than ten times the price of a label that the network calls nearly impossible. So
+# the network has no say any more: every cell takes the label of the majority around it. And the sum depends on the
+# widths: a Gaussian of width $\sigma$ covers about $2\pi\sigma^2$ cells, so with the finer cells of the paper's grid
+# hundreds of neighbours would count. Krähenbühl and Koltun's code therefore divides each kernel $K$ (cells with
+# themselves included, $K_{ii} = 1$) by the root of its row sums on both sides:
 #
 # $$ \tilde K_{ij} = \frac{K_{ij}}{\sqrt{D_i D_j}}, \qquad D_i = \sum_j K_{ij} $$
 #
@@ -630,7 +632,7 @@ def refine_all(params):
     return np.stack([mean_field(phi, cells, params).argmax(axis=0) for phi, cells in zip(unaries, o, strict=True)])
 
 
-# %% tags=["nbval-ignore-output"]
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 maps = {
     "network": np.stack([probability.argmax(axis=0) for probability in g]),
     "as printed": refine_all(as_printed),
@@ -670,8 +672,8 @@ plt.show()
 # | $\sigma_\beta$ | less alike states still count as the same; from about 1 on, occupancy hardly matters |
 # | $\sigma_\gamma$ | the second term reaches further |
 #
-# **Predict before you run.** Which of these five, made several times larger, costs the most class accuracy? Think of what a person on a
-# sidewalk differs in from the cells around.
+# **Predict before you run.** Which of these five, made several times larger, costs the most class accuracy? Think of
+# what a person on a sidewalk differs in from the cells around.
 #
 # <details><summary>Answer</summary>Of those tried here, a four times larger w<sub>2</sub>. The second term ignores
 # occupancy, so it also pulls at cells where something stands, and a person or a pole of one or two cells is outvoted by
@@ -706,14 +708,14 @@ plt.show()
 
 # %% [markdown]
 # Above each map stand pixel accuracy and class accuracy over all frames. Each of the five changes costs class accuracy,
-# compared with the default, and the default costs some compared with the network. With the larger $w_2$ the sign pole on the
-# sidewalk, 8 m ahead, and most of the thin fence are gone. With the larger $w_1$ sidewalk and vegetation begin to mix,
-# because both are FREE and the first term ties them together.
+# compared with the default, and the default costs some compared with the network. With the larger $w_2$ the sign pole
+# on the sidewalk, 8 m ahead, and most of the thin fence are gone. With the larger $w_1$ sidewalk and vegetation begin
+# to mix, because both are FREE and the first term ties them together.
 #
 # ### Play with it
 #
-# Can you find weights that keep the sign pole at B and still remove the stripe at A? (Without a running kernel there are
-# no sliders; the figure above shows six settings.)
+# Can you find weights that keep the sign pole at B and still remove the stripe at A? (Without a running kernel there
+# are no sliders; the figure above shows six settings.)
 
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
@@ -734,7 +736,7 @@ _ = interact(at, **weights)
 # **Small things are outvoted.** How many of the true cells of each class does the network find, and how many are left
 # after the CRF?
 
-# %% tags=["nbval-ignore-output"]
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 print("true cells that are found, per cent, within 30 m:   network   CRF")
 lost = {}
 for label in range(KITTI_14.n_semantic):
@@ -747,14 +749,14 @@ assert min(lost[name] for name in ("road", "sidewalk", "vegetation")) > 0
 assert max(lost[name] for name in ("pedestrian", "bicycle", "building")) < 0
 
 # %% [markdown]
-# Road, sidewalk and vegetation gain. Pedestrians, bicycles and buildings lose, because each of their few cells has dozens
-# of neighbours with another label. Nothing in the model says that a person is small and still a person.
+# Road, sidewalk and vegetation gain. Pedestrians, bicycles and buildings lose, because each of their few cells has
+# dozens of neighbours with another label. Nothing in the model says that a person is small and still a person.
 #
 # **Large errors stay.** The CRF only knows the network's probabilities and the occupancy grid. A patch that is wrong,
 # large and confident looks to it just like a patch that is right: in the first figure the network draws a column of
 # bicycle from 19 to 26 m, and most of it is still there after the CRF. Which changes were for the worse?
 
-# %% tags=["nbval-ignore-output"]
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 before, after = (maps[name] == truths for name in ("network", "normalised"))
 repaired, spoilt = (~before & after).sum(), (before & ~after).sum()
 same = ((maps["network"] != maps["normalised"]) & ~before & ~after).sum()
@@ -804,7 +806,8 @@ for (network, paper), name in zip(PAPER.items(), files, strict=True):
     ours = difference(name)
     lines.append(f"| {network}, paper, KITTI | " + " | ".join(f"{points:+.1f}" for points in paper) + " |")
     lines.append(f"| {network}, here, simulated | " + " | ".join(f"{points:+.1f}" for points in ours) + " |")
-    assert ours[1] < -1 > paper[1] and abs(ours[0]) < 1 > paper[0]
+    assert max(ours[1], paper[1]) < -1
+    assert max(abs(ours[0]), abs(paper[0])) < 1
 Markdown("\n".join(lines))
 
 # %% [markdown]
@@ -822,8 +825,8 @@ Markdown("\n".join(lines))
 # 3. Mean field cuts all links and asks how the others are on average. The free energy measures it: $F + \log Z =
 #    \text{KL} \geq 0$. Updating all cells at once needs damping, or rivals swap for ever.
 # 4. Beyond a critical coupling mean field picks a side: it is nearly certain where the exact answer is undecided.
-# 5. Equation (4) as printed over-smooths, because all neighbours together outweigh the network. Normalised, it repairs large
-#    areas and costs small things.
+# 5. Equation (4) as printed over-smooths, because all neighbours together outweigh the network. Normalised, it repairs
+#    large areas and costs small things.
 #
 # ## Further reading
 #
@@ -835,8 +838,8 @@ Markdown("\n".join(lines))
 #   parallel update may fail, and updates that converge.
 # - Baqué, Bagautdinov, Fleuret, Fua, *Principled parallel mean-field inference for discrete random fields*, CVPR 2016:
 #   the damped update as a proximal step.
-# - Blei, Kucukelbir, McAuliffe, *Variational inference: a review for statisticians*, JASA 112(518), 2017: mean field and
-#   the free energy (there with the opposite sign, "ELBO") far beyond grids.
+# - Blei, Kucukelbir, McAuliffe, *Variational inference: a review for statisticians*, JASA 112(518), 2017: mean field
+#   and the free energy (there with the opposite sign, "ELBO") far beyond grids.
 #
 # ## Exercise
 #

@@ -1,0 +1,169 @@
+"""Hidden tests of exercise 10, the CRF by hand: the package and sums over every pair are the reference."""
+
+from collections.abc import Callable
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import softmax
+
+from semgrid_edu.crf import CrfParams, exact_marginals, pair_weights
+from semgrid_edu.crf import energy as energy_of_map
+from semgrid_edu.crf import free_energy as free_energy_of_map
+from semgrid_instructor import hidden
+
+W1, W2 = 4.0, 3.0
+SIGMA_ALPHA, SIGMA_BETA, SIGMA_GAMMA = 3.2, 0.2, 1.2
+REACH, UPDATES = 6, 5
+"""What the setup cell of the exercise gives `refine`."""
+
+SHAPES = ((3, 2, 2), (2, 1, 5), (5, 3, 1), (4, 1, 1))
+"""C, H, W of small maps: all numbers different, and a map of a single cell."""
+
+
+def _map(shape: tuple[int, int, int], seed: int) -> tuple[NDArray, NDArray, CrfParams]:
+    """Return the unary term and the occupancy of a random map, and random parameters."""
+    rng = np.random.default_rng(seed)
+    unary, values = rng.exponential(size=shape), np.moveaxis(rng.dirichlet(np.ones(4), shape[1:]), -1, 0)
+    return unary, values, CrfParams(*rng.uniform(0.2, 1, 2), *rng.uniform(0.5, 3, 3), "none")
+
+
+def _flat(unary: NDArray, values: NDArray, params: CrfParams) -> tuple[NDArray, NDArray]:
+    """Return phi (C, N) and k (N, N); the diagonal of k is filled, because it must not count."""
+    phi = unary.reshape(len(unary), -1).copy()
+    return phi, pair_weights(values, params) + np.diag(np.linspace(2, 7, phi.shape[1]))
+
+
+@hidden
+def check_pair_price(pair_price: Callable) -> None:
+    """Compare every pair of a small map with the package's matrix."""
+    _, values, params = _map((2, 3, 4), 100)
+    wanted, states = pair_weights(values, params), values.reshape(4, -1).T
+    places = np.indices((3, 4)).reshape(2, -1).T.astype(float)
+    widths = params.sigma_alpha, params.sigma_beta, params.sigma_gamma
+    for i, j in ((0, 1), (2, 9), (11, 0), (5, 6)):
+        arguments = places[i].copy(), places[j].copy(), states[i].copy(), states[j].copy()
+        got = pair_price(*arguments, params.w_bilateral, params.w_spatial, *widths)
+        assert np.isclose(got, wanted[i, j]), "wrong price for other places, states and widths"
+
+
+@hidden
+def check_energy(energy: Callable) -> None:
+    """Compare random labellings of maps of other sizes."""
+    for seed, shape in enumerate(SHAPES):
+        unary, values, params = _map(shape, 101 + seed)
+        phi, k = _flat(unary, values, params)
+        for labels in np.random.default_rng(seed).integers(0, shape[0], (4, phi.shape[1])):
+            wanted = energy_of_map(labels.reshape(shape[1:]), unary, values, params)
+            got = energy(labels.copy(), phi.copy(), k.copy())
+            assert np.isclose(got, wanted), f"wrong energy with {phi.shape[1]} cells and {len(phi)} classes"
+
+
+@hidden
+def check_marginals(marginals: Callable) -> None:
+    """Compare with the package's elimination."""
+    for seed, shape in enumerate(SHAPES):
+        unary, values, params = _map(shape, 105 + seed)
+        phi, k = _flat(unary, values, params)
+        wanted, got = exact_marginals(unary, values, params).reshape(phi.shape), np.asarray(marginals(phi, k))
+        assert got.shape == wanted.shape, f"shape {got.shape} instead of {wanted.shape}"
+        assert np.allclose(got, wanted), f"wrong with {phi.shape[1]} cells and {len(phi)} classes"
+
+
+def _updated(Q: NDArray, phi: NDArray, k: NDArray) -> NDArray:
+    """Return Q after one update of all cells at once."""
+    return softmax(-phi - (1 - Q) @ (k - np.diag(np.diag(k))), axis=0)
+
+
+@hidden
+def check_update(update: Callable) -> None:
+    """Other numbers of cells and classes."""
+    for seed, shape in enumerate(SHAPES):
+        phi, k = _flat(*_map(shape, 109 + seed))
+        Q = softmax(np.random.default_rng(seed).normal(size=phi.shape), axis=0)
+        got = np.asarray(update(Q.copy(), phi.copy(), k.copy()))
+        assert got.shape == Q.shape, f"shape {got.shape} instead of {Q.shape}"
+        assert np.allclose(got, _updated(Q, phi, k)), f"wrong with {phi.shape[1]} cells and {len(phi)} classes"
+
+
+@hidden
+def check_update_limits(update: Callable) -> None:
+    """Prices that are thousands apart from cell to cell, and prices of pairs of thousands."""
+    rng = np.random.default_rng(113)
+    phi = rng.normal(size=(3, 6)) + rng.choice([0, 800, 5000], size=6)
+    phi[1, 2] = phi[0, 4] = np.inf
+    Q = softmax(rng.normal(size=phi.shape), axis=0)
+    k = np.exp(-np.abs(np.subtract.outer(range(6), range(6))))
+    for prices in (0 * k, 3000 * k):
+        got = np.asarray(update(Q.copy(), phi.copy(), prices))
+        assert np.isfinite(got).all(), "a result isn't finite when prices are thousands"
+    got = update(Q.copy(), phi.copy(), 0 * k)
+    assert np.allclose(got, softmax(-phi, axis=0)), "wrong when prices are thousands"
+
+
+@hidden
+def check_free_energy(free_energy: Callable) -> None:
+    """Compare with the package on maps of other sizes."""
+    for seed, shape in enumerate(SHAPES):
+        unary, values, params = _map(shape, 114 + seed)
+        phi, k = _flat(unary, values, params)
+        Q = softmax(np.random.default_rng(seed).normal(size=shape), axis=0)
+        wanted = free_energy_of_map(Q, unary, values, params)
+        got = free_energy(Q.reshape(phi.shape).copy(), phi.copy(), k.copy())
+        assert np.isclose(got, wanted), f"wrong with {phi.shape[1]} cells and {len(phi)} classes"
+
+
+@hidden
+def check_free_energy_limits(free_energy: Callable) -> None:
+    """Certain cells; an impossible class that gets a probability; a tiny probability that isn't 0."""
+    phi, k = np.array([[0.3, np.inf], [0.7, 0.4]]), np.array([[3, 0.5], [0.5, 3]])
+    certain = free_energy(np.array([[1.0, 0], [0, 1.0]]), phi.copy(), k.copy())
+    assert np.isclose(certain, 0.3 + 0.4 + 0.5), "certain cells have no entropy, only their energy"
+    impossible = free_energy(np.full((2, 2), 0.5), phi.copy(), k.copy())
+    assert np.isposinf(impossible), "an impossible class that gets a probability costs infinitely much"
+    tiny = free_energy(np.array([[1e-12, 0], [1 - 1e-12, 1]]), np.array([[1e12, 0], [0, 0]]), k.copy())
+    assert np.isclose(tiny, 1), "a tiny probability isn't 0: times a large price it counts"
+
+
+@hidden
+def check_normalise(normalise: Callable) -> None:
+    """Random kernels of other sizes: the scaled row sums, found by dividing entry by entry."""
+    for seed, size in ((118, 1), (119, 2), (120, 7)):
+        features = np.random.default_rng(seed).normal(size=(size, 2))
+        K = np.exp(-((features[:, None] - features) ** 2).sum(axis=-1) / 2)
+        got = np.asarray(normalise(K.copy()))
+        for i, j in np.ndindex(K.shape):
+            wanted = K[i, j] / np.sqrt(sum(K[i])) / np.sqrt(sum(K[j]))
+            assert np.isclose(got[i, j], wanted), f"wrong with {size} cells"
+
+
+def _refined(log_g: NDArray, o: NDArray) -> NDArray:
+    """Return the refined map from a matrix of all pairs, those out of reach set to 0."""
+    classes, height, width = log_g.shape
+    places, states = np.indices((height, width)).reshape(2, -1).T, o.reshape(4, -1).T
+    apart, unlike = (((f[:, None] - f) ** 2).sum(axis=-1) for f in (places, states))
+    near = (np.abs(places[:, None] - places) <= REACH).all(axis=-1)
+    bilateral = near * np.exp(-apart / (2 * SIGMA_ALPHA**2) - unlike / (2 * SIGMA_BETA**2))
+    spatial = near * np.exp(-apart / (2 * SIGMA_GAMMA**2))
+    k = sum(w * K / np.sqrt(np.outer(K.sum(1), K.sum(1))) for w, K in ((W1, bilateral), (W2, spatial)))
+    phi = -log_g.reshape(classes, -1)
+    Q = np.exp(-phi)
+    for _ in range(UPDATES):
+        Q = _updated(Q, phi, k)
+    return Q.reshape(log_g.shape)
+
+
+@hidden
+def check_refine(refine: Callable) -> None:
+    """Maps wider and higher than the reach, with one class, one row or one column among them; float32 too."""
+    for seed, (shape, dtype) in enumerate(
+        product(((4, 9, 11), (3, 1, 15), (2, 14, 2), (1, 3, 3)), (np.float64, np.float32))
+    ):
+        rng = np.random.default_rng(121 + seed)
+        g = softmax(1.5 * rng.normal(size=shape), axis=0).astype(dtype)
+        o = np.moveaxis(rng.dirichlet(np.full(4, 0.3), shape[1:]), -1, 0).astype(dtype)
+        log_g = np.log(g)
+        got = np.asarray(refine(log_g.copy(), o.copy()))
+        assert got.shape == shape, f"shape {got.shape} instead of {shape}"
+        wanted = _refined(log_g.astype(float), o.astype(float))
+        assert np.allclose(got, wanted, atol=2e-3), f"wrong on a map of {shape[1]} x {shape[2]} cells"
