@@ -95,7 +95,7 @@ plt.show()
 # Here are four cells of such a model. Each circle $x_i$ is the label of cell $i$; each black square is a table of
 # prices. One square belongs to each cell, and one to each pair:
 
-# %% jupyter={"source_hidden": true} alt="a factor graph of four cells on a circle: a black square at each cell and one between each of the six pairs"
+# %% tags=["graph"] jupyter={"source_hidden": true} alt="a factor graph of four cells on a circle: a black square at each cell and one between each of the six pairs"
 stage = crf_stage(unary=two_classes(np.full((2, 2), 0.6)))
 fig, ax = plt.subplots(figsize=(5.5, 4.2), layout="constrained")
 stage.draw(ax).set_title("four cells, every pair linked")

@@ -1,6 +1,15 @@
 """The graders of exercise 10, against real mistakes and other right ways."""
 
+import numpy as np
 from grader_checks import GraderChecks, mistake, right
+from scipy.ndimage import gaussian_filter
+from scipy.special import log_softmax
+
+from semgrid_edu.course.grading import reference_answers
+from semgrid_edu.course.notebooks import NOTEBOOKS, read_percent
+from semgrid_edu.crf import CrfParams, mean_field_naive
+from semgrid_edu.graphical.stages.crf import all_free
+from semgrid_edu.pipeline import load_stages
 
 
 def price(result, apart="np.sum((c_i - c_j) ** 2)", unlike="np.sum((o_i - o_j) ** 2)"):
@@ -412,7 +421,7 @@ def update(Q, phi, k):
         mistake(
             "agreement costs",
             task="update",
-            loses=3,
+            loses=2,
             says="different labels are rewarded",
             code=updated("phi + Q @ others", others="k - np.diag(np.diag(k))").replace("+ Q", "- (1 - Q)"),
         ),
@@ -836,3 +845,20 @@ def refine(log_g, o):
             code=refined(("REACH + 1", "REACH")),
         ),
     )
+
+
+def test_the_reference_is_a_stage_that_agrees_with_the_package(tmp_path):
+    """What the exercise tells students to write into a file refines a map nearly as the package does."""
+    source = NOTEBOOKS / "src" / "exercises" / "10_crf.py"
+    setup = next(cell.source for cell in read_percent(source).cells if "REACH, UPDATES" in cell.source)
+    answer = reference_answers(source)["refine"].replace("### BEGIN SOLUTION", "").replace("### END SOLUTION", "")
+    path = tmp_path / "my_stages.py"
+    path.write_text(f"{setup}\n\n{answer}", encoding="utf-8")
+    rng = np.random.default_rng(0)
+    scores = gaussian_filter(rng.normal(size=(4, 24, 18)), (0, 2, 2)) * 12 + rng.normal(size=(4, 24, 18))
+    log_g, o = log_softmax(scores, axis=0), all_free((24, 18))
+    refined = load_stages(path).refine(log_g, o)
+    np.testing.assert_allclose(refined.sum(axis=0), 1)
+    package = mean_field_naive(-log_g, o, CrfParams.for_cells(0.5))
+    assert (refined.argmax(axis=0) == package.argmax(axis=0)).mean() > 0.9
+    assert (refined.argmax(axis=0) != log_g.argmax(axis=0)).mean() > 0.1

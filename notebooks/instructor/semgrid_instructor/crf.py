@@ -155,7 +155,7 @@ def _refined(log_g: NDArray, o: NDArray) -> NDArray:
 
 @hidden
 def check_refine(refine: Callable) -> None:
-    """Maps wider and higher than the reach, with one class, one row or one column among them; float32 too."""
+    """Try maps wider and higher than the reach, with one class, one row or one column among them; float32 too."""
     for seed, (shape, dtype) in enumerate(
         product(((4, 9, 11), (3, 1, 15), (2, 14, 2), (1, 3, 3)), (np.float64, np.float32))
     ):
