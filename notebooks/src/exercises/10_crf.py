@@ -532,5 +532,5 @@ assert not complaint, complaint
 # %% [markdown] nbgrader={"grade": true, "grade_id": "how-sure", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # Mean field treats the cells as independent. Above the critical coupling it picks a side: independent cells can't say "we all agree, but we don't know on what", so each becomes nearly certain,
 # while the exact marginal may still be close to one half. The 0.998 therefore says that the neighbours agree, not that road is 99.8 % probable; as a label it may be useful, as a probability it
-# isn't calibrated. KL is never negative. A negative number means that log Z was left out (then it is the free energy, of which only differences count), that pairs were counted twice or
+# isn't calibrated. KL is never negative. A negative number means that log Z was left out (then it is the free energy, of which only differences count), that pairs were counted wrongly, or
 # that cells were paired with themselves. One point for "too sure, picks a side", one for "never negative, log Z or double counting".
