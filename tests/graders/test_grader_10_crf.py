@@ -1,13 +1,19 @@
 """The graders of exercise 10, against real mistakes and other right ways."""
 
+import warnings
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 from grader_checks import GraderChecks, mistake, right
 from scipy.ndimage import gaussian_filter
 from scipy.special import log_softmax
 
 from semgrid_edu.course.grading import reference_answers
 from semgrid_edu.course.notebooks import NOTEBOOKS, read_percent
-from semgrid_edu.crf import CrfParams, mean_field_naive
+from semgrid_edu.crf import CrfParams, energy, exact_marginals, free_energy, gram_matrix
+from semgrid_edu.crf import mean_field_naive, mean_field_sequential, pair_weights
 from semgrid_edu.graphical.stages.crf import all_free
 from semgrid_edu.pipeline import load_stages
 
@@ -845,6 +851,37 @@ def refine(log_g, o):
             code=refined(("REACH + 1", "REACH")),
         ),
     )
+
+
+def answers():
+    """Return the reference's functions."""
+    source = NOTEBOOKS / "src" / "exercises" / "10_crf.py"
+    setup = next(cell.source for cell in read_percent(source).cells if "REACH, UPDATES" in cell.source)
+    names = {}
+    with warnings.catch_warnings():  # the setup silences warnings
+        exec(
+            "\n".join([setup, *(text for text in reference_answers(source).values() if text.startswith("def"))]), names
+        )
+    return SimpleNamespace(**names)
+
+
+def test_the_reference_computes_what_the_package_does():
+    own, rng = answers(), np.random.default_rng(1)
+    unary, values = rng.exponential(size=(3, 2, 3)), np.moveaxis(rng.dirichlet(np.ones(4), (2, 3)), -1, 0)
+    params = CrfParams(1.2, 0.8, 2.0, 0.5, 1.5, "none")
+    places, states = np.indices((2, 3)).reshape(2, -1).T, values.reshape(4, -1).T
+    pair = places[0], places[4], states[0], states[4]
+    phi, k = unary.reshape(3, -1), pair_weights(values, params)
+    assert own.pair_price(*pair, 1.2, 0.8, 2.0, 0.5, 1.5) == pytest.approx(k[0, 4])
+    labels, Q = rng.integers(0, 3, 6), rng.dirichlet(np.ones(3), 6).T
+    assert own.energy(labels, phi, k) == pytest.approx(energy(labels.reshape(2, 3), unary, values, params))
+    np.testing.assert_allclose(own.marginals(phi, k), exact_marginals(unary, values, params).reshape(3, -1))
+    assert own.free_energy(Q, phi, k) == pytest.approx(free_energy(Q.reshape(3, 2, 3), unary, values, params))
+    settled = mean_field_sequential(unary, values, params, iterations=2000).reshape(3, -1)
+    np.testing.assert_allclose(own.update(settled, phi, k), settled, atol=1e-9)
+    spatial = CrfParams(w_bilateral=0, w_spatial=1, sigma_gamma=1.5)
+    K = gram_matrix(values, replace(spatial, normalization="none"))
+    np.testing.assert_allclose(own.normalise(K), gram_matrix(values, spatial))
 
 
 def test_the_reference_is_a_stage_that_agrees_with_the_package(tmp_path):

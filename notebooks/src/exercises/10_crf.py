@@ -427,7 +427,7 @@ assert not complaint, complaint
 # 2. $D^{(1)}$ and $D^{(2)}$, maps of H x W, are their sums over all offsets. Normalise: $k = $ `W1` $K^{(1)}_{ij} / \sqrt{D^{(1)}_i D^{(1)}_j}\; + $ `W2` $K^{(2)}_{ij} / \sqrt{D^{(2)}_i D^{(2)}_j}$.
 # 3. Start with $Q = g$ and do `UPDATES` updates as in task 3, all cells at once. The offset (0, 0) is no pair.
 #
-# Complete `refine`: it returns $Q$, `(C, H, W)`. (Normalised prices with many neighbours are safe without damping here; the lecture says when they aren't.)
+# Complete `refine`: it returns $Q$, `(C, H, W)`. (With these prices the free energy of the lecture's frame falls without damping too. The lecture shows two cells for which it doesn't.)
 
 
 # %% nbgrader={"grade": false, "grade_id": "refine", "locked": false, "schema_version": 3, "solution": true, "task": false}
