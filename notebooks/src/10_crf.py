@@ -733,9 +733,8 @@ plt.show()
 # Can you find weights that keep the sign pole at B and still remove the stripe at A? (Without a running kernel there
 # are no sliders; the figure above shows six settings.)
 #
-# <details><summary>Answer</summary>We found none. With w<sub>1</sub> = 1 and w<sub>2</sub> = 0.1 the pole is lost
-# already, and most of the stripe is still there. Prices can't tell the two apart: both are small, both are free or
-# standing among cells of another label, and the network isn't sure of either.</details>
+# <details><summary>Answer</summary>We tried ten pairs of weights and found none. With w<sub>1</sub> = 1 and
+# w<sub>2</sub> = 0.1 the pole is lost already, and most of the stripe is still there.</details>
 
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}

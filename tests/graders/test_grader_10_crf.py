@@ -12,8 +12,16 @@ from scipy.special import log_softmax
 
 from semgrid_edu.course.grading import reference_answers
 from semgrid_edu.course.notebooks import NOTEBOOKS, read_percent
-from semgrid_edu.crf import CrfParams, energy, exact_marginals, free_energy, gram_matrix
-from semgrid_edu.crf import mean_field_naive, mean_field_sequential, pair_weights
+from semgrid_edu.crf import (
+    CrfParams,
+    energy,
+    exact_marginals,
+    free_energy,
+    gram_matrix,
+    mean_field_naive,
+    mean_field_sequential,
+    pair_weights,
+)
 from semgrid_edu.graphical.stages.crf import all_free
 from semgrid_edu.pipeline import load_stages
 
