@@ -78,7 +78,8 @@ STAGES = (
         "crf",
         "The fully connected CRF on a few cells",
         model="semgrid_edu.graphical.stages.crf_stage",
-        check="tests/graphical/stages/test_stage_crf.py::test_probabilities_are_those_of_the_packages_energy",
+        check="tests/crf/test_exact.py::test_everything_exact_is_what_enumeration_says",
+        lecture="10_crf#graph",
     ),
     StageModel(
         "system",
