@@ -1,5 +1,6 @@
 """The fully connected CRF that refines the semantic grid: energy, exact inference, mean field, naive and fast."""
 
+from semgrid_edu.crf.accurate import mean_field_accurate
 from semgrid_edu.crf.dense import energy, free_energy, gram_matrix, pair_weights
 from semgrid_edu.crf.exact import crf_model, exact_marginals, log_partition, most_likely
 from semgrid_edu.crf.lattice import PermutohedralLattice
@@ -8,11 +9,13 @@ from semgrid_edu.crf.mean_field import mean_field
 from semgrid_edu.crf.naive import damping, mean_field_naive, mean_field_sequential, mean_field_updates
 from semgrid_edu.crf.params import CrfParams, unary_from_log_probability, unary_from_probability
 from semgrid_edu.crf.spatial import SeparableGaussian
+from semgrid_edu.crf.windowed import WindowedGaussian
 
 __all__ = [
     "CrfParams",
     "PermutohedralLattice",
     "SeparableGaussian",
+    "WindowedGaussian",
     "crf_model",
     "damping",
     "enclosing_simplex_literal",
@@ -23,6 +26,7 @@ __all__ = [
     "lattice_literal",
     "log_partition",
     "mean_field",
+    "mean_field_accurate",
     "mean_field_naive",
     "mean_field_sequential",
     "mean_field_updates",
