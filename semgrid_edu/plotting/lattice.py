@@ -83,7 +83,7 @@ def draw_triangles(low: ArrayLike, high: ArrayLike, ax: Axes) -> Axes:
     places = np.stack(np.meshgrid(*[np.arange(-far, far + 1)] * 2), axis=-1).reshape(-1, 2) @ steps[:2]
     near = places[((places > np.subtract(low, 2)) & (places < np.add(high, 2))).all(axis=1)]
     edges = [np.stack([near, near + one], axis=1) for one in steps]
-    ax.add_collection(LineCollection(np.concatenate(edges), colors="0.85", linewidths=0.6, zorder=0))
+    ax.add_collection(LineCollection(np.concatenate(edges), colors="0.78", linewidths=0.7, zorder=0))
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     return ax
 
