@@ -13,8 +13,8 @@
 # - subtract what a cell tells itself;
 # - tell the error of a kernel from the error of stopping early, and choose a filter for a given task.
 #
-# **Prerequisites.** Lecture 10: equations (3) and (4), mean field with damping, normalisation. Convolution, as in
-# lecture [01](01_bayes.ipynb).
+# **Prerequisites.** Lecture [10](10_crf.ipynb): equations (3) and (4), mean field with damping, normalisation.
+# Convolution, as in lecture [01](01_bayes.ipynb).
 #
 # **Time.** 75 minutes, of which the computer needs one.
 #
@@ -83,7 +83,7 @@ plotting.occupancy(spec, o, ax=axes[2]).set(title="occupancy grid o", ylim=(0, 4
 plt.show()
 
 # %% [markdown]
-# The middle map took ten iterations of mean field over 8804 cells and 14 classes. Lecture 10 would have visited 38
+# The middle map took ten iterations of mean field over 8804 cells and 14 classes. Lecture 10 would have visited 39
 # million pairs of cells in each of them. In this lecture we find out how to do without that.
 #
 # ## The graph, and a second graph that computes
@@ -162,7 +162,8 @@ for height, width in ((20, 15), (40, 30), (60, 40)):
     print(f", so the paper's grid would take {took * (55_025 / (height * width)) ** 2 / 60:5.0f} minutes")
 
 # %% [markdown]
-# The frame must be ready in a tenth of a second. We need something else than a faster loop.
+# The LIDAR delivers ten scans a second, so a map has a tenth of a second. A faster loop won't get us there, because the
+# number of pairs stays the same. We need another way to compute the sum.
 #
 # ## Message passing is filtering
 #
@@ -593,8 +594,7 @@ print(
 # A cell that counts itself defends its own opinion. With the symmetric normalisation a cell among many similar ones
 # hardly counts for itself, so for most cells nothing changes. A lonely cell, whose occupancy is unlike that of all
 # cells around it, hears almost nobody else: after normalisation its own share is nearly 1. Such a cell would be
-# confirmed in whatever it believed at first, in each iteration again. These are few cells in this frame, but they are
-# the ones that need a second opinion least from themselves.
+# confirmed in its first opinion again in each iteration.
 #
 # ## What kernel is it really?
 #

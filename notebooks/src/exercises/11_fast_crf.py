@@ -323,6 +323,8 @@ assert not complaint, complaint
 # blur.diagonal                                             # k_ii, (N,)
 # ```
 #
+# Their first call takes some seconds, because they are compiled then.
+#
 # For one more point: no matrix of all pairs, so that it can refine the maps of a drive. Lecture 10's damping isn't needed with these settings; if you use it,
 # that is right too.
 
