@@ -13,7 +13,7 @@ from semgrid_edu.crf import enclosing_simplex_literal
 from semgrid_edu.crf.lattice_literal import Vertex, blur_literal, splat_literal, step
 from semgrid_edu.crf.simplices import elevation
 
-MARK = 30.0
+MARK = 50.0
 """Area of the mark of a point, or of a vertex that holds one point, in points squared."""
 
 SIZE = 3
