@@ -189,6 +189,15 @@ EQUATIONS = (
         exercise="10_crf#update",
     ),
     Equation(
+        "lattice",
+        "3.5",
+        "The sum over all cells as a filter: splat, blur, slice",
+        literal="semgrid_edu.crf.lattice_literal",
+        fast="semgrid_edu.crf.PermutohedralLattice",
+        lecture="11_fast_crf#splat-blur-slice",
+        exercise="11_fast_crf#lattice-filter",
+    ),
+    Equation(
         "ground-truth",
         "4",
         "Labels of the image, carried to the grid",

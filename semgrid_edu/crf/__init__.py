@@ -6,6 +6,7 @@ from semgrid_edu.crf.doctor import check
 from semgrid_edu.crf.exact import crf_model, exact_marginals, log_partition, most_likely
 from semgrid_edu.crf.faults.finding import Finding, Findings
 from semgrid_edu.crf.lattice import PermutohedralLattice
+from semgrid_edu.crf.lattice_literal import enclosing_simplex_literal, lattice_literal
 from semgrid_edu.crf.mean_field import mean_field
 from semgrid_edu.crf.naive import damping, mean_field_naive, mean_field_sequential, mean_field_updates
 from semgrid_edu.crf.params import CrfParams, unary_from_log_probability, unary_from_probability
@@ -33,12 +34,14 @@ __all__ = [
     "check",
     "crf_model",
     "damping",
+    "enclosing_simplex_literal",
     "energy",
     "exact_marginals",
     "expected_calibration_error",
     "fit_temperature",
     "free_energy",
     "gram_matrix",
+    "lattice_literal",
     "log_partition",
     "mean_field",
     "mean_field_accurate",

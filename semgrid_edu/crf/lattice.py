@@ -20,7 +20,7 @@ from semgrid_edu.errors import ArgumentError
 
 @dataclass(frozen=True)
 class PermutohedralLattice:
-    """Sums over points, weighted by a Gaussian of the distance between their features.
+    """Sums over points, weighted by a Gaussian of the distance between their features (eq. (4)).
 
     A lattice is built once for the features and then filters any number of values. Its kernel approximates
     exp(-|f_i - f_j|^2 / 2): the blur has the variance and the integral of the Gaussian but a finite reach, and what it

@@ -20,6 +20,7 @@ from semgrid_edu.plotting.colours import (
 from semgrid_edu.plotting.grids import grid_labels, grid_values, label_maps, occupancy, velocity, velocity_arrows
 from semgrid_edu.plotting.images import image_labels, image_values, plane_on_image, points_on_image
 from semgrid_edu.plotting.inference import coupling_errors, error_against_time, picks_a_side
+from semgrid_edu.plotting.lattice import LatticeFrame, draw_lattice_frame, draw_triangles, lattice_story, vertex_places
 from semgrid_edu.plotting.legends import class_legend
 from semgrid_edu.plotting.lines import belief_history, probability_line, probability_lines, state_history
 from semgrid_edu.plotting.moving import animate_occupancy, particles, velocity_wheel
@@ -37,6 +38,7 @@ __all__ = [
     "STATE_NAMES",
     "WHEEL_SPEED",
     "Animation",
+    "LatticeFrame",
     "animate",
     "animate_occupancy",
     "belief_history",
@@ -44,12 +46,15 @@ __all__ = [
     "confusion",
     "coupling_errors",
     "depth_colours",
+    "draw_lattice_frame",
+    "draw_triangles",
     "error_against_time",
     "grid_labels",
     "grid_values",
     "image_labels",
     "image_values",
     "label_maps",
+    "lattice_story",
     "occupancy",
     "occupancy_colours",
     "particles",
@@ -66,4 +71,5 @@ __all__ = [
     "velocity_ellipse",
     "velocity_spread",
     "velocity_wheel",
+    "vertex_places",
 ]
