@@ -1,9 +1,17 @@
 """Time mean field against pydensecrf2 and against the written-out twin: `python benchmarks/bench_crf.py`.
 
 The street is made up: classes in patches, noisy network scores, occupancy states in patches of their own. Both
-libraries take turns, so that a busy machine slows both; the best of the rounds counts.
+libraries take turns, so that a busy machine slows both; the best of the rounds counts. Every time includes the set-up
+of the kernels. pydensecrf2 gets the four state probabilities as they are (six features of a point) or, since they sum
+to one, as three numbers with the same distances (five features, as `mean_field` has them).
 """
 
+import os
+import subprocess
+import sys
+import tempfile
+
+import numba
 import numpy as np
 import pydensecrf.densecrf as densecrf
 from numpy.typing import NDArray
@@ -17,28 +25,41 @@ from semgrid_edu.grid import GridSpec
 N_CLASSES = 14
 ROUNDS = 15
 
+ZERO_SUM = np.array([[1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1]]) / 2
+"""Takes four probabilities to three numbers, and keeps distances."""
 
-def street(shape: tuple[int, int], seed: int) -> tuple[NDArray, NDArray, NDArray]:
+FIRST_CALL = """
+import time
+import numpy as np
+from semgrid_edu.crf import CrfParams, mean_field
+start = time.perf_counter()
+mean_field(np.zeros((2, 3, 3)), np.full((4, 3, 3), 0.25), CrfParams())
+print(time.perf_counter() - start)
+"""
+
+
+def street(shape: tuple[int, int], seed: int, n_classes: int = N_CLASSES) -> tuple[NDArray, NDArray, NDArray]:
     """Make up unary (C, H, W), values (4, H, W) and the true labels (H, W)."""
     rng = np.random.default_rng(seed)
 
     def patches(count: int) -> NDArray:
         return np.argmax([gaussian_filter(rng.normal(size=shape), 4) for _ in range(count)], axis=0)
 
-    truth, state = patches(N_CLASSES), patches(4)
-    scores = 2 * np.eye(N_CLASSES)[truth] + 1.5 * rng.normal(size=(*shape, N_CLASSES))
+    truth, state = patches(n_classes), patches(4)
+    scores = 2 * np.eye(n_classes)[truth] + 1.5 * rng.normal(size=(*shape, n_classes))
     belief = 5 * np.eye(4)[state] + 0.5 * rng.normal(size=(*shape, 4))
     unary = unary_from_probability(softmax(scores, axis=-1).transpose(2, 0, 1))
     return unary, softmax(belief, axis=-1).transpose(2, 0, 1), truth
 
 
-def partner(unary: NDArray, values: NDArray, params: CrfParams, iterations: int = 10) -> NDArray:
-    """Do the same with pydensecrf2, which filters in six dimensions and keeps a cell's word to itself."""
+def partner(unary: NDArray, values: NDArray, params: CrfParams, state_features: NDArray | None = None) -> NDArray:
+    """Do the same with pydensecrf2, which keeps a cell's word to itself."""
+    state = values if state_features is None else np.einsum("ks,shw->khw", state_features, values)
     n_classes, height, width = unary.shape
     place = np.indices((height, width))
     crf = densecrf.DenseCRF(height * width, n_classes)
     crf.setUnaryEnergy(np.ascontiguousarray(unary.reshape(n_classes, -1), dtype=np.float32))
-    bilateral = np.concatenate([place / params.sigma_alpha, values / params.sigma_beta]).reshape(6, -1)
+    bilateral = np.concatenate([place / params.sigma_alpha, state / params.sigma_beta]).reshape(-1, height * width)
     spatial = (place / params.sigma_gamma).reshape(2, -1)
     for features, weight in ((bilateral, params.w_bilateral), (spatial, params.w_spatial)):
         crf.addPairwiseEnergy(
@@ -47,35 +68,74 @@ def partner(unary: NDArray, values: NDArray, params: CrfParams, iterations: int 
             kernel=densecrf.DIAG_KERNEL,
             normalization=densecrf.NORMALIZE_SYMMETRIC,
         )
-    return np.asarray(crf.inference(iterations)).reshape(unary.shape)
+    return np.asarray(crf.inference(10)).reshape(unary.shape)
+
+
+def compare(name: str, shape: tuple[int, int], threads: int) -> None:
+    """Print the times of all three, and how many times ours the others are."""
+    unary, values, _ = street(shape, seed=0)
+    params = CrfParams()
+    numba.set_num_threads(threads)
+    ours, six, five = best_times(
+        [
+            lambda: mean_field(unary, values, params),
+            lambda: partner(unary, values, params),
+            lambda: partner(unary, values, params, ZERO_SUM),
+        ],
+        ROUNDS,
+    )
+    print(f"{name} {shape}, threads: {threads}: mean_field {ours:.1f} ms; pydensecrf2 ", end="")
+    print(f"6-D {six:.1f} ms, ratio {six / ours:.2f}; 5-D {five:.1f} ms, ratio {five / ours:.2f}")
+
+
+def agreement() -> None:
+    """Print how often labels are right, and how far results on a small grid lie from the written-out twin's."""
+    params = CrfParams()
+    unary, values, truth = street(GridSpec.paper().shape, seed=0)
+    ours, theirs = mean_field(unary, values, params), partner(unary, values, params)
+    accuracy = [(q.argmax(axis=0) == truth).mean() for q in (-unary, ours, theirs)]
+    print("accuracy without CRF {:.3f}, mean_field {:.3f}, pydensecrf2 {:.3f};".format(*accuracy), end=" ")
+    print(f"same label in {(ours.argmax(axis=0) == theirs.argmax(axis=0)).mean():.3f} of cells")
+    unary, values, _ = street((40, 30), seed=0)
+    exact = mean_field_naive(unary, values, params)
+    for label, q in (
+        ("mean_field", mean_field(unary, values, params)),
+        ("pydensecrf2", partner(unary, values, params)),
+    ):
+        error, same = abs(q - exact), (q.argmax(axis=0) == exact.argmax(axis=0)).mean()
+        print(f"  {label} against mean_field_naive, 40 x 30 cells: mean |dQ| {error.mean():.5f}, ", end="")
+        print(f"max {error.max():.3f}, same label in {same:.3f} of cells")
+
+
+def growth() -> None:
+    """Print a table: the time as cells or classes become more, and the time for each of them."""
+    print("| cells | classes | ms | ns for a cell and class |\n|---:|---:|---:|---:|")
+    cases = [((rows, 155), N_CLASSES) for rows in (89, 178, 355, 710)] + [((355, 155), n) for n in (2, 7, 28, 56)]
+    for shape, n_classes in cases:
+        unary, values, _ = street(shape, 0, n_classes)
+        (ms,) = best_times([lambda u=unary, v=values: mean_field(u, v, CrfParams())], ROUNDS)
+        print(f"| {unary[0].size} | {n_classes} | {ms:.1f} | {1e6 * ms / unary.size:.0f} |")
+
+
+def first_calls() -> None:
+    """Print how long a process waits for its first result: compiled anew, and loaded from the cache on disk."""
+    with tempfile.TemporaryDirectory() as folder:
+        for label in ("compiled", "loaded from the cache"):
+            command, environment = [sys.executable, "-c", FIRST_CALL], {**os.environ, "NUMBA_CACHE_DIR": folder}
+            seconds = subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout
+            print(f"first call, {label}: {float(seconds):.1f} s")
 
 
 def main() -> None:
     """Print times, their ratio and how far results agree."""
-    params = CrfParams()
-    for name, spec in (("compact", GridSpec.compact()), ("paper", GridSpec.paper())):
-        unary, values, truth = street(spec.shape, seed=0)
-        ours, theirs = mean_field(unary, values, params), partner(unary, values, params)
-        fast, slow = best_times(
-            [lambda u=unary, v=values: mean_field(u, v, params), lambda u=unary, v=values: partner(u, v, params)],
-            ROUNDS,
-        )
-        print(f"{name} {spec.shape}: mean_field {fast:.1f} ms, pydensecrf2 {slow:.1f} ms, ratio {slow / fast:.2f}")
-        accuracy = [(q.argmax(axis=0) == truth).mean() for q in (-unary, ours, theirs)]
-        print("  accuracy without CRF {:.3f}, mean_field {:.3f}, pydensecrf2 {:.3f};".format(*accuracy), end=" ")
-        print(f"same label in {(ours.argmax(axis=0) == theirs.argmax(axis=0)).mean():.3f} of cells")
-    unary, values, _ = street((40, 30), seed=0)
-    exact, ours, theirs = (f(unary, values, params) for f in (mean_field_naive, mean_field, partner))
-    naive, fast = best_times(
-        [lambda: mean_field_naive(unary, values, params), lambda: mean_field(unary, values, params)], ROUNDS
-    )
-    print(f"small (40, 30): mean_field_naive {naive:.1f} ms, mean_field {fast:.1f} ms, ratio {naive / fast:.1f}")
-    for label, q in (("mean_field", ours), ("pydensecrf2", theirs)):
-        same = (q.argmax(axis=0) == exact.argmax(axis=0)).mean()
-        print(
-            f"  {label} against exact: mean |dQ| {abs(q - exact).mean():.5f}, max {abs(q - exact).max():.3f}, ", end=""
-        )
-        print(f"same label in {same:.3f} of cells")
+    most = numba.get_num_threads()
+    for threads in range(min(2, most), 0, -1):
+        compare("paper", GridSpec.paper().shape, threads)
+        compare("compact", GridSpec.compact().shape, threads)
+    numba.set_num_threads(most)
+    agreement()
+    growth()
+    first_calls()
 
 
 if __name__ == "__main__":

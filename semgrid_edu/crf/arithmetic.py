@@ -4,8 +4,11 @@ import numpy as np
 from numba import njit
 
 FAST = {"contract", "nnan", "nsz"}
-"""What the compiler may do: round x y + z once, and take for granted that no number is NaN. It may not change the order
-of a sum, as `fastmath=True` allows: then each compilation chooses an order, and two processes differ in the last bits."""
+"""What the compiler may do: round x y + z once, and take for granted that no number is NaN.
+
+It may not change the order of a sum, which `fastmath=True` allows: then the order, and with it the last bits, depend on
+how the compiler happened to see the sum.
+"""
 
 HALF = np.float32(0.5)
 """A factor of 0.5 alone would make the compiler compute in double precision."""

@@ -79,17 +79,17 @@ class PermutohedralLattice:
             raise ArgumentError("features", "fewer standard deviations, or a larger sigma", np.abs(features).max())
         origins, ranks, weights = enclosing_simplices(elevated)
         vertices = number_vertices(origins, ranks)
-        corners = vertices.simplices[vertices.members]
+        corners = vertices.simplices.take(vertices.members, axis=0)
         starts, members = sort_by_vertex(corners.ravel(), vertices.neighbours.shape[2])
-        factor = peak(dimensions)
+        factor, shares = np.float32(peak(dimensions)), weights.astype(np.float32)
         return cls(
             corners=corners,
-            slices=(factor * weights).astype(np.float32),
+            slices=factor * shares,
             neighbours=vertices.neighbours,
             starts=starts,
             points=members // np.int32(dimensions + 1),
-            splats=weights.ravel()[members].astype(np.float32),
-            diagonal=np.float32(factor) * self_responses(vertices.members, weights, responses(*vertices[1:])),
+            splats=shares.ravel()[members],
+            diagonal=factor * self_responses(vertices.members, weights, responses(*vertices[1:])),
         )
 
     def scaled(self, scale: NDArray) -> "PermutohedralLattice":
@@ -106,12 +106,8 @@ class PermutohedralLattice:
             The same vertices with other weights.
         """
         scale = scale.astype(np.float32)
-        return replace(
-            self,
-            slices=self.slices * scale[:, None],
-            splats=self.splats * scale[self.points],
-            diagonal=self.diagonal * scale**2,
-        )
+        slices, splats = _scaled(self.slices, self.splats, self.points, scale)
+        return replace(self, slices=slices, splats=splats, diagonal=self.diagonal * scale**2)
 
     def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """Filter values at the points.
@@ -159,6 +155,17 @@ class PermutohedralLattice:
             _blur(blurred, forth, back, other)
             blurred, other = other, blurred
         return blurred
+
+
+@njit(cache=True, parallel=True)
+def _scaled(slices, splats, points, scale):
+    """Return both weights of each point times its scale."""
+    scaled_slices, scaled_splats = np.empty_like(slices), np.empty_like(splats)
+    for i in prange(len(slices)):
+        scaled_slices[i] = scale[i] * slices[i]
+    for n in prange(len(splats)):
+        scaled_splats[n] = scale[points[n]] * splats[n]
+    return scaled_slices, scaled_splats
 
 
 @njit(cache=True, parallel=True, fastmath=FAST)

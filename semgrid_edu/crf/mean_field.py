@@ -156,8 +156,8 @@ def _above_best(unary):
 def _update(rewards, phi, own, part, logits, Q, cells):
     """Update all cells, and return the largest change of a probability; `cells` gets a copy of Q in the filters' order.
 
-    The reward of a cell contains what it says itself; this is subtracted. Its log Q, known up to one number, goes part of
-    the way to the reward minus the unary term.
+    The reward of a cell contains what it says itself; this is subtracted. Its log Q, known up to one number, goes part
+    of the way to the reward minus the unary term.
     """
     n_classes, height, width = phi.shape
     lanes, change = cells.shape[1], np.zeros(height, np.float32)

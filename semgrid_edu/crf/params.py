@@ -168,10 +168,10 @@ def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float6
         raise ArgumentError("unary", "shape (C, H, W), nothing empty", f"shape {unary.shape}")
     if values.shape != (N_STATES, *unary.shape[1:]):
         raise ArgumentError("values", f"shape {(N_STATES, *unary.shape[1:])}", f"shape {values.shape}")
-    best = unary.min(axis=0)  # NaN where any cost is NaN
-    if np.isnan(best).any() or np.isneginf(best).any():
+    lowest = unary.min()  # NaN where any cost is NaN
+    if np.isnan(lowest) or np.isneginf(lowest):
         raise ArgumentError("unary", "numbers, or inf for an impossible class", "NaN or -inf")
-    if np.isinf(best).any():
+    if np.isinf(unary.max()) and np.isinf(unary.min(axis=0)).any():
         raise ArgumentError("unary", "a possible class in each cell", "a cell where every class is inf")
     if not (values.min() >= -1e-3 and np.abs(values.sum(axis=0) - 1).max() <= 1e-3):
         raise ArgumentError("values", "four probabilities that sum to 1 in each cell", "a cell where they don't")
