@@ -316,6 +316,13 @@ def test_axes_of_equal_length_are_told_apart_by_the_numbers():
     assert names(found) == ["states on the wrong axis"]
 
 
+def test_an_impossible_class_is_no_score_that_stands_out():
+    case = street()
+    unary = 1 + case.unary
+    unary[3] = np.inf
+    assert names(check(unary, case.values, case.params)) == ["no distribution"]
+
+
 def test_of_two_classes_scores_look_like_costs():
     case = street(0, (60, 40), 2)
     for scores in (case.scores, -case.scores):

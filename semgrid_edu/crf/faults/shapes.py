@@ -45,9 +45,9 @@ def as_numbers(name: str, argument: object) -> tuple[NDArray | None, Finding | N
     if np.ma.is_masked(argument):
         return array, Finding(
             "masked cells",
-            "Cells that were masked have a label all the same, and influence their neighbours.",
+            "The CRF stops with an ArgumentError; elsewhere masked cells get a label, and influence their neighbours.",
             f"`{name}` is a masked array; {np.ma.count_masked(argument):,} of its {array.size:,} numbers are masked.",
-            "The CRF computes with the numbers under the mask, which may be anything.",
+            "numpy drops the mask when it makes an ordinary array; the numbers under it may be anything.",
             "Fill them with what you know: the same cost for every class, and UNKNOWN with probability 1.",
         )
     return array, None
@@ -56,7 +56,7 @@ def as_numbers(name: str, argument: object) -> tuple[NDArray | None, Finding | N
 def _no_array(name: str, found: str) -> Finding:
     return Finding(
         "no array of numbers",
-        "The CRF stops with a TypeError, a ValueError or a RuntimeError that doesn't speak of the CRF.",
+        "The CRF stops with an ArgumentError: expected an array of real numbers.",
         f"`{name}` is {found}.",
         "A tensor that carries gradients, a list of rows of different lengths, None, text, or complex numbers.",
         "Hand over an array of real numbers; of a tensor `tensor.detach().cpu().numpy()`.",

@@ -187,7 +187,7 @@ def _scaled(phi: NDArray) -> Finding | None:
     return Finding(
         "scaled costs",
         "The CRF smooths more, or less, than the same weights do elsewhere.",
-        f"exp(-unary) doesn't sum to one, but exp(-{factor:.4g} unary) does, in every cell.",
+        f"exp(-unary) doesn't sum to one, but exp(-{factor:.4g} unary) does, in the cells looked at.",
         cause,
         "Natural logarithms: -np.log(g)."
         if base
@@ -200,9 +200,9 @@ def _scores(phi: NDArray) -> Finding | None:
     if len(phi) < 3 or phi.shape[1] * phi.shape[2] < 16:
         return None
     ranked = np.sort(phi, axis=0)
-    lead, behind = (np.median(d[np.isfinite(d)]) for d in (ranked[-1] - ranked[-2], ranked[1] - ranked[0]))
+    lead, behind = np.median(ranked[-1] - ranked[-2]), np.median(ranked[1] - ranked[0])
     total = logsumexp(-phi, axis=0)
-    if not lead > behind or np.mean(np.abs(total) <= CLOSE) > 0.5:
+    if not behind < lead < np.inf or np.mean(np.abs(total) <= CLOSE) > 0.5:
         return None
     return Finding(
         "scores",
