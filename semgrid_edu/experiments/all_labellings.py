@@ -69,8 +69,11 @@ def visit_labellings(unary: NDArray, values: NDArray, params: CrfParams) -> Exac
     parts = np.split(np.arange(cells), [cells // 4, cells // 2])
     groups = [_Group.of(phi[part], weights[np.ix_(part, part)]) for part in parts]
     a, b, c = groups
-    ab = a.energy[:, None] + b.energy + _between(a, b, weights[np.ix_(parts[0], parts[1])])
-    ac, bc = (_between(g, c, weights[np.ix_(part, parts[2])]) for g, part in zip((a, b), parts, strict=False))
+    ab, ac, bc = (
+        _between(groups[g], groups[h], weights[np.ix_(parts[g], parts[h])], classes)
+        for g, h in ((0, 1), (0, 2), (1, 2))
+    )
+    ab += a.energy[:, None] + b.energy
     totals, log_z = _sums(ab, ac, bc, c.energy)
     marginals = np.concatenate([total @ group.chosen for total, group in zip(totals, groups, strict=True)])
     best = _best(ab, ac, bc, c.energy)
@@ -94,9 +97,8 @@ class _Group(NamedTuple):
         return cls(labels, chosen, chosen @ phi.ravel() + (weights.sum() - agree) / 2)
 
 
-def _between(one: _Group, other: _Group, weights: NDArray) -> NDArray[np.float64]:
+def _between(one: _Group, other: _Group, weights: NDArray, classes: int) -> NDArray[np.float64]:
     """Return what the pairs between two groups cost, for all labellings of both: the weights where labels differ."""
-    classes = other.chosen.shape[1] // weights.shape[1]
     return weights.sum() - one.chosen @ np.kron(weights, np.eye(classes)) @ other.chosen.T
 
 
