@@ -1,10 +1,10 @@
 """The CRF without approximation by visiting every labelling, up to 16 cells of three classes (eq. (3), (4)).
 
-The cells are split into two halves. A labelling is a labelling of the one half together with one of the other; its
-energy is that of both, plus the pairs between them, which for all labellings at once are a product of matrices.
+The cells are split into groups a, b and c. A labelling of all cells is one of each group, and its energy is that of the
+groups plus that of the pairs between them. So exp(-E) is a product of tables over (a, b), (a, c), (b, c) and c, and the
+sum over all labellings a product of matrices.
 """
 
-from collections.abc import Callable, Iterator
 from itertools import product
 from typing import NamedTuple
 
@@ -16,9 +16,7 @@ from semgrid_edu.crf.params import check_inputs
 from semgrid_edu.errors import ArgumentError
 
 MOST_LABELLINGS = 10**8
-"""A few seconds of work."""
-_ROWS = 256
-"""So many labellings of the first half at a time: the energies of up to 10,000 others each take 20 MB."""
+"""A second of work."""
 
 
 class ExactCrf(NamedTuple):
@@ -29,7 +27,7 @@ class ExactCrf(NamedTuple):
     marginals : (C, H, W) float64
         P(x_i = l).
     labels : (H, W) int64
-        The labelling of least energy; the first one when several tie.
+        The labelling of least energy; one of them when several tie.
     log_partition : float
         log Z.
     """
@@ -49,7 +47,8 @@ def visit_labellings(unary: NDArray, values: NDArray, params: CrfParams) -> Exac
     values : (4, H, W) float
         o_i, the occupancy probabilities of each cell.
     params : CrfParams
-        Weights, widths and normalisation.
+        Weights, widths and normalisation; a labelling's pair costs have to be some hundreds at most, since exp(-700) is
+        nearly the smallest number.
 
     Returns
     -------
@@ -66,52 +65,57 @@ def visit_labellings(unary: NDArray, values: NDArray, params: CrfParams) -> Exac
         raise ArgumentError("unary", "finite numbers", "inf")
     if classes**cells > MOST_LABELLINGS:
         raise ArgumentError("unary", f"at most {MOST_LABELLINGS:,} labellings", f"{classes}^{cells}")
-    halves, energies = _split(unary.reshape(classes, -1).T, pair_weights(values, params))
-    least, *best = min(_least(row, block) for row, block in energies())
-    sums = [np.zeros(half.chosen.shape[1]) for half in halves]
-    for row, block in energies():
-        p = np.exp(least - block)
-        sums[0] += p.sum(axis=1) @ halves[0].chosen[row : row + _ROWS]
-        sums[1] += p.sum(axis=0) @ halves[1].chosen
-    total = np.concatenate(sums).reshape(cells, classes).T
-    chosen = np.concatenate([half.chosen[k] for half, k in zip(halves, best, strict=True)]).reshape(cells, classes)
-    Z = total[:, 0].sum()
-    shape = unary.shape[1:]
-    return ExactCrf((total / Z).reshape(unary.shape), chosen.argmax(axis=1).reshape(shape), float(np.log(Z) - least))
+    phi, weights = unary.reshape(classes, -1).T, pair_weights(values, params)
+    parts = np.split(np.arange(cells), [cells // 4, cells // 2])
+    groups = [_Group.of(phi[part], weights[np.ix_(part, part)]) for part in parts]
+    a, b, c = groups
+    ab, ac, bc = (
+        _between(groups[g], groups[h], weights[np.ix_(parts[g], parts[h])], classes)
+        for g, h in ((0, 1), (0, 2), (1, 2))
+    )
+    ab += a.energy[:, None] + b.energy
+    totals, log_z = _sums(ab, ac, bc, c.energy)
+    marginals = np.concatenate([total @ group.chosen for total, group in zip(totals, groups, strict=True)])
+    best = _best(ab, ac, bc, c.energy)
+    labels = np.concatenate([group.labels[k] for group, k in zip(groups, best, strict=True)])
+    return ExactCrf(marginals.reshape(cells, classes).T.reshape(unary.shape), labels.reshape(unary.shape[1:]), log_z)
 
 
-def _least(row: int, block: NDArray) -> tuple[float, int, int]:
-    """Return the least energy of some rows, and its labellings of the first and of the second half."""
-    k, other = np.unravel_index(block.argmin(), block.shape)
-    return float(block[k, other]), row + int(k), int(other)
+class _Group(NamedTuple):
+    """All labellings of some cells: (L, n) classes, the same as (L, n C) zeros and ones, and (L,) energies."""
 
-
-class _Half(NamedTuple):
-    """The labellings of half of the cells: which class each cell has, (L, n C) of 0 and 1, and their energies, (L,)."""
-
+    labels: NDArray[np.int64]
     chosen: NDArray[np.float64]
     energy: NDArray[np.float64]
 
     @classmethod
-    def of(cls, phi: NDArray, weights: NDArray) -> "_Half":
+    def of(cls, phi: NDArray, weights: NDArray) -> "_Group":
         cells, classes = phi.shape
         labels = np.array(list(product(range(classes), repeat=cells)), dtype=np.int64)
         chosen = np.eye(classes)[labels].reshape(len(labels), cells * classes)
         agree = np.einsum("lk,lk->l", chosen @ np.kron(weights, np.eye(classes)), chosen)  # each pair twice
-        return cls(chosen, chosen @ phi.ravel() + (weights.sum() - agree) / 2)
+        return cls(labels, chosen, chosen @ phi.ravel() + (weights.sum() - agree) / 2)
 
 
-def _split(phi: NDArray, weights: NDArray) -> tuple[tuple[_Half, _Half], Callable[[], Iterator[tuple[int, NDArray]]]]:
-    """Return both halves, and a function that yields the energies of all labellings, some rows at a time."""
-    cells, classes = phi.shape
-    first = cells // 2
-    left, right = _Half.of(phi[:first], weights[:first, :first]), _Half.of(phi[first:], weights[first:, first:])
-    between = weights[:first, first:]
-    reward = np.kron(between, np.eye(classes)) @ right.chosen.T
+def _between(one: _Group, other: _Group, weights: NDArray, classes: int) -> NDArray[np.float64]:
+    """Return what the pairs between two groups cost, for all labellings of both: the weights where labels differ."""
+    return weights.sum() - one.chosen @ np.kron(weights, np.eye(classes)) @ other.chosen.T
 
-    def energies() -> Iterator[tuple[int, NDArray]]:
-        for row in range(0, len(left.energy), _ROWS):
-            some = slice(row, row + _ROWS)
-            yield row, left.energy[some, None] + right.energy + between.sum() - left.chosen[some] @ reward
 
-    return (left, right), energies
+def _sums(ab: NDArray, ac: NDArray, bc: NDArray, c: NDArray) -> tuple[list[NDArray], float]:
+    """Return the probabilities of the labellings of each group, and log Z."""
+    p_ab, p_c, with_a, with_b = np.exp(ab.min() - ab), np.exp(c.min() - c), np.exp(-ac), np.exp(-bc)
+    joint = p_ab * ((with_a * p_c) @ with_b.T)
+    last = p_c * (with_a * (p_ab @ with_b)).sum(axis=0)
+    Z = last.sum()
+    return [joint.sum(axis=1) / Z, joint.sum(axis=0) / Z, last / Z], float(np.log(Z) - ab.min() - c.min())
+
+
+def _best(ab: NDArray, ac: NDArray, bc: NDArray, c: NDArray) -> tuple[int, int, int]:
+    """Return the labelling of each group in the labelling of least energy."""
+    found = []
+    for k in range(len(ab)):
+        energy = ab[k][:, None] + bc + (ac[k] + c)
+        place = np.unravel_index(energy.argmin(), energy.shape)
+        found.append((energy[place], k, *place))
+    return min(found)[1:]

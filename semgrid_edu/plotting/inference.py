@@ -74,7 +74,7 @@ def _points(ax: Axes, x: Sequence[float], y: Sequence[float], name: str, number:
 def coupling_errors(result: Mapping) -> Figure:
     """Draw the errors of approximate inference on tiny grids against the coupling, one column per size.
 
-    Lines are means over the random grids; bands reach from the first to the third quartile.
+    Lines are means over the random grids; in the upper row, bands reach from the first to the third quartile.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def coupling_errors(result: Mapping) -> Figure:
     for column, (name, case) in zip(axes.T, cases.items(), strict=True):
         for ax, part in zip(column, ("variation", "labels"), strict=True):
             for way, errors in case[part].items():
-                _band(ax, result["couplings"], 100 * np.asarray(errors), way, numbers[way])
+                _mean(ax, result["couplings"], 100 * np.asarray(errors), numbers[way], way, band=part == "variation")
             ax.grid(alpha=0.3)
         column[0].set_title(name, loc="left", fontsize="medium")
         column[1].set_xlabel("coupling $w_1$")
@@ -104,12 +104,13 @@ def coupling_errors(result: Mapping) -> Figure:
     return figure
 
 
-def _band(ax: Axes, x: Sequence[float], errors: np.ndarray, name: str, number: int) -> None:
+def _mean(ax: Axes, x: Sequence[float], errors: np.ndarray, number: int, name: str, band: bool) -> None:
     ax.plot(
         x, errors.mean(axis=1), color=f"C{number}", marker=_MARKERS[number], markersize=4, linewidth=1.2, label=name
     )
-    low, high = np.quantile(errors, (0.25, 0.75), axis=1)
-    ax.fill_between(x, low, high, color=f"C{number}", alpha=0.1, linewidth=0)
+    if band:
+        low, high = np.quantile(errors, (0.25, 0.75), axis=1)
+        ax.fill_between(x, low, high, color=f"C{number}", alpha=0.1, linewidth=0)
 
 
 def picks_a_side(symmetric: Mapping, ax: Axes | None = None) -> Axes:
