@@ -141,7 +141,7 @@ print("number of cells that one square links, at most:", max(len(factor.names) f
 # **Predict before you run.** The network said *car* for cell 2, with 0.6. What does the model say? Add the two rows in
 # which cell 2 is road.
 #
-# <details><summary>Answer</summary>0.568 + 0.023 = 0.592, so cell 2 is road now. Its neighbour is sure and says road,
+# <details><summary>Answer</summary>0.592 (0.568 + 0.023, rounded at the end), so cell 2 is road now. Its neighbour is sure and says road,
 # and the pair price is larger than the network's preference for car, log (0.6 / 0.4) = 0.41.</details>
 #
 # In symbols, $x_i$ is the label of cell $i$, $\phi_u(x_i) = -\log g_{x_i,i}$ its own price (the **unary** term), and
@@ -452,6 +452,18 @@ for name in ("all at once, damped", "one after the other"):
     assert (np.diff(F[name]) <= 1e-12).all()
     print(f"{name}: P(road) ends at", runs[name][-1][0, 0].round(2), f" F = {F[name][-1]:.2f}")
 
+# %% jupyter={"source_hidden": true}
+t, start, own = np.linspace(0.02, 0.98, 193), 0.7, gram_matrix(free, strong)[0, 0]
+easy = 2 * (-t * np.log(0.7) - (1 - t) * np.log(0.3) + xlogy(t, t) + xlogy(1 - t, 1 - t))
+tangent = 4 * ((1 - 2 * start * (1 - start)) + (4 * start - 2) * (t - start))
+penalty = own * (rel_entr(t, start) + rel_entr(1 - t, 1 - start))
+curves = {"free energy $F$": easy + 4 * (1 - 2 * t * (1 - t)), "pair term by its tangent": easy + tangent}
+curves["tangent, and a penalty for moving"] = easy + tangent + penalty
+true, dotted, dashed = curves.values()
+here = np.interp(start, t, true)
+assert true[dotted.argmin()] > here > true[dashed.argmin()]
+assert (dashed >= true - 1e-9).all()
+
 # %% jupyter={"source_hidden": true} alt="left, free energy against the number of updates: all at once it climbs from 2.2 to 5.5 and keeps jumping, damped and one after the other it falls to about 1; right, free energy along a line of opposite opinions with a tangent curve that dips below it and a damped curve that lies above it"
 fig, axes = plt.subplots(1, 2, figsize=(10.5, 3.8), layout="constrained")
 looks = (("#d55e00", "s:"), ("#0072b2", "o-"), ("0.2", "^--"))
@@ -461,22 +473,12 @@ axes[0].axhline(-log_partition(rivals, free, strong), color="0.6", linewidth=1)
 axes[0].text(N_UPDATES, -log_partition(rivals, free, strong) - 0.08, "$-\\log Z$", ha="right", va="top", fontsize=9)
 axes[0].set(xlabel="updates", ylabel="free energy [nats]", ylim=(0.4, 6), title="two rivals, price 4")
 axes[0].legend(fontsize=9, frameon=False, loc="upper left", bbox_to_anchor=(0.35, 0.68))
-t, start, own = np.linspace(0.02, 0.98, 193), 0.7, gram_matrix(free, strong)[0, 0]
-easy = 2 * (-t * np.log(0.7) - (1 - t) * np.log(0.3) + xlogy(t, t) + xlogy(1 - t, 1 - t))
-tangent = 4 * ((1 - 2 * start * (1 - start)) + (4 * start - 2) * (t - start))
-penalty = own * (rel_entr(t, start) + rel_entr(1 - t, 1 - start))
-curves = {"free energy $F$": easy + 4 * (1 - 2 * t * (1 - t)), "pair term by its tangent": easy + tangent}
-curves["tangent, and a penalty for moving"] = easy + tangent + penalty
 for (name, curve), (colour, style) in zip(
     curves.items(), (("0.2", "-"), ("#d55e00", ":"), ("#0072b2", "--")), strict=True
 ):
     axes[1].plot(t, curve, style, color=colour, label=name)
     lowest = curve.argmin()
     axes[1].plot(t[lowest], curve[lowest], "o" if style != "-" else "", color=colour)
-true, dotted, dashed = curves.values()
-here = np.interp(start, t, true)
-assert true[dotted.argmin()] > here > true[dashed.argmin()]
-assert (dashed >= true - 1e-9).all()
 axes[1].plot(start, here, "k*", markersize=11, label="where we stand")
 axes[1].set(xlabel="$Q_1$(road) = $Q_2$(car)", ylabel="free energy [nats]", ylim=(0.5, 4.5), title="why damping helps")
 axes[1].legend(fontsize=9, frameon=False)
@@ -814,7 +816,7 @@ plt.show()
 # them are this project's, from three networks trained on a simulated data set (`semgrid-edu evaluate`, one seed):
 
 
-# %% tags=["claim-2"]
+# %% tags=["claim-2"] jupyter={"source_hidden": true}
 def difference(name):
     """Return what the CRF changes on minikitti's test frames, in points, by metric."""
     scores = json.loads(Path(f"../docs/results/{name}.json").read_text(encoding="utf-8"))["scores"]

@@ -239,30 +239,22 @@ def update(Q, phi, k):
 # %% nbgrader={"grade": false, "grade_id": "update-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 slips = {
     (0.885, 0.094, 0.108): "a cell counts itself: the diagonal of k must be left out",
-    (
-        0.655,
-        0.144,
-        0.319,
-    ): "different labels are rewarded: being unlike the others must lower the probability; check the sign of the sum",
+    (0.655, 0.144, 0.319): "different labels are rewarded: they must cost; check the sign of the sum",
     (0.296, 0.382, 0.296): "the cells' own prices phi are missing",
     (0.108, 0.555, 0.201): "the sign of phi is swapped: a high price is a low probability",
-    (0.654, 0.126, 0.220): "you normalise over the cells: each cell has its own Z, the sum over its classes, axis 0",
+    (0.654, 0.126, 0.220): "you normalise over the cells: each cell has its own Z, a sum over axis 0",
     (0.269, 0.052, 0.091): "you divide by the sum over all cells and classes: each cell has its own Z",
     (0.287, 0.055, 0.096): "the classes of a cell don't sum to 1: divide by Z_i",
     (0.571, 0.225, 0.276): "cell 1 already used the new Q of cell 0: all cells use the old Q",
     (0.453, 0.184, 0.280): "you use each cell's best class: the whole distribution counts",
     (0.557, 0.249, 0.290): "you start from log Q: the cells' own opinion is phi, in every update",
-    (
-        0.592,
-        0.211,
-        0.304,
-    ): "each pair is halved: within a cell's own sum every neighbour counts once, with its full price",
+    (0.592, 0.211, 0.304): "each pair is halved: in a cell's own sum every neighbour has its full price",
     (0.527, 0.266, 0.280): "each pair counts twice: every neighbour counts once",
     (0.600, 0.204, 0.306): "that is a mean over the cells: take the sum over the others",
     (0.777, 0.134, 0.208): "you multiply by the old Q: it only stands in the sum over the others",
-    (0.614, 0.241, 0.297): "only the pairs i < j are used: a cell hears from all others, before and after it",
-    (0.571, 0.178, 0.310): "only the pairs i > j are used: a cell hears from all others, before and after it",
-    (-1.250, -2.900, -2.340): "those are minus the prices: take the exponential and divide by the sum of the classes",
+    (0.614, 0.241, 0.297): "only the pairs i < j are used: a cell hears from all others",
+    (0.571, 0.178, 0.310): "only the pairs i > j are used: a cell hears from all others",
+    (-1.250, -2.900, -2.340): "those are minus the prices: take the exponential, then divide by Z_i",
 }
 
 # %% nbgrader={"grade": true, "grade_id": "update-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
