@@ -44,7 +44,9 @@ def test_the_sensor_model_makes_what_it_hits_occupied_and_leaves_the_rest_unknow
     hit[rows[inside], cols[inside]] = True
     occupied = belief.probability[[State.STATIC, State.DYNAMIC]].sum(axis=0)
     assert hit.any()
-    np.testing.assert_allclose(occupied[hit], 0.8 * 0.07 / (0.8 * 0.07 + 0.05 * 0.93), atol=1e-5)
+    free, *prior = CmcdotParams().first_sight
+    expected = 0.8 * sum(prior) / (0.8 * sum(prior) + 0.05 * free)
+    np.testing.assert_allclose(occupied[hit], expected, atol=1e-5)
     assert (belief.probability[State.UNKNOWN][~hit] > 0.99).all()
 
 
