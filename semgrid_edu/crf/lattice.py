@@ -122,7 +122,7 @@ class PermutohedralLattice:
         (N, K) float32
             sum_j k(f_i, f_j) values_j, the point itself included.
         """
-        out = np.zeros_like(values)
+        out = np.zeros(values.shape, np.float32)
         self.add(values, out)
         return out
 

@@ -76,7 +76,7 @@ class SeparableGaussian:
         (H W, K) float32
             sum_j k_ij values_j, the cell itself included.
         """
-        out = np.empty_like(values)
+        out = np.empty(values.shape, np.float32)
         self.filter(values, out)
         return out
 
