@@ -864,7 +864,7 @@ for fastest, spacing, cell in ((8, 2, 0.5), (16, 2, 0.5), (16, 1, 0.5), (16, 2, 
     print(f"{V:10d}  {H:4d} x {W:3d}  {1000 * took:6.1f} ms, {each:4.1f} ns for each of V x H x W numbers")
 
 # %% [markdown]
-# In the first three rows the grid stays and the lattice grows: four times as many velocities take three to four times as
+# In the first three rows the grid stays and the lattice grows: four times as many velocities take 3 to 4 times as
 # long. The last two rows, beside the second, keep the lattice and change the cells. There the time grows less than in
 # proportion, because each velocity costs a few calls, however small its map is. From 71 x 31 to 142 x 62 cells it does
 # not even double, and from there to 284 x 124 it grows more than twofold. The larger the map, the nearer the time comes
