@@ -209,8 +209,8 @@ print("o", now.belief.probability.shape, " s", now.scores.shape, " g", now.grid.
 # %% [markdown]
 # **Predict before you run.** A parked car stands beside the road. Which state do the cells right *behind* it get?
 #
-# <details><summary>Answer</summary>UNKNOWN, a grey shadow: no beam reaches them. Not FREE: nothing was seen there,
-# not even nothing. And FREE doesn't mean that you may drive there: lawn is free too.</details>
+# <details><summary>Answer</summary>UNKNOWN, a grey shadow: no beam reaches them. Not FREE: no beam has shown that
+# there is nothing. And FREE doesn't mean that you may drive there: lawn is free too.</details>
 
 # %%
 fig, axes = plt.subplots(1, 2, figsize=(8, 6), layout="compressed")

@@ -739,7 +739,7 @@ plt.show()
 # 2. So each uncovered cell of a wall raised the odds of a particle that runs along with the edge by 15.
 # 3. Switching suspects off one at a time found the moving edge of shadows; transparency and poses had been wrong bets.
 # 4. What comes out of a wall and goes on along it can't claim unseen cells; what has left doesn't stand where it was.
-# 5. What remains: cells that were held for free, walls without a past, and a price that who sets off slowly pays.
+# 5. What remains: cells that were held for free, walls without a past, and people who set off are found later.
 #
 # ## Further reading
 #
