@@ -865,9 +865,9 @@ for fastest, spacing, cell in ((8, 2, 0.5), (16, 2, 0.5), (16, 1, 0.5), (16, 2, 
 
 # %% [markdown]
 # In the first three rows the grid stays and the lattice grows: from the first to the third, sixteen times as many
-# velocities take ten to twenty times as long. The last two rows, beside the second, keep the lattice and change the cells.
-# There, too, the time grows less than in proportion, because each velocity costs a few calls, however small its map is.
-# The larger the map, the nearer the time comes to growing with V x H x W.
+# velocities take ten to twenty times as long. The last two rows, beside the second, keep the lattice and change the
+# cells. There the time grows less than in proportion, because each velocity costs a few calls, however small its map
+# is. The larger the map, the nearer the time comes to growing with V x H x W.
 #
 # Nearly all of it is spent on flying zeros about: at no instant of the drive above does one cell in
 # twenty hold something that moves with a probability of 0.1 or more. Lecture 04 puts the memory where the mass is:
