@@ -6,8 +6,8 @@ from numba import njit
 FAST = {"contract", "nnan", "nsz"}
 """What the compiler may do: round x y + z once, and take for granted that no number is NaN.
 
-It may not change the order of a sum, which `fastmath=True` allows: then the order, and with it the last bits, depend on
-how the compiler happened to see the sum.
+It may not change the order of a sum, as `fastmath=True` would let it: the order decides the last bits, and they should
+be the same in every process.
 """
 
 HALF = np.float32(0.5)
