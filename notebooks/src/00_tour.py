@@ -96,8 +96,8 @@ plt.rcParams["figure.dpi"] = 80
 # | [07](07_segmentation.ipynb) | $i \to s$ | three networks for segmentation |
 # | [08](08_fusion.ipynb) | $(p, o) \to g$ | reduction, fusion, training end to end |
 # | 09 | | where ground truth comes from |
-# | 10 | $g \to g$ | the CRF by hand: equations (3) and (4) |
-# | 11 | $g \to g$ | the fast CRF |
+# | [10](10_crf.ipynb) | $g \to g$ | the CRF by hand: equations (3) and (4) |
+# | [11](11_fast_crf.ipynb) | $g \to g$ | the fast CRF |
 # | 12 | all | the paper's experiments, every claim put to the test |
 # | 13 | all | a real drive: KITTI on your disk |
 

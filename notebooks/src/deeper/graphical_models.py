@@ -753,7 +753,7 @@ plt.show()
 # | [05](../05_pixels.ipynb), [06](../06_planes.ipynb) planes | pixel scores to plane scores | **the distance**: scores go to each cell where the pixel's ray crosses a plane |
 # | [07](../07_segmentation.ipynb) segmentation | the image points to the scores of each pixel | **scan to scores**: the network sees the image alone |
 # | [08](../08_fusion.ipynb) fusion | planes and occupancy point to the class of each cell | **image to occupancy**, **class to occupancy**, **class to class of the next frame** |
-# | 10, 11 (to come) CRF | classes of cells, each pair linked by a factor | none in the model, **all** in mean field's answer |
+# | [10](../10_crf.ipynb), [11](../11_fast_crf.ipynb) CRF | classes of cells, each pair linked by a factor | none in the model, **all** in mean field's answer |
 #
 # `semgrid_edu.graphical.stages` builds these graphs at toy size; the field `cut` of each lists its edges with the
 # price.
