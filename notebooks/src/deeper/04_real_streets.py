@@ -718,8 +718,8 @@ plt.show()
 # - **Slow starters.** Whoever has just set off has an origin in which they stood a moment ago. So they are doubted when
 #   they go where nobody has looked. On six streets where people set off, at 0.2 m, CMCDOT called 94 % of the walkers'
 #   cells DYNAMIC before, and 68 % now (`semgrid-edu reproduce streets`; to 25 m, 1.5 s after they set off). In the
-#   street that lost most we followed those who weren't found: ahead of them were UNKNOWN cells, because no beam reaches
-#   the ground there.
+#   street that lost most we followed four who weren't found: ahead of them were cells of which no scan had said
+#   anything.
 # - **A single return.** At first sight most cells are free, so one hit in a new cell isn't believed until a second
 #   scan confirms it.
 #
