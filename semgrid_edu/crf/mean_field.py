@@ -71,8 +71,8 @@ def mean_field(
     params : CrfParams
         Weights, widths and normalisation.
     iterations : int
-        The largest number of updates of all cells. With the default parameters nearly all labels have settled after ten;
-        probabilities of single cells still change later.
+        The largest number of updates of all cells. With the default parameters nearly all labels have settled after
+        ten; probabilities of single cells still change later.
     tolerance : float
         Stop as soon as an update changes no probability by more than this.
 

@@ -12,7 +12,7 @@ from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.experiments.crf_outputs import grid_outputs
 from semgrid_edu.networks import load_net
 from semgrid_edu.storage.files import sha256
-from semgrid_edu.storage.provenance import write_provenance
+from semgrid_edu.storage.provenance import short_path, write_provenance
 from semgrid_edu.training import TrainingParams
 from semgrid_edu.training.crf import CRF_TRAINING, train_crf
 
@@ -133,19 +133,3 @@ def _train_command(
         f"--weight-limit {variant.weight_limit:g} --seed {seed} --iterations {params.grid_iterations}",
     ]
     return " ".join(["semgrid-edu train-crf", *filter(None, options)])
-
-
-def short_path(weights: str | Path) -> str:
-    """Return the last two parts of a path to weights: the folder, which names the network, and the file.
-
-    Parameters
-    ----------
-    weights : path-like
-        The file.
-
-    Returns
-    -------
-    str
-        Such as "segnet_compact/weights.safetensors".
-    """
-    return "/".join(Path(weights).resolve().parts[-2:])

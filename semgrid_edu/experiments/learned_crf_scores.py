@@ -24,11 +24,11 @@ from semgrid_edu.experiments.crf_outputs import (
 )
 from semgrid_edu.experiments.crf_scores import gain_interval
 from semgrid_edu.experiments.evaluate import scores, scores_table
-from semgrid_edu.experiments.learned_crf import MEAN_FIELD_UPDATES, VARIANTS, short_path, train_crf_on
+from semgrid_edu.experiments.learned_crf import MEAN_FIELD_UPDATES, VARIANTS, train_crf_on
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.networks import WEIGHTS, load_net
 from semgrid_edu.storage.files import sha256
-from semgrid_edu.storage.provenance import versions
+from semgrid_edu.storage.provenance import short_path, versions
 from semgrid_edu.training import CHECKPOINT, TrainingParams
 from semgrid_edu.training.crf import CRF_TRAINING
 

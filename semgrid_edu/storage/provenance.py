@@ -56,6 +56,22 @@ def write_provenance(folder: str | Path, command: str, seed: int, packages: tupl
     )
 
 
+def short_path(weights: str | Path) -> str:
+    """Return the last two parts of a path to weights: the folder, which names the network, and the file.
+
+    Parameters
+    ----------
+    weights : path-like
+        The file.
+
+    Returns
+    -------
+    str
+        Such as "segnet_compact/weights.safetensors".
+    """
+    return "/".join(Path(weights).resolve().parts[-2:])
+
+
 def provenance_problems(folder: str | Path) -> list[str]:
     """Compare the files of a folder with its `provenance.json`.
 

@@ -79,6 +79,13 @@ def test_each_choice_is_the_best_of_the_trials(found):
     assert {chosen["pixel accuracy"]["trial"], chosen["class accuracy"]["trial"]} & set(found["pareto"])
 
 
+def test_the_table_says_when_no_trial_kept_class_accuracy(found):
+    lossless = {cells: {name: 0.0 for name in scores} for cells, scores in found["unrefined"].items()}
+    assert "none of the trials" not in crf_search.search_table(found | {"unrefined": lossless})
+    perfect = {cells: {name: 1.0 for name in scores} for cells, scores in found["unrefined"].items()}
+    assert crf_search.search_table(found | {"unrefined": perfect}).count("none of the trials kept class accuracy") == 1
+
+
 def test_network_and_default_crf_score_on_the_test_split_as_in_the_evaluation(found, inputs):
     _, dataset, weights = inputs
     expected = evaluate(dataset, weights)["scores"]
