@@ -80,9 +80,9 @@ def test_each_choice_is_the_best_of_the_trials(found):
 
 
 def test_the_table_says_when_no_trial_kept_class_accuracy(found):
-    lossless = {cells: {name: 0.0 for name in scores} for cells, scores in found["unrefined"].items()}
+    lossless = {cells: dict.fromkeys(scores, 0.0) for cells, scores in found["unrefined"].items()}
     assert "none of the trials" not in crf_search.search_table(found | {"unrefined": lossless})
-    perfect = {cells: {name: 1.0 for name in scores} for cells, scores in found["unrefined"].items()}
+    perfect = {cells: dict.fromkeys(scores, 1.0) for cells, scores in found["unrefined"].items()}
     assert crf_search.search_table(found | {"unrefined": perfect}).count("none of the trials kept class accuracy") == 1
 
 
