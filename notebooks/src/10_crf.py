@@ -534,8 +534,8 @@ assert F_of[0] - F_of[10] > 0.9 * (F_of[0] - F_of[60])
 
 # %% [markdown]
 # After ten updates fewer than two labels in a hundred differ from those after sixty, and more than nine tenths of the
-# fall of $F$ have happened. Single cells still change much later: in update 20 one probability moves by about 0.1. Ten is the
-# package's default, and Krähenbühl and Koltun, from whom the paper takes its method, use ten as well.
+# fall of $F$ have happened. Single cells still change much later: in update 20 one probability moves by about 0.1. Ten
+# updates are the package's default.
 #
 # ## How wrong is mean field when cells pull hard?
 #
