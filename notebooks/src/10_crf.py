@@ -857,6 +857,8 @@ Markdown("\n".join(lines))
 #
 # - [Graphical models from nothing](deeper/graphical_models.ipynb), a companion: factors, elimination, messages, and
 #   mean field on three variables.
+# - [The CRF, measured](deeper/11_crf_measured.ipynb), a companion (after lecture 11): approximate against exact inference
+#   on random grids, as the coupling grows.
 # - Krähenbühl, Koltun, *Efficient inference in fully connected CRFs with Gaussian edge potentials*, NIPS 2011: the
 #   model and the method that the paper uses.
 # - Krähenbühl, Koltun, *Parameter learning and convergent inference for dense random fields*, ICML 2013: why the

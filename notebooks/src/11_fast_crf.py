@@ -992,6 +992,7 @@ for name, values in learned["learnt"].items():
 #
 # ## Further reading
 #
+# - [The CRF, measured](deeper/11_crf_measured.ipynb), a companion: every way to run the CRF, its error against its time.
 # - Krähenbühl, Koltun, *Efficient inference in fully connected CRFs with Gaussian edge potentials*, NIPS 2011: mean
 #   field by filtering. Their follow-up, *Parameter learning and convergent inference for dense random fields*, ICML
 #   2013, has the damping.
