@@ -46,11 +46,12 @@ def test_a_thousand_times_the_free_energy_never_rises():
         assert (np.diff(found) <= ROUNDING * (1 + np.abs(found).max())).all(), seed
 
 
-def test_a_hundred_times_the_distance_from_the_exact_distribution_is_never_negative():
-    for seed in range(100):
+def test_a_thousand_times_the_distance_from_the_exact_distribution_is_never_negative():
+    """On at most six cells of each grid, so that every labelling can be counted."""
+    for seed in range(1000):
         unary, values, params = random_crf(seed)
         unary, values = unary[:, :2, :3], values[:, :2, :3]
-        distance = energies(unary, values, params, 8) + log_partition(unary, values, params)
+        distance = energies(unary, values, params, 3) + log_partition(unary, values, params)
         assert (distance >= -1e-9).all(), seed
 
 

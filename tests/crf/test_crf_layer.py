@@ -113,7 +113,7 @@ def test_the_gradients_of_pair_sums_are_differences():
 @pytest.mark.parametrize("radius", [2, COVERING])
 def test_the_gradients_of_weights_widths_costs_and_scores_are_differences(normalization, radius):
     """With costs off the Potts model, at which the largest eigenvalue is a kink of the step size."""
-    log_g, occupancy = random_grids(3, classes=3, shape=(4, 5))
+    log_g, occupancy = random_grids(3, batch=1, classes=3, shape=(3, 4))
     layer = CrfLayer(CrfParams(1.5, 0.7, 1.5, 0.6, 1.2, normalization), 3, radius, 3, learn_compatibility=True)
     layer.label_costs.data += 0.5 * random_costs(0, 3)
     names, parameters = zip(*layer.named_parameters(), strict=True)
