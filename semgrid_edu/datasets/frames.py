@@ -1,11 +1,13 @@
 """What all readers of drives have in common: frames that are read when they are asked for, and labels in part."""
 
 import operator
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import overload
 
 import numpy as np
 
+from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.labels import IGNORE, LabelSet
 
@@ -29,6 +31,17 @@ class FrameSequence(Sequence[Frame]):
         if not -len(self) <= k < len(self):
             raise IndexError(f"frame {k} of a drive of {len(self)} frames")
         return self._frame(k % len(self))
+
+    def problems(self) -> list[str]:
+        """Read every frame and list all that is wrong.
+
+        Returns
+        -------
+        list of str
+            One line for each problem, which names the file; empty when all frames are sound.
+        """
+        found = [error_of(partial(self._frame, k)) for k in range(len(self))]
+        return [error for error in dict.fromkeys(found) if error]
 
     def _frame(self, k: int) -> Frame:
         """Read frame k, 0 <= k < len(self)."""
@@ -57,3 +70,23 @@ def nothing_known(label_set: LabelSet, image_size: tuple[int, int]) -> FrameLabe
         birdseye=np.full(LABEL_GRID.shape, IGNORE, dtype=np.uint8),
         visible=np.zeros(LABEL_GRID.shape, dtype=np.bool_),
     )
+
+
+def error_of(read: Callable[[], object]) -> str:
+    """Return the error that a reader raises as text.
+
+    Parameters
+    ----------
+    read : callable
+        Reads something, and raises `DataError` when it is missing or damaged.
+
+    Returns
+    -------
+    str
+        Empty when it is sound.
+    """
+    try:
+        read()
+    except DataError as error:
+        return str(error)
+    return ""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, invert_rigid
 from semgrid_edu.datasets.calibration import read_camera, read_rectification, read_rigid
-from semgrid_edu.datasets.frames import FrameSequence
+from semgrid_edu.datasets.frames import FrameSequence, error_of
 from semgrid_edu.datasets.kitti_labels import KINDS, is_labelled, read_label, read_labels
 from semgrid_edu.datasets.oxts import imu_pose, read_packet
 from semgrid_edu.datasets.scans import read_scan
@@ -119,7 +119,7 @@ class KittiRawDrive(FrameSequence):
         list of str
             One line for each problem, which names the file; empty when the drive is sound.
         """
-        found = [*map(_error_of, self._readers()), *self._short_scans()]
+        found = [*map(error_of, self._readers()), *self._short_scans()]
         return [error for error in dict.fromkeys(found) if error]
 
     def _readers(self) -> Iterator[Callable[[], object]]:
@@ -129,7 +129,7 @@ class KittiRawDrive(FrameSequence):
         yield partial(read_rigid, self.date_folder / "calib_imu_to_velo.txt")
         for path in self._timestamp_files():
             yield partial(read_timestamps, path, len(self))
-        size = None if _error_of(lambda: self.camera) else self.camera.size
+        size = None if error_of(lambda: self.camera) else self.camera.size
         for k in range(len(self)):
             yield partial(self._points, k)
             yield partial(read_packet, self._file("oxts", k, ".txt"))
@@ -219,12 +219,3 @@ def _last_frame(folder: Path) -> int:
     """Return the highest frame number among the files of a folder, -1 without any."""
     names = (path.name for path in folder.iterdir()) if folder.is_dir() else ()
     return max((int(match[1]) for match in map(_FRAME_FILE.fullmatch, names) if match), default=-1)
-
-
-def _error_of(read: Callable[[], object]) -> str:
-    """Return the error that a reader raises as text, or an empty text."""
-    try:
-        read()
-    except DataError as error:
-        return str(error)
-    return ""

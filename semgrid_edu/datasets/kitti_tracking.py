@@ -42,7 +42,8 @@ class KittiTrackingRun(FrameSequence):
     Raises
     ------
     DataError
-        When there are no images of the run. `drive[k]` raises it when a file that the frame needs is missing or damaged.
+        When there are no images of the run. `drive[k]` raises it when a file that the frame needs is missing or
+        damaged.
     """
 
     def __init__(self, root: str | Path, run: int) -> None:

@@ -1,4 +1,4 @@
-"""SemanticKITTI (Behley et al., ICCV 2019): labelled scans of KITTI's odometry sequences, and what they show from above.
+"""SemanticKITTI (Behley et al., ICCV 2019): labelled scans of KITTI's odometry sequences, and their truth from above.
 
     sequences/00/velodyne/000000.bin    sequences/00/labels/000000.label    sequences/00/image_2/000000.png (optional)
     sequences/00/calib.txt              sequences/00/poses.txt              sequences/00/times.txt
@@ -37,9 +37,10 @@ IMAGE_SIZES = {"00": (376, 1241), "01": (376, 1241), "02": (376, 1241), "03": (3
 class SemanticKittiSequence(FrameSequence):
     """The frames of a sequence. Each is read, and checked, when it is asked for.
 
-    Scans and their labels (`scan`, `classes`, `moving`, and `truth` of a single scan) need neither calibration nor poses.
-    In a `Frame`, `labels` hold the bird's-eye truth of this single scan, visible where the camera sees a return; the
-    image is not labelled. Without the folder image_2 frames have no image.
+    Scans and their labels (`scan`, `classes`, `moving`, and `truth` of a single scan) need neither calibration nor
+    poses. In a `Frame`, `labels` hold the bird's-eye truth of this single scan, visible where the camera sees a return;
+    the image is not labelled. Without the folder image_2 frames have no image. The world is the LIDAR's frame at the
+    first scan.
 
     Parameters
     ----------
@@ -163,7 +164,7 @@ class SemanticKittiSequence(FrameSequence):
         return birdseye_votes(points, classes, spec, KITTI_14)
 
     def _labelled_points(self, j: int, k: int) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
-        """Return the returns of scan j in the grid frame of frame k, and their classes, without what moved meanwhile."""
+        """Return scan j in the grid frame of frame k, and its classes, without what has moved between them."""
         points, classes = self.scan(j)[:, :3].astype(np.float64), self.classes(j)
         if j != k:
             T_lidar_k_from_lidar_j = invert_rigid(self._poses[k]) @ self._poses[j]
@@ -206,7 +207,7 @@ class SemanticKittiSequence(FrameSequence):
 
     @cached_property
     def camera(self) -> Camera:
-        """The calibration of image_2, the same for all frames; its size is that of the first image, or of `IMAGE_SIZES`."""
+        """The calibration of image_2, the same for all frames; its size from the first image or `IMAGE_SIZES`."""
         if self._has_images:
             height, width = read_png(self._image_file(0), "RGB", None).shape[:2]
         elif self.folder.name in IMAGE_SIZES:
@@ -230,7 +231,7 @@ class SemanticKittiSequence(FrameSequence):
         return [float(time - times[0]) for time in times]
 
     def _lines(self, path: Path) -> list[str]:
-        """Return the lines of a file with one line per frame, of which more frames may have been left out on the disk."""
+        """Return the lines of a file with one line per frame; the last frames may be missing on this disk."""
         lines = read_text(path).splitlines()
         if len(lines) < len(self):
             raise DataError(path, f"at least {len(self)} lines, one per frame", f"{len(lines)}")

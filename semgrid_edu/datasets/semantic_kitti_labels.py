@@ -52,18 +52,20 @@ SEMANTIC_KITTI_CLASSES = ClassTable(
         259: "car",  # other vehicle
     },
 )
-"""KITTI-14's class of each number in their labels, of which those from 252 on are of things that move. As in the rest of
-the package, poles are signage, whoever rides a bicycle belongs to it, and grass is vegetation. Larger vehicles become cars
-and motorcycles bicycles, for which KITTI-14 has no class of their own."""
+"""KITTI-14's class of each number in the labels.
+
+As in the rest of the package, poles are signage, whoever rides a bicycle belongs to it, and grass is vegetation.
+KITTI-14 has no classes for larger vehicles and for motorcycles, so they become cars and bicycles."""
 
 FIRST_MOVING = 252
-"""The numbers of classes that move begin here."""
+"""From this number on, a class is of things that move."""
 
 
 def read_point_labels(path: Path, n_points: int) -> NDArray[np.int64]:
     """Read the number of each return's class.
 
-    The file holds a little-endian uint32 for each return: the class in the lower 16 bits, the instance in the upper ones.
+    The file holds a little-endian uint32 for each return: the class in the lower 16 bits, the instance in the upper
+    ones.
 
     Parameters
     ----------
