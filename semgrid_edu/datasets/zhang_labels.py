@@ -18,7 +18,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from scipy.io import loadmat
-from scipy.io.matlab import MatReadError
 
 from semgrid_edu.datasets.class_tables import ClassTable
 from semgrid_edu.datasets.frames import nothing_known
@@ -149,8 +148,8 @@ def _matrix(path: Path) -> NDArray:
         variables = {name: value for name, value in loadmat(io.BytesIO(content)).items() if not name.startswith("__")}
     except NotImplementedError:
         raise DataError(path, "a MATLAB file up to version 7.2", "version 7.3; save it again with `-v7`") from None
-    except (MatReadError, ValueError, TypeError, OSError, EOFError) as error:
-        raise DataError(path, "a MATLAB file", error) from error
+    except Exception as error:  # scipy lets through whatever a damaged file makes of it: IndexError, zlib.error, ...
+        raise DataError(path, "a MATLAB file", f"{type(error).__name__}: {error}") from error
     found = [value for value in variables.values() if isinstance(value, np.ndarray) and min(value.shape) > 1]
     if len(found) != 1 or found[0].ndim != 2 or found[0].dtype.kind not in "iufb":
         raise DataError(path, "one matrix of numbers", f"the variables {', '.join(variables) or '(none)'}")

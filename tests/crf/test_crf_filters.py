@@ -75,9 +75,6 @@ def test_lattice_refuses_what_it_cannot_hold(features):
 def test_filters_take_values_in_any_memory_order():
     rng = np.random.default_rng(0)
     values = rng.random((16, 30)).astype(np.float32).T
-    lattice, gaussian = (
-        PermutohedralLattice.build(rng.normal(size=(30, 3))),
-        SeparableGaussian.build((5, 6), 2.0, 1.0, "none"),
-    )
+    lattice, gaussian = PermutohedralLattice.build(rng.normal(size=(30, 3))), SeparableGaussian.build((5, 6), 2.0, 1.0, "none")
     for kernel in (lattice, gaussian):
         np.testing.assert_array_equal(kernel(values), kernel(np.ascontiguousarray(values)))
