@@ -1,4 +1,4 @@
-"""Zhang et al.'s labels on runs of KITTI's tracking benchmark: files in their layout, and every class of their readme."""
+"""Zhang et al.'s labels on runs of KITTI's tracking benchmark: their layout, and every class of their readme."""
 
 import numpy as np
 import pytest
