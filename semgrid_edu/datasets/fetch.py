@@ -61,43 +61,50 @@ def fetch_kitti(folder: str | Path, drive: str, source: str = KITTI_SOURCE) -> K
     if not named:
         raise ArgumentError("drive", "date and number such as 2011_09_26_0013", repr(drive))
     date, number = named.groups()
+    target, urls = drive_folder(folder, date, number), []
     if not all((folder / date / name).exists() for name in _CALIBRATION):
-        _fetch_archive(folder, f"{source}/{date}_calib.zip", date)
-    target = drive_folder(folder, date, number)
+        urls.append(f"{source}/{date}_calib.zip")
     if not target.exists():
-        _fetch_archive(folder, f"{source}/{date}_drive_{number}/{target.name}.zip", date)
+        urls.append(f"{source}/{date}_drive_{number}/{target.name}.zip")
+    files = _known_files((folder / "archives").absolute(), urls)
+    for name in files.urls:
+        archive = _download(files, name)
+        unpack_zip(archive, folder, date)
+        _record(files, name, archive)
     return KittiRawDrive(folder, date, number)
 
 
-def _fetch_archive(folder: Path, url: str, date: str) -> None:
-    """Get an archive, unpack it, and record its checksum when none was known."""
-    archives, name = (folder / "archives").absolute(), url.rpartition("/")[2]
-    files = pooch.create(archives, base_url="", registry={name: None}, urls={name: url})
+def _known_files(archives: Path, urls: list[str]) -> pooch.Pooch:
+    """Return where archives are, by name, and their checksums, None where the registry has none."""
+    names = {url.rpartition("/")[2]: url for url in urls}
+    files = pooch.create(archives, base_url="", registry=dict.fromkeys(names), urls=names)
     if (archives / REGISTRY).exists():
-        _load_registry(files, archives / REGISTRY)
-    archive = _download(files, archives, name)
-    unpack_zip(archive, folder, date)
+        try:
+            files.load_registry(archives / REGISTRY)
+        except OSError as error:
+            raise DataError(archives / REGISTRY, "lines `name sha256`", error) from error
+    return files
+
+
+def _record(files: pooch.Pooch, name: str, archive: Path) -> None:
+    """Write an archive's checksum to the registry when it wasn't known."""
     if files.registry[name] is None:
-        recorded = files.registry | {name: sha256(archive)}
-        write_text(archives / REGISTRY, "".join(f"{key} {value}\n" for key, value in sorted(recorded.items())))
+        files.registry[name] = sha256(archive)
+        known = {key: value for key, value in sorted(files.registry.items()) if value}
+        write_text(Path(files.path) / REGISTRY, "".join(f"{key} {value}\n" for key, value in known.items()))
 
 
-def _load_registry(files: pooch.Pooch, path: Path) -> None:
-    try:
-        files.load_registry(path)
-    except OSError as error:
-        raise DataError(path, "lines `name sha256`", error) from error
-
-
-def _download(files: pooch.Pooch, archives: Path, name: str) -> Path:
+def _download(files: pooch.Pooch, name: str) -> Path:
     """Return where an archive is, after a download if it isn't there."""
-    known, by_hand = files.registry[name], f"without network, put {name} into {archives} and give the command again"
+    archives, known = Path(files.path), files.registry[name]
     try:
         return Path(files.fetch(name, downloader=ResumingDownloader(archives / f".{name}.part")))
     except requests.HTTPError as error:
         refusal = f"{error.response.status_code} {error.response.reason}"
         raise DataError(files.urls[name], "an archive", f"{refusal}: is there such a drive?") from error
     except requests.RequestException as error:
+        missing = " and ".join(url for name, url in files.urls.items() if not (archives / name).exists())
+        by_hand = f"without network, put {missing} into {archives} by hand and call this again"
         raise DataError(files.urls[name], "an answer of the server", f"{type(error).__name__}; {by_hand}") from error
     except ValueError as error:
         expected = f"the SHA-256 {known} that {archives / REGISTRY} has"

@@ -6,13 +6,13 @@ from pathlib import Path
 import requests
 from tqdm.auto import tqdm
 
-from semgrid_edu.storage.files import write_text
+from semgrid_edu.storage.files import named_errors, write_text
 
 CHUNK = 2**16
 """Bytes that are read at once; so many at most are lost when a connection breaks off."""
 
 _BROKEN = (requests.ConnectionError, requests.Timeout, requests.exceptions.ChunkedEncodingError)
-"""What `requests` raises when a connection can't be made or breaks off."""
+"""What `requests` raises when a connection can't be made or breaks off; a server's own fault (5xx) counts as that."""
 
 
 class ResumingDownloader:
@@ -80,6 +80,8 @@ class ResumingDownloader:
             if start and not self._goes_on(response, start):
                 self._forget()
                 raise requests.ConnectionError("the file isn't the one of which a part was kept", response=response)
+            if response.status_code >= requests.codes.server_error:
+                raise requests.ConnectionError(f"{response.status_code} {response.reason}", response=response)
             response.raise_for_status()
             if response.status_code != requests.codes.partial_content:
                 self._forget()
@@ -105,7 +107,8 @@ class ResumingDownloader:
             tqdm(desc=name, total=total, initial=start, unit="B", unit_scale=True) as bar,
         ):
             for chunk in response.iter_content(CHUNK):
-                file.write(chunk)
+                with named_errors(self.kept):
+                    file.write(chunk)
                 bar.update(len(chunk))
         found = self.kept.stat().st_size
         if total is not None and found != total:

@@ -9,6 +9,7 @@ from pathlib import Path, PurePosixPath
 from tqdm.auto import tqdm
 
 from semgrid_edu.errors import DataError
+from semgrid_edu.storage.files import named_errors
 
 
 def unpack_zip(archive: Path, folder: Path, top: str) -> None:
@@ -34,7 +35,7 @@ def unpack_zip(archive: Path, folder: Path, top: str) -> None:
     hidden = folder / f".{archive.stem}.partial"
     shutil.rmtree(hidden, ignore_errors=True)
     try:
-        with zipfile.ZipFile(archive) as opened:
+        with named_errors(folder), zipfile.ZipFile(archive) as opened:
             for info in opened.infolist():
                 _check_member(archive, info, top)
             for info in tqdm(opened.infolist(), desc=f"unpacking {archive.name}", unit="file"):

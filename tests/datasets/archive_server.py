@@ -9,6 +9,8 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 def serve(files, break_after=(), tags=True, ranges=True):
     """Serve files (path to content). The n-th answer breaks off after break_after[n] bytes; the others are whole.
 
+    None in break_after is an error of the server, 503.
+
     Yields the address and the list of requests: (path, Range header or None).
     """
     requests, breaks = [], list(break_after)
@@ -17,6 +19,10 @@ def serve(files, break_after=(), tags=True, ranges=True):
         def do_GET(self):
             asked = self.headers.get("Range")
             requests.append((self.path, asked))
+            if breaks and breaks[0] is None:
+                self.send_error(503)
+                breaks.pop(0)
+                return
             content = files.get(self.path)
             if content is None:
                 self.send_error(404)

@@ -72,11 +72,17 @@ class TestDownload:
         assert requests == [(CALIB, None), (SYNC, None), (SYNC, "bytes=5000-"), (SYNC, "bytes=8000-")]
         assert contents(tmp_path) == contents(original)
 
+    def test_an_overloaded_server_is_asked_again(self, tmp_path, original, archives):
+        with serve(archives, break_after=[None, None]) as (source, requests):
+            fetch_kitti(tmp_path, DRIVE, source)
+        assert [path for path, _ in requests] == [CALIB, CALIB, CALIB, SYNC]
+        assert contents(tmp_path) == contents(original)
+
     def test_goes_on_in_another_process(self, tmp_path, original, archives):
         # Each answer brings 100 bytes, so that all five attempts at the calibration break off.
         with (
             serve(archives, break_after=[100] * 5) as (source, _),
-            pytest.raises(DataError, match=r"put 2026_01_01_calib.zip into .*archives and give the command again"),
+            pytest.raises(DataError, match=r"put .*_calib.zip and .*_sync.zip into .*archives by hand"),
         ):
             fetch_kitti(tmp_path, DRIVE, source)
         assert not (tmp_path / DATE).exists()
@@ -140,9 +146,18 @@ class TestChecksums:
 
 
 class TestWithoutNetwork:
-    def test_says_which_file_to_put_where(self, tmp_path):
-        place = f"put 2026_01_01_calib.zip into {tmp_path / 'archives'}"
-        with pytest.raises(DataError, match=f"127.0.0.1:1/.*: expected an answer of the server, .*{place}"):
+    def test_says_which_files_to_put_where(self, tmp_path):
+        source = "http://127.0.0.1:1"
+        place = f"put {source}{CALIB} and {source}{SYNC} into {tmp_path / 'archives'} by hand and call this again"
+        with pytest.raises(
+            DataError, match=f"{CALIB}: expected an answer of the server, found ConnectionError; .*{place}"
+        ):
+            fetch_kitti(tmp_path, DRIVE, source)
+
+    def test_names_only_what_is_missing(self, tmp_path, archives):
+        (tmp_path / "archives").mkdir()
+        (tmp_path / "archives" / CALIB[1:]).write_bytes(archives[CALIB])
+        with pytest.raises(DataError, match=f"without network, put http://127.0.0.1:1{SYNC} into"):
             fetch_kitti(tmp_path, DRIVE, "http://127.0.0.1:1")
 
     def test_archives_put_there_by_hand_are_unpacked(self, tmp_path, original, archives):

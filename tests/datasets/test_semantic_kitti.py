@@ -1,6 +1,7 @@
 """SemanticKITTI's layout: every class, poses, truth of one scan and of several, and what is missing or damaged."""
 
 import numpy as np
+import pykitti
 import pytest
 from PIL import Image
 from tiny_drive import BASELINE, CAMERA_FROM_LIDAR, SIZE, K
@@ -117,6 +118,25 @@ class TestFrames:
         expected[0, 3] += BASELINE
         camera = SemanticKittiSequence(root, "00").camera
         np.testing.assert_allclose(camera.T_camera_from_lidar, expected, atol=1e-12)
+
+    def test_pykitti_reads_the_same(self, root, folder):
+        (root / "poses").mkdir()
+        (folder / "poses.txt").rename(root / "poses" / "00.txt")
+        text = (
+            (folder / "calib.txt")
+            .read_text()
+            .replace("Tr:", "P1: 1 0 0 0 0 1 0 0 0 0 1 0\nP3: 1 0 0 0 0 1 0 0 0 0 1 0\nTr:")
+        )
+        (folder / "calib.txt").write_text(text)
+        theirs = pykitti.odometry(str(root), "00")
+        (root / "poses" / "00.txt").rename(folder / "poses.txt")
+        ours = SemanticKittiSequence(root, "00")
+        np.testing.assert_allclose(ours.camera.T_camera_from_lidar, theirs.calib.T_cam2_velo, atol=1e-12)
+        np.testing.assert_allclose(ours.camera.K, theirs.calib.K_cam2)
+        T_camera0_from_lidar = theirs.calib.T_cam0_velo
+        for frame, pose in zip(ours, theirs.poses, strict=True):
+            expected = np.linalg.inv(T_camera0_from_lidar) @ pose @ T_camera0_from_lidar
+            np.testing.assert_allclose(frame.T_world_from_lidar, expected, atol=1e-9)
 
     def test_without_images_the_size_is_that_of_the_sequence(self, root, folder):
         assert SemanticKittiSequence(root, "00")[0].image is None
