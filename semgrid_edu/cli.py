@@ -9,11 +9,11 @@ from typing import Annotated
 import typer
 from typer.core import TyperCommand
 
+from semgrid_edu.data_commands import data, report
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.experiments.commands import keep_result, reproduce
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
-data = typer.Typer(no_args_is_help=True, help="Make and check data.")
 course = typer.Typer(no_args_is_help=True, help="Build the notebooks and the exercises.")
 app.add_typer(data, name="data")
 app.add_typer(course, name="course")
@@ -48,44 +48,6 @@ def demo(
     chosen = KittiRawDrive(kitti, date, drive) if kitti and date and drive else sample_drive()
     page = write_demo(chosen, sample_weights(), out, stages)
     typer.echo(f"open {page.resolve().as_uri()}\nin one picture: {page.parent / 'overview.png'}")
-
-
-@data.command()
-def make(
-    name: Annotated[
-        str, typer.Argument(help="minikitti, minichroma, minisynthia, validation, sample, or all for the first three.")
-    ],
-    folder: Annotated[Path, typer.Argument(help="Takes the data set's own folder.")],
-    seed: Annotated[int, typer.Option(help="Seed for the drives; the same seed gives the same bytes.")] = 0,
-    workers: Annotated[int, typer.Option(help="Number of processes that share the work.")] = 2,
-) -> None:
-    """Simulate a data set in KITTI's raw layout; the same command finishes one that was interrupted."""
-    from semgrid_edu.simulation.datasets import DATA_SETS, make_dataset
-
-    for one in DATA_SETS if name == "all" else [name]:
-        typer.echo(f"{one} is in {make_dataset(one, folder, seed, workers)}")
-
-
-@data.command()
-def verify(
-    folder: Annotated[Path | None, typer.Argument(help="A folder of samples; the shipped ones by default.")] = None,
-) -> None:
-    """Check the samples against the checksums in their provenance files."""
-    from semgrid_edu.datasets.samples import samples_problems
-
-    _report(samples_problems(folder), "every sample is as it was made")
-
-
-@data.command()
-def excerpt(
-    folder: Annotated[Path, typer.Argument(help="The folder that takes the frames and their provenance.")],
-    data: Annotated[Path, typer.Option(help="A data set with train frames, such as data/minikitti.")],
-    frames: Annotated[int, typer.Option(min=1, help="Number of frames.")] = 6,
-) -> None:
-    """Keep a few labelled frames of a data set, in the form in which a network takes them."""
-    from semgrid_edu.datasets.samples import write_excerpt
-
-    write_excerpt(data, frames, folder)
 
 
 @course.callback()
@@ -129,7 +91,7 @@ def check() -> None:
     """Check that every notebook agrees with its source, has run, and is fit to be shown."""
     from semgrid_edu.course.checks import course_problems
 
-    _report(course_problems(), "every notebook agrees with its source")
+    report(course_problems(), "every notebook agrees with its source")
 
 
 @course.command()
@@ -255,14 +217,6 @@ def search_crf(
         keep_result(out, lambda: search_crf(data, test, weights, out, seed, trials), search_table)
     except KeyboardInterrupt:
         sys.exit(f"semgrid-edu: interrupted; the same command goes on from {out}")
-
-
-def _report(problems: list[str], sound: str) -> None:
-    """Print every problem on a line of its own and exit with 1, or print `sound` when there is none."""
-    if problems:
-        typer.echo("\n".join(problems), err=True)
-        raise typer.Exit(1)
-    typer.echo(sound)
 
 
 def run() -> None:

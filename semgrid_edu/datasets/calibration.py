@@ -63,15 +63,42 @@ def read_rectification(path: Path) -> tuple[NDArray[np.float64], NDArray[np.floa
         When the file is missing or damaged.
     """
     calibration = read_calibration(path)
-    P = _entry(path, calibration, "P_rect_02", (3, 4))
-    if not (P[0, 0] > 0 and P[1, 1] > 0 and P[1, 0] == 0 and np.array_equal(P[2, :3], [0, 0, 1])):
-        raise DataError(path, "P_rect_02 = K [I | t] with K upper triangular, focal lengths above 0", P.tolist())
-    width, height = _entry(path, calibration, "S_rect_02", (2,))
+    K, T_camera_from_rectified = projection(path, calibration, "P_rect_02")
+    width, height = entry_of(path, calibration, "S_rect_02", (2,))
     if not (width >= 1 and height >= 1 and width % 1 == 0 and height % 1 == 0):
         raise DataError(path, "S_rect_02: width and height in pixels", [width, height])
     T_rectified_from_camera0 = rigid_transform(_rotation(path, calibration, "R_rect_00"), np.zeros(3))
-    T_camera_from_rectified = rigid_transform(np.eye(3), np.array([P[0, 3] / P[0, 0], 0, 0]))
-    return P[:, :3], T_camera_from_rectified @ T_rectified_from_camera0, (int(height), int(width))
+    return K, T_camera_from_rectified @ T_rectified_from_camera0, (int(height), int(width))
+
+
+def projection(path: Path, calibration: dict[str, str], key: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Take apart the projection matrix of a rectified camera, K [I | t].
+
+    Parameters
+    ----------
+    path : Path
+        Where the calibration comes from, for the error.
+    calibration : dict of str to str
+        The values of each key.
+    key : str
+        The key of the matrix, such as P_rect_02.
+
+    Returns
+    -------
+    K : (3, 3) float64
+        Intrinsic matrix, pixels.
+    T_camera_from_rectified : (4, 4) float64
+        Shift from the rectified frame of camera 0 along its x axis, metres.
+
+    Raises
+    ------
+    DataError
+        When the key is missing or has no such matrix.
+    """
+    P = entry_of(path, calibration, key, (3, 4))
+    if not (P[0, 0] > 0 and P[1, 1] > 0 and P[1, 0] == 0 and np.array_equal(P[2, :3], [0, 0, 1])):
+        raise DataError(path, f"{key} = K [I | t] with K upper triangular, focal lengths above 0", P.tolist())
+    return P[:, :3], rigid_transform(np.eye(3), np.array([P[0, 3] / P[0, 0], 0, 0]))
 
 
 def read_rigid(path: Path) -> NDArray[np.float64]:
@@ -93,7 +120,7 @@ def read_rigid(path: Path) -> NDArray[np.float64]:
         When the file is missing or damaged, or R isn't a rotation.
     """
     calibration = read_calibration(path)
-    return rigid_transform(_rotation(path, calibration, "R"), _entry(path, calibration, "T", (3,)))
+    return rigid_transform(_rotation(path, calibration, "R"), entry_of(path, calibration, "T", (3,)))
 
 
 def read_calibration(path: Path) -> dict[str, str]:
@@ -126,8 +153,29 @@ def read_calibration(path: Path) -> dict[str, str]:
     return entries
 
 
-def _entry(path: Path, calibration: dict[str, str], key: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Return the numbers of one key in the shape they should have."""
+def entry_of(path: Path, calibration: dict[str, str], key: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return the numbers of one key in the shape they should have.
+
+    Parameters
+    ----------
+    path : Path
+        Where the calibration comes from, for the error.
+    calibration : dict of str to str
+        The values of each key.
+    key : str
+        The key.
+    shape : tuple of int
+        Shape of the result.
+
+    Returns
+    -------
+    (shape) float64
+
+    Raises
+    ------
+    DataError
+        When the key is missing, or has more or fewer numbers.
+    """
     if key not in calibration:
         raise DataError(path, f"the key {key}", f"the keys {', '.join(calibration)}")
     numbers = parse_numbers(path, calibration[key], key)
@@ -137,8 +185,32 @@ def _entry(path: Path, calibration: dict[str, str], key: str, shape: tuple[int, 
 
 
 def _rotation(path: Path, calibration: dict[str, str], key: str) -> NDArray[np.float64]:
-    """Return a rotation matrix, refusing what bends, scales or mirrors."""
-    R = _entry(path, calibration, key, (3, 3))
+    """Return a rotation matrix."""
+    return check_rotation(path, entry_of(path, calibration, key, (3, 3)), key)
+
+
+def check_rotation(path: Path, R: NDArray[np.float64], what: str) -> NDArray[np.float64]:
+    """Return a rotation matrix, refusing what bends, scales or mirrors.
+
+    Parameters
+    ----------
+    path : Path
+        Where the matrix comes from, for the error.
+    R : (3, 3) float64
+        The matrix.
+    what : str
+        What the matrix is, for the error.
+
+    Returns
+    -------
+    (3, 3) float64
+        `R` as it is.
+
+    Raises
+    ------
+    DataError
+        When it isn't a rotation.
+    """
     if np.abs(R @ R.T - np.eye(3)).max() > ROTATION_TOLERANCE or np.linalg.det(R) < 0:
-        raise DataError(path, f"a rotation matrix for {key}", R.tolist())
+        raise DataError(path, f"a rotation matrix for {what}", R.tolist())
     return R

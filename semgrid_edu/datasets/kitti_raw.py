@@ -1,26 +1,23 @@
 """One drive in KITTI's raw layout, real or simulated, frame by frame (section 4; Geiger et al., IJRR 2013)."""
 
-import operator
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import cached_property, partial
 from pathlib import Path
-from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, invert_rigid
 from semgrid_edu.datasets.calibration import read_camera, read_rectification, read_rigid
+from semgrid_edu.datasets.frames import FrameSequence, error_of
 from semgrid_edu.datasets.kitti_labels import KINDS, is_labelled, read_label, read_labels
-from semgrid_edu.datasets.oxts import mercator_pose, mercator_scale, read_packet
+from semgrid_edu.datasets.oxts import imu_pose, read_packet
+from semgrid_edu.datasets.scans import read_scan
 from semgrid_edu.datasets.timestamps import read_timestamps
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import Frame, FrameLabels
-from semgrid_edu.storage.reading import read_bytes, read_png
-
-LIDAR_RANGE = 250.0
-"""Largest coordinate of a return, metres. KITTI's HDL-64E sees 120 m, so what lies twice as far is no measurement."""
+from semgrid_edu.storage.reading import read_png
 
 SAME_INSTANT = np.timedelta64(500, "ms")
 """How much the sensors' times of one frame may differ; at 10 Hz they should lie within 0.1 s."""
@@ -55,7 +52,7 @@ def drive_folder(root: str | Path, date: str, drive: str) -> Path:
     return Path(root) / date / f"{date}_drive_{drive}_sync"
 
 
-class KittiRawDrive(Sequence[Frame]):
+class KittiRawDrive(FrameSequence):
     """The frames of a drive. Each is read, and checked, when it is asked for.
 
     `drive[k]` is frame k as KITTI numbers it, `drive[-1]` the last one, `drive[2:5]` a list of three.
@@ -99,18 +96,7 @@ class KittiRawDrive(Sequence[Frame]):
         """Return the number of frames, including those whose scans were never recorded."""
         return self._length
 
-    @overload
-    def __getitem__(self, index: int) -> Frame: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[Frame]: ...
-    def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
-        """Read a frame, or a list of frames."""
-        if isinstance(index, slice):
-            return [self[k] for k in range(*index.indices(len(self)))]
-        k = operator.index(index)
-        if not -len(self) <= k < len(self):
-            raise IndexError(f"frame {k} of a drive of {len(self)} frames")
-        k %= len(self)
+    def _frame(self, k: int) -> Frame:
         return Frame(
             image=self._image(k),
             points=self._points(k),
@@ -133,7 +119,7 @@ class KittiRawDrive(Sequence[Frame]):
         list of str
             One line for each problem, which names the file; empty when the drive is sound.
         """
-        found = [*map(_error_of, self._readers()), *self._short_scans()]
+        found = [*map(error_of, self._readers()), *self._short_scans()]
         return [error for error in dict.fromkeys(found) if error]
 
     def _readers(self) -> Iterator[Callable[[], object]]:
@@ -143,7 +129,7 @@ class KittiRawDrive(Sequence[Frame]):
         yield partial(read_rigid, self.date_folder / "calib_imu_to_velo.txt")
         for path in self._timestamp_files():
             yield partial(read_timestamps, path, len(self))
-        size = None if _error_of(lambda: self.camera) else self.camera.size
+        size = None if error_of(lambda: self.camera) else self.camera.size
         for k in range(len(self)):
             yield partial(self._points, k)
             yield partial(read_packet, self._file("oxts", k, ".txt"))
@@ -184,18 +170,7 @@ class KittiRawDrive(Sequence[Frame]):
         return float((lidar[k] - first) / np.timedelta64(1, "s"))
 
     def _points(self, k: int) -> NDArray[np.float32]:
-        """Read a scan, (N, 4)."""
-        path = self._file("velodyne_points", k, ".bin")
-        content = read_bytes(path)
-        if len(content) % 16:
-            raise DataError(path, "points of 4 x 4 bytes", f"{len(content)} bytes, {len(content) % 16} too many")
-        points = np.frombuffer(content, dtype="<f4").reshape(-1, 4).astype(np.float32)
-        strange = ~(np.abs(points[:, :3]) <= LIDAR_RANGE).all(axis=1) | ~np.isfinite(points[:, 3])
-        if strange.any():
-            first = strange.argmax()
-            expected = f"finite coordinates within {LIDAR_RANGE:g} m and a finite reflectance"
-            raise DataError(path, expected, f"{points[first].tolist()} at point {first}")
-        return points
+        return read_scan(self._file("velodyne_points", k, ".bin"))
 
     def _short_scans(self) -> list[str]:
         """Name the scans that are much smaller than the drive's median scan: cut short, most likely."""
@@ -223,10 +198,8 @@ class KittiRawDrive(Sequence[Frame]):
 
     def _pose(self, k: int) -> NDArray[np.float64]:
         """Return T_world_from_lidar; the world is the frame of the IMU at the drive's first packet."""
-        scale = mercator_scale(self._first_packet)
-        T_mercator_from_world = mercator_pose(self._first_packet, scale)
-        T_mercator_from_imu = mercator_pose(read_packet(self._file("oxts", k, ".txt")), scale)
-        return invert_rigid(T_mercator_from_world) @ T_mercator_from_imu @ invert_rigid(self._T_lidar_from_imu)
+        T_world_from_imu = imu_pose(self._first_packet, read_packet(self._file("oxts", k, ".txt")))
+        return T_world_from_imu @ invert_rigid(self._T_lidar_from_imu)
 
     def _labels(self, k: int) -> FrameLabels | None:
         return read_labels(self.folder / "labels", f"{k:010d}.png", self.camera.size)
@@ -246,12 +219,3 @@ def _last_frame(folder: Path) -> int:
     """Return the highest frame number among the files of a folder, -1 without any."""
     names = (path.name for path in folder.iterdir()) if folder.is_dir() else ()
     return max((int(match[1]) for match in map(_FRAME_FILE.fullmatch, names) if match), default=-1)
-
-
-def _error_of(read: Callable[[], object]) -> str:
-    """Return the error that a reader raises as text, or an empty text."""
-    try:
-        read()
-    except DataError as error:
-        return str(error)
-    return ""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from semgrid_edu.camera import rigid_transform
+from semgrid_edu.camera import invert_rigid, rigid_transform
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.reading import parse_numbers, read_text
 
@@ -35,7 +35,30 @@ def read_packet(path: Path) -> NDArray[np.float64]:
     DataError
         When the file is missing or damaged, or its numbers are no position or no attitude.
     """
-    packet = parse_numbers(path, read_text(path), "an oxts packet")
+    return parse_packet(path, read_text(path))
+
+
+def parse_packet(path: Path, text: str) -> NDArray[np.float64]:
+    """Return the numbers of a packet.
+
+    Parameters
+    ----------
+    path : Path
+        Where the packet comes from, for the error.
+    text : str
+        Its numbers.
+
+    Returns
+    -------
+    (30,) float64
+        As `read_packet` says.
+
+    Raises
+    ------
+    DataError
+        When the numbers are no position or no attitude.
+    """
+    packet = parse_numbers(path, text, "an oxts packet")
     if packet.size != PACKET_FIELDS:
         raise DataError(path, f"{PACKET_FIELDS} numbers", f"{packet.size}")
     latitude, longitude = packet[:2]
@@ -80,3 +103,20 @@ def mercator_pose(packet: NDArray, scale: float) -> NDArray[np.float64]:
     roll, pitch, yaw = packet[3:6]
     rotation = Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix()
     return rigid_transform(rotation, np.array([x, y, packet[2]]))
+
+
+def imu_pose(first: NDArray, packet: NDArray) -> NDArray[np.float64]:
+    """Return the pose of the IMU in the frame that it had at a drive's first packet.
+
+    Parameters
+    ----------
+    first, packet : (30,) float
+        The first packet, and the one whose pose is asked for, from `read_packet`.
+
+    Returns
+    -------
+    (4, 4) float64
+        T_world_from_imu, metres.
+    """
+    scale = mercator_scale(first)
+    return invert_rigid(mercator_pose(first, scale)) @ mercator_pose(packet, scale)

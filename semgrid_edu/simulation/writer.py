@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from semgrid_edu.datasets.depth_points import depth_scan
 from semgrid_edu.datasets.kitti_labels import DEPTH_UNIT
 from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.labels import KITTI_14, LabelSet
@@ -105,9 +106,7 @@ def _write_labels(folder: Path, name: str, frame: SimulatedFrame, label_set: Lab
 
 
 def depth_as_points(frame: SimulatedFrame, rig: Rig) -> NDArray[np.float32]:
-    """Return the depth image thinned to a LIDAR's sparsity and carried back to 3-D (section 4: SYNTHIA).
-
-    Every fourth row and every second column is kept, up to 80 m. The reflectance is 0, because a depth image has none.
+    """Return the depth image as a scan, thinned to a LIDAR's sparsity (section 4: SYNTHIA).
 
     Parameters
     ----------
@@ -119,15 +118,9 @@ def depth_as_points(frame: SimulatedFrame, rig: Rig) -> NDArray[np.float32]:
     Returns
     -------
     (N, 4) float32
-        LIDAR frame, metres.
+        As `depth_scan` says.
     """
-    v, u = np.mgrid[: rig.image_size[0] : 4, : rig.image_size[1] : 2]
-    depth = frame.picture.depth[v, u]
-    near = depth < 80.0
-    rays = np.stack([u[near], v[near], np.ones(near.sum())], axis=-1) @ np.linalg.inv(rig.camera.K).T
-    T = rig.T_lidar_from_camera
-    points = (rays * depth[near, None]) @ T[:3, :3].T + T[:3, 3]
-    return np.column_stack([points, np.zeros(len(points))]).astype(np.float32)
+    return depth_scan(frame.picture.depth, rig.camera)
 
 
 def lidar_points(frame: SimulatedFrame, rig: Rig) -> NDArray[np.float32]:

@@ -1,0 +1,92 @@
+"""What all readers of drives have in common: frames that are read when they are asked for, and labels in part."""
+
+import operator
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import overload
+
+import numpy as np
+
+from semgrid_edu.errors import DataError
+from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
+from semgrid_edu.labels import IGNORE, LabelSet
+
+
+class FrameSequence(Sequence[Frame]):
+    """The frames of a drive. Each is read, and checked, when it is asked for.
+
+    `drive[k]` is frame k, `drive[-1]` the last one, `drive[2:5]` a list of three. A reader derives from this class and
+    defines `__len__` and `_frame`.
+    """
+
+    @overload
+    def __getitem__(self, index: int) -> Frame: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Frame]: ...
+    def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
+        """Read a frame, or a list of frames."""
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        k = operator.index(index)
+        if not -len(self) <= k < len(self):
+            raise IndexError(f"frame {k} of a drive of {len(self)} frames")
+        return self._frame(k % len(self))
+
+    def problems(self) -> list[str]:
+        """Read every frame and list all that is wrong.
+
+        Returns
+        -------
+        list of str
+            One line for each problem, which names the file; empty when all frames are sound.
+        """
+        found = [error_of(partial(self._frame, k)) for k in range(len(self))]
+        return [error for error in dict.fromkeys(found) if error]
+
+    def _frame(self, k: int) -> Frame:
+        """Read frame k, 0 <= k < len(self)."""
+        raise NotImplementedError
+
+
+def nothing_known(label_set: LabelSet, image_size: tuple[int, int]) -> FrameLabels:
+    """Return the truth of a frame of which nothing is known, in which a reader replaces what its data set does tell.
+
+    Parameters
+    ----------
+    label_set : LabelSet
+        The classes of what is replaced.
+    image_size : (int, int)
+        Height and width of the image, pixels.
+
+    Returns
+    -------
+    FrameLabels
+        Without a label, without a depth, and with nothing visible.
+    """
+    return FrameLabels(
+        label_set=label_set,
+        image=np.full(image_size, IGNORE, dtype=np.uint8),
+        depth=np.full(image_size, np.nan, dtype=np.float32),
+        birdseye=np.full(LABEL_GRID.shape, IGNORE, dtype=np.uint8),
+        visible=np.zeros(LABEL_GRID.shape, dtype=np.bool_),
+    )
+
+
+def error_of(read: Callable[[], object]) -> str:
+    """Return the error that a reader raises as text.
+
+    Parameters
+    ----------
+    read : callable
+        Reads something, and raises `DataError` when it is missing or damaged.
+
+    Returns
+    -------
+    str
+        Empty when it is sound.
+    """
+    try:
+        read()
+    except DataError as error:
+        return str(error)
+    return ""

@@ -1,0 +1,216 @@
+"""Zhang et al.'s labels on runs of KITTI's tracking benchmark: their layout, and every class of their readme."""
+
+import numpy as np
+import pytest
+from PIL import Image
+from scipy.io import savemat
+from tiny_drive import BASELINE, CAMERA_FROM_LIDAR, LIDAR_FROM_IMU, SIZE, K, write_packet, write_tiny_drive
+
+from semgrid_edu.datasets import KittiRawDrive, KittiTrackingRun, ZhangDrive, ZhangLabels, zhang, zhang_raw_drive
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.labels import IGNORE, KITTI_14
+
+README = {
+    "NOT GROUND TRUTHED": (255, 255, 255),
+    "building": (153, 0, 0),
+    "sky": (0, 51, 102),
+    "road": (160, 160, 160),
+    "vegetation": (0, 102, 0),
+    "sidewalk": (255, 228, 196),
+    "car": (255, 200, 50),
+    "pedestrian": (255, 153, 255),
+    "bicycle": (204, 153, 255),  # the readme says cyclist
+    "signage": (130, 255, 255),
+    "fence": (193, 120, 87),
+}
+"""Names and colours of the numbers 0 to 10, copied from the data set's readme."""
+
+EXPECTED = np.array([IGNORE] + [KITTI_14.index(name) for name in list(README)[1:]], dtype=np.uint8)
+
+
+@pytest.fixture
+def numbers():
+    return np.arange(SIZE[0] * SIZE[1]).reshape(SIZE) % 11
+
+
+@pytest.fixture
+def folder(tmp_path, numbers):
+    """A matrix for acquisition 1 of run 9, a picture for acquisition 20 of run 0."""
+    for place in ("trn/0009", "test/0000"):
+        (tmp_path / "zhang" / "image_02" / place).mkdir(parents=True)
+    savemat(tmp_path / "zhang/image_02/trn/0009/000001.mat", {"truth": numbers.astype(float)})
+    picture = np.array(list(README.values()), dtype=np.uint8)[numbers]
+    Image.fromarray(picture).save(tmp_path / "zhang/image_02/test/0000/000020.png")
+    return tmp_path / "zhang"
+
+
+def write_run(root, run=9, n_frames=2):
+    """Write a run in the layout of the tracking benchmark's development kit: 1 m ahead from frame to frame."""
+    training, name = root / "training", f"{run:04d}"
+    for sensor in ("image_02", "velodyne"):
+        (training / sensor / name).mkdir(parents=True)
+    for folder in ("calib", "oxts"):
+        (training / folder).mkdir(exist_ok=True)
+    packets = []
+    for k in range(n_frames):
+        Image.new("RGB", SIZE[::-1], (k, 2, 3)).save(training / "image_02" / name / f"{k:06d}.png")
+        np.array([[k, 1, 2, 0.5]], "<f4").tofile(training / "velodyne" / name / f"{k:06d}.bin")
+        write_packet(root / "packet.txt", np.array([float(k), 0, 0]), (0.0, 0.0, 0.0))
+        packets.append((root / "packet.txt").read_text())
+    (training / "oxts" / f"{name}.txt").write_text("".join(packets))
+    P2 = np.c_[K, [K[0, 0] * BASELINE, 0, 0]]
+    rows = [("P0:", P2), ("P1:", P2), ("P2:", P2), ("P3:", P2), ("R_rect", np.eye(3))]
+    rows += [("Tr_velo_cam", CAMERA_FROM_LIDAR[:3]), ("Tr_imu_velo", LIDAR_FROM_IMU[:3])]
+    text = "".join(f"{key} {' '.join(f'{x:.12e}' for x in np.ravel(matrix))} \n" for key, matrix in rows)
+    (training / "calib" / f"{name}.txt").write_text(text + "\n")
+    return root
+
+
+class TestLabels:
+    @pytest.mark.parametrize(("run", "acquisition"), [(9, 1), (0, 20)], ids=["matrix", "picture"])
+    def test_every_class_becomes_that_of_kitti_14(self, folder, numbers, run, acquisition):
+        labels = ZhangLabels(folder).read(run, acquisition, SIZE)
+        np.testing.assert_array_equal(labels.image, EXPECTED[numbers])
+        assert labels.label_set is KITTI_14
+
+    def test_says_nothing_about_what_it_does_not_know(self, folder):
+        labels = ZhangLabels(folder).read(9, 1, SIZE)
+        assert np.isnan(labels.depth).all()
+        assert (labels.birdseye == IGNORE).all()
+        assert not labels.visible.any()
+
+    def test_a_frame_without_labels(self, folder):
+        assert ZhangLabels(folder).read(9, 2, SIZE) is None
+
+    def test_splits_go_by_run(self, folder):
+        labels = ZhangLabels(folder)
+        assert (labels.frames("train"), labels.frames("test")) == ([(9, 1)], [(0, 20)])
+        with pytest.raises(ArgumentError, match="split: expected one of train, test, found 'validation'"):
+            labels.frames("validation")
+
+    def test_the_matrix_comes_before_the_picture(self, folder, numbers):
+        Image.new("RGB", SIZE[::-1], (255, 255, 255)).save(folder / "image_02/trn/0009/000001.png")
+        np.testing.assert_array_equal(ZhangLabels(folder).read(9, 1, SIZE).image, EXPECTED[numbers])
+
+    def test_no_labels(self, tmp_path):
+        with pytest.raises(DataError, match=r"expected labels such as .*000000.mat, found no folder"):
+            ZhangLabels(tmp_path / "nowhere")
+
+    @pytest.mark.parametrize(
+        ("variables", "message"),
+        [
+            ({"truth": np.full(SIZE, 11)}, "expected labels among 0, 1, .*, 10, found 11"),
+            ({"truth": np.full(SIZE, 1.5)}, "expected labels among .*, found 1.5"),
+            ({"truth": np.zeros((4, 5))}, "expected labels of 12 x 40 pixels, found 4 x 5"),
+            ({"a": np.zeros(SIZE), "b": np.zeros(SIZE)}, "expected one matrix of numbers, found the variables a, b"),
+            ({"name": "text"}, "expected one matrix of numbers, found the variables name"),
+        ],
+    )
+    def test_a_wrong_matrix_is_named(self, folder, variables, message):
+        savemat(folder / "image_02/trn/0009/000001.mat", variables)
+        with pytest.raises(DataError, match=f"000001.mat: {message}"):
+            ZhangLabels(folder).read(9, 1, SIZE)
+
+    @pytest.mark.parametrize("content", [b"no matrix", b"MATLAB 5.0 MAT-file" + bytes(30), b"\0" * 200])
+    def test_a_damaged_file_is_named(self, folder, content):
+        (folder / "image_02/trn/0009/000001.mat").write_bytes(content)
+        with pytest.raises(DataError, match=r"000001.mat: expected"):
+            ZhangLabels(folder).read(9, 1, SIZE)
+
+    def test_matlab_7_3_is_told_how_to_be_saved(self, folder):
+        header = b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM"
+        (folder / "image_02/trn/0009/000001.mat").write_bytes(header + bytes(400))
+        with pytest.raises(DataError, match=r"up to version 7.2, found version 7.3; save it again with `-v7`"):
+            ZhangLabels(folder).read(9, 1, SIZE)
+
+    def test_an_unknown_colour_is_named(self, folder):
+        Image.new("RGB", SIZE[::-1], (1, 2, 3)).save(folder / "image_02/test/0000/000020.png")
+        with pytest.raises(DataError, match=r"000020.png: expected the colours of .*, found \(1, 2, 3\)"):
+            ZhangLabels(folder).read(0, 20, SIZE)
+
+
+class TestTrackingRun:
+    def test_what_was_written_is_read(self, tmp_path):
+        run = KittiTrackingRun(write_run(tmp_path), 9)
+        assert run.problems() == []
+        frame = run[1]
+        assert tuple(frame.image[0, 0]) == (1, 2, 3)
+        np.testing.assert_array_equal(frame.points, np.array([[1, 1, 2, 0.5]], np.float32))
+        np.testing.assert_array_equal(frame.camera.K, K)
+        assert (len(run), frame.camera.size, frame.time) == (2, SIZE, 0.1)
+
+    def test_the_camera_stands_where_calibration_says(self, tmp_path):
+        expected = CAMERA_FROM_LIDAR.copy()
+        expected[0, 3] += BASELINE
+        camera = KittiTrackingRun(write_run(tmp_path), 9).camera
+        np.testing.assert_allclose(camera.T_camera_from_lidar, expected, atol=1e-12)
+
+    def test_the_car_drives_east_in_the_world_of_its_imu(self, tmp_path):
+        expected = np.linalg.inv(LIDAR_FROM_IMU)
+        for frame in KittiTrackingRun(write_run(tmp_path), 9):
+            np.testing.assert_allclose(frame.T_world_from_lidar, expected, atol=1e-6)
+            expected[0, 3] += 1
+
+    def test_a_scan_that_was_never_recorded_hurts_its_own_frame_only(self, tmp_path):
+        run = KittiTrackingRun(write_run(tmp_path), 9)
+        (tmp_path / "training/velodyne/0009/000000.bin").unlink()
+        assert len(run[1].points) == 1
+        with pytest.raises(DataError, match=r"000000.bin: expected a file, found nothing there"):
+            run[0]
+
+    @pytest.mark.parametrize(
+        ("file", "old", "new", "message"),
+        [
+            (
+                "calib/0009.txt",
+                "Tr_velo_cam",
+                "Tr_velo",
+                r"expected the key Tr_velo_cam, found the keys P0, .*Tr_velo,",
+            ),
+            ("calib/0009.txt", "R_rect 1", "R_rect 2", "expected a rotation matrix for R_rect"),
+            ("calib/0009.txt", "P2: 2", "P2: 2 2", "expected 12 numbers for P2, found 13"),
+            (
+                "calib/0009.txt",
+                "Tr_velo_cam",
+                "Tr",
+                "expected the key Tr_imu_velo, found a calibration of the odometry",
+            ),
+            ("oxts/0009.txt", "\n", "\n\n", "expected 2 lines, one per frame, found 4"),
+            ("oxts/0009.txt", "49.0", "449.0", "expected latitude and longitude in degrees"),
+        ],
+    )
+    def test_damage_is_named(self, tmp_path, file, old, new, message):
+        path = write_run(tmp_path) / "training" / file
+        assert old in path.read_text()
+        path.write_text(path.read_text().replace(old, new))
+        with pytest.raises(DataError, match=f"0009.txt: {message}"):
+            KittiTrackingRun(tmp_path, 9)[1]
+
+    def test_no_such_run(self, tmp_path):
+        with pytest.raises(DataError, match=r"0003: expected images such as 000000.png, found no folder"):
+            KittiTrackingRun(write_run(tmp_path), 3)
+
+
+class TestLabelledDrive:
+    def test_frames_of_the_run_carry_their_labels(self, tmp_path, folder, numbers):
+        drive = ZhangDrive(KittiTrackingRun(write_run(tmp_path), 9), ZhangLabels(folder), 9)
+        assert drive[0].labels is None
+        np.testing.assert_array_equal(drive[1].labels.image, EXPECTED[numbers])
+        np.testing.assert_array_equal(drive[1].points, drive.drive[1].points)
+
+    def test_raw_drives_too(self, tmp_path, folder, numbers, monkeypatch):
+        write_tiny_drive(tmp_path)
+        monkeypatch.setitem(zhang.RAW_DRIVES, 9, ("2026_01_01", "0001", 3))
+        drive = zhang_raw_drive(tmp_path, ZhangLabels(folder), 9)
+        np.testing.assert_array_equal(drive[1].labels.image, EXPECTED[numbers])
+        np.testing.assert_array_equal(drive[1].points, KittiRawDrive(tmp_path, "2026_01_01", "0001")[1].points)
+
+    def test_a_raw_drive_of_another_length_is_another_drive(self, tmp_path, folder, monkeypatch):
+        write_tiny_drive(tmp_path)
+        monkeypatch.setitem(zhang.RAW_DRIVES, 9, ("2026_01_01", "0001", 803))
+        with pytest.raises(DataError, match="expected the 803 frames of tracking run 9, found 3"):
+            zhang_raw_drive(tmp_path, ZhangLabels(folder), 9)
+
+    def test_a_run_without_a_known_raw_drive(self, tmp_path, folder):
+        with pytest.raises(ArgumentError, match="run: expected one of 0, 4, 5, 10, 11, 13, 19, found 9"):
+            zhang_raw_drive(tmp_path, ZhangLabels(folder), 9)
