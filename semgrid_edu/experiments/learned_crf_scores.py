@@ -13,19 +13,19 @@ from tqdm.auto import tqdm
 from semgrid_edu.crf import CrfParams
 from semgrid_edu.crf.layer import CrfLayer
 from semgrid_edu.crf.layer_file import load_crf
-from semgrid_edu.datasets.index import INDEX_FILE, load_index
+from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.experiments.confusions import drive_confusions
 from semgrid_edu.experiments.crf_outputs import (
     GridOutputs,
-    frame_confusions,
     grid_outputs,
+    refined_confusions,
     refined_grids,
     refuse_known_drives,
 )
-from semgrid_edu.experiments.crf_scores import gain_interval
+from semgrid_edu.experiments.crf_scores import gains_by_metric
 from semgrid_edu.experiments.evaluate import scores, scores_table
 from semgrid_edu.experiments.learned_crf import MEAN_FIELD_UPDATES, VARIANTS, train_crf_on
-from semgrid_edu.metrics import METRICS
 from semgrid_edu.networks import WEIGHTS, load_net
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import short_path, versions
@@ -57,7 +57,7 @@ def compare_learned_crfs(
     params : TrainingParams
         How to train.
     seed : int
-        Seed for the order of the frames, and for the confidence intervals.
+        Seed for the order of the frames.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def compare_learned_crfs(
             train_crf_on(data[variant.split], weights, folder, variant, params, seed, resume)
     layers = {variant.name: load_crf(Path(runs) / variant.folder / WEIGHTS) for variant in VARIANTS}
     names = {split: folder.resolve().name for split, folder in data.items()}
-    return scores_on_test(dataset_dir, weights, layers, seed) | {
+    return scores_on_test(dataset_dir, weights, layers) | {
         "learnt": {name: learnt_values(layer) for name, layer in layers.items()},
         "params": asdict(params),
         "mean field updates": MEAN_FIELD_UPDATES,
@@ -94,9 +94,7 @@ def compare_learned_crfs(
     }
 
 
-def scores_on_test(
-    dataset_dir: str | Path, weights: str | Path, layers: dict[str, CrfLayer], seed: int = 0
-) -> dict[str, object]:
+def scores_on_test(dataset_dir: str | Path, weights: str | Path, layers: dict[str, CrfLayer]) -> dict[str, object]:
     """Score the network, the default CRF and trained ones on the test split.
 
     Parameters
@@ -107,14 +105,12 @@ def scores_on_test(
         The network.
     layers : dict of str to CrfLayer
         The trained CRFs by name.
-    seed : int
-        Seed for the confidence intervals.
 
     Returns
     -------
     dict
-        "frames"; by method "scores" (see `Scores`), "gains" over the network by metric (low, gain, high: a 95 %
-        interval over test drives), and "confusion".
+        "frames"; by method "scores" (see `Scores`), "gains" over the network by metric (low, gain, high: see
+        `gains_by_metric`), and "confusion".
     """
     test = TrainingSet(dataset_dir, "test")
     outputs = grid_outputs(load_net(weights, test.camera), test)
@@ -127,17 +123,15 @@ def scores_on_test(
     methods |= {
         name: partial(layer_grids, layer, outputs) for name, layer in {"untrained layer": untrained, **layers}.items()
     }
-    starts = np.cumsum([0, *map(len, load_index(dataset_dir).frames_by_drive("test").values())])[:-1]
-    per_drive = {name: np.add.reduceat(frame_confusions(outputs, run()), starts) for name, run in methods.items()}
+    per_drive = {
+        name: drive_confusions(refined_confusions(outputs, run()), test.drives) for name, run in methods.items()
+    }
     confusions = {name: drives.sum(axis=0) for name, drives in per_drive.items()}
     return {
         "frames": len(test),
         "scores": scores(confusions, test.label_set),
         "gains": {
-            name: {
-                metric: gain_interval(drives, per_drive["network"], function, seed)
-                for metric, function in METRICS.items()
-            }
+            name: gains_by_metric(drives, per_drive["network"])
             for name, drives in per_drive.items()
             if name != "network"
         },

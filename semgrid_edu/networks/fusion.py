@@ -4,7 +4,7 @@ import torch
 from torch import Tensor, nn
 
 from semgrid_edu.networks.conv_deconv import ConvDeconv, fresh_weights
-from semgrid_edu.occupancy import N_STATES
+from semgrid_edu.occupancy import N_STATES, State
 
 
 class FusionNet(nn.Module):
@@ -27,13 +27,24 @@ class FusionNet(nn.Module):
         than the network after it.
     seed : int
         Seed for the initial weights.
+    uses_occupancy : bool
+        Whether the network sees the occupancy grid. Without, each cell is UNKNOWN to it, see `Architecture`.
     """
 
     WIDTHS, DEPTHS = (32, 48, 64), (1, 1, 2)
     """Three stages instead of VGG16's five: Fig. 5 shows a reduced number of layers and no widths."""
 
-    def __init__(self, n_scores: int, n_planes: int, n_classes: int, n_reduced: int = 16, seed: int = 0) -> None:
+    def __init__(
+        self,
+        n_scores: int,
+        n_planes: int,
+        n_classes: int,
+        n_reduced: int = 16,
+        seed: int = 0,
+        uses_occupancy: bool = True,
+    ) -> None:
         super().__init__()
+        self.uses_occupancy = uses_occupancy
         with fresh_weights(self, seed):
             # On (B, C, D, H, W) a D x 1 x 1 kernel is the 1x1 convolution of all D x C planes.
             self.reduce = nn.Sequential(
@@ -73,5 +84,14 @@ class FusionNet(nn.Module):
         (B, C, H, W) float
             g before the soft-max.
         """
+        if not self.uses_occupancy:
+            occupancy = _unknown_everywhere(occupancy)
         occupancy = occupancy.contiguous(memory_format=torch.channels_last)
         return self.conv_deconv(torch.cat([reduced.squeeze(2), occupancy], dim=1))
+
+
+def _unknown_everywhere(occupancy: Tensor) -> Tensor:
+    """Return the occupancy grids of a scan without a single beam, in the shape of these."""
+    unknown = torch.zeros_like(occupancy)
+    unknown[:, State.UNKNOWN] = 1
+    return unknown

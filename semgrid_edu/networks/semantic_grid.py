@@ -65,7 +65,8 @@ class SemanticGridNet(nn.Module):
         self.n_classes = n_classes
         self.architecture = architecture
         n_scores = getattr(segmenter, "n_classes", n_classes)
-        self.fusion = FusionNet(n_scores, sampler.planes_shape[0], n_classes, seed=seed)
+        uses_occupancy = architecture is None or architecture.uses_occupancy
+        self.fusion = FusionNet(n_scores, sampler.planes_shape[0], n_classes, seed=seed, uses_occupancy=uses_occupancy)
 
     def need_architecture(self) -> Architecture:
         """Return the architecture, for work that can't be done without it, such as saving or training.
