@@ -67,6 +67,9 @@ class TrainingSet(Dataset[Sample]):
         The classes of labels and truth.
     spec : GridSpec
         The grid.
+    drives : tuple of str
+        Date and drive of each frame, such as "2026_01_01 0143". Frames of one drive look alike, so they aren't
+        independent.
     arrays : dict of str to arrays mapped from disk
         All frames at once, as `cached_arrays` returns them.
 
@@ -95,6 +98,8 @@ class TrainingSet(Dataset[Sample]):
         recipe = ArrayRecipe(spec or GridSpec.compact(), tuple(image_size), params or CmcdotParams())
         self.spec, self.label_set = recipe.spec, index.label_set
         self.camera = _shared_camera(index, split).resized(recipe.image_size)
+        by_drive = index.frames_by_drive(split)
+        self.drives = tuple(f"{date} {drive}" for (date, drive), numbers in by_drive.items() for _ in numbers)
         self.arrays = cached_arrays(index, split, recipe)
 
     def __len__(self) -> int:

@@ -12,7 +12,7 @@ from semgrid_edu.datasets.index import DatasetIndex, load_index
 from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import DataError
-from semgrid_edu.experiments.evaluate import learned_log_g
+from semgrid_edu.experiments.learned_grids import learned_log_g
 from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.storage.files import sha256
@@ -99,7 +99,7 @@ def refined_grids(outputs: GridOutputs, params: CrfParams | None) -> NDArray[np.
     return np.stack([mean_field(unary_from_log_probability(log_g), o, params) for log_g, o in frames])
 
 
-def frame_confusions(outputs: GridOutputs, refined: NDArray) -> NDArray[np.int64]:
+def refined_confusions(outputs: GridOutputs, refined: NDArray) -> NDArray[np.int64]:
     """Compare the most probable classes with the truth, frame by frame.
 
     Parameters

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.crf import CrfParams, expected_calibration_error, negative_log_likelihood, reliability
-from semgrid_edu.datasets.index import load_index
 from semgrid_edu.datasets.training_set import TrainingSet
-from semgrid_edu.experiments.crf_outputs import GridOutputs, frame_confusions, grid_outputs, outputs_at, refined_grids
+from semgrid_edu.experiments.confusions import drive_confusions
+from semgrid_edu.experiments.crf_outputs import GridOutputs, grid_outputs, outputs_at, refined_confusions, refined_grids
 from semgrid_edu.experiments.evaluate import scores
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.networks import load_net
@@ -67,11 +67,10 @@ def compare_on_test(
     methods = {"network": (network, None), "CRF": (network, default), "calibrated, CRF": (calibrated, default)}
     methods |= {f"calibrated, CRF for {objective}": (calibrated, params) for objective, params in chosen.items()}
     per_drive, ece = {}, {}
-    frames = list(map(len, load_index(dataset_dir).frames_by_drive("test").values()))
     for method, (outputs, params) in methods.items():
         refined = refined_grids(outputs, params)
         ece[method] = expected_calibration_error(reliability(refined.swapaxes(0, 1), outputs.truth))
-        per_drive[method] = np.add.reduceat(frame_confusions(outputs, refined), np.cumsum([0, *frames[:-1]]))
+        per_drive[method] = drive_confusions(refined_confusions(outputs, refined), test.drives)
     confusions = {method: confusion.sum(axis=0) for method, confusion in per_drive.items()}
     return {
         "frames": len(test),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from semgrid_edu.crf import CrfParams, next_point, params_at, point_of
 from semgrid_edu.crf.search import FACTORS
 from semgrid_edu.errors import DataError
-from semgrid_edu.experiments.crf_outputs import GridOutputs, frame_confusions, refined_grids
+from semgrid_edu.experiments.crf_outputs import GridOutputs, refined_confusions, refined_grids
 from semgrid_edu.experiments.evaluate import scores
 from semgrid_edu.labels import LabelSet
 
@@ -88,7 +88,7 @@ def validation_scores(outputs: GridOutputs, params: CrfParams | None, label_set:
     dict of str to dict
         Values from 0 to 1, by cells ("all" or "semantic") and metric.
     """
-    confusion = frame_confusions(outputs, refined_grids(outputs, params)).sum(axis=0)
+    confusion = refined_confusions(outputs, refined_grids(outputs, params)).sum(axis=0)
     return scores({"refined": confusion}, label_set)["refined"]
 
 

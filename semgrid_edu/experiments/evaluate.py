@@ -1,33 +1,25 @@
 """The trained network compared with simple baselines, on frames kept for testing (sections 4.2 and 4.3)."""
 
-from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
-import numpy as np
-import torch
 from numpy.typing import NDArray
 from torch import nn
-from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.training_cache import SEED
-from semgrid_edu.datasets.training_set import Sample, TrainingSet
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.experiments.baselines import carry_labels, close_gaps, majority_class
+from semgrid_edu.experiments.confusions import frame_confusions
+from semgrid_edu.experiments.learned_grids import Grids, Refine, best_labels, network_grids
 from semgrid_edu.labels import LabelSet
-from semgrid_edu.metrics import METRICS, confusion_matrix, semantic_cells
-from semgrid_edu.networks import IMAGE_STAGE, SemanticGridNet, load_net, unit_image
+from semgrid_edu.metrics import METRICS, semantic_cells
+from semgrid_edu.networks import IMAGE_STAGE, SemanticGridNet, load_net
 from semgrid_edu.pipeline import Stages
-from semgrid_edu.pipeline.seams import Seam
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import versions
 
 Scores = dict[str, dict[str, dict[str, float]]]
 """Values of the metrics, 0..1: by method, by cells ("all" or "semantic"), by metric."""
-
-
-Refine = Callable[[NDArray, NDArray], NDArray]
-"""A stage (log_g (C, H, W), o (4, H, W)) -> g (C, H, W), as `semgrid_edu.pipeline.Stages` describes it."""
 
 
 def evaluate(dataset_dir: str | Path, weights: str | Path, refine: Refine | None = None) -> dict[str, object]:
@@ -65,7 +57,9 @@ def evaluate(dataset_dir: str | Path, weights: str | Path, refine: Refine | None
     image_stage = Path(weights).with_name(IMAGE_STAGE)
     if image_stage.exists():
         segmenters["image-stage"] = load_net(image_stage, test.camera).segmenter
-    confusions = confusion_matrices(net, segmenters, test, majority_class(training.arrays["truth"]), refine)
+    grids = compared_grids(net, segmenters, majority_class(training.arrays["truth"]), refine)
+    compared = frame_confusions(grids, test)
+    confusions = {method: compared.total(method) for method in compared.counts}
     return {
         "scores": scores(confusions, test.label_set),
         "confusion": {method: confusion.tolist() for method, confusion in confusions.items()},
@@ -85,23 +79,21 @@ def _command(data: str, weights: str, refine: Refine | None) -> str:
     return f'evaluate("{data}", "{weights}", refine={_name(refine)})'
 
 
-def confusion_matrices(
-    net: SemanticGridNet,
-    segmenters: dict[str, nn.Module],
-    test: TrainingSet,
-    majority: NDArray,
-    refine: Refine | None = None,
-) -> dict[str, NDArray[np.int64]]:
-    """Compare the grids of each method with the truth of every frame.
+def _name(refine: Refine | None) -> str:
+    return "CRF" if refine is None else getattr(refine, "__name__", type(refine).__name__)
+
+
+def compared_grids(
+    net: SemanticGridNet, segmenters: dict[str, nn.Module], majority: NDArray, refine: Refine | None = None
+) -> Grids:
+    """Return the function that makes the grids of every method for a frame, as `frame_confusions` takes it.
 
     Parameters
     ----------
     net : SemanticGridNet
-        The network, for the grid and the images of the test set.
+        The network, for the grid and the images of the frames.
     segmenters : dict of str to Module
         Image networks by name, i -> s. Geometry carries their labels from the image to the grid.
-    test : TrainingSet
-        The frames, with truth.
     majority : (H, W) int
         The majority class of each cell.
     refine : callable, optional
@@ -109,103 +101,22 @@ def confusion_matrices(
 
     Returns
     -------
-    dict of str to (C, C) int64
-        Number of cells by method: one row per true class, one column per class that the method gives.
-
-    Raises
-    ------
-    ArgumentError
-        When the network has other classes than the test set.
+    callable
+        (frames, k) -> grids of frame k by method.
     """
-    n_classes = len(test.label_set)
-    if net.n_classes != n_classes:
-        raise ArgumentError("net", f"the {n_classes} classes of {test.label_set.name}", net.n_classes)
-    total: dict[str, NDArray[np.int64]] = {}
-    for k in tqdm(range(len(test)), desc="evaluate", unit="frame"):
-        truth, sample = test.arrays["truth"][k], test[k]
-        grids = {"majority class": majority, **learned_grids(net, sample, refine, k)}
+    learned = network_grids(net, {_name(refine): refine or Stages.of(net).refine})
+
+    def grids(frames: TrainingSet, k: int) -> dict[str, NDArray]:
+        sample = frames[k]
+        found = {"majority class": majority, **learned(frames, k)}
         labels = {name: best_labels(segmenter, sample) for name, segmenter in segmenters.items()}
         for name, label_image in (labels | {"true": sample.labels.numpy()}).items():
-            carried = carry_labels(label_image, *test.returns(k), sample.occupancy.numpy())
-            grids[f"geometry, {name} labels"] = carried
-            grids[f"geometry, {name} labels, gaps closed"] = close_gaps(carried, test.spec.cell)
-        for method, grid in grids.items():
-            total[method] = total.get(method, 0) + confusion_matrix(truth, grid, n_classes)
-    return total
+            carried = carry_labels(label_image, *frames.returns(k), sample.occupancy.numpy())
+            found[f"geometry, {name} labels"] = carried
+            found[f"geometry, {name} labels, gaps closed"] = close_gaps(carried, frames.spec.cell)
+        return found
 
-
-def learned_grids(
-    net: SemanticGridNet, sample: Sample, refine: Refine | None = None, number: int = 0
-) -> dict[str, NDArray[np.int64]]:
-    """Return the most probable class of each cell, before and after refinement.
-
-    Parameters
-    ----------
-    net : SemanticGridNet
-        The network, for the sizes of the frame.
-    sample : Sample
-        A frame of a data set.
-    refine : callable, optional
-        Refines the network's grids, as in `evaluate`.
-    number : int
-        Number of the frame, for error messages.
-
-    Returns
-    -------
-    dict of str to (H, W) int64
-        The classes under "network", and the refined ones under "network + " and the name of the refinement.
-
-    Raises
-    ------
-    StageError
-        When `refine` raises an error, or returns anything but probabilities.
-    """
-    log_g = learned_log_g(net, sample)
-    seam = Seam("refine", refine or Stages.of(net).refine, number)
-    refined, _ = seam.call(log_g.shape, log_g, sample.occupancy.numpy())
-    return {"network": log_g.argmax(axis=0), f"network + {_name(refine)}": refined.argmax(axis=0)}
-
-
-def _name(refine: Refine | None) -> str:
-    return "CRF" if refine is None else getattr(refine, "__name__", type(refine).__name__)
-
-
-@torch.inference_mode()
-def learned_log_g(net: SemanticGridNet, sample: Sample) -> NDArray[np.float32]:
-    """Return the network's semantic grid of a frame as log-probabilities.
-
-    Parameters
-    ----------
-    net : SemanticGridNet
-        The network, for the sizes of the frame.
-    sample : Sample
-        A frame of a data set.
-
-    Returns
-    -------
-    (C, H, W) float32
-        log g, natural logarithms.
-    """
-    return net(unit_image(sample.image)[None], sample.occupancy[None])[0].log_softmax(dim=0).numpy()
-
-
-@torch.inference_mode()
-def best_labels(segmenter: nn.Module, sample: Sample) -> NDArray[np.int64]:
-    """Return the class with the highest score at each pixel.
-
-    Parameters
-    ----------
-    segmenter : Module
-        An image network, i -> s: (1, 3, h, w) RGB in 0..1 -> (1, C, h, w) scores.
-    sample : Sample
-        A frame of a data set.
-
-    Returns
-    -------
-    (h, w) int64
-        Classes.
-    """
-    return segmenter(unit_image(sample.image)[None])[0].argmax(dim=0).numpy()
+    return grids
 
 
 def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:

@@ -13,12 +13,13 @@ from tqdm.auto import tqdm
 from semgrid_edu.crf import CrfParams
 from semgrid_edu.crf.layer import CrfLayer
 from semgrid_edu.crf.layer_file import load_crf
-from semgrid_edu.datasets.index import INDEX_FILE, load_index
+from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.experiments.confusions import drive_confusions
 from semgrid_edu.experiments.crf_outputs import (
     GridOutputs,
-    frame_confusions,
     grid_outputs,
+    refined_confusions,
     refined_grids,
     refuse_known_drives,
 )
@@ -127,8 +128,9 @@ def scores_on_test(
     methods |= {
         name: partial(layer_grids, layer, outputs) for name, layer in {"untrained layer": untrained, **layers}.items()
     }
-    starts = np.cumsum([0, *map(len, load_index(dataset_dir).frames_by_drive("test").values())])[:-1]
-    per_drive = {name: np.add.reduceat(frame_confusions(outputs, run()), starts) for name, run in methods.items()}
+    per_drive = {
+        name: drive_confusions(refined_confusions(outputs, run()), test.drives) for name, run in methods.items()
+    }
     confusions = {name: drives.sum(axis=0) for name, drives in per_drive.items()}
     return {
         "frames": len(test),

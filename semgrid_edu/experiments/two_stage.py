@@ -8,7 +8,8 @@ import numpy as np
 from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.training_set import TrainingSet
-from semgrid_edu.experiments.evaluate import Scores, best_labels, learned_log_g, scores
+from semgrid_edu.experiments.evaluate import Scores, scores
+from semgrid_edu.experiments.learned_grids import best_labels, learned_log_g
 from semgrid_edu.metrics import METRICS, confusion_matrix
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, load_net
 from semgrid_edu.storage.files import sha256

@@ -8,7 +8,8 @@ import torch
 from tiny_drive import write_tiny_dataset
 
 from semgrid_edu.datasets import KittiRawDrive, training_cache
-from semgrid_edu.experiments.evaluate import confusion_matrices, evaluate, scores, scores_table
+from semgrid_edu.experiments.confusions import frame_confusions
+from semgrid_edu.experiments.evaluate import compared_grids, evaluate, scores, scores_table
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import Architecture, build_net, save_net
@@ -22,7 +23,7 @@ TRUTH = np.array([[[ROAD, CAR], [FREE, STATIC]]], np.uint8)
 class FourCells:
     """One frame of 2 x 2 cells and as many pixels, each pixel's return in the cell of its number."""
 
-    label_set = KITTI_14
+    label_set, drives = KITTI_14, ("2026_01_01 0001",)
     spec = GridSpec(0.0, 1.0, 0.0, 1.0, 0.5)
     arrays = {"truth": TRUTH}  # noqa: RUF012
 
@@ -55,12 +56,16 @@ class AlwaysRoad:
         return 9 * torch.eye(14)[ROAD].reshape(1, 14, 1, 1).expand(1, 14, 2, 2)
 
 
+def confusions_of(segmenters, refine=None):
+    """The confusion matrices of a network that sees road everywhere, when cars are the majority of each cell."""
+    grids = compared_grids(AlwaysRoad(), segmenters, np.full((2, 2), CAR), refine)
+    found = frame_confusions(grids, FourCells())
+    return {method: found.total(method) for method in found.counts}
+
+
 @pytest.fixture(scope="module")
 def found():
-    confusions = confusion_matrices(
-        AlwaysRoad(), {"all-road": AlwaysRoad().segmenter}, FourCells(), np.full((2, 2), CAR)
-    )
-    return scores(confusions, KITTI_14)
+    return scores(confusions_of({"all-road": AlwaysRoad().segmenter}), KITTI_14)
 
 
 def test_scores_are_those_counted_by_hand(found):
@@ -83,14 +88,14 @@ def test_another_refinement_has_a_row_of_its_own():
         assert o.shape == (4, 2, 2)
         return np.eye(14)[np.full((2, 2), CAR)].transpose(2, 0, 1)
 
-    confusions = confusion_matrices(AlwaysRoad(), {}, FourCells(), np.full((2, 2), CAR), always_car)
+    confusions = confusions_of({}, always_car)
     assert confusions.keys() >= {"network", "network + always_car"}
     np.testing.assert_array_equal(np.argwhere(confusions["network + always_car"])[:, 1], CAR)
 
 
 def test_a_refinement_that_gives_no_probabilities_is_refused():
     with pytest.raises(StageError, match=r"^refine \(test_evaluate.py, line \d+\), frame 0: .* log-probabilities"):
-        confusion_matrices(AlwaysRoad(), {}, FourCells(), np.full((2, 2), CAR), lambda log_g, o: log_g)
+        confusions_of({}, lambda log_g, o: log_g)
 
 
 def test_table_shows_every_method_and_number(found):
