@@ -6,8 +6,8 @@ from pathlib import Path
 
 from tqdm.auto import tqdm
 
-from semgrid_edu.experiments.reproduction.executors import Workplace
 from semgrid_edu.experiments.reproduction.runs import Run, run_one
+from semgrid_edu.storage.workplace import Workplace
 
 
 def execute(runs: Sequence[Run], root: str | Path, place: Workplace, device: str = "cpu") -> dict[Run, str]:

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from semgrid_edu.experiments.reproduction.execute import execute
-from semgrid_edu.experiments.reproduction.executors import usable_cores, workplace
 from semgrid_edu.experiments.reproduction.plan import estimate, plan_table, with_needs
 from semgrid_edu.experiments.reproduction.runs import OUTPUT, Run, check_runs_folder
 from semgrid_edu.experiments.reproduction.scales import scale_named
 from semgrid_edu.experiments.reproduction.wanted import EXPERIMENTS
+from semgrid_edu.storage.workplace import usable_cores, workplace
 
 
 @dataclass(frozen=True)

@@ -230,7 +230,7 @@ def _printing_to(path: Path):
 
 
 def check_runs_folder(root: str | Path) -> Path:
-    """Return the folder of all runs, made when missing.
+    """Return the folder of all runs as an absolute path, under which every machine finds it; it is made when missing.
 
     Parameters
     ----------
@@ -242,7 +242,7 @@ def check_runs_folder(root: str | Path) -> Path:
     ArgumentError
         When a file is in its place.
     """
-    root = Path(root)
+    root = Path(root).resolve()
     if root.exists() and not root.is_dir():
         raise ArgumentError("--runs", "a folder", f"the file {root}")
     root.mkdir(parents=True, exist_ok=True)

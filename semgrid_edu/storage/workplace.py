@@ -1,4 +1,4 @@
-"""Where runs are done: in processes of this machine, or on a dask.distributed cluster; the same code behind both."""
+"""Where independent tasks are done: in processes of this machine, or on a dask.distributed cluster."""
 
 import os
 from collections.abc import Callable, Iterator
