@@ -11,6 +11,7 @@ from typer.core import TyperCommand
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.experiments.commands import keep_result, reproduce
+from semgrid_edu.experiments.reproduction.commands import add_commands
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 data = typer.Typer(no_args_is_help=True, help="Make and check data.")
@@ -18,6 +19,7 @@ course = typer.Typer(no_args_is_help=True, help="Build the notebooks and the exe
 app.add_typer(data, name="data")
 app.add_typer(course, name="course")
 app.add_typer(reproduce, name="reproduce")
+add_commands(reproduce)
 
 
 @app.callback()

@@ -6,12 +6,8 @@ from typing import Annotated
 
 import typer
 
-from semgrid_edu.experiments.reproduction.commands import add_commands
-
 reproduce = typer.Typer(no_args_is_help=True, help="Run the experiments of the lectures.")
 """What `semgrid-edu` adds to its commands."""
-
-add_commands(reproduce)
 
 
 @reproduce.command()

@@ -32,6 +32,7 @@ def _command(experiment: str) -> Callable[..., None]:
 
     def command(
         runs: Annotated[Path, typer.Option(help="Takes one folder per run; the same command goes on.")],
+        out: Annotated[Path, typer.Option(help="Takes the results: JSON, Markdown and pictures.")],
         scale: Annotated[str, typer.Option(help="quick (minutes), reduced (hours) or paper (needs a GPU).")] = "quick",
         seeds: Annotated[int | None, typer.Option(min=1, help="Number of seeds; the scale's own by default.")] = None,
         workers: Annotated[int | None, typer.Option(help="Runs at a time; one per core by default.")] = None,
@@ -43,7 +44,7 @@ def _command(experiment: str) -> Callable[..., None]:
     ) -> None:
         from semgrid_edu.experiments.reproduction.reproduce import Request, reproduce
 
-        request = Request(experiment, scale, seeds, runs, workers, scheduler, device)
+        request = Request(experiment, scale, seeds, runs, out, workers, scheduler, device)
         problems = reproduce(request, typer.echo, plan)
         if problems:
             typer.echo(problems, err=True)

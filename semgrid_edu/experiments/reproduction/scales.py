@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.reproduction.data_runs import ArraysRun, DataRun
+from semgrid_edu.experiments.reproduction.score_runs import ScoreRun
 from semgrid_edu.experiments.reproduction.training_runs import GridStageRun, ImageStageRun
 from semgrid_edu.experiments.reproduction.variants import USUAL, Variant
 
@@ -81,6 +82,28 @@ class Scale:
         """
         image_stage = self.image_stage(data, segmenter, seed, n_frames)
         return GridStageRun(image_stage, self.arrays(data, "train", truth), self.grid_iterations, variant)
+
+    def scored(
+        self,
+        data: str,
+        segmenter: str,
+        seed: int,
+        truth: str = "lidar",
+        variant: Variant = USUAL,
+        n_frames: int | None = None,
+        crf: bool = True,
+    ) -> ScoreRun:
+        """Return the scoring of a network on the test frames of the data that it learned from.
+
+        Parameters
+        ----------
+        data, segmenter, seed, truth, variant, n_frames
+            The network, as `Scale.grid_stage` takes it.
+        crf : bool
+            Whether the CRF is scored as well.
+        """
+        network = self.grid_stage(data, segmenter, seed, truth, variant, n_frames)
+        return ScoreRun(network, self.arrays(data, "test", truth), crf)
 
     def arrays(self, data: str, split: str, truth: str) -> ArraysRun:
         """Return the making of the arrays of a split. Parameters are those of `ArraysRun`."""
