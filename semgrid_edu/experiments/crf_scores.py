@@ -1,6 +1,5 @@
 """What the chosen CRFs are worth on the test split, and how well calibrated the grids are (sections 3.5 and 4.2)."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +10,9 @@ from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.experiments.confusions import drive_confusions
 from semgrid_edu.experiments.crf_outputs import GridOutputs, grid_outputs, outputs_at, refined_confusions, refined_grids
 from semgrid_edu.experiments.evaluate import scores
+from semgrid_edu.experiments.statistics import paired_interval
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.networks import load_net
-
-DRAWS = 1000
-"""Number of bootstrap samples of the test drives behind an interval."""
 
 
 def calibration(outputs: GridOutputs) -> dict[str, object]:
@@ -38,7 +35,7 @@ def calibration(outputs: GridOutputs) -> dict[str, object]:
 
 
 def compare_on_test(
-    dataset_dir: str | Path, weights: str | Path, temperature: float, chosen: dict[str, CrfParams], seed: int = 0
+    dataset_dir: str | Path, weights: str | Path, temperature: float, chosen: dict[str, CrfParams]
 ) -> dict[str, object]:
     """Score the network, the default CRF, and the chosen CRFs on the test split.
 
@@ -52,8 +49,6 @@ def compare_on_test(
         T of the calibrated network.
     chosen : dict of str to CrfParams
         What was chosen, by objective.
-    seed : int
-        Seed for the bootstrap samples.
 
     Returns
     -------
@@ -78,7 +73,7 @@ def compare_on_test(
         "scores": scores(confusions, test.label_set),
         "ECE": ece,
         "gains": {
-            method: _gains(confusion, per_drive["network"], seed)
+            method: gains_by_metric(confusion, per_drive["network"])
             for method, confusion in per_drive.items()
             if method != "network"
         },
@@ -86,33 +81,18 @@ def compare_on_test(
     }
 
 
-def _gains(a: NDArray, b: NDArray, seed: int) -> dict[str, list[float]]:
-    return {name: list(gain_interval(a, b, metric, seed)) for name, metric in METRICS.items()}
-
-
-def gain_interval(
-    a: NDArray, b: NDArray, metric: Callable[[NDArray], float], seed: int = 0
-) -> tuple[float, float, float]:
-    """Return by how much one method beats another on the same drives, and how much of that is the choice of drives.
-
-    Drives are drawn anew, with replacement, a thousand times, the same ones for both methods (paired bootstrap).
+def gains_by_metric(a: NDArray, b: NDArray) -> dict[str, list[float]]:
+    """Return by how much one network's refined grids beat another one's on the same drives, by every metric.
 
     Parameters
     ----------
     a, b : (V, C, C) int
-        Confusion matrices of the two methods, drive by drive.
-    metric : callable
-        Takes the sum of some drives' matrices.
-    seed : int
-        Seed for the draws.
+        Confusion matrices of the two, drive by drive.
 
     Returns
     -------
-    low, gain, high : float
-        metric(a) - metric(b) over all drives, and the middle 95 % of it over the draws.
+    dict of str to [low, gain, high]
+        By metric, with the 95 % interval of `paired_interval`. There is one network, so the interval is for that one,
+        on new drives.
     """
-    drives = len(a)
-    times = np.random.default_rng(seed).multinomial(drives, np.full(drives, 1 / drives), size=DRAWS)
-    draws = zip(np.tensordot(times, a, 1), np.tensordot(times, b, 1), strict=True)
-    low, high = np.quantile([metric(of_a) - metric(of_b) for of_a, of_b in draws], [0.025, 0.975])
-    return float(low), metric(a.sum(axis=0)) - metric(b.sum(axis=0)), float(high)
+    return {name: list(paired_interval(a[None], b[None], metric)) for name, metric in METRICS.items()}

@@ -57,7 +57,7 @@ def search_crf(
         Takes every trial as soon as it has ended, as JSON. If the file holds trials of the same search, they aren't
         repeated.
     seed : int
-        Seed for the parameters that are tried, and for the confidence intervals; not negative.
+        Seed for the parameters that are tried; not negative.
     n_trials : int
         Number of trials in all, at least one.
 
@@ -103,7 +103,7 @@ def search_crf(
         "unrefined": unrefined,
         "chosen": {name: {"trial": k, **trials[k]} for name, k in chosen.items()},
         "pareto": pareto_front(values[:, :2]).tolist(),
-        "test": compare_on_test(dataset_dir, weights, temperature, params, seed),
+        "test": compare_on_test(dataset_dir, weights, temperature, params),
         "command": _command(validation_dir, dataset_dir, weights, seed, n_trials),
         "date": f"{datetime.now(UTC):%Y-%m-%d}",
         "minutes": round(sum(trial["seconds"] for trial in trials) / 60, 1),

@@ -23,10 +23,9 @@ from semgrid_edu.experiments.crf_outputs import (
     refined_grids,
     refuse_known_drives,
 )
-from semgrid_edu.experiments.crf_scores import gain_interval
+from semgrid_edu.experiments.crf_scores import gains_by_metric
 from semgrid_edu.experiments.evaluate import scores, scores_table
 from semgrid_edu.experiments.learned_crf import MEAN_FIELD_UPDATES, VARIANTS, short_path, train_crf_on
-from semgrid_edu.metrics import METRICS
 from semgrid_edu.networks import WEIGHTS, load_net
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import versions
@@ -58,7 +57,7 @@ def compare_learned_crfs(
     params : TrainingParams
         How to train.
     seed : int
-        Seed for the order of the frames, and for the confidence intervals.
+        Seed for the order of the frames.
 
     Returns
     -------
@@ -81,7 +80,7 @@ def compare_learned_crfs(
             train_crf_on(data[variant.split], weights, folder, variant, params, seed, resume)
     layers = {variant.name: load_crf(Path(runs) / variant.folder / WEIGHTS) for variant in VARIANTS}
     names = {split: folder.resolve().name for split, folder in data.items()}
-    return scores_on_test(dataset_dir, weights, layers, seed) | {
+    return scores_on_test(dataset_dir, weights, layers) | {
         "learnt": {name: learnt_values(layer) for name, layer in layers.items()},
         "params": asdict(params),
         "mean field updates": MEAN_FIELD_UPDATES,
@@ -95,9 +94,7 @@ def compare_learned_crfs(
     }
 
 
-def scores_on_test(
-    dataset_dir: str | Path, weights: str | Path, layers: dict[str, CrfLayer], seed: int = 0
-) -> dict[str, object]:
+def scores_on_test(dataset_dir: str | Path, weights: str | Path, layers: dict[str, CrfLayer]) -> dict[str, object]:
     """Score the network, the default CRF and trained ones on the test split.
 
     Parameters
@@ -108,14 +105,12 @@ def scores_on_test(
         The network.
     layers : dict of str to CrfLayer
         The trained CRFs by name.
-    seed : int
-        Seed for the confidence intervals.
 
     Returns
     -------
     dict
-        "frames"; by method "scores" (see `Scores`), "gains" over the network by metric (low, gain, high: a 95 %
-        interval over test drives), and "confusion".
+        "frames"; by method "scores" (see `Scores`), "gains" over the network by metric (low, gain, high: see
+        `gains_by_metric`), and "confusion".
     """
     test = TrainingSet(dataset_dir, "test")
     outputs = grid_outputs(load_net(weights, test.camera), test)
@@ -136,10 +131,7 @@ def scores_on_test(
         "frames": len(test),
         "scores": scores(confusions, test.label_set),
         "gains": {
-            name: {
-                metric: gain_interval(drives, per_drive["network"], function, seed)
-                for metric, function in METRICS.items()
-            }
+            name: gains_by_metric(drives, per_drive["network"])
             for name, drives in per_drive.items()
             if name != "network"
         },

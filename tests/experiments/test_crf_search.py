@@ -11,10 +11,8 @@ from semgrid_edu.crf import search as rules
 from semgrid_edu.datasets import KittiRawDrive, training_cache
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.experiments import crf_search
-from semgrid_edu.experiments.crf_scores import gain_interval
 from semgrid_edu.experiments.crf_trials import objective_values
 from semgrid_edu.experiments.evaluate import evaluate
-from semgrid_edu.metrics import METRICS, pixel_accuracy
 from semgrid_edu.networks import Architecture, build_net, save_net
 
 TRIALS = 6
@@ -155,13 +153,3 @@ def test_a_loss_of_class_accuracy_is_worth_less_than_any_gain_in_pixels():
     trials, unrefined = [trial(0.9, 0.5), trial(0.8, 0.6), trial(0.7, 0.7)], {"all": {"class accuracy": 0.6}}
     expected = [[0.9, 0.5, -0.1], [0.8, 0.6, 0.8], [0.7, 0.7, 0.7]]
     np.testing.assert_allclose(objective_values(trials, unrefined), expected)
-
-
-def test_the_interval_of_a_gain():
-    """Five of ten cells more in each of two drives: no choice of drives changes that; half as many in one: it does."""
-    right, half = np.diag([10, 0]), np.array([[5, 5], [0, 0]])
-    assert gain_interval(np.stack([right] * 2), np.stack([half] * 2), pixel_accuracy) == (0.5, 0.5, 0.5)
-    low, gain, high = gain_interval(np.stack([right, half]), np.stack([half] * 2), pixel_accuracy)
-    assert (low, gain, high) == (0.0, 0.25, 0.5)
-    for metric in METRICS.values():
-        assert gain_interval(np.stack([right, half]), np.stack([right, half]), metric) == (0.0, 0.0, 0.0)
