@@ -100,7 +100,8 @@ class TrainingSet(Dataset[Sample]):
         self.camera = _shared_camera(index, split).resized(recipe.image_size)
         by_drive = index.frames_by_drive(split)
         self.drives = tuple(f"{date} {drive}" for (date, drive), numbers in by_drive.items() for _ in numbers)
-        self.arrays = cached_arrays(index, split, recipe)
+        arrays = cached_arrays(index, split, recipe)
+        self.arrays = arrays | {"true": arrays["truth"]}
 
     def __len__(self) -> int:
         """Return the number of labelled frames."""

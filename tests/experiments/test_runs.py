@@ -12,10 +12,10 @@ from tiny_runs import HandMadeData, Note, results, tiny_trainings
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.experiments.reproduction.execute import execute
+from semgrid_edu.experiments.reproduction.experiments import EXPERIMENTS
 from semgrid_edu.experiments.reproduction.plan import estimate, plan_table, with_needs
 from semgrid_edu.experiments.reproduction.runs import check_runs_folder, claim_folder, run_one
 from semgrid_edu.experiments.reproduction.scales import SCALES, scale_named
-from semgrid_edu.experiments.reproduction.wanted import EXPERIMENTS
 from semgrid_edu.networks import WEIGHTS
 from semgrid_edu.storage.workplace import Workplace, workplace
 
@@ -103,11 +103,11 @@ def test_recorded_times_take_the_place_of_trials(tmp_path):
 
 @pytest.mark.parametrize("scale", SCALES.values(), ids=SCALES)
 def test_names_tell_runs_apart_and_stages_are_shared(scale):
-    plan = with_needs(run for experiment in EXPERIMENTS.values() for run in experiment(scale, None))
+    plan = with_needs(run for experiment in EXPERIMENTS.values() for run in experiment.runs(scale, 3))
     assert len({run.name for run in plan}) == len(plan)
     settings = [json.dumps(run.settings(), sort_keys=True) for run in plan]
     assert len(set(settings)) == len(plan)
-    table1 = with_needs(EXPERIMENTS["table1"](scale, 3))
+    table1 = with_needs(EXPERIMENTS["table1"].runs(scale, 3))
     assert sum(run.name.startswith("image-") for run in table1) == 9
     assert sum(run.name.startswith("data-") for run in table1) == 1
 

@@ -89,8 +89,5 @@ def confusion_markdown(result: dict) -> str:
 
 
 def _matrix(names: list[str], matrix: list[list[float | None]]) -> str:
-    cells = [
-        [name, *("-" if share is None else f"{share:.2f}" for share in row)]
-        for name, row in zip(names, matrix, strict=True)
-    ]
-    return markdown_table([["", *names], *cells])
+    shares = (["-" if share is None else f"{share:.2f}" for share in row] for row in matrix)
+    return markdown_table([["", *names], *([name, *row] for name, row in zip(names, shares, strict=True))])

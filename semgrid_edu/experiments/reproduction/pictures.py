@@ -64,16 +64,13 @@ def draw_measured(ax: Axes, place: float, value: dict, colour: str = OURS) -> No
 
 def _legend() -> list:
     """Return what the marks mean."""
-    line, dot = (
-        plt.Line2D([], [], color=OURS, linewidth=2, alpha=0.6),
-        plt.Line2D([], [], color=OURS, marker="o", linestyle=""),
-    )
-    seed = plt.Line2D([], [], color=OURS, marker="|", linestyle="")
-    paper = plt.Line2D([], [], color=PAPERS, marker="D", markerfacecolor="none", linestyle="")
-    words = ("95 % interval", "ours, mean", "ours, each seed", "the paper's")
-    for handle, word in zip((line, dot, seed, paper), words, strict=True):
-        handle.set_label(word)
-    return [dot, line, seed, paper]
+    words = {
+        "ours, mean": {"color": OURS, "marker": "o", "linestyle": ""},
+        "95 % interval": {"color": OURS, "linewidth": 2, "alpha": 0.6},
+        "ours, each seed": {"color": OURS, "marker": "|", "linestyle": ""},
+        "the paper's": {"color": PAPERS, "marker": "D", "markerfacecolor": "none", "linestyle": ""},
+    }
+    return [plt.Line2D([], [], label=word, **style) for word, style in words.items()]
 
 
 def confusion_picture(result: dict) -> Figure:

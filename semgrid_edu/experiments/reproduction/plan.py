@@ -64,7 +64,7 @@ class Estimate:
         """
         longest: dict[Run, float] = {}
         for run in TopologicalSorter({run: run.needs for run in self.seconds}).static_order():
-            longest[run] = self.seconds.get(run, 0.0) + max((longest[one] for one in run.needs), default=0.0)
+            longest[run] = self.seconds.get(run, 0.0) + max((longest.get(one, 0.0) for one in run.needs), default=0.0)
         return max(sum(self.seconds.values()) / workers, *longest.values(), 0.0) / 3600
 
 

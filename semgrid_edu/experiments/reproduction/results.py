@@ -123,7 +123,7 @@ def result_markdown(result: dict, experiment: Experiment) -> str:
     listed = "\n".join(f"- {line}" for line in result["deviations"])
     return (
         f"# {experiment.title}\n\nScale {result['scale']}, {result['seeds']} seeds. Means over the seeds; in brackets "
-        "95 % intervals from resampling drives and seeds. Per cent.\n\n"
+        "95 % intervals over drives and seeds. Per cent.\n\n"
         f"{experiment.markdown(result)}\n\nOther than in the paper:\n\n{listed}\n\n"
         f"Made by `{result['command']}`, commit {', '.join(result['commits'])}.\n"
     )
