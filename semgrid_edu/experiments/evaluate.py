@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from torch import nn
 from tqdm.auto import tqdm
 
+from semgrid_edu.datasets.ground_truth import carry_labels, close_gaps
 from semgrid_edu.datasets.training_cache import SEED
 from semgrid_edu.datasets.training_set import Sample, TrainingSet
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.baselines import carry_labels, close_gaps, majority_class
+from semgrid_edu.experiments.baselines import majority_class
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS, confusion_matrix, semantic_cells
 from semgrid_edu.networks import IMAGE_STAGE, SemanticGridNet, load_net, unit_image
