@@ -7,7 +7,7 @@ from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.simulation.datasets import RECIPES, DatasetRecipe, Route, make_from_recipe
 from semgrid_edu.simulation.street.plan import Wishes
-from semgrid_edu.training.run import architecture
+from semgrid_edu.training.run import architecture, chosen_truth
 
 
 def _short(split: str, layout: str, n_frames: int = 6) -> Route:
@@ -146,5 +146,5 @@ class ArraysRun(Run):
         -------
         TrainingSet
         """
-        usual = architecture("segnet", self.preset)
-        return TrainingSet(self.data.dataset_dir(root), self.split, usual.grid, usual.image_size)
+        usual, made = architecture("segnet", self.preset), chosen_truth(self.truth)
+        return TrainingSet(self.data.dataset_dir(root), self.split, usual.grid, usual.image_size, made=made)
