@@ -12,12 +12,14 @@ from typer.core import TyperCommand
 from semgrid_edu.data_commands import data, report
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.experiments.commands import keep_result, reproduce
+from semgrid_edu.experiments.reproduction.commands import add_commands
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 course = typer.Typer(no_args_is_help=True, help="Build the notebooks and the exercises.")
 app.add_typer(data, name="data")
 app.add_typer(course, name="course")
 app.add_typer(reproduce, name="reproduce")
+add_commands(reproduce)
 
 
 @app.callback()
@@ -131,15 +133,19 @@ def train(
     two_stage: Annotated[
         bool, typer.Option("--two-stage", help="Keep the image network fixed while the fusion learns.")
     ] = False,
+    truth: Annotated[
+        str, typer.Option(help="true, or lidar: made from image labels and LIDAR with real data's errors.")
+    ] = "true",
     resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was interrupted.")] = False,
     device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu, cuda or cuda:N.")] = "auto",
 ) -> None:
     """Train a network: first its image network, then all of it on grids. torchrun runs it in several processes."""
-    from semgrid_edu.training.run import how_to_go_on, train_network, training_params
+    from semgrid_edu.training.run import chosen_truth, how_to_go_on, train_network, training_params
 
     params = training_params(preset, iterations, end_to_end=not two_stage, from_imagenet=imagenet is not None)
+    choices = {"preset": preset, "imagenet": imagenet, "device": device, "made": chosen_truth(truth)}
     try:
-        train_network(data, out, segmenter, params, seed, resume, preset=preset, imagenet=imagenet, device=device)
+        train_network(data, out, segmenter, params, seed, resume, **choices)
     except KeyboardInterrupt:
         sys.exit(f"semgrid-edu: interrupted; {how_to_go_on(out)}")
 

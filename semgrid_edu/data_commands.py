@@ -19,12 +19,15 @@ def make(
     folder: Annotated[Path, typer.Argument(help="Takes the data set's own folder.")],
     seed: Annotated[int, typer.Option(help="Seed for the drives; the same seed gives the same bytes.")] = 0,
     workers: Annotated[int, typer.Option(help="Number of processes that share the work.")] = 2,
+    scheduler: Annotated[
+        str | None, typer.Option(help="tcp://HOST:PORT of a dask.distributed cluster that shares the work instead.")
+    ] = None,
 ) -> None:
     """Simulate a data set in KITTI's raw layout; the same command finishes one that was interrupted."""
     from semgrid_edu.simulation.datasets import DATA_SETS, make_dataset
 
     for one in DATA_SETS if name == "all" else [name]:
-        typer.echo(f"{one} is in {make_dataset(one, folder, seed, workers)}")
+        typer.echo(f"{one} is in {make_dataset(one, folder, seed, workers, scheduler)}")
 
 
 @data.command()

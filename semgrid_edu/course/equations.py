@@ -201,7 +201,7 @@ EQUATIONS = (
         "ground-truth",
         "4",
         "Labels of the image, carried to the grid",
-        literal="semgrid_edu.experiments.baselines.carry_labels",
+        literal="semgrid_edu.datasets.ground_truth.carry_labels",
     ),
     Equation(
         "median-frequency",

@@ -12,6 +12,7 @@ from torch.utils.data import Dataset
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.calibration import read_camera
 from semgrid_edu.datasets.index import DatasetIndex, load_index
+from semgrid_edu.datasets.made_truth import MadeTruth, made_grids
 from semgrid_edu.datasets.training_cache import ArrayRecipe, cached_arrays
 from semgrid_edu.errors import DataError
 from semgrid_edu.grid import GridSpec
@@ -58,6 +59,9 @@ class TrainingSet(Dataset[Sample]):
         Height and width to which the images are resized, pixels; those of the compact network when left out.
     params : CmcdotParams, optional
         Parameters of the occupancy filter; the package's own when left out.
+    made : MadeTruth, optional
+        How to make the truth from image labels and LIDAR, as one must with real data. When left out, the truth is what
+        the data set says of its cells (`grid_truth`).
 
     Attributes
     ----------
@@ -71,7 +75,8 @@ class TrainingSet(Dataset[Sample]):
         Date and drive of each frame, such as "2026_01_01 0143". Frames of one drive look alike, so they aren't
         independent.
     arrays : dict of str to arrays mapped from disk
-        All frames at once, as `cached_arrays` returns them.
+        All frames at once, as `cached_arrays` returns them, and "true", (N, H, W) uint8: `grid_truth` of every frame.
+        "truth" is the same, or what `made` makes. The labels of pixels are the true ones in both cases.
 
     Raises
     ------
@@ -83,6 +88,7 @@ class TrainingSet(Dataset[Sample]):
     Examples
     --------
     >>> training = TrainingSet("data/minikitti", "train")                  # doctest: +SKIP
+    >>> as_in_the_paper = TrainingSet("data/minikitti", "train", made=MadeTruth())  # doctest: +SKIP
     >>> torch.utils.data.DataLoader(training, batch_size=6, shuffle=True)  # doctest: +SKIP
     """
 
@@ -93,6 +99,7 @@ class TrainingSet(Dataset[Sample]):
         spec: GridSpec | None = None,
         image_size: tuple[int, int] = Architecture.image_size,
         params: CmcdotParams | None = None,
+        made: MadeTruth | None = None,
     ) -> None:
         index = load_index(dataset_dir)
         recipe = ArrayRecipe(spec or GridSpec.compact(), tuple(image_size), params or CmcdotParams())
@@ -100,7 +107,11 @@ class TrainingSet(Dataset[Sample]):
         self.camera = _shared_camera(index, split).resized(recipe.image_size)
         by_drive = index.frames_by_drive(split)
         self.drives = tuple(f"{date} {drive}" for (date, drive), numbers in by_drive.items() for _ in numbers)
-        self.arrays = cached_arrays(index, split, recipe)
+        arrays = cached_arrays(index, split, recipe)
+        self.arrays = arrays | {"true": arrays["truth"]}
+        if made:
+            folder = Path(arrays["truth"].filename).parent
+            self.arrays["truth"] = made_grids(index, split, recipe, made, folder)
 
     def __len__(self) -> int:
         """Return the number of labelled frames."""

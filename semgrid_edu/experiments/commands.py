@@ -98,6 +98,21 @@ def learned_crf(
     keep_result(out, lambda: compare_learned_crfs(data, validation, weights, runs, seed=seed), learned_crf_table)
 
 
+@reproduce.command()
+def truth_policies(
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives, the errors, the particles.")] = 0,
+    drives: Annotated[int, typer.Option(min=1, help="Number of drives, of two seconds each.")] = 20,
+    grid: Annotated[str, typer.Option(help="compact or paper.")] = "compact",
+    lidar: Annotated[str, typer.Option(help="coarse, that of the simulated data sets, or HDL-64E.")] = "coarse",
+    out: Annotated[Path, typer.Option(help="Takes each drive; the same command goes on.")] = Path("truth.json"),
+) -> None:
+    """Measure how wrong each way of making ground truth from LIDAR is, by class and distance (lecture 09)."""
+    from semgrid_edu.experiments.truth_policies import truth_policies
+    from semgrid_edu.experiments.truth_tables import truth_tables
+
+    keep_result(out, lambda: truth_policies(out, seed, drives, grid, lidar), truth_tables)
+
+
 def keep_result(out: Path, compute: Callable[[], dict], table: Callable[[dict], str]) -> None:
     """Compute an experiment's result, once it is known that the file can be written; write it, and print its table.
 

@@ -6,9 +6,10 @@ from pathlib import Path
 from numpy.typing import NDArray
 from torch import nn
 
+from semgrid_edu.datasets.ground_truth import carry_labels, close_gaps
 from semgrid_edu.datasets.training_cache import SEED
 from semgrid_edu.datasets.training_set import TrainingSet
-from semgrid_edu.experiments.baselines import carry_labels, close_gaps, majority_class
+from semgrid_edu.experiments.baselines import majority_class
 from semgrid_edu.experiments.confusions import frame_confusions
 from semgrid_edu.experiments.learned_grids import Grids, Refine, best_labels, network_grids
 from semgrid_edu.labels import LabelSet

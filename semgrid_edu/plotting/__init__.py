@@ -25,6 +25,7 @@ from semgrid_edu.plotting.legends import class_legend
 from semgrid_edu.plotting.lines import belief_history, probability_line, probability_lines, state_history
 from semgrid_edu.plotting.moving import animate_occupancy, particles, velocity_wheel
 from semgrid_edu.plotting.spread import velocity_ellipse, velocity_spread
+from semgrid_edu.plotting.truth import difference_kinds, policy_errors, truth_difference, truth_errors
 
 FIGURE_DPI = 110
 """Dots per inch of every figure in a notebook: `plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI`."""
@@ -46,6 +47,7 @@ __all__ = [
     "confusion",
     "coupling_errors",
     "depth_colours",
+    "difference_kinds",
     "draw_lattice_frame",
     "draw_triangles",
     "error_against_time",
@@ -61,10 +63,13 @@ __all__ = [
     "picks_a_side",
     "plane_on_image",
     "points_on_image",
+    "policy_errors",
     "probability_line",
     "probability_lines",
     "state_history",
     "training_curves",
+    "truth_difference",
+    "truth_errors",
     "velocity",
     "velocity_arrows",
     "velocity_colours",

@@ -27,7 +27,7 @@ from semgrid_edu.simulation.writer import (
 )
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import versions, write_provenance
-from semgrid_edu.storage.workers import worker_pool
+from semgrid_edu.storage.workplace import workplace
 
 FORMAT = 1
 """Raised whenever the simulator changes what a seed gives, so that old and new drives don't mix in one folder."""
@@ -123,7 +123,7 @@ PACKAGES = ("numpy", "numba", "embreex", "trimesh", "pillow")
 """The packages whose versions can change what a seed gives."""
 
 
-def make_dataset(name: str, folder: Path, seed: int = 0, workers: int = 2) -> Path:
+def make_dataset(name: str, folder: Path, seed: int = 0, workers: int = 2, scheduler: str | None = None) -> Path:
     """Make a data set, or finish one that was interrupted.
 
     The same name and seed give the same bytes, whatever the number of workers and of interruptions.
@@ -138,6 +138,8 @@ def make_dataset(name: str, folder: Path, seed: int = 0, workers: int = 2) -> Pa
         Seed for all drives; not negative.
     workers : int
         Number of processes that share the work, at least one.
+    scheduler : str, optional
+        Address of a dask.distributed scheduler whose workers share the work instead, see `workplace`.
 
     Returns
     -------
@@ -153,10 +155,12 @@ def make_dataset(name: str, folder: Path, seed: int = 0, workers: int = 2) -> Pa
     """
     if name not in RECIPES:
         raise ArgumentError("name", f"one of {', '.join(RECIPES)}", repr(name))
-    return make_from_recipe(RECIPES[name], folder, seed, workers)
+    return make_from_recipe(RECIPES[name], folder, seed, workers, scheduler)
 
 
-def make_from_recipe(recipe: DatasetRecipe, folder: Path, seed: int, workers: int) -> Path:
+def make_from_recipe(
+    recipe: DatasetRecipe, folder: Path, seed: int, workers: int, scheduler: str | None = None
+) -> Path:
     """Make a data set of your own, or finish one that was interrupted.
 
     Parameters
@@ -169,6 +173,8 @@ def make_from_recipe(recipe: DatasetRecipe, folder: Path, seed: int, workers: in
         Seed for all drives; not negative.
     workers : int
         Number of processes that share the work, at least one.
+    scheduler : str, optional
+        Address of a dask.distributed scheduler whose workers share the work instead, see `workplace`.
 
     Returns
     -------
@@ -186,14 +192,14 @@ def make_from_recipe(recipe: DatasetRecipe, folder: Path, seed: int, workers: in
         raise ArgumentError("seed", "a whole number from 0 up", seed)
     if workers < 1:
         raise ArgumentError("workers", "at least one process", workers)
-    root = Path(folder) / recipe.name
+    root = Path(folder).resolve() / recipe.name  # absolute: the machines of a cluster work in other folders
     _claim(root, {"name": recipe.name, "seed": seed, "format": FORMAT})
     write_calibration(root, Rig())
     drives = [f"{k + 1:04d}" for k in range(len(recipe.routes))]
     missing = [k for k, drive in enumerate(drives) if not drive_folder(root, DATE, drive).exists()]
     missing.sort(key=lambda k: -recipe.routes[k].n_frames)
     with tqdm(total=len(drives), initial=len(drives) - len(missing), desc=recipe.name, unit="drive") as bar:
-        for _ in _run(partial(_make_drive, recipe, root, seed), missing, workers):
+        for _ in _run(partial(_make_drive, recipe, root, seed), missing, workers, scheduler):
             bar.update()
     index = _index(recipe, drives, seed)
     write_json(root / INDEX_FILE, index)
@@ -217,15 +223,15 @@ def _claim(root: Path, marker: dict) -> None:
         write_json(path, marker)
 
 
-def _run(work: partial, items: list[int], workers: int) -> Iterator[int]:
+def _run(work: partial, items: list[int], workers: int, scheduler: str | None) -> Iterator[int]:
     """Do the work in processes (in this one when one is enough), and yield each item when it is done."""
-    if workers == 1 or len(items) < 2:
+    if not scheduler and (workers == 1 or len(items) < 2):
         for item in items:
             work(item)
             yield item
         return
-    with worker_pool(workers) as pool:
-        for future in as_completed(jobs := {pool.submit(work, item): item for item in items}):
+    with workplace(None if scheduler else workers, scheduler) as place:
+        for future in as_completed(jobs := {place.executor.submit(work, item): item for item in items}):
             future.result()
             yield jobs[future]
 

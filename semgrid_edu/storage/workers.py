@@ -3,16 +3,17 @@
 import os
 import threading
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
-from multiprocessing import get_context, parent_process
+from multiprocessing import current_process, get_context, parent_process
 
 
 @contextmanager
-def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+def worker_pool(workers: int) -> Iterator[Executor]:
     """Yield a pool of processes. When the block raises, work that hasn't begun is dropped.
 
-    The processes are spawned. Forked ones would inherit the locks of torch's and numba's threads, and hang.
+    The processes are spawned. Forked ones would inherit the locks of torch's and numba's threads, and hang. A worker of
+    a dask.distributed cluster may start no processes of its own; there one thread does all the work.
 
     Parameters
     ----------
@@ -21,9 +22,13 @@ def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
     Yields
     ------
-    concurrent.futures.ProcessPoolExecutor
+    concurrent.futures.Executor
         Its processes end with the block, or when this process is killed.
     """
+    if current_process().daemon:
+        with ThreadPoolExecutor(1) as pool:
+            yield pool
+        return
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_end_with_parent) as pool:
         try:
             yield pool

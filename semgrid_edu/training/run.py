@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from semgrid_edu.datasets.index import INDEX_FILE
+from semgrid_edu.datasets.made_truth import MadeTruth
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
@@ -73,6 +74,30 @@ def training_params(
     return params if preset == "compact" else replace(params, learning_rate=1e-3, weight_limit=math.inf)
 
 
+def chosen_truth(name: str) -> MadeTruth | None:
+    """Return how the truth to learn from is made.
+
+    Parameters
+    ----------
+    name : str
+        "true" for what the data set says of its cells; "lidar" for grids made from its image labels and scans, with
+        errors like those of real data.
+
+    Returns
+    -------
+    MadeTruth or None
+        What `TrainingSet` takes; None for "true".
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such truth.
+    """
+    if name not in ("true", "lidar"):
+        raise ArgumentError("--truth", "true or lidar", repr(name))
+    return MadeTruth() if name == "lidar" else None
+
+
 def train_network(
     dataset_dir: str | Path,
     folder: str | Path,
@@ -84,6 +109,7 @@ def train_network(
     preset: str = "compact",
     imagenet: str | Path | None = None,
     device: str = "cpu",
+    made: MadeTruth | None = None,
 ) -> None:
     """Train a network on the split "train" of a data set; under torchrun, in all of its processes.
 
@@ -107,6 +133,8 @@ def train_network(
         ImageNet weights for the image network of preset "paper": see `load_imagenet`.
     device : str
         "cpu", "cuda", "cuda:N" or "auto", see `choose_device`.
+    made : MadeTruth, optional
+        How to make the truth from image labels and LIDAR; the data set's own truth when left out.
 
     Raises
     ------
@@ -118,7 +146,7 @@ def train_network(
     began, description = datetime.now(UTC), architecture(segmenter, preset)
     with process_group(device) as chosen:
         with first_process_first():
-            dataset = TrainingSet(dataset_dir, "train", description.grid, description.image_size)
+            dataset = TrainingSet(dataset_dir, "train", description.grid, description.image_size, made=made)
         net = build_net(description, dataset.camera, seed)
         if imagenet:
             load_imagenet(net.segmenter, imagenet)
@@ -135,8 +163,9 @@ def train_network(
             "params": {name: str(value) if value == math.inf else value for name, value in asdict(params).items()},
             "dataset": sha256(Path(dataset_dir) / INDEX_FILE),
             **({"imagenet": sha256(imagenet)} if imagenet else {}),
+            **({"truth": asdict(made)} if made else {}),
         }
-        command = _command(dataset_dir, folder, description, imagenet, seed, params)
+        command = _command(dataset_dir, folder, description, imagenet, seed, params, made)
         write_provenance(folder, command, seed, ("torch", "numpy", "safetensors"), **details)
 
 
@@ -147,14 +176,16 @@ def _command(
     imagenet: str | Path | None,
     seed: int,
     params: TrainingParams,
+    made: MadeTruth | None,
 ) -> str:
-    """Return the command that makes the same training run."""
+    """Return the command that makes the same training run, or as near as a command can: policies have no options."""
     options = [
         f"--data {_name(dataset_dir)} --out {_name(folder)} --segmenter {description.segmenter}",
         f"--preset {description.preset}" if description.preset != Architecture.preset else "",
         f"--imagenet {_name(imagenet)}" if imagenet else "",
         f"--seed {seed} --iterations {params.grid_iterations}",
         "" if params.end_to_end else "--two-stage",
+        "--truth lidar" if made else "",
     ]
     return " ".join(["semgrid-edu train", *filter(None, options)])
 

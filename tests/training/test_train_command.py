@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.cli import app
+from semgrid_edu.datasets.made_truth import MadeTruth
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.networks import SEGMENTERS, Architecture, Fcn, load_net
 from semgrid_edu.storage.files import sha256, write_text
@@ -26,8 +27,9 @@ class _Noise:
         Architecture().image_size,
     )
 
-    def __init__(self, dataset_dir, split, spec, image_size):
+    def __init__(self, dataset_dir, split, spec, image_size, made):
         assert split == "train"
+        self.made = made
         self.rng = torch.Generator().manual_seed(0)
 
     def __len__(self):
@@ -77,6 +79,7 @@ def test_the_command_leaves_weights_log_and_provenance(monkeypatch, tmp_path):
     assert provenance["seed"] == 3
     assert provenance["params"]["batch_size"] == 6
     assert provenance["dataset"] == sha256(data / "dataset.json")
+    assert "truth" not in provenance
     assert len((out / "log.csv").read_text().splitlines()) == 3
     assert isinstance(load_net(out / "weights.safetensors", _Noise.camera).segmenter, Fcn)
 
@@ -117,18 +120,22 @@ def test_the_options_reach_the_training(monkeypatch, tmp_path):
     for path in (data / "dataset.json", imagenet):
         write_text(path, "{}")
     options = ["--preset", "paper", "--imagenet", str(imagenet), "--seed", "2", "--iterations", "7", "--two-stage"]
-    options += ["--resume"]
+    options += ["--truth", "lidar", "--resume"]
     result = CliRunner().invoke(app, ["train", "--data", str(data), "--out", str(out), *options, "--device", "cpu"])
     assert result.exit_code == 0, result.output
     assert given["net"] == experiment.architecture("segnet", "paper")
     assert given["imagenet"] == (_Net.segmenter, imagenet)
-    net, _, folder, params, seed, resume, device = given["train"]
+    net, dataset, folder, params, seed, resume, device = given["train"]
+    assert dataset.made == MadeTruth()
     assert (net, folder, seed, resume, device) == (_Net, out, 2, True, torch.device("cpu"))
     assert params == experiment.training_params("paper", 7, end_to_end=False, from_imagenet=True)
     provenance = json.loads((out / "provenance.json").read_text())
     written = "--segmenter segnet --preset paper --imagenet vgg16.safetensors --seed 2 --iterations 7 --two-stage"
-    assert provenance["command"] == f"semgrid-edu train --data minikitti --out out {written}"
+    assert provenance["command"] == f"semgrid-edu train --data minikitti --out out {written} --truth lidar"
     assert provenance["resumed"] is True
+    assert provenance["truth"]["policy"] == {
+        "past": 0, "future": 0, "movers": "smeared", "deskew": False, "visible_to": "any", "cleanup": True
+    }  # fmt: skip
     assert provenance["params"]["weight_limit"] == "inf"
     assert provenance["imagenet"] == sha256(imagenet)
 
@@ -154,6 +161,7 @@ def test_ctrl_c_says_how_to_go_on(monkeypatch, tmp_path, kept):
     ("option", "message"),
     [
         (["--device", "cuda:99"], "--device: expected cpu or one of the"),
+        (["--truth", "guessed"], "--truth: expected true or lidar, found 'guessed'"),
         (["--preset", "huge"], "--preset: expected compact or paper, found 'huge'"),
         (["--segmenter", "unknown"], f"name: expected one of {', '.join(SEGMENTERS)}"),
         (["--imagenet", "nowhere.safetensors"], "nowhere.safetensors: expected a safetensors file"),

@@ -1,0 +1,118 @@
+"""Image labels on the grid: carried there with the LIDAR's depth, and the gaps between its rings closed (section 4)."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE, LabelSet
+from semgrid_edu.occupancy import State
+
+CLOSING_REACH = 1.5
+"""Metres. Of 0.5 to 3 m it gives the best pixel accuracy on minikitti's training split, with true image labels."""
+
+
+def carry_labels(
+    labels: NDArray, pixels: NDArray, cells: NDArray, occupancy: NDArray, label_set: LabelSet = KITTI_14
+) -> NDArray[np.uint8]:
+    """Carry image labels to the grid with the LIDAR's depth: pure geometry, as the paper makes its ground truth.
+
+    Each return that the camera sees takes the class of its pixel to its cell. There the returns vote as the fine
+    cells of the truth do (`LabelSet.most_voted`); a cell that no labelled return reaches is unknown by occupancy
+    state. Sky sends no return, so such a label is an error at an object's outline and is dropped.
+
+    Parameters
+    ----------
+    labels : (h, w) uint8
+        The class of each pixel: a network's arg-max, or the truth for an upper bound; 255 where unlabelled.
+    pixels, cells : (N,) int
+        Pixel and cell of each return, from `semgrid_edu.datasets.returns.seen_returns`.
+    occupancy : (4, H, W) float
+        Probability of FREE, STATIC, DYNAMIC and UNKNOWN.
+    label_set : LabelSet
+        The classes, with an unknown one for each occupancy state.
+
+    Returns
+    -------
+    (H, W) uint8
+
+    Raises
+    ------
+    ArgumentError
+        When a pixel or a cell lies outside, or the label set has no unknown classes.
+    """
+    labels = np.asarray(labels)
+    unknown = np.array(unknown_numbers(label_set), np.uint8)[np.argmax(occupancy, axis=-3)]
+    for name, places, size in (("pixels", pixels, labels.size), ("cells", cells, unknown.size)):
+        if len(places) and not (min(places) >= 0 and max(places) < size):
+            raise ArgumentError(name, f"numbers from 0 to {size - 1}", f"{min(places)} to {max(places)}")
+    classes = labels.ravel()[pixels]
+    kept = classes != IGNORE
+    if "sky" in label_set.names:
+        kept &= classes != label_set.index("sky")
+    n = len(label_set)
+    votes = np.bincount(cells[kept] * n + classes[kept], minlength=unknown.size * n).reshape(*unknown.shape, n)
+    return label_set.most_voted(np.moveaxis(votes, -1, 0), otherwise=unknown)
+
+
+def close_gaps(
+    grid: NDArray, cell: float, reach: float = CLOSING_REACH, label_set: LabelSet = KITTI_14
+) -> NDArray[np.uint8]:
+    """Label the gaps between the LIDAR's rings: the morphological clean-up that the paper gives such a grid.
+
+    Parameters
+    ----------
+    grid : (H, W) uint8
+        From `carry_labels`.
+    cell : float
+        Side of a cell, metres.
+    reach : float
+        How far a label spreads, metres.
+    label_set : LabelSet
+        The classes, with an unknown one for each occupancy state.
+
+    Returns
+    -------
+    (H, W) uint8
+        Each cell that was observed, but that no label reached, takes the class of the nearest cell that has one.
+
+    Raises
+    ------
+    ArgumentError
+        When the label set has no unknown classes.
+    """
+    unobserved = unknown_numbers(label_set)[State.UNKNOWN]
+    unlabelled = grid >= label_set.n_semantic
+    if unlabelled.all():
+        return grid
+    distance, nearest = distance_transform_edt(unlabelled, sampling=cell, return_indices=True)
+    return np.where((grid != unobserved) & (distance <= reach), grid[tuple(nearest)], grid)
+
+
+def unknown_numbers(label_set: LabelSet) -> tuple[int, ...]:
+    """Return the unknown class of each occupancy state.
+
+    Parameters
+    ----------
+    label_set : LabelSet
+        The classes.
+
+    Returns
+    -------
+    tuple of 4 int
+        Class numbers in the order FREE, STATIC, DYNAMIC, UNKNOWN.
+
+    Raises
+    ------
+    ArgumentError
+        When the label set has no unknown classes.
+
+    Examples
+    --------
+    >>> unknown_numbers(KITTI_14)
+    (10, 11, 12, 13)
+    """
+    names = [KITTI_14.names[c] for c in UNKNOWN_OF_STATE]
+    if not set(names) <= set(label_set.names):
+        raise ArgumentError("label_set", f"a label set with the classes {', '.join(names)}", label_set.name)
+    return tuple(label_set.index(name) for name in names)

@@ -1,0 +1,197 @@
+"""Errors like those of real data: a calibration that is a little off, labels drawn by hand, scans that are skewed (4).
+
+The simulator's calibration and labels are exact. Truth made from them would be better than any that can be made of
+real data.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, gaussian_filter, label
+from scipy.spatial.transform import Rotation
+
+from semgrid_edu.camera import Camera, rigid_transform
+from semgrid_edu.datasets.ground_truth.sweep import EgoVelocity, ego_velocity, skew_scan
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.frame import Frame
+from semgrid_edu.labels import IGNORE, LabelSet
+
+WAVE = 8.0
+"""Width (standard deviation) of the Gaussian that smooths the shifts of outlines, pixels: an assumption."""
+
+
+@dataclass(frozen=True)
+class TruthFlaws:
+    """How large the errors are. All are drawn from normal distributions around 0.
+
+    Parameters
+    ----------
+    rotation : float
+        Standard deviation of the camera's error about each axis, degrees. The default is an assumption: 1.3 pixels of
+        the simulated camera, 2.5 of KITTI's.
+    translation : float
+        Standard deviation of its error along each axis, metres. The default is an assumption.
+    outline : float
+        Standard deviation of the shift of outlines, along u and along v, pixels. With the defaults 1.6 % of the pixels
+        of six frames of minikitti change, and two annotators disagree on 2.2 %. Two annotators of Cityscapes disagree
+        on 2 % of what both label (Cordts et al., 2016, section 2.2).
+    small : int
+        Area below which a thing that stands out of its surroundings may be missed, pixels: an assumption.
+    missed : float
+        Probability that such a small thing is missed, 0..1: an assumption.
+    skewed : bool
+        Whether scans are skewed as a turning scanner on a moving vehicle records them (`skew_scan`).
+
+    Raises
+    ------
+    ArgumentError
+        When a number is negative, or the probability is above 1.
+    """
+
+    rotation: float = 0.2
+    translation: float = 0.03
+    outline: float = 0.4
+    small: int = 40
+    missed: float = 0.5
+    skewed: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse what no error can be."""
+        for name in ("rotation", "translation", "outline", "small", "missed"):
+            value = getattr(self, name)
+            if not 0 <= value < np.inf or (name == "missed" and value > 1):
+                raise ArgumentError(name, "a finite number from 0 up, a probability up to 1", value)
+
+
+NO_FLAWS = TruthFlaws(rotation=0, translation=0, outline=0, small=0, missed=0, skewed=False)
+"""Exact calibration, exact labels, scans of one instant: the simulator's own."""
+
+
+def miscalibrated(camera: Camera, flaws: TruthFlaws, rng: np.random.Generator) -> Camera:
+    """Return a camera with an error in where it is said to stand and look.
+
+    Parameters
+    ----------
+    camera : Camera
+        The true calibration.
+    flaws : TruthFlaws
+        How large the error is.
+    rng : numpy.random.Generator
+        Source of the error: one generator always gives the same camera.
+
+    Returns
+    -------
+    Camera
+    """
+    angles, shift = rng.standard_normal((2, 3)) * [[flaws.rotation], [flaws.translation]]
+    error = rigid_transform(Rotation.from_rotvec(angles, degrees=True).as_matrix(), shift)
+    return replace(camera, T_camera_from_lidar=error @ camera.T_camera_from_lidar)
+
+
+def flawed_labels(
+    labels: NDArray[np.uint8], label_set: LabelSet, flaws: TruthFlaws, rng: np.random.Generator
+) -> NDArray[np.uint8]:
+    """Return image labels as a person might have drawn them: some small things missed, outlines a little off.
+
+    Parameters
+    ----------
+    labels : (h, w) uint8
+        The true class of each pixel; 255 where unlabelled.
+    label_set : LabelSet
+        The classes; patches of flat ones, such as road between two cars, are never missed.
+    flaws : TruthFlaws
+        How large the errors are.
+    rng : numpy.random.Generator
+        Source of the errors.
+
+    Returns
+    -------
+    (h, w) uint8
+    """
+    kept = _without_small_things(labels, label_set, flaws, rng)
+    if not flaws.outline:
+        return kept
+    waves = gaussian_filter(rng.standard_normal((2, *labels.shape)), (0, WAVE, WAVE))
+    shifts = np.rint(waves * (flaws.outline / waves.std())).astype(int)
+    limits = np.reshape(labels.shape, (2, 1, 1)) - 1
+    rows, cols = np.clip(np.indices(labels.shape) + shifts, 0, limits)
+    return kept[rows, cols]
+
+
+def _without_small_things(
+    labels: NDArray[np.uint8], label_set: LabelSet, flaws: TruthFlaws, rng: np.random.Generator
+) -> NDArray[np.uint8]:
+    """Paint some small things over with what surrounds them."""
+    flat = {label_set.index(name) for name in label_set.flat}
+    missed = np.zeros(labels.shape, bool)
+    for c in sorted(set(np.unique(labels).tolist()) - flat - {IGNORE}):
+        things, count = label(labels == c)
+        areas = np.bincount(things.ravel(), minlength=count + 1)
+        gone = (areas < flaws.small) & (rng.random(count + 1) < flaws.missed)
+        missed |= gone[things] & (things > 0)
+    if not missed.any() or missed.all():
+        return labels
+    nearest = distance_transform_edt(missed, return_distances=False, return_indices=True)
+    return labels[tuple(nearest)]
+
+
+def flawed_drive(frames: Sequence[Frame], flaws: TruthFlaws, seed: int, number: int = 0) -> list[Frame]:
+    """Return the frames of a drive as real data would have them, each by `flawed_frame`.
+
+    Parameters
+    ----------
+    frames : sequence of Frame
+        The frames of a simulated drive, in the order of time.
+    flaws : TruthFlaws
+        How large the errors are.
+    seed : int
+        Seed for the errors. Drives with the same seed have the same error of calibration.
+    number : int
+        Number of the drive, so that drives with the same seed have other errors in their labels.
+
+    Returns
+    -------
+    list of Frame
+        The scan of a drive with one frame alone isn't skewed, since nothing tells how the vehicle moves.
+    """
+    others = [frames[k - 1 if k else min(1, len(frames) - 1)] for k in range(len(frames))]
+    velocities = [ego_velocity(a, b) if a is not b else None for a, b in zip(frames, others, strict=True)]
+    return [flawed_frame(frame, flaws, seed, (number, k), velocities[k]) for k, frame in enumerate(frames)]
+
+
+def flawed_frame(
+    frame: Frame,
+    flaws: TruthFlaws,
+    seed: int,
+    key: tuple[int, ...] = (),
+    velocity: EgoVelocity | None = None,
+) -> Frame:
+    """Return a frame as real data would have it: its calibration off, its labels drawn by hand, its scan skewed.
+
+    Parameters
+    ----------
+    frame : Frame
+        A simulated frame.
+    flaws : TruthFlaws
+        How large the errors are.
+    seed : int
+        Seed for the error of calibration: frames with the same seed have the same one, as those of one day do.
+    key : tuple of int
+        Tells frames with the same seed apart, so that the errors in their labels differ.
+    velocity : EgoVelocity, optional
+        Of the vehicle; without it the scan isn't skewed.
+
+    Returns
+    -------
+    Frame
+        Another frame; bird's-eye labels, depth and image are the true ones.
+    """
+    camera = miscalibrated(frame.camera, flaws, np.random.default_rng([seed, 0]))
+    points = skew_scan(frame.points, velocity) if flaws.skewed and velocity else frame.points
+    labels = frame.labels
+    if labels is not None:
+        rng = np.random.default_rng([seed, 1, *key])
+        labels = replace(labels, image=flawed_labels(labels.image, labels.label_set, flaws, rng))
+    return replace(frame, camera=camera, points=points, labels=labels)

@@ -1,0 +1,116 @@
+"""A semantic grid made from image labels and LIDAR scans by a policy: the paper's ground truth, and others (4)."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.datasets.ground_truth.carrying import carry_labels, close_gaps, unknown_numbers
+from semgrid_edu.datasets.ground_truth.policy import TruthPolicy
+from semgrid_edu.datasets.ground_truth.sight import in_sight
+from semgrid_edu.datasets.ground_truth.window import Moment, gather_points
+from semgrid_edu.datasets.returns import seen_returns
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.frame import Frame
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import IGNORE
+from semgrid_edu.occupancy import State
+from semgrid_edu.occupancy.state import check_shape
+
+
+def lidar_truth(
+    frame: Frame,
+    probability: NDArray,
+    spec: GridSpec,
+    policy: TruthPolicy | None = None,
+    before: Sequence[Moment] = (),
+    after: Sequence[Moment] = (),
+) -> NDArray[np.uint8]:
+    """Make the ground truth of a frame from its image labels, as the paper does.
+
+    Each pixel that a return falls on takes the depth of that return, of several the closest. So it has a place in
+    space, and its label goes to the cell there. Then gaps are closed, and what has no label is unknown-free, -static,
+    -dynamic or -unobserved by its most probable occupancy state. (In the paper a human corrects the result as well.)
+
+    Parameters
+    ----------
+    frame : Frame
+        The frame, with labels.
+    probability : (4, H, W) float
+        Probability of FREE, STATIC, DYNAMIC and UNKNOWN in each cell.
+    spec : GridSpec
+        The grid.
+    policy : TruthPolicy, optional
+        What is done differently; the paper's way when left out.
+    before, after : sequence of Moment
+        The frames before and after this one, in the order of time, for policies that need them. Of these, as many are
+        used as there are.
+
+    Returns
+    -------
+    (H, W) uint8
+        A class of the frame's label set in every cell.
+
+    Raises
+    ------
+    ArgumentError
+        When the frame has no labels, its label set has no unknown classes, the shape of `probability` is wrong, or the
+        policy needs frames or beliefs that aren't given.
+
+    Examples
+    --------
+    >>> truth = lidar_truth(drive[9], belief.probability, GridSpec.compact())           # doctest: +SKIP
+    >>> wide = TruthPolicy(past=9, movers="carried")                                    # doctest: +SKIP
+    >>> truth = lidar_truth(drive[9], belief.probability, spec, wide, before=moments)   # doctest: +SKIP
+    """
+    policy = policy or TruthPolicy()
+    if frame.labels is None:
+        raise ArgumentError("frame", "a frame with labels", "a frame without")
+    label_set, size = frame.labels.label_set, frame.camera.size
+    unknown = np.array(unknown_numbers(label_set), np.uint8)
+    check_shape("probability", probability, (4, *spec.shape))
+    check_shape("frame.labels.image", frame.labels.image, size)
+    gathered = replace(frame, points=gather_points(frame, before, after, spec, policy))
+    known = np.where(frame.labels.image < label_set.n_semantic, frame.labels.image, IGNORE)
+    truth = carry_labels(known, *seen_returns(gathered, spec, size), probability, label_set)
+    if policy.cleanup:
+        truth = close_gaps(truth, spec.cell, label_set=label_set)
+    states = np.argmax(probability, axis=0)
+    if policy.visible_to == "camera":
+        truth = np.where(in_sight(frame, spec), truth, unknown[states])
+    elif policy.visible_to == "lidar":
+        truth = np.where(states != State.UNKNOWN, truth, unknown[states])
+    return truth
+
+
+def drive_truth(
+    moments: Sequence[Moment], k: int, spec: GridSpec, policy: TruthPolicy | None = None
+) -> NDArray[np.uint8]:
+    """Make the ground truth of one frame of a drive with `lidar_truth`.
+
+    Parameters
+    ----------
+    moments : sequence of Moment
+        The frames of the drive in the order of time, each with what the filter believes after it.
+    k : int
+        Number of the frame.
+    spec : GridSpec
+        The grid of the beliefs.
+    policy : TruthPolicy, optional
+        How to make it; the paper's way when left out.
+
+    Returns
+    -------
+    (H, W) uint8
+        A class of the frame's label set in every cell.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such frame, it has no belief, or as `lidar_truth` raises it.
+    """
+    if not 0 <= k < len(moments) or moments[k].belief is None:
+        raise ArgumentError("k", f"a frame with a belief, 0 to {len(moments) - 1}", k)
+    frame, belief = moments[k]
+    return lidar_truth(frame, belief.probability, spec, policy, moments[:k], moments[k + 1 :])

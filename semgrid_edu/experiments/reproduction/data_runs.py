@@ -1,0 +1,150 @@
+"""Runs that make data: a simulated data set, and the arrays of one of its splits (section 4)."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.experiments.reproduction.runs import Run
+from semgrid_edu.simulation.datasets import RECIPES, DatasetRecipe, Route, make_from_recipe
+from semgrid_edu.simulation.street.plan import Wishes
+from semgrid_edu.training.run import architecture, chosen_truth
+
+
+def _short(split: str, layout: str, n_frames: int = 6) -> Route:
+    """Return a route of a few frames, all labelled."""
+    return Route(split, n_frames, True, Wishes(layout=layout, speed=10.0))
+
+
+SMALL_RECIPES = {
+    recipe.name: recipe
+    for recipe in (
+        DatasetRecipe("quickkitti", "KITTI-14", (Route("train", 5, False),) * 18 + (Route("test", 5, False),) * 8),
+        DatasetRecipe(
+            "quickchroma",
+            "KITTI-14",
+            (_short("train", "junction"), _short("train", "bend"), _short("test", "junction"), _short("test", "bend")),
+        ),
+        DatasetRecipe(
+            "quicksynthia", "SYNTHIA-10", (_short("train", "junction", 8), _short("test", "junction", 8)), dense=True
+        ),
+    )
+}
+"""Data sets like minikitti, minichroma and minisynthia, small enough to be made in a minute."""
+
+RECIPE_OF = RECIPES | SMALL_RECIPES
+"""Every data set that a run can make, by name."""
+
+
+@dataclass(frozen=True)
+class DataRun(Run):
+    """Simulate a data set.
+
+    Parameters
+    ----------
+    data : str
+        Its name, a key of `RECIPE_OF`.
+    seed : int
+        Seed for its drives.
+    """
+
+    data: str
+    seed: int = 0
+
+    @property
+    def name(self) -> str:
+        """The name of its folder."""
+        return f"data-{self.data}" + (f"-seed{self.seed}" if self.seed else "")
+
+    @property
+    def steps(self) -> int:
+        """Number of frames, of which each is simulated."""
+        return sum(route.n_frames for route in RECIPE_OF[self.data].routes)
+
+    @property
+    def pace(self) -> str:
+        """Frames of all data sets take about the same time."""
+        return "simulate"
+
+    def probe(self) -> float:
+        """Return the seconds that a frame took on one core when this was written."""
+        return 0.2
+
+    def work(self, root: Path, device: str) -> None:
+        """Make the data set. Parameters are those of `Run.work`."""
+        make_from_recipe(RECIPE_OF[self.data], self.folder(root), self.seed, workers=1)
+
+    def dataset_dir(self, root: str | Path) -> Path:
+        """Return the folder of the data set itself.
+
+        Parameters
+        ----------
+        root : path-like
+            The folder of all runs.
+        """
+        return self.folder(root) / self.data
+
+
+@dataclass(frozen=True)
+class ArraysRun(Run):
+    """Make the arrays of a split, which networks learn from and are scored on: images, occupancy grids, truth.
+
+    Parameters
+    ----------
+    data : DataRun
+        The data set.
+    split : str
+        One of its splits, such as "train".
+    truth : str
+        "true" for the simulator's labels, "lidar" for labels made with the LIDAR as the paper makes them.
+    preset : str
+        "compact" or "paper": decides the grid and the size of the images, see `architecture`.
+    """
+
+    data: DataRun
+    split: str
+    truth: str = "true"
+    preset: str = "compact"
+
+    @property
+    def name(self) -> str:
+        """The name of its folder, which holds no arrays: they lie in the cache of the data set."""
+        parts = ["arrays", self.data.name.removeprefix("data-"), self.split, self.truth]
+        return "-".join(parts + [self.preset] * (self.preset != "compact"))
+
+    @property
+    def needs(self) -> tuple[Run, ...]:
+        """The data set."""
+        return (self.data,)
+
+    @property
+    def steps(self) -> int:
+        """Number of frames of the split, over which the occupancy filter runs."""
+        return sum(route.n_frames for route in RECIPE_OF[self.data.data].routes if route.split == self.split)
+
+    @property
+    def pace(self) -> str:
+        """It depends on the size of the grid."""
+        return f"arrays {self.preset}"
+
+    def probe(self) -> float:
+        """Return the seconds that a frame took on one core when this was written."""
+        return 0.1 if self.preset == "compact" else 0.5
+
+    def work(self, root: Path, device: str) -> None:
+        """Make the arrays. Parameters are those of `Run.work`."""
+        self.frames(root)
+
+    def frames(self, root: str | Path) -> TrainingSet:
+        """Return the frames of the split.
+
+        Parameters
+        ----------
+        root : path-like
+            The folder of all runs.
+
+        Returns
+        -------
+        TrainingSet
+        """
+        usual, made = architecture("segnet", self.preset), chosen_truth(self.truth)
+        return TrainingSet(self.data.dataset_dir(root), self.split, usual.grid, usual.image_size, made=made)

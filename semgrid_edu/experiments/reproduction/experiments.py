@@ -1,0 +1,134 @@
+"""The experiments of the paper, each with the runs that it needs and what it makes of them (section 4)."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from semgrid_edu.experiments.reproduction.accuracy_tables import (
+    accuracy_markdown,
+    accuracy_rows,
+    crf_gains,
+    network_gains,
+)
+from semgrid_edu.experiments.reproduction.confusion_table import confusion_markdown, confusion_result
+from semgrid_edu.experiments.reproduction.paper import NETWORKS, TABLE_1_SCORES, TABLE_2_SCORES
+from semgrid_edu.experiments.reproduction.pictures import accuracy_picture, confusion_picture
+from semgrid_edu.experiments.reproduction.runs import Run
+from semgrid_edu.experiments.reproduction.scales import Scale
+from semgrid_edu.experiments.reproduction.score_runs import ScoreRun
+from semgrid_edu.labels import KITTI_14
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One table or list of the paper.
+
+    Parameters
+    ----------
+    title : str
+        What it is called.
+    field : str
+        On which data: "kitti", "chroma" or "synthia", as `deviations` takes it.
+    seeds : callable
+        (scale) -> how many seeds it has by default.
+    runs : callable
+        (scale, number of seeds) -> the runs that it is computed from.
+    result : callable
+        (scale, number of seeds, folder of all runs) -> the result; JSON can hold it.
+    markdown : callable
+        result -> Markdown.
+    picture : callable
+        result -> Figure.
+    """
+
+    title: str
+    field: str
+    seeds: Callable[[Scale], int]
+    runs: Callable[[Scale, int], Sequence[Run]]
+    result: Callable[[Scale, int, Path], dict]
+    markdown: Callable[[dict], str]
+    picture: Callable[[dict], Figure]
+
+
+def table1_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
+    """Return the runs of Table 1.
+
+    Parameters
+    ----------
+    scale : Scale
+        How large they are.
+    seeds : int
+        Number of seeds.
+
+    Returns
+    -------
+    dict of str to list of ScoreRun
+        By image network one per seed.
+    """
+    return {segmenter: [scale.scored(scale.kitti, segmenter, seed) for seed in range(seeds)] for segmenter in NETWORKS}
+
+
+def table2_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
+    """Return the runs of Table 2: routes that were never driven in training. Parameters are those of `table1_runs`.
+
+    Returns
+    -------
+    dict of str to list of ScoreRun
+        By image network, SegNet alone, one per seed.
+    """
+    return {"segnet": [scale.scored(scale.chroma, "segnet", seed) for seed in range(seeds)]}
+
+
+def table3_runs(scale: Scale, seeds: int) -> list[ScoreRun]:
+    """Return the runs of Table 3: SegNet on data without any error. Parameters are those of `table1_runs`.
+
+    Returns
+    -------
+    list of ScoreRun
+        One per seed.
+    """
+    return [scale.scored(scale.synthia, "segnet", seed, truth="true", crf=False) for seed in range(seeds)]
+
+
+def _seed_by_seed(runs: dict[str, list[ScoreRun]]) -> list[Run]:
+    """Return all runs of the first seed, then of the second: a plan that is stopped has whole seeds."""
+    return [run for alike in zip(*runs.values(), strict=True) for run in alike]
+
+
+def _accuracies(runs: dict[str, list[ScoreRun]], root: Path, paper: dict) -> dict:
+    gains = crf_gains(runs, root, KITTI_14) + network_gains(runs, root, KITTI_14)
+    return {"rows": accuracy_rows(runs, root, KITTI_14, paper), "differences": gains}
+
+
+EXPERIMENTS = {
+    "table1": Experiment(
+        "Table 1: image networks, with and without the CRF",
+        "kitti",
+        lambda scale: scale.table1_seeds,
+        lambda scale, seeds: _seed_by_seed(table1_runs(scale, seeds)),
+        lambda scale, seeds, root: _accuracies(table1_runs(scale, seeds), root, TABLE_1_SCORES),
+        accuracy_markdown,
+        accuracy_picture,
+    ),
+    "table2": Experiment(
+        "Table 2: routes that were never driven in training",
+        "chroma",
+        lambda scale: scale.seeds,
+        lambda scale, seeds: _seed_by_seed(table2_runs(scale, seeds)),
+        lambda scale, seeds, root: _accuracies(table2_runs(scale, seeds), root, TABLE_2_SCORES),
+        accuracy_markdown,
+        accuracy_picture,
+    ),
+    "table3": Experiment(
+        "Table 3: confusion on data without any error",
+        "synthia",
+        lambda scale: scale.seeds,
+        table3_runs,
+        lambda scale, seeds, root: confusion_result(table3_runs(scale, seeds), root),
+        confusion_markdown,
+        confusion_picture,
+    ),
+}
+"""Every experiment by the name of its command."""

@@ -1,0 +1,93 @@
+"""Pictures of the tables: the paper's values beside ours, with intervals and every seed (section 4)."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from semgrid_edu.experiments.reproduction.paper import NETWORKS
+from semgrid_edu.metrics import METRICS
+from semgrid_edu.plotting import confusion
+
+OURS, PAPERS = "#00429d", "#c0392b"
+"""The colours of our values and of the paper's; their markers differ too."""
+
+
+def accuracy_picture(result: dict) -> Figure:
+    """Draw Table 1 or 2: one panel per metric, one line per network, without and with the CRF.
+
+    Parameters
+    ----------
+    result : dict
+        Its "rows" are from `accuracy_rows`.
+
+    Returns
+    -------
+    Figure
+    """
+    rows = result["rows"]
+    names = [NETWORKS[row["network"]] + (" + CRF" if row["CRF"] else "") for row in rows]
+    size = (11, 1.6 + 0.45 * len(rows))
+    figure, axes = plt.subplots(1, len(METRICS), figsize=size, sharey=True, layout="constrained")
+    for ax, metric in zip(axes, METRICS, strict=True):
+        for place, row in enumerate(rows):
+            draw_measured(ax, place, row["scores"]["lidar"]["all"][metric])
+            ax.plot(100 * row["paper"][metric], place, "D", color=PAPERS, markerfacecolor="none", zorder=3)
+        ax.set(title=metric, xlabel="per cent of all labelled cells" if metric != "FmIoU" else "per cent")
+        ax.grid(axis="x", alpha=0.3)
+    axes[0].set_yticks(range(len(rows)), names)
+    axes[0].invert_yaxis()
+    axes[-1].legend(handles=_legend(), loc="best", fontsize="small")
+    return figure
+
+
+def draw_measured(ax: Axes, place: float, value: dict, colour: str = OURS) -> None:
+    """Draw a score as a line of a chart: interval, mean, and a small point for every seed.
+
+    Parameters
+    ----------
+    ax : Axes
+        The chart.
+    place : float
+        Where the line is on the vertical axis.
+    value : dict
+        From `measured` or `compared`.
+    colour : str
+        The colour.
+    """
+    if value["low"] is not None:
+        ax.plot([100 * value["low"], 100 * value["high"]], [place, place], color=colour, linewidth=2, alpha=0.6)
+    ax.plot(100 * value["mean"], place, "o", color=colour, zorder=2)
+    seeds = 100 * np.array(value["seeds"])
+    ax.plot(seeds, np.full(len(seeds), place + 0.22), "|", color=colour, markersize=6)
+
+
+def _legend() -> list:
+    """Return what the marks mean."""
+    words = {
+        "ours, mean": {"color": OURS, "marker": "o", "linestyle": ""},
+        "95 % interval": {"color": OURS, "linewidth": 2, "alpha": 0.6},
+        "ours, each seed": {"color": OURS, "marker": "|", "linestyle": ""},
+        "the paper's": {"color": PAPERS, "marker": "D", "markerfacecolor": "none", "linestyle": ""},
+    }
+    return [plt.Line2D([], [], label=word, **style) for word, style in words.items()]
+
+
+def confusion_picture(result: dict) -> Figure:
+    """Draw Table 3: our confusion matrix beside the paper's.
+
+    Parameters
+    ----------
+    result : dict
+        From `confusion_result`.
+
+    Returns
+    -------
+    Figure
+    """
+    figure, axes = plt.subplots(1, 2, figsize=(13, 6.6), layout="constrained")
+    for ax, whose, title in zip(axes, ("ours", "paper"), ("ours, mean over the seeds", "the paper's"), strict=True):
+        shares = np.array([[np.nan if share is None else share for share in row] for row in result[whose]["matrix"]])
+        confusion(np.nan_to_num(shares), result["classes"], ax)
+        ax.set_title(title)
+    return figure

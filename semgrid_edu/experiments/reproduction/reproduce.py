@@ -1,0 +1,103 @@
+"""From a request to results: the plan and its estimate, the runs, the tables (section 4)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from semgrid_edu.experiments.reproduction.execute import execute
+from semgrid_edu.experiments.reproduction.experiments import EXPERIMENTS, Experiment
+from semgrid_edu.experiments.reproduction.plan import estimate, plan_table, with_needs
+from semgrid_edu.experiments.reproduction.results import write_result
+from semgrid_edu.experiments.reproduction.runs import OUTPUT, Run, check_runs_folder
+from semgrid_edu.experiments.reproduction.scales import Scale, scale_named
+from semgrid_edu.storage.workplace import usable_cores, workplace
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a command of `semgrid-edu reproduce` was asked for.
+
+    Parameters
+    ----------
+    experiment : str
+        A key of `EXPERIMENTS`, or "all".
+    scale : str
+        A key of `SCALES`.
+    seeds : int or None
+        Number of seeds; None for the scale's own.
+    runs : Path
+        The folder of all runs.
+    out : Path
+        The folder of the results.
+    workers : int or None
+        Runs at a time; None for one per core.
+    scheduler : str or None
+        Address of a cluster that does the runs; None for processes of this machine.
+    device : str
+        The device of the trainings, see `choose_device`.
+    """
+
+    experiment: str
+    scale: str
+    seeds: int | None
+    runs: Path
+    out: Path
+    workers: int | None = None
+    scheduler: str | None = None
+    device: str = "cpu"
+
+    @property
+    def chosen(self) -> dict[str, Experiment]:
+        """The experiments that were asked for, by name."""
+        return EXPERIMENTS if self.experiment == "all" else {self.experiment: EXPERIMENTS[self.experiment]}
+
+    def seeds_of(self, experiment: Experiment) -> int:
+        """Return the number of seeds of an experiment.
+
+        Parameters
+        ----------
+        experiment : Experiment
+            One of `chosen`.
+        """
+        return self.seeds or experiment.seeds(scale_named(self.scale))
+
+    def plan(self) -> list[Run]:
+        """Return the runs of all experiments, each after those that it needs."""
+        scale = scale_named(self.scale)
+        return with_needs(run for one in self.chosen.values() for run in one.runs(scale, self.seeds_of(one)))
+
+
+def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = False) -> str:
+    """Tell the plan, do the runs, and write the results.
+
+    Parameters
+    ----------
+    request : Request
+        What was asked for.
+    echo : callable
+        Shows text to the user.
+    plan_only : bool
+        Whether to stop after the plan.
+
+    Returns
+    -------
+    str
+        What went wrong, one line per run; empty when all went well.
+    """
+    root, plan = check_runs_folder(request.runs), request.plan()
+    estimated = estimate(plan, root)
+    hours = estimated.hours(request.workers or usable_cores())
+    told = f"{len(estimated.seconds)} of {len(plan)} runs are left, about {60 * hours:.0f} minutes"
+    echo(f"{plan_table(plan, estimated)}\n\n{told}" + (" on this machine" if request.scheduler else ""))
+    if plan_only:
+        return ""
+    with workplace(request.workers, request.scheduler) as place:
+        failed = execute(plan, root, place, request.device)
+    scale: Scale = scale_named(request.scale)
+    for name, experiment in request.chosen.items():
+        seeds = request.seeds_of(experiment)
+        if not failed.keys() & set(with_needs(experiment.runs(scale, seeds))):
+            echo(write_result(name, experiment, scale, seeds, root, request.out))
+    return "\n".join(
+        f"{run.name}: {error.strip().splitlines()[-1]} ({run.folder(root) / OUTPUT})" for run, error in failed.items()
+    )

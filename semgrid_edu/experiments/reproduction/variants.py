@@ -1,0 +1,53 @@
+"""What a network can be other than the paper's: the rows of the ablations (section 4)."""
+
+from dataclasses import dataclass, replace
+
+from semgrid_edu.networks import Architecture
+from semgrid_edu.planes import plane_heights
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What a network can be other than the paper's, for the ablations.
+
+    Parameters
+    ----------
+    n_planes : int
+        D, the number of planes.
+    spacing : float
+        d, the distance between planes, metres.
+    balanced : bool
+        Whether the loss weights rare classes more (median frequency balancing).
+    end_to_end : bool
+        Whether the loss on the grid teaches the image network too.
+    """
+
+    n_planes: int = 20
+    spacing: float = 0.2
+    balanced: bool = True
+    end_to_end: bool = True
+
+    @property
+    def name(self) -> str:
+        """What is other than in the paper, each part after a hyphen; empty when nothing is."""
+        parts = (
+            (f"{self.n_planes}planes", self.n_planes == USUAL.n_planes),
+            (f"{self.spacing:g}m", self.spacing == USUAL.spacing),
+            ("unbalanced", self.balanced),
+            ("two-stage", self.end_to_end),
+        )
+        return "".join(f"-{part}" for part, as_usual in parts if not as_usual)
+
+    def applied_to(self, described: Architecture) -> Architecture:
+        """Return an architecture with the planes of this variant.
+
+        Parameters
+        ----------
+        described : Architecture
+            The usual one.
+        """
+        return replace(described, heights=tuple(plane_heights(self.n_planes, self.spacing).tolist()))
+
+
+USUAL = Variant()
+"""The network of the paper."""

@@ -1,0 +1,114 @@
+"""How wrong a made ground truth is: cells counted by class and distance, against what the simulator knows (section 4).
+
+Two things are known of each cell: what stands in it, and whether the camera sees it. A label is right when what it says
+stands there. A cell that the camera sees should have a label.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import LabelSet
+
+BAND_EDGES = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 73.0)
+"""Distances from the LIDAR at which the bands begin and end, metres; the grid's far corners are 72.7 m away."""
+COUNTED = ("seen", "found", "missed", "labelled", "right", "hidden")
+"""What is counted of each class c and each band: cells that the camera sees, in which c stands ("seen"), those of them
+that are labelled c ("found") and those without a label ("missed"); cells that are labelled c ("labelled"), those of
+them in which c stands ("right") and those that the camera doesn't see ("hidden")."""
+
+
+@dataclass(frozen=True, eq=False)
+class TruthCounts:
+    """Cells of a made ground truth, counted by class and distance.
+
+    Parameters
+    ----------
+    cells : (6, B, n_semantic) int64
+        Numbers of cells: one plane for each of `COUNTED`, one row per band of distance, one column per class.
+    """
+
+    cells: NDArray[np.int64]
+
+    @classmethod
+    def of_frame(
+        cls, made: NDArray, truth: NDArray, standing: NDArray, spec: GridSpec, label_set: LabelSet
+    ) -> "TruthCounts":
+        """Count the cells of one frame.
+
+        Parameters
+        ----------
+        made : (H, W) int
+            The made ground truth.
+        truth : (H, W) int
+            From `grid_truth`: what stands in the cells that the camera sees, an unknown class elsewhere.
+        standing : (H, W) int
+            What stands in each cell, seen or not; 255 where not even the simulator says.
+        spec : GridSpec
+            The grid.
+        label_set : LabelSet
+            The classes.
+
+        Returns
+        -------
+        TruthCounts
+
+        Raises
+        ------
+        ArgumentError
+            When a map doesn't fit the grid.
+        """
+        for name, grid in (("made", made), ("truth", truth), ("standing", standing)):
+            if np.shape(grid) != spec.shape:
+                raise ArgumentError(name, f"shape {spec.shape}", f"shape {np.shape(grid)}")
+        band = np.digitize(np.hypot(*np.moveaxis(spec.centers(), -1, 0)), BAND_EDGES[1:-1])
+        n = label_set.n_semantic
+        chosen = {
+            "seen": (truth, truth < n),
+            "found": (truth, (truth < n) & (made == truth)),
+            "missed": (truth, (truth < n) & (made >= n)),
+            "labelled": (made, made < n),
+            "right": (made, (made < n) & (made == standing)),
+            "hidden": (made, (made < n) & (truth >= n)),
+        }
+        cells = np.zeros((len(COUNTED), len(BAND_EDGES) - 1, n), np.int64)
+        for plane, name in enumerate(COUNTED):
+            classes, where = chosen[name]
+            np.add.at(cells[plane], (band[where], np.asarray(classes)[where]), 1)
+        return cls(cells)
+
+    def __add__(self, other: "TruthCounts") -> "TruthCounts":
+        """Return the counts of the frames of both."""
+        return TruthCounts(self.cells + other.cells)
+
+    def shares(self, axis: int | tuple[int, ...] | None = None) -> dict[str, NDArray[np.float64]]:
+        """Return what the counts say, as shares.
+
+        Parameters
+        ----------
+        axis : int or tuple of int, optional
+            What to add up first: 0 for the bands of distance, 1 for the classes, both for one number; nothing when
+            left out.
+
+        Returns
+        -------
+        dict of str to (...) float64
+            Shares from 0 to 1; NaN where there is nothing to share. "wrong": of the labelled cells, those in which
+            something else stands. "found", "mistaken" and "missed": of the cells that the camera sees, those with the
+            right label, with another label, and without a label. "hidden": of the labelled cells, those that the
+            camera doesn't see. "iou": intersection over union of both, among the cells that the camera sees.
+        """
+        added = () if axis is None else tuple(a + 1 for a in np.atleast_1d(axis))
+        seen, found, missed, labelled, right, hidden = self.cells.sum(axis=added).astype(np.float64)
+        with np.errstate(invalid="ignore"):
+            return {
+                "wrong": 1 - right / labelled,
+                "found": found / seen,
+                "mistaken": (seen - found - missed) / seen,
+                "missed": missed / seen,
+                "hidden": hidden / labelled,
+                "iou": found / (seen + labelled - hidden - found),
+            }

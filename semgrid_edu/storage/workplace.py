@@ -1,0 +1,80 @@
+"""Where independent tasks are done: in processes of this machine, or on a dask.distributed cluster."""
+
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.storage.workers import worker_pool
+
+
+@dataclass(frozen=True)
+class Workplace:
+    """What does the work, and how much of it at a time.
+
+    Parameters
+    ----------
+    executor : concurrent.futures.Executor
+        Takes functions and their arguments, and gives futures.
+    slots : callable
+        () -> the number of tasks that can be under way at the same time; a cluster may grow and shrink.
+    """
+
+    executor: Executor
+    slots: Callable[[], int]
+
+
+def usable_cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def workplace(workers: int | None = None, scheduler: str | None = None) -> Iterator[Workplace]:
+    """Open the place where tasks are done.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Number of processes on this machine; one per core when left out.
+    scheduler : str, optional
+        Address of a dask.distributed scheduler, such as "tcp://10.0.0.1:8786", whose workers are used instead. They
+        must see the same folders, under the same names, and have the same version of this package. When one of them
+        dies, the scheduler gives its tasks to another one.
+
+    Yields
+    ------
+    Workplace
+
+    Raises
+    ------
+    ArgumentError
+        When there is no worker, both are given, or dask.distributed isn't installed.
+    OSError
+        When the scheduler doesn't answer.
+    """
+    if workers is not None and workers < 1:
+        raise ArgumentError("--workers", "at least one process", workers)
+    if workers is not None and scheduler:
+        raise ArgumentError("--workers", "nothing beside --scheduler, which has workers of its own", workers)
+    if scheduler:
+        with _cluster(scheduler) as place:
+            yield place
+        return
+    number = workers or usable_cores()
+    with worker_pool(number) as pool:
+        yield Workplace(pool, lambda: number)
+
+
+@contextmanager
+def _cluster(address: str) -> Iterator[Workplace]:
+    """Connect to a cluster."""
+    try:
+        from distributed import Client
+    except ImportError:
+        missing = "dask.distributed (pip install 'semgrid_edu[cluster]')"
+        raise ArgumentError("--scheduler", missing, "no module named distributed") from None
+    with Client(address, set_as_default=False) as client, client.get_executor(pure=False) as executor:
+        yield Workplace(executor, lambda: max(1, sum(client.nthreads().values())))

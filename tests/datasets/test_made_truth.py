@@ -1,0 +1,99 @@
+"""A training set whose truth is made from LIDAR: what changes, what stays, and when it is made anew."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from tiny_drive import DATE, write_tiny_dataset
+
+from semgrid_edu.datasets import KittiRawDrive, made_truth, training_cache
+from semgrid_edu.datasets.ground_truth import NO_FLAWS, TruthFlaws, TruthPolicy, lidar_truth
+from semgrid_edu.datasets.made_truth import MadeTruth
+from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import track_drive
+from semgrid_edu.storage.tensors import write_tensors
+
+SMALL = (6, 20)
+EXACT = MadeTruth(flaws=NO_FLAWS)
+
+
+class InThisProcess:
+    """Stands for a pool of worker processes, which take seconds to start."""
+
+    def __init__(self, _):
+        pass
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    map = staticmethod(map)
+
+
+@pytest.fixture(autouse=True)
+def _no_workers(monkeypatch):
+    for module in (made_truth, training_cache):
+        monkeypatch.setattr(module, "worker_pool", InThisProcess)
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory):
+    return write_tiny_dataset(tmp_path_factory.mktemp("tiny"))
+
+
+def training(root, made=None, split="train"):
+    return TrainingSet(root, split, image_size=SMALL, made=made)
+
+
+def test_the_truth_is_made_and_the_rest_stays(root):
+    true, made = training(root), training(root, EXACT)
+    for name in true.arrays.keys() - {"truth"}:
+        np.testing.assert_array_equal(true.arrays[name], made.arrays[name])
+    np.testing.assert_array_equal(true.arrays["true"], true.arrays["truth"])
+    assert (made.arrays["truth"] != made.arrays["true"]).any()
+    for k, name in enumerate(("0001", "0002")):
+        drive, spec = KittiRawDrive(root, DATE, name), GridSpec.compact()
+        *_, belief = track_drive(drive, spec, seed=0)
+        expected = lidar_truth(drive[2], belief.probability, spec)
+        np.testing.assert_array_equal(made[k].truth, expected)
+        assert made[k].truth.dtype == torch.uint8
+
+
+def test_it_is_made_once(root, monkeypatch):
+    first = training(root, EXACT).arrays["truth"]
+    monkeypatch.setattr(made_truth, "_make_grids", None)
+    np.testing.assert_array_equal(training(root, EXACT).arrays["truth"], first)
+    for other in (
+        replace(EXACT, seed=1),
+        replace(EXACT, policy=TruthPolicy(cleanup=False)),
+        MadeTruth(flaws=TruthFlaws()),
+    ):
+        with pytest.raises(TypeError, match="NoneType"):
+            training(root, other)
+
+
+def test_seed_policy_and_flaws_decide_it(root):
+    flawed = MadeTruth(TruthPolicy(past=2, movers="carved"), TruthFlaws(rotation=2.0))
+    one, other = (training(root, made).arrays["truth"] for made in (flawed, replace(flawed, seed=1)))
+    assert (one != other).any()
+    for path in root.glob("cache/*/train/made-*"):
+        path.unlink()
+    np.testing.assert_array_equal(training(root, flawed).arrays["truth"], one)
+
+
+def test_a_damaged_file_is_named(root):
+    training(root, EXACT, "test")
+    (path,) = root.glob("cache/*/test/made-*.safetensors")
+    write_tensors(path, {"other": torch.zeros(1)})
+    with pytest.raises(DataError, match="delete the file to make it anew"):
+        training(root, EXACT, "test")
+
+
+def test_a_negative_seed_is_refused():
+    with pytest.raises(ArgumentError, match="seed"):
+        MadeTruth(seed=-1)

@@ -1,0 +1,197 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+from tiny_runs import HandMadeData, Note, results, tiny_trainings
+
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.experiments.reproduction.execute import execute
+from semgrid_edu.experiments.reproduction.experiments import EXPERIMENTS
+from semgrid_edu.experiments.reproduction.plan import estimate, plan_table, with_needs
+from semgrid_edu.experiments.reproduction.runs import check_runs_folder, claim_folder, run_one
+from semgrid_edu.experiments.reproduction.scales import SCALES, scale_named
+from semgrid_edu.networks import WEIGHTS
+from semgrid_edu.storage.workplace import Workplace, workplace
+
+A = Note("a")
+B, C = Note("b", (A,)), Note("c", (A,))
+D = Note("d", (B, C))
+
+
+def here(slots=2):
+    """Threads of this process, of which runs take one at a time."""
+    return Workplace(ThreadPoolExecutor(slots), lambda: slots)
+
+
+def started(root):
+    return {path.parent.name: len(path.read_text()) for path in root.glob("note-*/started")}
+
+
+def test_a_plan_holds_each_run_once_after_those_that_it_needs():
+    assert with_needs([D, C]) == [A, B, C, D]
+
+
+def test_every_run_is_done_once(tmp_path):
+    for _ in range(2):
+        assert execute(with_needs([D]), tmp_path, here()) == {}
+    assert started(tmp_path) == {"note-a": 1, "note-b": 1, "note-c": 1, "note-d": 1}
+
+
+def test_a_run_that_fails_stops_only_those_that_need_it_and_is_tried_again(tmp_path):
+    weak = Note("weak", (A,), fails_without="help")
+    plan = with_needs([weak, Note("after", (weak,)), D])
+    failed = execute(plan, tmp_path, here())
+    assert [run.name for run in failed] == ["note-weak", "note-after"]
+    assert "no help" in failed[weak]
+    assert "note-weak" in failed[Note("after", (weak,))]
+    assert "no help" in (weak.folder(tmp_path) / "output.txt").read_text()
+    assert D.has_ended(tmp_path)
+    (tmp_path / "help").touch()
+    assert execute(plan, tmp_path, here()) == {}
+    assert started(tmp_path) == {f"note-{name}": 1 + (name == "weak") for name in ("a", "b", "c", "d", "weak", "after")}
+
+
+def test_a_process_that_dies_is_an_error_of_its_run(tmp_path):
+    class Broken(ThreadPoolExecutor):
+        def submit(self, *_):
+            from concurrent.futures.process import BrokenProcessPool
+
+            raise BrokenProcessPool("died")
+
+    failed = execute([A, B], tmp_path, Workplace(Broken(), lambda: 1))
+    assert "died" in failed[A]
+    assert "note-a" in failed[B]
+
+
+def test_the_folder_of_another_run_is_refused(tmp_path):
+    claim_folder(Note("a", seconds_each=1.0), tmp_path)
+    with pytest.raises(DataError, match="'seconds_each': 0"):
+        claim_folder(A, tmp_path)
+    assert "DataError" in run_one(A, tmp_path).error
+
+
+def test_a_file_in_place_of_the_runs_is_refused(tmp_path):
+    (tmp_path / "runs").touch()
+    with pytest.raises(ArgumentError, match="--runs"):
+        check_runs_folder(tmp_path / "runs")
+
+
+def test_the_estimate_adds_up_what_is_left(tmp_path):
+    """Two steps of 30 s each: four runs in two processes, three of which need each other one after the other."""
+    plan = with_needs([D])
+    estimated = estimate(plan, tmp_path)
+    assert estimated.hours(1) == pytest.approx(4 * 60 / 3600)
+    assert estimated.hours(2) == pytest.approx(3 * 60 / 3600)
+    assert estimated.hours(99) == pytest.approx(3 * 60 / 3600)
+    cells = plan_table(plan, estimated).splitlines()[2].strip("|").split("|")
+    assert [cell.strip() for cell in cells] == ["note", "4", "0", "2", "1.0"]
+
+
+def test_recorded_times_take_the_place_of_trials(tmp_path):
+    claim_folder(A, tmp_path)
+    (A.folder(tmp_path) / "ended.json").write_text(json.dumps({"seconds": 8}))
+    estimated = estimate(with_needs([D]), tmp_path)
+    assert estimated.seconds == dict.fromkeys((B, C, D), 8.0)
+    assert estimated.measured == 3
+
+
+@pytest.mark.parametrize("scale", SCALES.values(), ids=SCALES)
+def test_names_tell_runs_apart_and_stages_are_shared(scale):
+    plan = with_needs(run for experiment in EXPERIMENTS.values() for run in experiment.runs(scale, 3))
+    assert len({run.name for run in plan}) == len(plan)
+    settings = [json.dumps(run.settings(), sort_keys=True) for run in plan]
+    assert len(set(settings)) == len(plan)
+    table1 = with_needs(EXPERIMENTS["table1"].runs(scale, 3))
+    assert sum(run.name.startswith("image-") for run in table1) == 9
+    assert sum(run.name.startswith("data-") for run in table1) == 1
+
+
+def test_an_unknown_scale_is_refused():
+    with pytest.raises(ArgumentError, match="quick, reduced, paper"):
+        scale_named("huge")
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    """Two tiny networks, trained without any interruption."""
+    root = tmp_path_factory.mktemp("runs")
+    assert execute(with_needs(tiny_trainings()), root, here(1)) == {}
+    return root
+
+
+def test_the_image_stage_is_trained_once_and_both_networks_start_from_it(trained):
+    assert len(list(trained.glob("image-*"))) == 1
+    assert len(list(trained.glob(f"grid-*/{WEIGHTS}"))) == 2
+    names = sorted(path.name for path in trained.glob("grid-*"))
+    assert names == ["grid-tiny-segnet-true-2+2-seed1", "grid-tiny-segnet-true-2planes-unbalanced-2+2-seed1"]
+
+
+SCRIPT = """
+import sys
+from pathlib import Path
+from tiny_runs import tiny_trainings
+from semgrid_edu.experiments.reproduction.execute import execute
+from semgrid_edu.experiments.reproduction.plan import with_needs
+from semgrid_edu.storage.workplace import workplace
+if __name__ == "__main__":
+    with workplace(1) as place:
+        assert execute(with_needs(tiny_trainings()), Path(sys.argv[1]), place) == {}
+"""
+
+
+def test_a_killed_plan_goes_on_with_the_same_bytes(trained, tmp_path):
+    """Killed as a whole when the first of two networks has been trained and the second begins."""
+    script, root = tmp_path / "script.py", tmp_path / "runs"
+    script.write_text(SCRIPT)
+    paths = os.pathsep.join([str(Path(__file__).parents[1]), *sys.path])
+    command = [sys.executable, str(script), str(root)]
+    process = subprocess.Popen(command, env=os.environ | {"PYTHONPATH": paths}, stderr=subprocess.DEVNULL)
+    second = tiny_trainings()[1]
+    wait_for(lambda: (second.folder(root) / "log.csv").exists())
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    time.sleep(1)  # the worker notices within an instant that its parent is gone
+    assert HandMadeData().has_ended(root)
+    assert not second.has_ended(root)
+    assert execute(with_needs(tiny_trainings()), root, here(1)) == {}
+    assert results(root) == results(trained)
+
+
+def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(trained, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    first = tiny_trainings()[0]
+    with (
+        distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None, scheduler_port=0) as cluster,
+        distributed.Client(cluster) as client,
+        ThreadPoolExecutor(1) as driver,
+        workplace(scheduler=cluster.scheduler_address) as place,
+    ):
+        pids = client.run(os.getpid)
+        ended = driver.submit(execute, with_needs(tiny_trainings()), tmp_path, place)
+        wait_for(lambda: (first.folder(tmp_path) / "log.csv").exists() or ended.done())
+        busy = [address for address, tasks in client.processing().items() if tasks]
+        os.kill(pids[busy[0]], signal.SIGKILL)
+        assert ended.result() == {}
+        assert set(client.run(os.getpid).values()) != set(pids.values())
+    assert results(tmp_path) == results(trained)
+
+
+def test_a_cluster_without_answer_or_with_workers_of_its_own_is_refused():
+    with pytest.raises(ArgumentError, match="--workers"), workplace(2, "tcp://127.0.0.1:1"):
+        pass
+    with pytest.raises(ArgumentError, match="--workers"), workplace(0):
+        pass
+
+
+def wait_for(condition, seconds=120):
+    """Wait until a condition holds; a hang fails."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)

@@ -1,0 +1,182 @@
+"""The policy laboratory: counts by hand, trials on the sample drive, and a run that is interrupted."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from semgrid_edu.cli import app
+from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.datasets.ground_truth import NO_FLAWS, TruthPolicy
+from semgrid_edu.datasets.samples import sample_drive
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.experiments import truth_policies as laboratory
+from semgrid_edu.experiments.truth_counts import BAND_EDGES, COUNTED, TruthCounts
+from semgrid_edu.experiments.truth_tables import class_table, distance_table, policy_table
+from semgrid_edu.experiments.truth_trials import TRIALS, Trial
+from semgrid_edu.frame import LABEL_GRID
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import KITTI_14
+from semgrid_edu.simulation.drive import SimulatedDrive
+from semgrid_edu.simulation.writer import write_calibration, write_drive
+
+ROAD, WALK, CAR = (KITTI_14.index(name) for name in ("road", "sidewalk", "car"))
+FREE, HIDDEN = KITTI_14.index("unknown-free"), KITTI_14.index("unknown-unobserved")
+LANE = GridSpec(0.0, 25.0, -5.0, 5.0, 5.0)
+"""5 rows, 12.5 to 22.5 m away, then 7.5 and 2.5 m; 2 columns."""
+
+
+def counts():
+    """Of 5 seen road cells 3 are found, 1 is mistaken, 1 is missed; one car is right, one isn't, and that is hidden."""
+    truth = np.array([[ROAD, ROAD], [ROAD, FREE], [ROAD, CAR], [ROAD, HIDDEN], [FREE, FREE]])
+    made = np.array([[ROAD, FREE], [CAR, FREE], [ROAD, CAR], [ROAD, CAR], [FREE, WALK]])
+    standing = np.array([[ROAD, ROAD], [ROAD, CAR], [ROAD, CAR], [ROAD, ROAD], [ROAD, WALK]])
+    return TruthCounts.of_frame(made, truth, standing, LANE, KITTI_14)
+
+
+def of_class(c):
+    return dict(zip(COUNTED, counts().cells.sum(axis=1)[:, c].tolist(), strict=True))
+
+
+def test_cells_are_counted_by_class():
+    assert of_class(ROAD) == {"seen": 5, "found": 3, "missed": 1, "labelled": 3, "right": 3, "hidden": 0}
+    assert of_class(CAR) == {"seen": 1, "found": 1, "missed": 0, "labelled": 3, "right": 1, "hidden": 1}
+    assert of_class(WALK) == {"seen": 0, "found": 0, "missed": 0, "labelled": 1, "right": 1, "hidden": 1}
+
+
+def test_cells_are_counted_by_distance():
+    # The centres of the rows lie 22.6, 17.7, 12.7, 7.9 and 3.5 m away.
+    assert counts().cells[COUNTED.index("seen")].sum(axis=1).tolist() == [1, 3, 2, 0, 0, 0]
+
+
+def test_shares_follow_from_the_counts():
+    shares = counts().shares(axis=0)
+    expected = {"found": 3 / 5, "mistaken": 1 / 5, "missed": 1 / 5, "wrong": 0, "hidden": 0, "iou": 3 / 5}
+    assert {name: share[ROAD] for name, share in shares.items()} == pytest.approx(expected)
+    assert shares["wrong"][CAR] == pytest.approx(2 / 3)
+    assert shares["iou"][CAR] == pytest.approx(1 / 2)  # of the two cars in sight of the camera one is right
+    assert np.isnan(shares["found"][WALK])
+    assert counts().shares(axis=(0, 1))["found"] == pytest.approx(4 / 6)
+    assert (counts() + counts()).shares(axis=(0, 1))["wrong"] == pytest.approx(2 / 7)
+
+
+def test_maps_of_another_grid_are_refused():
+    flat = np.zeros(LANE.shape, int)
+    with pytest.raises(ArgumentError, match="standing"):
+        TruthCounts.of_frame(flat, flat, flat.T, LANE, KITTI_14)
+
+
+def test_every_cell_of_the_grid_lies_in_a_band():
+    corner = np.hypot(LABEL_GRID.x_max, LABEL_GRID.y_max)
+    assert BAND_EDGES[0] == 0
+    assert BAND_EDGES[-1] >= corner
+
+
+@pytest.fixture(scope="module")
+def scored():
+    """Four trials on a frame of the shipped drive."""
+    trials = {
+        "paper": TRIALS["one scan (the paper)"],
+        "bare": Trial(TruthPolicy(cleanup=False)),
+        "exact": Trial(flaws=NO_FLAWS),
+        "wide": Trial(TruthPolicy(past=2, future=2, movers="carved")),
+    }
+    return laboratory.score_frame(trials, sample_drive()[:6], 3, GridSpec.compact(), seed=4)
+
+
+class TestSampleDrive:
+    def test_all_trials_are_measured_by_the_same_truth(self, scored):
+        seen = [one.cells[COUNTED.index("seen")] for one in scored.values()]
+        assert seen[0].sum() > 1000
+        for other in seen[1:]:
+            np.testing.assert_array_equal(other, seen[0])
+
+    def test_closing_gaps_labels_more_cells_and_more_of_them_wrongly(self, scored):
+        paper, bare = (scored[name].shares(axis=(0, 1)) for name in ("paper", "bare"))
+        assert paper["found"] > bare["found"]
+        assert paper["wrong"] > bare["wrong"]
+
+    def test_more_scans_leave_fewer_cells_without_a_label(self, scored):
+        assert scored["wide"].shares(axis=(0, 1))["missed"] < scored["paper"].shares(axis=(0, 1))["missed"]
+
+    def test_errors_in_the_data_make_it_worse(self, scored):
+        assert scored["paper"].shares(axis=(0, 1))["iou"] < scored["exact"].shares(axis=(0, 1))["iou"]
+
+    def test_the_same_seed_gives_the_same_counts(self, scored):
+        again = laboratory.score_frame({"paper": Trial()}, sample_drive()[:6], 3, GridSpec.compact(), seed=4)
+        np.testing.assert_array_equal(again["paper"].cells, scored["paper"].cells)
+
+    def test_a_frame_that_has_no_labels_is_refused(self):
+        with pytest.raises(ArgumentError, match="k: expected the number of a labelled frame"):
+            laboratory.score_frame({}, sample_drive()[:2], 2, GridSpec.compact())
+
+
+def test_a_simulated_frame_is_what_a_reader_finds_on_disk(tmp_path):
+    (frame,) = laboratory.simulated_drive(7, n_frames=1)
+    drive = SimulatedDrive(7, 1)
+    write_calibration(tmp_path, drive.rig)
+    write_drive(tmp_path, "0001", drive, {0})
+    read = KittiRawDrive(tmp_path, "2026_01_01", "0001")[0]
+    np.testing.assert_array_equal(frame.points, read.points)
+    for kind in ("image", "birdseye", "visible"):
+        np.testing.assert_array_equal(getattr(frame.labels, kind), getattr(read.labels, kind))
+    np.testing.assert_allclose(frame.camera.T_camera_from_lidar, read.camera.T_camera_from_lidar, atol=1e-9)
+
+
+class TestRun:
+    @pytest.fixture
+    def asked(self, monkeypatch):
+        """The drives that are asked for, in place of simulating them."""
+        numbers = []
+
+        def score(trials, spec, number, lidar):
+            numbers.append(number)
+            return {name: TruthCounts(counts().cells * (number - 699)) for name in trials}
+
+        monkeypatch.setattr(laboratory, "score_trials", score)
+        return numbers
+
+    def test_an_interrupted_run_goes_on_where_it_was(self, asked, tmp_path):
+        whole = laboratory.truth_policies(tmp_path / "whole.json", drives=4)
+        assert asked == [700, 701, 702, 703]
+        laboratory.truth_policies(tmp_path / "parts.json", drives=3)
+        again = laboratory.truth_policies(tmp_path / "parts.json", drives=4)
+        assert asked[4:] == [700, 701, 702, 703]
+        assert again | {"minutes": 0} == whole | {"minutes": 0}
+        paper = laboratory.counts_of(whole, "one scan (the paper)")
+        np.testing.assert_array_equal(paper.cells, counts().cells * (1 + 2 + 3 + 4))
+
+    def test_a_log_of_other_choices_is_refused(self, asked, tmp_path):
+        laboratory.truth_policies(tmp_path / "truth.json", drives=1)
+        with pytest.raises(DataError, match="choose another file"):
+            laboratory.truth_policies(tmp_path / "truth.json", drives=1, seed=1)
+        assert asked == [700]
+
+    def test_the_command_keeps_the_result_and_prints_its_tables(self, asked, tmp_path):
+        out = tmp_path / "truth.json"
+        arguments = ["reproduce", "truth-policies", "--seed", "1", "--drives", "2", "--out", str(out)]
+        shown = CliRunner().invoke(app, arguments)
+        assert shown.exit_code == 0, shown.output
+        result = json.loads(out.read_text())
+        assert asked == [1700, 1701]
+        assert result["command"] == (
+            "semgrid-edu reproduce truth-policies --seed 1 --drives 2 --grid compact --lidar coarse"
+        )
+        assert {"date", "minutes", "versions", "seed"} <= result.keys()
+        for table in (policy_table(result), class_table(result, "one scan (the paper)")):
+            assert table in shown.output
+        found = {row.split("|")[1].strip(): row.split("|")[2].strip() for row in policy_table(result).splitlines()[2:]}
+        assert found == dict.fromkeys(TRIALS, "66.7")
+        assert "| 10-20 m  |  66.7 |     33.3 |    0.0 |" in distance_table(result, "one scan (the paper)")
+
+    @pytest.mark.parametrize("wrong", [{"drives": 0}, {"grid": "huge"}, {"lidar": "radar"}, {"seed": -1}], ids=str)
+    def test_what_cannot_be_run_is_refused(self, asked, tmp_path, wrong):
+        with pytest.raises(ArgumentError, match=next(iter(wrong))):
+            laboratory.truth_policies(tmp_path / "truth.json", **wrong)
+        assert asked == []
+
+    def test_an_unknown_trial_is_refused(self, asked, tmp_path):
+        result = laboratory.truth_policies(tmp_path / "truth.json", drives=1)
+        with pytest.raises(ArgumentError, match="name"):
+            laboratory.counts_of(result, "none")

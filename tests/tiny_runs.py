@@ -1,0 +1,77 @@
+"""Runs of seconds: some that only write a file, and trainings on hand-made data. Processes import them from here."""
+
+import hashlib
+import json
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from tiny_drive import DATE, write_tiny_drive
+
+from semgrid_edu.experiments.reproduction import data_runs
+from semgrid_edu.experiments.reproduction.data_runs import ArraysRun, DataRun
+from semgrid_edu.experiments.reproduction.runs import Run
+from semgrid_edu.experiments.reproduction.training_runs import GridStageRun, ImageStageRun
+from semgrid_edu.experiments.reproduction.variants import Variant
+from semgrid_edu.simulation.datasets import DatasetRecipe, Route
+
+data_runs.RECIPE_OF["tiny"] = DatasetRecipe("tiny", "KITTI-14", (Route("train", 2, False),) * 6)
+
+
+@dataclass(frozen=True)
+class Note(Run):
+    """Writes a line that depends on its own label and on the lines of those that it needs; counts how often."""
+
+    label: str
+    after: tuple["Note", ...] = ()
+    fails_without: str = ""
+    seconds_each: float = 0.0
+
+    name = property(lambda self: f"note-{self.label}")
+    needs = property(lambda self: self.after)
+    steps = property(lambda self: 2)
+    pace = property(lambda self: "note")
+
+    def probe(self) -> float:
+        return 30.0
+
+    def work(self, root: Path, device: str) -> None:
+        with (self.folder(root) / "started").open("a") as file:
+            file.write("x")
+        time.sleep(self.seconds_each)
+        if self.fails_without and not (root / self.fails_without).exists():
+            raise RuntimeError(f"no {self.fails_without}")
+        lines = [self.label, *((run.folder(root) / "line").read_text() for run in self.after)]
+        (self.folder(root) / "line").write_text(hashlib.sha256("\n".join(lines).encode()).hexdigest())
+
+
+@dataclass(frozen=True)
+class HandMadeData(DataRun):
+    """Six drives to learn from, two frames each, the last one labelled."""
+
+    data: str = "tiny"
+
+    def work(self, root: Path, device: str) -> None:
+        folder = self.dataset_dir(root)
+        folder.mkdir(exist_ok=True)
+        drives = [f"{k:04d}" for k in range(1, 7)]
+        for drive in drives:
+            write_tiny_drive(folder, drive, n_frames=2, labelled=(1,))
+        frames = [{"date": DATE, "drive": drive, "frame": 1} for drive in drives]
+        index = {"name": "tiny", "label_set": "KITTI-14", "splits": {"train": frames}}
+        (folder / "dataset.json").write_text(json.dumps(index))
+
+
+def tiny_trainings(iterations: int = 2) -> list[GridStageRun]:
+    """Two networks that share an image stage."""
+    arrays = ArraysRun(HandMadeData(), "train")
+    image_stage = ImageStageRun(arrays, "segnet", seed=1, iterations=iterations)
+    variants = Variant(), Variant(n_planes=2, balanced=False)
+    return [GridStageRun(image_stage, arrays, iterations, variant) for variant in variants]
+
+
+def results(root: Path) -> dict[str, bytes]:
+    """The bytes of every result: all but what was printed, when it was, and how long it took."""
+    told = ("output.txt", "ended.json", "started", "provenance.json")
+    files = [path for path in root.rglob("*") if path.is_file() and path.name not in told]
+    return {path.relative_to(root).as_posix(): path.read_bytes() for path in sorted(files) if "cache" not in path.parts}
