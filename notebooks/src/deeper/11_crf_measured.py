@@ -12,7 +12,7 @@
 #
 # **Prerequisites.** Lectures [10](../10_crf.ipynb) and [11](../11_fast_crf.ipynb).
 #
-# **Time.** 25 minutes; the computer needs seconds, because the results are committed.
+# **Time.** 15 minutes; the computer needs seconds, because the results are committed.
 
 # %% jupyter={"source_hidden": true}
 import json
@@ -146,6 +146,13 @@ Markdown(crf_error_tables(error))
 # **Landmarks depend on the map.** On the crops, 512 landmarks stand for 4096 cells, and their kernel error is smaller
 # than the lattice's. On the compact grid, which is larger and more varied, it is 1.4 % with 512 landmarks, four times
 # the lattice's, at several times its time.
+#
+# ## Where this breaks
+#
+# The exact answers stop at sixteen cells. There, scores and states were drawn at random, cell by cell; on a street,
+# neighbours are alike. So the upper pictures say how each way fails, not how often it fails on a map. On the real maps
+# nobody knows the exact marginals: all errors there are against mean field with the exact kernel, and mean field itself
+# may be far off. And both maps are of one instant of one simulated drive.
 #
 # ## In five lines
 #
