@@ -896,60 +896,74 @@ print(f"{'class accuracy':<14}", *(f"{100 * class_accuracy(n):7.1f} %" for n in 
 # %% [markdown]
 # ## Can other weights and widths mend it?
 #
-# So far weights and widths were the package's defaults. Can one find better ones? We must not choose them on the test
-# frames: whatever is chosen on some frames looks better on them than it is. Two ways were tried, both on 72 simulated
-# drives that no network has learned from (*validation data*):
+# So far weights and widths were the package's defaults. Better ones must not be chosen on the test frames, because
+# whatever is chosen on some frames looks better on them than it is. Two ways were tried on 72 other simulated drives,
+# from which no network has learned (*validation data*):
 #
 # - **Search** (`semgrid-edu search-crf`). First the scores are divided by a temperature, 1.16 for SegNet, chosen such
 #   that of the cells called with 80 % certainty about 80 % are right (*calibration*). Then 120 settings of two weights
-#   and three widths are tried. The left picture shows them. No setting is best in both metrics, so two are chosen.
+#   and three widths are tried. The left picture shows them. None is best in both metrics, so two are chosen.
 # - **Learning** (`semgrid-edu reproduce learned-crf`). Five iterations of mean field are a chain of differentiable
 #   steps, so gradient descent can learn weights, widths and label costs like any other layer. Eight variants differ in
 #   what they learn, from which drives, and by which loss.
 
 
-# %% jupyter={"source_hidden": true} alt="left: settings of the search as dots, change in pixel accuracy against change in class accuracy; those above zero in pixel accuracy lie left of zero in class accuracy. Right: default, chosen and learned CRFs on test frames, with intervals; none gains in both"
+# %% jupyter={"source_hidden": true}
+METRIC_NAMES = ("class accuracy", "pixel accuracy")
+FILES = {"SegNet": "crf_search", "FCN": "crf_search_fcn", "DeepLab": "crf_search_deeplab"}
+MARKS = {"pixel accuracy": "^", "class accuracy": "v"}
+
+
 def kept(name):
     """Return a committed result."""
     return json.loads(Path(f"../docs/results/{name}.json").read_text(encoding="utf-8"))
 
 
-METRIC_NAMES = ("class accuracy", "pixel accuracy")
-FILES = {"SegNet": "crf_search", "FCN": "crf_search_fcn", "DeepLab": "crf_search_deeplab"}
-search, learned = kept("crf_search"), kept("learned_crf")
-tried = np.array(
-    [[100 * (t["scores"]["all"][m] - search["unrefined"]["all"][m]) for m in METRIC_NAMES] for t in search["trials"]]
-)
-front = tried[search["pareto"]]
-fig, axes = plt.subplots(1, 2, figsize=(11, 4.6), layout="compressed", sharex=True, sharey=True)
-axes[0].plot(*tried.T, ".", color="0.5", label="setting tried")
-axes[0].plot(*front[np.argsort(front[:, 0])].T, "-", color="C0", label="no setting beats these in both metrics")
-axes[0].plot(*tried[0], "s", color="C0", label="default")
-for mark, goal in (("^", "pixel accuracy"), ("v", "class accuracy")):
-    axes[0].plot(*tried[search["chosen"][goal]["trial"]], mark, color="C0", ms=9, label=f"chosen for {goal}")
+def points(scores):
+    """Return what a CRF changes on the validation frames, in points: class accuracy, pixel accuracy."""
+    return [100 * (scores["all"][metric] - search["unrefined"]["all"][metric]) for metric in METRIC_NAMES]
 
 
-def cross(gains, mark, color, label=None):
+def cross(ax, gains, mark, color, label=None):
     """Draw mean gains with their intervals: of class accuracy to the side, of pixel accuracy upward."""
     low, (x, y), high = 100 * np.array([gains[m] for m in METRIC_NAMES]).T
     (left, down), (right, up) = (x, y) - low, high - (x, y)
-    axes[1].errorbar(x, y, [[down], [up]], [[left], [right]], fmt=mark, color=color, ms=6, lw=1, label=label)
+    ax.errorbar(x, y, [[down], [up]], [[left], [right]], fmt=mark, color=color, ms=6, lw=1, label=label)
 
 
-for color, (name, file) in zip(("C0", "C1", "C2"), FILES.items(), strict=True):
-    gains = kept(file)["test"]["gains"]
-    cross(gains["CRF"], "s", color, f"{name}, marks as on the left")
-    for mark, goal in (("^", "pixel accuracy"), ("v", "class accuracy")):
-        cross(gains[f"calibrated, CRF for {goal}"], mark, color)
-for k, name in enumerate(learned["learnt"]):
-    cross(learned["gains"][name], "o", "C3", None if k else "SegNet, learned in eight ways")
-limits = {"xlim": (-9, 1), "ylim": (-1.3, 1.3)}
-outside = ((tried < (-9, -1.3)) | (tried > (1, 1.3))).any(axis=1).sum()
-axes[0].set(
-    title=f"SegNet, 72 validation frames ({outside} of 120 lie outside)", ylabel="pixel accuracy: change [points]"
-)
-axes[1].set(title="110 test frames, 95 % intervals over drives", **limits)
-for ax in axes:
+# %% jupyter={"source_hidden": true}
+def draw_search(ax):
+    """Draw the settings of the search, on the validation frames."""
+    tried = np.array([points(trial["scores"]) for trial in search["trials"]])
+    front = tried[search["pareto"]]
+    ax.plot(*tried.T, ".", color="0.5", label="setting tried")
+    ax.plot(*front[np.argsort(front[:, 0])].T, "-", color="C0", label="no setting beats these in both metrics")
+    ax.plot(*tried[0], "s", color="C0", label="default")
+    for goal, mark in MARKS.items():
+        ax.plot(*tried[search["chosen"][goal]["trial"]], mark, color="C0", ms=9, label=f"chosen for {goal}")
+    outside = (~((tried > (-9, -1.3)) & (tried < (1, 1.3))).all(axis=1)).sum()
+    ax.set(
+        title=f"SegNet, 72 validation frames ({outside} of 120 lie outside)", ylabel="pixel accuracy: change [points]"
+    )
+
+
+def draw_test(ax):
+    """Draw default, searched and learned CRFs, on the test frames."""
+    for color, (name, file) in zip(("C0", "C1", "C2"), FILES.items(), strict=True):
+        gains = kept(file)["test"]["gains"]
+        cross(ax, gains["CRF"], "s", color, f"{name}, marks as on the left")
+        for goal, mark in MARKS.items():
+            cross(ax, gains[f"calibrated, CRF for {goal}"], mark, color)
+    for k, name in enumerate(learned["learnt"]):
+        cross(ax, learned["gains"][name], "o", "C3", None if k else "SegNet, learned in eight ways")
+    ax.set(title="110 test frames, 95 % intervals over drives", xlim=(-9, 1), ylim=(-1.3, 1.3))
+
+
+# %% jupyter={"source_hidden": true} alt="left: settings of the search as dots, change in pixel accuracy against change in class accuracy; those above zero in pixel accuracy lie left of zero in class accuracy. Right: default, chosen and learned CRFs on test frames, with intervals; none gains in both"
+search, learned = kept("crf_search"), kept("learned_crf")
+fig, axes = plt.subplots(1, 2, figsize=(11, 4.6), layout="compressed", sharex=True, sharey=True)
+for ax, draw_on in zip(axes, (draw_search, draw_test), strict=True):
+    draw_on(ax)
     ax.axhline(0, color="0.7", lw=0.8)
     ax.axvline(0, color="0.7", lw=0.8)
     ax.set_xlabel("class accuracy: change [points]")

@@ -162,7 +162,8 @@ def _scaled(slices, splats, points, scale):
     """Return both weights of each point times its scale."""
     scaled_slices, scaled_splats = np.empty_like(slices), np.empty_like(splats)
     for i in prange(len(slices)):
-        scaled_slices[i] = scale[i] * slices[i]
+        for corner in range(slices.shape[1]):  # a row at a time, numba would make an array of each product
+            scaled_slices[i, corner] = scale[i] * slices[i, corner]
     for n in prange(len(splats)):
         scaled_splats[n] = scale[points[n]] * splats[n]
     return scaled_slices, scaled_splats

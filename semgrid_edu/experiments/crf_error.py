@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
 from semgrid_edu.crf import CrfParams, mean_field, mean_field_accurate, mean_field_naive
-from semgrid_edu.crf.dense import MAX_CELLS
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.crf_scenes import CrfProblem, crf_scenes
 from semgrid_edu.experiments.kept_parts import read_parts
@@ -42,7 +41,7 @@ Way = Callable[[NDArray, NDArray, CrfParams, int, float], NDArray]
 
 
 def crf_ways(seed: int = 0) -> dict[str, Way]:
-    """Return every way to run mean field, by name.
+    """Return every way to run mean field, by name, the one with the exact kernel first.
 
     Parameters
     ----------
@@ -52,7 +51,6 @@ def crf_ways(seed: int = 0) -> dict[str, Way]:
     Returns
     -------
     dict of str to callable
-        "naive" and "all pairs" refuse or take too long on large grids, see `ways_for`.
     """
     return {
         "naive": mean_field_naive,
@@ -61,24 +59,6 @@ def crf_ways(seed: int = 0) -> dict[str, Way]:
         "lattice": mean_field,
         **{f"rank {rank}": partial(mean_field_low_rank, rank=rank, seed=seed) for rank in RANKS},
     }
-
-
-def ways_for(cells: int, seed: int = 0) -> dict[str, Way]:
-    """Return the ways for a grid, the first of them the reference for the others.
-
-    Parameters
-    ----------
-    cells : int
-        Number of cells. Above `MAX_CELLS` all pairs are too many, and "accurate" is the reference.
-    seed : int
-        Seed for the landmarks of the low-rank kernels.
-
-    Returns
-    -------
-    dict of str to callable
-    """
-    ways = crf_ways(seed)
-    return ways if cells <= MAX_CELLS else {name: ways[name] for name in ways if name not in ("naive", "all pairs")}
 
 
 def crf_error(log: str | Path, seed: int = 0, scenes: Mapping[str, Sequence[CrfProblem]] | None = None) -> dict:
@@ -141,7 +121,7 @@ def measure_scene(problems: Sequence[CrfProblem], seed: int = 0, name: str = "")
         Errors are those of `distance`. "settled", a list of one, is the kernel error when both have converged.
     """
     shape, found = problems[0].unary.shape, []
-    ways = ways_for(shape[1] * shape[2], seed)
+    ways = crf_ways(seed)
     with tqdm(total=len(problems) * len(ways), desc=name, unit="way") as bar:
         for problem in problems:
             runs = {}
