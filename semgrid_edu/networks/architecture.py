@@ -27,6 +27,12 @@ class Architecture:
         The cells of the semantic grid, (H, W) of them.
     heights : (D,) float
         delta_i, the heights of the planes above the ground, metres.
+    uses_occupancy : bool
+        Whether the fusion network sees the occupancy grid. Without, each cell is UNKNOWN to it, whatever grid it is
+        given: so all else, also the initial weights, is that of the network with occupancy, and the two can be
+        compared.
+    reduces : bool
+        Whether the 1x1 convolution reduces the planes. Without, all D x C of them go into the conv-deconv network.
     """
 
     segmenter: str = "segnet"
@@ -35,3 +41,5 @@ class Architecture:
     image_size: tuple[int, int] = (96, 320)
     grid: GridSpec = field(default_factory=GridSpec.compact)
     heights: tuple[float, ...] = tuple(plane_heights().tolist())
+    uses_occupancy: bool = True
+    reduces: bool = True

@@ -34,9 +34,12 @@ def save_net(net: SemanticGridNet, path: str | Path) -> None:
     ArgumentError
         When the network has no architecture, so that nothing says how to build it again.
     """
-    architecture = json.dumps(asdict(net.need_architecture()))
+    description = asdict(net.need_architecture())
+    for name in ("uses_occupancy", "reduces"):
+        if description[name]:  # left out, so that networks have the checksums they had before this existed
+            del description[name]
     tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in net.state_dict().items()}
-    write_tensors(path, tensors, {"architecture": architecture})
+    write_tensors(path, tensors, {"architecture": json.dumps(description)})
 
 
 def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -7,6 +9,7 @@ from torch import nn
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import SEGMENTERS, Architecture, FusionNet, SemanticGridNet, build_net, build_segmenter
+from semgrid_edu.occupancy import State
 from semgrid_edu.planes import PlaneSampler, plane_pixels
 
 N_CLASSES = 5
@@ -75,6 +78,20 @@ def test_frames_of_a_batch_do_not_touch(small_net, batch):
     image, occupancy, _ = batch
     alone = torch.cat([small_net(image[k : k + 1], occupancy[k : k + 1]) for k in range(2)])
     torch.testing.assert_close(small_net(image, occupancy), alone)
+
+
+def test_without_occupancy_each_cell_is_unknown_to_the_network(camera):
+    small = Architecture(image_size=(16, 24), heights=(0.0, 0.5))
+    net, blind = (build_net(replace(small, uses_occupancy=uses), camera, seed=3).eval() for uses in (True, False))
+    for name, tensor in net.state_dict().items():
+        assert torch.equal(tensor, blind.state_dict()[name])
+    rng = torch.Generator().manual_seed(0)
+    image, grids = torch.rand(1, 3, 16, 24, generator=rng), torch.rand(2, 1, 4, 142, 62, generator=rng)
+    unknown = torch.zeros(1, 4, 142, 62)
+    unknown[:, State.UNKNOWN] = 1
+    assert torch.equal(blind(image, grids[0]), net(image, unknown))
+    assert torch.equal(blind(image, grids[0]), blind(image, grids[1]))
+    assert not torch.equal(net(image, grids[0]), net(image, unknown))
 
 
 def test_both_inputs_matter(small_net, batch):

@@ -6,9 +6,11 @@ import pytest
 import torch
 from safetensors.torch import load_file, save_file
 
+from semgrid_edu.datasets.samples import sample_weights
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import SEGMENTERS, Architecture, SemanticGridNet, build_net, load_net, save_net
+from semgrid_edu.storage.files import sha256
 
 SMALL = Architecture(image_size=(24, 80), grid=GridSpec(0, 30, -6, 6, 1.0), heights=(0.0, 0.5, 1.0))
 
@@ -42,6 +44,21 @@ def test_weights_come_back_bit_for_bit(net, saved, camera):
     for name, tensor in net.state_dict().items():
         assert torch.equal(tensor, loaded.state_dict()[name])
     assert torch.equal(loaded(*_inputs(SMALL)), net(*_inputs(SMALL)))
+
+
+def test_a_network_without_occupancy_comes_back_without(camera, tmp_path):
+    path = tmp_path / "blind.safetensors"
+    save_net(build_net(replace(SMALL, uses_occupancy=False), camera), path)
+    loaded = load_net(path, camera)
+    assert not loaded.architecture.uses_occupancy
+    assert not loaded.fusion.uses_occupancy
+
+
+def test_shipped_networks_are_written_again_byte_for_byte(camera, tmp_path):
+    """Their files are older than the switch for the occupancy grid, and their checksums stand in documents."""
+    shipped = sample_weights()
+    save_net(load_net(shipped, camera), tmp_path / "again.safetensors")
+    assert sha256(tmp_path / "again.safetensors") == sha256(shipped)
 
 
 def test_the_same_weights_give_the_same_bytes(net, saved, tmp_path):
