@@ -99,7 +99,7 @@ def _unknown_everywhere(occupancy: Tensor) -> Tensor:
 
 
 def _reduction(n_scores: int, n_planes: int, n_reduced: int | None) -> nn.Module:
-    """Return what takes (B, C, D, H, W) to (B, n_reduced, 1, H, W); without a number all planes are kept, one by one."""
+    """Return what takes (B, C, D, H, W) to (B, n_reduced, 1, H, W); without a number to (B, C x D, 1, H, W)."""
     if n_reduced is None:
         return nn.Sequential(nn.Flatten(1, 2), nn.Unflatten(1, (n_scores * n_planes, 1)))
     # On (B, C, D, H, W) a D x 1 x 1 kernel is the 1x1 convolution of all D x C planes.

@@ -71,7 +71,7 @@ def test_a_process_that_dies_is_an_error_of_its_run(tmp_path):
 
 def test_the_folder_of_another_run_is_refused(tmp_path):
     claim_folder(Note("a", seconds_each=1.0), tmp_path)
-    with pytest.raises(DataError, match="'seconds_each': 0"):
+    with pytest.raises(DataError, match="seconds_each"):
         claim_folder(A, tmp_path)
     assert "DataError" in run_one(A, tmp_path).error
 

@@ -116,6 +116,8 @@ class Run:
 
 def _unusual(thing: object) -> object:
     """Return the kind of a dataclass and its fields that differ from their defaults; anything else as it is."""
+    if isinstance(thing, tuple):
+        return [_unusual(part) for part in thing]
     if not is_dataclass(thing):
         return thing
     given = {field.name: getattr(thing, field.name) for field in fields(thing)}
