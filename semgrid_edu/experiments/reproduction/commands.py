@@ -10,6 +10,8 @@ HELP = {
     "table1": "Table 1: SegNet, FCN and DeepLab, with and without the CRF.",
     "table2": "Table 2: SegNet on routes that were never driven in training.",
     "table3": "Table 3: SegNet's confusion matrix on data without any error.",
+    "claims": "The paper's nine claims, each with a verdict.",
+    "ablations": "What the paper leaves open: planes, occupancy, reduction, balancing, calibration, frames, distance.",
     "all": "All of these.",
 }
 """The experiments of the paper, and what their commands say of themselves."""

@@ -6,6 +6,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from semgrid_edu.experiments.reproduction.ablation_tables import ablations_markdown
+from semgrid_edu.experiments.reproduction.ablations import ablation_runs, ablations
 from semgrid_edu.experiments.reproduction.accuracy_tables import (
     accuracy_markdown,
     accuracy_rows,
@@ -13,8 +15,9 @@ from semgrid_edu.experiments.reproduction.accuracy_tables import (
     network_gains,
 )
 from semgrid_edu.experiments.reproduction.confusion_table import confusion_markdown, confusion_result
+from semgrid_edu.experiments.reproduction.judging import claim_runs, claims_markdown, claims_picture, judge_claims
 from semgrid_edu.experiments.reproduction.paper import NETWORKS, TABLE_1_SCORES, TABLE_2_SCORES
-from semgrid_edu.experiments.reproduction.pictures import accuracy_picture, confusion_picture
+from semgrid_edu.experiments.reproduction.pictures import ablations_picture, accuracy_picture, confusion_picture
 from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.experiments.reproduction.scales import Scale
 from semgrid_edu.experiments.reproduction.score_runs import ScoreRun
@@ -129,6 +132,24 @@ EXPERIMENTS = {
         lambda scale, seeds, root: confusion_result(table3_runs(scale, seeds), root),
         confusion_markdown,
         confusion_picture,
+    ),
+    "claims": Experiment(
+        "The nine claims",
+        "kitti",
+        lambda scale: scale.seeds,
+        claim_runs,
+        judge_claims,
+        claims_markdown,
+        claims_picture,
+    ),
+    "ablations": Experiment(
+        "Ablations",
+        "kitti",
+        lambda scale: scale.seeds,
+        ablation_runs,
+        ablations,
+        ablations_markdown,
+        ablations_picture,
     ),
 }
 """Every experiment by the name of its command."""

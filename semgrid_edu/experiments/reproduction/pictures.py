@@ -55,6 +55,8 @@ def draw_measured(ax: Axes, place: float, value: dict, colour: str = OURS) -> No
     colour : str
         The colour.
     """
+    if value["mean"] is None:
+        return
     if value["low"] is not None:
         ax.plot([100 * value["low"], 100 * value["high"]], [place, place], color=colour, linewidth=2, alpha=0.6)
     ax.plot(100 * value["mean"], place, "o", color=colour, zorder=2)
@@ -90,4 +92,36 @@ def confusion_picture(result: dict) -> Figure:
         shares = np.array([[np.nan if share is None else share for share in row] for row in result[whose]["matrix"]])
         confusion(np.nan_to_num(shares), result["classes"], ax)
         ax.set_title(title)
+    return figure
+
+
+def ablations_picture(result: dict) -> Figure:
+    """Draw the ablations: pixel accuracy of the variants, with wrong calibrations, with few frames, and by distance.
+
+    Parameters
+    ----------
+    result : dict
+        From `ablations`.
+
+    Returns
+    -------
+    Figure
+    """
+    figure, axes = plt.subplots(1, 3, figsize=(15, 6), layout="constrained")
+    trained = [row for row in result["variants"] if row["what"] != "usual"] + result["frames"]
+    for ax, rows, title in zip(
+        axes, (trained, result["calibration"]), ("trained otherwise", "wrong calibration"), strict=False
+    ):
+        for place, row in enumerate(rows):
+            draw_measured(ax, place, row["differences"]["true"]["all"]["pixel accuracy"])
+        ax.axvline(0, color="0.4", linewidth=0.8)
+        ax.set_yticks(range(len(rows)), [row["what"] for row in rows])
+        ax.set(title=title, xlabel="pixel accuracy: difference from usual, points")
+    for place, row in enumerate(result["distance"]):
+        draw_measured(axes[2], place, row["pixel accuracy"])
+    axes[2].set_yticks(range(len(result["distance"])), [row["what"] for row in result["distance"]])
+    axes[2].set(title="by distance", xlabel="pixel accuracy, per cent of cells with a semantic class")
+    for ax in axes:
+        ax.invert_yaxis()
+        ax.grid(axis="x", alpha=0.3)
     return figure
