@@ -7,7 +7,7 @@ from sklearn.metrics import confusion_matrix
 from semgrid_edu.camera import project, transform_points
 from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.experiments.reproduction.calibration_errors import EXACT, CalibrationError
-from semgrid_edu.experiments.reproduction.counting import CountingRun, GridCounts, band_names, distance_bands
+from semgrid_edu.experiments.reproduction.counting import CountingRun, GridCounts, distance_band_names, distance_bands
 from semgrid_edu.experiments.reproduction.overturned_runs import boxes_on
 from semgrid_edu.experiments.reproduction.score_runs import SEARCHED
 from semgrid_edu.grid import GridSpec
@@ -54,7 +54,7 @@ def test_all_bands_together_are_the_whole_grid(counted, truth):
 def test_a_band_holds_the_cells_at_its_distance(counted):
     folder, _, _ = counted
     x, y = np.moveaxis(SPEC.centers(), -1, 0)
-    for name, low, high in zip(band_names(), range(0, 70, 10), [*range(10, 70, 10), 100], strict=True):
+    for name, low, high in zip(distance_band_names(), range(0, 70, 10), [*range(10, 70, 10), 100], strict=True):
         cells = ((x**2 + y**2 >= low**2) & (x**2 + y**2 < high**2)).sum()
         assert Here().confusions(folder, "network", "true", name).counts["network"][0].sum() == cells
     assert distance_bands(SPEC)[-1, SPEC.shape[1] // 2] == 0

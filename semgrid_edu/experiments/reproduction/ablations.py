@@ -5,7 +5,7 @@ from pathlib import Path
 
 from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.experiments.reproduction.calibration_errors import CalibrationError
-from semgrid_edu.experiments.reproduction.counting import band_names
+from semgrid_edu.experiments.reproduction.counting import distance_band_names
 from semgrid_edu.experiments.reproduction.measured import all_metrics, by_seed, compared, measured, on_cells
 from semgrid_edu.experiments.reproduction.paper import NETWORKS
 from semgrid_edu.experiments.reproduction.runs import Run
@@ -147,7 +147,7 @@ def ablations(scale: Scale, seeds: int, root: Path) -> dict:
         "variants": [_row(name, runs, usual, root) for name, runs in networks.items()],
         "calibration": [_row(error.name.removeprefix("-"), runs, usual, root) for error, runs in wrong.items()],
         "frames": _small_sets(scale, seeds, root),
-        "distance": [_band(band, usual, root) for band in band_names()],
+        "distance": [_band(band, usual, root) for band in distance_band_names()],
         "sureness": [_sureness(method, usual, root) for method in (NETWORK, WITH_CRF, WITH_SEARCHED)],
     }
 

@@ -22,7 +22,7 @@ BANDS = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, np.inf)
 """Limits of the bands of distance from the LIDAR by which cells are counted, metres."""
 
 
-def band_names() -> list[str]:
+def distance_band_names() -> list[str]:
     """Return the names of the bands of distance, nearest first."""
     return [f"{low:g}-{high:g} m" if np.isfinite(high) else f"beyond {low:g} m" for low, high in pairwise(BANDS)]
 
@@ -42,7 +42,7 @@ class CountingRun(Run):
         truth : str
             Against which labels: "true" or "lidar".
         band : str, optional
-            One of `band_names`; all distances when left out.
+            One of `distance_band_names`; all distances when left out.
 
         Returns
         -------
@@ -50,7 +50,7 @@ class CountingRun(Run):
             With one method, called `method`.
         """
         found = load_confusions(self.folder(root) / CONFUSIONS)
-        bands = [band] if band else band_names()
+        bands = [band] if band else distance_band_names()
         return FrameConfusions(found.drives, {method: sum(found.counts[_key(method, truth, one)] for one in bands)})
 
     def reliability(self, root: str | Path, method: str) -> Reliability:
@@ -98,7 +98,7 @@ class GridCounts:
             The class that it gives to each cell.
         """
         for truth, grids in self.truths.items():
-            for number, name in enumerate(band_names()):
+            for number, name in enumerate(distance_band_names()):
                 there = self.band == number
                 matrix = confusion_matrix(grids[k][there], called[there], len(self.frames.label_set))
                 self.matrices.setdefault(_key(method, truth, name), []).append(matrix)
@@ -149,6 +149,6 @@ def distance_bands(spec: GridSpec) -> NDArray[np.int64]:
     Returns
     -------
     (H, W) int64
-        Number of the band of `band_names`, by the horizontal distance from the LIDAR to the cell's centre.
+        Number of the band of `distance_band_names`, by the horizontal distance from the LIDAR to the cell's centre.
     """
     return np.digitize(np.hypot(*np.moveaxis(spec.centers(), -1, 0)), BANDS[1:-1])
