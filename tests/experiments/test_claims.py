@@ -76,8 +76,8 @@ def test_a_crf_that_smooths_reproduces_claims_2_and_3_and_one_that_does_nothing_
 
 def test_few_drives_or_seeds_are_too_small_to_tell():
     runs = SimpleNamespace(networks=networks(**SMOOTHED))
-    assert judge(2, runs, drives=9) == "cannot tell"
-    assert verdict(CLAIMS[2].statements(runs, None), 2, DRIVES) == "cannot tell"
+    assert judge(2, runs, drives=9) == "cannot tell (too small)"
+    assert verdict(CLAIMS[2].statements(runs, None), 2, DRIVES) == "cannot tell (too small)"
 
 
 @pytest.mark.parametrize(

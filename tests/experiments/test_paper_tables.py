@@ -81,7 +81,7 @@ def test_table_3_is_in_per_cent_of_its_rows():
 
 
 def test_every_command_has_a_result():
-    assert list(EXPERIMENTS) == ["table1", "table2", "table3", "claims", "ablations"]
+    assert list(EXPERIMENTS) == ["table1", "table2", "table3", "claims", "ablations", "figures"]
 
 
 def test_a_result_is_written_with_all_that_made_it(tmp_path):
@@ -90,7 +90,7 @@ def test_a_result_is_written_with_all_that_made_it(tmp_path):
         run.folder(tmp_path).mkdir()
         ended = {"seconds": seconds, "commit": "abc", "date": "2026-01-01"}
         (run.folder(tmp_path) / "ended.json").write_text(json.dumps(ended))
-    draw = lambda _: plt.figure()  # noqa: E731
+    draw = lambda *_: plt.figure()  # noqa: E731
     shown = Experiment("A table", "kitti", lambda _: 2, lambda *_: runs, lambda *_: {"x": 1}, lambda _: "of x", draw)
     text = write_result("table", shown, scale, 2, tmp_path, tmp_path / "out")
     content = json.loads((tmp_path / "out" / "table.json").read_text())

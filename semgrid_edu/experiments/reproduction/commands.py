@@ -12,6 +12,7 @@ HELP = {
     "table3": "Table 3: SegNet's confusion matrix on data without any error.",
     "claims": "The paper's nine claims, each with a verdict.",
     "ablations": "What the paper leaves open: planes, occupancy, reduction, balancing, calibration, frames, distance.",
+    "figures": "Figures 6 and 7: a few test frames with their labels and grids.",
     "all": "All of these.",
 }
 """The experiments of the paper, and what their commands say of themselves."""

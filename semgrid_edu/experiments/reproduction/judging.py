@@ -127,6 +127,7 @@ def claims_picture(result: dict) -> Figure:
     ax.invert_yaxis()
     ax.grid(axis="x", alpha=0.3)
     ax.set(xlabel="points on the claimed side of the limit (right of 0: as claimed)", xscale="symlog")
+    ax.xaxis.set_major_formatter("{x:g}")
     return figure
 
 

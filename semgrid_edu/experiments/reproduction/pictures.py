@@ -37,7 +37,7 @@ def accuracy_picture(result: dict) -> Figure:
         ax.grid(axis="x", alpha=0.3)
     axes[0].set_yticks(range(len(rows)), names)
     axes[0].invert_yaxis()
-    axes[-1].legend(handles=_legend(), loc="best", fontsize="small")
+    figure.legend(handles=_legend(), loc="outside lower center", ncols=4)
     return figure
 
 

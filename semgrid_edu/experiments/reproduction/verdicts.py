@@ -17,6 +17,9 @@ from semgrid_edu.experiments.reproduction.measured import Measured
 REPRODUCED, NOT_REPRODUCED, CANNOT_TELL = "reproduced", "not reproduced", "cannot tell"
 """The three verdicts."""
 
+TOO_SMALL = "cannot tell (too small)"
+"""The third one, when there are too few seeds or drives."""
+
 MIN_SEEDS, MIN_DRIVES = 3, 10
 """With fewer seeds or drives, no verdict."""
 
@@ -64,16 +67,16 @@ def verdict(statements: Sequence[Statement], seeds: int, drives: int) -> str:
     Returns
     -------
     str
-        `REPRODUCED`, `NOT_REPRODUCED` or `CANNOT_TELL`.
+        `REPRODUCED`, `NOT_REPRODUCED`, `CANNOT_TELL` or `TOO_SMALL`.
 
     Examples
     --------
     >>> gain = Statement("gain", {"mean": 0.02, "low": 0.01, "high": 0.03, "seeds": []})
     >>> verdict([gain], seeds=3, drives=110), verdict([gain._replace(above=False)], 3, 110), verdict([gain], 3, 2)
-    ('reproduced', 'not reproduced', 'cannot tell')
+    ('reproduced', 'not reproduced', 'cannot tell (too small)')
     """
     if seeds < MIN_SEEDS or drives < MIN_DRIVES:
-        return CANNOT_TELL
+        return TOO_SMALL
     found = [statement.holds for statement in statements]
     if False in found:
         return NOT_REPRODUCED
