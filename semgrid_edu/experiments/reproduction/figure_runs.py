@@ -116,7 +116,14 @@ def figure_runs(scale: Scale, seeds: int) -> list[FigureRun]:
 
 
 def shown_frames(scale: Scale, seeds: int, root: Path) -> dict:
-    """Return which frames the figures show, and their grids. Parameters are those of `figure_runs`; `root` holds them.
+    """Return which frames the figures show, and where their grids are.
+
+    Parameters
+    ----------
+    scale, seeds
+        As `figure_runs` takes them.
+    root : Path
+        The folder of all runs.
 
     Returns
     -------
