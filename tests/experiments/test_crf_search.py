@@ -165,5 +165,5 @@ def test_gains_over_several_drives_have_intervals():
     assert gains["pixel accuracy"] == list(paired_interval(a[None], b[None], pixel_accuracy))
     assert gains_by_metric(a[:1], b[:1])["pixel accuracy"] == [None, 0.5, None]
     text = gains_text({"CRF": gains, "one": gains_by_metric(a[:1], b[:1])})
-    assert "CRF: pixel accuracy +33.33 (-38.38 to +105.05)" in text  # t of 2 degrees of freedom, 4.30, times 50 / 3
+    assert "CRF: pixel accuracy +33.33 (-38.38 to +105.04)" in text  # t of 2 degrees of freedom, 4.30, times 50 / 3
     assert "one: pixel accuracy +50.00, class" in text
