@@ -96,7 +96,7 @@ def confusion_picture(result: dict) -> Figure:
 
 
 def ablations_picture(result: dict) -> Figure:
-    """Draw the ablations: pixel accuracy of the variants, with wrong calibrations, with few frames, and by distance.
+    """Draw the ablations: pixel accuracy of the variants, with wrong calibrations, by distance, and reliability.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def ablations_picture(result: dict) -> Figure:
     -------
     Figure
     """
-    figure, axes = plt.subplots(1, 3, figsize=(15, 6), layout="constrained")
+    figure, axes = plt.subplots(1, 4, figsize=(19, 6), layout="constrained")
     trained = [row for row in result["variants"] if row["what"] != "usual"] + result["frames"]
     for ax, rows, title in zip(
         axes, (trained, result["calibration"]), ("trained otherwise", "wrong calibration"), strict=False
@@ -121,7 +121,22 @@ def ablations_picture(result: dict) -> Figure:
         draw_measured(axes[2], place, row["pixel accuracy"])
     axes[2].set_yticks(range(len(result["distance"])), [row["what"] for row in result["distance"]])
     axes[2].set(title="by distance", xlabel="pixel accuracy, per cent of cells with a semantic class")
-    for ax in axes:
+    for ax in axes[:3]:
         ax.invert_yaxis()
         ax.grid(axis="x", alpha=0.3)
+    _draw_sureness(axes[3], result["sureness"])
     return figure
+
+
+def _draw_sureness(ax: Axes, rows: list[dict]) -> None:
+    """Draw the reliability diagram of each method, all seeds together."""
+    ax.plot([0, 1], [0, 1], color="0.4", linewidth=0.8)
+    for row, marker in zip(rows, "osD", strict=True):
+        cells, confidence, accuracy = (
+            np.array([diagram[name] for diagram in row["diagrams"]]) for name in ("cells", "confidence", "accuracy")
+        )
+        some = cells.sum(axis=0) > 0
+        sure, right = ((cells * part).sum(axis=0)[some] / cells.sum(axis=0)[some] for part in (confidence, accuracy))
+        ax.plot(sure, right, marker=marker, label=row["what"])
+    ax.set(title="reliability", xlabel="how sure: mean probability", ylabel="how often right", xlim=(0, 1), ylim=(0, 1))
+    ax.legend(loc="upper left")
