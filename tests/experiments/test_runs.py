@@ -17,6 +17,7 @@ from semgrid_edu.experiments.reproduction.plan import estimate, plan_table, with
 from semgrid_edu.experiments.reproduction.runs import check_runs_folder, claim_folder, run_one
 from semgrid_edu.experiments.reproduction.scales import SCALES, scale_named
 from semgrid_edu.networks import WEIGHTS
+from semgrid_edu.simulation.datasets import DatasetRecipe, Route, make_from_recipe
 from semgrid_edu.storage.workplace import Workplace, workplace
 
 A = Note("a")
@@ -163,12 +164,18 @@ def test_a_killed_plan_goes_on_with_the_same_bytes(trained, tmp_path):
     assert results(root) == results(trained)
 
 
-def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(trained, tmp_path):
+@pytest.fixture(scope="module")
+def cluster():
+    """A cluster of two workers on this machine."""
     distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None, scheduler_port=0) as cluster:
+        yield cluster
+
+
+def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(cluster, trained, tmp_path):
     first = tiny_trainings()[0]
     with (
-        distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None, scheduler_port=0) as cluster,
-        distributed.Client(cluster) as client,
+        cluster.get_client() as client,
         ThreadPoolExecutor(1) as driver,
         workplace(scheduler=cluster.scheduler_address) as place,
     ):
@@ -180,6 +187,13 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(trained, tmp_path):
         assert ended.result() == {}
         assert set(client.run(os.getpid).values()) != set(pids.values())
     assert results(tmp_path) == results(trained)
+
+
+def test_a_cluster_makes_the_same_data(cluster, tmp_path):
+    recipe = DatasetRecipe("two", "KITTI-14", (Route("drive", 1, True),) * 2)
+    alone = make_from_recipe(recipe, tmp_path / "alone", seed=3, workers=1)
+    together = make_from_recipe(recipe, tmp_path / "together", 3, 2, cluster.scheduler_address)
+    assert results(together) == results(alone)
 
 
 def test_a_cluster_without_answer_or_with_workers_of_its_own_is_refused():
