@@ -27,16 +27,18 @@ RATIOS = {
 """Standard deviations, on the logit scale, of seeds, of drives, and of what a seed does on one drive alone."""
 
 
-def population(method: int, of_seeds: float, of_drives: float, of_both: float) -> NDArray[np.float64]:
+def population(
+    method: int, of_seeds: float, of_drives: float, of_both: float, rarest: float = 0.7
+) -> NDArray[np.float64]:
     """Return the confusion matrices of 200 seeds of a method on 800 drives, (200, 800, 4, 4).
 
-    All methods meet the same drives. These differ in size by a log-normal factor, and three in ten lack the rarest of
-    four classes. The recall of a class varies on the logit scale, by the standard deviations of `RATIOS`; half of the
-    variance of seeds and drives is common to all classes.
+    All methods meet the same drives. These differ in size by a log-normal factor, and a share of them, `rarest`, has
+    the rarest of four classes. The recall of a class varies on the logit scale, by the standard deviations of `RATIOS`;
+    half of the variance of seeds and drives is common to all classes.
     """
     world, own, (n_seeds, n_drives, n) = np.random.default_rng(1), np.random.default_rng([2, method]), (200, 800, 4)
     cells = np.array([3000, 1500, 400, 120]) * world.lognormal(0, 0.8, (n_drives, n))
-    cells[:, 3] *= world.random(n_drives) > 0.3
+    cells[:, 3] *= world.random(n_drives) > 1 - rarest
     logit = np.array([2.0, 1.2, 0.6, 0.0]) + 0.1 * method
     for rng, sd, size in ((own, of_seeds, (n_seeds, 1)), (world, of_drives, (1, n_drives))):
         for of_class in (1, n):
@@ -50,7 +52,7 @@ def coverage(interval: Callable, metric: Metric, *methods: NDArray, trials: int 
     """Return how often an interval of one method, or of two that are compared, holds the true value."""
     on_all_drives = zip(*(method.sum(axis=1) for method in methods), strict=True)
     truth = np.mean([np.subtract.reduce([metric(matrix) for matrix in of_seed]) for of_seed in on_all_drives])
-    rng, held = np.random.default_rng(0), 0
+    rng, held = np.random.default_rng(1), 0
     for _ in range(trials):
         drawn = np.ix_(rng.integers(0, len(methods[0]), SEEDS), rng.integers(0, methods[0].shape[1], DRIVES))
         low, _, high = interval(*(method[drawn] for method in methods), metric)
@@ -79,6 +81,10 @@ def main() -> None:
         held.append(coverage(resampled_interval, METRICS["pixel accuracy"], a, b, trials=TRIALS // 10))
         rows.append([name, *map(per_cent, held)])
     print(markdown_table(rows))
+    for rarest in (0.2, 0.1, 0.05):
+        few = population(0, *RATIOS["seeds a little"], rarest)
+        held = per_cent(coverage(drive_interval, METRICS["class accuracy"], few))
+        print(f"a class in {rarest:.0%} of the drives: class accuracy {held}")
 
 
 if __name__ == "__main__":

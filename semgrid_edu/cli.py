@@ -200,11 +200,16 @@ def evaluate(
     data: Annotated[Path, typer.Option(help="A data set with train and test frames, such as data/minikitti.")],
     weights: Annotated[Path, typer.Option(help="A network trained on its train frames.")],
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("evaluation.json"),
+    confusions: Annotated[Path | None, typer.Option(help="Takes each frame's confusion matrices, as .npz.")] = None,
 ) -> None:
-    """Score a trained network and two simple baselines on the test frames."""
+    """Score a trained network and the baselines on the test frames."""
     from semgrid_edu.experiments.evaluate import evaluate, scores_table
 
-    keep_result(out, lambda: evaluate(data, weights), lambda result: scores_table(result["scores"]))
+    keep_result(
+        out,
+        lambda: evaluate(data, weights, confusions_file=confusions),
+        lambda result: scores_table(result["scores"]),
+    )
 
 
 @app.command()

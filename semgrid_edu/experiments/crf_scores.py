@@ -81,7 +81,7 @@ def compare_on_test(
     }
 
 
-def gains_by_metric(a: NDArray, b: NDArray) -> dict[str, list[float]]:
+def gains_by_metric(a: NDArray, b: NDArray) -> dict[str, list[float | None]]:
     """Return by how much one network's refined grids beat another one's on the same drives, by every metric.
 
     Parameters
@@ -93,6 +93,31 @@ def gains_by_metric(a: NDArray, b: NDArray) -> dict[str, list[float]]:
     -------
     dict of str to [low, gain, high]
         By metric, with the 95 % interval of `paired_interval`. There is one network, so the interval is for that one,
-        on new drives.
+        on new drives. One drive alone gives no interval: then low and high are None.
     """
+    if len(a) == 1:
+        return {name: [None, metric(a[0]) - metric(b[0]), None] for name, metric in METRICS.items()}
     return {name: list(paired_interval(a[None], b[None], metric)) for name, metric in METRICS.items()}
+
+
+def gains_text(gains: dict[str, dict[str, list[float | None]]]) -> str:
+    """Return gains as text to print, in points.
+
+    Parameters
+    ----------
+    gains : dict of str to dict
+        What `gains_by_metric` returns, by method.
+
+    Returns
+    -------
+    str
+        One line per method, with intervals in brackets where there are any.
+    """
+    lines = ["gain over the network without CRF, points, and its 95 % interval over test drives:"]
+    for method, by_metric in gains.items():
+        shown = []
+        for name, (low, gain, high) in by_metric.items():
+            interval = "" if low is None else f" ({100 * low:+.2f} to {100 * high:+.2f})"
+            shown.append(f"{name} {100 * gain:+.2f}{interval}")
+        lines.append(f"{method}: {', '.join(shown)}")
+    return "\n".join(lines)

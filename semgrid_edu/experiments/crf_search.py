@@ -11,7 +11,7 @@ from semgrid_edu.datasets.index import INDEX_FILE, load_index
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.crf_outputs import grid_outputs, outputs_at, refuse_known_drives
-from semgrid_edu.experiments.crf_scores import calibration, compare_on_test
+from semgrid_edu.experiments.crf_scores import calibration, compare_on_test, gains_text
 from semgrid_edu.experiments.crf_trials import (
     OBJECTIVES,
     next_params,
@@ -135,12 +135,7 @@ def search_table(result: dict) -> str:
         warning = "; none of the trials kept class accuracy" if objective == OBJECTIVES[2] and crf < net else ""
         lines.append(f"best {objective}: trial {trial['trial']}, {params}{warning}")
         lines.append(f"    on the validation drives {', '.join(accuracies)}")
-    lines += ["", scores_table(result["test"]["scores"]), "", "gain over the network without CRF, points:"]
-    for method, gains in result["test"]["gains"].items():
-        shown = (
-            f"{name} {100 * g:+.2f} ({100 * low:+.2f} to {100 * high:+.2f})" for name, (low, g, high) in gains.items()
-        )
-        lines.append(f"{method}: {', '.join(shown)}")
+    lines += ["", scores_table(result["test"]["scores"]), "", gains_text(result["test"]["gains"])]
     return "\n".join(lines)
 
 

@@ -3,15 +3,16 @@
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
 from numpy.typing import NDArray
 from torch import nn
 
-from semgrid_edu.datasets.ground_truth import carry_labels, close_gaps
 from semgrid_edu.datasets.training_cache import SEED
 from semgrid_edu.datasets.training_set import TrainingSet
-from semgrid_edu.experiments.baselines import majority_class
-from semgrid_edu.experiments.confusions import frame_confusions
+from semgrid_edu.experiments.baseline_grids import baseline_grids, carried_grids
+from semgrid_edu.experiments.confusions import FrameConfusions, frame_confusions, save_confusions
 from semgrid_edu.experiments.learned_grids import Grids, Refine, best_labels, network_grids
+from semgrid_edu.experiments.statistics import drive_interval
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS, semantic_cells
 from semgrid_edu.networks import IMAGE_STAGE, SemanticGridNet, load_net
@@ -22,8 +23,16 @@ from semgrid_edu.storage.provenance import versions
 Scores = dict[str, dict[str, dict[str, float]]]
 """Values of the metrics, 0..1: by method, by cells ("all" or "semantic"), by metric."""
 
+Intervals = dict[str, dict[str, dict[str, list[float]]]]
+"""The same with [low, value, high] of a 95 % interval in place of the value."""
 
-def evaluate(dataset_dir: str | Path, weights: str | Path, refine: Refine | None = None) -> dict[str, object]:
+
+def evaluate(
+    dataset_dir: str | Path,
+    weights: str | Path,
+    refine: Refine | None = None,
+    confusions_file: str | Path | None = None,
+) -> dict[str, object]:
     """Score the network and the baselines on the test split of a data set.
 
     Parameters
@@ -36,12 +45,14 @@ def evaluate(dataset_dir: str | Path, weights: str | Path, refine: Refine | None
         learned from images alone, not yet from grids.
     refine : callable, optional
         Refines the network's grids, as in `Stages`, and is named in the row "network + ..."; the CRF when left out.
+    confusions_file : path-like, optional
+        Takes the confusion matrix of each frame, see `save_confusions`.
 
     Returns
     -------
     dict
-        "scores" (see `Scores`), "confusion" (a matrix for each method, one row per true class), and what they were
-        computed from; it can be written as JSON.
+        "scores" (see `Scores`), "intervals" (see `Intervals`; None when there is one test drive), "confusion" (a matrix
+        for each method, one row per true class), and what they were computed from; it can be written as JSON.
 
     Raises
     ------
@@ -58,11 +69,13 @@ def evaluate(dataset_dir: str | Path, weights: str | Path, refine: Refine | None
     image_stage = Path(weights).with_name(IMAGE_STAGE)
     if image_stage.exists():
         segmenters["image-stage"] = load_net(image_stage, test.camera).segmenter
-    grids = compared_grids(net, segmenters, majority_class(training.arrays["truth"]), refine)
-    compared = frame_confusions(grids, test)
+    compared = frame_confusions(compared_grids(net, segmenters, training, refine), test)
+    if confusions_file:
+        save_confusions(confusions_file, compared)
     confusions = {method: compared.total(method) for method in compared.counts}
     return {
         "scores": scores(confusions, test.label_set),
+        "intervals": intervals(compared, test.label_set) if len(set(test.drives)) > 1 else None,
         "confusion": {method: confusion.tolist() for method, confusion in confusions.items()},
         "classes": list(test.label_set.names),
         "frames": {"train": len(training), "test": len(test)},
@@ -85,7 +98,7 @@ def _name(refine: Refine | None) -> str:
 
 
 def compared_grids(
-    net: SemanticGridNet, segmenters: dict[str, nn.Module], majority: NDArray, refine: Refine | None = None
+    net: SemanticGridNet, segmenters: dict[str, nn.Module], training: TrainingSet, refine: Refine | None = None
 ) -> Grids:
     """Return the function that makes the grids of every method for a frame, as `frame_confusions` takes it.
 
@@ -94,9 +107,9 @@ def compared_grids(
     net : SemanticGridNet
         The network, for the grid and the images of the frames.
     segmenters : dict of str to Module
-        Image networks by name, i -> s. Geometry carries their labels from the image to the grid.
-    majority : (H, W) int
-        The majority class of each cell.
+        Image networks by name, i -> s. Geometry carries their labels from the image to the grid, see `carried_grids`.
+    training : TrainingSet
+        The frames that the baselines learn from.
     refine : callable, optional
         Refines the network's grids, as in `evaluate`.
 
@@ -106,18 +119,41 @@ def compared_grids(
         (frames, k) -> grids of frame k by method.
     """
     learned = network_grids(net, {_name(refine): refine or Stages.of(net).refine})
+    baselines = baseline_grids(training)
 
     def grids(frames: TrainingSet, k: int) -> dict[str, NDArray]:
-        sample = frames[k]
-        found = {"majority class": majority, **learned(frames, k)}
-        labels = {name: best_labels(segmenter, sample) for name, segmenter in segmenters.items()}
-        for name, label_image in (labels | {"true": sample.labels.numpy()}).items():
-            carried = carry_labels(label_image, *frames.returns(k), sample.occupancy.numpy())
-            found[f"geometry, {name} labels"] = carried
-            found[f"geometry, {name} labels, gaps closed"] = close_gaps(carried, frames.spec.cell)
+        found = {**learned(frames, k), **baselines(frames, k)}
+        for name, segmenter in segmenters.items():
+            found |= carried_grids(name, best_labels(segmenter, frames[k]), frames, k)
         return found
 
     return grids
+
+
+def intervals(compared: FrameConfusions, label_set: LabelSet) -> Intervals:
+    """Return the confidence intervals of all scores, over drives.
+
+    Parameters
+    ----------
+    compared : FrameConfusions
+        Confusion matrices of the frames of two drives or more.
+    label_set : LabelSet
+        The classes, of which it says which are semantic.
+
+    Returns
+    -------
+    Intervals
+        From `drive_interval`: each is for this one network, or baseline, on new drives.
+    """
+    result: Intervals = {}
+    for method in compared.counts:
+        by_drive = compared.by_drive(method)
+        semantic = np.stack([semantic_cells(matrix, label_set) for matrix in by_drive])
+        result[method] = {
+            cells: {name: list(drive_interval(matrices[None], metric)) for name, metric in METRICS.items()}
+            for cells, matrices in (("all", by_drive), ("semantic", semantic))
+        }
+    return result
 
 
 def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:
@@ -126,7 +162,7 @@ def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:
     Parameters
     ----------
     confusions : dict of str to (C, C) int
-        Confusion matrix of each method, from `confusion_matrices`.
+        Confusion matrix of each method.
     label_set : LabelSet
         The classes, of which it says which are semantic.
 

@@ -23,7 +23,7 @@ from semgrid_edu.experiments.crf_outputs import (
     refined_grids,
     refuse_known_drives,
 )
-from semgrid_edu.experiments.crf_scores import gains_by_metric
+from semgrid_edu.experiments.crf_scores import gains_by_metric, gains_text
 from semgrid_edu.experiments.evaluate import scores, scores_table
 from semgrid_edu.experiments.learned_crf import MEAN_FIELD_UPDATES, VARIANTS, train_crf_on
 from semgrid_edu.networks import WEIGHTS, load_net
@@ -192,13 +192,7 @@ def learned_crf_table(result: dict) -> str:
     str
         Scores in per cent; gains over the network without CRF in points, with 95 % intervals over test drives.
     """
-    lines = [scores_table(result["scores"]), "", "gain over the network without CRF, points:"]
-    for method, gains in result["gains"].items():
-        shown = (
-            f"{name} {100 * g:+.2f} ({100 * low:+.2f} to {100 * high:+.2f})" for name, (low, g, high) in gains.items()
-        )
-        lines.append(f"{method}: {', '.join(shown)}")
-    lines.append("")
+    lines = [scores_table(result["scores"]), "", gains_text(result["gains"]), ""]
     for method, learnt in result["learnt"].items():
         named = (f"{name} {value:.3g}" for name, value in learnt.items() if name != "compatibility")
         lines.append(f"{method}: {', '.join(named)}")

@@ -4,7 +4,9 @@ Simulated drives are filtered by CMCDOT, their calibration, labels and scans get
 (`TruthFlaws`), each policy makes the truth of the frame in the middle, and its cells are counted (`TruthCounts`).
 """
 
+import hashlib
 from collections.abc import Iterable
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -19,9 +21,9 @@ from semgrid_edu.experiments.occupancy import LIDARS
 from semgrid_edu.experiments.simulated_runs import GRIDS, check_request
 from semgrid_edu.experiments.truth_counts import BAND_EDGES, COUNTED, TruthCounts
 from semgrid_edu.experiments.truth_trials import REACH, TRIALS, Trial
-from semgrid_edu.frame import Frame, FrameLabels
+from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import KITTI_14
+from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.occupancy import track_drive
 from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.simulation.sensors.rig import Rig
@@ -62,8 +64,8 @@ def truth_policies(
     -------
     dict
         "drives": by number of the drive and name of the trial, each of `COUNTED` added up over classes and distances;
-        "sums": by name of the trial the cells of `TruthCounts`, of all drives; and all that made them. JSON can hold
-        it.
+        "sums": by name of the trial the cells of `TruthCounts`, of all drives; "policies": the trials; and all that
+        made them. JSON can hold it.
 
     Raises
     ------
@@ -86,11 +88,12 @@ def truth_policies(
             for name, one in counts.items():
                 sums[name] = (one + TruthCounts(np.array(sums.get(name, 0)))).cells.tolist()
             spent = minutes + (datetime.now(UTC) - began).total_seconds() / 60
-            result = identity | {"drives": done, "sums": sums, "minutes": {"of all drives": round(spent, 2)}}
-            write_json(log, result)
+            write_json(log, identity | {"drives": done, "sums": sums, "minutes": {"of all drives": round(spent, 2)}})
             bar.update()
     choices = f"--grid {grid} --lidar {lidar}"
-    return identity | {
+    return {
+        **identity,
+        **_legend(trials),
         "drives": done,
         "sums": sums,
         "minutes": read_parts(log, identity, "minutes"),
@@ -101,12 +104,15 @@ def truth_policies(
 
 
 def _identity(seed: int, grid: str, lidar: str, trials: dict[str, Trial]) -> dict[str, object]:
-    """Return what makes the experiment, for the log to be compared with."""
+    """Return what makes the experiment, for the log to be compared with; all trials as one short number."""
+    digest = hashlib.sha256(repr(trials).encode()).hexdigest()[:16]
+    return {"seed": seed, "grid": grid, "lidar": lidar, "trials": digest}
+
+
+def _legend(trials: dict[str, Trial]) -> dict[str, object]:
+    """Return what the numbers of a result stand for."""
     return {
-        "seed": seed,
-        "grid": grid,
-        "lidar": lidar,
-        "trials": {name: repr(trial) for name, trial in trials.items()},
+        "policies": {name: asdict(trial.policy) | {"errors": asdict(trial.flaws)} for name, trial in trials.items()},
         "counted": list(COUNTED),
         "bands": list(BAND_EDGES),
         "classes": list(KITTI_14.names[: KITTI_14.n_semantic]),
@@ -114,7 +120,9 @@ def _identity(seed: int, grid: str, lidar: str, trials: dict[str, Trial]) -> dic
 
 
 def simulated_drive(number: int, lidar: str = "coarse", n_frames: int = 2 * REACH + 1) -> list[Frame]:
-    """Take the frames of a simulated drive, of which the one in the middle has labels; none has an image.
+    """Take the frames of a simulated drive with labels of their pixels, but without images.
+
+    The frame in the middle has bird's-eye labels too. Those of the others are 255.
 
     Parameters
     ----------
@@ -130,15 +138,15 @@ def simulated_drive(number: int, lidar: str = "coarse", n_frames: int = 2 * REAC
     list of Frame
     """
     drive = SimulatedDrive(number, n_frames, rig=Rig(lidar=LIDARS[lidar]))
-    return [_labelled_frame(drive, k) if k == n_frames // 2 else drive.scan(k) for k in range(n_frames)]
+    return [_labelled_frame(drive, k, birdseye=k == n_frames // 2) for k in range(n_frames)]
 
 
-def _labelled_frame(drive: SimulatedDrive, k: int) -> Frame:
+def _labelled_frame(drive: SimulatedDrive, k: int, birdseye: bool) -> Frame:
     """Take a frame with labels in KITTI-14, as a data set on disk would hold it, but without the image."""
-    taken, classes = drive.frame(k, labelled=True), class_of_kind(KITTI_14)
-    labels = FrameLabels(
-        KITTI_14, classes[taken.picture.kind], taken.picture.depth, classes[taken.truth.kinds], taken.truth.visible
-    )
+    taken, classes = drive.frame(k, labelled=birdseye), class_of_kind(KITTI_14)
+    kinds = taken.truth.kinds if birdseye else np.full(LABEL_GRID.shape, IGNORE, np.uint8)
+    visible = taken.truth.visible if birdseye else np.zeros(LABEL_GRID.shape, bool)
+    labels = FrameLabels(KITTI_14, classes[taken.picture.kind], taken.picture.depth, classes[kinds], visible)
     return Frame(None, taken.points, drive.rig.camera, taken.T_world_from_lidar, k * PERIOD, labels)
 
 

@@ -31,6 +31,8 @@ class Architecture:
         Whether the fusion network sees the occupancy grid. Without, each cell is UNKNOWN to it, whatever grid it is
         given: so all else, also the initial weights, is that of the network with occupancy, and the two can be
         compared.
+    reduces : bool
+        Whether the 1x1 convolution reduces the planes. Without, all D x C of them go into the conv-deconv network.
     """
 
     segmenter: str = "segnet"
@@ -40,3 +42,4 @@ class Architecture:
     grid: GridSpec = field(default_factory=GridSpec.compact)
     heights: tuple[float, ...] = tuple(plane_heights().tolist())
     uses_occupancy: bool = True
+    reduces: bool = True

@@ -6,6 +6,10 @@ from torch import Tensor, nn
 from semgrid_edu.networks.conv_deconv import ConvDeconv, fresh_weights
 from semgrid_edu.occupancy import N_STATES, State
 
+N_REDUCED = 16
+"""Number of planes after the reduction. The paper gives no number; with 16 of 280 the reduction costs less than the
+network after it."""
+
 
 class FusionNet(nn.Module):
     """Fuse the image's scores on D planes with the occupancy grid: (p, o) -> g.
@@ -22,9 +26,8 @@ class FusionNet(nn.Module):
         D, the number of planes.
     n_classes : int
         C, the number of classes of the semantic grid.
-    n_reduced : int
-        Number of planes after the reduction. The paper gives no number; with 16 of 280 the reduction costs less
-        than the network after it.
+    n_reduced : int or None
+        Number of planes after the reduction; None to leave it out, so that the conv-deconv network takes all D x C.
     seed : int
         Seed for the initial weights.
     uses_occupancy : bool
@@ -39,18 +42,16 @@ class FusionNet(nn.Module):
         n_scores: int,
         n_planes: int,
         n_classes: int,
-        n_reduced: int = 16,
+        n_reduced: int | None = N_REDUCED,
         seed: int = 0,
         uses_occupancy: bool = True,
     ) -> None:
         super().__init__()
         self.uses_occupancy = uses_occupancy
         with fresh_weights(self, seed):
-            # On (B, C, D, H, W) a D x 1 x 1 kernel is the 1x1 convolution of all D x C planes.
-            self.reduce = nn.Sequential(
-                nn.Conv3d(n_scores, n_reduced, (n_planes, 1, 1)), nn.BatchNorm3d(n_reduced), nn.ReLU(inplace=True)
-            )
-            self.conv_deconv = ConvDeconv(n_reduced + N_STATES, n_classes, self.WIDTHS, self.DEPTHS, skips=True)
+            self.reduce = _reduction(n_scores, n_planes, n_reduced)
+            n_left = n_reduced or n_scores * n_planes
+            self.conv_deconv = ConvDeconv(n_left + N_STATES, n_classes, self.WIDTHS, self.DEPTHS, skips=True)
 
     def forward(self, planes: Tensor, occupancy: Tensor) -> Tensor:
         """Return the logits of the semantic grid; a soft-max over C makes them probabilities.
@@ -95,3 +96,12 @@ def _unknown_everywhere(occupancy: Tensor) -> Tensor:
     unknown = torch.zeros_like(occupancy)
     unknown[:, State.UNKNOWN] = 1
     return unknown
+
+
+def _reduction(n_scores: int, n_planes: int, n_reduced: int | None) -> nn.Module:
+    """Return what takes (B, C, D, H, W) to (B, n_reduced, 1, H, W); without a number to (B, C x D, 1, H, W)."""
+    if n_reduced is None:
+        return nn.Sequential(nn.Flatten(1, 2), nn.Unflatten(1, (n_scores * n_planes, 1)))
+    # On (B, C, D, H, W) a D x 1 x 1 kernel is the 1x1 convolution of all D x C planes.
+    convolution = nn.Conv3d(n_scores, n_reduced, (n_planes, 1, 1))
+    return nn.Sequential(convolution, nn.BatchNorm3d(n_reduced), nn.ReLU(inplace=True))

@@ -6,7 +6,7 @@ from torch import Tensor, nn
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks.architecture import Architecture
-from semgrid_edu.networks.fusion import FusionNet
+from semgrid_edu.networks.fusion import N_REDUCED, FusionNet
 from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.planes import PlaneSampler
 
@@ -65,8 +65,15 @@ class SemanticGridNet(nn.Module):
         self.n_classes = n_classes
         self.architecture = architecture
         n_scores = getattr(segmenter, "n_classes", n_classes)
-        uses_occupancy = architecture is None or architecture.uses_occupancy
-        self.fusion = FusionNet(n_scores, sampler.planes_shape[0], n_classes, seed=seed, uses_occupancy=uses_occupancy)
+        usual = architecture or Architecture()
+        self.fusion = FusionNet(
+            n_scores,
+            sampler.planes_shape[0],
+            n_classes,
+            n_reduced=N_REDUCED if usual.reduces else None,
+            seed=seed,
+            uses_occupancy=usual.uses_occupancy,
+        )
 
     def need_architecture(self) -> Architecture:
         """Return the architecture, for work that can't be done without it, such as saving or training.

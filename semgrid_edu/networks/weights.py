@@ -35,8 +35,9 @@ def save_net(net: SemanticGridNet, path: str | Path) -> None:
         When the network has no architecture, so that nothing says how to build it again.
     """
     description = asdict(net.need_architecture())
-    if description["uses_occupancy"]:  # left out, so that networks have the checksums they had before this existed
-        del description["uses_occupancy"]
+    for name in ("uses_occupancy", "reduces"):
+        if description[name]:  # left out, so that networks have the checksums they had before this existed
+            del description[name]
     tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in net.state_dict().items()}
     write_tensors(path, tensors, {"architecture": json.dumps(description)})
 

@@ -1,5 +1,7 @@
 """Truth on the grid: the class where the camera sees, the kind of unknown elsewhere."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -53,5 +55,18 @@ def test_refuses_other_shapes_and_label_sets(states):
     labels = make_labels(np.zeros(LABEL_GRID.shape, np.uint8), np.ones(LABEL_GRID.shape, bool))
     with pytest.raises(ArgumentError, match="belief_probability"):
         grid_truth(labels, belief_of(states)[:, 1:], SPEC)
-    with pytest.raises(ArgumentError, match="SYNTHIA-10"):
-        grid_truth(make_labels(labels.birdseye, labels.visible, SYNTHIA_10), belief_of(states), SPEC)
+    other = replace(KITTI_14, name="other")
+    with pytest.raises(ArgumentError, match="KITTI-14 or SYNTHIA-10, found other"):
+        grid_truth(make_labels(labels.birdseye, labels.visible, other), belief_of(states), SPEC)
+
+
+def test_without_a_label_synthias_cells_are_void(states):
+    birdseye = np.full(LABEL_GRID.shape, SYNTHIA_10.index("lane"), np.uint8)
+    birdseye[:, 150:] = IGNORE
+    visible = np.zeros(LABEL_GRID.shape, bool)
+    visible[350:] = True
+    expected = np.full(SPEC.shape, SYNTHIA_10.index("void"))
+    expected[70:, :30] = SYNTHIA_10.index("lane")
+    np.testing.assert_array_equal(
+        grid_truth(make_labels(birdseye, visible, SYNTHIA_10), belief_of(states), SPEC), expected
+    )

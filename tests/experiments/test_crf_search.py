@@ -11,8 +11,11 @@ from semgrid_edu.crf import search as rules
 from semgrid_edu.datasets import KittiRawDrive, training_cache
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.experiments import crf_search
+from semgrid_edu.experiments.crf_scores import gains_by_metric, gains_text
 from semgrid_edu.experiments.crf_trials import objective_values
 from semgrid_edu.experiments.evaluate import evaluate
+from semgrid_edu.experiments.statistics import paired_interval
+from semgrid_edu.metrics import pixel_accuracy
 from semgrid_edu.networks import Architecture, build_net, save_net
 
 TRIALS = 6
@@ -160,3 +163,14 @@ def test_a_loss_of_class_accuracy_is_worth_less_than_any_gain_in_pixels():
     trials, unrefined = [trial(0.9, 0.5), trial(0.8, 0.6), trial(0.7, 0.7)], {"all": {"class accuracy": 0.6}}
     expected = [[0.9, 0.5, -0.1], [0.8, 0.6, 0.8], [0.7, 0.7, 0.7]]
     np.testing.assert_allclose(objective_values(trials, unrefined), expected)
+
+
+def test_gains_over_several_drives_have_intervals():
+    right, half = np.diag([10, 0]), np.array([[5, 5], [0, 0]])
+    a, b = np.stack([right, half, right]), np.stack([half, half, half])
+    gains = gains_by_metric(a, b)
+    assert gains["pixel accuracy"] == list(paired_interval(a[None], b[None], pixel_accuracy))
+    assert gains_by_metric(a[:1], b[:1])["pixel accuracy"] == [None, 0.5, None]
+    text = gains_text({"CRF": gains, "one": gains_by_metric(a[:1], b[:1])})
+    assert "CRF: pixel accuracy +33.33 (-38.38 to +105.04)" in text  # t of 2 degrees of freedom, 4.30, times 50 / 3
+    assert "one: pixel accuracy +50.00, class" in text

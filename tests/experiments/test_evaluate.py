@@ -7,17 +7,31 @@ import pytest
 import torch
 from tiny_drive import write_tiny_dataset
 
+from semgrid_edu.camera import Camera
 from semgrid_edu.datasets import KittiRawDrive, training_cache
-from semgrid_edu.experiments.confusions import frame_confusions
-from semgrid_edu.experiments.evaluate import compared_grids, evaluate, scores, scores_table
+from semgrid_edu.experiments.confusions import FrameConfusions, frame_confusions, load_confusions
+from semgrid_edu.experiments.evaluate import compared_grids, evaluate, intervals, scores, scores_table
+from semgrid_edu.experiments.statistics import drive_interval
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
+from semgrid_edu.metrics import pixel_accuracy
 from semgrid_edu.networks import Architecture, build_net, save_net
 from semgrid_edu.pipeline import StageError
 from semgrid_edu.storage.files import sha256
 
 ROAD, CAR, FREE, STATIC = (KITTI_14.index(name) for name in ("road", "car", "unknown-free", "unknown-static"))
 TRUTH = np.array([[[ROAD, CAR], [FREE, STATIC]]], np.uint8)
+LABELS = np.array([[ROAD, CAR], [255, 255]], np.uint8)
+_FREE, _STATIC = np.array([[0.97, 0.01, 0.01, 0.01], [0.01, 0.97, 0.01, 0.01]], np.float32)
+OCCUPANCY = np.stack([[_FREE, _STATIC], [_FREE, _STATIC]]).transpose(2, 0, 1).copy()
+
+# From 1 m above the ground straight down: the image of four pixels is the map of the four cells.
+LOOKS_DOWN = Camera(
+    np.array([[2, 0, 1.5], [0, 2, 1.5], [0, 0, 1]]),
+    np.array([[0.0, -1, 0, 0], [-1, 0, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1]]),
+    (2, 2),
+    lidar_height=1.0,
+)
 
 
 class FourCells:
@@ -25,7 +39,8 @@ class FourCells:
 
     label_set, drives = KITTI_14, ("2026_01_01 0001",)
     spec = GridSpec(0.0, 1.0, 0.0, 1.0, 0.5)
-    arrays = {"truth": TRUTH}  # noqa: RUF012
+    camera = LOOKS_DOWN
+    arrays = {"truth": TRUTH, "occupancy": OCCUPANCY[None], "labels": LABELS[None]}  # noqa: RUF012
 
     def __len__(self):
         return 1
@@ -33,14 +48,17 @@ class FourCells:
     def __getitem__(self, k):
         from semgrid_edu.datasets.training_set import Sample
 
-        free, static = np.array([[0.97, 0.01, 0.01, 0.01], [0.01, 0.97, 0.01, 0.01]], np.float32)
-        occupancy = np.stack([[free, static], [free, static]]).transpose(2, 0, 1).copy()
-        labels = np.array([[ROAD, CAR], [255, 255]], np.uint8)
-        parts = np.zeros((3, 2, 2), np.uint8), labels, occupancy, TRUTH[0]
+        parts = np.zeros((3, 2, 2), np.uint8), LABELS, OCCUPANCY, TRUTH[0]
         return Sample(*map(torch.from_numpy, parts))
 
     def returns(self, k):
         return np.arange(4), np.arange(4)
+
+
+class AllCars(FourCells):
+    """What the baselines learn from."""
+
+    arrays = FourCells.arrays | {"truth": np.full((1, 2, 2), CAR)}
 
 
 class AlwaysRoad:
@@ -58,7 +76,7 @@ class AlwaysRoad:
 
 def confusions_of(segmenters, refine=None):
     """The confusion matrices of a network that sees road everywhere, when cars are the majority of each cell."""
-    grids = compared_grids(AlwaysRoad(), segmenters, np.full((2, 2), CAR), refine)
+    grids = compared_grids(AlwaysRoad(), segmenters, AllCars(), refine)
     found = frame_confusions(grids, FourCells())
     return {method: found.total(method) for method in found.counts}
 
@@ -74,10 +92,15 @@ def test_scores_are_those_counted_by_hand(found):
         "majority class": 0.25,
         "network": 0.25,
         "network + CRF": 0.25,
+        "occupancy alone": 0.25,
         "geometry, all-road labels": 0.25,
         "geometry, all-road labels, gaps closed": 0.25,
+        "flat ground, all-road labels": 0.25,
+        "flat ground, all-road labels, observed cells": 0.25,
         "geometry, true labels": 1.0,
         "geometry, true labels, gaps closed": 0.5,  # the free and the static cell take the class of their neighbour
+        "flat ground, true labels": 1.0,
+        "flat ground, true labels, observed cells": 1.0,
     }
     assert found["network"]["semantic"]["class accuracy"] == 0.5
 
@@ -101,8 +124,21 @@ def test_a_refinement_that_gives_no_probabilities_is_refused():
 def test_table_shows_every_method_and_number(found):
     lines = scores_table(found).splitlines()
     assert len(lines) == 2 + len(found)
-    assert [float(word) for word in lines[-2].split("labels")[1].split()] == [100.0] * 6
+    (line,) = (line for line in lines if line.startswith("geometry, true labels "))
+    assert [float(word) for word in line.split("labels")[1].split()] == [100.0] * 6
     assert json.loads(json.dumps(found)) == found
+
+
+def test_intervals_are_those_of_the_drives():
+    right, wrong = np.zeros((2, 14, 14), np.int64)
+    right[ROAD, ROAD], wrong[ROAD, FREE] = 10, 10
+    counts = np.stack([right + wrong, right, right + wrong, 2 * wrong])
+    counts[:, FREE, FREE] = 20
+    found = intervals(FrameConfusions(("a", "a", "b", "b"), {"network": counts}), KITTI_14)["network"]
+    for cells, empty in (("all", False), ("semantic", True)):
+        by_drive = np.array([counts[:2].sum(axis=0), counts[2:].sum(axis=0)])
+        by_drive[:, FREE] *= not empty
+        assert found[cells]["pixel accuracy"] == list(drive_interval(by_drive[None], pixel_accuracy))
 
 
 def test_evaluates_a_network_from_disk(tmp_path, monkeypatch):
@@ -115,11 +151,15 @@ def test_evaluates_a_network_from_disk(tmp_path, monkeypatch):
     camera = KittiRawDrive(root, "2026_01_01", "0001").camera
     save_net(build_net(Architecture(), camera), tmp_path / "net.safetensors")
     save_net(build_net(Architecture(), camera, seed=1), tmp_path / "image_stage.safetensors")
-    result = evaluate(root, tmp_path / "net.safetensors")
+    result = evaluate(root, tmp_path / "net.safetensors", confusions_file=tmp_path / "confusions.npz")
     assert {"geometry, end-to-end labels", "geometry, image-stage labels"} < result["scores"].keys()
     assert result == json.loads(json.dumps(result))
     assert result["frames"] == {"train": 1, "test": 1}
     assert result["weights"]["sha256"] == sha256(tmp_path / "net.safetensors")
     assert result["command"] == "semgrid-edu evaluate --data tiny --weights net.safetensors"
+    assert result["intervals"] is None  # of one drive
+    kept = load_confusions(tmp_path / "confusions.npz")
+    assert kept.drives == ("2026_01_01 0003",)
     for method, confusion in result["confusion"].items():
+        assert kept.total(method).tolist() == confusion
         assert np.sum(confusion) == 142 * 62, method  # every cell has a class

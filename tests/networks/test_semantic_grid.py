@@ -187,3 +187,13 @@ def test_the_image_is_as_the_network_sees_it_and_so_is_the_camera(camera):
     seen = inside & (sampled != 0)
     assert seen.sum() > 0.9 * inside.sum()
     np.testing.assert_allclose(sampled[seen], expected[seen], atol=1e-3)
+
+
+def test_without_the_reduction_all_planes_reach_the_conv_deconv_network():
+    fusion = FusionNet(n_scores=3, n_planes=4, n_classes=5, n_reduced=None)
+    planes = torch.randn(2, 3, 4, 8, 8, generator=torch.Generator().manual_seed(0))
+    kept = fusion.reduce(planes)
+    assert torch.equal(kept[:, :, 0], planes.flatten(1, 2))
+    assert fusion(planes, torch.full((2, 4, 8, 8), 0.25)).shape == (2, 5, 8, 8)
+    first = next(module for module in fusion.conv_deconv.modules() if isinstance(module, torch.nn.Conv2d))
+    assert first.in_channels == 3 * 4 + 4

@@ -6,10 +6,11 @@ import pytest
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.mover_times import convoy_pairs
 from semgrid_edu.frame import LABEL_GRID
-from semgrid_edu.simulation.drive import PERIOD
+from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.simulation.named_streets import TEST_STREETS, named_street
 from semgrid_edu.simulation.sensors.rig import Rig
-from semgrid_edu.simulation.street.plan import ANY, YARD, draw_plan
+from semgrid_edu.simulation.street.casts import overturned_car
+from semgrid_edu.simulation.street.plan import ANY, YARD, Wishes, draw_plan
 from semgrid_edu.simulation.street.trajectories import Departure
 from semgrid_edu.simulation.things.materials import Kind, Material
 
@@ -150,3 +151,14 @@ def test_an_unknown_street_is_refused():
 
 def test_every_street_has_a_name_of_its_own():
     assert len(set(TEST_STREETS)) == len(TEST_STREETS) == 10
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_car_lies_on_its_top_a_few_metres_ahead(seed):
+    objects = SimulatedDrive(seed, 3, Wishes(cast=overturned_car)).objects(2 * PERIOD)
+    (lying,) = (one for one in objects if one.get("overturned"))
+    assert lying["class"] == "car"
+    assert not lying["moving"]
+    assert 9 <= lying["centre"][0] <= 23
+    assert lying["centre"][2] == pytest.approx(lying["size"][2] / 2, abs=0.3)
+    assert all("overturned" not in one for one in objects if one is not lying)

@@ -31,6 +31,20 @@ def test_placing_turns_then_moves():
     assert turned.vertices.mean(axis=0) == pytest.approx([10, 21, 1], abs=1e-5)
 
 
+def test_an_overturned_car_stands_on_its_roof():
+    height = car_size("sedan")[2]
+    upright, lying = car("sedan"), car("sedan").overturned(height)
+    ends = upright.vertices.min(axis=0), upright.vertices.max(axis=0)
+    turned = lying.vertices.min(axis=0), lying.vertices.max(axis=0)
+    np.testing.assert_allclose(turned[0][2], height - ends[1][2], atol=1e-5)
+    np.testing.assert_allclose([turned[0][0], turned[1][0]], [ends[0][0], ends[1][0]], atol=1e-5)
+    np.testing.assert_allclose(lying.vertices[:, 2], height - upright.vertices[:, 2], atol=1e-5)
+    outward = np.cross(*(lying.vertices[lying.faces[:, k]] - lying.vertices[lying.faces[:, 0]] for k in (1, 2)))
+    lengths = np.linalg.norm(outward, axis=1, keepdims=True)
+    flat = lengths[:, 0] > 1e-6
+    np.testing.assert_allclose((outward / np.maximum(lengths, 1e-9))[flat], lying.normals[flat], atol=1e-3)
+
+
 def test_merging_keeps_every_triangle():
     one, two = box((0, 0, 0), (1, 1, 1), **STYLE), ball((5, 0, 0), (1, 1, 1), **STYLE)
     both = merge([one, two])

@@ -10,6 +10,9 @@ HELP = {
     "table1": "Table 1: SegNet, FCN and DeepLab, with and without the CRF.",
     "table2": "Table 2: SegNet on routes that were never driven in training.",
     "table3": "Table 3: SegNet's confusion matrix on data without any error.",
+    "claims": "The paper's nine claims, each with a verdict.",
+    "ablations": "What the paper leaves open: planes, occupancy, reduction, balancing, calibration, frames, distance.",
+    "figures": "Figures 6 and 7: a few test frames with their labels and grids.",
     "all": "All of these.",
 }
 """The experiments of the paper, and what their commands say of themselves."""

@@ -6,6 +6,7 @@ from pathlib import Path
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.simulation.datasets import RECIPES, DatasetRecipe, Route, make_from_recipe
+from semgrid_edu.simulation.street.casts import overturned_car
 from semgrid_edu.simulation.street.plan import Wishes
 from semgrid_edu.training.run import architecture, chosen_truth
 
@@ -13,6 +14,11 @@ from semgrid_edu.training.run import architecture, chosen_truth
 def _short(split: str, layout: str, n_frames: int = 6) -> Route:
     """Return a route of a few frames, all labelled."""
     return Route(split, n_frames, True, Wishes(layout=layout, speed=10.0))
+
+
+def _routes(number: int, n_frames: int) -> tuple[Route, ...]:
+    """Return short routes to test on, by turns through a junction and a bend."""
+    return tuple(_short("test", ("junction", "bend")[k % 2], n_frames) for k in range(number))
 
 
 SMALL_RECIPES = {
@@ -27,9 +33,16 @@ SMALL_RECIPES = {
         DatasetRecipe(
             "quicksynthia", "SYNTHIA-10", (_short("train", "junction", 8), _short("test", "junction", 8)), dense=True
         ),
+        DatasetRecipe("chromaroutes", "KITTI-14", _routes(20, 10)),
+        DatasetRecipe("synthiaroutes", "SYNTHIA-10", _routes(20, 10), dense=True),
+        DatasetRecipe("overturned", "KITTI-14", (Route("test", 10, False, Wishes(cast=overturned_car)),) * 30),
+        DatasetRecipe("quickoverturned", "KITTI-14", (Route("test", 4, False, Wishes(cast=overturned_car)),) * 4),
+        DatasetRecipe("quickchromaroutes", "KITTI-14", _routes(3, 2)),
+        DatasetRecipe("quicksynthiaroutes", "SYNTHIA-10", _routes(3, 2), dense=True),
     )
 }
-"""Data sets like minikitti, minichroma and minisynthia, small enough to be made in a minute."""
+"""Data sets like minikitti, minichroma and minisynthia, small enough to be made in a minute. More routes to test on,
+because two routes, or one, say little about how routes differ. And drives in each of which a car lies on its top."""
 
 RECIPE_OF = RECIPES | SMALL_RECIPES
 """Every data set that a run can make, by name."""

@@ -10,7 +10,7 @@ from semgrid_edu.experiments.reproduction.runs import Run, run_one
 from semgrid_edu.storage.workplace import Workplace
 
 
-def execute(runs: Sequence[Run], root: str | Path, place: Workplace, device: str = "cpu") -> dict[Run, str]:
+def execute_plan(runs: Sequence[Run], root: str | Path, place: Workplace, device: str = "cpu") -> dict[Run, str]:
     """Do all runs that haven't ended.
 
     A run that fails stops only those that need it. The command can be killed at any time: what has ended stays, and a

@@ -6,6 +6,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from semgrid_edu.experiments.reproduction.ablation_tables import ablations_markdown
+from semgrid_edu.experiments.reproduction.ablations import ablation_runs, ablations
 from semgrid_edu.experiments.reproduction.accuracy_tables import (
     accuracy_markdown,
     accuracy_rows,
@@ -13,8 +15,11 @@ from semgrid_edu.experiments.reproduction.accuracy_tables import (
     network_gains,
 )
 from semgrid_edu.experiments.reproduction.confusion_table import confusion_markdown, confusion_result
+from semgrid_edu.experiments.reproduction.figure_pictures import figures_markdown, figures_picture
+from semgrid_edu.experiments.reproduction.figure_runs import figure_runs, shown_frames
+from semgrid_edu.experiments.reproduction.judging import claim_runs, claims_markdown, claims_picture, judge_claims
 from semgrid_edu.experiments.reproduction.paper import NETWORKS, TABLE_1_SCORES, TABLE_2_SCORES
-from semgrid_edu.experiments.reproduction.pictures import accuracy_picture, confusion_picture
+from semgrid_edu.experiments.reproduction.pictures import ablations_picture, accuracy_picture, confusion_picture
 from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.experiments.reproduction.scales import Scale
 from semgrid_edu.experiments.reproduction.score_runs import ScoreRun
@@ -40,7 +45,7 @@ class Experiment:
     markdown : callable
         result -> Markdown.
     picture : callable
-        result -> Figure.
+        (result, folder of all runs) -> Figure.
     """
 
     title: str
@@ -49,7 +54,7 @@ class Experiment:
     runs: Callable[[Scale, int], Sequence[Run]]
     result: Callable[[Scale, int, Path], dict]
     markdown: Callable[[dict], str]
-    picture: Callable[[dict], Figure]
+    picture: Callable[[dict, Path], Figure]
 
 
 def table1_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
@@ -110,7 +115,7 @@ EXPERIMENTS = {
         lambda scale, seeds: _seed_by_seed(table1_runs(scale, seeds)),
         lambda scale, seeds, root: _accuracies(table1_runs(scale, seeds), root, TABLE_1_SCORES),
         accuracy_markdown,
-        accuracy_picture,
+        lambda result, _: accuracy_picture(result),
     ),
     "table2": Experiment(
         "Table 2: routes that were never driven in training",
@@ -119,7 +124,7 @@ EXPERIMENTS = {
         lambda scale, seeds: _seed_by_seed(table2_runs(scale, seeds)),
         lambda scale, seeds, root: _accuracies(table2_runs(scale, seeds), root, TABLE_2_SCORES),
         accuracy_markdown,
-        accuracy_picture,
+        lambda result, _: accuracy_picture(result),
     ),
     "table3": Experiment(
         "Table 3: confusion on data without any error",
@@ -128,7 +133,34 @@ EXPERIMENTS = {
         table3_runs,
         lambda scale, seeds, root: confusion_result(table3_runs(scale, seeds), root),
         confusion_markdown,
-        confusion_picture,
+        lambda result, _: confusion_picture(result),
+    ),
+    "claims": Experiment(
+        "The nine claims",
+        "kitti",
+        lambda scale: scale.seeds,
+        claim_runs,
+        judge_claims,
+        claims_markdown,
+        lambda result, _: claims_picture(result),
+    ),
+    "ablations": Experiment(
+        "Ablations",
+        "kitti",
+        lambda scale: scale.seeds,
+        ablation_runs,
+        ablations,
+        ablations_markdown,
+        lambda result, _: ablations_picture(result),
+    ),
+    "figures": Experiment(
+        "Figures 6 and 7",
+        "kitti",
+        lambda scale: scale.seeds,
+        figure_runs,
+        shown_frames,
+        figures_markdown,
+        figures_picture,
     ),
 }
 """Every experiment by the name of its command."""

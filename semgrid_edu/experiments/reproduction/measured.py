@@ -6,33 +6,34 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.confusions import seed_confusions
-from semgrid_edu.experiments.reproduction.score_runs import ScoreRun
-from semgrid_edu.experiments.statistics import drive_interval, paired_interval
+from semgrid_edu.experiments.reproduction.counting import CountingRun
+from semgrid_edu.experiments.statistics import Interval, drive_interval, paired_interval
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS, semantic_cells
 
 Measured = dict[str, object]
-"""The "mean" over the seeds, "low" and "high" of its 95 % interval, or None where one drive alone was scored, and the
-value of each of the "seeds"."""
+"""The "mean" over the seeds, "low" and "high" of its 95 % interval, and the value of each of the "seeds"; None where
+there is none."""
 
 SHOWN_SEEDS = 5
 """Up to so many seeds each one's value is shown."""
 
 
 def by_seed(
-    runs: Sequence[ScoreRun], root: str | Path, method: str, truth: str, band: str | None = None
+    runs: Sequence[CountingRun], root: str | Path, method: str, truth: str, band: str | None = None
 ) -> NDArray[np.int64]:
     """Return the confusion matrices of a method, seed by seed and drive by drive.
 
     Parameters
     ----------
-    runs : sequence of S ScoreRun
+    runs : sequence of S CountingRun
         The same network, trained with S seeds.
     root : path-like
         The folder of all runs.
     method, truth, band
-        What to count, as `ScoreRun.confusions` takes them.
+        What to count, as `CountingRun.confusions` takes them.
 
     Returns
     -------
@@ -52,7 +53,7 @@ def measured(confusions: NDArray, metric: Callable[[NDArray], float]) -> Measure
         Takes a confusion matrix and returns a number.
     """
     seeds = [float(metric(matrix)) for matrix in confusions.sum(axis=1)]
-    return _with_interval(seeds, None if confusions.shape[1] < 2 else drive_interval(confusions, metric))
+    return _with_interval(seeds, lambda: drive_interval(confusions, metric))
 
 
 def compared(a: NDArray, b: NDArray, metric: Callable[[NDArray], float]) -> Measured:
@@ -65,14 +66,18 @@ def compared(a: NDArray, b: NDArray, metric: Callable[[NDArray], float]) -> Meas
     metric : callable
         Takes a confusion matrix and returns a number.
     """
-    pairs = np.broadcast(a.sum(axis=1)[..., 0, 0], b.sum(axis=1)[..., 0, 0]).shape[0]
-    seeds = [float(metric(a[s % len(a)].sum(axis=0)) - metric(b[s % len(b)].sum(axis=0))) for s in range(pairs)]
-    return _with_interval(seeds, None if a.shape[1] < 2 else paired_interval(a, b, metric))
+    ours, theirs = np.broadcast_arrays(*([metric(matrix) for matrix in some.sum(axis=1)] for some in (a, b)))
+    return _with_interval((ours - theirs).tolist(), lambda: paired_interval(a, b, metric))
 
 
-def _with_interval(seeds: list[float], interval: tuple[float, float, float] | None) -> Measured:
-    low, _, high = interval or (None, None, None)
-    return {"mean": float(np.mean(seeds)), "low": low, "high": high, "seeds": seeds}
+def _with_interval(seeds: list[float], interval: Callable[[], Interval]) -> Measured:
+    """Return a score with its interval, if there is one: not for one drive, nor where a class is in one drive alone."""
+    try:
+        low, mean, high = interval()
+    except ArgumentError:
+        low, mean, high = None, float(np.mean(seeds)), None
+    defined = [None if np.isnan(seed) else seed for seed in seeds]
+    return {"mean": None if np.isnan(mean) else mean, "low": low, "high": high, "seeds": defined}
 
 
 def on_cells(confusions: NDArray, cells: str, label_set: LabelSet) -> NDArray[np.int64]:
@@ -137,6 +142,8 @@ def shown(value: Measured, digits: int = 1) -> str:
     >>> shown({"mean": 0.824, "low": 0.812, "high": 0.836, "seeds": [0.824]})
     '82.4 (81.2 to 83.6)'
     """
+    if value["mean"] is None:
+        return "-"
     mean = f"{100 * value['mean']:.{digits}f}"
     if value["low"] is None:
         return mean
@@ -157,8 +164,7 @@ def shown_seeds(value: Measured, digits: int = 1) -> str:
     -------
     str
     """
-    seeds = [f"{100 * one:.{digits}f}" for one in value["seeds"]]
+    seeds = ["-" if one is None else f"{100 * one:.{digits}f}" for one in value["seeds"]]
     if len(seeds) <= SHOWN_SEEDS:
         return ", ".join(seeds)
-    ends = (f"{100 * end:.{digits}f}" for end in (min(value["seeds"]), max(value["seeds"])))
-    return f"{' to '.join(ends)} ({len(seeds)} seeds)"
+    return f"{min(seeds, key=float)} to {max(seeds, key=float)} ({len(seeds)} seeds)"

@@ -37,7 +37,7 @@ def accuracy_picture(result: dict) -> Figure:
         ax.grid(axis="x", alpha=0.3)
     axes[0].set_yticks(range(len(rows)), names)
     axes[0].invert_yaxis()
-    axes[-1].legend(handles=_legend(), loc="best", fontsize="small")
+    figure.legend(handles=_legend(), loc="outside lower center", ncols=4)
     return figure
 
 
@@ -55,6 +55,8 @@ def draw_measured(ax: Axes, place: float, value: dict, colour: str = OURS) -> No
     colour : str
         The colour.
     """
+    if value["mean"] is None:
+        return
     if value["low"] is not None:
         ax.plot([100 * value["low"], 100 * value["high"]], [place, place], color=colour, linewidth=2, alpha=0.6)
     ax.plot(100 * value["mean"], place, "o", color=colour, zorder=2)
@@ -91,3 +93,50 @@ def confusion_picture(result: dict) -> Figure:
         confusion(np.nan_to_num(shares), result["classes"], ax)
         ax.set_title(title)
     return figure
+
+
+def ablations_picture(result: dict) -> Figure:
+    """Draw the ablations: pixel accuracy of the variants, with wrong calibrations, by distance, and reliability.
+
+    Parameters
+    ----------
+    result : dict
+        From `ablations`.
+
+    Returns
+    -------
+    Figure
+    """
+    figure, axes = plt.subplots(1, 4, figsize=(19, 6), layout="constrained")
+    trained = [row for row in result["variants"] if row["what"] != "usual"] + result["frames"]
+    for ax, rows, title in zip(
+        axes, (trained, result["calibration"]), ("trained otherwise", "wrong calibration"), strict=False
+    ):
+        for place, row in enumerate(rows):
+            draw_measured(ax, place, row["differences"]["true"]["all"]["pixel accuracy"])
+        ax.axvline(0, color="0.4", linewidth=0.8)
+        ax.set_yticks(range(len(rows)), [row["what"] for row in rows])
+        ax.set(title=title, xlabel="pixel accuracy: difference from usual, points")
+    for place, row in enumerate(result["distance"]):
+        draw_measured(axes[2], place, row["pixel accuracy"])
+    axes[2].set_yticks(range(len(result["distance"])), [row["what"] for row in result["distance"]])
+    axes[2].set(title="by distance", xlabel="pixel accuracy, per cent of cells with a semantic class")
+    for ax in axes[:3]:
+        ax.invert_yaxis()
+        ax.grid(axis="x", alpha=0.3)
+    _draw_sureness(axes[3], result["sureness"])
+    return figure
+
+
+def _draw_sureness(ax: Axes, rows: list[dict]) -> None:
+    """Draw the reliability diagram of each method, all seeds together."""
+    ax.plot([0, 1], [0, 1], color="0.4", linewidth=0.8)
+    for row, marker in zip(rows, "osD", strict=True):
+        cells, confidence, accuracy = (
+            np.array([diagram[name] for diagram in row["diagrams"]]) for name in ("cells", "confidence", "accuracy")
+        )
+        some = cells.sum(axis=0) > 0
+        sure, right = ((cells * part).sum(axis=0)[some] / cells.sum(axis=0)[some] for part in (confidence, accuracy))
+        ax.plot(sure, right, marker=marker, label=row["what"])
+    ax.set(title="reliability", xlabel="how sure: mean probability", ylabel="how often right", xlim=(0, 1), ylim=(0, 1))
+    ax.legend(loc="upper left")

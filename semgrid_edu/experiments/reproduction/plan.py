@@ -35,7 +35,7 @@ def with_needs(wanted: Iterable[Run]) -> list[Run]:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class TimeEstimate:
     """How long the runs of a plan will take.
 
     Parameters
@@ -68,8 +68,8 @@ class Estimate:
         return max(sum(self.seconds.values()) / workers, *longest.values(), 0.0) / 3600
 
 
-def estimate(runs: list[Run], root: str | Path) -> Estimate:
-    """Estimate how long runs will take.
+def estimate(runs: list[Run], root: str | Path) -> TimeEstimate:
+    """TimeEstimate how long runs will take.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def estimate(runs: list[Run], root: str | Path) -> Estimate:
 
     Returns
     -------
-    Estimate
+    TimeEstimate
         Of the runs that haven't ended.
     """
     paces: dict[str, list[float]] = {}
@@ -93,17 +93,17 @@ def estimate(runs: list[Run], root: str | Path) -> Estimate:
     for run in left:
         if run.pace not in known:
             known[run.pace] = run.probe()
-    return Estimate({run: known[run.pace] * run.steps for run in left}, measured)
+    return TimeEstimate({run: known[run.pace] * run.steps for run in left}, measured)
 
 
-def plan_table(runs: list[Run], estimated: Estimate) -> str:
+def plan_table(runs: list[Run], estimated: TimeEstimate) -> str:
     """Return a plan as a table to print: kinds of runs, how many there are and have ended, and their time.
 
     Parameters
     ----------
     runs : list of Run
         The runs of the plan.
-    estimated : Estimate
+    estimated : TimeEstimate
         Their times.
 
     Returns

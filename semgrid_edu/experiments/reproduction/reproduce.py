@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from semgrid_edu.experiments.reproduction.execute import execute
+from semgrid_edu.experiments.reproduction.execute import execute_plan
 from semgrid_edu.experiments.reproduction.experiments import EXPERIMENTS, Experiment
 from semgrid_edu.experiments.reproduction.plan import estimate, plan_table, with_needs
 from semgrid_edu.experiments.reproduction.results import write_result
@@ -92,7 +92,7 @@ def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = F
     if plan_only:
         return ""
     with workplace(request.workers, request.scheduler) as place:
-        failed = execute(plan, root, place, request.device)
+        failed = execute_plan(plan, root, place, request.device)
     scale: Scale = scale_named(request.scale)
     for name, experiment in request.chosen.items():
         seeds = request.seeds_of(experiment)

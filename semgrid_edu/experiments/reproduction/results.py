@@ -59,7 +59,7 @@ def write_result(name: str, experiment: Experiment, scale: Scale, seeds: int, ro
     write_json(out / f"{name}.json", result)
     write_text(out / f"{name}.md", text)
     write_json(out / f"{name}_times.json", times(runs, root))
-    figure = experiment.picture(result)
+    figure = experiment.picture(result, root)
     with atomic_path(out / f"{name}.png") as path:
         figure.savefig(path, dpi=130)
     plt.close(figure)
@@ -122,8 +122,8 @@ def result_markdown(result: dict, experiment: Experiment) -> str:
     """
     listed = "\n".join(f"- {line}" for line in result["deviations"])
     return (
-        f"# {experiment.title}\n\nScale {result['scale']}, {result['seeds']} seeds. Means over the seeds; in brackets "
-        "95 % intervals over drives and seeds. Per cent.\n\n"
+        f"# {experiment.title}\n\nScale {result['scale']}, number of seeds: {result['seeds']}. Means over the seeds; "
+        "in brackets 95 % intervals over drives and seeds. Per cent.\n\n"
         f"{experiment.markdown(result)}\n\nOther than in the paper:\n\n{listed}\n\n"
         f"Made by `{result['command']}`, commit {', '.join(result['commits'])}.\n"
     )

@@ -6,7 +6,7 @@ import subprocess
 import threading
 import time
 import traceback
-from dataclasses import asdict, dataclass
+from dataclasses import MISSING, dataclass, fields, is_dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
@@ -107,8 +107,24 @@ class Run:
             raise DataError(path, "the record of a run that has ended", error) from error
 
     def settings(self) -> dict:
-        """Return what decides the run, as JSON gives it back."""
-        return json.loads(json.dumps({"kind": type(self).__name__} | asdict(self)))
+        """Return what decides the run, as JSON gives it back.
+
+        What is as usual is left out, so that a run stays the same run when a later version knows more settings.
+        """
+        return json.loads(json.dumps(_unusual(self)))
+
+
+def _unusual(thing: object) -> object:
+    """Return the kind of a dataclass and its fields that differ from their defaults; anything else as it is."""
+    if isinstance(thing, tuple):
+        return [_unusual(part) for part in thing]
+    if not is_dataclass(thing):
+        return thing
+    given = {field.name: getattr(thing, field.name) for field in fields(thing)}
+    usual = {field.name: field.default for field in fields(thing)}
+    return {"kind": type(thing).__name__} | {
+        name: _unusual(value) for name, value in given.items() if usual[name] is MISSING or value != usual[name]
+    }
 
 
 class Outcome(NamedTuple):

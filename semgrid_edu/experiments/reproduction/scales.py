@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.reproduction.data_runs import ArraysRun, DataRun
+from semgrid_edu.experiments.reproduction.data_runs import RECIPE_OF, ArraysRun, DataRun
 from semgrid_edu.experiments.reproduction.score_runs import ScoreRun
 from semgrid_edu.experiments.reproduction.training_runs import GridStageRun, ImageStageRun
 from semgrid_edu.experiments.reproduction.variants import USUAL, Variant
@@ -19,6 +19,10 @@ class Scale:
         What `--scale` calls it.
     kitti, chroma, synthia : str
         The data sets in place of the paper's three, keys of `RECIPE_OF`.
+    chroma_routes, synthia_routes : str
+        More routes to test on, for the claims.
+    overturned : str
+        Drives with a car that lies on its top.
     preset : str
         "compact" or "paper": networks, images and grid, see `architecture`.
     image_iterations, grid_iterations : int
@@ -31,11 +35,19 @@ class Scale:
     kitti: str
     chroma: str
     synthia: str
+    chroma_routes: str
+    synthia_routes: str
+    overturned: str
     preset: str
     image_iterations: int
     grid_iterations: int
     table1_seeds: int
     seeds: int
+
+    @property
+    def frames_to_train(self) -> int:
+        """Number of labelled frames that Table 1's networks learn from."""
+        return sum(len(route.labelled) for route in RECIPE_OF[self.kitti].routes if route.split == "train")
 
     def image_stage(self, data: str, segmenter: str, seed: int, n_frames: int | None = None) -> ImageStageRun:
         """Return the training of an image network.
@@ -113,9 +125,48 @@ class Scale:
 SCALES = {
     scale.name: scale
     for scale in (
-        Scale("quick", "quickkitti", "quickchroma", "quicksynthia", "compact", 30, 30, table1_seeds=2, seeds=2),
-        Scale("reduced", "minikitti", "minichroma", "minisynthia", "compact", 1000, 1000, table1_seeds=5, seeds=3),
-        Scale("paper", "minikitti", "minichroma", "minisynthia", "paper", 2000, 2000, table1_seeds=5, seeds=3),
+        Scale(
+            "quick",
+            "quickkitti",
+            "quickchroma",
+            "quicksynthia",
+            "quickchromaroutes",
+            "quicksynthiaroutes",
+            "quickoverturned",
+            "compact",
+            12,
+            10,
+            table1_seeds=2,
+            seeds=2,
+        ),
+        Scale(
+            "reduced",
+            "minikitti",
+            "minichroma",
+            "minisynthia",
+            "chromaroutes",
+            "synthiaroutes",
+            "overturned",
+            "compact",
+            1000,
+            1000,
+            table1_seeds=5,
+            seeds=3,
+        ),
+        Scale(
+            "paper",
+            "minikitti",
+            "minichroma",
+            "minisynthia",
+            "chromaroutes",
+            "synthiaroutes",
+            "overturned",
+            "paper",
+            2000,
+            2000,
+            table1_seeds=5,
+            seeds=3,
+        ),
     )
 }
 """Every scale by name."""

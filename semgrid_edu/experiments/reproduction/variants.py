@@ -16,6 +16,10 @@ class Variant:
         D, the number of planes.
     spacing : float
         d, the distance between planes, metres.
+    occupancy : bool
+        Whether the network sees the occupancy grid.
+    reduces : bool
+        Whether a 1x1 convolution reduces the planes.
     balanced : bool
         Whether the loss weights rare classes more (median frequency balancing).
     end_to_end : bool
@@ -24,6 +28,8 @@ class Variant:
 
     n_planes: int = 20
     spacing: float = 0.2
+    occupancy: bool = True
+    reduces: bool = True
     balanced: bool = True
     end_to_end: bool = True
 
@@ -33,20 +39,23 @@ class Variant:
         parts = (
             (f"{self.n_planes}planes", self.n_planes == USUAL.n_planes),
             (f"{self.spacing:g}m", self.spacing == USUAL.spacing),
+            ("no-occupancy", self.occupancy),
+            ("no-reduction", self.reduces),
             ("unbalanced", self.balanced),
             ("two-stage", self.end_to_end),
         )
         return "".join(f"-{part}" for part, as_usual in parts if not as_usual)
 
     def applied_to(self, described: Architecture) -> Architecture:
-        """Return an architecture with the planes of this variant.
+        """Return an architecture changed as this variant says.
 
         Parameters
         ----------
         described : Architecture
             The usual one.
         """
-        return replace(described, heights=tuple(plane_heights(self.n_planes, self.spacing).tolist()))
+        heights = tuple(plane_heights(self.n_planes, self.spacing).tolist())
+        return replace(described, heights=heights, uses_occupancy=self.occupancy, reduces=self.reduces)
 
 
 USUAL = Variant()

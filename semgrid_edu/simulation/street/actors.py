@@ -39,6 +39,8 @@ class Actor:
         The body of a car ("bicycle" for a parked bicycle) and its paint; for a pedestrian or a cyclist, the person.
     phase : float
         Distance added to the one covered, metres, so that people don't walk in step.
+    overturned : bool
+        Whether it lies on its top, as a car may after an accident.
     """
 
     instance: int
@@ -47,6 +49,7 @@ class Actor:
     trajectory: Trajectory
     look: Look
     phase: float = 0.0
+    overturned: bool = False
 
     def shape(self, road: Road, t: float) -> Shape:
         """Return its shape in the world at one instant.
@@ -69,6 +72,8 @@ class Actor:
         else:
             model, paint = self.look
             body = (bicycle() if model == "bicycle" else car(model)).recoloured(Material.PAINT, paint)
+        if self.overturned:
+            body = body.overturned(self.size[2])
         return body.placed(position, yaw)
 
     def footprint(self, road: Road, t: float) -> Footprint:
@@ -133,7 +138,8 @@ class Actor:
         -------
         dict
             "id" and "class"; "centre" (x, y, z) and "size" (length, width, height) of its box, metres; "yaw", rad;
-            "velocity" (x, y) over ground, m/s; and whether it is "moving". All are in the grid frame.
+            "velocity" (x, y) over ground, m/s; and whether it is "moving". All are in the grid frame. "overturned" is
+            there only if it is true.
         """
         yaw = self.trajectory.pose(road, t)[1]
         velocity = T_grid_from_world[:3, :2] @ self.trajectory.velocity(road, t)
@@ -146,6 +152,7 @@ class Actor:
             "yaw": round(float(np.arctan2(heading[1], heading[0])), 4),
             "velocity": _rounded(velocity[:2]),
             "moving": bool(np.hypot(*velocity[:2]) > MOVING_SPEED),
+            **({"overturned": True} if self.overturned else {}),
         }
 
 

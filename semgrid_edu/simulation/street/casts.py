@@ -1,14 +1,15 @@
-"""Who takes part in the test streets: convoys, pedestrians, people and cars that set off, and crossing cars.
+"""Who takes part in the test streets: convoys, pedestrians, people and cars that set off, crossing and overturned cars.
 
 Each function puts its road users on the street of the `Traffic` that it is given.
 """
 
 import numpy as np
 
-from semgrid_edu.simulation.street.road_users import park_cars
+from semgrid_edu.simulation.street.road_users import fill_street, park_cars
 from semgrid_edu.simulation.street.traffic import Traffic
-from semgrid_edu.simulation.street.trajectories import Departure, Pace
+from semgrid_edu.simulation.street.trajectories import STAND, Departure, Pace, Trajectory
 from semgrid_edu.simulation.things.cars import car_size
+from semgrid_edu.simulation.things.materials import Kind
 
 
 def convoys(traffic: Traffic) -> None:
@@ -77,6 +78,22 @@ def crossing_cars(traffic: Traffic) -> None:
         halfway = pace.distance(rng.uniform(0.3, 0.7) * traffic.duration)
         for k in range(2):
             traffic.drive_car(s, sign * (halfway + k * rng.uniform(12, 20)), 0, -sign, pace)
+
+
+def overturned_car(traffic: Traffic) -> None:
+    """Let a car lie on its top in the oncoming lane, 10 to 22 m ahead at the end, in the usual traffic.
+
+    Parameters are those of `park_cars`.
+    """
+    road, rng, ego = traffic.road, traffic.rng, traffic.ego
+    end = ego.at(traffic.duration)[0]
+    for _ in range(20):  # until the place is free
+        look = (traffic.body(), traffic.paint())
+        along, across = np.cos(angle := rng.uniform(-0.5, 0.5)), np.sin(angle)
+        place = Trajectory(end + rng.uniform(10, 22), 0.5 * road.lane, float(along), float(across), STAND)
+        if traffic.park(Kind.CAR, car_size(look[0]), place, look, overturned=True):
+            break
+    fill_street(traffic)
 
 
 def _walking(rng: np.random.Generator) -> Pace:

@@ -80,7 +80,7 @@ class Traffic:
             taken.append(foot)
         return True
 
-    def park(self, kind: Kind, size: Size, trajectory: Trajectory, look: Look) -> bool:
+    def park(self, kind: Kind, size: Size, trajectory: Trajectory, look: Look, overturned: bool = False) -> bool:
         """Park a car or a bicycle for the whole drive, unless the place is taken.
 
         Parameters
@@ -93,13 +93,15 @@ class Traffic:
             Where it stands; its pace is `STAND`.
         look : (str, (float, float, float))
             Body and paint, as for `Actor`.
+        overturned : bool
+            Whether it lies on its top.
 
         Returns
         -------
         bool
             Whether it was parked.
         """
-        actor = Actor(self.builder.next_instance, kind, size, trajectory, look)
+        actor = Actor(self.builder.next_instance, kind, size, trajectory, look, overturned=overturned)
         foot = actor.footprint(self.road, 0.0)
         if collides(foot, self._static, 0.1):
             return False

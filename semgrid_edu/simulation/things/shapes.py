@@ -55,6 +55,22 @@ class Shape:
         vertices = (self.vertices * np.asarray(scale, np.float32)) @ rotation.T + np.asarray(position, np.float32)
         return replace(self, vertices=vertices, normals=self.normals @ rotation.T)
 
+    def overturned(self, height: float) -> "Shape":
+        """Return the shape turned about the x axis by half a turn, so that it stands on its top.
+
+        Parameters
+        ----------
+        height : float
+            Height of the shape, metres, by which it is lifted.
+
+        Returns
+        -------
+        Shape
+        """
+        half_a_turn = np.array([1, -1, -1], np.float32)
+        lifted = self.vertices * half_a_turn + np.array([0, 0, height], np.float32)
+        return replace(self, vertices=lifted, normals=self.normals * half_a_turn)
+
     def recoloured(self, material: Material, colour: ArrayLike) -> "Shape":
         """Return the shape with another colour on all triangles of one material.
 

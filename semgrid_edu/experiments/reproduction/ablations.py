@@ -1,0 +1,194 @@
+"""What the paper leaves open: one thing changed at a time, against the same seeds and drives (section 4)."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from semgrid_edu.crf import expected_calibration_error
+from semgrid_edu.experiments.reproduction.calibration_errors import CalibrationError
+from semgrid_edu.experiments.reproduction.counting import distance_band_names
+from semgrid_edu.experiments.reproduction.measured import all_metrics, by_seed, compared, measured, on_cells
+from semgrid_edu.experiments.reproduction.paper import NETWORKS
+from semgrid_edu.experiments.reproduction.runs import Run
+from semgrid_edu.experiments.reproduction.scales import Scale
+from semgrid_edu.experiments.reproduction.score_runs import (
+    NETWORK,
+    WITH_CRF,
+    WITH_SEARCHED,
+    ScoreRun,
+)
+from semgrid_edu.experiments.reproduction.variants import Variant
+from semgrid_edu.labels import KITTI_14
+from semgrid_edu.metrics import METRICS, pixel_accuracy
+
+VARIANTS = {
+    "1 plane": Variant(n_planes=1),
+    "2 planes": Variant(n_planes=2),
+    "5 planes": Variant(n_planes=5),
+    "10 planes": Variant(n_planes=10),
+    "planes 0.1 m apart": Variant(spacing=0.1),
+    "planes 0.4 m apart": Variant(spacing=0.4),
+    "no occupancy grid": Variant(occupancy=False),
+    "no 1x1 reduction": Variant(reduces=False),
+    "no balancing": Variant(balanced=False),
+}
+"""What is other than usual: 20 planes 0.2 m apart, with occupancy grid, reduction and balancing."""
+
+CALIBRATION_ERRORS = (
+    *(CalibrationError(pitch=size) for size in (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)),
+    *(CalibrationError(yaw=size) for size in (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)),
+    *(CalibrationError(height=size) for size in (-0.2, -0.1, 0.1, 0.2)),
+)
+"""Errors of the calibration that the trained network is given when it is tested: degrees, metres."""
+
+FEW = 4
+"""The small training set has one in so many frames."""
+
+
+def usual_runs(scale: Scale, seeds: int) -> list[ScoreRun]:
+    """Return the runs of the usual network, which are SegNet's of Table 1.
+
+    Parameters
+    ----------
+    scale : Scale
+        How large they are.
+    seeds : int
+        Number of seeds.
+
+    Returns
+    -------
+    list of ScoreRun
+        One per seed.
+    """
+    return [scale.scored(scale.kitti, "segnet", seed) for seed in range(seeds)]
+
+
+def variant_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
+    """Return the runs of the networks that are other than usual. Parameters are those of `usual_runs`.
+
+    Returns
+    -------
+    dict of str to list of ScoreRun
+        By what is other, one per seed.
+    """
+    found = {
+        name: [scale.scored(scale.kitti, "segnet", seed, variant=variant, crf=False) for seed in range(seeds)]
+        for name, variant in VARIANTS.items()
+    }
+    found["learned from true labels"] = [
+        ScoreRun(scale.grid_stage(scale.kitti, "segnet", seed, truth="true"), usual.frames, crf=False)
+        for seed, usual in enumerate(usual_runs(scale, seeds))
+    ]
+    return found
+
+
+def small_set_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
+    """Return the runs of the three networks of Table 1 on a part of the frames. Parameters are those of `usual_runs`.
+
+    Returns
+    -------
+    dict of str to list of ScoreRun
+        By image network one per seed.
+    """
+    n_frames = max(scale.frames_to_train // FEW, 6)
+    return {
+        segmenter: [scale.scored(scale.kitti, segmenter, seed, n_frames=n_frames, crf=False) for seed in range(seeds)]
+        for segmenter in NETWORKS
+    }
+
+
+def miscalibrated_runs(scale: Scale, seeds: int) -> dict[CalibrationError, list[ScoreRun]]:
+    """Return the runs of the usual network with wrong calibrations. Parameters are those of `usual_runs`.
+
+    Returns
+    -------
+    dict of CalibrationError to list of ScoreRun
+        By error one per seed.
+    """
+    return {
+        error: [ScoreRun(usual.network, usual.frames, False, error) for usual in usual_runs(scale, seeds)]
+        for error in CALIBRATION_ERRORS
+    }
+
+
+def ablation_runs(scale: Scale, seeds: int) -> list[Run]:
+    """Return all runs of the ablations. Parameters are those of `usual_runs`.
+
+    Returns
+    -------
+    list of Run
+        The usual networks first; then what needs no other training; then the variants.
+    """
+    others = (miscalibrated_runs(scale, seeds), variant_runs(scale, seeds), small_set_runs(scale, seeds))
+    return [*usual_runs(scale, seeds), *(run for found in others for runs in found.values() for run in runs)]
+
+
+def ablations(scale: Scale, seeds: int, root: Path) -> dict:
+    """Return all ablations, from runs that have ended.
+
+    Parameters
+    ----------
+    scale : Scale
+        How large they are.
+    seeds : int
+        Number of seeds.
+    root : Path
+        The folder of all runs.
+
+    Returns
+    -------
+    dict
+        "variants", "calibration", "frames", "distance" and "sureness": lists of rows, each with what it is ("what")
+        and its scores.
+    """
+    usual = usual_runs(scale, seeds)
+    networks = {"usual": usual} | variant_runs(scale, seeds)
+    wrong = miscalibrated_runs(scale, seeds)
+    return {
+        "variants": [_row(name, runs, usual, root) for name, runs in networks.items()],
+        "calibration": [_row(error.name.removeprefix("-"), runs, usual, root) for error, runs in wrong.items()],
+        "frames": _small_sets(scale, seeds, root),
+        "distance": [_band(band, usual, root) for band in distance_band_names()],
+        "sureness": [_sureness(method, usual, root) for method in (NETWORK, WITH_CRF, WITH_SEARCHED)],
+    }
+
+
+def _row(what: str, runs: Sequence[ScoreRun], usual: Sequence[ScoreRun], root: Path) -> dict:
+    """Return the scores of a variant and its differences from the usual network, by truth, cells and metric."""
+    scores, differences = {}, {}
+    for truth in ("lidar", "true"):
+        ours, theirs = (by_seed(some, root, NETWORK, truth) for some in (runs, usual))
+        scores[truth] = all_metrics(ours, KITTI_14)
+        differences[truth] = {
+            cells: {
+                name: compared(on_cells(ours, cells, KITTI_14), on_cells(theirs, cells, KITTI_14), metric)
+                for name, metric in METRICS.items()
+            }
+            for cells in ("all", "semantic")
+        }
+    return {"what": what, "scores": scores, "differences": differences}
+
+
+def _small_sets(scale: Scale, seeds: int, root: Path) -> list[dict]:
+    """Return each network's scores with few frames, and what it loses against all of them."""
+    rows = []
+    for segmenter, few in small_set_runs(scale, seeds).items():
+        many = [scale.scored(scale.kitti, segmenter, seed) for seed in range(seeds)]
+        rows.append(_row(f"{NETWORKS[segmenter]}, {few[0].network.image_stage.n_frames} frames", few, many, root))
+    return rows
+
+
+def _band(band: str, usual: Sequence[ScoreRun], root: Path) -> dict:
+    """Return the scores of the cells in a band of distance, by the true labels."""
+    found = by_seed(usual, root, NETWORK, "true", band)
+    kept = on_cells(found, "semantic", KITTI_14)
+    return {"what": band, "cells": int(kept.sum()), "pixel accuracy": measured(kept, pixel_accuracy)}
+
+
+def _sureness(method: str, usual: Sequence[ScoreRun], root: Path) -> dict:
+    """Return how well a method's probabilities mean what they say, seed by seed."""
+    diagrams = [run.reliability(root, method) for run in usual]
+    return {
+        "what": method,
+        "expected calibration error": [expected_calibration_error(diagram) for diagram in diagrams],
+        "diagrams": [{name: column.tolist() for name, column in diagram._asdict().items()} for diagram in diagrams],
+    }

@@ -1,0 +1,154 @@
+"""Grids counted against the truth, frame by frame, by distance, and by how sure they are (section 4.2)."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.crf import reliability
+from semgrid_edu.crf.temperature import Reliability
+from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.experiments.confusions import FrameConfusions, load_confusions, save_confusions
+from semgrid_edu.experiments.reproduction.runs import Run
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.metrics import confusion_matrix
+from semgrid_edu.storage.arrays import read_arrays, write_arrays
+
+CONFUSIONS, RELIABILITY = "confusions.npz", "reliability.npz"
+"""The files of a run that counts: confusion matrices by frame, and how often a method is right when it is how sure."""
+
+BANDS = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, np.inf)
+"""Limits of the bands of distance from the LIDAR by which cells are counted, metres."""
+
+
+def distance_band_names() -> list[str]:
+    """Return the names of the bands of distance, nearest first."""
+    return [f"{low:g}-{high:g} m" if np.isfinite(high) else f"beyond {low:g} m" for low, high in pairwise(BANDS)]
+
+
+class CountingRun(Run):
+    """A run that counts grids against the truth, by `GridCounts`."""
+
+    def confusions(self, root: str | Path, method: str, truth: str, band: str | None = None) -> FrameConfusions:
+        """Return the confusion matrices of one method.
+
+        Parameters
+        ----------
+        root : path-like
+            The folder of all runs.
+        method : str
+            Such as `NETWORK`.
+        truth : str
+            Against which labels: "true" or "lidar".
+        band : str, optional
+            One of `distance_band_names`; all distances when left out.
+
+        Returns
+        -------
+        FrameConfusions
+            With one method, called `method`.
+        """
+        found = load_confusions(self.folder(root) / CONFUSIONS)
+        bands = [band] if band else distance_band_names()
+        return FrameConfusions(found.drives, {method: sum(found.counts[_key(method, truth, one)] for one in bands)})
+
+    def reliability(self, root: str | Path, method: str) -> Reliability:
+        """Return how often a method is right when it is how sure, over all frames, by the true labels.
+
+        Parameters
+        ----------
+        root : path-like
+            The folder of all runs.
+        method : str
+            Such as `NETWORK`.
+        """
+        cells, confidence, right = read_arrays(self.folder(root) / RELIABILITY)[method]
+        some = np.maximum(cells, 1)
+        return Reliability(confidence / some, right / some, cells.astype(np.int64))
+
+
+class GridCounts:
+    """What is counted over the frames: confusion matrices by method, truth and band of distance, and reliability.
+
+    Parameters
+    ----------
+    frames : TrainingSet
+        The frames, with the truth that their methods learned from and the true one.
+    """
+
+    def __init__(self, frames: TrainingSet) -> None:
+        self.frames = frames
+        truth, true = frames.arrays["truth"], frames.arrays["true"]
+        self.truths = {"true": true} if truth is true else {"lidar": truth, "true": true}
+        self.band = distance_bands(frames.spec)
+        self.matrices: dict[str, list[NDArray]] = {}
+        self.sure: dict[str, NDArray] = {}
+
+    def add(self, method: str, k: int, called: NDArray) -> None:
+        """Count a grid.
+
+        Parameters
+        ----------
+        method : str
+            What made it.
+        k : int
+            Number of the frame.
+        called : (H, W) int
+            The class that it gives to each cell.
+        """
+        for truth, grids in self.truths.items():
+            for number, name in enumerate(distance_band_names()):
+                there = self.band == number
+                matrix = confusion_matrix(grids[k][there], called[there], len(self.frames.label_set))
+                self.matrices.setdefault(_key(method, truth, name), []).append(matrix)
+
+    def add_probability(self, method: str, k: int, probability: NDArray) -> None:
+        """Count the most probable classes of a grid, and how sure it is of them.
+
+        Parameters
+        ----------
+        method : str
+            What made it.
+        k : int
+            Number of the frame.
+        probability : (C, H, W) float
+            Its distribution over the classes in each cell.
+        """
+        self.add(method, k, probability.argmax(axis=0))
+        diagram = reliability(probability, self.truths["true"][k])
+        sums = np.stack([diagram.cells, diagram.confidence * diagram.cells, diagram.accuracy * diagram.cells])
+        self.sure[method] = self.sure.get(method, 0) + sums
+
+    def write(self, folder: Path) -> None:
+        """Write all that was counted.
+
+        Parameters
+        ----------
+        folder : Path
+            The folder of the run, from which `CountingRun` reads.
+        """
+        write_arrays(folder / RELIABILITY, self.sure)
+        matrices = {key: np.stack(found) for key, found in self.matrices.items()}
+        save_confusions(folder / CONFUSIONS, FrameConfusions(self.frames.drives, matrices))
+
+
+def _key(method: str, truth: str, band: str) -> str:
+    """Return the name that a method has in the file of confusion matrices."""
+    return f"{method}, {truth} labels, {band}"
+
+
+def distance_bands(spec: GridSpec) -> NDArray[np.int64]:
+    """Return the band of distance that each cell lies in.
+
+    Parameters
+    ----------
+    spec : GridSpec
+        The grid.
+
+    Returns
+    -------
+    (H, W) int64
+        Number of the band of `distance_band_names`, by the horizontal distance from the LIDAR to the cell's centre.
+    """
+    return np.digitize(np.hypot(*np.moveaxis(spec.centers(), -1, 0)), BANDS[1:-1])

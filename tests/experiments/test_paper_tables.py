@@ -1,0 +1,103 @@
+import json
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from tiny_runs import Note
+
+from semgrid_edu.experiments.confusions import FrameConfusions
+from semgrid_edu.experiments.reproduction.accuracy_tables import (
+    accuracy_markdown,
+    accuracy_rows,
+    crf_gains,
+    network_gains,
+)
+from semgrid_edu.experiments.reproduction.confusion_table import confusion_markdown, confusion_result
+from semgrid_edu.experiments.reproduction.experiments import EXPERIMENTS, Experiment
+from semgrid_edu.experiments.reproduction.paper import TABLE_1_SCORES
+from semgrid_edu.experiments.reproduction.pictures import accuracy_picture, confusion_picture
+from semgrid_edu.experiments.reproduction.results import write_result
+from semgrid_edu.experiments.reproduction.scales import SCALES
+from semgrid_edu.experiments.reproduction.score_runs import WITH_CRF
+from semgrid_edu.labels import KITTI_14, SYNTHIA_10
+
+
+class Counted:
+    """A run on two drives of 100 cells each, of which so many are right by its seed; the CRF adds four."""
+
+    def __init__(self, n_classes, right):
+        self.n_classes, self.right = n_classes, right
+
+    def confusions(self, _root, method, _truth, _band=None):
+        matrices = np.zeros((2, self.n_classes, self.n_classes), int)
+        for drive, matrix in enumerate(matrices):
+            right = self.right + 4 * (method == WITH_CRF) + drive
+            matrix[0, :2] = right, 100 - right
+        return FrameConfusions(("a", "b"), {method: matrices})
+
+
+@pytest.fixture
+def table1():
+    runs = {name: [Counted(14, right), Counted(14, right + 2)] for name, right in (("segnet", 80), ("fcn", 70))}
+    gains = crf_gains(runs, None, KITTI_14) + network_gains(runs, None, KITTI_14)
+    return {"rows": accuracy_rows(runs, None, KITTI_14, TABLE_1_SCORES), "differences": gains}
+
+
+def test_rows_hold_mean_and_every_seed(table1):
+    """SegNet is right in 80 and 81 of 100 cells with one seed, in 82 and 83 with the other."""
+    first, with_crf, *_ = table1["rows"]
+    accuracy = first["scores"]["lidar"]["all"]["pixel accuracy"]
+    assert accuracy["seeds"] == pytest.approx([0.805, 0.825])
+    assert accuracy["mean"] == pytest.approx(0.815)
+    assert with_crf["scores"]["true"]["semantic"]["pixel accuracy"]["mean"] == pytest.approx(0.855)
+    assert first["confusion"]["lidar"][0][:2] == [326, 74]
+
+
+def test_differences_are_paired(table1):
+    """Every drive and seed differs by the same number of cells, so the interval is a point."""
+    by_name = {row["what"]: row["scores"]["lidar"]["all"]["pixel accuracy"] for row in table1["differences"]}
+    for what, expected in (("SegNet: with CRF - without", 0.04), ("SegNet - FCN", 0.1)):
+        value = by_name[what]
+        assert [value["low"], value["mean"], value["high"]] == pytest.approx([expected] * 3)
+
+
+def test_the_table_shows_the_papers_values_beside_ours(table1):
+    lines = accuracy_markdown(table1).splitlines()
+    (first, *_) = (line for line in lines if line.startswith("| SegNet"))
+    assert [cell.strip() for cell in first.split("|")][2:4] == ["no", "81.1"]
+    assert "81.5 (" in first
+    assert any("80.5, 82.5" in line for line in lines)
+    plt.close(accuracy_picture(table1))
+
+
+def test_table_3_is_in_per_cent_of_its_rows():
+    result = confusion_result([Counted(10, 80), Counted(10, 90)], None)
+    assert result["ours"]["matrix"][0][:2] == [85.5, 14.5]
+    assert result["ours"]["matrix"][1] == [None] * 10
+    assert result["paper"]["matrix"][2][2] == 57.42
+    text = confusion_markdown(json.loads(json.dumps(result)))
+    assert all(f"| {name} " in text for name in SYNTHIA_10.names)
+    plt.close(confusion_picture(result))
+
+
+def test_every_command_has_a_result():
+    assert list(EXPERIMENTS) == ["table1", "table2", "table3", "claims", "ablations", "figures"]
+
+
+def test_a_result_is_written_with_all_that_made_it(tmp_path):
+    runs, scale = [Note("a"), Note("b", (Note("a"),))], SCALES["quick"]
+    for run, seconds in zip(runs, (60, 120), strict=True):
+        run.folder(tmp_path).mkdir()
+        ended = {"seconds": seconds, "commit": "abc", "date": "2026-01-01"}
+        (run.folder(tmp_path) / "ended.json").write_text(json.dumps(ended))
+    draw = lambda *_: plt.figure()  # noqa: E731
+    shown = Experiment("A table", "kitti", lambda _: 2, lambda *_: runs, lambda *_: {"x": 1}, lambda _: "of x", draw)
+    text = write_result("table", shown, scale, 2, tmp_path, tmp_path / "out")
+    content = json.loads((tmp_path / "out" / "table.json").read_text())
+    assert content["x"] == 1
+    assert content["commits"] == ["abc"]
+    assert content["command"].startswith("semgrid-edu reproduce table --scale quick --seeds 2")
+    assert all(line in text for line in content["deviations"])
+    times = json.loads((tmp_path / "out" / "table_times.json").read_text())
+    assert times == {"hours": 0.05, "dates": ["2026-01-01"], "minutes": {"note-a": 1.0, "note-b": 2.0}}
+    assert (tmp_path / "out" / "table.png").exists()
