@@ -17,7 +17,7 @@ from semgrid_edu.plotting.colours import (
     occupancy_colours,
     velocity_colours,
 )
-from semgrid_edu.plotting.forest import forest_plot
+from semgrid_edu.plotting.forest import draw_score, forest_plot
 from semgrid_edu.plotting.grids import grid_labels, grid_values, label_maps, occupancy, velocity, velocity_arrows
 from semgrid_edu.plotting.images import image_labels, image_values, plane_on_image, points_on_image
 from semgrid_edu.plotting.inference import coupling_errors, error_against_time, picks_a_side
@@ -50,6 +50,7 @@ __all__ = [
     "depth_colours",
     "difference_kinds",
     "draw_lattice_frame",
+    "draw_score",
     "draw_triangles",
     "error_against_time",
     "forest_plot",

@@ -1,38 +1,36 @@
 """Forest plots: one row per method, with its mean, its confidence interval, and every seed (section 4.2)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.score_rows import ScoreRow
+from semgrid_edu.experiments.measured import Measured, shown
 
+SEED_COLOUR = "#d95f02"
 _SEED_DROP = 0.24
 """How far the seeds lie below the interval, rows."""
 
 
 def forest_plot(
-    rows: Sequence[ScoreRow],
+    rows: Mapping[str, Measured],
     ax: Axes | None = None,
     label: str = "score [%]",
-    scale: float = 100.0,
     reference: float | None = None,
 ) -> Axes:
     """Draw means with their confidence intervals, and below each the value of every seed.
 
     Parameters
     ----------
-    rows : sequence of ScoreRow
-        From `score_row` or `gain_row`, from top to bottom.
+    rows : mapping of str to dict
+        Scores from `measured` or differences from `compared` by name, from top to bottom.
     ax : Axes, optional
         Axes to draw into.
     label : str
         Label of the x axis, with the unit.
-    scale : float
-        Factor of all numbers; 100 turns shares into per cent, and differences of shares into points.
     reference : float, optional
-        Where to draw a vertical line, in the unit of the rows: 0 for differences.
+        Where to draw a vertical line, a share as the scores are: 0 for differences.
 
     Returns
     -------
@@ -45,18 +43,19 @@ def forest_plot(
 
     Examples
     --------
-    >>> rows = [score_row(name, matrices, pixel_accuracy) for name, matrices in methods.items()]  # doctest: +SKIP
-    >>> forest_plot(rows, label="pixel accuracy [%]")                                             # doctest: +SKIP
+    >>> rows = {name: measured(matrices, pixel_accuracy) for name, matrices in methods.items()}  # doctest: +SKIP
+    >>> forest_plot(rows, label="pixel accuracy [%]")                                            # doctest: +SKIP
     """
     if not rows:
         raise ArgumentError("rows", "one or more", "none")
     if ax is None:
         _, ax = plt.subplots(figsize=(8, 1.2 + 0.5 * len(rows)), layout="constrained")
     if reference is not None:
-        ax.axvline(scale * reference, color="0.5", linewidth=1, linestyle="--", zorder=0)
-    for number, row in enumerate(rows):
-        _draw_row(ax, number, row, scale)
-    ax.set_yticks(range(len(rows)), [row.name for row in rows])
+        ax.axvline(100 * reference, color="0.5", linewidth=1, linestyle="--", zorder=0)
+    for number, value in enumerate(rows.values()):
+        draw_score(ax, number, value)
+        ax.annotate(shown(value), (1.02, number), xycoords=("axes fraction", "data"), va="center", fontsize="small")
+    ax.set_yticks(range(len(rows)), list(rows))
     ax.set(xlabel=label, ylim=(len(rows) - 0.4, -0.6))
     ax.tick_params(axis="y", length=0)
     ax.grid(axis="x", alpha=0.3)
@@ -66,13 +65,27 @@ def forest_plot(
     return ax
 
 
-def _draw_row(ax: Axes, number: int, row: ScoreRow, scale: float) -> None:
-    """Draw interval and mean, the numbers beside the axes, and the seeds if there are two or more."""
-    low, mean, high = (scale * value for value in row.interval)
-    ax.plot([low, high], [number, number], color="#1f4e79", linewidth=2.5, label="confidence interval")
-    ax.plot(mean, number, "D", color="#1f4e79", markersize=6, label="mean")
-    if len(row.seeds) > 1:
-        seeds, places = [scale * value for value in row.seeds], [number + _SEED_DROP] * len(row.seeds)
-        ax.plot(seeds, places, "o", color="#d95f02", markerfacecolor="none", markersize=5, label="one seed")
-    text = f"{mean:.1f} ({low:.1f} to {high:.1f})"
-    ax.annotate(text, (1.02, number), xycoords=("axes fraction", "data"), va="center", fontsize="small")
+def draw_score(ax: Axes, place: float, value: Measured, colour: str = "#1f4e79") -> None:
+    """Draw one score as a line of a chart, per cent: interval, mean, and below them a circle for every seed.
+
+    Parameters
+    ----------
+    ax : Axes
+        The chart.
+    place : float
+        Where the line is on the vertical axis.
+    value : dict
+        From `measured` or `compared`.
+    colour : str
+        The colour of interval and mean.
+    """
+    if value["mean"] is None:
+        return
+    if value["low"] is not None:
+        ends = [100 * value["low"], 100 * value["high"]]
+        ax.plot(ends, [place, place], color=colour, linewidth=2.5, alpha=0.6, label="95 % interval")
+    ax.plot(100 * value["mean"], place, "D", color=colour, markersize=6, label="mean")
+    seeds = [100 * seed for seed in value["seeds"] if seed is not None]
+    if len(seeds) > 1:
+        places = [place + _SEED_DROP] * len(seeds)
+        ax.plot(seeds, places, "o", color=SEED_COLOUR, markerfacecolor="none", markersize=5, label="one seed")

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from semgrid_edu.experiments.confusions import FrameConfusions
+from semgrid_edu.experiments.measured import measured, on_cells, shown, shown_seeds
 from semgrid_edu.experiments.reproduction.claims import CLAIMS, called, called_void
 from semgrid_edu.experiments.reproduction.deviations import deviations
-from semgrid_edu.experiments.reproduction.measured import measured, on_cells, shown, shown_seeds
 from semgrid_edu.experiments.reproduction.paper import NETWORKS, TABLE_1_SCORES, TABLE_3_CONFUSION
 from semgrid_edu.experiments.reproduction.scales import SCALES
 from semgrid_edu.experiments.reproduction.score_runs import NETWORK, WITH_CRF

@@ -6,8 +6,8 @@ from interval_coverage import RATIOS, coverage, population
 from scipy import stats
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.score_rows import ScoreRow, gain_row, score_row
-from semgrid_edu.experiments.statistics import Interval, drive_interval, paired_interval
+from semgrid_edu.experiments.measured import compared, measured
+from semgrid_edu.experiments.statistics import drive_interval, paired_interval
 from semgrid_edu.metrics import METRICS, class_accuracy, pixel_accuracy
 
 
@@ -87,7 +87,7 @@ def test_a_method_without_seeds_stands_against_every_seed():
     found = paired_interval(net, baseline, pixel_accuracy)
     np.testing.assert_allclose(found, paired_interval(net, np.repeat(baseline, 3, axis=0), pixel_accuracy))
     assert paired_interval(net, net, pixel_accuracy) == (0.0, 0.0, 0.0)
-    assert gain_row("", net, baseline, pixel_accuracy).seeds == pytest.approx(
+    assert compared(net, baseline, pixel_accuracy)["seeds"] == pytest.approx(
         net[..., 0, 0].mean(axis=1) / 100 - baseline[..., 0, 0].mean() / 100
     )
 
@@ -118,14 +118,10 @@ def test_what_gives_no_interval_is_refused():
             paired_interval(np.repeat(fine, 3, axis=0), b, pixel_accuracy)
 
 
-def test_a_row_shows_every_seed_up_to_five():
-    rng = np.random.default_rng(0)
-    confusions = matrices(rng.uniform(60, 90, (6, 8)))
+def test_what_was_measured_is_the_interval_and_every_seed():
+    confusions = matrices(np.random.default_rng(0).uniform(60, 90, (3, 8)))
     for metric in METRICS.values():
-        row = score_row("network", confusions[:3], metric)
-        assert row.interval == drive_interval(confusions[:3], metric)
-        assert np.mean(row.seeds) == pytest.approx(row.interval.mean)
-    assert score_row("", confusions[:5], pixel_accuracy).text().count(",") == 4
-    row = score_row("", confusions, pixel_accuracy)
-    assert row.text().endswith(f"6 seeds {100 * min(row.seeds):.1f} to {100 * max(row.seeds):.1f}")
-    assert ScoreRow("", Interval(0.5, 0.6, 0.7), (0.6,)).text(digits=0) == "60 (50 to 70)"
+        value, interval = measured(confusions, metric), drive_interval(confusions, metric)
+        assert (value["low"], value["mean"], value["high"]) == interval
+        assert value["seeds"] == [metric(matrix) for matrix in confusions.sum(axis=1)]
+        assert np.mean(value["seeds"]) == pytest.approx(value["mean"])

@@ -4,8 +4,6 @@ import pytest
 
 from semgrid_edu import plotting
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.score_rows import ScoreRow
-from semgrid_edu.experiments.statistics import Interval
 from semgrid_edu.plotting import training_curves
 from semgrid_edu.training.log import TrainingLog
 
@@ -54,15 +52,15 @@ def test_nothing_to_draw_is_refused():
 
 
 def test_a_forest_shows_each_interval_and_every_seed():
-    rows = [
-        ScoreRow("network", Interval(0.7, 0.8, 0.9), (0.75, 0.8, 0.85)),
-        ScoreRow("baseline", Interval(0.4, 0.5, 0.65), (0.5,)),
-    ]
+    rows = {
+        "network": {"mean": 0.8, "low": 0.7, "high": 0.9, "seeds": [0.75, 0.8, 0.85]},
+        "baseline": {"mean": 0.5, "low": 0.4, "high": 0.65, "seeds": [0.5]},
+    }
     ax = plotting.forest_plot(rows, reference=0.6)
     assert [text.get_text() for text in ax.get_yticklabels()] == ["network", "baseline"]
     lines = {(line.get_label(), round(float(line.get_ydata()[0]))): line.get_xdata() for line in ax.lines[1:]}
-    np.testing.assert_allclose(lines["confidence interval", 0], [70, 90])
-    np.testing.assert_allclose(lines["confidence interval", 1], [40, 65])
+    np.testing.assert_allclose(lines["95 % interval", 0], [70, 90])
+    np.testing.assert_allclose(lines["95 % interval", 1], [40, 65])
     np.testing.assert_allclose(lines["mean", 1], [50])
     np.testing.assert_allclose(lines["one seed", 0], [75, 80, 85])
     assert ("one seed", 1) not in lines  # it would only repeat the mean
@@ -70,4 +68,4 @@ def test_a_forest_shows_each_interval_and_every_seed():
     assert [text.get_text() for text in ax.texts] == ["80.0 (70.0 to 90.0)", "50.0 (40.0 to 65.0)"]
     assert ax.yaxis_inverted()
     with pytest.raises(ArgumentError, match="rows"):
-        plotting.forest_plot([])
+        plotting.forest_plot({})

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from semgrid_edu.experiments.reproduction.measured import shown
+from semgrid_edu.experiments.measured import shown
 from semgrid_edu.experiments.tables import markdown_table
 from semgrid_edu.metrics import METRICS
 

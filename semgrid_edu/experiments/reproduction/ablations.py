@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from semgrid_edu.crf import expected_calibration_error
+from semgrid_edu.experiments.measured import all_metrics, compared, measured, on_cells
 from semgrid_edu.experiments.reproduction.calibration_errors import CalibrationError
-from semgrid_edu.experiments.reproduction.counting import distance_band_names
-from semgrid_edu.experiments.reproduction.measured import all_metrics, by_seed, compared, measured, on_cells
+from semgrid_edu.experiments.reproduction.counting import by_seed, distance_band_names
 from semgrid_edu.experiments.reproduction.paper import NETWORKS
 from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.experiments.reproduction.scales import Scale

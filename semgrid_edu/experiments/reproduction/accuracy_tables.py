@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 
-from semgrid_edu.experiments.reproduction.measured import all_metrics, by_seed, compared, on_cells, shown, shown_seeds
+from semgrid_edu.experiments.measured import all_metrics, compared, on_cells, shown, shown_seeds
+from semgrid_edu.experiments.reproduction.counting import by_seed
 from semgrid_edu.experiments.reproduction.paper import NETWORKS
 from semgrid_edu.experiments.reproduction.score_runs import NETWORK, WITH_CRF, ScoreRun
 from semgrid_edu.experiments.tables import markdown_table, per_cent

@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.experiments.measured import compared, measured
 from semgrid_edu.experiments.reproduction.baseline_runs import GEOMETRY, OCCUPANCY_ALONE, TRUE_GEOMETRY
 from semgrid_edu.experiments.reproduction.claim_runs import ClaimRuns
-from semgrid_edu.experiments.reproduction.measured import by_seed, compared, measured
+from semgrid_edu.experiments.reproduction.counting import by_seed
 from semgrid_edu.experiments.reproduction.overturned_runs import OVERTURNED
 from semgrid_edu.experiments.reproduction.paper import NETWORKS
 from semgrid_edu.experiments.reproduction.score_runs import NETWORK, WITH_CRF, ScoreRun

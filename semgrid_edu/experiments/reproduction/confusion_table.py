@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.experiments.reproduction.measured import by_seed, measured, shown, shown_seeds
+from semgrid_edu.experiments.measured import measured, shown, shown_seeds
+from semgrid_edu.experiments.reproduction.counting import by_seed
 from semgrid_edu.experiments.reproduction.paper import TABLE_3_CONFUSION, TABLE_3_SCORES
 from semgrid_edu.experiments.reproduction.score_runs import NETWORK, ScoreRun
 from semgrid_edu.experiments.tables import markdown_table, per_cent

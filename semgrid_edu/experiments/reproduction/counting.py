@@ -1,5 +1,6 @@
 """Grids counted against the truth, frame by frame, by distance, and by how sure they are (section 4.2)."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from semgrid_edu.crf import reliability
 from semgrid_edu.crf.temperature import Reliability
 from semgrid_edu.datasets.training_set import TrainingSet
-from semgrid_edu.experiments.confusions import FrameConfusions, load_confusions, save_confusions
+from semgrid_edu.experiments.confusions import FrameConfusions, load_confusions, save_confusions, seed_confusions
 from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import confusion_matrix
@@ -66,6 +67,27 @@ class CountingRun(Run):
         cells, confidence, right = read_arrays(self.folder(root) / RELIABILITY)[method]
         some = np.maximum(cells, 1)
         return Reliability(confidence / some, right / some, cells.astype(np.int64))
+
+
+def by_seed(
+    runs: Sequence[CountingRun], root: str | Path, method: str, truth: str, band: str | None = None
+) -> NDArray[np.int64]:
+    """Return the confusion matrices of a method, seed by seed and drive by drive.
+
+    Parameters
+    ----------
+    runs : sequence of S CountingRun
+        The same network, trained with S seeds.
+    root : path-like
+        The folder of all runs.
+    method, truth, band
+        What to count, as `CountingRun.confusions` takes them.
+
+    Returns
+    -------
+    (S, V, C, C) int64
+    """
+    return seed_confusions([run.confusions(root, method, truth, band) for run in runs], method)
 
 
 class GridCounts:

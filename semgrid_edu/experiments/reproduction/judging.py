@@ -5,16 +5,16 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
+from semgrid_edu.experiments.measured import shown
 from semgrid_edu.experiments.reproduction import verdicts
 from semgrid_edu.experiments.reproduction.claim_runs import runs_of_claims
 from semgrid_edu.experiments.reproduction.claims import CLAIMS
 from semgrid_edu.experiments.reproduction.deviations import frame_counts
-from semgrid_edu.experiments.reproduction.measured import shown
-from semgrid_edu.experiments.reproduction.pictures import draw_measured
 from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.experiments.reproduction.scales import Scale
 from semgrid_edu.experiments.reproduction.verdicts import verdict
 from semgrid_edu.experiments.tables import markdown_table
+from semgrid_edu.plotting import draw_score
 
 HOLDS = {True: "yes", False: "no", None: "cannot tell"}
 """How a statement's result is written."""
@@ -121,7 +121,7 @@ def claims_picture(result: dict) -> Figure:
         value = {name: _from_limit(part, one["limit"], sign) for name, part in one["value"].items()}
         if sign < 0:
             value["low"], value["high"] = value["high"], value["low"]
-        draw_measured(ax, place, value)
+        draw_score(ax, place, value)
     ax.axvline(0, color="0.4", linewidth=0.8)
     ax.set_yticks(range(len(rows)), [f"{number}: {one['what']}" for number, one in rows], fontsize="small")
     ax.invert_yaxis()

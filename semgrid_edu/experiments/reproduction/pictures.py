@@ -7,10 +7,10 @@ from matplotlib.figure import Figure
 
 from semgrid_edu.experiments.reproduction.paper import NETWORKS
 from semgrid_edu.metrics import METRICS
-from semgrid_edu.plotting import confusion
+from semgrid_edu.plotting import confusion, draw_score
 
-OURS, PAPERS = "#00429d", "#c0392b"
-"""The colours of our values and of the paper's; their markers differ too."""
+PAPERS = "#c0392b"
+"""The colour of the paper's values; their marker differs from ours too."""
 
 
 def accuracy_picture(result: dict) -> Figure:
@@ -31,48 +31,15 @@ def accuracy_picture(result: dict) -> Figure:
     figure, axes = plt.subplots(1, len(METRICS), figsize=size, sharey=True, layout="constrained")
     for ax, metric in zip(axes, METRICS, strict=True):
         for place, row in enumerate(rows):
-            draw_measured(ax, place, row["scores"]["lidar"]["all"][metric])
-            ax.plot(100 * row["paper"][metric], place, "D", color=PAPERS, markerfacecolor="none", zorder=3)
+            draw_score(ax, place, row["scores"]["lidar"]["all"][metric])
+            ax.plot(100 * row["paper"][metric], place, "X", color=PAPERS, label="the paper's", zorder=3)
         ax.set(title=metric, xlabel="per cent of all labelled cells" if metric != "FmIoU" else "per cent")
         ax.grid(axis="x", alpha=0.3)
     axes[0].set_yticks(range(len(rows)), names)
     axes[0].invert_yaxis()
-    figure.legend(handles=_legend(), loc="outside lower center", ncols=4)
+    once = {text: drawn for drawn, text in zip(*axes[0].get_legend_handles_labels(), strict=True)}
+    figure.legend(once.values(), once, loc="outside lower center", ncols=4)
     return figure
-
-
-def draw_measured(ax: Axes, place: float, value: dict, colour: str = OURS) -> None:
-    """Draw a score as a line of a chart: interval, mean, and a small point for every seed.
-
-    Parameters
-    ----------
-    ax : Axes
-        The chart.
-    place : float
-        Where the line is on the vertical axis.
-    value : dict
-        From `measured` or `compared`.
-    colour : str
-        The colour.
-    """
-    if value["mean"] is None:
-        return
-    if value["low"] is not None:
-        ax.plot([100 * value["low"], 100 * value["high"]], [place, place], color=colour, linewidth=2, alpha=0.6)
-    ax.plot(100 * value["mean"], place, "o", color=colour, zorder=2)
-    seeds = 100 * np.array(value["seeds"])
-    ax.plot(seeds, np.full(len(seeds), place + 0.22), "|", color=colour, markersize=6)
-
-
-def _legend() -> list:
-    """Return what the marks mean."""
-    words = {
-        "ours, mean": {"color": OURS, "marker": "o", "linestyle": ""},
-        "95 % interval": {"color": OURS, "linewidth": 2, "alpha": 0.6},
-        "ours, each seed": {"color": OURS, "marker": "|", "linestyle": ""},
-        "the paper's": {"color": PAPERS, "marker": "D", "markerfacecolor": "none", "linestyle": ""},
-    }
-    return [plt.Line2D([], [], label=word, **style) for word, style in words.items()]
 
 
 def confusion_picture(result: dict) -> Figure:
@@ -113,12 +80,12 @@ def ablations_picture(result: dict) -> Figure:
         axes, (trained, result["calibration"]), ("trained otherwise", "wrong calibration"), strict=False
     ):
         for place, row in enumerate(rows):
-            draw_measured(ax, place, row["differences"]["true"]["all"]["pixel accuracy"])
+            draw_score(ax, place, row["differences"]["true"]["all"]["pixel accuracy"])
         ax.axvline(0, color="0.4", linewidth=0.8)
         ax.set_yticks(range(len(rows)), [row["what"] for row in rows])
         ax.set(title=title, xlabel="pixel accuracy: difference from usual, points")
     for place, row in enumerate(result["distance"]):
-        draw_measured(axes[2], place, row["pixel accuracy"])
+        draw_score(axes[2], place, row["pixel accuracy"])
     axes[2].set_yticks(range(len(result["distance"])), [row["what"] for row in result["distance"]])
     axes[2].set(title="by distance", xlabel="pixel accuracy, per cent of cells with a semantic class")
     for ax in axes[:3]:

@@ -9,8 +9,8 @@ import numpy as np
 import torch
 from scipy import stats
 
+from semgrid_edu.experiments.measured import Measured
 from semgrid_edu.experiments.reproduction.data_runs import ArraysRun
-from semgrid_edu.experiments.reproduction.measured import Measured
 from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.experiments.reproduction.training_runs import GridStageRun
 from semgrid_edu.networks import WEIGHTS, SemanticGridNet, load_net, unit_image

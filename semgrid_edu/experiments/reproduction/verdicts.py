@@ -12,7 +12,7 @@ a 95 % interval over drives and seeds. Then the claim is
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from semgrid_edu.experiments.reproduction.measured import Measured
+from semgrid_edu.experiments.measured import Measured
 
 REPRODUCED, NOT_REPRODUCED, CANNOT_TELL = "reproduced", "not reproduced", "cannot tell"
 """The three verdicts."""

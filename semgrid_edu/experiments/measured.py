@@ -1,14 +1,11 @@
 """A score with all that is known of it: mean, confidence interval, and every seed's value (section 4.2)."""
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.confusions import seed_confusions
-from semgrid_edu.experiments.reproduction.counting import CountingRun
 from semgrid_edu.experiments.statistics import Interval, drive_interval, paired_interval
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS, semantic_cells
@@ -21,34 +18,13 @@ SHOWN_SEEDS = 5
 """Up to so many seeds each one's value is shown."""
 
 
-def by_seed(
-    runs: Sequence[CountingRun], root: str | Path, method: str, truth: str, band: str | None = None
-) -> NDArray[np.int64]:
-    """Return the confusion matrices of a method, seed by seed and drive by drive.
-
-    Parameters
-    ----------
-    runs : sequence of S CountingRun
-        The same network, trained with S seeds.
-    root : path-like
-        The folder of all runs.
-    method, truth, band
-        What to count, as `CountingRun.confusions` takes them.
-
-    Returns
-    -------
-    (S, V, C, C) int64
-    """
-    return seed_confusions([run.confusions(root, method, truth, band) for run in runs], method)
-
-
 def measured(confusions: NDArray, metric: Callable[[NDArray], float]) -> Measured:
     """Return a score.
 
     Parameters
     ----------
     confusions : (S, V, C, C) int
-        From `by_seed`.
+        By seed and drive, see `drive_interval`.
     metric : callable
         Takes a confusion matrix and returns a number.
     """
@@ -62,7 +38,7 @@ def compared(a: NDArray, b: NDArray, metric: Callable[[NDArray], float]) -> Meas
     Parameters
     ----------
     a, b : (S, V, C, C) int
-        From `by_seed`.
+        By seed and drive, see `drive_interval`.
     metric : callable
         Takes a confusion matrix and returns a number.
     """
@@ -86,7 +62,7 @@ def on_cells(confusions: NDArray, cells: str, label_set: LabelSet) -> NDArray[np
     Parameters
     ----------
     confusions : (S, V, C, C) int
-        From `by_seed`.
+        By seed and drive, see `drive_interval`.
     cells : str
         "all", or "semantic" for those whose truth is a semantic class.
     label_set : LabelSet
@@ -108,7 +84,7 @@ def all_metrics(confusions: NDArray, label_set: LabelSet) -> dict[str, dict[str,
     Parameters
     ----------
     confusions : (S, V, C, C) int
-        From `by_seed`.
+        By seed and drive, see `drive_interval`.
     label_set : LabelSet
         The classes.
 
