@@ -5,7 +5,8 @@ from itertools import pairwise
 from pathlib import Path
 
 from semgrid_edu.experiments.measured import all_metrics, compared, on_cells, shown, shown_seeds
-from semgrid_edu.experiments.reproduction.counting import by_seed
+from semgrid_edu.experiments.reproduction.baseline_runs import BASELINES, BaselineRun
+from semgrid_edu.experiments.reproduction.counting import CountingRun, by_seed
 from semgrid_edu.experiments.reproduction.paper import NETWORKS
 from semgrid_edu.experiments.reproduction.score_runs import NETWORK, WITH_CRF, ScoreRun
 from semgrid_edu.experiments.tables import markdown_table, per_cent
@@ -79,10 +80,37 @@ def network_gains(runs: Mapping[str, Sequence[ScoreRun]], root: Path, label_set:
     return [comparison(f"{NETWORKS[a]} - {NETWORKS[b]}", runs[a], runs[b], root, label_set) for a, b in pairwise(runs)]
 
 
+def baseline_gains(
+    networks: Sequence[ScoreRun], baselines: Sequence[BaselineRun], root: Path, label_set: LabelSet
+) -> list[dict]:
+    """Return by how much SegNet beats each baseline.
+
+    Parameters
+    ----------
+    networks : sequence of S ScoreRun
+        SegNet's runs, one per seed.
+    baselines : sequence of S BaselineRun
+        The baselines of the same seeds, on the same frames.
+    root : Path
+        The folder of all runs.
+    label_set : LabelSet
+        The classes.
+
+    Returns
+    -------
+    list of dict
+        As `crf_gains`.
+    """
+    return [
+        comparison(f"{NETWORKS['segnet']} - {name}", networks, baselines, root, label_set, (NETWORK, name))
+        for name in BASELINES
+    ]
+
+
 def comparison(
     what: str,
-    a: Sequence[ScoreRun],
-    b: Sequence[ScoreRun],
+    a: Sequence[CountingRun],
+    b: Sequence[CountingRun],
     root: Path,
     label_set: LabelSet,
     methods: tuple[str, str] = (NETWORK, NETWORK),
@@ -93,7 +121,7 @@ def comparison(
     ----------
     what : str
         What is compared.
-    a, b : sequence of S ScoreRun
+    a, b : sequence of S CountingRun
         The runs of both, one per seed.
     root : Path
         The folder of all runs.
@@ -126,7 +154,7 @@ def accuracy_markdown(result: dict) -> str:
     Parameters
     ----------
     result : dict
-        Its "rows" are from `accuracy_rows`, its "differences" from `crf_gains` and `network_gains`.
+        Its "rows" are from `accuracy_rows`, its "differences" from `crf_gains`, `network_gains` and `baseline_gains`.
 
     Returns
     -------
@@ -138,10 +166,11 @@ def accuracy_markdown(result: dict) -> str:
             with_class = "all labelled cells" if cells == "all" else "cells with a semantic class"
             sections.append(f"Against {words}, {with_class}:\n\n{_scores(result['rows'], truth, cells)}")
     sections.append(f"Every seed, all labelled cells, labels made with the LIDAR:\n\n{_seeds(result['rows'])}")
-    sections.append(
-        "Paired differences (same seeds, same drives), all labelled cells, labels made with the LIDAR, points:\n\n"
-        + _differences(result["differences"])
-    )
+    for truth, words in TRUTHS.items():
+        sections.append(
+            f"Paired differences (same seeds, same drives), all labelled cells, against {words}, points:\n\n"
+            + _differences(result["differences"], truth)
+        )
     return "\n\n".join(sections)
 
 
@@ -167,8 +196,8 @@ def _seeds(rows: list[dict]) -> str:
     return markdown_table(lines)
 
 
-def _differences(rows: list[dict]) -> str:
+def _differences(rows: list[dict], truth: str) -> str:
     lines = [["difference", *METRICS]]
     for row in rows:
-        lines.append([row["what"], *(shown(row["scores"]["lidar"]["all"][name], 2) for name in METRICS)])
+        lines.append([row["what"], *(shown(row["scores"][truth]["all"][name], 2) for name in METRICS)])
     return markdown_table(lines)

@@ -1,6 +1,6 @@
 """The experiments of the paper, each with the runs that it needs and what it makes of them (section 4)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,9 +11,11 @@ from semgrid_edu.experiments.reproduction.ablations import ablation_runs, ablati
 from semgrid_edu.experiments.reproduction.accuracy_tables import (
     accuracy_markdown,
     accuracy_rows,
+    baseline_gains,
     crf_gains,
     network_gains,
 )
+from semgrid_edu.experiments.reproduction.baseline_runs import BaselineRun
 from semgrid_edu.experiments.reproduction.confusion_table import confusion_markdown, confusion_result
 from semgrid_edu.experiments.reproduction.figure_pictures import figures_markdown, figures_picture
 from semgrid_edu.experiments.reproduction.figure_runs import figure_runs, shown_frames
@@ -75,6 +77,23 @@ def table1_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
     return {segmenter: [scale.scored(scale.kitti, segmenter, seed) for seed in range(seeds)] for segmenter in NETWORKS}
 
 
+def table1_baselines(scale: Scale, seeds: int) -> list[BaselineRun]:
+    """Return the runs of the baselines that Table 1's SegNet is compared with, one per seed.
+
+    Parameters
+    ----------
+    scale : Scale
+        How large they are.
+    seeds : int
+        Number of seeds.
+
+    Returns
+    -------
+    list of BaselineRun
+    """
+    return [BaselineRun(run.network, run.frames) for run in table1_runs(scale, seeds)["segnet"]]
+
+
 def table2_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
     """Return the runs of Table 2: routes that were never driven in training. Parameters are those of `table1_runs`.
 
@@ -97,7 +116,7 @@ def table3_runs(scale: Scale, seeds: int) -> list[ScoreRun]:
     return [scale.scored(scale.synthia, "segnet", seed, truth="true", crf=False) for seed in range(seeds)]
 
 
-def _seed_by_seed(runs: dict[str, list[ScoreRun]]) -> list[Run]:
+def _seed_by_seed(runs: Mapping[str, Sequence[Run]]) -> list[Run]:
     """Return all runs of the first seed, then of the second: a plan that is stopped has whole seeds."""
     return [run for alike in zip(*runs.values(), strict=True) for run in alike]
 
@@ -107,13 +126,21 @@ def _accuracies(runs: dict[str, list[ScoreRun]], root: Path, paper: dict) -> dic
     return {"rows": accuracy_rows(runs, root, KITTI_14, paper), "differences": gains}
 
 
+def _table1(scale: Scale, seeds: int, root: Path) -> dict:
+    """Return Table 1 with the differences from the baselines."""
+    runs, baselines = table1_runs(scale, seeds), table1_baselines(scale, seeds)
+    result = _accuracies(runs, root, TABLE_1_SCORES)
+    result["differences"] += baseline_gains(runs["segnet"], baselines, root, KITTI_14)
+    return result
+
+
 EXPERIMENTS = {
     "table1": Experiment(
         "Table 1: image networks, with and without the CRF",
         "kitti",
         lambda scale: scale.table1_seeds,
-        lambda scale, seeds: _seed_by_seed(table1_runs(scale, seeds)),
-        lambda scale, seeds, root: _accuracies(table1_runs(scale, seeds), root, TABLE_1_SCORES),
+        lambda scale, seeds: _seed_by_seed(table1_runs(scale, seeds) | {"baselines": table1_baselines(scale, seeds)}),
+        _table1,
         accuracy_markdown,
         lambda result, _: accuracy_picture(result),
     ),
