@@ -132,6 +132,12 @@ def test_no_two_public_things_share_a_name():
     assert {name: modules for name, modules in places.items() if len(modules) > 1} == {}
 
 
+def test_no_two_test_files_share_a_name():
+    """Pytest imports them by name, and refuses the second."""
+    names = [path.name for path in Path(__file__).parent.rglob("test_*.py")]
+    assert sorted(names) == sorted(set(names))
+
+
 def test_the_docstring_reader_knows_a_parameter_without_words():
     docstring = """Add.
 

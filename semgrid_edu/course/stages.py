@@ -78,7 +78,7 @@ STAGES = (
         "crf",
         "The fully connected CRF on a few cells",
         model="semgrid_edu.graphical.stages.crf_stage",
-        check="tests/crf/test_exact.py::test_everything_exact_is_what_enumeration_says",
+        check="tests/crf/test_crf_exact.py::test_everything_exact_is_what_enumeration_says",
         lecture="10_crf#graph",
     ),
     StageModel(

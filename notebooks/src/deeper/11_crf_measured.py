@@ -157,7 +157,8 @@ Markdown(crf_error_tables(error))
 # ## In five lines
 #
 # 1. Up to a coupling of 1, every way is within 1 % of the exact marginals on 3 x 3 and 4 x 4 cells.
-# 2. Beyond it, converged mean field picks a side: poor marginals, and often good labels. Early stopping hides it.
+# 2. Beyond it, converged mean field picks a side: poor marginals, though its labels can be good. Early stopping hides
+#    it.
 # 3. F(Q) + log Z is a distance. It was never negative and never rose.
 # 4. Errors of an approximate CRF have two parts, from the kernel and from stopping early. Compare each with its own
 #    reference.
