@@ -19,9 +19,9 @@ from semgrid_edu.experiments.occupancy import LIDARS
 from semgrid_edu.experiments.simulated_runs import GRIDS, check_request
 from semgrid_edu.experiments.truth_counts import BAND_EDGES, COUNTED, TruthCounts
 from semgrid_edu.experiments.truth_trials import REACH, TRIALS, Trial
-from semgrid_edu.frame import Frame, FrameLabels
+from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import KITTI_14
+from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.occupancy import track_drive
 from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.simulation.sensors.rig import Rig
@@ -114,7 +114,9 @@ def _identity(seed: int, grid: str, lidar: str, trials: dict[str, Trial]) -> dic
 
 
 def simulated_drive(number: int, lidar: str = "coarse", n_frames: int = 2 * REACH + 1) -> list[Frame]:
-    """Take the frames of a simulated drive, of which the one in the middle has labels; none has an image.
+    """Take the frames of a simulated drive with labels of their pixels, but without images.
+
+    The frame in the middle has bird's-eye labels too. Those of the others are 255.
 
     Parameters
     ----------
@@ -130,15 +132,15 @@ def simulated_drive(number: int, lidar: str = "coarse", n_frames: int = 2 * REAC
     list of Frame
     """
     drive = SimulatedDrive(number, n_frames, rig=Rig(lidar=LIDARS[lidar]))
-    return [_labelled_frame(drive, k) if k == n_frames // 2 else drive.scan(k) for k in range(n_frames)]
+    return [_labelled_frame(drive, k, birdseye=k == n_frames // 2) for k in range(n_frames)]
 
 
-def _labelled_frame(drive: SimulatedDrive, k: int) -> Frame:
+def _labelled_frame(drive: SimulatedDrive, k: int, birdseye: bool) -> Frame:
     """Take a frame with labels in KITTI-14, as a data set on disk would hold it, but without the image."""
-    taken, classes = drive.frame(k, labelled=True), class_of_kind(KITTI_14)
-    labels = FrameLabels(
-        KITTI_14, classes[taken.picture.kind], taken.picture.depth, classes[taken.truth.kinds], taken.truth.visible
-    )
+    taken, classes = drive.frame(k, labelled=birdseye), class_of_kind(KITTI_14)
+    kinds = taken.truth.kinds if birdseye else np.full(LABEL_GRID.shape, IGNORE, np.uint8)
+    visible = taken.truth.visible if birdseye else np.zeros(LABEL_GRID.shape, bool)
+    labels = FrameLabels(KITTI_14, classes[taken.picture.kind], taken.picture.depth, classes[kinds], visible)
     return Frame(None, taken.points, drive.rig.camera, taken.T_world_from_lidar, k * PERIOD, labels)
 
 

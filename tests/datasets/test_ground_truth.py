@@ -24,7 +24,7 @@ CAMERA = Camera(
 ROAD, CAR, SKY = (KITTI_14.index(name) for name in ("road", "car", "sky"))
 UNKNOWN = {state: KITTI_14.index(f"unknown-{name}") for state, name in zip(
     State, ("free", "static", "dynamic", "unobserved"), strict=True)}  # fmt: skip
-BARE = TruthPolicy(cleanup=False)
+BARE = TruthPolicy(cleanup="none")
 
 
 def labels_of(image, label_set=KITTI_14):
@@ -82,8 +82,54 @@ def test_without_returns_everything_is_unknown():
 
 def test_clean_up_closes_what_lies_within_its_reach():
     frame = frame_of((10.5, 0.5, 0))
-    cells = labelled(lidar_truth(frame, states_of(State.FREE), SPEC))
+    cells = labelled(lidar_truth(frame, states_of(State.FREE), SPEC, TruthPolicy(cleanup="spread")))
     assert set(cells) == {(10 + i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)}  # 1.5 m: the eight neighbours
+
+
+def test_the_ground_spreads_farther_but_what_stands_does_not():
+    post = frame_of((10.5, 0.5, 0), image=CAR)
+    assert labelled(lidar_truth(post, states_of(State.FREE), SPEC)) == {(10, 0): CAR}
+    road = labelled(lidar_truth(frame_of((10.5, 0.5, 0)), states_of(State.FREE), SPEC))
+    assert set(road) == {(10 + i, j) for i in range(-3, 4) for j in range(-3, 4) if np.hypot(i, j) <= 3}
+
+
+@pytest.mark.parametrize(("vote", "winner"), [("standing", CAR), ("majority", ROAD)])
+def test_the_vote_decides_a_cell_with_several_classes(vote, winner):
+    image = np.full(SIZE, ROAD)
+    image[:, 99] = CAR
+    returns = (10.5, 0.1, 0), (10.5, 0.5, 0), (10.5, 0.5, 0.5)  # pixels 99, 95 and 95 of the row
+    truth = lidar_truth(frame_of(*returns, image=image), states_of(State.FREE), SPEC, replace(BARE, vote=vote))
+    assert labelled(truth) == {(10, 0): winner}
+
+
+class TestOwnLabels:
+    """Some road that a car hides now was seen a moment ago, and the image of that moment says what it is."""
+
+    now = frame_of((20.5, 0.5, 0), image=CAR, time=0.1)
+    then = frame_of((30.5, 0.75, 0), image=ROAD, time=0.0)
+
+    def cells(self, labels, then=None):
+        policy = TruthPolicy(past=1, labels=labels, cleanup="none")
+        before = [Moment(then or self.then, None)]
+        return labelled(lidar_truth(self.now, states_of(State.FREE), SPEC, policy, before))
+
+    def test_the_present_image_sees_the_closest_return_of_all_scans(self):
+        assert self.cells("present") == {(20, 0): CAR}
+
+    def test_the_image_of_its_own_instant_labels_what_is_hidden_now(self):
+        assert self.cells("own") == {(20, 0): CAR, (30, 0): ROAD}
+
+    def test_one_scan_is_the_same_with_both(self):
+        rng = np.random.default_rng(3)
+        frame = frame_of(*rng.uniform((1, -12, -1.7), (45, 12, 2), (300, 3)), image=rng.integers(0, 10, SIZE))
+        one, other = (
+            lidar_truth(frame, states_of(State.FREE), SPEC, TruthPolicy(labels=labels)) for labels in ("own", "present")
+        )
+        np.testing.assert_array_equal(one, other)
+
+    def test_a_frame_of_the_window_without_labels_is_refused(self):
+        with pytest.raises(ArgumentError, match="image labels of every frame of the window, found none at 0 s"):
+            self.cells("own", replace(self.then, labels=None))
 
 
 class TestMovers:
@@ -99,7 +145,7 @@ class TestMovers:
         return Belief(states_of(states), velocity, np.full((2, 2, *SPEC.shape), np.nan, np.float32))
 
     def cells(self, movers, speed=(10.0, 0.0)):
-        policy = TruthPolicy(past=1, movers=movers, cleanup=False)
+        policy = TruthPolicy(past=1, movers=movers, cleanup="none")
         before = [Moment(self.then, self.belief(speed))]
         return set(labelled(lidar_truth(self.now, states_of(State.FREE), SPEC, policy, before)))
 
@@ -122,13 +168,13 @@ class TestMovers:
 
     def test_scans_beyond_the_window_are_not_used(self):
         before = [Moment(self.then, None)]
-        for policy in (BARE, TruthPolicy(future=3, cleanup=False)):
+        for policy in (BARE, TruthPolicy(future=3, cleanup="none")):
             truth = lidar_truth(self.now, states_of(State.FREE), SPEC, policy, before)
             assert set(labelled(truth)) == self.car
 
     def test_the_future_is_added_as_the_past_is(self):
         later = replace(self.then, time=0.8)
-        policy = TruthPolicy(future=1, movers="carried", cleanup=False)
+        policy = TruthPolicy(future=1, movers="carried", cleanup="none")
         after = [Moment(later, self.belief((-10.0, 0.0)))]  # it comes back to where it is now
         truth = lidar_truth(self.now, states_of(State.FREE), SPEC, policy, after=after)
         assert set(labelled(truth)) == self.car | self.post
@@ -140,7 +186,7 @@ class TestMovers:
 
     def test_a_drive_is_cut_where_it_ends(self):
         moments = [Moment(self.then, self.belief((10.0, 0.0))), Moment(self.now, self.belief((10.0, 0.0)))]
-        policy = TruthPolicy(past=9, future=9, movers="carved", cleanup=False)
+        policy = TruthPolicy(past=9, future=9, movers="carved", cleanup="none")
         assert set(labelled(drive_truth(moments, 1, SPEC, policy))) == self.car | self.post
 
 
@@ -153,7 +199,7 @@ def test_deskewing_uses_the_motion_between_the_frames():
     free = np.moveaxis(np.eye(4)[np.zeros(wide.shape, int)], -1, 0)
     found = [
         39 - np.argwhere(lidar_truth(frame, free, wide, policy, before) == ROAD)[:, 0]
-        for policy in (BARE, TruthPolicy(deskew=True, cleanup=False))
+        for policy in (BARE, TruthPolicy(deskew=True, cleanup="none"))
     ]
     assert [rows.tolist() for rows in found] == [[15], [14]]
     with pytest.raises(ArgumentError, match="whose pose tells the motion"):
@@ -164,7 +210,7 @@ def test_visible_to_the_lidar_means_that_its_state_is_known():
     states = np.full(SPEC.shape, State.FREE)
     states[29, 9] = State.UNKNOWN
     frame = frame_of((10.5, 0.5, 0), (20.5, 0.6, 0))
-    policy = TruthPolicy(visible_to="lidar", cleanup=False)
+    policy = TruthPolicy(visible_to="lidar", cleanup="none")
     truth = lidar_truth(frame, states_of(states), SPEC, policy)
     assert labelled(truth) == {(20, 0): ROAD}
     assert truth[29, 9] == UNKNOWN[State.UNKNOWN]
@@ -176,7 +222,7 @@ def test_the_camera_sees_as_far_as_the_last_return_in_each_direction():
     assert sight[39 - 18, 4:16].all()  # in front of the wall
     assert not sight[39 - 23].any()  # behind it
     assert not sight[39 - 5, [0, -1]].any()  # beside the image, whose half angle is 45 degrees
-    policy = TruthPolicy(past=1, visible_to="camera", cleanup=False)
+    policy = TruthPolicy(past=1, visible_to="camera", cleanup="none")
     seen_before = [Moment(frame_of((30.5, 0.5, 5.0)), None)]  # above the wall: through a gap between its returns
     for visible_to, held in (("any", True), ("camera", False)):
         truth = lidar_truth(wall, states_of(State.FREE), SPEC, replace(policy, visible_to=visible_to), seen_before)
@@ -205,7 +251,7 @@ def test_every_cell_has_a_class_of_the_label_set():
         moments = [Moment(replace(frame, time=0.0), belief), Moment(frame, belief)]
         for movers in ("smeared", "carved", "carried"):
             for visible_to in ("any", "camera", "lidar"):
-                policy = TruthPolicy(past=1, movers=movers, visible_to=visible_to, deskew=True)
+                policy = TruthPolicy(1, 0, rng.choice(["own", "present"]), movers, visible_to=visible_to, deskew=True)
                 truth = drive_truth(moments, 1, SPEC, policy)
                 assert truth.dtype == np.uint8
                 assert truth.shape == SPEC.shape
@@ -234,7 +280,9 @@ def test_a_belief_of_another_grid_is_refused():
 
 
 @pytest.mark.parametrize(
-    "choice", [{"movers": "frozen"}, {"visible_to": "radar"}, {"past": -1}, {"future": 1.5}], ids=str
+    "choice",
+    [{"movers": "frozen"}, {"visible_to": "radar"}, {"cleanup": True}, {"vote": "all"}, {"past": -1}, {"future": 1.5}],
+    ids=str,
 )
 def test_a_policy_that_does_not_exist_is_refused(choice):
     with pytest.raises(ArgumentError, match=next(iter(choice))):

@@ -70,7 +70,7 @@ def test_it_is_made_once(root, monkeypatch):
     np.testing.assert_array_equal(training(root, EXACT).arrays["truth"], first)
     for other in (
         replace(EXACT, seed=1),
-        replace(EXACT, policy=TruthPolicy(cleanup=False)),
+        replace(EXACT, policy=TruthPolicy(cleanup="none")),
         MadeTruth(flaws=TruthFlaws()),
     ):
         with pytest.raises(TypeError, match="NoneType"):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets.returns import seen_returns
+from semgrid_edu.datasets.returns import closest_returns, seen_returns
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 
@@ -25,6 +25,12 @@ def test_closest_return_of_a_pixel_hides_the_others():
     pixels, cells = seen_returns(frame_of((30.5, 0.1, 0), (10.5, 0.1, 0), (20.5, 0.1, 0)), SPEC, (5, 5))
     assert pixels.tolist() == [2 * 5 + 2]
     assert cells.tolist() == [29 * 20 + 9]
+
+
+def test_the_closest_returns_are_known_by_their_numbers():
+    frame = frame_of((30.5, 0.1, 0), (10.5, 2.1, 1.05), (-5.0, 0.1, 0), (10.5, 0.1, 0))
+    returns, uv = closest_returns(frame)
+    assert dict(zip(returns.tolist(), map(tuple, uv.tolist()), strict=True)) == {1: (0, 1), 3: (2, 2)}
 
 
 def test_left_is_left_and_up_is_up():

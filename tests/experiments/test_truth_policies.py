@@ -78,7 +78,7 @@ def scored():
     """Four trials on a frame of the shipped drive."""
     trials = {
         "paper": TRIALS["one scan (the paper)"],
-        "bare": Trial(TruthPolicy(cleanup=False)),
+        "bare": Trial(TruthPolicy(cleanup="none")),
         "exact": Trial(flaws=NO_FLAWS),
         "wide": Trial(TruthPolicy(past=2, future=2, movers="carved")),
     }

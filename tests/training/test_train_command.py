@@ -1,4 +1,5 @@
 import json
+from dataclasses import asdict
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -133,9 +134,7 @@ def test_the_options_reach_the_training(monkeypatch, tmp_path):
     written = "--segmenter segnet --preset paper --imagenet vgg16.safetensors --seed 2 --iterations 7 --two-stage"
     assert provenance["command"] == f"semgrid-edu train --data minikitti --out out {written} --truth lidar"
     assert provenance["resumed"] is True
-    assert provenance["truth"]["policy"] == {
-        "past": 0, "future": 0, "movers": "smeared", "deskew": False, "visible_to": "any", "cleanup": True
-    }  # fmt: skip
+    assert provenance["truth"] == asdict(MadeTruth())
     assert provenance["params"]["weight_limit"] == "inf"
     assert provenance["imagenet"] == sha256(imagenet)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import binary_closing, distance_transform_edt
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE, LabelSet
@@ -10,6 +10,13 @@ from semgrid_edu.occupancy import State
 
 CLOSING_REACH = 1.5
 """Metres. Of 0.5 to 3 m it gives the best pixel accuracy on minikitti's training split, with true image labels."""
+
+GROUND_REACH = 3.0
+"""Metres. Beyond 30 m the LIDAR's rings lie this far apart on the ground and farther."""
+
+THING_REACH = 1.0
+"""Metres. Half the width of the gaps in walls and hedges that are closed. Of the few values tried on six training
+frames of minikitti, 1 m is better than 0.5 m, and 3 m of ground better than 2 m, by mean intersection over union."""
 
 
 def carry_labels(
@@ -87,6 +94,45 @@ def close_gaps(
         return grid
     distance, nearest = distance_transform_edt(unlabelled, sampling=cell, return_indices=True)
     return np.where((grid != unobserved) & (distance <= reach), grid[tuple(nearest)], grid)
+
+
+def close_and_spread(grid: NDArray, cell: float, label_set: LabelSet = KITTI_14) -> NDArray[np.uint8]:
+    """Label the gaps between the LIDAR's rings, so that what stands doesn't grow.
+
+    The ground lies between the rings too, so it spreads by up to `GROUND_REACH`. What stands would cover the ground
+    around it if it spread. It is closed instead (dilated, then eroded, class by class), which fills the gaps in it that
+    are up to twice `THING_REACH` wide and moves no outline.
+
+    Parameters
+    ----------
+    grid : (H, W) uint8
+        From `carry_labels`.
+    cell : float
+        Side of a cell, metres.
+    label_set : LabelSet
+        The classes, with an unknown one for each occupancy state.
+
+    Returns
+    -------
+    (H, W) uint8
+        Cells that were observed, but that no label reached, may have one now; the others are as they were.
+
+    Raises
+    ------
+    ArgumentError
+        When the label set has no unknown classes.
+    """
+    flat = np.array([label_set.index(name) for name in label_set.flat])
+    only_ground = np.where((grid < label_set.n_semantic) & ~np.isin(grid, flat), unknown_numbers(label_set)[0], grid)
+    spread = close_gaps(only_ground, cell, GROUND_REACH, label_set)
+    margin = round(THING_REACH / cell)
+    square = np.ones((2 * margin + 1,) * 2, bool)
+    fillable = (grid >= label_set.n_semantic) & (grid != unknown_numbers(label_set)[State.UNKNOWN])
+    closed = np.where(fillable, spread, grid)
+    for c in set(range(label_set.n_semantic)) - set(flat.tolist()):
+        thing = np.pad(grid == c, margin)
+        closed[fillable & binary_closing(thing, square)[margin:-margin, margin:-margin]] = c
+    return closed
 
 
 def unknown_numbers(label_set: LabelSet) -> tuple[int, ...]:

@@ -6,15 +6,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.datasets.ground_truth.carrying import carry_labels, close_gaps, unknown_numbers
+from semgrid_edu.datasets.ground_truth.carrying import carry_labels, close_and_spread, close_gaps, unknown_numbers
 from semgrid_edu.datasets.ground_truth.policy import TruthPolicy
 from semgrid_edu.datasets.ground_truth.sight import in_sight
-from semgrid_edu.datasets.ground_truth.window import Moment, gather_points
-from semgrid_edu.datasets.returns import seen_returns
+from semgrid_edu.datasets.ground_truth.window import Moment, gather_returns
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import IGNORE
 from semgrid_edu.occupancy import State
 from semgrid_edu.occupancy.state import check_shape
 
@@ -55,8 +53,8 @@ def lidar_truth(
     Raises
     ------
     ArgumentError
-        When the frame has no labels, its label set has no unknown classes, the shape of `probability` is wrong, or the
-        policy needs frames or beliefs that aren't given.
+        When the frame has no labels, its label set has no unknown classes, the shape of `probability` or of the labels
+        is wrong, or the policy needs frames, labels or beliefs that aren't given.
 
     Examples
     --------
@@ -67,15 +65,18 @@ def lidar_truth(
     policy = policy or TruthPolicy()
     if frame.labels is None:
         raise ArgumentError("frame", "a frame with labels", "a frame without")
-    label_set, size = frame.labels.label_set, frame.camera.size
+    label_set = frame.labels.label_set
     unknown = np.array(unknown_numbers(label_set), np.uint8)
     check_shape("probability", probability, (4, *spec.shape))
-    check_shape("frame.labels.image", frame.labels.image, size)
-    gathered = replace(frame, points=gather_points(frame, before, after, spec, policy))
-    known = np.where(frame.labels.image < label_set.n_semantic, frame.labels.image, IGNORE)
-    truth = carry_labels(known, *seen_returns(gathered, spec, size), probability, label_set)
-    if policy.cleanup:
+    returns = gather_returns(frame, before, after, spec, policy)
+    rows, cols, inside = spec.cells(returns.places)
+    cells, classes = (rows * spec.shape[1] + cols)[inside], returns.classes[inside]
+    voters = label_set if policy.vote == "standing" else replace(label_set, flat=())
+    truth = carry_labels(classes, np.arange(len(cells)), cells, probability, voters)
+    if policy.cleanup == "spread":
         truth = close_gaps(truth, spec.cell, label_set=label_set)
+    elif policy.cleanup == "close":
+        truth = close_and_spread(truth, spec.cell, label_set)
     states = np.argmax(probability, axis=0)
     if policy.visible_to == "camera":
         truth = np.where(in_sight(frame, spec), truth, unknown[states])

@@ -5,7 +5,10 @@ from dataclasses import dataclass
 from semgrid_edu.errors import ArgumentError
 
 MOVERS = ("smeared", "carved", "carried")
+LABELS = ("present", "own")
 SIGHTS = ("any", "camera", "lidar")
+VOTES = ("standing", "majority")
+CLEANUPS = ("none", "spread", "close")
 
 
 @dataclass(frozen=True)
@@ -17,6 +20,11 @@ class TruthPolicy:
     past, future : int
         Numbers of scans before and after the labelled one that are added to it, moved by the vehicle's poses. The
         paper uses the one scan.
+    labels : str
+        Which image labels the returns of these other scans. "present": that of the labelled frame, so that one labelled
+        image is enough, as in KITTI, where one image in ten has labels. What the camera doesn't see at that instant
+        takes the label of what hides it, unless a return of that lies on the same pixel. "own": the image of the scan's
+        own instant, so that all frames of the window need labels.
     movers : str
         What happens to returns from moving things in these other scans. "smeared": nothing, so that they stay where
         the thing was. "carved": they are removed. "carried": they are moved to where the thing is now, by the velocity
@@ -26,11 +34,17 @@ class TruthPolicy:
         Whether to undo the motion of the vehicle within a turn of the LIDAR (`deskew_scan`). It is for scans as a
         scanner records them, such as KITTI's raw ones. Simulated scans are taken at one instant, so it would bend
         them, unless `TruthFlaws.skewed` has bent them first.
+    vote : str
+        Which class a cell takes when its returns have several. "standing": the most frequent one of those that stand,
+        the ground's only if none does, as in the true grids (`LabelSet.most_voted`); a thin pole then keeps its cell,
+        but so does one wrong return. "majority": the most frequent one.
     visible_to : str
         Which cells may keep a label. "any": all. "camera": those in the sight of the camera, as far as this scan tells
         (`in_sight`). "lidar": those about which the LIDAR has said something: their most probable state isn't UNKNOWN.
-    cleanup : bool
-        Whether the gaps between the rings are closed (`close_gaps`).
+    cleanup : str
+        How the gaps between the rings are closed. "none": not. "spread": all classes alike spread into them
+        (`close_gaps`). "close": what stands is closed, and only the ground spreads (`close_and_spread`). The paper says
+        that it uses morphological methods, not which.
 
     Raises
     ------
@@ -45,14 +59,17 @@ class TruthPolicy:
 
     past: int = 0
     future: int = 0
+    labels: str = "present"
     movers: str = "smeared"
     deskew: bool = False
+    vote: str = "standing"
     visible_to: str = "any"
-    cleanup: bool = True
+    cleanup: str = "close"
 
     def __post_init__(self) -> None:
         """Refuse what isn't a choice."""
-        for name, choices in (("movers", MOVERS), ("visible_to", SIGHTS)):
+        choices_of = {"labels": LABELS, "movers": MOVERS, "vote": VOTES, "visible_to": SIGHTS, "cleanup": CLEANUPS}
+        for name, choices in choices_of.items():
             if getattr(self, name) not in choices:
                 raise ArgumentError(name, f"one of {', '.join(choices)}", repr(getattr(self, name)))
         for name in ("past", "future"):
