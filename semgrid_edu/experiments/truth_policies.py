@@ -4,7 +4,9 @@ Simulated drives are filtered by CMCDOT, their calibration, labels and scans get
 (`TruthFlaws`), each policy makes the truth of the frame in the middle, and its cells are counted (`TruthCounts`).
 """
 
+import hashlib
 from collections.abc import Iterable
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -62,8 +64,8 @@ def truth_policies(
     -------
     dict
         "drives": by number of the drive and name of the trial, each of `COUNTED` added up over classes and distances;
-        "sums": by name of the trial the cells of `TruthCounts`, of all drives; and all that made them. JSON can hold
-        it.
+        "sums": by name of the trial the cells of `TruthCounts`, of all drives; "policies": the trials; and all that
+        made them. JSON can hold it.
 
     Raises
     ------
@@ -86,11 +88,12 @@ def truth_policies(
             for name, one in counts.items():
                 sums[name] = (one + TruthCounts(np.array(sums.get(name, 0)))).cells.tolist()
             spent = minutes + (datetime.now(UTC) - began).total_seconds() / 60
-            result = identity | {"drives": done, "sums": sums, "minutes": {"of all drives": round(spent, 2)}}
-            write_json(log, result)
+            write_json(log, identity | {"drives": done, "sums": sums, "minutes": {"of all drives": round(spent, 2)}})
             bar.update()
     choices = f"--grid {grid} --lidar {lidar}"
-    return identity | {
+    return {
+        **identity,
+        **_legend(trials),
         "drives": done,
         "sums": sums,
         "minutes": read_parts(log, identity, "minutes"),
@@ -101,12 +104,15 @@ def truth_policies(
 
 
 def _identity(seed: int, grid: str, lidar: str, trials: dict[str, Trial]) -> dict[str, object]:
-    """Return what makes the experiment, for the log to be compared with."""
+    """Return what makes the experiment, for the log to be compared with; all trials as one short number."""
+    digest = hashlib.sha256(repr(trials).encode()).hexdigest()[:16]
+    return {"seed": seed, "grid": grid, "lidar": lidar, "trials": digest}
+
+
+def _legend(trials: dict[str, Trial]) -> dict[str, object]:
+    """Return what the numbers of a result stand for."""
     return {
-        "seed": seed,
-        "grid": grid,
-        "lidar": lidar,
-        "trials": {name: repr(trial) for name, trial in trials.items()},
+        "policies": {name: asdict(trial.policy) | {"errors": asdict(trial.flaws)} for name, trial in trials.items()},
         "counted": list(COUNTED),
         "bands": list(BAND_EDGES),
         "classes": list(KITTI_14.names[: KITTI_14.n_semantic]),
