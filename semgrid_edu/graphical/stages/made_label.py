@@ -116,7 +116,7 @@ def made_label_stage(world: LabelWorld | None = None) -> StageGraph:
     return StageGraph(
         "How one cell gets its label",
         GraphicalModel(factors, parents | {"o": ("m",), "y": (*votes, "o")}),
-        observed=tuple(f"{name}{k}" for k in range(1, world.returns + 1) for name in "ad") + ("o",),
+        observed=("o", *(f"{name}{k}" for k in range(1, world.returns + 1) for name in "ad")),
         positions=_positions(world.returns),
         equations={"m": "what stands there", "c": "calibration", "o": "occupancy", "y": "label"},
         cut=MADE_LABEL_CUT,
@@ -146,7 +146,7 @@ def wrong_label(world: LabelWorld, content: int | None = None) -> float:
 
 def _voted(world: LabelWorld) -> NDArray[np.float64]:
     """Return P(y | x1, ..., o) by the package's own `carry_labels`, to which each assignment is one cell of a grid."""
-    shape = (3,) * world.returns + (4,)
+    shape = (*(3,) * world.returns, 4)
     cells = np.indices(shape).reshape(len(shape), -1)
     classes = np.array([*CONTENTS, IGNORE], np.uint8)[cells[:-1]]
     n = cells.shape[1]

@@ -44,7 +44,16 @@ def test_a_cell_without_a_vote_is_unknown_by_its_state():
         assert found[MADE.index(KITTI_14.index(f"unknown-{name}"))] == pytest.approx(1)
 
 
-@pytest.mark.parametrize("wrong", [{"returns": 0}, {"returns": 10}, {"outline": 1.5}, {"lost": -1}, {"vote": "loudest"}])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"returns": 0},
+        {"returns": 10},
+        {"outline": 1.5},
+        {"lost": -1},
+        {"vote": "loudest"},
+    ],
+)
 def test_bad_input(wrong):
     with pytest.raises(ArgumentError, match=next(iter(wrong))):
         LabelWorld(**wrong)
