@@ -670,7 +670,7 @@ plt.show()
 # one such choice, and the laboratory counts its errors. None of the public data sets can do that, because none knows
 # the truth.
 
-# %% tags=["policies"] jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true}
 AROUND = "9 before and after"
 OWN = f"{AROUND}, own labels, movers"
 policies = [
@@ -690,6 +690,8 @@ policies = [
     ("  carved, what stands wins", f"{OWN} carved, what stands wins"),
     ("  carved, only what the camera sees", f"{OWN} carved, visible to camera"),
 ]
+
+# %% tags=["policies"] jupyter={"source_hidden": true}
 columns = ("found", "mistaken", "missed", "wrong", "hidden")
 
 

@@ -322,7 +322,7 @@ def close_mask(mask, reach):
             "opened instead of closed",
             task="close-mask",
             loses=2,
-            says="dilate first, then erode",
+            says="Dilate first, then erode",
             code=closing("binary_dilation(binary_erosion(padded, square), square)"),
         ),
         mistake(
