@@ -52,8 +52,6 @@ def count_votes(cells, classes, n_cells):
 def closing(body, pad="2 * reach", cut="[2 * reach : -2 * reach, 2 * reach : -2 * reach]"):
     """Return an answer to task 3 that does this to the padded mask."""
     return f"""
-from scipy.ndimage import binary_closing, binary_dilation, binary_erosion, generate_binary_structure, iterate_structure
-
 def close_mask(mask, reach):
     square = np.ones((2 * reach + 1, 2 * reach + 1), bool)
     padded = np.pad(mask, {pad})
@@ -302,9 +300,24 @@ def count_votes(cells, classes, n_cells):
             code=votes(ground="[ROAD, SIDEWALK, VEGETATION, 8]"),
         ),
         # ---- task 3
-        right("scipy's closing", task="close-mask", code=closing("binary_closing(padded, square)")),
         right(
-            "distances along rows and columns",
+            "shifted copies",
+            task="close-mask",
+            code="""
+def close_mask(mask, reach):
+    height, width = mask.shape
+    padded = np.pad(mask.astype(bool), 2 * reach)
+    steps = [(i, j) for i in range(2 * reach + 1) for j in range(2 * reach + 1)]
+    dilated = np.zeros((height + 2 * reach, width + 2 * reach), bool)
+    for i, j in steps:
+        dilated |= padded[i : i + height + 2 * reach, j : j + width + 2 * reach]
+    closed = np.ones((height, width), bool)
+    for i, j in steps:
+        closed &= dilated[i : i + height, j : j + width]
+    return closed""",
+        ),
+        right(
+            "growing what is there, then what is not",
             task="close-mask",
             code="""
 def close_mask(mask, reach):
@@ -323,56 +336,56 @@ def close_mask(mask, reach):
             task="close-mask",
             loses=2,
             says="Dilate first, then erode",
-            code=closing("binary_dilation(binary_erosion(padded, square), square)"),
+            code=closing("ndimage.binary_dilation(ndimage.binary_erosion(padded, square), square)"),
         ),
         mistake(
             "dilated alone",
             task="close-mask",
             loses=2,
             says="that is the dilated mask",
-            code=closing("binary_dilation(padded, square)"),
+            code=closing("ndimage.binary_dilation(padded, square)"),
         ),
         mistake(
             "nothing around the map",
             task="close-mask",
             loses=2,
             says="surround the map with False cells before you dilate",
-            code=closing("binary_closing(padded, square)", pad="0", cut=""),
+            code=closing("ndimage.binary_closing(padded, square)", pad="0", cut=""),
         ),
         mistake(
             "not cut off",
             task="close-mask",
             loses=2,
             says="cut the surrounding cells off",
-            code=closing("binary_closing(padded, square)", cut=""),
+            code=closing("ndimage.binary_closing(padded, square)", cut=""),
         ),
         mistake(
             "a cross, scipy's default",
             task="close-mask",
             loses=2,
             says="the gap of two cells is still open",
-            code=closing("binary_closing(padded, iterations=reach)"),
+            code=closing("ndimage.binary_closing(padded, iterations=reach)"),
         ),
         mistake(
             "twice the reach",
             task="close-mask",
             loses=2,
             says="the gap of five cells is closed",
-            code=closing("binary_closing(padded, square, iterations=3)", pad="6", cut="[6:-6, 6:-6]"),
+            code=closing("ndimage.binary_closing(padded, square, iterations=3)", pad="6", cut="[6:-6, 6:-6]"),
         ),
         mistake(
             "rows alone",
             task="close-mask",
             loses=2,
             says="turned upright",
-            code=closing("binary_closing(padded, square[:1])"),
+            code=closing("ndimage.binary_closing(padded, square[:1])"),
         ),
         mistake(
             "columns are joined, too far in the corners",
             task="close-mask",
             loses=2,
             says="on inputs you haven't seen",
-            code=closing("binary_closing(padded, square[:1]) | binary_closing(padded, square[:, :1])"),
+            code=closing("ndimage.binary_closing(padded, square[:1]) | ndimage.binary_closing(padded, square[:, :1])"),
         ),
         # ---- task 4
         right(
