@@ -95,7 +95,7 @@ plt.rcParams["figure.dpi"] = 80
 # | [06](06_planes.ipynb) | $s \to p$ | sampling that learns: equation (2) and its gradient |
 # | [07](07_segmentation.ipynb) | $i \to s$ | three networks for segmentation |
 # | [08](08_fusion.ipynb) | $(p, o) \to g$ | reduction, fusion, training end to end |
-# | 09 | | where ground truth comes from |
+# | [09](09_truth.ipynb) | | where ground truth comes from, and how wrong it is |
 # | [10](10_crf.ipynb) | $g \to g$ | the CRF by hand: equations (3) and (4) |
 # | [11](11_fast_crf.ipynb) | $g \to g$ | the fast CRF |
 # | 12 | all | the paper's experiments, every claim put to the test |

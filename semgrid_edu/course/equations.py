@@ -202,6 +202,8 @@ EQUATIONS = (
         "4",
         "Labels of the image, carried to the grid",
         literal="semgrid_edu.datasets.ground_truth.carry_labels",
+        lecture="09_truth#recipe",
+        exercise="09_truth#count-votes",
     ),
     Equation(
         "median-frequency",

@@ -75,6 +75,13 @@ STAGES = (
         check="tests/graphical/stages/test_stage_cmcdot.py::test_elsewhere_they_tend_to_bof_and_its_bias_remains",
     ),
     StageModel(
+        "label",
+        "How one cell gets its label",
+        model="semgrid_edu.graphical.stages.made_label_stage",
+        check="tests/graphical/stages/test_stage_made_label.py::test_a_shared_error_is_never_outvoted",
+        lecture="09_truth#graph",
+    ),
+    StageModel(
         "crf",
         "The fully connected CRF on a few cells",
         model="semgrid_edu.graphical.stages.crf_stage",

@@ -9,6 +9,7 @@ from semgrid_edu.graphical.stages.cmcdot_graph import cmcdot_stage
 from semgrid_edu.graphical.stages.crf import crf_stage
 from semgrid_edu.graphical.stages.line import bayes_on_a_line
 from semgrid_edu.graphical.stages.log_odds_cell import one_log_odds_cell, package_log_odds_cell
+from semgrid_edu.graphical.stages.made_label import LabelWorld, made_label_stage, wrong_label
 from semgrid_edu.graphical.stages.shared_error import count_rings, scan_with_pose_error
 from semgrid_edu.graphical.stages.stage_graph import CutEdge, StageGraph
 from semgrid_edu.graphical.stages.system import whole_system
@@ -19,6 +20,7 @@ from semgrid_edu.graphical.stages.thick_walls import thick_walls
 __all__ = [
     "BeamWorld",
     "CutEdge",
+    "LabelWorld",
     "StageGraph",
     "SystemWorld",
     "bayes_on_a_line",
@@ -29,6 +31,7 @@ __all__ = [
     "count_rings",
     "crf_stage",
     "exact_cell",
+    "made_label_stage",
     "one_cell",
     "one_log_odds_cell",
     "package_cell",
@@ -38,4 +41,5 @@ __all__ = [
     "system_gain",
     "thick_walls",
     "whole_system",
+    "wrong_label",
 ]
