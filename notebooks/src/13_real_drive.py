@@ -42,6 +42,7 @@ from ipywidgets import FloatSlider, interact
 from scipy.ndimage import gaussian_filter
 from scipy.spatial import KDTree
 
+# %% jupyter={"source_hidden": true}
 from semgrid_edu import plotting
 from semgrid_edu.camera import project, transform_points
 from semgrid_edu.datasets import KittiRawDrive
@@ -260,8 +261,8 @@ for name, frame in {"as it is": as_it_is, "camera turned": turned, "upside down"
     print(f"{name:<15} {share_on_image(frame.points, frame.camera):.3f} of the returns ahead fall on the image")
 
 # %% [markdown]
-# So this share looks like a check and is a weak one. It falls to 0 if the camera is said to look backwards, but it is blind
-# to the two degrees that we most need to find.
+# So this share looks like a check and is a weak one. It falls to 0 if the camera is said to look backwards, but it is
+# blind to the two degrees that we most need to find.
 #
 # We need something that the image and the scan both know: **borders**. Where a car ends and the wall behind it begins,
 # the LIDAR's distance jumps, and mostly the brightness of the image changes, too (Levinson and Thrun, 2013).
@@ -537,8 +538,8 @@ for name, one in measured["drives"].items():
 
 # %% [markdown]
 # From the second second on, the filter calls nearly all hit cells of moving cars DYNAMIC, on both drives, and it has
-# learned from neither. The shares of the states differ for a reason that has nothing to do with learning: the real
-# scanner sends about ten times as many beams, so fewer cells stay UNKNOWN, and the two streets are different streets.
+# learned from neither. The shares of the states differ for reasons that have nothing to do with learning: the real
+# scanner returns about ten times as many points, so that fewer cells stay UNKNOWN, and the streets are different ones.
 
 # %% [markdown]
 # ## What doesn't: a network that learned in simulation

@@ -233,6 +233,8 @@ T[:3, 3] = 1.0, 0.3, 0.05
 before = np.array([[8.0, 2, 0], [12, -3, 1], [15, 4, 0.5], [20, -1, 1], [25, 6, 0], [9, -6, 1]])
 aside = np.array([[0.1, 0, 0], [0, 0.2, 0], [0, 0, 0.3], [0.4, 0, 0], [0, 2, 0]])
 now = carried(before[:5] + aside, np.linalg.inv(T))
+
+# %% nbgrader={"grade": false, "grade_id": "overlay-slips", "locked": true, "schema_version": 3, "solution": false, "task": false}
 wrong = {
     "that is the mean: a few things that move would spoil it, take the median": nearest(before, carried(now, T)).mean(),
     "you move by the inverse: T carries points of now into the frame of before": np.median(
