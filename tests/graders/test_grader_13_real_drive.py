@@ -59,19 +59,17 @@ def overlay(before, now, T):
 
 
 def diagnose(
-    lost="len(find_gaps([f.time for f in frames])) > 0",
+    lost="len(time_gaps([f.time for f in frames])) > 0",
     tilted="abs(rise) > 1",
-    backwards="overlay(a, b, T) > 2 * overlay(a, b, np.linalg.inv(T))",
+    backwards="overlay_error(a, b, T) > 2 * overlay_error(a, b, np.linalg.inv(T))",
     turned="abs(best) >= 1",
-    lane="(p[:, 0] > 3) & (p[:, 0] < 20) & (abs(p[:, 1]) < 1.5) & (p[:, 2] < -1)",
 ):
     """Return an answer to task 5 with these parts."""
     return f"""
 def find_fault(frames):
-    p = frames[-1].points[:, :3]
-    rise = ground(p[{lane}])[1]
-    T = motion_between(frames[1], frames[6])
-    a, b = standing_points(frames[1]), standing_points(frames[6])
+    a, b = frames[1], frames[6]
+    rise = ground_plane(frames[-1].points, 1.73).pitch
+    T = motion_between(a, b)
     turns = np.arange(-3, 3.5, 0.5)
     best = turns[sum(edge_contrast(f, turns) for f in frames[::3]).argmax()]
     if {lost}:
@@ -313,7 +311,7 @@ def overlay(before, now, T):
         right(
             "every reading first, then the largest",
             task="find-fault",
-            code=diagnose(tilted="abs(rise) > 0.8", turned="abs(best) > 1.2", backwards="overlay(a, b, T) > 0.6"),
+            code=diagnose(tilted="abs(rise) > 0.8", turned="abs(best) > 1.2", backwards="overlay_error(a, b, T) > 0.6"),
         ),
         mistake(
             "always sound",

@@ -22,8 +22,8 @@ import warnings
 import numpy as np
 
 from semgrid_edu.datasets.samples import sample_drive
-from semgrid_edu.experiments.new_data.drive_checks import edge_contrast  # task 5 may use these three
-from semgrid_edu.experiments.new_data.ego_motion import motion_between, standing_points
+from semgrid_edu.experiments.new_data.drive_checks import edge_contrast, ground_plane, time_gaps  # for task 5
+from semgrid_edu.experiments.new_data.ego_motion import motion_between, overlay_error
 from semgrid_edu.experiments.new_data.faults import FAULTS
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
@@ -281,32 +281,32 @@ assert not complaint, complaint
 # - `"LIDAR tilted"`: the LIDAR leans by 2 degrees, which the calibration doesn't know;
 # - `"poses backwards"`: the poses say that the vehicle drives backwards.
 #
-# A frame has `frame.time`, `frame.points` (N, 4), `frame.image` and `frame.camera` (with `K`, `T_camera_from_lidar` and `size`). Use your functions of tasks 1, 3
-# and 4, and from the package:
+# A frame has `frame.time`, `frame.points` (N, 4), `frame.image` and `frame.camera`. Use the package's functions for tasks 1, 3 and 4, so that a mistake there
+# costs nothing here:
 #
 # ```python
-# standing_points(frame)                    # (n, 3): the returns of things that stand up
+# time_gaps(times)                          # task 1
+# ground_plane(frame.points, 1.73).pitch    # task 3: how much the ground of the own lane rises ahead, degrees
+# overlay_error(before, now, T)             # task 4, for two frames: it takes the returns of things that stand up
 # motion_between(before, now)               # (4, 4): T_before_from_now, as the poses say
 # edge_contrast(frame, [-2, -1, 0, 1, 2])   # how well borders in scan and image agree, for a camera turned by these degrees
 # ```
 #
-# For the ground take the returns of your own lane, from 3 to 20 m ahead and up to 1.5 m to each side, below z = -1. For the motion compare frames that are five apart. Against what do
-# you compare the distance? If the motion is right, its inverse is wrong. Average `edge_contrast` over a few frames. A second is enough for all of it.
+# For the motion compare frames that are five apart. Against what do you compare the distance? If the motion is right, its inverse is wrong. Average `edge_contrast`
+# over a few frames. A second is enough for all of it.
 
 
 # %% nbgrader={"grade": false, "grade_id": "find-fault", "locked": false, "schema_version": 3, "solution": true, "task": false}
 def find_fault(frames):
     """Return the name of the fault."""
     ### BEGIN SOLUTION
-    if find_gaps([frame.time for frame in frames]):
+    if len(time_gaps([frame.time for frame in frames])):
         return "two frames lost"
-    points = frames[0].points[:, :3]
-    lane = points[(points[:, 0] > 3) & (points[:, 0] < 20) & (np.abs(points[:, 1]) < 1.5) & (points[:, 2] < -1)]
-    if abs(ground(lane)[1]) > 1:
+    if abs(ground_plane(frames[0].points, 1.73).pitch) > 1:
         return "LIDAR tilted"
-    T = motion_between(frames[0], frames[5])
-    before, now = standing_points(frames[0]), standing_points(frames[5])
-    if overlay(before, now, np.linalg.inv(T)) < overlay(before, now, T):
+    before, now = frames[0], frames[5]
+    T = motion_between(before, now)
+    if overlay_error(before, now, np.linalg.inv(T)) < overlay_error(before, now, T):
         return "poses backwards"
     turns = np.arange(-3, 3.1, 0.5)
     contrast = np.mean([edge_contrast(frame, turns) for frame in frames[::3]], axis=0)
