@@ -253,7 +253,7 @@ def ground(points):
         mistake(
             "what lies below 1.21 m is road",
             task="ground",
-            loses=3,
+            loses=1,
             says="on inputs you haven't seen",
             code="""
 def ground(points):
