@@ -113,6 +113,21 @@ def truth_policies(
     keep_result(out, lambda: truth_policies(out, seed, drives, grid, lidar), truth_tables)
 
 
+@reproduce.command()
+def real_drive(
+    kitti: Annotated[
+        list[Path], typer.Option(help="A folder of KITTI raw drives; once more for another stretch of the same drive.")
+    ],
+    date: Annotated[str, typer.Option(help="Such as 2011_09_26.")] = "2011_09_26",
+    drive: Annotated[str, typer.Option(help="Such as 0013.")] = "0013",
+    out: Annotated[Path, typer.Option(help="Where to write the numbers.")] = Path("real_drive.json"),
+) -> None:
+    """Put a real drive through every check of new data, beside the shipped drive (lecture 13)."""
+    from semgrid_edu.experiments.new_data.real_drive import compare_drives, real_drive_table
+
+    keep_result(out, lambda: compare_drives(kitti, date, drive), real_drive_table)
+
+
 def keep_result(out: Path, compute: Callable[[], dict], table: Callable[[dict], str]) -> None:
     """Compute an experiment's result, once it is known that the file can be written; write it, and print its table.
 
