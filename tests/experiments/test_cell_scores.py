@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.experiments.cell_scores import CellScores, TimeEstimate, hit_cell_groups
+from semgrid_edu.experiments.cell_scores import CellScores, Estimate, hit_cell_groups
 from semgrid_edu.experiments.cell_truth import CellTruth, pool_truth
 from semgrid_edu.experiments.scenes import KnownScene, SceneHistory
 from semgrid_edu.frame import LABEL_GRID, Frame
@@ -56,7 +56,7 @@ def belief() -> Belief:
 @pytest.fixture
 def summary() -> dict:
     scores = CellScores(ROW)
-    scores.add(scene(), TimeEstimate.of_belief(belief()))
+    scores.add(scene(), Estimate.of_belief(belief()))
     return scores.summary()
 
 
@@ -68,7 +68,7 @@ def test_the_confusion_counts_observed_cells_and_cells_never_seen(summary):
 
 def test_a_cell_that_was_seen_once_and_is_hidden_now_counts_nowhere():
     scores = CellScores(ROW)
-    scores.add(scene(never_seen=np.zeros((1, 5), bool)), TimeEstimate.of_belief(belief()))
+    scores.add(scene(never_seen=np.zeros((1, 5), bool)), Estimate.of_belief(belief()))
     assert scores.confusion.sum() == 4
 
 
@@ -93,12 +93,12 @@ def test_what_moves_counts_from_1_5_seconds_in_view_on(frames, cells):
 def test_smear_is_what_is_held_occupied_where_something_has_left(summary):
     assert summary["smear"] == {"cells": 1, "occupied": 0.0}
     scores = CellScores(ROW)
-    scores.add(scene(), TimeEstimate.of_log_odds(np.full((1, 5), 0.97)))
+    scores.add(scene(), Estimate.of_log_odds(np.full((1, 5), 0.97)))
     assert scores.summary()["smear"]["occupied"] == 1.0
 
 
 def test_a_log_odds_grid_calls_static_what_is_occupied_and_unknown_what_is_undecided():
-    estimate = TimeEstimate.of_log_odds(row(0.3, 0.5, 0.54, 0.7, 0.97))
+    estimate = Estimate.of_log_odds(row(0.3, 0.5, 0.54, 0.7, 0.97))
     assert estimate.state.tolist() == [[FREE, UNKNOWN, UNKNOWN, STATIC, STATIC]]
     assert not estimate.moves.any()
     assert np.isnan(estimate.velocity).all()

@@ -9,8 +9,8 @@ from semgrid_edu.course.exercises import build_course
 from semgrid_edu.course.grading import autograde, reference_answers, submission, tasks
 from semgrid_edu.course.notebooks import NOTEBOOKS
 
-TIMEOUT = 6
-"""Seconds for a cell: enough for any answer, and all that an endless loop costs the run."""
+TIMEOUT = 12
+"""Seconds for a cell: enough for any answer and for all imports on a busy machine, and what an endless loop costs."""
 
 
 @dataclass(frozen=True)

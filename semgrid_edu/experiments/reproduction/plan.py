@@ -69,7 +69,7 @@ class TimeEstimate:
 
 
 def estimate(runs: list[Run], root: str | Path) -> TimeEstimate:
-    """TimeEstimate how long runs will take.
+    """Estimate how long runs will take.
 
     Parameters
     ----------
