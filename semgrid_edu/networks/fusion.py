@@ -1,6 +1,7 @@
 """Reduction of the planes and their fusion with the occupancy grid (paper, section 3.4, Fig. 4 and 5)."""
 
 import torch
+import torch.nn.functional as F
 from torch import Tensor, nn
 
 from semgrid_edu.networks.conv_deconv import ConvDeconv, fresh_weights
@@ -102,6 +103,19 @@ def _reduction(n_scores: int, n_planes: int, n_reduced: int | None) -> nn.Module
     """Return what takes (B, C, D, H, W) to (B, n_reduced, 1, H, W); without a number to (B, C x D, 1, H, W)."""
     if n_reduced is None:
         return nn.Sequential(nn.Flatten(1, 2), nn.Unflatten(1, (n_scores * n_planes, 1)))
-    # On (B, C, D, H, W) a D x 1 x 1 kernel is the 1x1 convolution of all D x C planes.
-    convolution = nn.Conv3d(n_scores, n_reduced, (n_planes, 1, 1))
+    convolution = _PlaneConvolution(n_scores, n_reduced, (n_planes, 1, 1))
     return nn.Sequential(convolution, nn.BatchNorm3d(n_reduced), nn.ReLU(inplace=True))
+
+
+class _PlaneConvolution(nn.Conv3d):
+    """The 1x1 convolution of all D x C planes: on (B, C, D, H, W), a D x 1 x 1 kernel.
+
+    It is computed as the product of matrices that it is, one row per cell. The planes lie in memory like this already,
+    so that nothing is copied.
+    """
+
+    def forward(self, planes: Tensor) -> Tensor:
+        """Return the (B, n_reduced, 1, H, W) reduced planes."""
+        cells = planes.permute(0, 3, 4, 2, 1).flatten(3)
+        weight = self.weight.flatten(2).transpose(1, 2).flatten(1)
+        return F.linear(cells, weight, self.bias).permute(0, 3, 1, 2).unsqueeze(2)

@@ -23,7 +23,8 @@ class PlaneOperator:
     Parameters
     ----------
     matrix : SparseMatrix
-        One row per point, one column per pixel. The rows of points that aren't visible are empty and cost nothing.
+        One row per point, one column per pixel. The D points of a cell follow each other, so that its scores lie next
+        to each other in memory. The rows of points that aren't visible are empty and cost nothing.
     transpose : SparseMatrix
         The same weights, one row per pixel and one column per point.
     image_size : (int, int)
@@ -58,7 +59,8 @@ class PlaneOperator:
         """
         pixels, visible = np.asarray(pixels), np.asarray(visible)
         check_plane_points(pixels, visible, image_size)
-        matrix = bilinear_matrix(pixels, visible, image_size)
+        by_cell = np.moveaxis(pixels, 0, 2), np.moveaxis(visible, 0, 2)
+        matrix = bilinear_matrix(*by_cell, image_size)
         both = (SparseMatrix.from_scipy(part) for part in (matrix, matrix.T.tocsr()))
         return cls(*both, tuple(image_size), visible.shape)
 
@@ -104,7 +106,8 @@ class PlaneOperator:
         """Return the planes of each image, (B, C, h, w) -> (B, C, D, H, W), differentiable; B is `n_images`."""
         rows = scores.permute(0, 2, 3, 1).flatten(0, 2)
         planes = SparseProduct.apply(rows, self.matrix, self.transpose)
-        return planes.unflatten(0, (self.n_images, *self.planes_shape)).permute(0, 4, 1, 2, 3)
+        n_planes, *shape = self.planes_shape
+        return planes.unflatten(0, (self.n_images, *shape, n_planes)).permute(0, 4, 3, 1, 2)
 
     def __deepcopy__(self, memo: dict) -> "PlaneOperator":
         """Return the operator itself: nothing in it changes, so copies of a network share it."""

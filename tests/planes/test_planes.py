@@ -221,7 +221,7 @@ def test_layout_in_memory_doesnt_matter():
         wider[::2, :, ::2, ::2],
     ):
         assert torch.equal(sampler(same), expected)
-    assert expected.permute(0, 2, 3, 4, 1).is_contiguous()
+    assert expected.permute(0, 3, 4, 2, 1).is_contiguous()
     one_for_all = scores[:, :1, :1, :1].expand(-1, 3, 30, 40)
     torch.testing.assert_close(sampler(one_for_all), sampler(one_for_all.clone()), rtol=0, atol=0)
     upstream = torch.ones(()).expand(expected.shape)  # as .sum().backward() hands it on

@@ -41,7 +41,7 @@ class ImageStageRun(Run):
     arrays: ArraysRun
     segmenter: str = "segnet"
     seed: int = 0
-    iterations: int = 1000
+    iterations: int = 500
     n_frames: int | None = None
 
     @property
@@ -127,7 +127,7 @@ class GridStageRun(Run):
 
     image_stage: ImageStageRun
     arrays: ArraysRun
-    iterations: int = 1000
+    iterations: int = 500
     variant: Variant = USUAL
 
     @property
