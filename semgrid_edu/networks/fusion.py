@@ -86,10 +86,20 @@ class FusionNet(nn.Module):
         (B, C, H, W) float
             g before the soft-max.
         """
+        return self.conv_deconv(self.joined(reduced, occupancy))
+
+    def joined(self, reduced: Tensor, occupancy: Tensor) -> Tensor:
+        """Append the occupancy grid to the reduced planes. Parameters are those of `FusionNet.fuse`.
+
+        Returns
+        -------
+        (B, n_reduced + 4, H, W) float
+            What the conv-deconv network takes.
+        """
         if not self.uses_occupancy:
             occupancy = _unknown_everywhere(occupancy)
         occupancy = occupancy.contiguous(memory_format=torch.channels_last)
-        return self.conv_deconv(torch.cat([reduced.squeeze(2), occupancy], dim=1))
+        return torch.cat([reduced.squeeze(2), occupancy], dim=1)
 
 
 def _unknown_everywhere(occupancy: Tensor) -> Tensor:

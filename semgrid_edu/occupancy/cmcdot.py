@@ -1,19 +1,20 @@
 """CMCDOT, the Conditional Monte Carlo Dense Occupancy Tracker (paper, section 3.2; Rummelhard et al., ITSC 2015)."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.local_belief import local_belief
-from semgrid_edu.occupancy.moving_map import MAX_YAW, map_around, scroll
+from semgrid_edu.occupancy.moving_map import MAX_YAW, look_up, map_around, scroll
 from semgrid_edu.occupancy.observation import observe
 from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.particles import cells_of, transform
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import Belief, FilterState, Particles
-from semgrid_edu.occupancy.steps import move, predict, resample, update
+from semgrid_edu.occupancy.steps import NOTHING_KNOWN, move, predict, resample, update
 from semgrid_edu.occupancy.velocities import velocity_moments
 
 
@@ -32,6 +33,8 @@ class Cmcdot:
         What the filter assumes of the world and of its sensor, and how it spends its particles.
     seed : int or numpy.random.Generator
         Seed or source of all random numbers that the filter draws: the same seed gives the same bits.
+    keep_steps : bool
+        Whether each belief also tells what the map held after each step (`Belief.steps`). Nothing else changes by it.
 
     Examples
     --------
@@ -42,8 +45,15 @@ class Cmcdot:
     (np.int64(1), np.int64(0))
     """
 
-    def __init__(self, spec: GridSpec, params: CmcdotParams | None = None, seed: int | np.random.Generator = 0) -> None:
+    def __init__(
+        self,
+        spec: GridSpec,
+        params: CmcdotParams | None = None,
+        seed: int | np.random.Generator = 0,
+        keep_steps: bool = False,
+    ) -> None:
         self.spec = spec
+        self.keep_steps = keep_steps
         self.params = params or CmcdotParams()
         self.map_spec = map_around(spec, MAX_YAW)
         self._rng = np.random.default_rng(seed)
@@ -83,18 +93,28 @@ class Cmcdot:
             doesn't turn the scan into evidence. The tracker then stays as it was.
         """
         shift, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
-        random = self._rng.bit_generator.state
+        random, steps = self._rng.bit_generator.state, {}
         with ThreadPoolExecutor(1) as another_core:
             scan = another_core.submit(observe, self.params.sensor, points_grid, pose, self.map_spec, self.spec)
             # One name for what is between two steps: its memory, as large as what the filter keeps, is then used again
             state = move(self._state, self.map_spec, shift)
+            self._keep(steps, "move", state, pose)
             state = predict(state, self.map_spec, self.params, dt, self._rng)
+            self._keep(steps, "predict", state, pose)
         if scan.exception():
             self._rng.bit_generator.state = random
         seen, predicted = scan.result(), state.probability
         state = update(state, self.map_spec, seen.on_map, self.params)
+        self._keep(steps, "update", state, pose)
         self._state, self._pose = resample(state, self.map_spec, self.params, self._rng), seen.pose
-        return local_belief(predicted, self._velocities(), seen, self.map_spec, self.spec, self.params)
+        self._keep(steps, "resample", self._state, pose)
+        belief = local_belief(predicted, self._velocities(), seen, self.map_spec, self.spec, self.params)
+        return replace(belief, steps=steps)
+
+    def _keep(self, steps: dict[str, NDArray], name: str, state: FilterState, pose: PlanarMotion) -> None:
+        """Note what the map holds after a step, at the centres of the vehicle's own cells."""
+        if self.keep_steps:
+            steps[name] = look_up(state.probability, NOTHING_KNOWN, self.map_spec, self.spec, pose)
 
     def _velocities(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return mean and covariance of the particles' velocities in each cell of the map."""

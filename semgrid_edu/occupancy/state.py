@@ -1,6 +1,6 @@
 """What the filter believes of each cell: four states and a velocity (paper, section 3.2)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
@@ -58,11 +58,15 @@ class Belief:
     velocity_covariance : (2, 2, H, W) float32
         Covariance of that velocity along the same axes, m^2/s^2: how much it varies within the cell, and how uncertain
         it is. Symmetric and positive semi-definite; NaN where the velocity is NaN.
+    steps : dict of str to (4, H, W) float32
+        How the filter came to this belief: the four probabilities after "move", "predict", "update" and "resample", in
+        this order, looked up at the centres of the same cells. Empty unless the filter was asked to keep them.
     """
 
     probability: NDArray[np.float32]
     velocity: NDArray[np.float32]
     velocity_covariance: NDArray[np.float32]
+    steps: dict[str, NDArray[np.float32]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

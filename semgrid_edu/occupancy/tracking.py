@@ -20,6 +20,7 @@ def track_drive(
     spec: GridSpec,
     params: CmcdotParams | None = None,
     seed: int | np.random.Generator = 0,
+    keep_steps: bool = False,
 ) -> Iterator[Belief]:
     """Filter the scans of a drive, one after the other.
 
@@ -33,6 +34,8 @@ def track_drive(
         What the filter assumes of the world and of its sensor, and how it spends its particles.
     seed : int or numpy.random.Generator
         Seed or source of all random numbers that the filter draws.
+    keep_steps : bool
+        Whether each belief also tells what the filter's map held after each step (`Belief.steps`).
 
     Yields
     ------
@@ -44,7 +47,7 @@ def track_drive(
     ArgumentError
         When frames run backwards in time, or a scan or pose isn't finite.
     """
-    tracker, before = Cmcdot(spec, params, seed), None
+    tracker, before = Cmcdot(spec, params, seed, keep_steps), None
     for frame in frames:
         if before is None:
             motion, dt = PlanarMotion(), LIDAR_PERIOD

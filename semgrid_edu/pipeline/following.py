@@ -110,7 +110,7 @@ class Follower:
         shapes = {"probability": (N_STATES, *grid), "velocity": (2, *grid), "velocity_covariance": (2, 2, *grid)}
         arrays = {name: self._seam.array(getattr(belief, name), shape) for name, shape in shapes.items()}
         self._seam.probabilities(arrays["probability"], "state")
-        return Belief(**arrays)
+        return replace(belief, **arrays)
 
 
 def _without_velocity(probability: object, grid: tuple[int, int]) -> Belief:

@@ -87,7 +87,12 @@ class Stages:
 
     @classmethod
     def of(
-        cls, net: SemanticGridNet, occupancy: CmcdotParams | None = None, crf: CrfParams | None = None, seed: int = 0
+        cls,
+        net: SemanticGridNet,
+        occupancy: CmcdotParams | None = None,
+        crf: CrfParams | None = None,
+        seed: int = 0,
+        keep_steps: bool = False,
     ) -> "Stages":
         """Return the package's own five stages.
 
@@ -101,6 +106,8 @@ class Stages:
             Parameters of the refinement; `CrfParams.for_cells` when left out.
         seed : int
             Seed for the particles of the filter.
+        keep_steps : bool
+            Whether each belief also tells how the filter came to it, as `cell_story` asks for (`Belief.steps`).
 
         Returns
         -------
@@ -119,7 +126,7 @@ class Stages:
         """
         architecture = net.need_architecture()
         refine = _mean_field(crf, architecture.grid.cell)
-        return cls(_filter(occupancy, seed), *_functions_of(net), refine, architecture)
+        return cls(_filter(occupancy, seed, keep_steps), *_functions_of(net), refine, architecture)
 
     def over(self, other: "Stages") -> "Stages":
         """Return these stages, and those of `other` where one was left out.
@@ -195,9 +202,9 @@ def _check_function(name: str, function: object) -> None:
         raise ArgumentError(name, usage, f"{name}{signature}") from error
 
 
-def _filter(params: CmcdotParams | None, seed: int) -> Callable:
+def _filter(params: CmcdotParams | None, seed: int, keep_steps: bool = False) -> Callable:
     def track(frames: Iterable[Frame], spec: GridSpec) -> Iterator[Belief]:
-        return track_drive(frames, spec, params, seed)
+        return track_drive(frames, spec, params, seed, keep_steps)
 
     return track
 

@@ -1,0 +1,119 @@
+"""The parts of every class's score in every cell at once: one pass forward per plane, class and state (section 3.4)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from semgrid_edu.networks import SemanticGridNet
+from semgrid_edu.networks.conv_deconv import ConvDeconv
+from semgrid_edu.occupancy import N_STATES
+from semgrid_edu.story.contributions import fusion_inputs
+
+
+@dataclass(frozen=True, eq=False)
+class ContributionMaps:
+    """The parts of the score of each class l in each cell: the sums of `Contributions`, as maps.
+
+    Parameters
+    ----------
+    score : (L, H, W) float32
+        The logits.
+    by_plane : (D, L, H, W) float32
+        The part of each plane, all classes of its scores together.
+    by_class : (C, L, H, W) float32
+        The part of each class's scores, all planes together. Its sum is that of `by_plane`.
+    occupancy : (4, L, H, W) float32
+        The parts of FREE, STATIC, DYNAMIC and UNKNOWN.
+    """
+
+    score: NDArray[np.float32]
+    by_plane: NDArray[np.float32]
+    by_class: NDArray[np.float32]
+    occupancy: NDArray[np.float32]
+
+    @property
+    def rest(self) -> NDArray[np.float32]:
+        """(L, H, W): what remains of each score, the part of the biases."""
+        return self.score - self.by_plane.sum(axis=0) - self.occupancy.sum(axis=0)
+
+
+@torch.no_grad()
+def contribution_maps(net: SemanticGridNet, scores: NDArray, occupancy: NDArray) -> ContributionMaps:
+    """Compute `cell_contributions`, summed by plane and by class, for all cells and classes of a frame.
+
+    The gradient of one score takes a pass backward, and there are L H W scores. A pass forward carries a change of the
+    inputs to all scores. With a group of inputs as their own change, and the other inputs unchanged, it gives each
+    score's sum of gradient times input over the group. So D + C + 4 passes are enough.
+
+    Parameters
+    ----------
+    net : SemanticGridNet
+        The network, in evaluation mode.
+    scores : (C, h, w) float32
+        s, the image network's scores.
+    occupancy : (4, H, W) float32
+        o, the probabilities of the four states.
+
+    Returns
+    -------
+    ContributionMaps
+        The parts of all scores.
+
+    Raises
+    ------
+    ArgumentError
+        When the network is in training mode.
+    """
+    planes, o = fusion_inputs(net, scores, occupancy)
+    n_scores, n_planes = planes.shape[1:3]
+    groups = [(2, d) for d in range(n_planes)] + [(1, c) for c in range(n_scores)]
+    reduced, _ = _follow(net.fusion.reduce, planes, torch.zeros_like(planes))
+    changes = [_follow(net.fusion.reduce, planes, _only(planes, *group))[1].squeeze(2) for group in groups]
+    changes += [torch.zeros_like(reduced.squeeze(2))] * N_STATES
+    of_o = [torch.zeros_like(o)] * len(groups) + [_only(o, 1, s) * net.fusion.uses_occupancy for s in range(N_STATES)]
+    inputs = net.fusion.joined(reduced, o)
+    change = torch.cat([torch.cat(changes), torch.cat(of_o)], dim=1)
+    score, parts = _through(net.fusion.conv_deconv, inputs, change.contiguous(memory_format=torch.channels_last))
+    by_plane, by_class, by_state = np.split(parts.numpy(), [n_planes, n_planes + n_scores])
+    return ContributionMaps(score[0].numpy(), by_plane, by_class, by_state)
+
+
+def _only(inputs: Tensor, axis: int, index: int) -> Tensor:
+    """Return the inputs with all but one index of an axis set to zero."""
+    part = torch.zeros_like(inputs)
+    part.select(axis, index).copy_(inputs.select(axis, index))
+    return part
+
+
+def _through(network: ConvDeconv, x: Tensor, change: Tensor) -> tuple[Tensor, Tensor]:
+    """Send an input and changes of it through the network: `ConvDeconv.forward`, and its derivative."""
+    seen = []
+    for encode in network.encoder:
+        before, kept = _follow(encode, x, change)
+        x, indices = F.max_pool2d(before, 2, return_indices=True)
+        indices = indices.expand(len(kept), *x.shape[1:])
+        change = kept.flatten(2).gather(2, indices.flatten(2)).view(indices.shape)  # a maximum changes with its winner
+        seen.append((before, kept, indices))
+    for decode, (before, kept, indices) in zip(reversed(network.decoder), reversed(seen), strict=True):
+        x = F.max_unpool2d(x, indices[:1], 2, output_size=before.shape[2:])
+        change = F.max_unpool2d(change, indices, 2, output_size=before.shape[2:])
+        if network.skips:
+            x, change = torch.cat([x, before], dim=1), torch.cat([change, kept], dim=1)
+        x, change = _follow(decode, x, change)
+    return x, change
+
+
+def _follow(layers: nn.Sequential, x: Tensor, change: Tensor) -> tuple[Tensor, Tensor]:
+    """Send an input and changes of it through layers, each of which is a ReLU or linear plus a constant."""
+    for layer in layers:
+        if isinstance(layer, nn.Sequential):
+            x, change = _follow(layer, x, change)
+        elif isinstance(layer, nn.ReLU):
+            x, change = x.clamp(min=0), change * (x > 0)
+        else:
+            x, change = layer(x), layer(change) - layer(torch.zeros_like(x))
+    return x, change
