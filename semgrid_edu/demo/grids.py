@@ -43,13 +43,14 @@ def grid_svg(name: str, spec: GridSpec, camera: Camera, raster: str, text: str, 
     left, top = -spec.y_max, -spec.x_max
     box = f'x="{left:g}" y="{top:g}" width="{width:g}" height="{height:g}"'
     href = f'href="{raster}"' if raster else ""
+    errors = f'<image data-errors="{name}" {box} preserveAspectRatio="none"/>' if "occupancy" not in name else ""
     paths = f'<path class="arrows" data-arrows="{name}" d=""/>' if arrows else ""
     return (
         f'<svg viewBox="{left - 6.5:g} {top - 1:g} {width + 7.5:g} {height + 7:g}" role="img" '
-        f'data-text="{name}" aria-label="{text}">{_axes(spec)}'
+        f'data-text="{name}" data-grid="{name}" aria-label="{text}">{_axes(spec)}'
         f'<svg {box} viewBox="{left:g} {top:g} {width:g} {height:g}">'
-        f'<image data-image="{name}" {href} {box} preserveAspectRatio="none"/>'
-        f'<path class="sight" d="{_sight(camera, spec)}"/>{paths}</svg>'
+        f'<image data-image="{name}" {href} {box} preserveAspectRatio="none"/>{errors}'
+        f'<path class="sight" d="{_sight(camera, spec)}"/>{paths}<g data-marks="{name}"></g></svg>'
         f'<rect class="frame" {box}/><path class="vehicle" d="M0-1.6.9.7-.9.7z"/></svg>'
     )
 

@@ -3,7 +3,8 @@ const frames = JSON.parse(document.getElementById("frames").textContent);
 const slider = document.getElementById("slider");
 const play = document.getElementById("play");
 const clock = document.getElementById("clock");
-const PERIOD = 200; // ms: half the speed of a drive recorded at 10 Hz
+const speed = document.getElementById("speed");
+const watchers = []; // called with the number of the frame that is shown
 let timer = null;
 
 function show(k) {
@@ -26,23 +27,44 @@ function show(k) {
   }
   clock.textContent = frame.clock;
   slider.value = k;
+  slider.setAttribute("aria-valuetext", frame.clock);
+  for (const watcher of watchers) watcher(k);
 }
 
+function shown() { return Number(slider.value); }
 function go(k) { show(Math.max(0, Math.min(frames.length - 1, k))); }
 
-function toggle() {
-  if (timer === null) timer = setInterval(() => show((Number(slider.value) + 1) % frames.length), PERIOD);
-  else { clearInterval(timer); timer = null; }
-  play.textContent = timer === null ? "▶ Play" : "❚❚ Pause";
-  play.setAttribute("aria-pressed", String(timer !== null));
+// Milliseconds until the next frame: the drive's own time at speed 1.
+function pause(k) {
+  const next = frames[k + 1], seconds = next ? next.time - frames[k].time : 0;
+  return 1000 * (seconds > 0 ? Math.min(seconds, 5) : 0.1) / Number(speed.value);
 }
 
-slider.addEventListener("input", () => show(Number(slider.value)));
+function advance() {
+  timer = setTimeout(advance, pause((shown() + 1) % frames.length));
+  show((shown() + 1) % frames.length);
+}
+
+function toggle() {
+  if (timer === null) timer = setTimeout(advance, pause(shown()));
+  else { clearTimeout(timer); timer = null; }
+  play.textContent = timer === null ? "▶ Play" : "❚❚ Pause";
+  play.setAttribute("aria-pressed", String(timer !== null));
+  for (const region of document.querySelectorAll("[aria-live]")) region.setAttribute("aria-live", timer === null ? "polite" : "off");
+}
+
+slider.addEventListener("input", () => show(shown()));
 play.addEventListener("click", toggle);
+document.getElementById("back").addEventListener("click", () => go(shown() - 1));
+document.getElementById("next").addEventListener("click", () => go(shown() + 1));
 document.addEventListener("keydown", (event) => {
+  if (event.altKey || event.ctrlKey || event.metaKey || event.defaultPrevented) return; // those belong to the browser
+  if (event.target.closest("select")) return; // its own keys choose an option
   const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-  if (step) { event.preventDefault(); go(Number(slider.value) + step); }
-  else if (event.key === " " && event.target !== play) { event.preventDefault(); toggle(); }
+  if (step) { event.preventDefault(); go(shown() + step); }
+  else if (event.key === " " && event.target.tagName !== "BUTTON") { event.preventDefault(); toggle(); }
 });
 // index.html#12 opens frame 12.
-go(parseInt(location.hash.slice(1), 10) || 0);
+function follow() { go(parseInt(location.hash.slice(1), 10) || 0); }
+window.addEventListener("hashchange", follow);
+follow();

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from html import escape
 from importlib.resources import files
 from string import Template
@@ -11,8 +11,9 @@ import numpy as np
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.demo.comparison import Comparison
-from semgrid_edu.demo.panels import PanelFrame, panels_html, your_scores_html
+from semgrid_edu.demo.panels import PanelFrame, column_svg, panels_html, your_scores_html
 from semgrid_edu.demo.record import FrameView
+from semgrid_edu.demo.story_data import StoryData
 from semgrid_edu.demo.tables import metrics_table, times_table
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.plotting import DEPTH_RANGE, STATE_COLOURS, STATE_NAMES, depth_colours
@@ -25,6 +26,13 @@ NOTICE = (
     "outward from the vehicle. Where parked cars or a fence hide the foot of a bank, it can lose the ground, and then "
     "it takes the bank for an obstacle.</p>"
 )
+
+SWITCHES = (
+    '<label class="pick">Zoom <select id="zoom"><option value="1" selected>1</option><option value="2">2</option>'
+    '<option value="4">4</option></select></label>'
+    '<button id="errors" type="button" aria-pressed="false">Errors</button>'
+)
+"""The switches of the grids: a closer look, and what is wrong where the truth is known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +61,8 @@ class Summary:
         Which stages come from a student's file, when a second run with them is shown beside the package's own.
     your_milliseconds : dict of str to float
         Median time of each stage in that run, ms.
+    story : StoryData, optional
+        What all stories of cells have in common; without it, the page tells none.
     """
 
     title: str
@@ -65,6 +75,7 @@ class Summary:
     milliseconds: dict[str, float]
     comparison: Comparison | None = None
     your_milliseconds: dict[str, float] = field(default_factory=dict)
+    story: StoryData | None = None
 
 
 def page_html(summary: Summary, frames: Sequence[FrameView]) -> str:
@@ -88,7 +99,11 @@ def page_html(summary: Summary, frames: Sequence[FrameView]) -> str:
     return Template(_resource("page.html")).substitute(
         title=escape(f"semgrid_edu: {summary.title}"),
         style=_resource("page.css"),
-        script=_resource("page.js"),
+        script="\n".join(map(_resource, ("page.js", "story.js", "panel.js") if summary.story else ("page.js",))),
+        panel=_resource("panel.html") if summary.story else "",
+        switches=SWITCHES if summary.story else "",
+        column=column_svg(summary.camera),
+        story=_json(summary.story and asdict(summary.story)),
         lead=_lead(summary, len(frames)),
         notice="" if summary.labelled else NOTICE,
         last=len(frames) - 1,
@@ -99,13 +114,13 @@ def page_html(summary: Summary, frames: Sequence[FrameView]) -> str:
         far=f"{far:g}",
         ramp=",".join(f"rgb{tuple(colour)}" for colour in ramp.tolist()),
         network_size="{1} × {0} pixels".format(*summary.network_size),
-        your_scores=your_scores_html(first, summary.comparison),
+        your_scores=your_scores_html(first, summary.camera, summary.comparison),
         grids=panels_html(shared, bool(summary.labelled), summary.comparison),
         states=_swatches(zip(STATE_NAMES, STATE_COLOURS, strict=True)),
         classes=_swatches(summary.classes),
         metrics=metrics_table(summary.metrics, summary.labelled, summary.comparison) if summary.labelled else "",
         times=times_table(summary.milliseconds, summary.your_milliseconds, summary.comparison),
-        frames=json.dumps([vars(frame) for frame in frames]).replace("<", "\\u003c"),
+        frames=_json([vars(frame) for frame in frames]),
     )
 
 
@@ -118,8 +133,13 @@ def _lead(summary: Summary, n_frames: int) -> str:
         "method. A Bayes filter turns the laser scans into a grid of what is free, what stands still and what moves. A "
         "network gives each pixel of the camera image a score for each class. Planes above the ground carry these "
         "scores into the same grid, where a second network fuses them with the occupancy. The result is a map, "
-        f"{size}, of what stands where. Move the slider, press play, or use the arrow keys."
+        f"{size}, of what stands where. Move the slider, press play, or use the arrow keys; click a cell, and the page tells how it got its class."
     )
+
+
+def _json(data: object) -> str:
+    """Write data for a script element, which no text in it can end."""
+    return json.dumps(data).replace("<", "\\u003c")
 
 
 def _swatches(colours: Iterable[tuple[str, tuple[int, int, int]]]) -> str:

@@ -126,13 +126,32 @@ def _figure(panel: Panel, shared: PanelFrame) -> str:
     return f"<figure>{svg}{missing}<figcaption><b>{escape(panel.title)}</b>{symbol} — {panel.see}</figcaption></figure>"
 
 
-def your_scores_html(first: FrameView, comparison: Comparison | None) -> str:
+def column_svg(camera: Camera) -> str:
+    """Return an empty layer over an image, in which the script draws the points above a cell (eq. (1)).
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera at the size of the image. The centre of its first pixel is (0, 0).
+
+    Returns
+    -------
+    str
+        An svg element.
+    """
+    height, width = camera.size
+    return f'<svg data-column viewBox="-0.5 -0.5 {width} {height}" aria-hidden="true"></svg>'
+
+
+def your_scores_html(first: FrameView, camera: Camera, comparison: Comparison | None) -> str:
     """Return the figure of the image scores of a student's own network.
 
     Parameters
     ----------
     first : FrameView
         The frame that the page shows when it is opened.
+    camera : Camera
+        The camera at the size of the drive's images.
     comparison : Comparison or None
         Which stages come from a student's file.
 
@@ -147,7 +166,7 @@ def your_scores_html(first: FrameView, comparison: Comparison | None) -> str:
     image, text = first.images[name], escape(first.texts[name])
     return (
         f'\n<figure>\n<div class="stack"><img data-image="photo" src="{first.images["photo"]}" alt="">'
-        f'<img data-image="{name}" data-text="{name}" src="{image}" alt="{text}"></div>\n'
+        f'<img data-image="{name}" data-text="{name}" src="{image}" alt="{text}">{column_svg(camera)}</div>\n'
         f"<figcaption><b>Image scores, {escape(comparison.file)}</b> <i>s</i> — {comparison.made_with('scores')}"
         "</figcaption>\n</figure>"
     )

@@ -1,17 +1,19 @@
 """What the demo records while a drive runs: encoded frames, confusion matrices and times."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.datasets.truth import grid_truth
 from semgrid_edu.demo.comparison import MADE_BY, Comparison
+from semgrid_edu.demo.details import frame_details, packed
 from semgrid_edu.demo.grids import arrows_path
 from semgrid_edu.demo.rasters import classes_uri, photo_uri, points_layer, raster_uri, scores_layer
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS, confusion_matrix, semantic_cells
+from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.occupancy import State
 from semgrid_edu.pipeline import STAGES, FrameResult
 from semgrid_edu.plotting import occupancy_colours
@@ -39,12 +41,21 @@ class FrameView:
         Alternative texts of the images, by the same names; the photo has none.
     arrows : dict of str to str
         Velocities as an SVG path, for each occupancy grid among the images.
+    time : float
+        Time of the frame, seconds.
+    pose : list of float
+        T_world_from_lidar, row by row.
+    details : str
+        What the story of a cell is told from (`demo.details`); empty for frames whose stories the page leaves out.
     """
 
     clock: str
     images: dict[str, str]
     texts: dict[str, str]
     arrows: dict[str, str]
+    time: float = 0.0
+    pose: list[float] = field(default_factory=list)
+    details: str = ""
 
 
 class Record:
@@ -60,6 +71,10 @@ class Record:
         The page shows one frame in this many.
     comparison : Comparison, optional
         Which stages come from a student's file. With it, each frame has two results, the package's and the student's.
+    net : SemanticGridNet, optional
+        The network of the package's results; without it, the page tells no stories of cells.
+    stories : int
+        One shown frame in this many has the stories of its cells.
 
     Attributes
     ----------
@@ -69,11 +84,20 @@ class Record:
         Number of frames with truth so far.
     liveliest : (FrameResult, FrameResult or None), or None
         The results of the shown frame with the most moving cells.
+    layout : dict of str to int
+        Names of the maps in `FrameView.details`, in their order, and how many there are of each.
     """
 
     def __init__(
-        self, spec: GridSpec, label_set: LabelSet, every: int = 1, comparison: Comparison | None = None
+        self,
+        spec: GridSpec,
+        label_set: LabelSet,
+        every: int = 1,
+        comparison: Comparison | None = None,
+        net: SemanticGridNet | None = None,
+        stories: int = 1,
     ) -> None:
+        self.net, self.stories, self.layout = net, stories, {}
         self.spec, self.label_set, self.every, self.comparison = spec, label_set, every, comparison
         self.views: list[FrameView] = []
         self.labelled = 0
@@ -139,7 +163,9 @@ class Record:
             self.liveliest = package, yours
         returns = f"Camera image with the {len(visible_points(frame)[1])} LIDAR returns that the camera sees."
         images = {"photo": photo_uri(frame.image), "points": raster_uri(points_layer(frame))}
-        view = FrameView(f"frame {self._frames}, {frame.time:.1f} s", images, {"points": returns}, {})
+        pose, details = frame.T_world_from_lidar.ravel().tolist(), self._details(package, maps.get("truth"))
+        clock = f"frame {self._frames}, {frame.time:.1f} s"
+        view = FrameView(clock, images, {"points": returns}, {}, frame.time, pose, details)
         self._draw(view, package, tuple(MADE_BY))
         if yours is not None:
             self._draw(view, yours, self.comparison.changed, YOURS)
@@ -148,6 +174,14 @@ class Record:
             view.images[name] = classes_uri(labels, self.label_set)
             view.texts[name] = f"{self._whose(name)}Map of classes seen from above: {_shares(labels, self.label_set)}."
         self.views.append(view)
+
+    def _details(self, package: FrameResult, truth: NDArray | None) -> str:
+        """Return what the stories of the frame's cells are told from, if the page tells them."""
+        if self.net is None or len(self.views) % self.stories:
+            return ""
+        maps = frame_details(package, self.net, truth)
+        self.layout = {name: len(part) for name, part in maps.items()}
+        return packed(maps)
 
     def _draw(self, view: FrameView, result: FrameResult, wanted: tuple[str, ...], prefix: str = "") -> None:
         """Add scores and occupancy grid of a result to a view."""

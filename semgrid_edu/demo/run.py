@@ -9,6 +9,8 @@ from semgrid_edu.demo.comparison import Comparison
 from semgrid_edu.demo.overview import save_overview
 from semgrid_edu.demo.page import Summary, page_html
 from semgrid_edu.demo.record import Record
+from semgrid_edu.demo.story_data import StoryData
+from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.networks import load_net
 from semgrid_edu.pipeline import Stages, load_stages, run_side_by_side
@@ -16,6 +18,9 @@ from semgrid_edu.storage.files import write_text
 
 SHOWN = 40
 """Most frames that the page shows, evenly spaced, so that its size stays near 10 MB."""
+
+STORIES = 200_000
+"""Most cells that have a story, in all frames together: one takes some 45 bytes of the page."""
 
 
 def write_demo(drive: KittiRawDrive, weights: str | Path, out: str | Path, stages: str | Path | None = None) -> Path:
@@ -48,13 +53,15 @@ def write_demo(drive: KittiRawDrive, weights: str | Path, out: str | Path, stage
         When a stage of the file raises an error, or returns what the next one can't use.
     """
     net = load_net(weights, drive.camera)
-    own, yours, comparison = Stages.of(net), (), None
+    own, yours, comparison = Stages.of(net, keep_steps=True), (), None
     if stages is not None:
         mine = load_stages(stages)
         yours, comparison = (mine.over(own),), Comparison(Path(stages).name, mine.given)
     Path(out).mkdir(parents=True, exist_ok=True)  # before the work, to refuse a bad folder at once
     label_set = LABEL_SETS[net.architecture.label_set]
-    record = Record(net.architecture.grid, label_set, every=-(-len(drive) // SHOWN), comparison=comparison)
+    every = -(-len(drive) // SHOWN)
+    stories = _stories_every(-(-len(drive) // every), net.architecture.grid)
+    record = Record(net.architecture.grid, label_set, every, comparison, net, stories)
     results = run_side_by_side(drive, own, *yours)
     for of_frame in tqdm(results, total=len(drive), desc=drive.folder.name, unit="frame"):
         record.add(*of_frame)
@@ -69,8 +76,14 @@ def write_demo(drive: KittiRawDrive, weights: str | Path, out: str | Path, stage
         milliseconds=record.milliseconds(),
         comparison=comparison,
         your_milliseconds=record.your_milliseconds(),
+        story=StoryData.of(net, drive.camera, record.layout),
     )
     save_overview(*record.liveliest, record.spec, label_set, Path(out) / "overview.png", comparison)
     page = Path(out) / "index.html"
     write_text(page, page_html(summary, record.views))
     return page
+
+
+def _stories_every(n_shown: int, spec: GridSpec) -> int:
+    """Return of which one in how many shown frames the page tells the stories of the cells."""
+    return max(1, -(-n_shown * spec.shape[0] * spec.shape[1] // STORIES))

@@ -1,0 +1,243 @@
+// The panel that tells a cell's story, the marks in grids and images, and the switches of the grids.
+const story = JSON.parse(document.getElementById("storydata").textContent);
+const telling = document.getElementById("telling");
+const where = document.getElementById("where");
+const zoom = document.getElementById("zoom");
+const errors = document.getElementById("errors");
+const hover = document.getElementById("hover");
+const grids = [...document.querySelectorAll("svg[data-grid]")];
+const SVG = "http://www.w3.org/2000/svg";
+const unpacked = new Map(); // number of a frame -> its reader, or the promise of it
+let anchor = null; // the cell that was chosen, and the frame in which it was
+let turn = 0; // counts tellings, so that a late one doesn't overwrite a newer one
+
+const percent = (p) => `${Math.round(100 * p)} %`;
+const signed = (value) => `${value < 0 ? "−" : "+"}${Math.abs(value).toFixed(1)}`;
+const rgb = (colour) => `rgb(${colour.join(",")})`;
+const escaped = (text) => String(text).replace(/[&<>"]/g, (letter) => `&#${letter.charCodeAt(0)};`);
+const place = ([x, y]) => `${x.toFixed(1)} m ahead, ${Math.abs(y).toFixed(1)} m to the ${y < 0 ? "right" : "left"}`;
+
+function readerOf(k) {
+  if (!frames[k].details) return Promise.resolve(null);
+  if (!unpacked.has(k)) unpacked.set(k, unpack(frames[k].details).then((bytes) => reader(story, bytes)));
+  return unpacked.get(k);
+}
+
+// The cell of frame k that holds the place that was chosen; -1 when it has left the grid.
+function cellIn(k) { return cellThen(story.grid, frames[k].pose, frames[anchor.frame].pose, anchor.cell); }
+
+function choose(cell) { anchor = { frame: shown(), cell }; tell(shown()); }
+
+async function tell(k) {
+  const mine = ++turn;
+  if (anchor === null) return;
+  const cell = k === anchor.frame ? anchor.cell : cellIn(k);
+  mark(cell);
+  const read = await readerOf(k);
+  if (mine !== turn) return;
+  if (cell < 0 || read === null) {
+    const near = frames.map((frame, i) => i).filter((i) => frames[i].details).sort((a, b) => Math.abs(a - k) - Math.abs(b - k));
+    const reason = cell < 0 ? "The place has left the grid." : `To stay small, the page leaves out what this frame's stories need. The nearest frame that has it: ${frames[near[0]].clock}.`;
+    telling.innerHTML = `<p>${escaped(reason)}</p>`;
+    return;
+  }
+  const past = [];
+  for (let i = Math.max(0, k - 9); i <= k; i++) {
+    const then = await readerOf(i), at = cellThen(story.grid, frames[i].pose, frames[k].pose, cell);
+    if (then) past.push({ time: frames[i].time, states: at < 0 ? [0, 0, 0, 1] : states(then, "shown", at) });
+  }
+  const pulls = timer === null ? weights(story, read, cell) : null; // too slow for every frame of a drive that plays
+  if (mine !== turn) return;
+  const [label, rival, refined, truth] = read("classes", cell);
+  where.textContent = `${place(centre(story.grid, cell))}: ${story.names[refined]}.`;
+  telling.innerHTML = [heading(cell, read), scanStory(cell, read), stateStory(cell, read, past), partStory(cell, read, label, rival), crfStory(cell, read, pulls, [label, rival, refined])].join("");
+  if (pulls) drawPulls(cell, strongest(read, pulls, refined, 5));
+}
+
+function heading(cell, read) {
+  const [, , refined, truth] = read("classes", cell), row = Math.floor(cell / story.grid.cols);
+  const known = truth === 255 ? "Nobody labelled this frame." : truth === refined ? "This is right." : `The truth is <b>${escaped(story.names[truth])}</b>.`;
+  return `<p><b>${place(centre(story.grid, cell))}</b> (row ${row}, column ${cell % story.grid.cols}): the refined grid says ${swatch(refined)}. ${known}</p>`;
+}
+
+function swatch(label) { return `<span class="class" style="--swatch:${rgb(story.colours.classes[label])}">${escaped(story.names[label])}</span>`; }
+
+function scanStory(cell, read) {
+  const [obstacles] = read("obstacles", cell), [ground] = read("ground", cell), [reach] = read("reach", cell);
+  const distance = Math.hypot(...centre(story.grid, cell)), sees = (reach * story.steps.reach).toFixed(1);
+  const count = (n, what) => `${n === 255 ? "255 or more" : n} ${what} return${n === 1 ? "" : "s"}`;
+  const beam = reach ? `The beam through the cell's centre sees ${sees} m far; the cell is ${distance.toFixed(1)} m away.` : "Nothing came back in the beam through the cell's centre.";
+  const verdict = {
+    hit: "A return from an obstacle speaks for something that stands here, and overrules all else.",
+    passed: "So the beam passes the cell, which speaks for free space.",
+    ground: "The ground was seen here, which speaks for free space.",
+    silent: "So this scan says nothing of the cell, and its past decides.",
+  }[story.verdicts[read("verdict", cell)[0]]];
+  return `<h3>What the scan says</h3><p>${count(obstacles, "obstacle")} and ${count(ground, "ground")} lie in the cell. ${beam} ${verdict}</p>`;
+}
+
+function stateStory(cell, read, past) {
+  const words = { move: "moved with the vehicle", predict: "predicted", update: "updated with the scan", resample: "particles drawn again", shown: "<b>shown</b> in the grid" };
+  const rows = Object.entries(words).map(([name, text]) => {
+    const values = states(read, name, cell);
+    return `<tr><th scope="row">${text}</th>${values.map((p) => `<td>${percent(p)}</td>`).join("")}<td class="bands">${bands(values)}</td></tr>`;
+  });
+  const since = past.map(({ time, states: values }) => `<tr><th scope="row">${time.toFixed(1)} s</th>${values.map((p) => `<td>${percent(p)}</td>`).join("")}<td class="bands">${bands(values)}</td></tr>`);
+  const head = '<thead><tr><th></th><th scope="col">free</th><th scope="col">static</th><th scope="col">dynamic</th><th scope="col">unknown</th><th></th></tr></thead>';
+  return `<h3>Its four states</h3><p>The filter's map through the steps of this frame. The grid shows the prediction updated with the returns of exactly this cell; the map's cell may lie up to half a cell beside it.</p>
+<table>${head}<tbody>${rows.join("")}</tbody></table><details><summary>The same place in the last ${past.length} frames</summary><table>${head}<tbody>${since.join("")}</tbody></table></details>`;
+}
+
+function bands(values) {
+  return `<span class="band">${values.map((p, i) => `<i style="width:${100 * p}%;background:${rgb(story.colours.states[i])}"></i>`).join("")}</span>`;
+}
+
+function partStory(cell, read, label, rival) {
+  const of = parts(story, read, cell), image = sum(of.planes), largest = Math.max(...[...of.planes, ...of.scores, ...of.occupancy].map(Math.abs), 0.1);
+  const bars = (names, values) => values.map((value, i) => `<tr><th scope="row">${names[i]}</th><td>${signed(value)}</td><td class="bar-cell"><span class="${value < 0 ? "minus" : "plus"}" style="width:${(50 * Math.abs(value)) / largest}%"></span></td></tr>`);
+  const heights = story.heights.map((h) => `${h.toFixed(1)} m`), order = of.scores.map((_, i) => i).sort((a, b) => Math.abs(of.scores[b]) - Math.abs(of.scores[a]));
+  const times = Math.exp(Math.min(of.score, 9)), ratio = of.score > 9 ? "more than 8000" : times >= 10 ? times.toFixed(0) : times.toFixed(1);
+  const table = (rows) => `<table class="parts"><tbody>${rows.join("")}</tbody></table>`;
+  return `<h3>Why ${escaped(story.names[label])} and not ${escaped(story.names[rival])}?</h3>
+<p>In the semantic grid ${swatch(label)} is ${ratio} times as probable as ${swatch(rival)}: its fused score is higher by ${of.score.toFixed(1)}. Gradient times input splits this difference:
+image on the planes ${signed(image)}, occupancy ${signed(sum(of.occupancy))}, and ${signed(of.rest)} from the network's biases, which say the same whatever the input. The parts count all cells around that the network looks at.</p>
+<div class="two"><div><h4>Scores of the image, by class</h4>${table(bars(order.map((i) => escaped(story.names[i])), order.map((i) => of.scores[i])).slice(0, 8))}<h4>Occupancy, by state</h4>${table(bars(["free", "static", "dynamic", "unknown"], of.occupancy))}</div>
+<div><h4>By plane, from the highest down</h4>${table(bars(heights, of.planes).reverse())}</div></div>`;
+}
+
+function crfStory(cell, read, pulls, [label, rival, refined]) {
+  const before = read("before", cell), after = read("after", cell), shownClasses = [[label, 0], [rival, 1]];
+  if (refined !== label && refined !== rival) shownClasses.push([refined, 2]);
+  const total = pulls ? messages(story, read, pulls) : null;
+  const rows = shownClasses.map(([c, i]) => `<tr><th scope="row">${swatch(c)}</th><td>${percent(before[i] / 255)}</td><td>${total ? signed(total[c]) : ""}</td><td>${percent(after[i] / 255)}</td></tr>`);
+  const near = pulls ? strongest(read, pulls, refined, 5).map(({ cell: j, pull }) => `<li>${place(centre(story.grid, j))}: ${signed(pull)}</li>`) : [];
+  const changed = refined === label ? "The CRF leaves the class as it is." : `The CRF turns ${swatch(label)} into ${swatch(refined)}.`;
+  return `<h3>What the neighbours say</h3><p>${changed} In its last update the neighbours add this to the logarithm of each probability:</p>
+<table><thead><tr><th></th><th scope="col">before</th><th scope="col">neighbours</th><th scope="col">after</th></tr></thead><tbody>${rows.join("")}</tbody></table>
+${pulls ? `<p>They pull most towards ${swatch(refined)} (lines in the refined grid):</p><ol>${near.join("")}</ol>` : "<p>The neighbours are told when the drive is paused.</p>"}`;
+}
+
+// Marks: a square around the cell in every grid, and its points of equation (1) in every image.
+function mark(cell) {
+  const { grid } = story, [x, y] = cell < 0 ? [0, 0] : centre(grid, cell);
+  for (const group of document.querySelectorAll("[data-marks]")) {
+    group.replaceChildren();
+    if (cell >= 0) group.append(shape("rect", { class: "mark", x: -y - grid.cell / 2, y: -x - grid.cell / 2, width: grid.cell, height: grid.cell }), shape("circle", { class: "ring", cx: -y, cy: -x, r: 1.6 }));
+  }
+  for (const layer of document.querySelectorAll("[data-column]")) {
+    const seen = cell < 0 ? [] : pixels(story, cell).filter((point) => point.visible);
+    layer.replaceChildren(...seen.map(({ u, v, height }, i) => shape("circle", { cx: u, cy: v, r: story.camera.size[1] / (i ? 260 : 160), class: i ? "point" : "point lowest" })));
+  }
+  zoomGrids();
+}
+
+function drawPulls(cell, neighbours) {
+  const [x, y] = centre(story.grid, cell);
+  for (const group of document.querySelectorAll('[data-marks="refined"]'))
+    for (const { cell: j } of neighbours) { const [a, b] = centre(story.grid, j); group.append(shape("path", { class: "pull", d: `M${-b} ${-a}L${-y} ${-x}` })); }
+}
+
+function shape(kind, attributes) {
+  const element = document.createElementNS(SVG, kind);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  return element;
+}
+
+// Zoom: every grid shows the surroundings of the cell that was chosen, or of the road ahead.
+function zoomGrids() {
+  const factor = Number(zoom.value);
+  for (const svg of grids) {
+    svg.dataset.whole ??= svg.getAttribute("viewBox");
+    const [left, top, width, height] = svg.dataset.whole.split(" ").map(Number), w = width / factor, h = height / factor;
+    const cell = anchor === null ? cellAt(story.grid, 15, 0) : Math.max(0, cellIn(shown())), [x, y] = centre(story.grid, cell);
+    const clamp = (value, low, room) => Math.max(low, Math.min(low + room, value));
+    svg.setAttribute("viewBox", factor === 1 ? svg.dataset.whole : [clamp(-y - w / 2, left, width - w), clamp(-x - h / 2, top, height - h), w, h].join(" "));
+  }
+}
+
+// Errors: cells of a grid whose class isn't the truth's, painted red; the right ones fade. Read from the pictures themselves.
+async function colours(uri) {
+  const image = new Image();
+  image.src = uri;
+  await image.decode();
+  const canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [image.naturalWidth, image.naturalHeight];
+  const pen = canvas.getContext("2d");
+  pen.drawImage(image, 0, 0);
+  return pen.getImageData(0, 0, canvas.width, canvas.height);
+}
+
+async function paintErrors(k) {
+  const on = errors.getAttribute("aria-pressed") === "true", { images } = frames[k];
+  for (const layer of document.querySelectorAll("[data-errors]")) {
+    const estimate = images[layer.dataset.errors];
+    if (!on || !images.truth || !estimate) { layer.removeAttribute("href"); continue; }
+    const [guess, truth] = [await colours(estimate), await colours(images.truth)];
+    if (k !== shown()) return;
+    for (let i = 0; i < guess.data.length; i += 4) {
+      const right = [0, 1, 2].every((j) => guess.data[i + j] === truth.data[i + j]);
+      guess.data.set(right ? [255, 255, 255, 200] : [215, 25, 28, 255], i);
+    }
+    const canvas = document.createElement("canvas");
+    [canvas.width, canvas.height] = [guess.width, guess.height];
+    canvas.getContext("2d").putImageData(guess, 0, 0);
+    layer.setAttribute("href", canvas.toDataURL());
+  }
+}
+
+// Hover: the class or the states of the cell below the pointer.
+async function nameAt(name, cell) {
+  const k = shown(), kind = name.replace(/^your_/, "");
+  if (kind === "occupancy" && name === kind) {
+    const read = await readerOf(k);
+    return read ? states(read, "shown", cell).map((p, i) => `${["free", "static", "dynamic", "unknown"][i]} ${percent(p)}`).join(", ") : "";
+  }
+  if (kind === "occupancy" || !frames[k].images[name]) return "";
+  const { data } = await colours(frames[k].images[name]);
+  return story.names[story.colours.classes.findIndex((colour) => colour.every((value, j) => value === data[4 * cell + j]))] ?? "";
+}
+
+// The cell below the pointer: the inverse of what the browser did to draw the grid in metres.
+function cellBelow(svg, event) {
+  const { x, y } = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
+  return cellAt(story.grid, -y, -x);
+}
+
+function stepCell(event) {
+  const step = { ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [-1, 0], ArrowDown: [1, 0] }[event.key];
+  if (!step || event.altKey || event.ctrlKey || event.metaKey) return;
+  event.preventDefault();
+  event.stopPropagation();
+  const { rows, cols } = story.grid, start = anchor === null ? -1 : cellIn(shown());
+  const cell = start < 0 ? cellAt(story.grid, 15, 0) : start;
+  const row = Math.max(0, Math.min(rows - 1, Math.floor(cell / cols) + step[0])), col = Math.max(0, Math.min(cols - 1, (cell % cols) + step[1]));
+  choose(row * cols + col);
+}
+
+for (const svg of grids) {
+  svg.setAttribute("tabindex", "0");
+  svg.setAttribute("role", "application");
+  svg.setAttribute("aria-roledescription", "map; arrow keys choose a cell");
+  svg.addEventListener("click", (event) => { const cell = cellBelow(svg, event); if (cell >= 0) choose(cell); });
+  svg.addEventListener("keydown", stepCell);
+  svg.addEventListener("pointerleave", () => { hover.hidden = true; });
+  svg.addEventListener("pointermove", async (event) => {
+    const cell = cellBelow(svg, event), text = cell < 0 ? "" : await nameAt(svg.dataset.grid, cell);
+    hover.hidden = !text;
+    hover.textContent = text;
+    hover.style.left = `${Math.min(event.clientX + 14, innerWidth - 220)}px`;
+    hover.style.top = `${event.clientY + 14}px`;
+  });
+}
+zoom.addEventListener("change", zoomGrids);
+errors.addEventListener("click", () => { errors.setAttribute("aria-pressed", String(errors.getAttribute("aria-pressed") !== "true")); paintErrors(shown()); });
+play.addEventListener("click", () => { if (timer === null) tell(shown()); });
+errors.hidden = !frames.some((frame) => frame.images.truth);
+watchers.push(tell, paintErrors);
+// index.html#12/93/30 opens frame 12 and tells the story of row 93, column 30.
+function followCell() {
+  const [, row, col] = location.hash.slice(1).split("/").map(Number);
+  if (Number.isInteger(row) && Number.isInteger(col)) choose(row * story.grid.cols + col);
+}
+window.addEventListener("hashchange", followCell);
+followCell();
