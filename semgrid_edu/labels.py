@@ -123,7 +123,7 @@ _KITTI_COLOURS = {
     "sky": (66, 130, 182),
     "unknown-free": (225, 229, 232),
     "unknown-static": (131, 104, 76),
-    "unknown-dynamic": (252, 114, 0),
+    "unknown-dynamic": (244, 198, 156),
     "unknown-unobserved": (12, 16, 24),
 }
 

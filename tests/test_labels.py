@@ -7,6 +7,7 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import LABEL_GRID, FrameLabels
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14, SYNTHIA_10, UNKNOWN_OF_STATE
+from semgrid_edu.plotting import STATE_COLOURS
 
 
 def labels_with(patch: np.ndarray) -> FrameLabels:
@@ -62,3 +63,8 @@ def test_pooling_to_a_grid_that_cuts_fine_cells_is_refused():
         labels_with(np.zeros((1, 1))).birdseye_on(GridSpec(0, 71, -15.5, 15.5, 0.25))
     with pytest.raises(ArgumentError, match="coarsening"):
         labels_with(np.zeros((1, 1))).birdseye_on(GridSpec(0, 70, -15.5, 15.5, 0.5))
+
+
+def test_no_class_has_the_colour_of_an_occupancy_state():
+    """Else a cell of the state DYNAMIC and one of the class unknown-dynamic would look the same."""
+    assert not set(KITTI_14.rgb) & set(STATE_COLOURS)

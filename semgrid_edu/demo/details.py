@@ -82,14 +82,14 @@ def packed(maps: Mapping[str, NDArray[np.uint8]]) -> str:
     Returns
     -------
     str
-        Base64 of a zlib stream.
+        Data URI of a zlib stream.
     """
     raw = b"".join(np.ascontiguousarray(part).tobytes() for part in maps.values())
-    return base64.b64encode(zlib.compress(raw, 9)).decode()
+    return f"data:application/zlib;base64,{base64.b64encode(zlib.compress(raw, 9)).decode()}"
 
 
 def _said(result: FrameResult, spec: GridSpec) -> Maps:
-    """Return the numbers of returns, the reach of the beam, and what the scan says, as `cell_scan` does for one cell."""
+    """Return the numbers of returns, the reach of the beam and what the scan says: `cell_scan` for all cells."""
     sensor = SensorModel()
     scan = sensor.scan(result.frame.points_grid)
     rows, cols, inside = spec.cells(scan.points)
@@ -115,9 +115,9 @@ def _neighbours(result: FrameResult, spec: GridSpec) -> Maps:
 
 
 def _classes(result: FrameResult, truth: NDArray | None, parts: ContributionMaps) -> Maps:
-    """Return the classes that are compared, their probabilities before and after the CRF, and the parts of the score."""
+    """Return the classes that are compared, their probabilities around the CRF, and the parts of the score."""
     known = np.full(result.grid.shape[1:], NO_TRUTH) if truth is None else truth
-    label, rival = compared(result.grid, known)
+    label, rival = label_and_rival_maps(result.grid, known)
     refined = result.refined.argmax(axis=0)
     named = np.stack([label, rival, refined])
     before, after = (np.rint(255 * np.take_along_axis(g, named, axis=0)) for g in (result.grid, result.refined))
@@ -137,7 +137,7 @@ def _classes(result: FrameResult, truth: NDArray | None, parts: ContributionMaps
     }
 
 
-def compared(g: NDArray, truth: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def label_and_rival_maps(g: NDArray, truth: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return each cell's most probable class and the one that it is compared with: `label_and_rival` for all cells.
 
     Parameters

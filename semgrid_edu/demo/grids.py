@@ -43,7 +43,9 @@ def grid_svg(name: str, spec: GridSpec, camera: Camera, raster: str, text: str, 
     left, top = -spec.y_max, -spec.x_max
     box = f'x="{left:g}" y="{top:g}" width="{width:g}" height="{height:g}"'
     href = f'href="{raster}"' if raster else ""
-    errors = f'<image data-errors="{name}" {box} preserveAspectRatio="none"/>' if "occupancy" not in name else ""
+    errors = (
+        f'<image data-errors="{name}" {box} preserveAspectRatio="none"/>' if name.endswith(("grid", "refined")) else ""
+    )
     paths = f'<path class="arrows" data-arrows="{name}" d=""/>' if arrows else ""
     return (
         f'<svg viewBox="{left - 6.5:g} {top - 1:g} {width + 7.5:g} {height + 7:g}" role="img" '

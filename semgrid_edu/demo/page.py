@@ -100,7 +100,7 @@ def page_html(summary: Summary, frames: Sequence[FrameView]) -> str:
         title=escape(f"semgrid_edu: {summary.title}"),
         style=_resource("page.css"),
         script="\n".join(map(_resource, ("page.js", "story.js", "panel.js") if summary.story else ("page.js",))),
-        panel=_resource("panel.html") if summary.story else "",
+        panel=_panel(summary) if summary.story else "",
         switches=SWITCHES if summary.story else "",
         column=column_svg(summary.camera),
         story=_json(summary.story and asdict(summary.story)),
@@ -133,8 +133,14 @@ def _lead(summary: Summary, n_frames: int) -> str:
         "method. A Bayes filter turns the laser scans into a grid of what is free, what stands still and what moves. A "
         "network gives each pixel of the camera image a score for each class. Planes above the ground carry these "
         "scores into the same grid, where a second network fuses them with the occupancy. The result is a map, "
-        f"{size}, of what stands where. Move the slider, press play, or use the arrow keys; click a cell, and the page tells how it got its class."
+        f"{size}, of what stands where. Move the slider, press play, or use the arrow keys; click a cell, and "
+        "the page tells how it got its class."
     )
+
+
+def _panel(summary: Summary) -> str:
+    whose = " The stories are about the package's own stages." if summary.comparison else ""
+    return Template(_resource("panel.html")).substitute(whose=whose)
 
 
 def _json(data: object) -> str:

@@ -6,7 +6,7 @@ const zoom = document.getElementById("zoom");
 const errors = document.getElementById("errors");
 const hover = document.getElementById("hover");
 const grids = [...document.querySelectorAll("svg[data-grid]")];
-const SVG = "http://www.w3.org/2000/svg";
+const SVG = document.querySelector("svg").namespaceURI;
 const unpacked = new Map(); // number of a frame -> its reader, or the promise of it
 let anchor = null; // the cell that was chosen, and the frame in which it was
 let turn = 0; // counts tellings, so that a late one doesn't overwrite a newer one
@@ -15,7 +15,7 @@ const percent = (p) => `${Math.round(100 * p)} %`;
 const signed = (value) => `${value < 0 ? "−" : "+"}${Math.abs(value).toFixed(1)}`;
 const rgb = (colour) => `rgb(${colour.join(",")})`;
 const escaped = (text) => String(text).replace(/[&<>"]/g, (letter) => `&#${letter.charCodeAt(0)};`);
-const place = ([x, y]) => `${x.toFixed(1)} m ahead, ${Math.abs(y).toFixed(1)} m to the ${y < 0 ? "right" : "left"}`;
+const place = ([x, y]) => `${x.toFixed(2)} m ahead, ${Math.abs(y).toFixed(2)} m to the ${y < 0 ? "right" : "left"}`;
 
 function readerOf(k) {
   if (!frames[k].details) return Promise.resolve(null);
@@ -77,14 +77,14 @@ function scanStory(cell, read) {
 }
 
 function stateStory(cell, read, past) {
-  const words = { move: "moved with the vehicle", predict: "predicted", update: "updated with the scan", resample: "particles drawn again", shown: "<b>shown</b> in the grid" };
+  const words = { move: "moved", predict: "predicted", update: "updated", resample: "resampled", shown: "<b>shown</b>" };
   const rows = Object.entries(words).map(([name, text]) => {
     const values = states(read, name, cell);
     return `<tr><th scope="row">${text}</th>${values.map((p) => `<td>${percent(p)}</td>`).join("")}<td class="bands">${bands(values)}</td></tr>`;
   });
   const since = past.map(({ time, states: values }) => `<tr><th scope="row">${time.toFixed(1)} s</th>${values.map((p) => `<td>${percent(p)}</td>`).join("")}<td class="bands">${bands(values)}</td></tr>`);
   const head = '<thead><tr><th></th><th scope="col">free</th><th scope="col">static</th><th scope="col">dynamic</th><th scope="col">unknown</th><th></th></tr></thead>';
-  return `<h3>Its four states</h3><p>The filter's map through the steps of this frame. The grid shows the prediction updated with the returns of exactly this cell; the map's cell may lie up to half a cell beside it.</p>
+  return `<h3>Its four states</h3><p>The filter's map moves with the vehicle, predicts, is updated with the scan, and draws its particles again. The grid shows the prediction updated with the returns of exactly this cell; the map's cell may lie half a cell beside it.</p>
 <table>${head}<tbody>${rows.join("")}</tbody></table><details><summary>The same place in the last ${past.length} frames</summary><table>${head}<tbody>${since.join("")}</tbody></table></details>`;
 }
 
@@ -93,16 +93,24 @@ function bands(values) {
 }
 
 function partStory(cell, read, label, rival) {
-  const of = parts(story, read, cell), image = sum(of.planes), largest = Math.max(...[...of.planes, ...of.scores, ...of.occupancy].map(Math.abs), 0.1);
-  const bars = (names, values) => values.map((value, i) => `<tr><th scope="row">${names[i]}</th><td>${signed(value)}</td><td class="bar-cell"><span class="${value < 0 ? "minus" : "plus"}" style="width:${(50 * Math.abs(value)) / largest}%"></span></td></tr>`);
+  const of = parts(story, read, cell), image = sum(of.planes), occupancy = sum(of.occupancy);
   const heights = story.heights.map((h) => `${h.toFixed(1)} m`), order = of.scores.map((_, i) => i).sort((a, b) => Math.abs(of.scores[b]) - Math.abs(of.scores[a]));
-  const times = Math.exp(Math.min(of.score, 9)), ratio = of.score > 9 ? "more than 8000" : times >= 10 ? times.toFixed(0) : times.toFixed(1);
-  const table = (rows) => `<table class="parts"><tbody>${rows.join("")}</tbody></table>`;
+  const ratio = Number(Math.exp(of.score).toPrecision(2)), often = ratio > 1e6 ? "more than a million" : ratio.toLocaleString("en");
+  const byClass = order.slice(0, 8), states = ["free", "static", "dynamic", "unknown"];
   return `<h3>Why ${escaped(story.names[label])} and not ${escaped(story.names[rival])}?</h3>
-<p>In the semantic grid ${swatch(label)} is ${ratio} times as probable as ${swatch(rival)}: its fused score is higher by ${of.score.toFixed(1)}. Gradient times input splits this difference:
-image on the planes ${signed(image)}, occupancy ${signed(sum(of.occupancy))}, and ${signed(of.rest)} from the network's biases, which say the same whatever the input. The parts count all cells around that the network looks at.</p>
-<div class="two"><div><h4>Scores of the image, by class</h4>${table(bars(order.map((i) => escaped(story.names[i])), order.map((i) => of.scores[i])).slice(0, 8))}<h4>Occupancy, by state</h4>${table(bars(["free", "static", "dynamic", "unknown"], of.occupancy))}</div>
-<div><h4>By plane, from the highest down</h4>${table(bars(heights, of.planes).reverse())}</div></div>`;
+<p>In the semantic grid ${swatch(label)} is about ${often} times as probable as ${swatch(rival)}: its fused score is higher by ${of.score.toFixed(1)}. Gradient times input splits this difference:</p>
+${bars(["image, on the planes", "occupancy", "constants", "sum"], [image, occupancy, of.rest, of.score])}
+<p>The constants are biases and normalisations that the open ReLUs let pass: no input has a share in them. Image and occupancy count in all cells around that the network looks at. Below, each table has its own scale.</p>
+<div class="two"><div><h4>Image, by class of its scores</h4>${bars(byClass.map((i) => escaped(story.names[i])), byClass.map((i) => of.scores[i]))}<h4>Occupancy, by state</h4>${bars(states, of.occupancy)}</div>
+<div><h4>Image, by height of the plane</h4>${bars([...heights].reverse(), [...of.planes].reverse())}</div></div>`;
+}
+
+// A table of numbers with bars to both sides of zero.
+function bars(names, values) {
+  const largest = Math.max(...values.map(Math.abs), 0.1);
+  const bar = (value) => `<span class="${value < 0 ? "minus" : "plus"}" style="width:${(50 * Math.abs(value)) / largest}%"></span>`;
+  const rows = values.map((value, i) => `<tr><th scope="row">${names[i]}</th><td>${signed(value)}</td><td class="bar-cell">${bar(value)}</td></tr>`);
+  return `<table class="parts"><tbody>${rows.join("")}</tbody></table>`;
 }
 
 function crfStory(cell, read, pulls, [label, rival, refined]) {

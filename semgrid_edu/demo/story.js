@@ -1,8 +1,8 @@
 // The numbers of one cell's story, computed from the maps of a frame. Nothing here touches the page, so tests run it alone.
 
 // Returns the bytes of a frame's maps, one map after the other.
-async function unpack(base64) {
-  const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+async function unpack(uri) {
+  const bytes = Uint8Array.from(atob(uri.slice(uri.indexOf(",") + 1)), (letter) => letter.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
@@ -22,7 +22,7 @@ function states(read, name, cell) {
   return [...known, Math.max(0, 1 - known[0] - known[1] - known[2])];
 }
 
-// The parts of the difference of two scores. They sum to the score: rest holds the biases, and what rounding loses.
+// The parts of the difference of two scores. They sum to the score: rest holds the network's constants, and what rounding loses.
 function parts(story, read, cell) {
   const step = story.steps.part, small = (name) => read(name, cell).map((byte) => byte - 128);
   const large = read("large", cell), half = large.length / 2;

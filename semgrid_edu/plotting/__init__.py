@@ -26,6 +26,7 @@ from semgrid_edu.plotting.legends import class_legend
 from semgrid_edu.plotting.lines import belief_history, probability_line, probability_lines, state_history
 from semgrid_edu.plotting.moving import animate_occupancy, particles, velocity_wheel
 from semgrid_edu.plotting.spread import velocity_ellipse, velocity_spread
+from semgrid_edu.plotting.story import draw_cell_story as cell_story
 from semgrid_edu.plotting.truth import difference_kinds, policy_errors, truth_difference, truth_errors
 
 FIGURE_DPI = 110
@@ -44,6 +45,7 @@ __all__ = [
     "animate",
     "animate_occupancy",
     "belief_history",
+    "cell_story",
     "class_legend",
     "confusion",
     "coupling_errors",

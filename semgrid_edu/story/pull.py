@@ -131,7 +131,9 @@ def weights_of_cell(o: NDArray, params: CrfParams, cell: tuple[int, int]) -> tup
     bilateral = WindowedGaussian.build(o, params).scale.astype(np.float64)
     spatial = SeparableGaussian.build(o.shape[1:], params.sigma_gamma, params.w_spatial, params.normalization)
     of_place = np.outer(spatial.row_scale, spatial.column_scale).astype(np.float64)
-    weights = bilateral[cell] * bilateral * np.exp(-0.5 * (apart / params.sigma_alpha**2 + unlike / params.sigma_beta**2))
+    weights = (
+        bilateral[cell] * bilateral * np.exp(-0.5 * (apart / params.sigma_alpha**2 + unlike / params.sigma_beta**2))
+    )
     weights += of_place[cell] * of_place * np.exp(-0.5 * apart / params.sigma_gamma**2)
     own, weights[cell] = float(weights[cell]), 0
     return weights, own

@@ -1,0 +1,122 @@
+"""The story of one cell as a figure: its image column, states, parts of the score, and neighbours (paper, Fig. 2)."""
+
+from collections.abc import Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES
+from semgrid_edu.plotting.images import draw_image
+from semgrid_edu.plotting.legends import colour_legend
+from semgrid_edu.story import CellStory
+
+FOR, AGAINST = "#6a1b9a", "#d9902f"
+"""Colours of parts that speak for a class and of those that speak against it."""
+
+
+def draw_cell_story(story: CellStory, image: NDArray | None = None) -> Figure:
+    """Draw the story of one cell.
+
+    At the top the image with the points of the planes above the cell. Below, from left to right: the four states
+    through the steps of the filter and over the last frames, the parts of the score by kind, by class and by plane, and
+    the distribution before and after the CRF.
+
+    Parameters
+    ----------
+    story : CellStory
+        The story, from `cell_story`.
+    image : (h, w, 3) uint8, optional
+        The frame's image, RGB; without it, the top is left out.
+
+    Returns
+    -------
+    Figure
+        A new figure.
+    """
+    figure = plt.figure(figsize=(12, 5.2 if image is None else 8.4), layout="constrained")
+    parts = figure.subfigures(
+        1 if image is None else 2, 1, squeeze=False, height_ratios=[1] if image is None else [3, 5]
+    )
+    if image is not None:
+        _draw_column(story, image, parts[0, 0].subplots())
+    panels = parts[-1, 0].subplot_mosaic([["steps", "parts", "planes", "crf"], ["past", "classes", "planes", "crf"]])
+    _draw_states(story, panels["steps"], panels["past"])
+    _draw_parts(story, panels["parts"], panels["classes"], panels["planes"])
+    _draw_crf(story, panels["crf"])
+    x, y = story.xy
+    truth = "unknown" if story.truth is None or story.truth >= len(story.names) else story.names[story.truth]
+    figure.suptitle(
+        f"Cell {story.cell}, {x:.2f} m ahead, {abs(y):.2f} m to the {'right' if y < 0 else 'left'}: "
+        f"{story.names[story.refined]} (truth: {truth}). This scan: {story.scan.verdict}"
+    )
+    return figure
+
+
+def _draw_column(story: CellStory, image: NDArray, ax: Axes) -> None:
+    """Mark the points of eq. (1) on the image; the lowest one is filled."""
+    draw_image(image, ax)
+    seen = story.pixels[story.visible]
+    ax.scatter(*seen.T, s=14, facecolor="white", edgecolor="#d81b60", linewidth=1)
+    ax.scatter(*seen[:1].T, s=30, color="#d81b60")
+    ax.set_title("the planes' points above the cell, eq. (1)", loc="left", fontsize="medium")
+
+
+def _draw_states(story: CellStory, steps: Axes, past: Axes) -> None:
+    """Draw the four states as stacked bars: one bar per step, and one per frame."""
+    _stack(steps, list(story.steps), np.stack(list(story.steps.values()), axis=1))
+    _stack(past, [f"{time:.1f} s" for time in story.times], story.history)
+    steps.set_title("states, step by step", loc="left", fontsize="medium")
+    past.set_title("states of the place, frame by frame", loc="left", fontsize="medium")
+    colour_legend(
+        past, STATE_NAMES, STATE_COLOURS, loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=4, columnspacing=0.8
+    )
+
+
+def _stack(ax: Axes, names: Sequence[str], states: NDArray) -> None:
+    left = np.zeros(len(names))
+    for values, colour in zip(states, STATE_COLOURS, strict=True):
+        ax.barh(range(len(names)), values, left=left, color=np.divide(colour, 255), edgecolor="0.5", linewidth=0.4)
+        left = left + values
+    ax.set_yticks(range(len(names)), names, fontsize="small")
+    ax.set(xlim=(0, 1), ylim=(len(names) - 0.5, -0.5))
+
+
+def _draw_parts(story: CellStory, kinds: Axes, classes: Axes, planes: Axes) -> None:
+    """Draw why the cell got its class and not the rival."""
+    why = story.for_label.minus(story.for_rival)
+    sums = [why.planes.sum(), why.occupancy.sum(), why.rest, why.score]
+    _bars(kinds, ["image", "occupancy", "constants", "sum"], sums)
+    by_class = why.planes.sum(axis=1)
+    largest = np.argsort(-np.abs(by_class), kind="stable")[:6]
+    _bars(classes, [story.names[c] for c in largest], by_class[largest])
+    _bars(planes, [f"{height:.1f} m" for height in story.heights[::-1]], why.planes.sum(axis=0)[::-1])
+    kinds.set_title(
+        f"why {story.names[story.label]}\nand not {story.names[story.rival]}", loc="left", fontsize="medium"
+    )
+    classes.set_title("image, by class", loc="left", fontsize="medium")
+    planes.set_title("image, by plane", loc="left", fontsize="medium")
+    planes.set_xlabel("part of the difference of scores", fontsize="small")
+
+
+def _bars(ax: Axes, names: Sequence[str], values: Sequence[float]) -> None:
+    ax.barh(range(len(names)), values, color=[FOR if value >= 0 else AGAINST for value in values])
+    ax.axvline(0, color="0.4", linewidth=0.8)
+    ax.set_yticks(range(len(names)), names, fontsize="small")
+    ax.set_ylim(len(names) - 0.5, -0.5)
+
+
+def _draw_crf(story: CellStory, ax: Axes) -> None:
+    """Draw the probabilities of the classes that matter before and after the CRF, and what the neighbours add."""
+    pull = story.pull
+    classes = np.argsort(-np.maximum(pull.before, pull.after), kind="stable")[:4]
+    messages = pull.messages
+    names = [f"{story.names[c]}\n(neighbours {messages[c]:+.1f})" for c in classes]
+    ax.barh(np.arange(len(classes)) - 0.2, pull.before[classes], 0.38, color="0.7", label="before")
+    ax.barh(np.arange(len(classes)) + 0.2, pull.after[classes], 0.38, color=FOR, label="after")
+    ax.set_yticks(range(len(classes)), names, fontsize="small")
+    ax.set(xlim=(0, 1), ylim=(len(classes) - 0.5, -0.5), xlabel="probability")
+    ax.set_title("the CRF", loc="left", fontsize="medium")
+    ax.legend(fontsize="small", frameon=False, loc="lower right")
