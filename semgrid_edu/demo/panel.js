@@ -130,7 +130,7 @@ function mark(cell) {
   const { grid } = story, [x, y] = cell < 0 ? [0, 0] : centre(grid, cell);
   for (const group of document.querySelectorAll("[data-marks]")) {
     group.replaceChildren();
-    if (cell >= 0) group.append(shape("rect", { class: "mark", x: -y - grid.cell / 2, y: -x - grid.cell / 2, width: grid.cell, height: grid.cell }), shape("circle", { class: "ring", cx: -y, cy: -x, r: 1.6 }));
+    if (cell >= 0) group.append(shape("rect", { class: "mark", x: -y - grid.cell / 2, y: -x - grid.cell / 2, width: grid.cell, height: grid.cell }), shape("circle", { class: "ring", cx: -y, cy: -x, r: 0.4 + 1.2 / Number(zoom.value) }));
   }
   for (const layer of document.querySelectorAll("[data-column]")) {
     const seen = cell < 0 ? [] : pixels(story, cell).filter((point) => point.visible);
@@ -237,7 +237,7 @@ for (const svg of grids) {
     hover.style.top = `${event.clientY + 14}px`;
   });
 }
-zoom.addEventListener("change", zoomGrids);
+zoom.addEventListener("change", () => (anchor === null ? zoomGrids() : tell(shown())));
 errors.addEventListener("click", () => { errors.setAttribute("aria-pressed", String(errors.getAttribute("aria-pressed") !== "true")); paintErrors(shown()); });
 play.addEventListener("click", () => { if (timer === null) tell(shown()); });
 errors.hidden = !frames.some((frame) => frame.images.truth);

@@ -15,10 +15,13 @@ from tiny_drive import DATE, write_tiny_drive
 import semgrid_edu.demo.page as page_module
 from semgrid_edu.crf import CrfParams
 from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.datasets.samples import sample_drive, sample_weights
 from semgrid_edu.demo import write_demo
 from semgrid_edu.demo.details import PART_STEP, REACH_STEP, VERDICTS, label_and_rival_maps, states_bytes
+from semgrid_edu.demo.record import Record
 from semgrid_edu.demo.run import STORIES, _stories_every
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import Architecture, build_net, load_net, save_net
 from semgrid_edu.pipeline import Stages, run_pipeline
 from semgrid_edu.story import cell_story, weights_of_cell
@@ -194,3 +197,14 @@ class TestScript:
     @pytest.mark.parametrize("name", ["page.js", "story.js", "panel.js"])
     def test_is_written_without_mistakes_of_grammar(self, name):
         subprocess.run(["node", "--check", str(SCRIPTS / name)], check=True, capture_output=True, timeout=60)
+
+
+def test_the_page_of_the_shipped_drive_stays_below_12_megabytes():
+    """Judged by two of its frames: the pages of the others differ by little."""
+    shipped = sample_drive()
+    net = load_net(sample_weights(), shipped.camera)
+    record = Record(SPEC, KITTI_14, net=net)
+    for result in run_pipeline(shipped[8:10], Stages.of(net, keep_steps=True)):
+        record.add(result)
+    assert len(shipped) * max(len(json.dumps(vars(view))) for view in record.views) < 11.9e6
+    assert _stories_every(len(shipped), SPEC) == 1
