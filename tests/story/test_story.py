@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import torch
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from tiny_drive import DATE, write_tiny_drive
 from torch import nn
 
+from semgrid_edu import plotting
 from semgrid_edu.crf import CrfParams, mean_field_naive, pair_weights, unary_from_probability
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.truth import grid_truth
@@ -296,3 +298,34 @@ class TestStory:
     def test_is_told_without_steps_too(self, results, net):
         belief = dataclasses.replace(results[-1].belief, steps={})
         assert list(cell_story(dataclasses.replace(results[-1], belief=belief), (90, 30), net).steps) == ["shown"]
+
+
+class TestFigure:
+    @pytest.fixture
+    def axes(self, results, net):
+        story = cell_story(results[-1], (82, 25), net, past=results[:-1])
+        figure = plotting.cell_story(story, results[-1].frame.image)
+        yield story, figure.axes
+        plt.close(figure)
+
+    def test_bars_are_the_parts_and_the_last_is_their_sum(self, axes):
+        story, (_, _, kinds, planes, *_) = axes
+        image, occupancy, constants, total = (bar.get_width() for bar in kinds.patches)
+        assert image + occupancy + constants == pytest.approx(total)
+        assert sum(bar.get_width() for bar in planes.patches) == pytest.approx(image)
+        assert total == pytest.approx(story.for_label.score - story.for_rival.score)
+
+    def test_states_fill_their_bars(self, axes):
+        story, (_, steps, *_) = axes
+        ends = [bar.get_x() + bar.get_width() for bar in steps.patches[-len(story.steps) :]]
+        np.testing.assert_allclose(ends, 1, atol=1e-5)
+
+    def test_points_of_the_planes_lie_where_eq_1_says(self, axes):
+        story, (image, *_) = axes
+        np.testing.assert_allclose(image.collections[0].get_offsets(), story.pixels[story.visible])
+
+    def test_without_an_image(self, axes):
+        story, with_image = axes
+        figure = plotting.cell_story(story)
+        assert len(figure.axes) == len(with_image) - 1
+        plt.close(figure)
