@@ -13,6 +13,9 @@ from semgrid_edu.networks.conv_deconv import ConvDeconv
 from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.story.contributions import fusion_inputs
 
+AT_ONCE = 8
+"""How many passes are made together: more would take more memory, and no less time."""
+
 
 @dataclass(frozen=True, eq=False)
 class ContributionMaps:
@@ -77,9 +80,10 @@ def contribution_maps(net: SemanticGridNet, scores: NDArray, occupancy: NDArray)
     of_o = [torch.zeros_like(o)] * len(groups) + [_only(o, 1, s) * net.fusion.uses_occupancy for s in range(N_STATES)]
     inputs = net.fusion.joined(reduced, o)
     change = torch.cat([torch.cat(changes), torch.cat(of_o)], dim=1)
-    score, parts = _through(net.fusion.conv_deconv, inputs, change.contiguous(memory_format=torch.channels_last))
-    by_plane, by_class, by_state = np.split(parts.numpy(), [n_planes, n_planes + n_scores])
-    return ContributionMaps(score[0].numpy(), by_plane, by_class, by_state)
+    batches = change.contiguous(memory_format=torch.channels_last).split(AT_ONCE)
+    parts = np.concatenate([_through(net.fusion.conv_deconv, inputs, batch).numpy() for batch in batches])
+    by_plane, by_class, by_state = np.split(parts, [n_planes, n_planes + n_scores])
+    return ContributionMaps(net.fusion.conv_deconv(inputs)[0].numpy(), by_plane, by_class, by_state)
 
 
 def _only(inputs: Tensor, axis: int, index: int) -> Tensor:
@@ -89,8 +93,8 @@ def _only(inputs: Tensor, axis: int, index: int) -> Tensor:
     return part
 
 
-def _through(network: ConvDeconv, x: Tensor, change: Tensor) -> tuple[Tensor, Tensor]:
-    """Send an input and changes of it through the network: `ConvDeconv.forward`, and its derivative."""
+def _through(network: ConvDeconv, x: Tensor, change: Tensor) -> Tensor:
+    """Send changes of an input through the network: the derivative of `ConvDeconv.forward`."""
     seen = []
     for encode in network.encoder:
         before, kept = _follow(encode, x, change)
@@ -104,7 +108,7 @@ def _through(network: ConvDeconv, x: Tensor, change: Tensor) -> tuple[Tensor, Te
         if network.skips:
             x, change = torch.cat([x, before], dim=1), torch.cat([change, kept], dim=1)
         x, change = _follow(decode, x, change)
-    return x, change
+    return change
 
 
 def _follow(layers: nn.Sequential, x: Tensor, change: Tensor) -> tuple[Tensor, Tensor]:
