@@ -153,13 +153,15 @@ function shape(kind, attributes) {
 
 // Zoom: every grid shows the surroundings of the cell that was chosen, or of the road ahead.
 function zoomGrids() {
-  const factor = Number(zoom.value);
+  const factor = Number(zoom.value), { x_min, x_max, y_min, y_max } = story.grid;
+  const cell = anchor === null ? cellAt(story.grid, 15, 0) : Math.max(0, cellIn(shown())), [x, y] = centre(story.grid, cell);
+  const clamp = (value, low, high) => Math.max(low, Math.min(high, value));
   for (const svg of grids) {
     svg.dataset.whole ??= svg.getAttribute("viewBox");
-    const [left, top, width, height] = svg.dataset.whole.split(" ").map(Number), w = width / factor, h = height / factor;
-    const cell = anchor === null ? cellAt(story.grid, 15, 0) : Math.max(0, cellIn(shown())), [x, y] = centre(story.grid, cell);
-    const clamp = (value, low, room) => Math.max(low, Math.min(low + room, value));
-    svg.setAttribute("viewBox", factor === 1 ? svg.dataset.whole : [clamp(-y - w / 2, left, width - w), clamp(-x - h / 2, top, height - h), w, h].join(" "));
+    const [w, h] = svg.dataset.whole.split(" ").slice(2).map((side) => Number(side) / factor);
+    const near = [clamp(-y - w / 2, -y_max, -y_min - w), clamp(-x - h / 2, -x_max, -x_min - h), w, h];
+    svg.setAttribute("viewBox", factor === 1 ? svg.dataset.whole : near.join(" "));
+    svg.classList.toggle("near", factor > 1);
   }
 }
 
@@ -177,6 +179,7 @@ async function colours(uri) {
 
 async function paintErrors(k) {
   const on = errors.getAttribute("aria-pressed") === "true", { images } = frames[k];
+  document.getElementById("errorsnote").hidden = !on;
   for (const layer of document.querySelectorAll("[data-errors]")) {
     const estimate = images[layer.dataset.errors];
     if (!on || !images.truth || !estimate) { layer.removeAttribute("href"); continue; }
