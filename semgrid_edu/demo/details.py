@@ -85,7 +85,7 @@ def packed(maps: Mapping[str, NDArray[np.uint8]]) -> str:
         Data URI of a zlib stream.
     """
     raw = b"".join(np.ascontiguousarray(part).tobytes() for part in maps.values())
-    return f"data:application/zlib;base64,{base64.b64encode(zlib.compress(raw, 9)).decode()}"
+    return f"data:application/zlib;base64,{base64.b64encode(zlib.compress(raw, 6)).decode()}"
 
 
 def _said(result: FrameResult, spec: GridSpec) -> Maps:

@@ -1,5 +1,6 @@
 """The parts of every class's score in every cell at once: one pass forward per plane, class and state (section 3.4)."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,9 +75,8 @@ def contribution_maps(net: SemanticGridNet, scores: NDArray, occupancy: NDArray)
     planes, o = fusion_inputs(net, scores, occupancy)
     n_scores, n_planes = planes.shape[1:3]
     groups = [(2, d) for d in range(n_planes)] + [(1, c) for c in range(n_scores)]
-    reduced, _ = _follow(net.fusion.reduce, planes, torch.zeros_like(planes))
-    changes = [_follow(net.fusion.reduce, planes, _only(planes, *group))[1].squeeze(2) for group in groups]
-    changes += [torch.zeros_like(reduced.squeeze(2))] * N_STATES
+    reduced, changes = _follow(net.fusion.reduce, planes, (_only(planes, *group) for group in groups))
+    changes = [change.squeeze(2) for change in [*changes, *[torch.zeros_like(reduced)] * N_STATES]]
     of_o = [torch.zeros_like(o)] * len(groups) + [_only(o, 1, s) * net.fusion.uses_occupancy for s in range(N_STATES)]
     inputs = net.fusion.joined(reduced, o)
     change = torch.cat([torch.cat(changes), torch.cat(of_o)], dim=1)
@@ -97,7 +97,7 @@ def _through(network: ConvDeconv, x: Tensor, change: Tensor) -> Tensor:
     """Send changes of an input through the network: the derivative of `ConvDeconv.forward`."""
     seen = []
     for encode in network.encoder:
-        before, kept = _follow(encode, x, change)
+        before, (kept,) = _follow(encode, x, [change])
         x, indices = F.max_pool2d(before, 2, return_indices=True)
         indices = indices.expand(len(kept), *x.shape[1:])
         change = kept.flatten(2).gather(2, indices.flatten(2)).view(indices.shape)  # a maximum changes with its winner
@@ -107,17 +107,18 @@ def _through(network: ConvDeconv, x: Tensor, change: Tensor) -> Tensor:
         change = F.max_unpool2d(change, indices, 2, output_size=before.shape[2:])
         if network.skips:
             x, change = torch.cat([x, before], dim=1), torch.cat([change, kept], dim=1)
-        x, change = _follow(decode, x, change)
+        x, (change,) = _follow(decode, x, [change])
     return change
 
 
-def _follow(layers: nn.Sequential, x: Tensor, change: Tensor) -> tuple[Tensor, Tensor]:
+def _follow(layers: nn.Sequential, x: Tensor, changes: Iterable[Tensor]) -> tuple[Tensor, Iterable[Tensor]]:
     """Send an input and changes of it through layers, each of which is a ReLU or linear plus a constant."""
     for layer in layers:
         if isinstance(layer, nn.Sequential):
-            x, change = _follow(layer, x, change)
+            x, changes = _follow(layer, x, changes)
         elif isinstance(layer, nn.ReLU):
-            x, change = x.clamp(min=0), change * (x > 0)
+            x, changes = x.clamp(min=0), [change * (x > 0) for change in changes]
         else:
-            x, change = layer(x), layer(change) - layer(torch.zeros_like(x))
-    return x, change
+            constant = layer(torch.zeros_like(x))
+            x, changes = layer(x), [layer(change) - constant for change in changes]
+    return x, changes
