@@ -85,7 +85,7 @@ function stateStory(cell, read, past) {
   const since = past.map(({ time, states: values }) => `<tr><th scope="row">${time.toFixed(1)} s</th>${values.map((p) => `<td>${percent(p)}</td>`).join("")}<td class="bands">${bands(values)}</td></tr>`);
   const head = '<thead><tr><th></th><th scope="col">free</th><th scope="col">static</th><th scope="col">dynamic</th><th scope="col">unknown</th><th></th></tr></thead>';
   return `<h3>Its four states</h3><p>The filter's map moves with the vehicle, predicts, is updated with the scan, and draws its particles again. The grid shows the prediction updated with the returns of exactly this cell; the map's cell may lie half a cell beside it.</p>
-<table>${head}<tbody>${rows.join("")}</tbody></table><details><summary>The same place in the last ${past.length} frames</summary><table>${head}<tbody>${since.join("")}</tbody></table></details>`;
+<table>${head}<tbody>${rows.join("")}</tbody></table><details><summary>The same place in ${past.length} frames up to this one</summary><table>${head}<tbody>${since.join("")}</tbody></table></details>`;
 }
 
 function bands(values) {
