@@ -13,8 +13,8 @@ from tiny_runs import HandMadeData, Note, results, tiny_trainings
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.experiments.reproduction.execute import execute_plan
 from semgrid_edu.experiments.reproduction.experiments import EXPERIMENTS
+from semgrid_edu.experiments.reproduction.one_run import check_runs_folder, claim_folder, run_one
 from semgrid_edu.experiments.reproduction.plan import estimate, plan_table, with_needs
-from semgrid_edu.experiments.reproduction.runs import check_runs_folder, claim_folder, run_one
 from semgrid_edu.experiments.reproduction.scales import SCALES, scale_named
 from semgrid_edu.networks import WEIGHTS
 from semgrid_edu.simulation.datasets import DatasetRecipe, Route, make_from_recipe

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from tqdm.auto import tqdm
 
-from semgrid_edu.experiments.reproduction.runs import Run, run_one
+from semgrid_edu.experiments.reproduction.one_run import run_one
+from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.storage.workplace import Workplace
 
 

@@ -6,9 +6,10 @@ from pathlib import Path
 
 from semgrid_edu.experiments.reproduction.execute import execute_plan
 from semgrid_edu.experiments.reproduction.experiments import EXPERIMENTS, Experiment
+from semgrid_edu.experiments.reproduction.one_run import check_runs_folder
 from semgrid_edu.experiments.reproduction.plan import estimate, plan_table, with_needs
 from semgrid_edu.experiments.reproduction.results import write_result
-from semgrid_edu.experiments.reproduction.runs import OUTPUT, Run, check_runs_folder
+from semgrid_edu.experiments.reproduction.runs import OUTPUT, Run
 from semgrid_edu.experiments.reproduction.scales import Scale, scale_named
 from semgrid_edu.storage.workplace import usable_cores, workplace
 
