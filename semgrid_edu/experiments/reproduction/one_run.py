@@ -12,6 +12,7 @@ from typing import NamedTuple
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.experiments.reproduction.runs import CLAIM, ENDED, OUTPUT, Run
 from semgrid_edu.experiments.reproduction.threads import THREADS, few_threads
+from semgrid_edu.experiments.reproduction.torchrun import work_together
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import commit, versions
 
@@ -34,7 +35,7 @@ class Outcome(NamedTuple):
     error: str | None
 
 
-def run_one(run: Run, root: str | Path, device: str = "cpu") -> Outcome:
+def run_one(run: Run, root: str | Path, device: str = "cpu", processes: int = 1) -> Outcome:
     """Do one run; this is what every process and every machine of a cluster is asked to do.
 
     Parameters
@@ -45,21 +46,26 @@ def run_one(run: Run, root: str | Path, device: str = "cpu") -> Outcome:
         The folder of all runs, the same for all machines.
     device : str
         The device of a training run, see `choose_device`.
+    processes : int
+        In how many processes a training run is done, see `work_together`; other runs take one.
 
     Returns
     -------
     Outcome
         An error is returned, not raised, and stands in the run's `output.txt` too.
     """
-    began = time.perf_counter()
+    began, processes = time.perf_counter(), processes if run.is_training else 1
     if run.has_ended(root):
         return Outcome(0.0, None)
     with _ONE_AT_A_TIME, few_threads():
         try:
             claim_folder(run, root)
             with _printing_to(run.folder(root) / OUTPUT):
-                run.work(Path(root), device)
-            _record_end(run, root, device, time.perf_counter() - began)
+                if processes > 1:
+                    work_together(run, Path(root), device, processes)
+                else:
+                    run.work(Path(root), device)
+            _record_end(run, root, device, processes, time.perf_counter() - began)
         except Exception:
             return Outcome(time.perf_counter() - began, traceback.format_exc())
     return Outcome(time.perf_counter() - began, None)
@@ -94,7 +100,7 @@ def claim_folder(run: Run, root: str | Path) -> None:
         raise DataError(path, f"the run {ours}", f"{theirs}: choose another folder for the runs, or remove this one")
 
 
-def _record_end(run: Run, root: str | Path, device: str, seconds: float) -> None:
+def _record_end(run: Run, root: str | Path, device: str, processes: int, seconds: float) -> None:
     """Write the last file of a run, which says that all others are there."""
     record = {
         "seconds": round(seconds, 2),
@@ -103,6 +109,7 @@ def _record_end(run: Run, root: str | Path, device: str, seconds: float) -> None
         "threads": THREADS,
         "commit": commit(),
         "versions": versions("numpy", "torch", "numba"),
+        **({"processes": processes} if processes > 1 else {}),
     }
     write_json(run.folder(root) / ENDED, record)
 

@@ -30,6 +30,11 @@ class Run(ABC):
         return ()
 
     @property
+    def is_training(self) -> bool:
+        """Whether it is a training run, so that several processes can share its batches (`process_group`)."""
+        return False
+
+    @property
     @abstractmethod
     def steps(self) -> int:
         """How many steps its work has; all take about the same time."""
