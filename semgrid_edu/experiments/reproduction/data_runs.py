@@ -135,6 +135,11 @@ class ArraysRun(Run):
         return sum(route.n_frames for route in RECIPE_OF[self.data.data].routes if route.split == self.split)
 
     @property
+    def n_labelled(self) -> int:
+        """Number of labelled frames, which `frames` returns."""
+        return sum(len(route.labelled) for route in RECIPE_OF[self.data.data].routes if route.split == self.split)
+
+    @property
     def pace(self) -> str:
         """It depends on the size of the grid."""
         return f"arrays {self.preset}"

@@ -15,16 +15,16 @@ from semgrid_edu.experiments.reproduction.accuracy_tables import (
     crf_gains,
     network_gains,
 )
-from semgrid_edu.experiments.reproduction.baseline_runs import BaselineRun
 from semgrid_edu.experiments.reproduction.confusion_table import confusion_markdown, confusion_result
 from semgrid_edu.experiments.reproduction.figure_pictures import figures_markdown, figures_picture
 from semgrid_edu.experiments.reproduction.figure_runs import figure_runs, shown_frames
 from semgrid_edu.experiments.reproduction.judging import claim_runs, claims_markdown, claims_picture, judge_claims
-from semgrid_edu.experiments.reproduction.paper import NETWORKS, TABLE_1_SCORES, TABLE_2_SCORES
+from semgrid_edu.experiments.reproduction.paper import TABLE_1_SCORES, TABLE_2_SCORES
 from semgrid_edu.experiments.reproduction.pictures import ablations_picture, accuracy_picture, confusion_picture
 from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.experiments.reproduction.scales import Scale
 from semgrid_edu.experiments.reproduction.score_runs import ScoreRun
+from semgrid_edu.experiments.reproduction.table_runs import table1_baselines, table1_runs, table2_runs, table3_runs
 from semgrid_edu.labels import KITTI_14
 
 
@@ -57,63 +57,6 @@ class Experiment:
     result: Callable[[Scale, int, Path], dict]
     markdown: Callable[[dict], str]
     picture: Callable[[dict, Path], Figure]
-
-
-def table1_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
-    """Return the runs of Table 1.
-
-    Parameters
-    ----------
-    scale : Scale
-        How large they are.
-    seeds : int
-        Number of seeds.
-
-    Returns
-    -------
-    dict of str to list of ScoreRun
-        By image network one per seed.
-    """
-    return {segmenter: [scale.scored(scale.kitti, segmenter, seed) for seed in range(seeds)] for segmenter in NETWORKS}
-
-
-def table1_baselines(scale: Scale, seeds: int) -> list[BaselineRun]:
-    """Return the runs of the baselines that Table 1's SegNet is compared with, one per seed.
-
-    Parameters
-    ----------
-    scale : Scale
-        How large they are.
-    seeds : int
-        Number of seeds.
-
-    Returns
-    -------
-    list of BaselineRun
-    """
-    return [BaselineRun(run.network, run.frames) for run in table1_runs(scale, seeds)["segnet"]]
-
-
-def table2_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
-    """Return the runs of Table 2: routes that were never driven in training. Parameters are those of `table1_runs`.
-
-    Returns
-    -------
-    dict of str to list of ScoreRun
-        By image network, SegNet alone, one per seed.
-    """
-    return {"segnet": [scale.scored(scale.chroma, "segnet", seed) for seed in range(seeds)]}
-
-
-def table3_runs(scale: Scale, seeds: int) -> list[ScoreRun]:
-    """Return the runs of Table 3: SegNet on data without any error. Parameters are those of `table1_runs`.
-
-    Returns
-    -------
-    list of ScoreRun
-        One per seed.
-    """
-    return [scale.scored(scale.synthia, "segnet", seed, truth="true", crf=False) for seed in range(seeds)]
 
 
 def _seed_by_seed(runs: Mapping[str, Sequence[Run]]) -> list[Run]:
