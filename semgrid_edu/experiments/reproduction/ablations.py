@@ -106,7 +106,7 @@ def ablation_runs(scale: Scale, seeds: int) -> list[Run]:
     Returns
     -------
     list of Run
-        The usual networks first; then what needs no other training; then the variants.
+        The usual networks first; then what needs no other training run; then the variants.
     """
     others = (miscalibrated_runs(scale, seeds), variant_runs(scale, seeds), small_set_runs(scale, seeds))
     return [*usual_runs(scale, seeds), *(run for found in others for runs in found.values() for run in runs)]

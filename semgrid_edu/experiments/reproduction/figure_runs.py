@@ -29,7 +29,7 @@ class FigureRun(Run):
     Parameters
     ----------
     network : GridStageRun
-        The training of the network.
+        The run that trains the network.
     frames : ArraysRun
         The test frames.
     """

@@ -33,7 +33,7 @@ class OverturnedRun(CountingRun):
     Parameters
     ----------
     network : GridStageRun
-        The training of the network.
+        The run that trains the network.
     frames : ArraysRun
         The frames.
     """

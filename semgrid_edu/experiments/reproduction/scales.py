@@ -26,7 +26,7 @@ class Scale:
     preset : str
         "compact" or "paper": networks, images and grid, see `architecture`.
     image_iterations, grid_iterations : int
-        Steps of the two stages of a training.
+        Steps of the two stages of training.
     table1_seeds, seeds : int
         Number of seeds for Table 1, and for everything else.
     """
@@ -50,7 +50,7 @@ class Scale:
         return sum(len(route.labelled) for route in RECIPE_OF[self.kitti].routes if route.split == "train")
 
     def image_stage(self, data: str, segmenter: str, seed: int, n_frames: int | None = None) -> ImageStageRun:
-        """Return the training of an image network.
+        """Return the run that trains an image network.
 
         Parameters
         ----------
@@ -59,7 +59,7 @@ class Scale:
         segmenter : str
             The image network, a key of `SEGMENTERS`.
         seed : int
-            Seed of the training.
+            Seed of the run.
         n_frames : int, optional
             How many frames it learns from; all when left out.
         """
@@ -75,7 +75,7 @@ class Scale:
         variant: Variant = USUAL,
         n_frames: int | None = None,
     ) -> GridStageRun:
-        """Return the training of a whole network.
+        """Return the run that trains a whole network.
 
         Parameters
         ----------
@@ -84,7 +84,7 @@ class Scale:
         segmenter : str
             The image network, a key of `SEGMENTERS`.
         seed : int
-            Seed of the training.
+            Seed of the run.
         truth : str
             What it learns from, see `ArraysRun`.
         variant : Variant
@@ -105,7 +105,7 @@ class Scale:
         n_frames: int | None = None,
         crf: bool = True,
     ) -> ScoreRun:
-        """Return the scoring of a network on the test frames of the data that it learned from.
+        """Return the run that scores a network on the test frames of the data that it learned from.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ class Scale:
         return ScoreRun(network, self.arrays(data, "test", truth), crf)
 
     def arrays(self, data: str, split: str, truth: str) -> ArraysRun:
-        """Return the making of the arrays of a split. Parameters are those of `ArraysRun`."""
+        """Return the run that makes the arrays of a split. Parameters are those of `ArraysRun`."""
         return ArraysRun(DataRun(data), split, truth, self.preset)
 
 

@@ -37,7 +37,7 @@ class ScoreRun(CountingRun):
     Parameters
     ----------
     network : GridStageRun
-        The training of the network.
+        The run that trains the network.
     frames : ArraysRun
         The frames; with labels made with the LIDAR, they are scored against these and against the true ones.
     crf : bool
