@@ -120,7 +120,12 @@ def called_void(matrix: NDArray) -> float:
     Parameters
     ----------
     matrix : (10, 10) int
-        A confusion matrix of SYNTHIA-10.
+        A confusion matrix of SYNTHIA-10, one row per true class.
+
+    Returns
+    -------
+    float
+        From 0 to 1; NaN when no such cell is called wrong.
     """
     things = matrix[1:]
     wrong = things.sum() - np.trace(matrix[1:, 1:])

@@ -48,6 +48,11 @@ class CountingRun(Run):
         -------
         FrameConfusions
             With one method, called `method`.
+
+        Raises
+        ------
+        DataError
+            When the run hasn't ended, or its file is damaged.
         """
         found = load_confusions(self.folder(root) / CONFUSIONS)
         bands = [band] if band else distance_band_names()
@@ -62,6 +67,16 @@ class CountingRun(Run):
             The folder of all runs.
         method : str
             Such as `NETWORK`.
+
+        Returns
+        -------
+        Reliability
+            One entry per bin of confidence.
+
+        Raises
+        ------
+        DataError
+            When the run hasn't ended, or its file is damaged.
         """
         cells, confidence, right = read_arrays(self.folder(root) / RELIABILITY)[method]
         some = np.maximum(cells, 1)
@@ -85,6 +100,13 @@ def by_seed(
     Returns
     -------
     (S, V, C, C) int64
+
+    Raises
+    ------
+    ArgumentError
+        When there is no run, or two of them were scored on other frames.
+    DataError
+        When a run hasn't ended, or its file is damaged.
     """
     return seed_confusions([run.confusions(root, method, truth, band) for run in runs], method)
 

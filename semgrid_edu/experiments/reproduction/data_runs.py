@@ -163,6 +163,11 @@ class ArraysRun(Run):
         Returns
         -------
         TrainingSet
+
+        Raises
+        ------
+        DataError
+            When the data set is missing or damaged.
         """
         usual, made = architecture("segnet", self.preset), chosen_truth(self.truth)
         return TrainingSet(self.data.dataset_dir(root), self.split, usual.grid, usual.image_size, made=made)

@@ -79,6 +79,11 @@ def times(runs: Sequence[Run], root: Path) -> dict:
     -------
     dict
         "hours" of all runs, one after the other; "minutes" of each run; the "dates" on which they ended.
+
+    Raises
+    ------
+    DataError
+        When a run hasn't ended, or what it recorded is damaged.
     """
     ended = {run.name: run.record(root) for run in runs}
     return {

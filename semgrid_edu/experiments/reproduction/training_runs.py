@@ -221,6 +221,13 @@ def train_or_resume(
     ----------
     net, frames, folder, params, seed, device
         As `train` takes them.
+
+    Raises
+    ------
+    ArgumentError
+        When several processes can't share a batch evenly, or as `train` raises it.
+    DataError
+        When the checkpoint is damaged, or of another run.
     """
     if not (folder / WEIGHTS).exists():
         train(net, frames, folder, params, seed, resume=(folder / CHECKPOINT).exists(), device=device)
