@@ -12,7 +12,7 @@ from semgrid_edu.metrics import METRICS, semantic_cells
 
 Measured = dict[str, object]
 """The "mean" over the seeds, "low" and "high" of its 95 % interval, and the value of each of the "seeds"; None where
-there is none."""
+it can't be computed."""
 
 SHOWN_SEEDS = 5
 """Up to so many seeds each one's value is shown."""

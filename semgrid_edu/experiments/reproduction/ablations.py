@@ -28,14 +28,14 @@ VARIANTS = {
     "no 1x1 reduction": Variant(reduces=False),
     "no balancing": Variant(balanced=False),
 }
-"""What is other than usual: 20 planes 0.2 m apart, with occupancy grid, reduction and balancing."""
+"""Each differs in one thing from the usual network: 20 planes 0.2 m apart, occupancy grid, reduction, balancing."""
 
 CALIBRATION_ERRORS = (
     *(CalibrationError(pitch=size) for size in (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)),
     *(CalibrationError(yaw=size) for size in (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)),
     *(CalibrationError(height=size) for size in (-0.2, -0.1, 0.1, 0.2)),
 )
-"""Errors of the calibration that the trained network is given when it is tested: degrees, metres."""
+"""Errors in the calibration that the trained network is given when it is tested: degrees, metres."""
 
 FEW = 4
 """The small training set has one in so many frames."""
@@ -53,12 +53,12 @@ def usual_runs(scale: Scale, seeds: int) -> list[ScoreRun]:
 
 
 def variant_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
-    """Return the runs of the networks that are other than usual. Parameters are those of `table1_runs`.
+    """Return the runs of the networks that differ from the usual one. Parameters are those of `table1_runs`.
 
     Returns
     -------
     dict of str to list of ScoreRun
-        By what is other, one per seed.
+        By what differs, one per seed.
     """
     found = {
         name: [scale.scored(scale.kitti, "segnet", seed, variant=variant, crf=False) for seed in range(seeds)]

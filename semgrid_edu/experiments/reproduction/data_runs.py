@@ -17,7 +17,7 @@ def _short(split: str, layout: str, n_frames: int = 6) -> Route:
 
 
 def _routes(number: int, n_frames: int) -> tuple[Route, ...]:
-    """Return short routes to test on, by turns through a junction and a bend."""
+    """Return short routes to test on, through a junction and a bend in turn."""
     return tuple(_short("test", ("junction", "bend")[k % 2], n_frames) for k in range(number))
 
 

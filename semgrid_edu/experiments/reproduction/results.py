@@ -111,6 +111,6 @@ def result_markdown(result: dict, experiment: Experiment) -> str:
     return (
         f"# {experiment.title}\n\nScale {result['scale']}, number of seeds: {result['seeds']}. Means over the seeds; "
         "in brackets 95 % intervals over drives and seeds. Per cent.\n\n"
-        f"{experiment.markdown(result)}\n\nOther than in the paper:\n\n{listed}\n\n"
+        f"{experiment.markdown(result)}\n\nWhat differs from the paper:\n\n{listed}\n\n"
         f"Made by `{result['command']}`, commit {', '.join(result['commits'])}.\n"
     )

@@ -1,4 +1,4 @@
-"""The scales at which the paper's experiments can be done, and what each has other than the paper (section 4)."""
+"""The scales at which the paper's experiments can be done (section 4)."""
 
 from dataclasses import dataclass
 
@@ -88,7 +88,7 @@ class Scale:
         truth : str
             What it learns from, see `ArraysRun`.
         variant : Variant
-            What is other than in the paper.
+            What differs from the paper's network.
         n_frames : int, optional
             How many frames it learns from; all when left out.
         """

@@ -99,5 +99,5 @@ class ScoreRun(CountingRun):
 
 
 def _refined(params: CrfParams, temperature: float, log_g: NDArray, o: NDArray) -> NDArray:
-    """Refine a grid by the CRF, after it was made less or more sure."""
+    """Refine a grid by the CRF, after its log-probabilities were divided by a temperature."""
     return mean_field(unary_from_log_probability(at_temperature(log_g, temperature)), o, params)

@@ -133,7 +133,7 @@ class GridStageRun(TrainingRun):
     iterations : int
         Number of steps.
     variant : Variant
-        What is other than in the paper.
+        What differs from the paper's network.
     """
 
     image_stage: ImageStageRun
