@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from tiny_runs import Note, SharedNote, results, tiny_training_runs
+from tiny_runs import Note, SharedNote, results, tiny_training_runs, wait_for
 
 from semgrid_edu.experiments.reproduction.one_run import run_one
 from semgrid_edu.experiments.reproduction.runs import OUTPUT
@@ -73,11 +73,3 @@ def stays(path, seconds=1.0):
     before = path.stat().st_size
     time.sleep(seconds)
     return path.stat().st_size == before
-
-
-def wait_for(condition, seconds=120):
-    """Wait until a condition holds; a hang fails."""
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.05)

@@ -41,16 +41,19 @@ def write_result(name: str, experiment: Experiment, scale: Scale, seeds: int, ro
         The Markdown.
     """
     runs = with_needs(experiment.runs(scale, seeds))
+    records = [run.record(root) for run in runs]
+    processes = max(record.get("processes", 1) for record in records)
+    command = f"semgrid-edu reproduce {name} --scale {scale.name} --seeds {seeds} --runs RUNS --out OUT"
     made_by = {
         "experiment": name,
         "title": experiment.title,
-        "command": f"semgrid-edu reproduce {name} --scale {scale.name} --seeds {seeds} --runs RUNS --out OUT",
+        "command": command + (f" --processes {processes}" if processes > 1 else ""),
         "scale": scale.name,
         "seeds": seeds,
         "iterations": [scale.image_iterations, scale.grid_iterations],
         "frames and drives": frame_counts(getattr(scale, experiment.field)),
         "deviations": deviations(scale, experiment.field),
-        "commits": sorted({str(run.record(root)["commit"]) for run in runs}),
+        "commits": sorted({str(record["commit"]) for record in records}),
         "versions": versions("numpy", "torch", "numba", "scipy"),
     }
     result = made_by | experiment.result(scale, seeds, root)
