@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 from tiny_runs import Note, SharedNote, results, tiny_training_runs, wait_for
 
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.reproduction.one_run import run_one
+from semgrid_edu.experiments.reproduction.reproduce import Request, reproduce
 from semgrid_edu.experiments.reproduction.runs import OUTPUT
 from semgrid_edu.training.log import LOG, read_log
 
@@ -66,6 +68,14 @@ def test_other_runs_take_one_process(tmp_path):
     run = Note("a")
     assert run_one(run, tmp_path, processes=2).error is None
     assert "processes" not in run.record(tmp_path)
+
+
+def test_a_plan_that_torchrun_starts_twice_is_refused(monkeypatch, tmp_path):
+    monkeypatch.setenv("WORLD_SIZE", "2")
+    request = Request("table1", "quick", None, tmp_path / "runs", tmp_path / "out")
+    with pytest.raises(ArgumentError, match="--processes: expected 2"):
+        reproduce(request, print)
+    assert not (tmp_path / "runs").exists()
 
 
 def stays(path, seconds=1.0):
