@@ -160,7 +160,7 @@ def test_ctrl_c_says_how_to_go_on(monkeypatch, tmp_path, kept):
     ("option", "message"),
     [
         (["--device", "cuda:99"], "--device: expected cpu or one of the"),
-        (["--truth", "guessed"], "--truth: expected true or lidar, found 'guessed'"),
+        (["--truth", "guessed"], "--truth: expected one of true, lidar, no-cleanup"),
         (["--preset", "huge"], "--preset: expected compact or paper, found 'huge'"),
         (["--segmenter", "unknown"], f"name: expected one of {', '.join(SEGMENTERS)}"),
         (["--imagenet", "nowhere.safetensors"], "nowhere.safetensors: expected a safetensors file"),
