@@ -134,7 +134,11 @@ def train(
         bool, typer.Option("--two-stage", help="Keep the image network fixed while the fusion learns.")
     ] = False,
     truth: Annotated[
-        str, typer.Option(help="true, or lidar: made from image labels and LIDAR with real data's errors.")
+        str,
+        typer.Option(
+            help="true; lidar: made from image labels and LIDAR with real data's errors; or made in another way, "
+            "such as no-cleanup."
+        ),
     ] = "true",
     resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was interrupted.")] = False,
     device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu, cuda or cuda:N.")] = "auto",

@@ -108,7 +108,8 @@ class ArraysRun(Run):
     split : str
         One of its splits, such as "train".
     truth : str
-        "true" for the simulator's labels, "lidar" for labels made with the LIDAR as the paper makes them.
+        "true" for the simulator's labels, "lidar" for labels made with the LIDAR as the paper makes them, or another
+        key of `POLICIES`.
     preset : str
         "compact" or "paper": decides the grid and the size of the images, see `architecture`.
     """

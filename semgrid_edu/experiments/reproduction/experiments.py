@@ -25,6 +25,8 @@ from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.experiments.reproduction.scales import Scale
 from semgrid_edu.experiments.reproduction.score_runs import ScoreRun
 from semgrid_edu.experiments.reproduction.table_runs import table1_baselines, table1_runs, table2_runs, table3_runs
+from semgrid_edu.experiments.reproduction.truth_cost_tables import truth_costs_markdown, truth_costs_picture
+from semgrid_edu.experiments.reproduction.truth_costs import truth_cost_runs, truth_costs
 from semgrid_edu.labels import KITTI_14
 
 
@@ -48,6 +50,8 @@ class Experiment:
         result -> Markdown.
     picture : callable
         (result, folder of all runs) -> Figure.
+    deviations : tuple of str
+        In what it differs from the paper beside what all experiments on these data do, one sentence each.
     """
 
     title: str
@@ -57,6 +61,7 @@ class Experiment:
     result: Callable[[Scale, int, Path], dict]
     markdown: Callable[[dict], str]
     picture: Callable[[dict, Path], Figure]
+    deviations: tuple[str, ...] = ()
 
 
 def _seed_by_seed(runs: Mapping[str, Sequence[Run]]) -> list[Run]:
@@ -122,6 +127,20 @@ EXPERIMENTS = {
         ablations,
         ablations_markdown,
         lambda result, _: ablations_picture(result),
+    ),
+    "truth-costs": Experiment(
+        "What training costs on truth that is made in other ways",
+        "kitti",
+        lambda scale: scale.seeds,
+        truth_cost_runs,
+        truth_costs,
+        truth_costs_markdown,
+        lambda result, _: truth_costs_picture(result),
+        (
+            "The paper learns from one kind of truth. Three choices of the policy laboratory aren't trained on: scans "
+            "after the labelled one, and image labels for each scan, because the drives end with their one labelled "
+            "frame; and the mask of what is visible to the LIDAR, which hardly changes the labels.",
+        ),
     ),
     "figures": Experiment(
         "Figures 6 and 7",

@@ -52,7 +52,7 @@ def write_result(name: str, experiment: Experiment, scale: Scale, seeds: int, ro
         "seeds": seeds,
         "iterations": [scale.image_iterations, scale.grid_iterations],
         "frames and drives": frame_counts(getattr(scale, experiment.field)),
-        "deviations": deviations(scale, experiment.field),
+        "deviations": [*deviations(scale, experiment.field), *experiment.deviations],
         "commits": sorted({str(record["commit"]) for record in records}),
         "versions": versions("numpy", "torch", "numba", "scipy"),
     }

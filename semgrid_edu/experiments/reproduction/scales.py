@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from semgrid_edu.datasets.named_truths import POLICIES
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.reproduction.data_runs import RECIPE_OF, ArraysRun, DataRun
 from semgrid_edu.experiments.reproduction.score_runs import ScoreRun
@@ -29,6 +30,8 @@ class Scale:
         Steps of the two stages of training.
     table1_seeds, seeds : int
         Number of seeds for Table 1, and for everything else.
+    policies : tuple of str
+        The ways to make labels, beside the usual one, that networks learn from: keys of `POLICIES`.
     """
 
     name: str
@@ -43,6 +46,7 @@ class Scale:
     grid_iterations: int
     table1_seeds: int
     seeds: int
+    policies: tuple[str, ...] = tuple(name for name in POLICIES if name != "lidar")
 
     @property
     def frames_to_train(self) -> int:
@@ -138,6 +142,7 @@ SCALES = {
             10,
             table1_seeds=2,
             seeds=2,
+            policies=("no-cleanup", "accumulated-carved"),
         ),
         Scale(
             "reduced",
