@@ -16,7 +16,6 @@ from semgrid_edu.experiments.reproduction.execute import execute_plan
 from semgrid_edu.experiments.reproduction.experiments import EXPERIMENTS
 from semgrid_edu.experiments.reproduction.label_runs import LABELS, LabelsRun
 from semgrid_edu.experiments.reproduction.plan import with_needs
-from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.experiments.reproduction.scales import SCALES
 from semgrid_edu.experiments.reproduction.truth_cost_tables import (
     LEARNED_FROM,
@@ -117,7 +116,7 @@ def test_without_clean_up_fewer_cells_have_a_label(counted):
     assert 0 < n_labelled[0] < n_labelled[1]
 
 
-class Counted(Run):
+class Counted:
     """A run on two drives, in each of which 100 cells of road and 10 of car lie nearby; so many are called right."""
 
     def __init__(self, road, car):

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from semgrid_edu.experiments.reproduction.counting import CountingRun, GridCounts
 from semgrid_edu.experiments.reproduction.data_runs import ArraysRun
-from semgrid_edu.experiments.reproduction.deviations import frame_counts
 from semgrid_edu.experiments.reproduction.runs import Run
 
 LABELS = "labels"
@@ -40,7 +39,7 @@ class LabelsRun(CountingRun):
     @property
     def steps(self) -> int:
         """Number of labelled frames."""
-        return frame_counts(self.labels.data.data)[self.labels.split][0]
+        return self.labels.n_labelled
 
     @property
     def pace(self) -> str:
