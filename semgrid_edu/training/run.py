@@ -148,6 +148,7 @@ def train_network(
     with process_group(device) as chosen:
         with first_process_first():
             dataset = TrainingSet(dataset_dir, "train", description.grid, description.image_size, made=made)
+        description = replace(description, label_set=dataset.label_set.name)
         net = build_net(description, dataset.camera, seed)
         if imagenet:
             load_imagenet(net.segmenter, imagenet)

@@ -12,6 +12,7 @@ from semgrid_edu.cli import app
 from semgrid_edu.datasets.made_truth import MadeTruth
 from semgrid_edu.datasets.named_truths import POLICIES
 from semgrid_edu.datasets.training_set import Sample
+from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.networks import SEGMENTERS, Architecture, Fcn, load_net
 from semgrid_edu.storage.files import sha256, write_text
 from semgrid_edu.storage.provenance import provenance_problems
@@ -23,6 +24,7 @@ from semgrid_edu.training.log import LOG, Step, append_step, begin_log
 class _Noise:
     """Six frames of noise, in the place of a data set on disk."""
 
+    label_set = KITTI_14
     camera = Camera(
         np.array([[186, 0, 157], [0, 184, 44], [0, 0, 1.0]]),
         np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]]),
@@ -84,6 +86,19 @@ def test_the_command_leaves_weights_log_and_provenance(monkeypatch, tmp_path):
     assert "truth" not in provenance
     assert len((out / "log.csv").read_text().splitlines()) == 3
     assert isinstance(load_net(out / "weights.safetensors", _Noise.camera).segmenter, Fcn)
+
+
+def test_a_network_gets_the_classes_of_its_data(monkeypatch, tmp_path):
+    """minisynthia has ten classes and no unknown ones; networks have KITTI-14 by default."""
+    built = {}
+    monkeypatch.setattr(_Noise, "label_set", SYNTHIA_10)
+    monkeypatch.setattr(experiment, "TrainingSet", _Noise)
+    monkeypatch.setattr(experiment, "build_net", lambda description, *_: built.update(net=description) or _Net)
+    monkeypatch.setattr(experiment, "train", lambda *_: None)
+    write_text(tmp_path / "minisynthia" / "dataset.json", "{}")
+    params = experiment.training_params("compact", 1)
+    experiment.train_network(tmp_path / "minisynthia", tmp_path / "out", "segnet", params)
+    assert built["net"].label_set == SYNTHIA_10.name
 
 
 @pytest.mark.parametrize("option", ["--seed=-1", "--iterations=0"])
