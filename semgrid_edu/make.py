@@ -75,9 +75,19 @@ TARGETS = {target.__name__: target for target in (environment, demo, lint, test)
 """What can be asked for, by name."""
 
 
-def main() -> None:
-    """Do what the command line asks for."""
-    asked = sys.argv[1:]
+def make(asked: list[str]) -> None:
+    """Do what the command line asks for.
+
+    Parameters
+    ----------
+    asked : list of str
+        Keys of `TARGETS`, at least one.
+
+    Raises
+    ------
+    SystemExit
+        When something else is asked for, or a target fails.
+    """
     if not asked or not set(asked) <= TARGETS.keys():
         sys.exit(f"usage: python -m semgrid_edu.make [{' | '.join(TARGETS)}]")
     for target in asked:
@@ -85,4 +95,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    make(sys.argv[1:])

@@ -73,10 +73,9 @@ def test_an_old_python_is_refused(clone, monkeypatch):
 
 
 @pytest.mark.parametrize("asked", [[], ["demos"], ["demo", "--fast"]])
-def test_what_cannot_be_asked_for_is_refused(asked, monkeypatch):
-    monkeypatch.setattr(sys, "argv", ["make", *asked])
+def test_what_cannot_be_asked_for_is_refused(asked):
     with pytest.raises(SystemExit, match="usage"):
-        make.main()
+        make.make(asked)
 
 
 def test_it_needs_nothing_but_python():
