@@ -75,7 +75,7 @@ TARGETS = {target.__name__: target for target in (environment, demo, lint, test)
 """What can be asked for, by name."""
 
 
-def make(asked: list[str]) -> None:
+def make_targets(asked: list[str]) -> None:
     """Do what the command line asks for.
 
     Parameters
@@ -95,4 +95,4 @@ def make(asked: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    make(sys.argv[1:])
+    make_targets(sys.argv[1:])

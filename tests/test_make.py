@@ -75,7 +75,7 @@ def test_an_old_python_is_refused(clone, monkeypatch):
 @pytest.mark.parametrize("asked", [[], ["demos"], ["demo", "--fast"]])
 def test_what_cannot_be_asked_for_is_refused(asked):
     with pytest.raises(SystemExit, match="usage"):
-        make.make(asked)
+        make.make_targets(asked)
 
 
 def test_it_needs_nothing_but_python():
