@@ -598,7 +598,7 @@ assert max(of_kind, key=of_kind.get) == "error of calibration"
 #
 # Now the same errors (all of them, one scan), by distance from the LIDAR and by class.
 
-# %% tags=["class-and-distance"]
+# %% tags=["class-and-distance"] jupyter={"source_hidden": true}
 counted, n_drives = counts_of(result, PAPER), len(result["drives"])
 missed, of_class = counted.shares(axis=1)["missed"], counted.shares(axis=0)["wrong"]
 bands = [f"{a:.0f} to {b:.0f} m" for a, b in zip(result["bands"][:-1], result["bands"][1:], strict=True)]
@@ -718,14 +718,14 @@ plt.show()
 
 # %% jupyter={"source_hidden": true}
 AROUND = "9 before and after"
-OWN = f"{AROUND}, own labels, movers"
+OWN, SIGHT = f"{AROUND}, own labels, movers", "visible to camera"
 policies = [
     ("one scan (the paper)", PAPER),
     ("  without clean-up", "one scan, no clean-up"),
     ("  all classes spread alike", "one scan, all classes spread alike"),
     ("  majority", "one scan, majority of returns"),
     ("  de-skewed", "one scan, de-skewed"),
-    ("  only what the camera sees", "one scan, visible to camera"),
+    ("  only what the camera sees", f"one scan, {SIGHT}"),
     ("19 scans, one image: smeared", f"{AROUND}, movers smeared"),
     ("  carved", f"{AROUND}, movers carved"),
     ("  carried", f"{AROUND}, movers carried"),
@@ -734,7 +734,7 @@ policies = [
     ("  carried", f"{OWN} carried"),
     ("  carved, de-skewed", f"{OWN} carved, de-skewed"),
     ("  carved, what stands wins", f"{OWN} carved, what stands wins"),
-    ("  carved, only what the camera sees", f"{OWN} carved, visible to camera"),
+    ("  carved, only what the camera sees", f"{OWN} carved, {SIGHT}"),
 ]
 
 # %% tags=["policies"] jupyter={"source_hidden": true}
@@ -747,7 +747,6 @@ fewest, least = (min(policies, key=lambda policy: share_of(policy[1], c))[1] for
 assert fewest == least == "one scan, no clean-up"  # the fewest wrong labels, and the fewest right ones
 
 # %% tags=["pairs"] jupyter={"source_hidden": true}
-SIGHT = "visible to camera"
 pairs = {
     "a  19 scans, own images, smeared - one scan": (f"{OWN} smeared", PAPER),
     "b  the same, carved": (f"{OWN} carved", PAPER),
@@ -785,12 +784,13 @@ plt.show()
 # labels). The second table compares two policies drive by drive. In its lines:
 #
 # - **More scans find more, and a larger share of their labels is wrong** (a to c), for each treatment of moving things.
-#   About a third of these labels lies in cells that the camera doesn't see at this instant (column *hidden* above).
+#   About a third of these labels lies in cells that the camera doesn't see at this instant (column *hidden* above; of
+#   one scan's about a fifth).
 #   When both keep only what the camera sees (d), nineteen scans still find more, and the drives don't agree whether
 #   more of it is wrong.
-# - **One image for all scans makes more labels wrong than own images** (e to g). What another scan measured behind a car takes the
-#   label of the car, as the hidden return of step 1 did.
-# - **Carving helps a little, carrying doesn't** (h, i). Carried returns land where the filter's velocity puts them, and
+# - **One image for all scans makes more labels wrong than own images** (e to g). What another scan measured behind a
+#   car takes the label of the car, as the hidden return of step 1 did.
+# - **Carving makes a few labels fewer wrong, carrying doesn't** (h, i). Carried returns land where the filter's velocity puts them, and
 #   its errors land with them.
 # - **What stands wins** hardly matters with one scan (j), and is clearly worse than a majority with nineteen (k), as
 #   the graph said.
