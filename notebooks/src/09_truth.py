@@ -688,7 +688,7 @@ for movers in ("smeared", "carved", "carried"):
     np.testing.assert_allclose(earlier_returns(*then, movers), gathered, atol=1e-4)
     print(f"{movers:<9}{len(gathered):6d} returns of the scan 0.3 s ago")
 
-# %% jupyter={"source_hidden": true} alt="four maps around the oncoming cars on the left: the truth, and nineteen scans with moving things smeared, carved and carried; smeared cars are long streaks, carved ones almost gone"
+# %% jupyter={"source_hidden": true} alt="four maps around the oncoming cars on the left: the truth, and nineteen scans with moving things smeared, carved and carried; smeared cars are long streaks; carving removes that of the overtaking car and only a part of the band of oncoming ones"
 window = TruthPolicy(9, 9, "own", vote="majority")
 moments = [Moment(*pair) for pair in zip(frames, beliefs, strict=True)]
 fig, axes = plt.subplots(1, 4, figsize=(12, 5.6), layout="compressed", sharey=True)
@@ -773,7 +773,7 @@ for text, (one, other) in pairs.items():
 assert min(extra[line] for line in "abcefgk") > 0 > extra["h"]  # more wrong labels, and fewer
 assert max(abs(extra[line]) for line in "jlm") < 1
 
-# %% jupyter={"source_hidden": true} alt="bars of three kinds of error for fifteen policies: cells with another label, cells without a label, wrong labels; accumulated scans miss fewest cells and have more wrong labels"
+# %% jupyter={"source_hidden": true} alt="bars of three kinds of error for fifteen policies: cells with another label, cells without a label, wrong labels; accumulated scans miss fewest cells and have more wrong labels, except where only what the camera sees is kept"
 chosen = {name: result["sums"][name] for _, name in policies}
 plotting.policy_errors(result | {"sums": chosen})
 plt.show()
