@@ -81,9 +81,9 @@ for letter, (y, x) in {"A": (-8, 13), "B": (2, 55), "C": (6, 7), "D": (7.5, 29)}
 plt.show()
 
 # %% [markdown]
-# 27 % of the map's cells have the same label in both. That is little more than half of what the camera sees: 5.6 % more have
-# another label, and 18.9 % have none. The rest of this lecture follows a label on its way into the map, and finds out
-# where each kind of error comes from.
+# 27 % of the map's cells have the same label in both. That is little more than half of what the camera sees: 5.6 % more
+# have another label, and 18.9 % have none. The rest of this lecture follows a label on its way into the map, and finds
+# out where each kind of error comes from.
 #
 # ## The graph of a label
 #
@@ -535,8 +535,8 @@ for returns, change in (("all returns", lambda f: f), ("none hidden", without_hi
 # the clean-up buys labels with errors: closing triples the cells with a right label, from 16 % to 49 %, and raises
 # wrong labels to 17 %. Spreading all classes alike pays more (26 %) and gets less (40 %).
 #
-# The last line is a surprise. After closing, the recipe without hidden returns is hardly less wrong than with them, 16 %
-# against 17 %, and it finds less, 41 % instead of 49 %. It finds less because our test calls some returns of the far
+# The last line is a surprise. After closing, the recipe without hidden returns is hardly less wrong than with them
+# (16 % against 17 %), and it finds less (41 % instead of 49 %). It finds less because our test calls some returns of the far
 # road hidden, too: from 25 m on, half a pixel is more than half a metre of road. Their labels are right, and without
 # them the ground doesn't spread that far. And it is hardly less wrong because most wrong labels are no votes:
 
@@ -790,8 +790,8 @@ plt.show()
 #   more of it is wrong.
 # - **One image for all scans makes more labels wrong than own images** (e to g). What another scan measured behind a
 #   car takes the label of the car, as the hidden return of step 1 did.
-# - **Carving makes a few labels fewer wrong, carrying doesn't** (h, i). Carried returns land where the filter's velocity puts them, and
-#   its errors land with them.
+# - **Carving makes somewhat fewer labels wrong, carrying doesn't** (h, i). Carried returns land where the filter's
+#   velocity puts them, and its errors land with them.
 # - **What stands wins** hardly matters with one scan (j), and is clearly worse than a majority with nineteen (k), as
 #   the graph said.
 # - **De-skewing changes next to nothing here** (l, m). The scanner faces the camera's direction when the image is
@@ -918,10 +918,10 @@ plt.show()
 
 # %% [markdown]
 # On these ten frames one degree to either side raises wrong labels from 17 % to 21 or 22 %. One degree of nodding
-# raises them to 20 or 30 %, depending on its sign. With a positive sign each return takes the label of a pixel *above* its own: the far road
-# gets the labels of trees, cars and sidewalk (right map). With a negative sign it takes the label of a pixel below,
-# and below the road there is mostly road. That is also why 27 cells don't ruin the map: a label that moves from road
-# to road does no harm. The harm is at the outlines.
+# raises them to 20 or 30 %, depending on its sign. With a positive sign each return takes the label of a pixel *above*
+# its own: the far road gets the labels of trees, cars and sidewalk (right map). With a negative sign it takes the label
+# of a pixel below, and below the road there is mostly road. That is also why 27 cells don't ruin the map: a label that
+# moves from road to road does no harm. The harm is at the outlines.
 #
 # **Where no beam went.** A recipe can only carry what was measured. Of the cells that the camera sees, how many were
 # hit by a labelled return at all?

@@ -410,9 +410,9 @@ for name, one in real.items():
 # %% [markdown]
 # On the sample drive the mean plane is what the simulator put there. On drive 0013 the mean height is that of the
 # calibration, 1.73 m, within a centimetre, and the ground ahead rises by about half a degree, as if the LIDAR leaned
-# forward. Twenty metres ahead that is 15 to 19 cm. Does the car's nose hang down, is the LIDAR mounted so, or does the road rise? One check
-# can't tell these causes apart. It is the graph of the first section again: one child, several parents. The ground
-# filter of lecture 02 doesn't need to know. It follows the ground outward from the vehicle.
+# forward. Twenty metres ahead that is 15 to 19 cm. Does the car's nose hang down, is the LIDAR mounted so, or does the
+# road rise? One check can't tell these causes apart. It is the graph of the first section again: one child, several
+# parents. The ground filter of lecture 02 doesn't need to know. It follows the ground outward from the vehicle.
 
 # %% [markdown]
 # ## Check 5: does the vehicle move as its poses say?
@@ -509,8 +509,8 @@ ax.xaxis.tick_top()
 plt.show()
 
 # %% [markdown]
-# Orange cells with an exclamation mark are beyond a limit: one gap, half a degree of yaw, one degree of tilt,
-# 5 cm of motion, and the largest colour distance of one training image from the others. Three things are worth a look on the
+# Orange cells with an exclamation mark are beyond a limit: one gap, half a degree of yaw, one degree of tilt, 5 cm of
+# motion, and the largest colour distance of one training image from the others. Three things are worth a look on the
 # sample drive:
 #
 # - *Camera turned* and *images late* raise the same alarm, `yaw`. This is the graph of the first section, B with two
@@ -549,9 +549,9 @@ for name, one in measured["drives"].items():
     print(" " * 10, {state: round(share, 2) for state, share in one["grids"]["states"].items()}, "of all cells")
 
 # %% [markdown]
-# From the second second on, the filter calls nearly all hit cells of moving cars DYNAMIC, on both drives, and nothing in
-# it was trained. (Drive 0013 isn't new to it, though: two of its rules were made after its phantoms on this drive had
-# been seen, as [the companion of lecture 04](deeper/04_real_streets.ipynb) tells.) The shares of the states differ,
+# From the second second on, the filter calls nearly all hit cells of moving cars DYNAMIC, on both drives, and nothing
+# in it was trained. (Drive 0013 isn't new to it, though: two of its rules were made after its phantoms on this drive
+# had been seen, as [the companion of lecture 04](deeper/04_real_streets.ipynb) tells.) The shares of the states differ,
 # and should: the streets are different ones, and the real scanner returns about ten times as many points.
 
 # %% [markdown]
@@ -593,12 +593,13 @@ if right:
     print(f"with labels: {100 * np.mean(right):.0f} % of the pixels are right")
 
 # %% [markdown]
-# These numbers of pixels are those of the image network after its first stage, which learned pixels; the map is that
-# of the whole network (lecture 08). Read the columns `lane` and `standing` first. On drive 0013 fewer lane returns are called road than on the sample
-# drive: 0.84 and 0.77 in place of 0.95. Fewer of those from standing things are called something that stands: 0.86
-# and 0.87 in place of 0.98. Then read the confidence. That of the pixels falls by 0.05 and 0.08, less than the
-# agreement with the lane. That of the map hardly changes: it is 0.82 on the sample drive, 0.81 and 0.83 on the real
-# one. Nobody could tell from it that anything is different, so the map's confidence is no alarm for new data.
+# These numbers of pixels are those of the image network after its first stage, which learned pixels; the map is that of
+# the whole network (lecture 08). Read the columns `lane` and `standing` first. On drive 0013 fewer lane returns are
+# called road than on the sample drive: 0.84 and 0.77 in place of 0.95. Fewer of those from standing things are called
+# something that stands: 0.86 and 0.87 in place of 0.98. Then read the confidence. That of the pixels falls by 0.05 and
+# 0.08, less than the agreement with the lane. That of the map hardly changes: it is 0.82 on the sample drive, 0.81 and
+# 0.83 on the real one. Nobody could tell from it that anything is different, so the map's confidence is no alarm for
+# new data.
 #
 # What LIDAR agreement can't say: whether something that stands up is a car or a fence. It is a check with two classes,
 # not a score with ten.
@@ -723,8 +724,8 @@ plt.show()
 # of histograms tells you *that* the images are different, and not what it costs. Warmer light costs much, and the lane
 # column says where: less than half of the lane is still called road. Noise costs most, and the distance even falls: it
 # looks at colours, and noise changes the edges. Even more instructive is the last line: after `match_colours` the
-# distance is nearly zero, and the network does a little worse than before, not better. (The function gives an image the training images' histogram, colour by
-# colour.)
+# distance is nearly zero, and the network does a little worse than before, not better. (The function gives an image the
+# training images' histogram, colour by colour.)
 #
 # Would matching the colours at least help on the real drive? There we can only ask the LIDAR:
 
@@ -758,8 +759,8 @@ for name, one in measured["drives"].items():
 # %% [markdown]
 # ## Where this breaks
 #
-# **Checks that can't fail.** Two of the seven faults raised no alarm on the sample drive. The mirrored poses need a bend:
-# let us give the sample vehicle one by hand, and mirror that.
+# **Checks that can't fail.** Two of the seven faults raised no alarm on the sample drive. The mirrored poses need a
+# bend: let us give the sample vehicle one by hand, and mirror that.
 
 # %%
 bend = motion_between(frames[5], frames[10])
@@ -794,8 +795,8 @@ assert len(time_gaps(times[::2])) == 0
 # **Agreement isn't accuracy.** A network that calls every pixel *road* below the horizon and *building* above it would
 # agree with the LIDAR on the lane always. The two rules are cheap and coarse.
 #
-# **Six seconds of one street** are no evidence about real drives in general. Our two stretches of drive 0013, 61 frames,
-# are one place, one hour, one sun.
+# **Six seconds of one street** are no evidence about real drives in general. Our two stretches of drive 0013, 61
+# frames, are one place, one hour, one sun.
 #
 # ## In five lines
 #
