@@ -613,7 +613,7 @@ plt.show()
 
 # %% [markdown]
 # Look at the panel in the middle first, and at the first printed line, which adds up its classes. Near the vehicle
-# about a tenth of the cells that the camera sees lack a label; in the farthest band it is nearly all of them, because
+# less than a tenth of the cells that the camera sees lack a label; in the farthest band most of them do, because
 # hardly any ring reaches the ground there (**B** in the opening picture). Cars (dark blue triangles) lack labels at
 # every distance: only the sides that face us send returns (**D**). On the right, thin things stand out. Most cells that
 # are labelled signage, bicycle or fence hold something else (second line, all distances), and fewer of those labelled
@@ -786,7 +786,7 @@ plt.show()
 # - **More scans find more, and a larger share of their labels is wrong** (a to c), for each treatment of moving things.
 #   About a third of these labels lies in cells that the camera doesn't see at this instant (column *hidden* above; of
 #   one scan's about a fifth).
-#   When both keep only what the camera sees (d), nineteen scans still find more, and the drives don't agree whether
+#   When both keep only what the camera sees (d), nineteen scans still find more, and in most drives, not in all,
 #   more of it is wrong.
 # - **One image for all scans makes more labels wrong than own images** (e to g). What another scan measured behind a
 #   car takes the label of the car, as the hidden return of step 1 did.
