@@ -1,4 +1,4 @@
-"""The metrics: pixel accuracy, class accuracy and FmIoU over labelled cells (paper, section 4.2)."""
+"""The metrics (section 4.2): pixel accuracy, class accuracy, FmIoU over labelled cells; a distance of distributions."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -147,6 +147,26 @@ def frequency_weighted_iou(confusion: ArrayLike) -> float:
     return _ratio((cells[present] * hits[present] / union[present]).sum(), cells.sum())
 
 
+def class_iou(confusion: ArrayLike) -> NDArray[np.float64]:
+    """Return the intersection over union of each class, 0..1.
+
+    Parameters
+    ----------
+    confusion : (C, C) int
+        How often each true class (row) is called each class (column).
+
+    Returns
+    -------
+    (C,) float64
+        TP_c / (n_c + m_c - TP_c) for n_c true, m_c predicted and TP_c rightly predicted cells of class c; NaN for a
+        class that no cell has or is called.
+    """
+    matrix = _matrix(confusion)
+    hits = np.diag(matrix)
+    union = matrix.sum(axis=1) + matrix.sum(axis=0) - hits
+    return np.divide(hits, union, out=np.full(len(hits), np.nan), where=union > 0)
+
+
 def _matrix(confusion: ArrayLike) -> NDArray:
     """Return the confusion matrix as an array, or say why it isn't one."""
     matrix = np.asarray(confusion)
@@ -161,3 +181,23 @@ def _ratio(part: float, whole: float) -> float:
 
 METRICS = {"pixel accuracy": pixel_accuracy, "class accuracy": class_accuracy, "FmIoU": frequency_weighted_iou}
 """The three metrics of section 4.2, by the names that tables give them."""
+
+
+def total_variation(p: ArrayLike, q: ArrayLike) -> NDArray[np.float64]:
+    """Return the distance of distributions, sum |p - q| / 2: the most by which they disagree about any event.
+
+    Parameters
+    ----------
+    p, q : (..., K) float
+        Distributions along the last axis.
+
+    Returns
+    -------
+    (...) float64
+
+    Examples
+    --------
+    >>> total_variation([0.5, 0.5], [0.9, 0.1]).round(6)
+    np.float64(0.4)
+    """
+    return np.abs(np.asarray(p) - q).sum(axis=-1) / 2

@@ -6,16 +6,14 @@ import pytest
 import torch
 from tiny_drive import write_tiny_dataset
 
+from semgrid_edu.datasets.excerpts import FRAMES, read_excerpt, write_excerpt
 from semgrid_edu.datasets.samples import (
-    FRAMES,
-    read_excerpt,
     sample_drive,
     sample_frames,
     sample_image_stage,
     sample_weights,
     samples_problems,
     trained_segmenters,
-    write_excerpt,
 )
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
@@ -52,7 +50,7 @@ def test_samples_are_checked_one_by_one(excerpt):
 
 
 @pytest.mark.parametrize("segmenter", trained_segmenters())
-def test_shipped_weights_are_whole_trainings(segmenter):
+def test_shipped_weights_come_from_whole_training_runs(segmenter):
     folder = sample_weights(segmenter).parent
     assert sample_image_stage(segmenter).parent == folder
     names = {"weights.safetensors", "image_stage.safetensors", "log.csv", "provenance.json"}

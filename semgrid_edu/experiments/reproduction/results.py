@@ -1,6 +1,5 @@
 """Results on disk: JSON with all that made them, Markdown with every deviation, and a picture (section 4)."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import matplotlib.pyplot as plt
 from semgrid_edu.experiments.reproduction.deviations import deviations, frame_counts
 from semgrid_edu.experiments.reproduction.experiments import Experiment
 from semgrid_edu.experiments.reproduction.plan import with_needs
-from semgrid_edu.experiments.reproduction.runs import ENDED, Run
+from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.experiments.reproduction.scales import Scale
 from semgrid_edu.storage.files import atomic_path, write_json, write_text
 from semgrid_edu.storage.provenance import versions
@@ -42,16 +41,19 @@ def write_result(name: str, experiment: Experiment, scale: Scale, seeds: int, ro
         The Markdown.
     """
     runs = with_needs(experiment.runs(scale, seeds))
+    records = [run.record(root) for run in runs]
+    processes = max(record.get("processes", 1) for record in records)
+    command = f"semgrid-edu reproduce {name} --scale {scale.name} --seeds {seeds} --runs RUNS --out OUT"
     made_by = {
         "experiment": name,
         "title": experiment.title,
-        "command": f"semgrid-edu reproduce {name} --scale {scale.name} --seeds {seeds} --runs RUNS --out OUT",
+        "command": command + (f" --processes {processes}" if processes > 1 else ""),
         "scale": scale.name,
         "seeds": seeds,
         "iterations": [scale.image_iterations, scale.grid_iterations],
         "frames and drives": frame_counts(getattr(scale, experiment.field)),
-        "deviations": deviations(scale, experiment.field),
-        "commits": sorted({str(record["commit"]) for record in records(runs, root)}),
+        "deviations": [*deviations(scale, experiment.field), *experiment.deviations],
+        "commits": sorted({str(record["commit"]) for record in records}),
         "versions": versions("numpy", "torch", "numba", "scipy"),
     }
     result = made_by | experiment.result(scale, seeds, root)
@@ -66,25 +68,8 @@ def write_result(name: str, experiment: Experiment, scale: Scale, seeds: int, ro
     return text
 
 
-def records(runs: Sequence[Run], root: Path) -> list[dict]:
-    """Return what runs recorded when they ended.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        Runs that have ended.
-    root : Path
-        The folder of all runs.
-
-    Returns
-    -------
-    list of dict
-    """
-    return [json.loads((run.folder(root) / ENDED).read_text(encoding="utf-8")) for run in runs]
-
-
 def times(runs: Sequence[Run], root: Path) -> dict:
-    """Return how long runs took, alone and by kind.
+    """Return how long runs took, together and each by itself.
 
     Parameters
     ----------
@@ -97,8 +82,13 @@ def times(runs: Sequence[Run], root: Path) -> dict:
     -------
     dict
         "hours" of all runs, one after the other; "minutes" of each run; the "dates" on which they ended.
+
+    Raises
+    ------
+    DataError
+        When a run hasn't ended, or what it recorded is damaged.
     """
-    ended = dict(zip((run.name for run in runs), records(runs, root), strict=True))
+    ended = {run.name: run.record(root) for run in runs}
     return {
         "hours": round(sum(record["seconds"] for record in ended.values()) / 3600, 2),
         "dates": sorted({record["date"] for record in ended.values()}),
@@ -124,6 +114,6 @@ def result_markdown(result: dict, experiment: Experiment) -> str:
     return (
         f"# {experiment.title}\n\nScale {result['scale']}, number of seeds: {result['seeds']}. Means over the seeds; "
         "in brackets 95 % intervals over drives and seeds. Per cent.\n\n"
-        f"{experiment.markdown(result)}\n\nOther than in the paper:\n\n{listed}\n\n"
+        f"{experiment.markdown(result)}\n\nWhat differs from the paper:\n\n{listed}\n\n"
         f"Made by `{result['command']}`, commit {', '.join(result['commits'])}.\n"
     )
