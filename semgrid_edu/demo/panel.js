@@ -8,6 +8,7 @@ const hover = document.getElementById("hover");
 const grids = [...document.querySelectorAll("svg[data-grid]")];
 const SVG = document.querySelector("svg").namespaceURI;
 const unpacked = new Map(); // number of a frame -> its reader, or the promise of it
+const decoded = new Map(); // pictures of the shown frame -> their colours, or the promise of them
 let anchor = null; // the cell that was chosen, and the frame in which it was
 let turn = 0; // counts tellings, so that a late one doesn't overwrite a newer one
 
@@ -100,7 +101,7 @@ function partStory(cell, read, label, rival) {
   return `<h3>Why ${escaped(story.names[label])} and not ${escaped(story.names[rival])}?</h3>
 <p>In the semantic grid ${swatch(label)} is about ${often} times as probable as ${swatch(rival)}: its fused score is higher by ${of.score.toFixed(1)}. Gradient times input splits this difference:</p>
 ${bars(["image, on the planes", "occupancy", "constants", "sum"], [image, occupancy, of.rest, of.score])}
-<p>The constants are biases and normalisations that the open ReLUs let pass: no input has a share in them. Image and occupancy count in all cells around that the network looks at. Below, each table has its own scale.</p>
+<p>The constants are biases and normalisations that the open ReLUs let pass: no input has a share in them. Image and occupancy count in all cells around that the network looks at. A part isn't what would change if its input were missing, and parts that cancel may be much larger than their sum. Below, each table has its own scale.</p>
 <div class="two"><div><h4>Image, by class of its scores</h4>${bars(byClass.map((i) => escaped(story.names[i])), byClass.map((i) => of.scores[i]))}<h4>Occupancy, by state</h4>${bars(states, of.occupancy)}</div>
 <div><h4>Image, by height of the plane</h4>${bars([...heights].reverse(), [...of.planes].reverse())}</div></div>`;
 }
@@ -166,7 +167,12 @@ function zoomGrids() {
 }
 
 // Errors: cells of a grid whose class isn't the truth's, painted red; the right ones fade. Read from the pictures themselves.
-async function colours(uri) {
+function colours(uri) {
+  if (!decoded.has(uri)) decoded.set(uri, decode(uri));
+  return decoded.get(uri);
+}
+
+async function decode(uri) {
   const image = new Image();
   image.src = uri;
   await image.decode();
@@ -185,13 +191,14 @@ async function paintErrors(k) {
     if (!on || !images.truth || !estimate) { layer.removeAttribute("href"); continue; }
     const [guess, truth] = [await colours(estimate), await colours(images.truth)];
     if (k !== shown()) return;
+    const painted = new ImageData(guess.width, guess.height);
     for (let i = 0; i < guess.data.length; i += 4) {
       const right = [0, 1, 2].every((j) => guess.data[i + j] === truth.data[i + j]);
-      guess.data.set(right ? [255, 255, 255, 200] : [215, 25, 28, 255], i);
+      painted.data.set(right ? [255, 255, 255, 200] : [215, 25, 28, 255], i);
     }
     const canvas = document.createElement("canvas");
     [canvas.width, canvas.height] = [guess.width, guess.height];
-    canvas.getContext("2d").putImageData(guess, 0, 0);
+    canvas.getContext("2d").putImageData(painted, 0, 0);
     layer.setAttribute("href", canvas.toDataURL());
   }
 }
@@ -244,7 +251,7 @@ zoom.addEventListener("change", () => (anchor === null ? zoomGrids() : tell(show
 errors.addEventListener("click", () => { errors.setAttribute("aria-pressed", String(errors.getAttribute("aria-pressed") !== "true")); paintErrors(shown()); });
 play.addEventListener("click", () => { if (timer === null) tell(shown()); });
 errors.hidden = !frames.some((frame) => frame.images.truth);
-watchers.push(tell, paintErrors);
+watchers.push(() => decoded.clear(), tell, paintErrors);
 // index.html#12/93/30 opens frame 12 and tells the story of row 93, column 30.
 function followCell() {
   const [, row, col] = location.hash.slice(1).split("/").map(Number);

@@ -21,6 +21,9 @@ class Contributions:
     approximation. The constant, `rest`, comes from the biases and from the shifts of the batch normalisations: it is
     what the network says whatever the input, as long as the same ReLUs are open.
 
+    A part isn't what would change if its input were missing: then other ReLUs would be open. Parts of opposite signs
+    can be much larger than the score that they sum to, and then say little about causes.
+
     Parameters
     ----------
     score : float
