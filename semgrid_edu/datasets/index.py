@@ -1,6 +1,5 @@
 """The index of a data set: its labelled frames, split into those for training and those for testing (section 4)."""
 
-import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +7,7 @@ from typing import Any, NamedTuple
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import LABEL_SETS, LabelSet
-from semgrid_edu.storage.reading import read_text
+from semgrid_edu.storage.reading import read_json
 
 INDEX_FILE = "dataset.json"
 
@@ -95,10 +94,7 @@ def load_index(dataset_dir: str | Path) -> DatasetIndex:
     """
     root = Path(dataset_dir)
     path = root / INDEX_FILE
-    try:
-        content = json.loads(read_text(path))
-    except json.JSONDecodeError as error:
-        raise DataError(path, "JSON", error) from error
+    content = read_json(path)
     name, label_set, splits = (_entry(path, content, key) for key in ("name", "label_set", "splits"))
     if not isinstance(label_set, str) or label_set not in LABEL_SETS:
         raise DataError(path, f"label_set: one of {', '.join(LABEL_SETS)}", repr(label_set))

@@ -1,6 +1,5 @@
 """Simulated data sets in place of those of section 4, and the sample drive: made in parallel, resumed after a stop."""
 
-import json
 from collections.abc import Iterator
 from concurrent.futures import as_completed
 from dataclasses import dataclass
@@ -26,7 +25,9 @@ from semgrid_edu.simulation.writer import (
     write_drive,
 )
 from semgrid_edu.storage.files import write_json
+from semgrid_edu.storage.locking import LOCK, sole_writer
 from semgrid_edu.storage.provenance import versions, write_provenance
+from semgrid_edu.storage.reading import read_json
 from semgrid_edu.storage.workplace import workplace
 
 FORMAT = 1
@@ -211,10 +212,7 @@ def _claim(root: Path, marker: dict) -> None:
     """Mark the folder as that of this data set, or refuse it when it holds something else."""
     path = root / "simulation.json"
     if path.exists():
-        try:
-            found = json.loads(path.read_text())
-        except ValueError as error:
-            raise DataError(path, f"data made with {marker}", f"no JSON: {error}") from error
+        found = read_json(path)
         if found != marker:
             raise DataError(path, f"data made with {marker}", f"{found}: choose another folder or remove this one")
     elif root.exists() and any(root.iterdir()):
