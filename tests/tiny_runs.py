@@ -1,11 +1,13 @@
-"""Runs of seconds: some that only write a file, and trainings on hand-made data. Processes import them from here."""
+"""Runs of seconds, which processes import: some that only write a file, and training runs on hand-made data."""
 
 import hashlib
 import json
+import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
+import torch
 from tiny_drive import DATE, write_tiny_drive
 
 from semgrid_edu.experiments.reproduction import data_runs
@@ -46,6 +48,23 @@ class Note(Run):
 
 
 @dataclass(frozen=True)
+class SharedNote(Note):
+    """A note that several processes write together, line by line until its time is over."""
+
+    is_training = True
+
+    def work(self, root: Path, device: str) -> None:
+        if self.fails_without and not (root / self.fails_without).exists():
+            raise RuntimeError(f"no {self.fails_without}")
+        rank, processes, end = os.environ["RANK"], os.environ["WORLD_SIZE"], time.monotonic() + self.seconds_each
+        with (self.folder(root) / f"lines-{rank}").open("a") as file:
+            while not file.tell() or time.monotonic() < end:
+                file.write(f"{rank} of {processes}, {torch.get_num_threads()} thread\n")
+                file.flush()
+                time.sleep(0.05)
+
+
+@dataclass(frozen=True)
 class HandMadeData(DataRun):
     """Six drives to learn from, two frames each, the last one labelled."""
 
@@ -62,7 +81,7 @@ class HandMadeData(DataRun):
         (folder / "dataset.json").write_text(json.dumps(index))
 
 
-def tiny_trainings(iterations: int = 2) -> list[GridStageRun]:
+def tiny_training_runs(iterations: int = 2) -> list[GridStageRun]:
     """Two networks that share an image stage."""
     arrays = ArraysRun(HandMadeData(), "train")
     image_stage = ImageStageRun(arrays, "segnet", seed=1, iterations=iterations)

@@ -1,6 +1,7 @@
 """What all readers of drives have in common: frames that are read when they are asked for, and labels in part."""
 
 import operator
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import overload
@@ -43,9 +44,9 @@ class FrameSequence(Sequence[Frame]):
         found = [error_of(partial(self._frame, k)) for k in range(len(self))]
         return [error for error in dict.fromkeys(found) if error]
 
+    @abstractmethod
     def _frame(self, k: int) -> Frame:
         """Read frame k, 0 <= k < len(self)."""
-        raise NotImplementedError
 
 
 def nothing_known(label_set: LabelSet, image_size: tuple[int, int]) -> FrameLabels:

@@ -1,6 +1,7 @@
 """Provenance: the command, seed and versions that made a result, and checksums that show whether it was changed."""
 
 import platform
+import subprocess
 from importlib.metadata import version
 from pathlib import Path
 
@@ -30,6 +31,25 @@ def versions(*packages: str) -> dict[str, str]:
     ['numpy', 'python', 'semgrid_edu']
     """
     return {"python": platform.python_version()} | {name: version(name) for name in ("semgrid_edu", *packages)}
+
+
+def commit() -> str | None:
+    """Return the commit of the package's source tree, with "+" after it when files were changed since.
+
+    Returns
+    -------
+    str or None
+        None when the package doesn't lie in a git checkout.
+    """
+    git = ["git", "-C", str(Path(__file__).parent)]
+    try:
+        head, changes = (
+            subprocess.run([*git, *command], capture_output=True, text=True, check=True).stdout.strip()
+            for command in (["rev-parse", "--short=12", "HEAD"], ["status", "--porcelain", "--untracked-files=no"])
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return head + ("+" if changes else "")
 
 
 def write_provenance(folder: str | Path, command: str, seed: int, packages: tuple[str, ...], **details: object) -> None:

@@ -8,13 +8,13 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from tiny_runs import HandMadeData, Note, results, tiny_trainings
+from tiny_runs import HandMadeData, Note, results, tiny_training_runs
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.experiments.reproduction.execute import execute_plan
 from semgrid_edu.experiments.reproduction.experiments import EXPERIMENTS
+from semgrid_edu.experiments.reproduction.one_run import check_runs_folder, claim_folder, run_one
 from semgrid_edu.experiments.reproduction.plan import estimate, plan_table, with_needs
-from semgrid_edu.experiments.reproduction.runs import check_runs_folder, claim_folder, run_one
 from semgrid_edu.experiments.reproduction.scales import SCALES, scale_named
 from semgrid_edu.networks import WEIGHTS
 from semgrid_edu.simulation.datasets import DatasetRecipe, Route, make_from_recipe
@@ -122,7 +122,7 @@ def test_an_unknown_scale_is_refused():
 def trained(tmp_path_factory):
     """Two tiny networks, trained without any interruption."""
     root = tmp_path_factory.mktemp("runs")
-    assert execute_plan(with_needs(tiny_trainings()), root, here(1)) == {}
+    assert execute_plan(with_needs(tiny_training_runs()), root, here(1)) == {}
     return root
 
 
@@ -136,13 +136,13 @@ def test_the_image_stage_is_trained_once_and_both_networks_start_from_it(trained
 SCRIPT = """
 import sys
 from pathlib import Path
-from tiny_runs import tiny_trainings
+from tiny_runs import tiny_training_runs
 from semgrid_edu.experiments.reproduction.execute import execute_plan
 from semgrid_edu.experiments.reproduction.plan import with_needs
 from semgrid_edu.storage.workplace import workplace
 if __name__ == "__main__":
     with workplace(1) as place:
-        assert execute_plan(with_needs(tiny_trainings()), Path(sys.argv[1]), place) == {}
+        assert execute_plan(with_needs(tiny_training_runs()), Path(sys.argv[1]), place) == {}
 """
 
 
@@ -153,14 +153,14 @@ def test_a_killed_plan_goes_on_with_the_same_bytes(trained, tmp_path):
     paths = os.pathsep.join([str(Path(__file__).parents[1]), *sys.path])
     command = [sys.executable, str(script), str(root)]
     process = subprocess.Popen(command, env=os.environ | {"PYTHONPATH": paths}, stderr=subprocess.DEVNULL)
-    second = tiny_trainings()[1]
+    second = tiny_training_runs()[1]
     wait_for(lambda: (second.folder(root) / "log.csv").exists())
     process.send_signal(signal.SIGKILL)
     process.wait()
     time.sleep(1)  # the worker notices within an instant that its parent is gone
     assert HandMadeData().has_ended(root)
     assert not second.has_ended(root)
-    assert execute_plan(with_needs(tiny_trainings()), root, here(1)) == {}
+    assert execute_plan(with_needs(tiny_training_runs()), root, here(1)) == {}
     assert results(root) == results(trained)
 
 
@@ -173,14 +173,14 @@ def cluster():
 
 
 def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(cluster, trained, tmp_path):
-    first = tiny_trainings()[0]
+    first = tiny_training_runs()[0]
     with (
         cluster.get_client() as client,
         ThreadPoolExecutor(1) as driver,
         workplace(scheduler=cluster.scheduler_address) as place,
     ):
         pids = client.run(os.getpid)
-        ended = driver.submit(execute_plan, with_needs(tiny_trainings()), tmp_path, place)
+        ended = driver.submit(execute_plan, with_needs(tiny_training_runs()), tmp_path, place)
         wait_for(lambda: (first.folder(tmp_path) / "log.csv").exists() or ended.done())
         busy = [address for address, tasks in client.processing().items() if tasks]
         os.kill(pids[busy[0]], signal.SIGKILL)

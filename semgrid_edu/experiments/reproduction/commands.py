@@ -43,11 +43,15 @@ def _command(experiment: str) -> Callable[..., None]:
             str | None, typer.Option(help="tcp://HOST:PORT of a dask.distributed cluster that does the runs.")
         ] = None,
         device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu, cuda or cuda:N.")] = "cpu",
+        processes: Annotated[
+            int,
+            typer.Option(min=1, help="Processes of each training run, started by torchrun; on cuda a GPU for each."),
+        ] = 1,
         plan: Annotated[bool, typer.Option("--plan", help="Only tell the runs and how long they will take.")] = False,
     ) -> None:
         from semgrid_edu.experiments.reproduction.reproduce import Request, reproduce
 
-        request = Request(experiment, scale, seeds, runs, out, workers, scheduler, device)
+        request = Request(experiment, scale, seeds, runs, out, workers, scheduler, device, processes)
         problems = reproduce(request, typer.echo, plan)
         if problems:
             typer.echo(problems, err=True)

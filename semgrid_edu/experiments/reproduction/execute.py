@@ -6,15 +6,18 @@ from pathlib import Path
 
 from tqdm.auto import tqdm
 
-from semgrid_edu.experiments.reproduction.runs import Run, run_one
+from semgrid_edu.experiments.reproduction.one_run import run_one
+from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.storage.workplace import Workplace
 
 
-def execute_plan(runs: Sequence[Run], root: str | Path, place: Workplace, device: str = "cpu") -> dict[Run, str]:
+def execute_plan(
+    runs: Sequence[Run], root: str | Path, place: Workplace, device: str = "cpu", processes: int = 1
+) -> dict[Run, str]:
     """Do all runs that haven't ended.
 
     A run that fails stops only those that need it. The command can be killed at any time: what has ended stays, and a
-    training goes on from its checkpoint when the same command is given again.
+    training run goes on from its checkpoint when the same command is given again.
 
     Parameters
     ----------
@@ -25,7 +28,9 @@ def execute_plan(runs: Sequence[Run], root: str | Path, place: Workplace, device
     place : Workplace
         What does the work.
     device : str
-        The device of the trainings, see `choose_device`.
+        The device of the training runs, see `choose_device`.
+    processes : int
+        In how many processes each training run is done, see `work_together`.
 
     Returns
     -------
@@ -39,7 +44,7 @@ def execute_plan(runs: Sequence[Run], root: str | Path, place: Workplace, device
         while waiting or under_way:
             for run in _ready(waiting, under_way, failed, place.slots() - len(under_way)):
                 waiting.remove(run)
-                under_way[_begin(run, root, place, device)] = run
+                under_way[_begin(place, run, str(root), device, processes)] = run
             bar.set_postfix_str(", ".join(run.name for run in under_way.values()))
             ended, _ = wait(under_way, return_when=FIRST_COMPLETED)
             for future in ended:
@@ -54,10 +59,10 @@ def execute_plan(runs: Sequence[Run], root: str | Path, place: Workplace, device
     return failed
 
 
-def _begin(run: Run, root: str | Path, place: Workplace, device: str) -> Future:
-    """Hand a run to the workplace; when that has broken down, the future says so."""
+def _begin(place: Workplace, *arguments: object) -> Future:
+    """Hand a run to the workplace, with all that `run_one` takes; when that has broken down, the future says so."""
     try:
-        return place.executor.submit(run_one, run, str(root), device)
+        return place.executor.submit(run_one, *arguments)
     except BrokenExecutor as error:
         future: Future = Future()
         future.set_exception(error)

@@ -86,7 +86,7 @@ def estimate(runs: list[Run], root: str | Path) -> TimeEstimate:
     paces: dict[str, list[float]] = {}
     for run in runs:
         if run.has_ended(root):
-            paces.setdefault(run.pace, []).append(run.seconds(root) / run.steps)
+            paces.setdefault(run.pace, []).append(run.record(root)["seconds"] / run.steps)
     known = {pace: sum(times) / len(times) for pace, times in paces.items()}
     left = [run for run in runs if not run.has_ended(root)]
     measured = sum(run.pace in known for run in left)

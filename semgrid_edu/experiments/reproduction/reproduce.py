@@ -6,9 +6,10 @@ from pathlib import Path
 
 from semgrid_edu.experiments.reproduction.execute import execute_plan
 from semgrid_edu.experiments.reproduction.experiments import EXPERIMENTS, Experiment
+from semgrid_edu.experiments.reproduction.one_run import check_runs_folder
 from semgrid_edu.experiments.reproduction.plan import estimate, plan_table, with_needs
 from semgrid_edu.experiments.reproduction.results import write_result
-from semgrid_edu.experiments.reproduction.runs import OUTPUT, Run, check_runs_folder
+from semgrid_edu.experiments.reproduction.runs import OUTPUT, Run
 from semgrid_edu.experiments.reproduction.scales import Scale, scale_named
 from semgrid_edu.storage.workplace import usable_cores, workplace
 
@@ -34,7 +35,9 @@ class Request:
     scheduler : str or None
         Address of a cluster that does the runs; None for processes of this machine.
     device : str
-        The device of the trainings, see `choose_device`.
+        The device of the training runs, see `choose_device`.
+    processes : int
+        In how many processes each training run is done, see `work_together`.
     """
 
     experiment: str
@@ -45,6 +48,7 @@ class Request:
     workers: int | None = None
     scheduler: str | None = None
     device: str = "cpu"
+    processes: int = 1
 
     @property
     def chosen(self) -> dict[str, Experiment]:
@@ -92,7 +96,7 @@ def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = F
     if plan_only:
         return ""
     with workplace(request.workers, request.scheduler) as place:
-        failed = execute_plan(plan, root, place, request.device)
+        failed = execute_plan(plan, root, place, request.device, request.processes)
     scale: Scale = scale_named(request.scale)
     for name, experiment in request.chosen.items():
         seeds = request.seeds_of(experiment)

@@ -1,6 +1,5 @@
 """Results on disk: JSON with all that made them, Markdown with every deviation, and a picture (section 4)."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import matplotlib.pyplot as plt
 from semgrid_edu.experiments.reproduction.deviations import deviations, frame_counts
 from semgrid_edu.experiments.reproduction.experiments import Experiment
 from semgrid_edu.experiments.reproduction.plan import with_needs
-from semgrid_edu.experiments.reproduction.runs import ENDED, Run
+from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.experiments.reproduction.scales import Scale
 from semgrid_edu.storage.files import atomic_path, write_json, write_text
 from semgrid_edu.storage.provenance import versions
@@ -51,7 +50,7 @@ def write_result(name: str, experiment: Experiment, scale: Scale, seeds: int, ro
         "iterations": [scale.image_iterations, scale.grid_iterations],
         "frames and drives": frame_counts(getattr(scale, experiment.field)),
         "deviations": deviations(scale, experiment.field),
-        "commits": sorted({str(record["commit"]) for record in records(runs, root)}),
+        "commits": sorted({str(run.record(root)["commit"]) for run in runs}),
         "versions": versions("numpy", "torch", "numba", "scipy"),
     }
     result = made_by | experiment.result(scale, seeds, root)
@@ -66,25 +65,8 @@ def write_result(name: str, experiment: Experiment, scale: Scale, seeds: int, ro
     return text
 
 
-def records(runs: Sequence[Run], root: Path) -> list[dict]:
-    """Return what runs recorded when they ended.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        Runs that have ended.
-    root : Path
-        The folder of all runs.
-
-    Returns
-    -------
-    list of dict
-    """
-    return [json.loads((run.folder(root) / ENDED).read_text(encoding="utf-8")) for run in runs]
-
-
 def times(runs: Sequence[Run], root: Path) -> dict:
-    """Return how long runs took, alone and by kind.
+    """Return how long runs took, together and each by itself.
 
     Parameters
     ----------
@@ -98,7 +80,7 @@ def times(runs: Sequence[Run], root: Path) -> dict:
     dict
         "hours" of all runs, one after the other; "minutes" of each run; the "dates" on which they ended.
     """
-    ended = dict(zip((run.name for run in runs), records(runs, root), strict=True))
+    ended = {run.name: run.record(root) for run in runs}
     return {
         "hours": round(sum(record["seconds"] for record in ended.values()) / 3600, 2),
         "dates": sorted({record["date"] for record in ended.values()}),

@@ -62,6 +62,11 @@ class ImageStageRun(Run):
         return (self.arrays,)
 
     @property
+    def is_training(self) -> bool:
+        """It is."""
+        return True
+
+    @property
     def steps(self) -> int:
         """Number of training steps."""
         return self.iterations
@@ -141,6 +146,11 @@ class GridStageRun(Run):
     def needs(self) -> tuple[Run, ...]:
         """The image network and the arrays."""
         return self.image_stage, self.arrays
+
+    @property
+    def is_training(self) -> bool:
+        """It is."""
+        return True
 
     @property
     def steps(self) -> int:

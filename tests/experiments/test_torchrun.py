@@ -1,0 +1,83 @@
+"""Runs whose work several processes share, started by torchrun."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from tiny_runs import Note, SharedNote, results, tiny_training_runs
+
+from semgrid_edu.experiments.reproduction.one_run import run_one
+from semgrid_edu.experiments.reproduction.runs import OUTPUT
+from semgrid_edu.training.log import LOG, read_log
+
+SCRIPT = """
+import sys
+from tiny_runs import SharedNote
+from semgrid_edu.experiments.reproduction.one_run import run_one
+run_one(SharedNote("long", seconds_each=600.0), sys.argv[1], processes=2)
+"""
+
+
+@pytest.fixture(autouse=True)
+def _found_by_processes(monkeypatch):
+    """What this process finds, its processes find too."""
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(Path(__file__).parents[1]), *sys.path]))
+
+
+def test_two_processes_train_as_one_does(tmp_path):
+    """Half the batch in each is the same step but for rounding, and the folder holds the same files."""
+    run, one, two = tiny_training_runs()[0].image_stage, tmp_path / "one", tmp_path / "two"
+    for needed in (run.arrays.data, run.arrays, run):
+        assert run_one(needed, one).error is None
+    shutil.copytree(one, two, ignore=shutil.ignore_patterns("image-*"))
+    assert run_one(run, two, processes=2).error is None
+    assert run.record(two)["processes"] == 2
+    assert "processes" not in run.record(one)
+    assert results(two).keys() == results(one).keys()
+    losses = [read_log(run.folder(root) / LOG).loss for root in (one, two)]
+    assert losses[1] == pytest.approx(losses[0], rel=1e-3)
+
+
+def test_an_error_in_a_process_is_that_of_the_run(tmp_path):
+    run = SharedNote("weak", fails_without="help")
+    assert "status 1" in run_one(run, tmp_path, processes=2).error
+    assert "RuntimeError: no help" in (run.folder(tmp_path) / OUTPUT).read_text()
+    assert not run.has_ended(tmp_path)
+
+
+def test_processes_end_with_the_one_that_started_them(tmp_path):
+    script, root = tmp_path / "script.py", tmp_path / "runs"
+    script.write_text(SCRIPT)
+    process = subprocess.Popen([sys.executable, str(script), str(root)])
+    lines = [SharedNote("long").folder(root) / f"lines-{rank}" for rank in range(2)]
+    wait_for(lambda: all(path.exists() and path.stat().st_size for path in lines))
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    wait_for(lambda: all(stays(path) for path in lines))
+    assert [path.read_text().splitlines()[0] for path in lines] == [f"{rank} of 2, 1 thread" for rank in range(2)]
+
+
+def test_other_runs_take_one_process(tmp_path):
+    run = Note("a")
+    assert run_one(run, tmp_path, processes=2).error is None
+    assert "processes" not in run.record(tmp_path)
+
+
+def stays(path, seconds=1.0):
+    """Whether nothing is written to a file for a second, in which its processes would write twenty lines."""
+    before = path.stat().st_size
+    time.sleep(seconds)
+    return path.stat().st_size == before
+
+
+def wait_for(condition, seconds=120):
+    """Wait until a condition holds; a hang fails."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.05)
