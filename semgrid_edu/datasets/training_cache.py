@@ -104,7 +104,9 @@ def _key(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> str:
     calibration = [path for date in {date for date, _ in drives} for path in (index.root / date).glob("*.txt")]
     parts = [repr(recipe), *map(sha256, [index.root / INDEX_FILE, *code, *sorted(calibration)])]
     for date, drive in drives:
-        files = {file.relative_to(index.root): file.stat() for file in drive_folder(index.root, date, drive).rglob("*.*")}
+        files = {
+            file.relative_to(index.root): file.stat() for file in drive_folder(index.root, date, drive).rglob("*.*")
+        }
         parts += sorted(f"{name} {found.st_size} {found.st_mtime_ns}" for name, found in files.items())
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 

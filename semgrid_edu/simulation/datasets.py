@@ -17,6 +17,7 @@ from semgrid_edu.simulation.drive import SimulatedDrive
 from semgrid_edu.simulation.sensors.rig import Rig
 from semgrid_edu.simulation.street.plan import ANY, Wishes
 from semgrid_edu.simulation.street.sample_street import SAMPLE_WISHES
+from semgrid_edu.simulation.whole_drives import check_complete, remove_unfinished
 from semgrid_edu.simulation.writer import (
     DATE,
     depth_as_points,
@@ -152,7 +153,8 @@ def make_dataset(name: str, folder: Path, seed: int = 0, workers: int = 2, sched
     ArgumentError
         When there is no such data set, the seed is negative or there is no worker.
     DataError
-        When the folder holds something else, or the same with another seed or an older version.
+        When the folder holds something else, the same with another seed or an older version, or a drive that lacks
+        files; or when another process writes to it.
     """
     if name not in RECIPES:
         raise ArgumentError("name", f"one of {', '.join(RECIPES)}", repr(name))
@@ -187,24 +189,29 @@ def make_from_recipe(
     ArgumentError
         When the seed is negative or there is no worker.
     DataError
-        When the folder holds something else, or the same with another seed or an older version.
+        When the folder holds something else, the same with another seed or an older version, or a drive that lacks
+        files; or when another process writes to it.
     """
     if seed < 0:
         raise ArgumentError("seed", "a whole number from 0 up", seed)
     if workers < 1:
         raise ArgumentError("workers", "at least one process", workers)
     root = Path(folder).resolve() / recipe.name  # absolute: the machines of a cluster work in other folders
-    _claim(root, {"name": recipe.name, "seed": seed, "format": FORMAT})
-    write_calibration(root, Rig())
-    drives = [f"{k + 1:04d}" for k in range(len(recipe.routes))]
-    missing = [k for k, drive in enumerate(drives) if not drive_folder(root, DATE, drive).exists()]
-    missing.sort(key=lambda k: -recipe.routes[k].n_frames)
-    with tqdm(total=len(drives), initial=len(drives) - len(missing), desc=recipe.name, unit="drive") as bar:
-        for _ in _run(partial(_make_drive, recipe, root, seed), missing, workers, scheduler):
-            bar.update()
-    index = _index(recipe, drives, seed)
-    write_json(root / INDEX_FILE, index)
-    write_provenance(root, index["command"], seed, PACKAGES)
+    with sole_writer(root):
+        _claim(root, {"name": recipe.name, "seed": seed, "format": FORMAT})
+        write_calibration(root, Rig())
+        remove_unfinished(root / DATE)
+        drives = [f"{k + 1:04d}" for k in range(len(recipe.routes))]
+        missing = [k for k, drive in enumerate(drives) if not drive_folder(root, DATE, drive).exists()]
+        missing.sort(key=lambda k: -recipe.routes[k].n_frames)
+        with tqdm(total=len(drives), initial=len(drives) - len(missing), desc=recipe.name, unit="drive") as bar:
+            for _ in _run(partial(_make_drive, recipe, root, seed), missing, workers, scheduler):
+                bar.update()
+        for drive, route in zip(drives, recipe.routes, strict=True):
+            check_complete(drive_folder(root, DATE, drive), route.n_frames, route.labelled)
+        index = _index(recipe, drives, seed)
+        write_json(root / INDEX_FILE, index)
+        write_provenance(root, index["command"], seed, PACKAGES)
     return root
 
 
@@ -215,7 +222,7 @@ def _claim(root: Path, marker: dict) -> None:
         found = read_json(path)
         if found != marker:
             raise DataError(path, f"data made with {marker}", f"{found}: choose another folder or remove this one")
-    elif root.exists() and any(root.iterdir()):
+    elif {path.name for path in root.iterdir()} - {LOCK}:
         raise DataError(root, "an empty folder, or one that an earlier run began", "other files")
     else:
         write_json(path, marker)

@@ -11,6 +11,9 @@ from semgrid_edu.errors import DataError
 LOCK = ".lock"
 """Name of the file that is locked. It is empty, and stays when the lock is given free."""
 
+PATIENCE = 1.0
+"""Seconds to wait for a lock: when a command is killed, the processes that it had started end a moment later."""
+
 
 @contextmanager
 def sole_writer(folder: str | Path) -> Iterator[None]:
@@ -41,7 +44,7 @@ def sole_writer(folder: str | Path) -> Iterator[None]:
     folder.mkdir(parents=True, exist_ok=True)
     lock = FileLock(folder / LOCK)
     try:
-        lock.acquire(timeout=0)
+        lock.acquire(timeout=PATIENCE)
     except Timeout:
         raise DataError(folder, "a folder that no other process writes to", f"{LOCK} locked by another one") from None
     try:

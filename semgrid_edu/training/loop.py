@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, save_net
 from semgrid_edu.occupancy import N_STATES
+from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.training.allocator import keep_freed_memory
 from semgrid_edu.training.batches import draw_batch, share_of_batch
 from semgrid_edu.training.checkpoint import load_checkpoint, save_checkpoint
@@ -78,12 +79,27 @@ def train(
         When the network has no architecture, the data don't fit the network, the checkpoint belongs to another run, or
         the loss isn't finite.
     DataError
-        When there is no checkpoint to resume from or it is damaged; or when the folder holds a checkpoint or a trained
-        network that a new run would overwrite.
+        When there is no checkpoint to resume from or it is damaged; when the folder holds a checkpoint or a trained
+        network that a new run would overwrite; or when another process trains in it.
     """
     params, folder, device = params or TrainingParams(), Path(folder), torch.device(device)
     check_folder(folder, resume)
     _check_dataset(net, dataset, params)
+    with sole_writer(folder) if rank() == 0 else nullcontext():
+        check_folder(folder, resume)  # once more: until now another process could write to it
+        _train(net, dataset, folder, params, seed, resume, device)
+
+
+def _train(
+    net: SemanticGridNet,
+    dataset: Sequence[Sample],
+    folder: Path,
+    params: TrainingParams,
+    seed: int,
+    resume: bool,
+    device: torch.device,
+) -> None:
+    """Do what `train` says, in a folder that no other process writes to."""
     stages = [stage for stage, n in (("image", params.image_iterations), ("grid", params.grid_iterations)) if n]
     alpha = {stage: class_weights(dataset, stage, net.n_classes, params.weight_limit) for stage in stages}
     optimiser = torch.optim.SGD(net.to(device).parameters(), lr=params.learning_rate, momentum=params.momentum)

@@ -130,7 +130,7 @@ def test_somebody_elses_folder_is_refused(alone, tmp_path):
         make_from_recipe(TINY, tmp_path, seed=5, workers=1)
     assert (tmp_path / "tiny" / "thesis.txt").read_text() == "precious"
     (tmp_path / "tiny" / "simulation.json").write_text("{")
-    with pytest.raises(DataError, match=r"simulation\.json: expected data made with .+, found no JSON"):
+    with pytest.raises(DataError, match=r"simulation\.json: expected a JSON object, found no JSON"):
         make_from_recipe(TINY, tmp_path, seed=5, workers=1)
 
 

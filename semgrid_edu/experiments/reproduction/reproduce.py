@@ -11,6 +11,7 @@ from semgrid_edu.experiments.reproduction.plan import estimate, plan_table, with
 from semgrid_edu.experiments.reproduction.results import write_result
 from semgrid_edu.experiments.reproduction.runs import OUTPUT, Run
 from semgrid_edu.experiments.reproduction.scales import Scale, scale_named
+from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.storage.workplace import usable_cores, workplace
 
 
@@ -95,7 +96,7 @@ def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = F
     echo(f"{plan_table(plan, estimated)}\n\n{told}" + (" on this machine" if request.scheduler else ""))
     if plan_only:
         return ""
-    with workplace(request.workers, request.scheduler) as place:
+    with sole_writer(root), workplace(request.workers, request.scheduler) as place:
         failed = execute_plan(plan, root, place, request.device, request.processes)
     scale: Scale = scale_named(request.scale)
     for name, experiment in request.chosen.items():
