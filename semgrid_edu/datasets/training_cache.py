@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
 import semgrid_edu
+from semgrid_edu.datasets.dataset_doubts import check_label_sets
 from semgrid_edu.datasets.index import INDEX_FILE, DatasetIndex
 from semgrid_edu.datasets.kitti_raw import KittiRawDrive, drive_folder
 from semgrid_edu.datasets.resizing import resize_image, resize_labels
@@ -90,6 +91,7 @@ def cached_arrays(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> dict[
     DataError
         When the data set, or what was kept, is damaged.
     """
+    check_label_sets(index, split)
     folder = index.root / "cache" / _key(index, split, recipe) / split
     if not folder.exists():
         _write_arrays(_pack(_process(index, split, recipe)), recipe, folder)
@@ -185,6 +187,8 @@ def _map_arrays(folder: Path) -> dict[str, NDArray]:
     arrays = {}
     for name, described in manifest.items():
         path = folder / f"{name}.npy"
+        if not path.is_file():
+            raise DataError(path, "an array (delete the folder to make it anew)", "no such file")
         try:
             arrays[name] = np.load(path, mmap_mode="r", allow_pickle=False)
         except (OSError, ValueError, EOFError) as error:

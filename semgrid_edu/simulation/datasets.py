@@ -29,7 +29,7 @@ from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.locking import LOCK, sole_writer
 from semgrid_edu.storage.provenance import versions, write_provenance
 from semgrid_edu.storage.reading import read_json
-from semgrid_edu.storage.workplace import workplace
+from semgrid_edu.storage.workplace import check_workers, workplace
 
 FORMAT = 1
 """Raised whenever the simulator changes what a seed gives, so that old and new drives don't mix in one folder."""
@@ -151,7 +151,7 @@ def make_dataset(name: str, folder: Path, seed: int = 0, workers: int = 2, sched
     Raises
     ------
     ArgumentError
-        When there is no such data set, the seed is negative or there is no worker.
+        When there is no such data set, the seed is negative, or there are no workers or too many.
     DataError
         When the folder holds something else, the same with another seed or an older version, or a drive that lacks
         files; or when another process writes to it.
@@ -187,15 +187,14 @@ def make_from_recipe(
     Raises
     ------
     ArgumentError
-        When the seed is negative or there is no worker.
+        When the seed is negative, or there are no workers or too many.
     DataError
         When the folder holds something else, the same with another seed or an older version, or a drive that lacks
         files; or when another process writes to it.
     """
     if seed < 0:
         raise ArgumentError("seed", "a whole number from 0 up", seed)
-    if workers < 1:
-        raise ArgumentError("workers", "at least one process", workers)
+    check_workers(workers)
     root = Path(folder).resolve() / recipe.name  # absolute: the machines of a cluster work in other folders
     with sole_writer(root):
         _claim(root, {"name": recipe.name, "seed": seed, "format": FORMAT})

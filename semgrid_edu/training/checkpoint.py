@@ -8,6 +8,7 @@ from torch.optim import SGD
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.networks.weights import check_tensors
+from semgrid_edu.storage.reading import parse_json
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
 
 
@@ -63,8 +64,7 @@ def load_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimise
     """
     header, tensors = read_tensors(path)
     try:
-        found, iteration = json.loads(header["run"]), int(header["iteration"])
-        found = dict(found)
+        found, iteration = parse_json(path, header["run"]), int(header["iteration"])
     except (KeyError, TypeError, ValueError) as error:
         raise DataError(path, "a checkpoint of a training run", error) from error
     _check_run(path, found, json.loads(json.dumps(run)))
