@@ -2,8 +2,9 @@
 
 import os
 import re
-import sys
 from collections.abc import Iterable, Sequence
+
+import typer
 
 from semgrid_edu.errors import ArgumentError
 
@@ -54,6 +55,6 @@ def tell(doubts: Iterable[str]) -> None:
     """
     doubts = list(doubts) if int(os.environ.get("RANK", 0)) == 0 else []
     for doubt in doubts[:TOLD]:
-        print(f"semgrid-edu: doubtful: {doubt}", file=sys.stderr)
+        typer.echo(f"semgrid-edu: doubtful: {doubt}", err=True)
     if len(doubts) > TOLD:
-        print(f"semgrid-edu: doubtful: {len(doubts) - TOLD} things more", file=sys.stderr)
+        typer.echo(f"semgrid-edu: doubtful: {len(doubts) - TOLD} things more", err=True)

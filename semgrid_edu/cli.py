@@ -250,7 +250,7 @@ def run() -> None:
     try:
         check_arguments(sys.argv[1:])
         if told := keep_compiled_functions():
-            print(f"semgrid-edu: {told}", file=sys.stderr)
+            typer.echo(f"semgrid-edu: {told}", err=True)
         app()
     except (ArgumentError, DataError) as error:
         sys.exit(f"semgrid-edu: {error}")

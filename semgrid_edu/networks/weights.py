@@ -100,11 +100,11 @@ def weights_doubts(path: str | Path) -> list[str]:
         When the file is missing or damaged, or holds a network of the image stage, whose fusion hasn't learnt yet.
     """
     _, tensors = read_tensors(path)
-    steps = {name: int(found.max()) for name, found in tensors.items() if name.endswith("num_batches_tracked")}
-    fusion = max((found for name, found in steps.items() if name.startswith("fusion.")), default=1)
-    if fusion == 0 and any(steps.values()):
+    learns = {name: bool((steps > 0).any()) for name, steps in tensors.items() if name.endswith("num_batches_tracked")}
+    fusion = [has_learnt for name, has_learnt in learns.items() if name.startswith("fusion.")]
+    if fusion and not any(fusion) and any(learns.values()):
         raise DataError(path, f"a whole network, such as {WEIGHTS}", "one of the image stage: its fusion hasn't learnt")
-    doubts = [] if fusion else [DataError(path, "a network that has learnt", "one that hasn't made a step")]
+    doubts = [] if any(fusion) else [DataError(path, "a network that has learnt", "one that hasn't made a step")]
     learnt = [found for name, found in tensors.items() if found.is_floating_point() and found.ndim > 1]
     if learnt and all(bool((found == found.round()).all()) for found in learnt):
         doubts.append(DataError(path, "weights like 0.137", "whole numbers alone: were they rounded?"))
