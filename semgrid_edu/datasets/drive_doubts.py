@@ -42,7 +42,7 @@ def short_scans(paths: Iterable[Path]) -> list[str]:
     tiny = [
         DataError(path, f"a scan of at least {FEWEST_RETURNS} points", size // RETURN)
         for path, size in sizes.items()
-        if 0 < size < least
+        if 0 < size < least and size % RETURN == 0  # else the reader names it
     ]
     return [str(error) for error in (*tiny, *short)]
 

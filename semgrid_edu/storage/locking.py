@@ -1,7 +1,7 @@
 """One writer at a time: a lock on a folder, which the system gives free when its process ends, however it ends."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -9,7 +9,7 @@ from filelock import FileLock, Timeout
 from semgrid_edu.errors import DataError
 
 LOCK = ".lock"
-"""Name of the file that is locked. It is empty, and stays when the lock is given free."""
+"""Name of the file that is locked. It is empty, and only a kill leaves it, which doesn't matter."""
 
 PATIENCE = 1.0
 """Seconds to wait for a lock: when a command is killed, the processes that it had started end a moment later."""
@@ -50,4 +50,6 @@ def sole_writer(folder: str | Path) -> Iterator[None]:
     try:
         yield
     finally:
-        lock.release()
+        with suppress(OSError):  # Windows keeps files that are open
+            (folder / LOCK).unlink()
+        lock.release()  # only now: `filelock` refuses a file that was removed while it waited

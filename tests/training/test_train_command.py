@@ -79,7 +79,7 @@ def test_the_command_leaves_weights_log_and_provenance(monkeypatch, tmp_path):
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0, result.output
     names = {"weights.safetensors", "image_stage.safetensors", "log.csv", "provenance.json"}
-    assert {path.name for path in out.iterdir()} == names | {".lock"}
+    assert {path.name for path in out.iterdir()} == names
     assert not provenance_problems(out)
     provenance = json.loads((out / "provenance.json").read_text())
     options = "--data minikitti --out compact --segmenter fcn --seed 3 --iterations 1"

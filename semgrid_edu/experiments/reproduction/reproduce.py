@@ -12,7 +12,7 @@ from semgrid_edu.experiments.reproduction.results import write_result
 from semgrid_edu.experiments.reproduction.runs import OUTPUT, Run
 from semgrid_edu.experiments.reproduction.scales import Scale, scale_named
 from semgrid_edu.storage.locking import sole_writer
-from semgrid_edu.storage.workplace import usable_cores, workplace
+from semgrid_edu.storage.workplace import check_workers, usable_cores, workplace
 
 
 @dataclass(frozen=True)
@@ -89,6 +89,7 @@ def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = F
     str
         What went wrong, one line per run; empty when all went well.
     """
+    check_workers(request.workers or 1)
     root, plan = check_runs_folder(request.runs), request.plan()
     estimated = estimate(plan, root)
     hours = estimated.hours(request.workers or usable_cores())
