@@ -16,21 +16,11 @@ def test_what_was_written_is_read(tmp_path):
         assert read_json(tmp_path / "a.json", kind) == content
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"",
-        b"{",
-        b"[1]",
-        b"3",
-        b"null",
-        b'"a"',
-        b"\xff\xfe{}",
-        b"[" * 10**5,
-        b'{"a":' * 10**5,
-        b'{"a": ' + b"9" * 5000 + b"}",
-    ],
-)
+DEEP = b"[" * 10**5, b'{"a":' * 10**5
+LONG = b'{"a": ' + b"9" * 5000 + b"}"
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"[1]", b"3", b"null", b'"a"', b"\xff\xfe{}", LONG, *DEEP])
 def test_anything_but_an_object_is_refused(tmp_path, content):
     (tmp_path / "a.json").write_bytes(content)
     with pytest.raises(DataError, match=r"a\.json: expected") as caught:
