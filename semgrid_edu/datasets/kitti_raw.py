@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import cached_property, partial
 from pathlib import Path
 
@@ -134,11 +135,12 @@ class KittiRawDrive(FrameSequence):
             One line for each scan that was probably cut short, and for each pose that no car can have got to since the
             one before; it names the file.
         """
-        names = {k: self._file("oxts", k, ".txt") for k in range(len(self))}
-        known = {k: path for k, path in names.items() if not error_of(partial(read_packet, path))}
-        packets = {path: read_packet(path) for path in known.values()}
-        scans = [self._file("velodyne_points", k, ".bin") for k in range(len(self))]
-        return [*short_scans(scans), *jumps(packets, self._seconds("oxts")[list(known)])]
+        scans, packets, known = [self._file("velodyne_points", k, ".bin") for k in range(len(self))], {}, []
+        for k in range(len(self)):
+            with suppress(DataError):  # what can't be read is an error of the frame, and no doubt
+                packets[self._file("oxts", k, ".txt")] = read_packet(self._file("oxts", k, ".txt"))
+                known.append(k)
+        return [*short_scans(scans), *jumps(packets, self._seconds("oxts")[np.array(known, int)])]
 
     def _readers(self) -> Iterator[Callable[[], object]]:
         """Yield a reader for each file, so that no damaged file hides another."""
