@@ -16,7 +16,7 @@ TOLD = 20
 
 
 def check_arguments(arguments: Sequence[str]) -> None:
-    """Refuse arguments that are empty, as those of unset variables are, and numbers that are too large.
+    """Refuse arguments that are empty, as those of unset variables are, aren't UTF-8, or are too large numbers.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def check_arguments(arguments: Sequence[str]) -> None:
     Raises
     ------
     ArgumentError
-        When an argument is empty, or is a whole number of more than 63 bits.
+        When an argument is empty, isn't UTF-8, or is a whole number of more than 63 bits.
 
     Examples
     --------
@@ -40,6 +40,10 @@ def check_arguments(arguments: Sequence[str]) -> None:
         name = option or (before if before.startswith("--") else f"argument {number + 1}")
         if not value.strip() and (equals or not option):
             raise ArgumentError(name, "a value", "nothing: is a variable unset?")
+        try:
+            value.encode()
+        except UnicodeEncodeError:
+            raise ArgumentError(name, "UTF-8, in which results write names down", ascii(value)) from None
         digits = re.fullmatch(r"[+-]?0*(\d*)", value)
         if digits and (len(digits[1]) > 19 or int(digits[1] or 0) > LARGEST):
             raise ArgumentError(name, f"a whole number up to {LARGEST}", value[:60])
@@ -53,7 +57,7 @@ def tell(doubts: Iterable[str]) -> None:
     doubts : iterable of str
         What `KittiRawDrive.doubts`, `dataset_doubts` or `weights_doubts` return.
     """
-    doubts = list(doubts) if int(os.environ.get("RANK", 0)) == 0 else []
+    doubts = list(doubts) if os.environ.get("RANK", "0") == "0" else []
     for doubt in doubts[:TOLD]:
         typer.echo(f"semgrid-edu: doubtful: {doubt}", err=True)
     if len(doubts) > TOLD:

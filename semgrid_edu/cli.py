@@ -217,6 +217,9 @@ def evaluate(
     from semgrid_edu.experiments.evaluate import evaluate, scores_table
     from semgrid_edu.networks.weights import weights_doubts
 
+    if confusions and confusions.suffix != ".npz":
+        raise ArgumentError("--confusions", "a file that ends in .npz", confusions)
+
     def scored() -> dict:
         tell(dataset_doubts(data, "train", "test") + weights_doubts(weights))
         return evaluate(data, weights, confusions_file=confusions)
@@ -253,6 +256,10 @@ def run() -> None:
             typer.echo(f"semgrid-edu: {told}", err=True)
         app()
     except (ArgumentError, DataError) as error:
+        sys.exit(f"semgrid-edu: {error}")
+    except RuntimeError as error:
+        if "Symlink loop" not in str(error):
+            raise
         sys.exit(f"semgrid-edu: {error}")
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""

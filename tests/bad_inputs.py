@@ -19,6 +19,7 @@ from PIL import Image
 from safetensors.torch import load_file, save_file
 from tiny_drive import DATE
 
+from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.storage.provenance import write_provenance
 from semgrid_edu.training.log import LOG, Step, append_step, begin_log
 
@@ -36,6 +37,7 @@ EVALUATE = "evaluate --data TINY --weights weights.safetensors --out scores.json
 TRAIN_CRF = "train-crf --data TINY --weights weights.safetensors --out OUT --split train"
 SEARCH = "search-crf --data TINY --test TINY --weights weights.safetensors --out log.json"
 LEARNED = "reproduce learned-crf --data TINY --validation TINY --weights weights.safetensors --runs RUNS --out log.json"
+FETCH = "data fetch kitti --drive 2011_09_26_0013 --folder OUT"
 TABLE1 = "reproduce table1 --runs RUNS --out OUT --plan"
 
 Spoil = Callable[[Path], object]
@@ -173,6 +175,27 @@ def log(*steps: Step) -> Spoil:
     return spoil
 
 
+def checkpoint(described: dict[str, str]) -> Spoil:
+    return lambda root: (
+        (root / "OUT").mkdir() or save_file({"a": torch.zeros(1)}, root / "OUT" / "checkpoint.safetensors", described)
+    )
+
+
+def locked(name: str) -> Spoil:
+    """Lock a folder until the table's `HELD` is emptied."""
+
+    def spoil(root: Path) -> None:
+        held = sole_writer(root / name)
+        held.__enter__()
+        HELD.append(held)
+
+    return spoil
+
+
+HELD: list = []
+"""Locks of the row that is tried."""
+
+
 def sample(root: Path) -> None:
     text("SAMPLES/one/file.txt", "as it was")(root)
     write_provenance(root / "SAMPLES" / "one", "made", 0, ("numpy",))
@@ -282,9 +305,11 @@ INDEXES = (
         "no frames to train on",
         TRAIN,
         "split: expected one of test",
-        index(splits={"test": [{"date": DATE, "drive": "0003", "frame": 2}]}),
+        index(splits={"test": [{"date": DATE, "drive": "0007", "frame": 2}]}),
     ),
     Row("a frame below 0", TRAIN, "dataset.json: expected a frame like", frames(frame=-1)),
+    Row("a frame of 26 digits", TRAIN, "dataset.json: expected a frame like", frames(frame=10**25)),
+    Row("a name that is a list", TRAIN, "dataset.json: expected name", index(name=["tiny"])),
     Row("a frame that is a word", TRAIN, "dataset.json: expected a frame like", frames(frame="two")),
     Row("a drive outside of the data set", TRAIN, "dataset.json: expected a frame like", frames(drive="../../x")),
     Row("a drive that isn't there, in an index", TRAIN, "0042_sync: expected a folder", frames(drive="0042")),
@@ -398,7 +423,55 @@ RUNS = (
         "OUT: expected .* interrupted run",
         text("OUT/checkpoint.safetensors", "x"),
     ),
-    Row("too few frames for a batch", TRAIN, "dataset: expected at least one batch of 6"),
+    Row("too few frames for a batch", TRAIN, "dataset: expected at least one batch of 6", frames()),
+    Row("no checkpoint to go on from", f"{TRAIN} --resume", "checkpoint.safetensors: expected a safetensors file"),
+    Row(
+        "a checkpoint whose header is a list",
+        f"{TRAIN} --resume",
+        "checkpoint.safetensors: expected a JSON object",
+        checkpoint({"run": "[1]", "iteration": "1"}),
+    ),
+    Row(
+        "a checkpoint nested 100,000 deep",
+        f"{TRAIN} --resume",
+        "checkpoint.safetensors: .*nested too deeply",
+        checkpoint({"run": DEEP, "iteration": "1"}),
+    ),
+    Row(
+        "a checkpoint of step -1",
+        f"{TRAIN} --resume",
+        "checkpoint.safetensors: expected a checkpoint",
+        checkpoint({"run": "{}", "iteration": "-1"}),
+    ),
+    Row(
+        "a checkpoint of another run",
+        f"{TRAIN} --resume",
+        "resume: expected the run of",
+        checkpoint({"run": "{}", "iteration": "1"}),
+    ),
+    Row("a training run in its data set", TRAIN.replace("OUT", "TINY"), "TINY: expected .*, found a data set"),
+    Row(
+        "a training run over other results",
+        TRAIN.replace("OUT", "SAMPLES/one"),
+        "found the provenance.json of something",
+    ),
+    Row(
+        "a CRF's training run in its data set", TRAIN_CRF.replace("OUT", "TINY"), "TINY: expected .*, found a data set"
+    ),
+    Row(
+        "a folder that another process writes to",
+        TRAIN,
+        "OUT: expected a folder that no other process writes to",
+        locked("OUT"),
+    ),
+    Row(
+        "a CRF's folder that another process writes to",
+        TRAIN_CRF,
+        "OUT: expected a folder that no other process writes to",
+        locked("OUT"),
+    ),
+    Row("a name that isn't UTF-8", "train --data TINY --out \udcff", "--out: expected UTF-8"),
+    Row("a link to itself", "curves loop --out c.png", "[Ll]oop", lambda r: (r / "loop").symlink_to(r / "loop")),
     Row("a device that isn't there", f"{TRAIN} --device cuda:99", "--device: expected cpu"),
     Row("an unknown device", f"{TRAIN} --device abacus", "--device: expected"),
     Row("an unknown preset", f"{TRAIN} --preset huge", "--preset: expected compact or paper"),
@@ -449,6 +522,19 @@ RUNS = (
 DATA = (
     Row("an unknown data set", "data make maxikitti OUT", "name: expected one of minikitti"),
     Row("a seed below 0, of data", "data make sample OUT --seed=-1", "seed: expected a whole number from 0 up"),
+    Row(
+        "data that another process makes",
+        "data make sample OUT",
+        "OUT/sample: expected a folder that no other process",
+        locked("OUT/sample"),
+    ),
+    Row("no scheduler there", "data make sample OUT --scheduler nowhere://x", "--scheduler: expected an address like tcp"),
+    Row(
+        "a damaged archive",
+        FETCH,
+        "2011_09_26_calib.zip: expected a sound zip archive",
+        text("OUT/archives/2011_09_26_calib.zip", "x"),
+    ),
     Row("no workers", "data make sample OUT --workers 0", "--workers: expected at least one process"),
     Row(
         "1000 workers",
@@ -512,7 +598,7 @@ DATA = (
         "data excerpt SAMPLES/one --data TINY",
         "expected an empty folder, or an earlier excerpt",
     ),
-    Row("an excerpt of too many frames", "data excerpt OUT --data TINY --frames 99", "n_frames: expected 1 to 2"),
+    Row("an excerpt of too many frames", "data excerpt OUT --data TINY --frames 99", "n_frames: expected 1 to 6"),
     Row("an excerpt of no frame", "data excerpt OUT --data TINY --frames 0", "Invalid value for '--frames'"),
 )
 
@@ -577,8 +663,48 @@ EXPERIMENTS = (
         "reproduce two-stage --data NONE --runs RUNS --out log.json",
         "dataset.json: expected a file",
     ),
-    Row("no validation frames, search", SEARCH, "split: expected one of"),
-    Row("no validation frames, learnt CRFs", LEARNED, "split: expected one of"),
+    Row("no validation frames, search", SEARCH, "split: expected one of", frames()),
+    Row("no validation frames, learnt CRFs", LEARNED, "split: expected one of", frames()),
+    Row(
+        "provenance of weights that is a list",
+        SEARCH,
+        "provenance.json: expected a JSON object",
+        text("provenance.json", "[]"),
+    ),
+    Row(
+        "trials that are a number",
+        SEARCH,
+        "log.json: expected the trials of a search",
+        text("log.json", '{"trials": 5}'),
+    ),
+    Row(
+        "another search's trials",
+        SEARCH,
+        "log.json: expected the trials",
+        text("log.json", '{"trials": [], "seed": 0}'),
+    ),
+    Row(
+        "a result over the weights",
+        EVALUATE.replace("scores.json", "weights.safetensors"),
+        "weights.safetensors: expected a new file",
+    ),
+    Row(
+        "a result over an index",
+        EVALUATE.replace("scores.json", "TINY/dataset.json"),
+        "dataset.json: expected a new file",
+    ),
+    Row(
+        "matrices over the weights",
+        f"{EVALUATE} --confusions weights.safetensors",
+        "--confusions: expected a file that ends in .npz",
+    ),
+    Row(
+        "runs that another process does",
+        TABLE1.replace(" --plan", ""),
+        "RUNS: expected a folder that no other process",
+        locked("RUNS"),
+    ),
+    Row("a word for the number of seeds", f"{TABLE1} --seeds many", "Invalid value for '--seeds'"),
     Row("no trials", f"{SEARCH} --trials 0", "Invalid value for '--trials'"),
     Row("an unknown scale", TABLE1 + " --scale galactic", "--scale: expected"),
     Row("a file in place of the runs", TABLE1.replace("RUNS", "architecture.json"), "--runs: expected a folder"),

@@ -4,13 +4,14 @@ import json
 import re
 import shlex
 import shutil
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 import typer
-from bad_inputs import HUGE, TABLE, log, sample
-from tiny_drive import DATE, write_tiny_dataset
+from bad_inputs import HELD, HUGE, TABLE, log, sample
+from tiny_drive import DATE, write_tiny_drive
 
 import semgrid_edu.experiments.evaluate
 import semgrid_edu.training.run
@@ -35,12 +36,22 @@ def in_this_process():
         yield
 
 
+def write_dataset(root: Path) -> None:
+    """Six drives to learn from, one to test, one for validation; three frames each, the last one labelled."""
+    frames = [{"date": DATE, "drive": f"{k:04d}", "frame": 2} for k in range(1, 9)]
+    for frame in frames:
+        write_tiny_drive(root, frame["drive"])
+    splits = {"train": frames[:6], "test": frames[6:7], "validation": frames[7:]}
+    (root / "dataset.json").write_text(json.dumps({"name": "tiny", "label_set": "KITTI-14", "splits": splits}))
+
+
 @pytest.fixture(scope="module")
 def prepared(tmp_path_factory) -> Path:
     """What every row of the table works on a copy of."""
     root = tmp_path_factory.mktemp("prepared")
-    for split in ("train", "test"):
-        TrainingSet(write_tiny_dataset(root / "TINY") if split == "train" else root / "TINY", split)
+    write_dataset(root / "TINY")
+    for split in ("train", "test", "validation"):
+        TrainingSet(root / "TINY", split)
     net = build_net(Architecture(), KittiRawDrive(root / "TINY", DATE, "0001").camera)
     (root / "architecture.json").write_text(json.dumps(asdict(net.architecture)))
     save_net(net, root / "fresh.safetensors")
@@ -54,11 +65,13 @@ def prepared(tmp_path_factory) -> Path:
 
 
 @pytest.fixture
-def place(prepared, tmp_path, monkeypatch) -> Path:
+def place(prepared, tmp_path, monkeypatch) -> Iterator[Path]:
     """A copy to spoil, as the current folder."""
     shutil.copytree(prepared, tmp_path / "place")
     monkeypatch.chdir(tmp_path / "place")
-    return tmp_path / "place"
+    yield tmp_path / "place"
+    while HELD:
+        HELD.pop().__exit__(None, None, None)
 
 
 @pytest.fixture

@@ -11,6 +11,9 @@ from semgrid_edu.storage.reading import read_json
 
 INDEX_FILE = "dataset.json"
 
+MOST_FRAMES = 10**10
+"""KITTI's files are named by the frame's number in ten digits."""
+
 
 class LabelledFrame(NamedTuple):
     """Where a labelled frame is.
@@ -96,6 +99,8 @@ def load_index(dataset_dir: str | Path) -> DatasetIndex:
     path = root / INDEX_FILE
     content = read_json(path)
     name, label_set, splits = (_entry(path, content, key) for key in ("name", "label_set", "splits"))
+    if not isinstance(name, str):
+        raise DataError(path, "name: a word or two", repr(name)[:200])
     if not isinstance(label_set, str) or label_set not in LABEL_SETS:
         raise DataError(path, f"label_set: one of {', '.join(LABEL_SETS)}", repr(label_set))
     if not isinstance(splits, dict) or not all(isinstance(frames, list) and frames for frames in splits.values()):
@@ -116,7 +121,7 @@ def _frame(path: Path, entry: Any) -> LabelledFrame:
     """Check one entry of a split."""
     date, drive, frame = (_entry(path, entry, key) for key in LabelledFrame._fields)
     sound_names = all(isinstance(name, str) and re.fullmatch(r"\w+", name) for name in (date, drive))
-    if not sound_names or type(frame) is not int or frame < 0:
+    if not sound_names or type(frame) is not int or not 0 <= frame < MOST_FRAMES:
         raise DataError(path, 'a frame like {"date": "2026_01_01", "drive": "0001", "frame": 9}', entry)
     return LabelledFrame(date, drive, frame)
 

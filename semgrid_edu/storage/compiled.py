@@ -23,7 +23,8 @@ def keep_compiled_functions() -> str:
     str
         One line for the user; empty when numba finds a place by itself.
     """
-    if VARIABLE in os.environ or any(map(_takes_files, _usual_folders())):
+    chosen = [Path(os.environ[VARIABLE])] if os.environ.get(VARIABLE) else []
+    if any(map(_takes_files, [*chosen, *_usual_folders()])):
         return ""
     os.environ[VARIABLE] = folder = str(_own_folder())
     return f"neither the package nor your cache folder can be written to; compiled functions are kept in {folder}"

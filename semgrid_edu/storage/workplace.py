@@ -95,5 +95,9 @@ def _cluster(address: str) -> Iterator[Workplace]:
     except ImportError:
         missing = "dask.distributed (pip install 'semgrid_edu[cluster]')"
         raise ArgumentError("--scheduler", missing, "no module named distributed") from None
-    with Client(address, set_as_default=False) as client, client.get_executor(pure=False) as executor:
+    try:
+        connected = Client(address, set_as_default=False)
+    except ValueError as error:
+        raise ArgumentError("--scheduler", "an address like tcp://HOST:PORT", f"{address}: {error}") from error
+    with connected as client, client.get_executor(pure=False) as executor:
         yield Workplace(executor, lambda: max(1, sum(client.nthreads().values())))

@@ -16,9 +16,9 @@ from semgrid_edu.networks import WEIGHTS
 from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.training.allocator import keep_freed_memory
 from semgrid_edu.training.batches import frames_of_step
-from semgrid_edu.training.checkpoint import load_checkpoint
+from semgrid_edu.training.checkpoint import CHECKPOINT, check_folder, load_checkpoint
 from semgrid_edu.training.log import LOG, Step, begin_log
-from semgrid_edu.training.loop import CHECKPOINT, check_finite, check_folder, learn, write_down
+from semgrid_edu.training.loop import check_finite, learn, write_down
 from semgrid_edu.training.loss import cross_entropy_sums, median_frequency_weights
 from semgrid_edu.training.params import TrainingParams
 

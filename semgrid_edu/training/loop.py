@@ -11,13 +11,13 @@ from torch import Tensor, nn
 from tqdm.auto import trange
 
 from semgrid_edu.datasets.training_set import Sample
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, save_net
 from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.training.allocator import keep_freed_memory
 from semgrid_edu.training.batches import draw_batch, share_of_batch
-from semgrid_edu.training.checkpoint import load_checkpoint, save_checkpoint
+from semgrid_edu.training.checkpoint import CHECKPOINT, check_folder, load_checkpoint, save_checkpoint
 from semgrid_edu.training.devices import mixed_precision
 from semgrid_edu.training.distributed import (
     in_parallel,
@@ -31,8 +31,6 @@ from semgrid_edu.training.log import LOG, Step, append_step, begin_log
 from semgrid_edu.training.loss import Objective, class_weights
 from semgrid_edu.training.params import TrainingParams
 
-CHECKPOINT = "checkpoint.safetensors"
-"""The file from which an interrupted run goes on, in the folder of the run."""
 CHECKPOINT_EVERY = 100
 """Iterations between checkpoints: an interruption costs about twenty seconds of work at most."""
 
@@ -199,27 +197,6 @@ def _gradients_as_found(net: nn.Module) -> Iterator[None]:
     finally:
         for parameter, learns in found:
             parameter.requires_grad_(learns)
-
-
-def check_folder(folder: Path, resume: bool) -> None:
-    """Refuse to overwrite a finished or an interrupted run.
-
-    Parameters
-    ----------
-    folder : Path
-        The folder of the training run to come.
-    resume : bool
-        Whether it continues an interrupted one.
-
-    Raises
-    ------
-    DataError
-        When the folder holds a run that would be lost.
-    """
-    if (folder / WEIGHTS).exists():
-        raise DataError(folder, "a folder without a trained network, which would be lost", WEIGHTS)
-    if (folder / CHECKPOINT).exists() and not resume:
-        raise DataError(folder, "a folder without an interrupted run (--resume continues it)", CHECKPOINT)
 
 
 def _check_dataset(net: SemanticGridNet, dataset: Sequence[Sample], params: TrainingParams) -> None:

@@ -1,6 +1,7 @@
 """From a request to results: the plan and its estimate, the runs, the tables (section 4)."""
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -90,14 +91,21 @@ def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = F
         What went wrong, one line per run; empty when all went well.
     """
     check_workers(request.workers or 1)
-    root, plan = check_runs_folder(request.runs), request.plan()
+    root = check_runs_folder(request.runs)
+    with nullcontext() if plan_only else sole_writer(root):
+        return _reproduced(request, root, echo, plan_only)
+
+
+def _reproduced(request: Request, root: Path, echo: Callable[[str], None], plan_only: bool) -> str:
+    """Do what `reproduce` says, in a folder of runs that no other process writes to."""
+    plan = request.plan()
     estimated = estimate(plan, root)
     hours = estimated.hours(request.workers or usable_cores())
     told = f"{len(estimated.seconds)} of {len(plan)} runs are left, about {60 * hours:.0f} minutes"
     echo(f"{plan_table(plan, estimated)}\n\n{told}" + (" on this machine" if request.scheduler else ""))
     if plan_only:
         return ""
-    with sole_writer(root), workplace(request.workers, request.scheduler) as place:
+    with workplace(request.workers, request.scheduler) as place:
         failed = execute_plan(plan, root, place, request.device, request.processes)
     scale: Scale = scale_named(request.scale)
     for name, experiment in request.chosen.items():
