@@ -528,7 +528,7 @@ DATA = (
         "OUT/sample: expected a folder that no other process",
         locked("OUT/sample"),
     ),
-    Row("no scheduler there", "data make sample OUT --scheduler nowhere://x", "--scheduler: expected an address like tcp"),
+    Row("no scheduler there", "data make sample OUT --scheduler nowhere://x", "--scheduler: expected an address"),
     Row(
         "a damaged archive",
         FETCH,
