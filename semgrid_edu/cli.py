@@ -14,6 +14,7 @@ from semgrid_edu.data_commands import data, report
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.experiments.commands import keep_result, reproduce
 from semgrid_edu.experiments.reproduction.commands import add_commands
+from semgrid_edu.storage.caching import CACHE_VARIABLE
 from semgrid_edu.storage.compiled import keep_compiled_functions
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
@@ -25,8 +26,15 @@ add_commands(reproduce)
 
 
 @app.callback()
-def main() -> None:
+def main(
+    cache: Annotated[
+        Path | None,
+        typer.Option(help="Keeps what is made of data sets; otherwise each keeps it itself, so it can't be read-only."),
+    ] = None,
+) -> None:
     """Probabilistic bird's-eye semantic perception, taught notebook by notebook."""
+    if cache is not None:
+        os.environ[CACHE_VARIABLE] = str(cache.resolve())
 
 
 @app.command()
@@ -137,7 +145,11 @@ def train(
         bool, typer.Option("--two-stage", help="Keep the image network fixed while the fusion learns.")
     ] = False,
     truth: Annotated[
-        str, typer.Option(help="true, or lidar: made from image labels and LIDAR with real data's errors.")
+        str,
+        typer.Option(
+            help="true; lidar: made from image labels and LIDAR with real data's errors; or made in another way, "
+            "such as no-cleanup."
+        ),
     ] = "true",
     resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was interrupted.")] = False,
     device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu, cuda or cuda:N.")] = "auto",

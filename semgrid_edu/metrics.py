@@ -147,6 +147,26 @@ def frequency_weighted_iou(confusion: ArrayLike) -> float:
     return _ratio((cells[present] * hits[present] / union[present]).sum(), cells.sum())
 
 
+def class_iou(confusion: ArrayLike) -> NDArray[np.float64]:
+    """Return the intersection over union of each class, 0..1.
+
+    Parameters
+    ----------
+    confusion : (C, C) int
+        How often each true class (row) is called each class (column).
+
+    Returns
+    -------
+    (C,) float64
+        TP_c / (n_c + m_c - TP_c) for n_c true, m_c predicted and TP_c rightly predicted cells of class c; NaN for a
+        class that no cell has or is called.
+    """
+    matrix = _matrix(confusion)
+    hits = np.diag(matrix)
+    union = matrix.sum(axis=1) + matrix.sum(axis=0) - hits
+    return np.divide(hits, union, out=np.full(len(hits), np.nan), where=union > 0)
+
+
 def _matrix(confusion: ArrayLike) -> NDArray:
     """Return the confusion matrix as an array, or say why it isn't one."""
     matrix = np.asarray(confusion)

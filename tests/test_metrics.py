@@ -11,6 +11,7 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import (
     class_accuracy,
+    class_iou,
     confusion_matrix,
     frequency_weighted_iou,
     pixel_accuracy,
@@ -31,6 +32,8 @@ def test_metrics_computed_by_hand():
     assert pixel_accuracy(BY_HAND) == pytest.approx(3 / 5)
     assert class_accuracy(BY_HAND) == pytest.approx((2 / 3 + 1 / 2) / 2)  # class 2 has no truth
     assert frequency_weighted_iou(BY_HAND) == pytest.approx(3 / 5 * 2 / 3 + 2 / 5 * 1 / 3)
+    np.testing.assert_allclose(class_iou(BY_HAND), [2 / 3, 1 / 3, 0])  # class 2 is called once, wrongly
+    assert np.isnan(class_iou([[1, 0], [0, 0]])[1])
 
 
 def _random_maps(n_classes=6, seed=0):
@@ -60,6 +63,8 @@ def test_metrics_agree_with_torchmetrics():
         (MulticlassJaccardIndex(6, average="weighted", ignore_index=255), frequency_weighted_iou),
     ):
         assert mine(ours) == pytest.approx(metric(*pair).item(), abs=1e-6)
+    by_class = MulticlassJaccardIndex(6, average="none", ignore_index=255)(*pair)
+    np.testing.assert_allclose(class_iou(ours), by_class, atol=1e-6)
 
 
 @given(hnp.arrays(np.uint8, (5, 4), elements=st.sampled_from([0, 1, 2, 3, 255])))

@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -94,3 +95,11 @@ def results(root: Path) -> dict[str, bytes]:
     told = ("output.txt", "ended.json", "started", "provenance.json")
     files = [path for path in root.rglob("*") if path.is_file() and path.name not in told]
     return {path.relative_to(root).as_posix(): path.read_bytes() for path in sorted(files) if "cache" not in path.parts}
+
+
+def wait_for(condition: Callable[[], bool], seconds: float = 120) -> None:
+    """Wait until a condition holds; a hang fails."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)

@@ -11,9 +11,10 @@ from nbformat import NotebookNode
 from semgrid_edu.course.figures import finish_figures
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.files import write_text
+from semgrid_edu.storage.shipped import shipped_folder
 
-NOTEBOOKS = Path(__file__).resolve().parents[2] / "notebooks"
-"""The lectures and exercises of a checkout; they are not part of the wheel."""
+NOTEBOOKS = shipped_folder("notebooks")
+"""The lectures and exercises. A wheel holds the sources of the exercises and the instructor's part alone."""
 
 METADATA = {
     "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},

@@ -88,8 +88,7 @@ def parse_pose(path: Path, text: str, what: str) -> NDArray[np.float64]:
     DataError
         When there are more or fewer numbers, or they are no rigid transform.
     """
-    matrix = entry_of(path, {what: text}, what, (3, 4))
-    return rigid_transform(check_rotation(path, matrix[:, :3], what), matrix[:, 3])
+    return _rigid(path, {what: text}, what)
 
 
 def _entries(path: Path) -> dict[str, str]:

@@ -1,9 +1,11 @@
 """What all readers of drives have in common: frames that are read when they are asked for, and labels in part."""
 
 import operator
+import re
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 from typing import overload
 
 import numpy as np
@@ -47,6 +49,34 @@ class FrameSequence(Sequence[Frame]):
     @abstractmethod
     def _frame(self, k: int) -> Frame:
         """Read frame k, 0 <= k < len(self)."""
+
+
+def count_frames(folder: Path, what: str, suffix: str) -> int:
+    """Return how many frames a drive has whose files are numbered with six digits, such as 000000.png.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder with one file per frame.
+    what : str
+        What the files are, such as "images", for the error.
+    suffix : str
+        How their names end, such as ".png".
+
+    Returns
+    -------
+    int
+        One more than the highest number, since files of some frames may be missing.
+
+    Raises
+    ------
+    DataError
+        When there is no such file.
+    """
+    numbers = [int(path.stem) for path in folder.glob(f"*{suffix}") if re.fullmatch(r"\d{6}", path.stem)]
+    if not numbers:
+        raise DataError(folder, f"{what} such as 000000{suffix}", "none" if folder.is_dir() else "no folder")
+    return 1 + max(numbers)
 
 
 def nothing_known(label_set: LabelSet, image_size: tuple[int, int]) -> FrameLabels:

@@ -14,6 +14,7 @@ from semgrid_edu.datasets.calibration import read_camera, read_rectification, re
 from semgrid_edu.datasets.drive_doubts import jumps, short_scans
 from semgrid_edu.datasets.frames import FrameSequence, error_of
 from semgrid_edu.datasets.kitti_labels import KINDS, is_labelled, read_label, read_labels
+from semgrid_edu.datasets.layouts import what_is
 from semgrid_edu.datasets.oxts import imu_pose, read_packet
 from semgrid_edu.datasets.scans import read_scan
 from semgrid_edu.datasets.timestamps import read_timestamps
@@ -87,8 +88,7 @@ class KittiRawDrive(FrameSequence):
         for name, value in (("date", date), ("drive", drive)):
             if not value:
                 raise ArgumentError(name, "such as 2011_09_26 and 0013", repr(value))
-        self.date_folder = _existing(Path(root), date, "dates", "*_*_*")
-        self.folder = _existing(self.date_folder, drive_folder(root, date, drive).name, "drives", "*_sync")
+        self.date_folder, self.folder = _existing(Path(root), date, drive)
         self._sensors = ["velodyne_points", "oxts"]
         if images and (self.folder / "image_02").exists():
             self._sensors.append("image_02")
@@ -222,14 +222,23 @@ class KittiRawDrive(FrameSequence):
         return read_labels(self.folder / "labels", f"{k:010d}.png", self.camera.size)
 
 
-def _existing(parent: Path, name: str, what: str, pattern: str) -> Path:
-    """Return parent/name, or say what there is instead."""
-    if not parent.is_dir():
-        raise DataError(parent, f"a folder of {what}", "no folder")
-    if not (parent / name).is_dir():
-        there = sorted(path.name for path in parent.glob(pattern) if path.is_dir())
-        raise DataError(parent / name, "a folder", f"only the {what} {', '.join(there)}" if there else f"no {what}")
-    return parent / name
+def _existing(root: Path, date: str, drive: str) -> tuple[Path, Path]:
+    """Return the folders of the date and of the drive, or say what there is instead."""
+    folder = drive_folder(root, date, drive)
+    if not root.is_dir():
+        raise DataError(root, "a folder of dates", "no folder")
+    if not folder.parent.is_dir():
+        raise DataError(folder.parent, "a folder", _instead(root, root, "dates", "*_*_*"))
+    if not folder.is_dir():
+        raise DataError(folder, "a folder", _instead(root, folder.parent, "drives", "*_sync"))
+    return folder.parent, folder
+
+
+def _instead(root: Path, parent: Path, what: str, pattern: str) -> str:
+    """Say which dates or drives there are, and what the whole folder looks like."""
+    there, layout = sorted(path.name for path in parent.glob(pattern) if path.is_dir()), what_is(root)
+    names = f"only the {what} {', '.join(there)}" if there else f"no {what}"
+    return names + (f"; {root} looks like {layout}" if layout else "")
 
 
 def _last_frame(folder: Path) -> int:

@@ -6,7 +6,6 @@ The layout is that of the benchmark's development kit, with four of its archives
     training/calib/0009.txt              training/oxts/0009.txt (one packet per line)
 """
 
-import re
 from functools import cached_property
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, invert_rigid
 from semgrid_edu.datasets.benchmark_calibration import BenchmarkCalibration, read_benchmark_calibration
-from semgrid_edu.datasets.frames import FrameSequence
+from semgrid_edu.datasets.frames import FrameSequence, count_frames
 from semgrid_edu.datasets.oxts import imu_pose, parse_packet
 from semgrid_edu.datasets.scans import read_scan
 from semgrid_edu.errors import DataError
@@ -49,11 +48,7 @@ class KittiTrackingRun(FrameSequence):
     def __init__(self, root: str | Path, run: int) -> None:
         self.folder = Path(root) / "training"
         self.name = f"{run:04d}"
-        images = self.folder / "image_02" / self.name
-        frames = [int(path.stem) for path in images.glob("*.png") if re.fullmatch(r"\d{6}", path.stem)]
-        if not frames:
-            raise DataError(images, "images such as 000000.png", "none" if images.is_dir() else "no folder")
-        self._length = 1 + max(frames)
+        self._length = count_frames(self.folder / "image_02" / self.name, "images", ".png")
 
     def __len__(self) -> int:
         """Return the number of frames, including those whose scans were never recorded."""

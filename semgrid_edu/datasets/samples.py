@@ -11,6 +11,7 @@ from semgrid_edu.datasets.training_set import Sample, TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.networks import IMAGE_STAGE, SEGMENTERS, WEIGHTS
 from semgrid_edu.storage.provenance import FILE_NAME, provenance_problems, write_provenance
+from semgrid_edu.storage.shipped import shipped_folder
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
 
 FRAMES = "frames.safetensors"
@@ -18,22 +19,8 @@ FRAMES = "frames.safetensors"
 
 
 def samples_dir() -> Path:
-    """Return the folder `data_samples` of the clone that this package runs from, or of the current folder.
-
-    Raises
-    ------
-    DataError
-        When there is none: an installed wheel holds the package alone.
-    """
-    beside_the_package = Path(__file__).resolve().parents[2] / "data_samples"
-    for folder in (beside_the_package, Path.cwd() / "data_samples"):
-        if folder.is_dir():
-            return folder
-    raise DataError(
-        Path.cwd() / "data_samples",
-        "the shipped samples (run inside a clone of the project, or make a drive with `semgrid-edu data make`)",
-        "no such folder",
-    )
+    """Return the folder of the samples. A wheel holds the drive and SegNet alone, a clone all of them."""
+    return shipped_folder("data_samples")
 
 
 def sample_drive() -> KittiRawDrive:

@@ -7,7 +7,6 @@ A pose is a row of twelve numbers: camera 0 of that frame in camera 0 of the fir
 camera of KITTI's odometry benchmark, whose archives hold image_2, calib.txt and times.txt.
 """
 
-import re
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, Camera, invert_rigid, lidar_from_grid, transform_points
 from semgrid_edu.datasets.benchmark_calibration import BenchmarkCalibration, parse_pose, read_benchmark_calibration
 from semgrid_edu.datasets.birdseye import birdseye_votes
-from semgrid_edu.datasets.frames import FrameSequence, nothing_known
+from semgrid_edu.datasets.frames import FrameSequence, count_frames, nothing_known
 from semgrid_edu.datasets.returns import seen_returns
 from semgrid_edu.datasets.scans import read_scan
 from semgrid_edu.datasets.semantic_kitti_labels import FIRST_MOVING, SEMANTIC_KITTI_CLASSES, read_point_labels
@@ -63,11 +62,7 @@ class SemanticKittiSequence(FrameSequence):
 
     def __init__(self, root: str | Path, sequence: str) -> None:
         self.folder = Path(root) / "sequences" / sequence
-        scans = self.folder / "velodyne"
-        frames = [int(path.stem) for path in scans.glob("*.bin") if re.fullmatch(r"\d{6}", path.stem)]
-        if not frames:
-            raise DataError(scans, "scans such as 000000.bin", "none" if scans.is_dir() else "no folder")
-        self._length = 1 + max(frames)
+        self._length = count_frames(self.folder / "velodyne", "scans", ".bin")
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -94,12 +89,7 @@ class SemanticKittiSequence(FrameSequence):
         return read_scan(self.folder / "velodyne" / f"{k:06d}.bin")
 
     def classes(self, k: int) -> NDArray[np.uint8]:
-        """Read the class of each return of one scan.
-
-        Parameters
-        ----------
-        k : int
-            Number of the frame.
+        """Read the class of each return of one scan. Parameters are those of `SemanticKittiSequence.scan`.
 
         Returns
         -------
@@ -116,19 +106,11 @@ class SemanticKittiSequence(FrameSequence):
     def moving(self, k: int) -> NDArray[np.bool_]:
         """Read which returns of one scan come from things that move.
 
-        Parameters
-        ----------
-        k : int
-            Number of the frame.
+        Parameters and errors are those of `SemanticKittiSequence.scan`.
 
         Returns
         -------
         (N,) bool
-
-        Raises
-        ------
-        DataError
-            When the file is missing or damaged.
         """
         return self._numbers(k) >= FIRST_MOVING
 
@@ -207,7 +189,13 @@ class SemanticKittiSequence(FrameSequence):
 
     @cached_property
     def camera(self) -> Camera:
-        """The calibration of image_2, the same for all frames; its size from the first image or `IMAGE_SIZES`."""
+        """The calibration of image_2, the same for all frames; its size from the first image or `IMAGE_SIZES`.
+
+        Raises
+        ------
+        DataError
+            When a file is missing or damaged, or nothing tells the size.
+        """
         if self._has_images:
             height, width = read_png(self._image_file(0), "RGB", None).shape[:2]
         elif self.folder.name in IMAGE_SIZES:

@@ -8,7 +8,6 @@
 Of the eight cameras this is the left one that looks ahead: the paper uses one pair of camera and depth.
 """
 
-import re
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -19,7 +18,7 @@ from numpy.typing import NDArray
 from semgrid_edu.camera import Camera, invert_rigid, lidar_from_grid, rigid_transform, transform_points
 from semgrid_edu.datasets.birdseye import birdseye_votes
 from semgrid_edu.datasets.depth_points import depth_scan, points_from_depth
-from semgrid_edu.datasets.frames import FrameSequence, error_of
+from semgrid_edu.datasets.frames import FrameSequence, count_frames, error_of
 from semgrid_edu.datasets.synthia_files import (
     read_synthia_depth,
     read_synthia_intrinsics,
@@ -72,11 +71,7 @@ class SynthiaSequence(FrameSequence):
 
     def __init__(self, root: str | Path, sequence: str) -> None:
         self.folder = Path(root) / sequence
-        images = self.folder / "RGB" / VIEW
-        frames = [int(path.stem) for path in images.glob("*.png") if re.fullmatch(r"\d{6}", path.stem)]
-        if not frames:
-            raise DataError(images, "images such as 000000.png", "none" if images.is_dir() else "no folder")
-        self._length = 1 + max(frames)
+        self._length = count_frames(self.folder / "RGB" / VIEW, "images", ".png")
 
     def __len__(self) -> int:
         """Return the number of frames."""

@@ -21,6 +21,7 @@ from semgrid_edu.datasets.truth import grid_truth
 from semgrid_edu.errors import DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams, track_drive
+from semgrid_edu.storage.caching import cache_folder
 from semgrid_edu.storage.files import sha256, write_json
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.storage.workers import worker_pool
@@ -63,7 +64,7 @@ class ArrayRecipe(NamedTuple):
 def cached_arrays(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> dict[str, NDArray]:
     """Return the arrays of a split's labelled frames, which are made on first use.
 
-    They are kept in `cache/` of the data set, in a folder that is named by a hash of all that decides them: the recipe,
+    They are kept in `cache_folder`, in a folder that is named by a hash of all that decides them: the recipe,
     the code that makes them, dataset.json, and the drives' files by name, size and time of their last change. (Hashing
     the contents of these files, about a gigabyte, at every start would take longer than reading the arrays.) When one
     of these changes, the arrays are made anew.
@@ -89,11 +90,12 @@ def cached_arrays(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> dict[
     ArgumentError
         When there is no such split.
     DataError
-        When the data set, or what was kept, is damaged.
+        When the data set, or what was kept, is damaged; or when nothing can be kept.
     """
     check_label_sets(index, split)
-    folder = index.root / "cache" / _key(index, split, recipe) / split
+    folder = cache_folder(index.root) / _key(index, split, recipe) / split
     if not folder.exists():
+        _make_room(folder.parent)
         _write_arrays(_pack(_process(index, split, recipe)), recipe, folder)
     return _map_arrays(folder)
 
@@ -113,6 +115,16 @@ def _key(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> str:
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 
+def _make_room(folder: Path) -> None:
+    """Make a folder for the arrays, before the work on them starts."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        expected = "a folder that can be written, for what is made of the data (`semgrid-edu --cache` takes another)"
+        raise DataError(folder, expected, error.strerror) from error
+
+
 def _process(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> list[dict[str, NDArray]]:
     """Make the arrays of every labelled frame of a split."""
     jobs = [(index.root, *name, labelled, recipe) for name, labelled in index.frames_by_drive(split).items()]
@@ -124,7 +136,6 @@ def _process(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> list[dict[
 
 def _write_arrays(arrays: dict[str, NDArray], recipe: ArrayRecipe, folder: Path) -> None:
     """Write the arrays and their manifest to a folder that appears whole or not at all."""
-    folder.parent.mkdir(parents=True, exist_ok=True)
     unfinished = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}-"))
     try:
         for name, array in arrays.items():

@@ -58,8 +58,11 @@ def carried_grids(name: str, labels: NDArray, frames: TrainingSet, k: int) -> di
     -------
     dict of str to (H, W) uint8
         By `carry_labels` ("geometry"), alone and with its gaps closed; by `inverse_perspective`, everywhere and in
-        observed cells only.
+        observed cells only. Empty when the label set has no unknown classes, with which these fill cells without a
+        label.
     """
+    if frames.label_set.n_semantic == len(frames.label_set):
+        return {}
     occupancy, places = frames.arrays["occupancy"][k], ground_pixels(frames.spec, frames.camera)
     by_depth = carry_labels(labels, *frames.returns(k), occupancy)
     return {

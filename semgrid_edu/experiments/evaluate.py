@@ -3,7 +3,6 @@
 from datetime import UTC, datetime
 from pathlib import Path
 
-import numpy as np
 from numpy.typing import NDArray
 from torch import nn
 
@@ -12,6 +11,7 @@ from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.experiments.baseline_grids import baseline_grids, carried_grids
 from semgrid_edu.experiments.confusions import FrameConfusions, frame_confusions, save_confusions
 from semgrid_edu.experiments.learned_grids import Grids, Refine, best_labels, network_grids
+from semgrid_edu.experiments.measured import on_cells
 from semgrid_edu.experiments.statistics import drive_interval
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS, semantic_cells
@@ -147,11 +147,13 @@ def intervals(compared: FrameConfusions, label_set: LabelSet) -> Intervals:
     """
     result: Intervals = {}
     for method in compared.counts:
-        by_drive = compared.by_drive(method)
-        semantic = np.stack([semantic_cells(matrix, label_set) for matrix in by_drive])
+        by_drive = compared.by_drive(method)[None]
         result[method] = {
-            cells: {name: list(drive_interval(matrices[None], metric)) for name, metric in METRICS.items()}
-            for cells, matrices in (("all", by_drive), ("semantic", semantic))
+            cells: {
+                name: list(drive_interval(on_cells(by_drive, cells, label_set), metric))
+                for name, metric in METRICS.items()
+            }
+            for cells in ("all", "semantic")
         }
     return result
 

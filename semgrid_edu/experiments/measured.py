@@ -12,7 +12,7 @@ from semgrid_edu.metrics import METRICS, semantic_cells
 
 Measured = dict[str, object]
 """The "mean" over the seeds, "low" and "high" of its 95 % interval, and the value of each of the "seeds"; None where
-there is none."""
+it can't be computed."""
 
 SHOWN_SEEDS = 5
 """Up to so many seeds each one's value is shown."""
@@ -26,7 +26,12 @@ def measured(confusions: NDArray, metric: Callable[[NDArray], float]) -> Measure
     confusions : (S, V, C, C) int
         By seed and drive, see `drive_interval`.
     metric : callable
-        Takes a confusion matrix and returns a number.
+        Takes a confusion matrix (C, C), row: truth, and returns a number.
+
+    Returns
+    -------
+    dict
+        As `Measured` says, in the unit of the metric.
     """
     seeds = [float(metric(matrix)) for matrix in confusions.sum(axis=1)]
     return _with_interval(seeds, lambda: drive_interval(confusions, metric))
@@ -38,9 +43,14 @@ def compared(a: NDArray, b: NDArray, metric: Callable[[NDArray], float]) -> Meas
     Parameters
     ----------
     a, b : (S, V, C, C) int
-        By seed and drive, see `drive_interval`.
+        By seed and drive, see `paired_interval`; a method without seeds may come as (1, V, C, C).
     metric : callable
-        Takes a confusion matrix and returns a number.
+        Takes a confusion matrix (C, C), row: truth, and returns a number.
+
+    Returns
+    -------
+    dict
+        As `Measured` says, in the unit of the metric.
     """
     ours, theirs = np.broadcast_arrays(*([metric(matrix) for matrix in some.sum(axis=1)] for some in (a, b)))
     return _with_interval((ours - theirs).tolist(), lambda: paired_interval(a, b, metric))
@@ -129,16 +139,7 @@ def shown(value: Measured, digits: int = 1) -> str:
 def shown_seeds(value: Measured, digits: int = 1) -> str:
     """Return every seed's value as text, per cent; of many, the lowest and the highest.
 
-    Parameters
-    ----------
-    value : dict
-        From `measured` or `compared`.
-    digits : int
-        Digits after the point.
-
-    Returns
-    -------
-    str
+    Parameters and result are those of `shown`.
     """
     seeds = ["-" if one is None else f"{100 * one:.{digits}f}" for one in value["seeds"]]
     if len(seeds) <= SHOWN_SEEDS:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.experiments.distances import distance_bands
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LabelSet
 
@@ -64,8 +65,7 @@ class TruthCounts:
         for name, grid in (("made", made), ("truth", truth), ("standing", standing)):
             if np.shape(grid) != spec.shape:
                 raise ArgumentError(name, f"shape {spec.shape}", f"shape {np.shape(grid)}")
-        band = np.digitize(np.hypot(*np.moveaxis(spec.centers(), -1, 0)), BAND_EDGES[1:-1])
-        n = label_set.n_semantic
+        band, n = distance_bands(spec, BAND_EDGES), label_set.n_semantic
         chosen = {
             "seen": (truth, truth < n),
             "found": (truth, (truth < n) & (made == truth)),

@@ -1,11 +1,11 @@
 """The policy laboratory's results as Markdown tables: by policy, by class, by distance (section 4)."""
 
-from collections.abc import Iterable, Sequence
-from itertools import pairwise
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.experiments.distances import band_names
 from semgrid_edu.experiments.tables import markdown_table, per_cent
 from semgrid_edu.experiments.truth_policies import counts_of
 
@@ -48,6 +48,11 @@ def class_table(result: dict, name: str) -> str:
     Returns
     -------
     str
+
+    Raises
+    ------
+    ArgumentError
+        When the result has no such policy.
     """
     return _table(counts_of(result, name).shares(axis=0), result["classes"])
 
@@ -55,47 +60,15 @@ def class_table(result: dict, name: str) -> str:
 def distance_table(result: dict, name: str) -> str:
     """Return one row per band of distance of one policy, over all classes, per cent.
 
-    Parameters
-    ----------
-    result : dict
-        From `truth_policies`, or from the JSON file that it was written to.
-    name : str
-        The name of the policy.
-
-    Returns
-    -------
-    str
+    Parameters, result and errors are those of `class_table`.
     """
     return _table(counts_of(result, name).shares(axis=1), band_names(result["bands"]))
-
-
-def band_names(edges: Sequence[float]) -> list[str]:
-    """Name bands of distance.
-
-    Parameters
-    ----------
-    edges : sequence of float
-        Where they begin and end, metres.
-
-    Returns
-    -------
-    list of str
-        Such as "10-20 m".
-    """
-    return [f"{low:g}-{high:g} m" for low, high in pairwise(edges)]
 
 
 def truth_tables(result: dict) -> str:
     """Return all policies, then classes and distances of the first one, each table under its title.
 
-    Parameters
-    ----------
-    result : dict
-        From `truth_policies`, or from the JSON file that it was written to.
-
-    Returns
-    -------
-    str
+    Parameters and result are those of `policy_table`.
     """
     first = next(iter(result["sums"]))
     tables = {

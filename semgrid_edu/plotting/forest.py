@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.measured import Measured, shown
 
-SEED_COLOUR = "#d95f02"
+SCORE_COLOUR, SEED_COLOUR = "#1f4e79", "#d95f02"
+"""The colours of interval and mean, and of single seeds."""
 _SEED_DROP = 0.24
 """How far the seeds lie below the interval, rows."""
 
@@ -65,7 +66,7 @@ def forest_plot(
     return ax
 
 
-def draw_score(ax: Axes, place: float, value: Measured, colour: str = "#1f4e79") -> None:
+def draw_score(ax: Axes, place: float, value: Measured) -> None:
     """Draw one score as a line of a chart, per cent: interval, mean, and below them a circle for every seed.
 
     Parameters
@@ -76,15 +77,13 @@ def draw_score(ax: Axes, place: float, value: Measured, colour: str = "#1f4e79")
         Where the line is on the vertical axis.
     value : dict
         From `measured` or `compared`.
-    colour : str
-        The colour of interval and mean.
     """
     if value["mean"] is None:
         return
     if value["low"] is not None:
         ends = [100 * value["low"], 100 * value["high"]]
-        ax.plot(ends, [place, place], color=colour, linewidth=2.5, alpha=0.6, label="95 % interval")
-    ax.plot(100 * value["mean"], place, "D", color=colour, markersize=6, label="mean")
+        ax.plot(ends, [place, place], color=SCORE_COLOUR, linewidth=2.5, alpha=0.6, label="95 % interval")
+    ax.plot(100 * value["mean"], place, "D", color=SCORE_COLOUR, markersize=6, label="mean")
     seeds = [100 * seed for seed in value["seeds"] if seed is not None]
     if len(seeds) > 1:
         places = [place + _SEED_DROP] * len(seeds)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.made_truth import MadeTruth
+from semgrid_edu.datasets.named_truths import POLICIES
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
@@ -80,8 +81,8 @@ def chosen_truth(name: str) -> MadeTruth | None:
     Parameters
     ----------
     name : str
-        "true" for what the data set says of its cells; "lidar" for grids made from its image labels and scans, with
-        errors like those of real data.
+        "true" for what the data set says of its cells; a key of `POLICIES`, such as "lidar", for grids made from its
+        image labels and scans, with errors like those of real data.
 
     Returns
     -------
@@ -93,9 +94,9 @@ def chosen_truth(name: str) -> MadeTruth | None:
     ArgumentError
         When there is no such truth.
     """
-    if name not in ("true", "lidar"):
-        raise ArgumentError("--truth", "true or lidar", repr(name))
-    return MadeTruth() if name == "lidar" else None
+    if name != "true" and name not in POLICIES:
+        raise ArgumentError("--truth", f"one of true, {', '.join(POLICIES)}", repr(name))
+    return None if name == "true" else MadeTruth(POLICIES[name])
 
 
 def train_network(
@@ -147,6 +148,7 @@ def train_network(
     with process_group(device) as chosen:
         with first_process_first():
             dataset = TrainingSet(dataset_dir, "train", description.grid, description.image_size, made=made)
+        description = replace(description, label_set=dataset.label_set.name)
         net = build_net(description, dataset.camera, seed)
         if imagenet:
             load_imagenet(net.segmenter, imagenet)
@@ -178,14 +180,15 @@ def _command(
     params: TrainingParams,
     made: MadeTruth | None,
 ) -> str:
-    """Return the command that makes the same training run, or as near as a command can: policies have no options."""
+    """Return the command that makes the same training run, or as near as a command can: not every policy has a name."""
+    named = (name for name, policy in POLICIES.items() if made == MadeTruth(policy))
     options = [
         f"--data {_name(dataset_dir)} --out {_name(folder)} --segmenter {description.segmenter}",
         f"--preset {description.preset}" if description.preset != Architecture.preset else "",
         f"--imagenet {_name(imagenet)}" if imagenet else "",
         f"--seed {seed} --iterations {params.grid_iterations}",
         "" if params.end_to_end else "--two-stage",
-        "--truth lidar" if made else "",
+        f"--truth {next(named, 'lidar')}" if made else "",
     ]
     return " ".join(["semgrid-edu train", *filter(None, options)])
 

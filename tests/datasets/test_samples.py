@@ -52,7 +52,7 @@ def test_samples_are_checked_one_by_one(excerpt):
 
 
 @pytest.mark.parametrize("segmenter", trained_segmenters())
-def test_shipped_weights_are_whole_trainings(segmenter):
+def test_shipped_weights_come_from_whole_training_runs(segmenter):
     folder = sample_weights(segmenter).parent
     assert sample_image_stage(segmenter).parent == folder
     names = {"weights.safetensors", "image_stage.safetensors", "log.csv", "provenance.json"}

@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 import torch
 from tiny_drive import DATE, SIZE, write_tiny_dataset
+from typer.testing import CliRunner
 
+from semgrid_edu.cli import app
 from semgrid_edu.datasets import KittiRawDrive, grid_truth, training_cache
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams, track_drive
+from semgrid_edu.storage.caching import CACHE_VARIABLE, cache_folder
 
 SMALL = (6, 20)
 
@@ -123,6 +126,39 @@ class TestBuilt:
     def test_unknown_split_is_named(self, built):
         with pytest.raises(ArgumentError, match="split"):
             TrainingSet(built, "validation")
+
+
+@pytest.mark.usefixtures("in_this_process")
+class TestCacheFolder:
+    def test_another_folder_leaves_the_data_as_they_are(self, tmp_path, monkeypatch):
+        root = write_tiny_dataset(tmp_path / "data")
+        before = sorted(root.rglob("*"))
+        monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "elsewhere"))
+        training = TrainingSet(root, "train", image_size=SMALL)
+        assert sorted(root.rglob("*")) == before
+        monkeypatch.setattr(training_cache, "_process", None)
+        again = TrainingSet(root, "train", image_size=SMALL)
+        np.testing.assert_array_equal(training.arrays["occupancy"], again.arrays["occupancy"])
+
+    def test_two_data_sets_share_a_folder(self, tmp_path, monkeypatch):
+        monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "elsewhere"))
+        first, second = (write_tiny_dataset(tmp_path / name) for name in ("first", "second"))
+        scan = second / DATE / f"{DATE}_drive_0001_sync" / "velodyne_points" / "data" / "0000000002.bin"
+        scan.write_bytes(scan.read_bytes()[: 16 * 40])
+        grids = [TrainingSet(root, "train", image_size=SMALL).arrays["occupancy"][0] for root in (first, second)]
+        assert not np.array_equal(*grids)
+
+    def test_folder_that_cannot_be_written_is_named_with_a_way_out(self, tmp_path):
+        root = write_tiny_dataset(tmp_path)
+        (root / "cache").write_text("a file")
+        with pytest.raises(DataError, match=r"cache.*--cache"):
+            TrainingSet(root, "train", image_size=SMALL)
+
+
+def test_the_command_line_passes_the_folder_on(tmp_path, monkeypatch):
+    monkeypatch.setenv(CACHE_VARIABLE, "")  # so that what the command sets is undone afterwards
+    CliRunner().invoke(app, ["--cache", str(tmp_path / "elsewhere"), "data", "verify"])
+    assert cache_folder(tmp_path) == tmp_path / "elsewhere"
 
 
 def test_error_in_a_worker_names_the_file_and_leaves_nothing(tmp_path):

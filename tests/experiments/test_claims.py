@@ -5,7 +5,8 @@ import pytest
 
 from semgrid_edu.experiments.confusions import FrameConfusions
 from semgrid_edu.experiments.measured import measured, on_cells, shown, shown_seeds
-from semgrid_edu.experiments.reproduction.claims import CLAIMS, called, called_void
+from semgrid_edu.experiments.reproduction.claim_statements import called, called_void
+from semgrid_edu.experiments.reproduction.claims import CLAIMS
 from semgrid_edu.experiments.reproduction.deviations import deviations
 from semgrid_edu.experiments.reproduction.paper import NETWORKS, TABLE_1_SCORES, TABLE_3_CONFUSION
 from semgrid_edu.experiments.reproduction.scales import SCALES

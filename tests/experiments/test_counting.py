@@ -6,8 +6,9 @@ from sklearn.metrics import confusion_matrix
 
 from semgrid_edu.camera import project, transform_points
 from semgrid_edu.crf import expected_calibration_error
+from semgrid_edu.experiments.distances import distance_bands
 from semgrid_edu.experiments.reproduction.calibration_errors import EXACT, CalibrationError
-from semgrid_edu.experiments.reproduction.counting import CountingRun, GridCounts, distance_band_names, distance_bands
+from semgrid_edu.experiments.reproduction.counting import BANDS, CountingRun, GridCounts, distance_band_names
 from semgrid_edu.experiments.reproduction.overturned_runs import boxes_on
 from semgrid_edu.experiments.reproduction.score_runs import SEARCHED
 from semgrid_edu.grid import GridSpec
@@ -18,7 +19,9 @@ SPEC = GridSpec(0.0, 71.0, -15.5, 15.5, 0.5)
 
 
 class Here(CountingRun):
-    """A run whose folder is the folder of all runs."""
+    """A run whose folder is the folder of all runs. It is only read, never done."""
+
+    name = steps = pace = probe = work = None
 
     def folder(self, root):
         return root
@@ -57,7 +60,7 @@ def test_a_band_holds_the_cells_at_its_distance(counted):
     for name, low, high in zip(distance_band_names(), range(0, 70, 10), [*range(10, 70, 10), 100], strict=True):
         cells = ((x**2 + y**2 >= low**2) & (x**2 + y**2 < high**2)).sum()
         assert Here().confusions(folder, "network", "true", name).counts["network"][0].sum() == cells
-    assert distance_bands(SPEC)[-1, SPEC.shape[1] // 2] == 0
+    assert distance_bands(SPEC, BANDS)[-1, SPEC.shape[1] // 2] == 0
 
 
 def test_sureness_adds_up_over_the_frames(counted):

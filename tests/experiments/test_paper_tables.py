@@ -81,23 +81,26 @@ def test_table_3_is_in_per_cent_of_its_rows():
 
 
 def test_every_command_has_a_result():
-    assert list(EXPERIMENTS) == ["table1", "table2", "table3", "claims", "ablations", "figures"]
+    assert list(EXPERIMENTS) == ["table1", "table2", "table3", "claims", "ablations", "truth-costs", "figures"]
 
 
 def test_a_result_is_written_with_all_that_made_it(tmp_path):
     runs, scale = [Note("a"), Note("b", (Note("a"),))], SCALES["quick"]
-    for run, seconds in zip(runs, (60, 120), strict=True):
+    for run, own in zip(runs, ({"seconds": 60}, {"seconds": 120, "processes": 2}), strict=True):
         run.folder(tmp_path).mkdir()
-        ended = {"seconds": seconds, "commit": "abc", "date": "2026-01-01"}
+        ended = {"commit": "abc", "date": "2026-01-01", **own}
         (run.folder(tmp_path) / "ended.json").write_text(json.dumps(ended))
     draw = lambda *_: plt.figure()  # noqa: E731
-    shown = Experiment("A table", "kitti", lambda _: 2, lambda *_: runs, lambda *_: {"x": 1}, lambda _: "of x", draw)
+    work = (lambda _: 2, lambda *_: runs, lambda *_: {"x": 1}, lambda _: "of x", draw)
+    shown = Experiment("A table", "kitti", *work, deviations=("No frame was seen by day.",))
     text = write_result("table", shown, scale, 2, tmp_path, tmp_path / "out")
     content = json.loads((tmp_path / "out" / "table.json").read_text())
     assert content["x"] == 1
     assert content["commits"] == ["abc"]
     assert content["command"].startswith("semgrid-edu reproduce table --scale quick --seeds 2")
+    assert content["command"].endswith(" --processes 2")
     assert all(line in text for line in content["deviations"])
+    assert content["deviations"][-1] == "No frame was seen by day."
     times = json.loads((tmp_path / "out" / "table_times.json").read_text())
     assert times == {"hours": 0.05, "dates": ["2026-01-01"], "minutes": {"note-a": 1.0, "note-b": 2.0}}
     assert (tmp_path / "out" / "table.png").exists()

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from tiny_runs import HandMadeData, Note, results, tiny_training_runs
+from tiny_runs import HandMadeData, Note, results, tiny_training_runs, wait_for
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.experiments.reproduction.execute import execute_plan
@@ -209,11 +209,3 @@ def test_a_cluster_without_answer_or_with_workers_of_its_own_is_refused():
         pass
     with pytest.raises(ArgumentError, match="--workers"), workplace(0):
         pass
-
-
-def wait_for(condition, seconds=120):
-    """Wait until a condition holds; a hang fails."""
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.01)

@@ -9,9 +9,11 @@ import time
 from pathlib import Path
 
 import pytest
-from tiny_runs import Note, SharedNote, results, tiny_training_runs
+from tiny_runs import Note, SharedNote, results, tiny_training_runs, wait_for
 
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.reproduction.one_run import run_one
+from semgrid_edu.experiments.reproduction.reproduce import Request, reproduce
 from semgrid_edu.experiments.reproduction.runs import OUTPUT
 from semgrid_edu.training.log import LOG, read_log
 
@@ -68,16 +70,16 @@ def test_other_runs_take_one_process(tmp_path):
     assert "processes" not in run.record(tmp_path)
 
 
+def test_a_plan_that_torchrun_starts_twice_is_refused(monkeypatch, tmp_path):
+    monkeypatch.setenv("WORLD_SIZE", "2")
+    request = Request("table1", "quick", None, tmp_path / "runs", tmp_path / "out")
+    with pytest.raises(ArgumentError, match="--processes: expected 2"):
+        reproduce(request, print)
+    assert not (tmp_path / "runs").exists()
+
+
 def stays(path, seconds=1.0):
     """Whether nothing is written to a file for a second, in which its processes would write twenty lines."""
     before = path.stat().st_size
     time.sleep(seconds)
     return path.stat().st_size == before
-
-
-def wait_for(condition, seconds=120):
-    """Wait until a condition holds; a hang fails."""
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.05)

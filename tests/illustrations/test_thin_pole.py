@@ -14,7 +14,7 @@ from semgrid_edu.illustrations.thin_pole import MECHANISMS, apply_mechanism, pla
 
 @pytest.fixture(autouse=True)
 def one_thread():
-    """The bits of a training depend on the number of threads, its speed hardly."""
+    """The bits of a training run depend on the number of threads, its speed hardly."""
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     yield

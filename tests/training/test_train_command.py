@@ -11,7 +11,9 @@ from semgrid_edu.camera import Camera
 from semgrid_edu.cli import app
 from semgrid_edu.datasets import dataset_doubts
 from semgrid_edu.datasets.made_truth import MadeTruth
+from semgrid_edu.datasets.named_truths import POLICIES
 from semgrid_edu.datasets.training_set import Sample
+from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.networks import SEGMENTERS, Architecture, Fcn, load_net
 from semgrid_edu.storage.files import sha256, write_text
 from semgrid_edu.storage.provenance import provenance_problems
@@ -23,6 +25,7 @@ from semgrid_edu.training.log import LOG, Step, append_step, begin_log
 class _Noise:
     """Six frames of noise, in the place of a data set on disk."""
 
+    label_set = KITTI_14
     camera = Camera(
         np.array([[186, 0, 157], [0, 184, 44], [0, 0, 1.0]]),
         np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]]),
@@ -92,6 +95,19 @@ def test_the_command_leaves_weights_log_and_provenance(monkeypatch, tmp_path):
     assert isinstance(load_net(out / "weights.safetensors", _Noise.camera).segmenter, Fcn)
 
 
+def test_a_network_gets_the_classes_of_its_data(monkeypatch, tmp_path):
+    """minisynthia has ten classes and no unknown ones; networks have KITTI-14 by default."""
+    built = {}
+    monkeypatch.setattr(_Noise, "label_set", SYNTHIA_10)
+    monkeypatch.setattr(experiment, "TrainingSet", _Noise)
+    monkeypatch.setattr(experiment, "build_net", lambda description, *_: built.update(net=description) or _Net)
+    monkeypatch.setattr(experiment, "train", lambda *_: None)
+    write_text(tmp_path / "minisynthia" / "dataset.json", "{}")
+    params = experiment.training_params("compact", 1)
+    experiment.train_network(tmp_path / "minisynthia", tmp_path / "out", "segnet", params)
+    assert built["net"].label_set == SYNTHIA_10.name
+
+
 @pytest.mark.parametrize("option", ["--seed=-1", "--iterations=0"])
 def test_numbers_that_cannot_be_are_refused(tmp_path, option):
     result = CliRunner().invoke(app, ["train", "--data", str(tmp_path), "--out", str(tmp_path / "out"), option])
@@ -117,7 +133,8 @@ def test_a_paper_preset_is_the_papers():
     assert experiment.training_params("paper", 5, end_to_end=False, from_imagenet=True).image_iterations == 5
 
 
-def test_the_options_reach_the_training(monkeypatch, tmp_path):
+@pytest.mark.parametrize("truth", ["lidar", "camera-mask"])
+def test_the_options_reach_the_training(monkeypatch, tmp_path, truth):
     """The paper's networks don't fit a test: what trains them is looked at instead."""
     given = {}
     monkeypatch.setattr(experiment, "TrainingSet", _Noise)
@@ -128,20 +145,20 @@ def test_the_options_reach_the_training(monkeypatch, tmp_path):
     for path in (data / "dataset.json", imagenet):
         write_text(path, "{}")
     options = ["--preset", "paper", "--imagenet", str(imagenet), "--seed", "2", "--iterations", "7", "--two-stage"]
-    options += ["--truth", "lidar", "--resume"]
+    options += ["--truth", truth, "--resume"]
     result = CliRunner().invoke(app, ["train", "--data", str(data), "--out", str(out), *options, "--device", "cpu"])
     assert result.exit_code == 0, result.output
     assert given["net"] == experiment.architecture("segnet", "paper")
     assert given["imagenet"] == (_Net.segmenter, imagenet)
     net, dataset, folder, params, seed, resume, device = given["train"]
-    assert dataset.made == MadeTruth()
+    assert dataset.made == MadeTruth(POLICIES[truth])
     assert (net, folder, seed, resume, device) == (_Net, out, 2, True, torch.device("cpu"))
     assert params == experiment.training_params("paper", 7, end_to_end=False, from_imagenet=True)
     provenance = json.loads((out / "provenance.json").read_text())
     written = "--segmenter segnet --preset paper --imagenet vgg16.safetensors --seed 2 --iterations 7 --two-stage"
-    assert provenance["command"] == f"semgrid-edu train --data minikitti --out out {written} --truth lidar"
+    assert provenance["command"] == f"semgrid-edu train --data minikitti --out out {written} --truth {truth}"
     assert provenance["resumed"] is True
-    assert provenance["truth"] == asdict(MadeTruth())
+    assert provenance["truth"] == asdict(dataset.made)
     assert provenance["params"]["weight_limit"] == "inf"
     assert provenance["imagenet"] == sha256(imagenet)
 
@@ -167,7 +184,7 @@ def test_ctrl_c_says_how_to_go_on(monkeypatch, tmp_path, kept):
     ("option", "message"),
     [
         (["--device", "cuda:99"], "--device: expected cpu or one of the"),
-        (["--truth", "guessed"], "--truth: expected true or lidar, found 'guessed'"),
+        (["--truth", "guessed"], "--truth: expected one of true, lidar, no-cleanup"),
         (["--preset", "huge"], "--preset: expected compact or paper, found 'huge'"),
         (["--segmenter", "unknown"], f"name: expected one of {', '.join(SEGMENTERS)}"),
         (["--imagenet", "nowhere.safetensors"], "nowhere.safetensors: expected a safetensors file"),

@@ -7,8 +7,8 @@ from semgrid_edu.experiments.tables import markdown_table
 from semgrid_edu.metrics import METRICS
 
 SECTIONS = {
-    "variants": "Networks that are trained otherwise. Usual: SegNet, 20 planes 0.2 m apart, occupancy grid, reduction, "
-    "balancing, labels made with the LIDAR.",
+    "variants": "Networks that are trained differently. Usual: SegNet, 20 planes 0.2 m apart, occupancy grid, "
+    "reduction, balancing, labels made with the LIDAR.",
     "calibration": "The usual network, tested with a wrong calibration: degrees of pitch (positive: believed to look "
     "further down) and yaw (to the left), metres of height.",
     "frames": "A quarter of the training frames, against all of them.",

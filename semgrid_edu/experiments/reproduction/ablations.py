@@ -4,21 +4,18 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from semgrid_edu.crf import expected_calibration_error
-from semgrid_edu.experiments.measured import all_metrics, compared, measured, on_cells
+from semgrid_edu.experiments.measured import all_metrics, measured, on_cells
+from semgrid_edu.experiments.reproduction.accuracy_tables import TRUTHS, comparison
 from semgrid_edu.experiments.reproduction.calibration_errors import CalibrationError
 from semgrid_edu.experiments.reproduction.counting import by_seed, distance_band_names
 from semgrid_edu.experiments.reproduction.paper import NETWORKS
 from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.experiments.reproduction.scales import Scale
-from semgrid_edu.experiments.reproduction.score_runs import (
-    NETWORK,
-    WITH_CRF,
-    WITH_SEARCHED,
-    ScoreRun,
-)
+from semgrid_edu.experiments.reproduction.score_runs import NETWORK, WITH_CRF, WITH_SEARCHED, ScoreRun
+from semgrid_edu.experiments.reproduction.table_runs import table1_runs
 from semgrid_edu.experiments.reproduction.variants import Variant
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.metrics import METRICS, pixel_accuracy
+from semgrid_edu.metrics import pixel_accuracy
 
 VARIANTS = {
     "1 plane": Variant(n_planes=1),
@@ -31,44 +28,37 @@ VARIANTS = {
     "no 1x1 reduction": Variant(reduces=False),
     "no balancing": Variant(balanced=False),
 }
-"""What is other than usual: 20 planes 0.2 m apart, with occupancy grid, reduction and balancing."""
+"""Each differs in one thing from the usual network: 20 planes 0.2 m apart, occupancy grid, reduction, balancing."""
 
 CALIBRATION_ERRORS = (
     *(CalibrationError(pitch=size) for size in (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)),
     *(CalibrationError(yaw=size) for size in (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)),
     *(CalibrationError(height=size) for size in (-0.2, -0.1, 0.1, 0.2)),
 )
-"""Errors of the calibration that the trained network is given when it is tested: degrees, metres."""
+"""Errors in the calibration that the trained network is given when it is tested: degrees, metres."""
 
 FEW = 4
 """The small training set has one in so many frames."""
 
 
 def usual_runs(scale: Scale, seeds: int) -> list[ScoreRun]:
-    """Return the runs of the usual network, which are SegNet's of Table 1.
-
-    Parameters
-    ----------
-    scale : Scale
-        How large they are.
-    seeds : int
-        Number of seeds.
+    """Return the runs of the usual network, which are SegNet's of Table 1. Parameters are those of `table1_runs`.
 
     Returns
     -------
     list of ScoreRun
         One per seed.
     """
-    return [scale.scored(scale.kitti, "segnet", seed) for seed in range(seeds)]
+    return table1_runs(scale, seeds)["segnet"]
 
 
 def variant_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
-    """Return the runs of the networks that are other than usual. Parameters are those of `usual_runs`.
+    """Return the runs of the networks that differ from the usual one. Parameters are those of `table1_runs`.
 
     Returns
     -------
     dict of str to list of ScoreRun
-        By what is other, one per seed.
+        By what differs, one per seed.
     """
     found = {
         name: [scale.scored(scale.kitti, "segnet", seed, variant=variant, crf=False) for seed in range(seeds)]
@@ -82,7 +72,7 @@ def variant_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
 
 
 def small_set_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
-    """Return the runs of the three networks of Table 1 on a part of the frames. Parameters are those of `usual_runs`.
+    """Return the runs of the three networks of Table 1 on a part of the frames. Parameters are those of `table1_runs`.
 
     Returns
     -------
@@ -97,7 +87,7 @@ def small_set_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
 
 
 def miscalibrated_runs(scale: Scale, seeds: int) -> dict[CalibrationError, list[ScoreRun]]:
-    """Return the runs of the usual network with wrong calibrations. Parameters are those of `usual_runs`.
+    """Return the runs of the usual network with wrong calibrations. Parameters are those of `table1_runs`.
 
     Returns
     -------
@@ -111,12 +101,12 @@ def miscalibrated_runs(scale: Scale, seeds: int) -> dict[CalibrationError, list[
 
 
 def ablation_runs(scale: Scale, seeds: int) -> list[Run]:
-    """Return all runs of the ablations. Parameters are those of `usual_runs`.
+    """Return all runs of the ablations. Parameters are those of `table1_runs`.
 
     Returns
     -------
     list of Run
-        The usual networks first; then what needs no other training; then the variants.
+        The usual networks first; then what needs no other training run; then the variants.
     """
     others = (miscalibrated_runs(scale, seeds), variant_runs(scale, seeds), small_set_runs(scale, seeds))
     return [*usual_runs(scale, seeds), *(run for found in others for runs in found.values() for run in runs)]
@@ -154,26 +144,17 @@ def ablations(scale: Scale, seeds: int, root: Path) -> dict:
 
 def _row(what: str, runs: Sequence[ScoreRun], usual: Sequence[ScoreRun], root: Path) -> dict:
     """Return the scores of a variant and its differences from the usual network, by truth, cells and metric."""
-    scores, differences = {}, {}
-    for truth in ("lidar", "true"):
-        ours, theirs = (by_seed(some, root, NETWORK, truth) for some in (runs, usual))
-        scores[truth] = all_metrics(ours, KITTI_14)
-        differences[truth] = {
-            cells: {
-                name: compared(on_cells(ours, cells, KITTI_14), on_cells(theirs, cells, KITTI_14), metric)
-                for name, metric in METRICS.items()
-            }
-            for cells in ("all", "semantic")
-        }
-    return {"what": what, "scores": scores, "differences": differences}
+    scores = {truth: all_metrics(by_seed(runs, root, NETWORK, truth), KITTI_14) for truth in TRUTHS}
+    return {"what": what, "scores": scores, "differences": comparison(what, runs, usual, root, KITTI_14)["scores"]}
 
 
 def _small_sets(scale: Scale, seeds: int, root: Path) -> list[dict]:
     """Return each network's scores with few frames, and what it loses against all of them."""
-    rows = []
+    rows, every = [], table1_runs(scale, seeds)
     for segmenter, few in small_set_runs(scale, seeds).items():
-        many = [scale.scored(scale.kitti, segmenter, seed) for seed in range(seeds)]
-        rows.append(_row(f"{NETWORKS[segmenter]}, {few[0].network.image_stage.n_frames} frames", few, many, root))
+        rows.append(
+            _row(f"{NETWORKS[segmenter]}, {few[0].network.image_stage.n_frames} frames", few, every[segmenter], root)
+        )
     return rows
 
 

@@ -16,7 +16,7 @@ from semgrid_edu.experiments.baselines import majority_class
 from semgrid_edu.experiments.learned_grids import best_labels
 from semgrid_edu.experiments.reproduction.calibration_errors import EXACT, CalibrationError
 from semgrid_edu.experiments.reproduction.counting import CountingRun, GridCounts
-from semgrid_edu.experiments.reproduction.data_runs import RECIPE_OF, ArraysRun
+from semgrid_edu.experiments.reproduction.data_runs import ArraysRun
 from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.experiments.reproduction.training_runs import GridStageRun
 from semgrid_edu.experiments.single_sources import (
@@ -71,8 +71,7 @@ class BaselineRun(CountingRun):
     @property
     def steps(self) -> int:
         """Number of frames that are scored."""
-        routes = RECIPE_OF[self.frames.data.data].routes
-        return sum(len(route.labelled) for route in routes if route.split == self.frames.split)
+        return self.frames.n_labelled
 
     @property
     def pace(self) -> str:

@@ -1,4 +1,4 @@
-"""Errors of calibration: the network believes the camera to stand and to look a little otherwise than it does (3.3)."""
+"""Errors of calibration: the camera stands and looks a little differently from what the network is told (3.3)."""
 
 from dataclasses import dataclass, replace
 

@@ -6,10 +6,10 @@ from itertools import chain
 from semgrid_edu.experiments.reproduction.baseline_runs import BaselineRun
 from semgrid_edu.experiments.reproduction.calibration_errors import CalibrationError
 from semgrid_edu.experiments.reproduction.overturned_runs import OverturnedRun
-from semgrid_edu.experiments.reproduction.paper import NETWORKS
 from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.experiments.reproduction.scales import Scale
 from semgrid_edu.experiments.reproduction.score_runs import ScoreRun
+from semgrid_edu.experiments.reproduction.table_runs import table1_runs
 from semgrid_edu.experiments.reproduction.time_runs import TimeRun
 from semgrid_edu.experiments.reproduction.variants import Variant
 
@@ -79,7 +79,7 @@ def runs_of_claims(scale: Scale, seeds: int) -> ClaimRuns:
     ClaimRuns
     """
     every, all_seeds = range(seeds), max(seeds, scale.table1_seeds if seeds == scale.seeds else seeds)
-    networks = {name: [scale.scored(scale.kitti, name, seed) for seed in range(all_seeds)] for name in NETWORKS}
+    networks = table1_runs(scale, all_seeds)
     usual = networks["segnet"][:seeds]
     blind, unreduced = (
         [scale.scored(scale.kitti, "segnet", seed, variant=variant, crf=False) for seed in every]

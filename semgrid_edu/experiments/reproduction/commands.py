@@ -12,6 +12,7 @@ HELP = {
     "table3": "Table 3: SegNet's confusion matrix on data without any error.",
     "claims": "The paper's nine claims, each with a verdict.",
     "ablations": "What the paper leaves open: planes, occupancy, reduction, balancing, calibration, frames, distance.",
+    "truth-costs": "What training costs on truth made in other ways: clean-up, mask, de-skew, scans added up.",
     "figures": "Figures 6 and 7: a few test frames with their labels and grids.",
     "all": "All of these.",
 }

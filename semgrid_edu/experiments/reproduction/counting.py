@@ -1,7 +1,6 @@
 """Grids counted against the truth, frame by frame, by distance, and by how sure they are (section 4.2)."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +10,8 @@ from semgrid_edu.crf import reliability
 from semgrid_edu.crf.temperature import Reliability
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.experiments.confusions import FrameConfusions, load_confusions, save_confusions, seed_confusions
+from semgrid_edu.experiments.distances import band_names, distance_bands
 from semgrid_edu.experiments.reproduction.runs import Run
-from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.storage.arrays import read_arrays, write_arrays
 
@@ -24,8 +23,8 @@ BANDS = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, np.inf)
 
 
 def distance_band_names() -> list[str]:
-    """Return the names of the bands of distance, nearest first."""
-    return [f"{low:g}-{high:g} m" if np.isfinite(high) else f"beyond {low:g} m" for low, high in pairwise(BANDS)]
+    """Return the names of the bands of distance, nearest first, such as "0-10 m"."""
+    return band_names(BANDS)
 
 
 class CountingRun(Run):
@@ -49,6 +48,11 @@ class CountingRun(Run):
         -------
         FrameConfusions
             With one method, called `method`.
+
+        Raises
+        ------
+        DataError
+            When the run hasn't ended, or its file is damaged.
         """
         found = load_confusions(self.folder(root) / CONFUSIONS)
         bands = [band] if band else distance_band_names()
@@ -63,6 +67,16 @@ class CountingRun(Run):
             The folder of all runs.
         method : str
             Such as `NETWORK`.
+
+        Returns
+        -------
+        Reliability
+            One entry per bin of confidence.
+
+        Raises
+        ------
+        DataError
+            When the run hasn't ended, or its file is damaged.
         """
         cells, confidence, right = read_arrays(self.folder(root) / RELIABILITY)[method]
         some = np.maximum(cells, 1)
@@ -86,6 +100,13 @@ def by_seed(
     Returns
     -------
     (S, V, C, C) int64
+
+    Raises
+    ------
+    ArgumentError
+        When there is no run, or two of them were scored on other frames.
+    DataError
+        When a run hasn't ended, or its file is damaged.
     """
     return seed_confusions([run.confusions(root, method, truth, band) for run in runs], method)
 
@@ -103,7 +124,7 @@ class GridCounts:
         self.frames = frames
         truth, true = frames.arrays["truth"], frames.arrays["true"]
         self.truths = {"true": true} if truth is true else {"lidar": truth, "true": true}
-        self.band = distance_bands(frames.spec)
+        self.band = distance_bands(frames.spec, BANDS)
         self.matrices: dict[str, list[NDArray]] = {}
         self.sure: dict[str, NDArray] = {}
 
@@ -158,19 +179,3 @@ class GridCounts:
 def _key(method: str, truth: str, band: str) -> str:
     """Return the name that a method has in the file of confusion matrices."""
     return f"{method}, {truth} labels, {band}"
-
-
-def distance_bands(spec: GridSpec) -> NDArray[np.int64]:
-    """Return the band of distance that each cell lies in.
-
-    Parameters
-    ----------
-    spec : GridSpec
-        The grid.
-
-    Returns
-    -------
-    (H, W) int64
-        Number of the band of `distance_band_names`, by the horizontal distance from the LIDAR to the cell's centre.
-    """
-    return np.digitize(np.hypot(*np.moveaxis(spec.centers(), -1, 0)), BANDS[1:-1])

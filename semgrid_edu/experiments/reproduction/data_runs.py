@@ -17,7 +17,7 @@ def _short(split: str, layout: str, n_frames: int = 6) -> Route:
 
 
 def _routes(number: int, n_frames: int) -> tuple[Route, ...]:
-    """Return short routes to test on, by turns through a junction and a bend."""
+    """Return short routes to test on, through a junction and a bend in turn."""
     return tuple(_short("test", ("junction", "bend")[k % 2], n_frames) for k in range(number))
 
 
@@ -108,7 +108,8 @@ class ArraysRun(Run):
     split : str
         One of its splits, such as "train".
     truth : str
-        "true" for the simulator's labels, "lidar" for labels made with the LIDAR as the paper makes them.
+        "true" for the simulator's labels, "lidar" for labels made with the LIDAR as the paper makes them, or another
+        key of `POLICIES`.
     preset : str
         "compact" or "paper": decides the grid and the size of the images, see `architecture`.
     """
@@ -135,6 +136,11 @@ class ArraysRun(Run):
         return sum(route.n_frames for route in RECIPE_OF[self.data.data].routes if route.split == self.split)
 
     @property
+    def n_labelled(self) -> int:
+        """Number of labelled frames, which `frames` returns."""
+        return sum(len(route.labelled) for route in RECIPE_OF[self.data.data].routes if route.split == self.split)
+
+    @property
     def pace(self) -> str:
         """It depends on the size of the grid."""
         return f"arrays {self.preset}"
@@ -158,6 +164,11 @@ class ArraysRun(Run):
         Returns
         -------
         TrainingSet
+
+        Raises
+        ------
+        DataError
+            When the data set is missing or damaged.
         """
         usual, made = architecture("segnet", self.preset), chosen_truth(self.truth)
         return TrainingSet(self.data.dataset_dir(root), self.split, usual.grid, usual.image_size, made=made)

@@ -1,4 +1,4 @@
-"""What is other than in the paper, at each scale: it stands below every table (section 4)."""
+"""What differs from the paper at each scale: it stands below every table (section 4)."""
 
 from semgrid_edu.experiments.reproduction.data_runs import RECIPE_OF
 from semgrid_edu.experiments.reproduction.scales import Scale

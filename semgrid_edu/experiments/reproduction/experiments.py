@@ -15,16 +15,18 @@ from semgrid_edu.experiments.reproduction.accuracy_tables import (
     crf_gains,
     network_gains,
 )
-from semgrid_edu.experiments.reproduction.baseline_runs import BaselineRun
 from semgrid_edu.experiments.reproduction.confusion_table import confusion_markdown, confusion_result
 from semgrid_edu.experiments.reproduction.figure_pictures import figures_markdown, figures_picture
 from semgrid_edu.experiments.reproduction.figure_runs import figure_runs, shown_frames
 from semgrid_edu.experiments.reproduction.judging import claim_runs, claims_markdown, claims_picture, judge_claims
-from semgrid_edu.experiments.reproduction.paper import NETWORKS, TABLE_1_SCORES, TABLE_2_SCORES
+from semgrid_edu.experiments.reproduction.paper import TABLE_1_SCORES, TABLE_2_SCORES
 from semgrid_edu.experiments.reproduction.pictures import ablations_picture, accuracy_picture, confusion_picture
 from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.experiments.reproduction.scales import Scale
 from semgrid_edu.experiments.reproduction.score_runs import ScoreRun
+from semgrid_edu.experiments.reproduction.table_runs import table1_baselines, table1_runs, table2_runs, table3_runs
+from semgrid_edu.experiments.reproduction.truth_cost_tables import truth_costs_markdown, truth_costs_picture
+from semgrid_edu.experiments.reproduction.truth_costs import truth_cost_runs, truth_costs
 from semgrid_edu.labels import KITTI_14
 
 
@@ -48,6 +50,8 @@ class Experiment:
         result -> Markdown.
     picture : callable
         (result, folder of all runs) -> Figure.
+    deviations : tuple of str
+        In what it differs from the paper beside what all experiments on these data do, one sentence each.
     """
 
     title: str
@@ -57,63 +61,7 @@ class Experiment:
     result: Callable[[Scale, int, Path], dict]
     markdown: Callable[[dict], str]
     picture: Callable[[dict, Path], Figure]
-
-
-def table1_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
-    """Return the runs of Table 1.
-
-    Parameters
-    ----------
-    scale : Scale
-        How large they are.
-    seeds : int
-        Number of seeds.
-
-    Returns
-    -------
-    dict of str to list of ScoreRun
-        By image network one per seed.
-    """
-    return {segmenter: [scale.scored(scale.kitti, segmenter, seed) for seed in range(seeds)] for segmenter in NETWORKS}
-
-
-def table1_baselines(scale: Scale, seeds: int) -> list[BaselineRun]:
-    """Return the runs of the baselines that Table 1's SegNet is compared with, one per seed.
-
-    Parameters
-    ----------
-    scale : Scale
-        How large they are.
-    seeds : int
-        Number of seeds.
-
-    Returns
-    -------
-    list of BaselineRun
-    """
-    return [BaselineRun(run.network, run.frames) for run in table1_runs(scale, seeds)["segnet"]]
-
-
-def table2_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
-    """Return the runs of Table 2: routes that were never driven in training. Parameters are those of `table1_runs`.
-
-    Returns
-    -------
-    dict of str to list of ScoreRun
-        By image network, SegNet alone, one per seed.
-    """
-    return {"segnet": [scale.scored(scale.chroma, "segnet", seed) for seed in range(seeds)]}
-
-
-def table3_runs(scale: Scale, seeds: int) -> list[ScoreRun]:
-    """Return the runs of Table 3: SegNet on data without any error. Parameters are those of `table1_runs`.
-
-    Returns
-    -------
-    list of ScoreRun
-        One per seed.
-    """
-    return [scale.scored(scale.synthia, "segnet", seed, truth="true", crf=False) for seed in range(seeds)]
+    deviations: tuple[str, ...] = ()
 
 
 def _seed_by_seed(runs: Mapping[str, Sequence[Run]]) -> list[Run]:
@@ -179,6 +127,20 @@ EXPERIMENTS = {
         ablations,
         ablations_markdown,
         lambda result, _: ablations_picture(result),
+    ),
+    "truth-costs": Experiment(
+        "What training costs on truth that is made in other ways",
+        "kitti",
+        lambda scale: scale.seeds,
+        truth_cost_runs,
+        truth_costs,
+        truth_costs_markdown,
+        lambda result, _: truth_costs_picture(result),
+        (
+            "The paper learns from one kind of truth. Three choices of the policy laboratory aren't trained on: scans "
+            "after the labelled one, and image labels for each scan, because the drives end with their one labelled "
+            "frame; and the mask of what is visible to the LIDAR, which hardly changes the labels.",
+        ),
     ),
     "figures": Experiment(
         "Figures 6 and 7",

@@ -29,7 +29,7 @@ class FigureRun(Run):
     Parameters
     ----------
     network : GridStageRun
-        The training of the network.
+        The run that trains the network.
     frames : ArraysRun
         The test frames.
     """
@@ -91,6 +91,11 @@ class FigureRun(Run):
         -------
         dict of str to (N, ...) arrays
             "frame" (N,), "image" (N, 3, h, w), and grids (N, H, W): "truth" as learnt, "true", "network", "refined".
+
+        Raises
+        ------
+        DataError
+            When the run hasn't ended, or its file is damaged.
         """
         return read_arrays(self.folder(root) / GRIDS)
 

@@ -13,7 +13,7 @@ from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.experiments.confusions import FrameConfusions, load_confusions, save_confusions
 from semgrid_edu.experiments.learned_grids import learned_log_g
 from semgrid_edu.experiments.reproduction.counting import CONFUSIONS, CountingRun
-from semgrid_edu.experiments.reproduction.data_runs import RECIPE_OF, ArraysRun
+from semgrid_edu.experiments.reproduction.data_runs import ArraysRun
 from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.experiments.reproduction.training_runs import GridStageRun
 from semgrid_edu.grid import GridSpec
@@ -33,7 +33,7 @@ class OverturnedRun(CountingRun):
     Parameters
     ----------
     network : GridStageRun
-        The training of the network.
+        The run that trains the network.
     frames : ArraysRun
         The frames.
     """
@@ -54,7 +54,7 @@ class OverturnedRun(CountingRun):
     @property
     def steps(self) -> int:
         """Number of frames."""
-        return sum(len(route.labelled) for route in RECIPE_OF[self.frames.data.data].routes)
+        return self.frames.n_labelled
 
     @property
     def pace(self) -> str:

@@ -77,7 +77,7 @@ def ablations_picture(result: dict) -> Figure:
     figure, axes = plt.subplots(1, 4, figsize=(19, 6), layout="constrained")
     trained = [row for row in result["variants"] if row["what"] != "usual"] + result["frames"]
     for ax, rows, title in zip(
-        axes, (trained, result["calibration"]), ("trained otherwise", "wrong calibration"), strict=False
+        axes, (trained, result["calibration"]), ("trained differently", "wrong calibration"), strict=False
     ):
         for place, row in enumerate(rows):
             draw_score(ax, place, row["differences"]["true"]["all"]["pixel accuracy"])

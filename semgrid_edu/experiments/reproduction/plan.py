@@ -82,6 +82,11 @@ def estimate(runs: list[Run], root: str | Path) -> TimeEstimate:
     -------
     TimeEstimate
         Of the runs that haven't ended.
+
+    Raises
+    ------
+    DataError
+        When what a run recorded is damaged.
     """
     paces: dict[str, list[float]] = {}
     for run in runs:

@@ -1,10 +1,12 @@
 """From a request to results: the plan and its estimate, the runs, the tables (section 4)."""
 
+import os
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.reproduction.execute import execute_plan
 from semgrid_edu.experiments.reproduction.experiments import EXPERIMENTS, Experiment
 from semgrid_edu.experiments.reproduction.one_run import check_runs_folder
@@ -89,7 +91,17 @@ def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = F
     -------
     str
         What went wrong, one line per run; empty when all went well.
+
+    Raises
+    ------
+    ArgumentError
+        When something that was asked for doesn't exist, or when torchrun started this process: two of them would do the
+        same runs in the same folders.
     """
+    started = int(os.environ.get("WORLD_SIZE", 1))
+    if started > 1:
+        expected = f"{started}, by which each training run starts torchrun itself"
+        raise ArgumentError("--processes", expected, f"a command that torchrun started {started} times")
     check_workers(request.workers or 1)
     root = check_runs_folder(request.runs)
     with nullcontext() if plan_only else sole_writer(root):

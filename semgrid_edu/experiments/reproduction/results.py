@@ -41,16 +41,19 @@ def write_result(name: str, experiment: Experiment, scale: Scale, seeds: int, ro
         The Markdown.
     """
     runs = with_needs(experiment.runs(scale, seeds))
+    records = [run.record(root) for run in runs]
+    processes = max(record.get("processes", 1) for record in records)
+    command = f"semgrid-edu reproduce {name} --scale {scale.name} --seeds {seeds} --runs RUNS --out OUT"
     made_by = {
         "experiment": name,
         "title": experiment.title,
-        "command": f"semgrid-edu reproduce {name} --scale {scale.name} --seeds {seeds} --runs RUNS --out OUT",
+        "command": command + (f" --processes {processes}" if processes > 1 else ""),
         "scale": scale.name,
         "seeds": seeds,
         "iterations": [scale.image_iterations, scale.grid_iterations],
         "frames and drives": frame_counts(getattr(scale, experiment.field)),
-        "deviations": deviations(scale, experiment.field),
-        "commits": sorted({str(run.record(root)["commit"]) for run in runs}),
+        "deviations": [*deviations(scale, experiment.field), *experiment.deviations],
+        "commits": sorted({str(record["commit"]) for record in records}),
         "versions": versions("numpy", "torch", "numba", "scipy"),
     }
     result = made_by | experiment.result(scale, seeds, root)
@@ -79,6 +82,11 @@ def times(runs: Sequence[Run], root: Path) -> dict:
     -------
     dict
         "hours" of all runs, one after the other; "minutes" of each run; the "dates" on which they ended.
+
+    Raises
+    ------
+    DataError
+        When a run hasn't ended, or what it recorded is damaged.
     """
     ended = {run.name: run.record(root) for run in runs}
     return {
@@ -106,6 +114,6 @@ def result_markdown(result: dict, experiment: Experiment) -> str:
     return (
         f"# {experiment.title}\n\nScale {result['scale']}, number of seeds: {result['seeds']}. Means over the seeds; "
         "in brackets 95 % intervals over drives and seeds. Per cent.\n\n"
-        f"{experiment.markdown(result)}\n\nOther than in the paper:\n\n{listed}\n\n"
+        f"{experiment.markdown(result)}\n\nWhat differs from the paper:\n\n{listed}\n\n"
         f"Made by `{result['command']}`, commit {', '.join(result['commits'])}.\n"
     )

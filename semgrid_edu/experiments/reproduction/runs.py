@@ -110,13 +110,13 @@ class Run(ABC):
     def settings(self) -> dict:
         """Return what decides the run, as JSON gives it back.
 
-        What is as usual is left out, so that a run stays the same run when a later version knows more settings.
+        Fields with their default values are left out, so that a run stays the same when a later version adds fields.
         """
         return json.loads(json.dumps(_unusual(self)))
 
 
 def _unusual(thing: object) -> object:
-    """Return the kind of a dataclass and its fields that differ from their defaults; anything else as it is."""
+    """Return the kind of a dataclass and its fields, without those at their defaults; anything else as it is."""
     if isinstance(thing, tuple):
         return [_unusual(part) for part in thing]
     if not is_dataclass(thing):

@@ -1,7 +1,8 @@
-"""The scales at which the paper's experiments can be done, and what each has other than the paper (section 4)."""
+"""The scales at which the paper's experiments can be done (section 4)."""
 
 from dataclasses import dataclass
 
+from semgrid_edu.datasets.named_truths import POLICIES
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.experiments.reproduction.data_runs import RECIPE_OF, ArraysRun, DataRun
 from semgrid_edu.experiments.reproduction.score_runs import ScoreRun
@@ -26,9 +27,11 @@ class Scale:
     preset : str
         "compact" or "paper": networks, images and grid, see `architecture`.
     image_iterations, grid_iterations : int
-        Steps of the two stages of a training.
+        Steps of the two stages of training.
     table1_seeds, seeds : int
         Number of seeds for Table 1, and for everything else.
+    policies : tuple of str
+        The ways to make labels, beside the usual one, that networks learn from: keys of `POLICIES`.
     """
 
     name: str
@@ -43,6 +46,7 @@ class Scale:
     grid_iterations: int
     table1_seeds: int
     seeds: int
+    policies: tuple[str, ...] = tuple(name for name in POLICIES if name != "lidar")
 
     @property
     def frames_to_train(self) -> int:
@@ -50,7 +54,7 @@ class Scale:
         return sum(len(route.labelled) for route in RECIPE_OF[self.kitti].routes if route.split == "train")
 
     def image_stage(self, data: str, segmenter: str, seed: int, n_frames: int | None = None) -> ImageStageRun:
-        """Return the training of an image network.
+        """Return the run that trains an image network.
 
         Parameters
         ----------
@@ -59,7 +63,7 @@ class Scale:
         segmenter : str
             The image network, a key of `SEGMENTERS`.
         seed : int
-            Seed of the training.
+            Seed of the run.
         n_frames : int, optional
             How many frames it learns from; all when left out.
         """
@@ -75,7 +79,7 @@ class Scale:
         variant: Variant = USUAL,
         n_frames: int | None = None,
     ) -> GridStageRun:
-        """Return the training of a whole network.
+        """Return the run that trains a whole network.
 
         Parameters
         ----------
@@ -84,11 +88,11 @@ class Scale:
         segmenter : str
             The image network, a key of `SEGMENTERS`.
         seed : int
-            Seed of the training.
+            Seed of the run.
         truth : str
             What it learns from, see `ArraysRun`.
         variant : Variant
-            What is other than in the paper.
+            What differs from the paper's network.
         n_frames : int, optional
             How many frames it learns from; all when left out.
         """
@@ -105,7 +109,7 @@ class Scale:
         n_frames: int | None = None,
         crf: bool = True,
     ) -> ScoreRun:
-        """Return the scoring of a network on the test frames of the data that it learned from.
+        """Return the run that scores a network on the test frames of the data that it learned from.
 
         Parameters
         ----------
@@ -118,7 +122,7 @@ class Scale:
         return ScoreRun(network, self.arrays(data, "test", truth), crf)
 
     def arrays(self, data: str, split: str, truth: str) -> ArraysRun:
-        """Return the making of the arrays of a split. Parameters are those of `ArraysRun`."""
+        """Return the run that makes the arrays of a split. Parameters are those of `ArraysRun`."""
         return ArraysRun(DataRun(data), split, truth, self.preset)
 
 
@@ -138,6 +142,7 @@ SCALES = {
             10,
             table1_seeds=2,
             seeds=2,
+            policies=("no-cleanup", "accumulated-carved"),
         ),
         Scale(
             "reduced",

@@ -13,7 +13,7 @@ from semgrid_edu.crf import CrfParams, at_temperature, mean_field, unary_from_lo
 from semgrid_edu.experiments.learned_grids import learned_log_g
 from semgrid_edu.experiments.reproduction.calibration_errors import EXACT, CalibrationError
 from semgrid_edu.experiments.reproduction.counting import CountingRun, GridCounts
-from semgrid_edu.experiments.reproduction.data_runs import RECIPE_OF, ArraysRun
+from semgrid_edu.experiments.reproduction.data_runs import ArraysRun
 from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.experiments.reproduction.training_runs import GridStageRun
 from semgrid_edu.networks import WEIGHTS, load_net
@@ -37,7 +37,7 @@ class ScoreRun(CountingRun):
     Parameters
     ----------
     network : GridStageRun
-        The training of the network.
+        The run that trains the network.
     frames : ArraysRun
         The frames; with labels made with the LIDAR, they are scored against these and against the true ones.
     crf : bool
@@ -65,8 +65,7 @@ class ScoreRun(CountingRun):
     @property
     def steps(self) -> int:
         """Number of frames that are scored."""
-        routes = RECIPE_OF[self.frames.data.data].routes
-        return sum(len(route.labelled) for route in routes if route.split == self.frames.split)
+        return self.frames.n_labelled
 
     @property
     def pace(self) -> str:
@@ -100,5 +99,5 @@ class ScoreRun(CountingRun):
 
 
 def _refined(params: CrfParams, temperature: float, log_g: NDArray, o: NDArray) -> NDArray:
-    """Refine a grid by the CRF, after it was made less or more sure."""
+    """Refine a grid by the CRF, after its log-probabilities were divided by a temperature."""
     return mean_field(unary_from_log_probability(at_temperature(log_g, temperature)), o, params)

@@ -31,7 +31,7 @@ class TimeRun(Run):
     Parameters
     ----------
     first, second : GridStageRun
-        The trainings of the two networks.
+        The runs that train the two networks.
     frames : ArraysRun
         The frames.
     """

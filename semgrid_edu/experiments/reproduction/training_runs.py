@@ -20,8 +20,24 @@ from semgrid_edu.training.distributed import first_process_first, process_group
 from semgrid_edu.training.run import architecture, training_params
 
 
+class TrainingRun(Run):
+    """A run that trains, and does nothing else: one step per iteration."""
+
+    iterations: int
+
+    @property
+    def is_training(self) -> bool:
+        """It is."""
+        return True
+
+    @property
+    def steps(self) -> int:
+        """Number of training steps."""
+        return self.iterations
+
+
 @dataclass(frozen=True)
-class ImageStageRun(Run):
+class ImageStageRun(TrainingRun):
     """Train an image network on the labels of pixels; it takes the place of the paper's ImageNet weights.
 
     Parameters
@@ -60,16 +76,6 @@ class ImageStageRun(Run):
     def needs(self) -> tuple[Run, ...]:
         """The arrays."""
         return (self.arrays,)
-
-    @property
-    def is_training(self) -> bool:
-        """It is."""
-        return True
-
-    @property
-    def steps(self) -> int:
-        """Number of training steps."""
-        return self.iterations
 
     @property
     def pace(self) -> str:
@@ -115,7 +121,7 @@ class ImageStageRun(Run):
 
 
 @dataclass(frozen=True)
-class GridStageRun(Run):
+class GridStageRun(TrainingRun):
     """Train the whole network on grids, from an image network that is trained already.
 
     Parameters
@@ -127,7 +133,7 @@ class GridStageRun(Run):
     iterations : int
         Number of steps.
     variant : Variant
-        What is other than in the paper.
+        What differs from the paper's network.
     """
 
     image_stage: ImageStageRun
@@ -146,16 +152,6 @@ class GridStageRun(Run):
     def needs(self) -> tuple[Run, ...]:
         """The image network and the arrays."""
         return self.image_stage, self.arrays
-
-    @property
-    def is_training(self) -> bool:
-        """It is."""
-        return True
-
-    @property
-    def steps(self) -> int:
-        """Number of training steps."""
-        return self.iterations
 
     @property
     def pace(self) -> str:
@@ -225,6 +221,13 @@ def train_or_resume(
     ----------
     net, frames, folder, params, seed, device
         As `train` takes them.
+
+    Raises
+    ------
+    ArgumentError
+        When several processes can't share a batch evenly, or as `train` raises it.
+    DataError
+        When the checkpoint is damaged, or of another run.
     """
     if not (folder / WEIGHTS).exists():
         train(net, frames, folder, params, seed, resume=(folder / CHECKPOINT).exists(), device=device)

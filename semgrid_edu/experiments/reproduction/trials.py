@@ -14,8 +14,11 @@ from semgrid_edu.training import Objective, TrainingParams
 from semgrid_edu.training.batches import Batch
 from semgrid_edu.training.loop import learn
 
+TIMED_STEPS = 2
+"""Number of steps that are timed, after one that isn't."""
 
-def seconds_per_step(described: Architecture, params: TrainingParams, stage: str, trials: int = 2) -> float:
+
+def seconds_per_step(described: Architecture, params: TrainingParams, stage: str) -> float:
     """Return how long a training step takes on this machine's CPU, tried on grey frames.
 
     Parameters
@@ -26,8 +29,6 @@ def seconds_per_step(described: Architecture, params: TrainingParams, stage: str
         How it is trained.
     stage : str
         "image" or "grid".
-    trials : int
-        Number of steps that are timed, after one that isn't.
 
     Returns
     -------
@@ -45,6 +46,6 @@ def seconds_per_step(described: Architecture, params: TrainingParams, stage: str
     with few_threads():
         learn(objective, optimiser, batch, torch.device("cpu"))
         began = time.perf_counter()
-        for _ in range(trials):
+        for _ in range(TIMED_STEPS):
             learn(objective, optimiser, batch, torch.device("cpu"))
-    return (time.perf_counter() - began) / trials
+    return (time.perf_counter() - began) / TIMED_STEPS

@@ -1,4 +1,4 @@
-"""What a network can be other than the paper's: the rows of the ablations (section 4)."""
+"""In what a network can differ from the paper's: the rows of the ablations (section 4)."""
 
 from dataclasses import dataclass, replace
 
@@ -8,7 +8,7 @@ from semgrid_edu.planes import plane_heights
 
 @dataclass(frozen=True)
 class Variant:
-    """What a network can be other than the paper's, for the ablations.
+    """In what a network can differ from the paper's, for the ablations.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Variant:
 
     @property
     def name(self) -> str:
-        """What is other than in the paper, each part after a hyphen; empty when nothing is."""
+        """What differs from the paper, each part after a hyphen; empty when nothing does."""
         parts = (
             (f"{self.n_planes}planes", self.n_planes == USUAL.n_planes),
             (f"{self.spacing:g}m", self.spacing == USUAL.spacing),

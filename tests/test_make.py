@@ -1,0 +1,90 @@
+"""What `make demo` and `make test` run, and when they make the environment."""
+
+import os
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from semgrid_edu import make
+
+
+@pytest.fixture
+def clone(tmp_path, monkeypatch):
+    """A clone without an environment, in which no program is really run."""
+    monkeypatch.setattr(make, "CLONE", tmp_path)
+    monkeypatch.setattr(make, "ENVIRONMENT", tmp_path / ".venv")
+    monkeypatch.setattr(make, "MADE", tmp_path / ".venv" / "made")
+    for name in make.NEEDS:
+        (tmp_path / name).touch()
+    (tmp_path / "notebooks" / "deeper").mkdir(parents=True)
+    for name in ("b.ipynb", "a.ipynb", "deeper/c.ipynb"):
+        (tmp_path / "notebooks" / name).touch()
+    monkeypatch.setattr(make.venv, "create", lambda folder, with_pip: folder.mkdir(exist_ok=True))
+    return tmp_path
+
+
+@pytest.fixture
+def ran(monkeypatch):
+    """The commands that were run: program, arguments, environment variables."""
+    commands = []
+
+    def run(command, cwd, env, check):
+        commands.append((command[0].name, *command[1:], env))
+        return SimpleNamespace(returncode=0)
+
+    monkeypatch.setattr(make.subprocess, "run", run)
+    return commands
+
+
+def test_the_environment_is_made_once_and_again_when_a_pin_changes(clone, ran):
+    make.environment()
+    make.environment()
+    assert len(ran) == 1
+    assert ran[0][:4] == ("python", "-m", "pip", "install")
+    made = make.MADE.stat().st_mtime
+    os.utime(clone / "constraints.txt", (made + 5, made + 5))
+    make.environment()
+    assert len(ran) == 2
+
+
+def test_an_environment_that_could_not_be_made_is_made_again(clone, monkeypatch):
+    monkeypatch.setattr(make.subprocess, "run", lambda *_, **__: SimpleNamespace(returncode=3))
+    with pytest.raises(SystemExit) as stopped:
+        make.environment()
+    assert stopped.value.code == 3
+    assert not make.MADE.exists()
+
+
+def test_tests_are_style_tests_and_notebooks(clone, ran):
+    make.test()
+    assert [command[2] for command in ran] == ["pip", "ruff", "ruff", "pytest", "pytest"]
+    notebooks = [word for word in ran[-1][:-1] if word.endswith(".ipynb")]
+    assert len(notebooks) == 3
+    assert ran[-2][-1]["OMP_NUM_THREADS"] == "1"
+    assert all(command[-1]["OMP_WAIT_POLICY"] == "PASSIVE" for command in ran)
+
+
+def test_an_old_python_is_refused(clone, monkeypatch):
+    monkeypatch.setattr(make, "OLDEST", (sys.version_info[0], sys.version_info[1] + 1))
+    with pytest.raises(SystemExit, match="or later is needed"):
+        make.demo()
+
+
+@pytest.mark.parametrize("asked", [[], ["demos"], ["demo", "--fast"]])
+def test_what_cannot_be_asked_for_is_refused(asked):
+    with pytest.raises(SystemExit, match="usage"):
+        make.make_targets(asked)
+
+
+def test_it_needs_nothing_but_python():
+    """A fresh machine has none of the package's dependencies: -S leaves out what is installed beside Python."""
+    done = subprocess.run(
+        [sys.executable, "-S", "-E", "-m", "semgrid_edu.make"],
+        cwd=make.CLONE,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "usage" in done.stderr
