@@ -475,7 +475,7 @@ RUNS = (
     Row("a device that isn't there", f"{TRAIN} --device cuda:99", "--device: expected cpu"),
     Row("an unknown device", f"{TRAIN} --device abacus", "--device: expected"),
     Row("an unknown preset", f"{TRAIN} --preset huge", "--preset: expected compact or paper"),
-    Row("an unknown truth", f"{TRAIN} --truth guessed", "--truth: expected true or lidar"),
+    Row("an unknown truth", f"{TRAIN} --truth guessed", "--truth: expected one of true, lidar"),
     Row("an unknown image network", f"{TRAIN} --segmenter vit", "name: expected one of"),
     Row("no steps", f"{TRAIN} --iterations 0", "Invalid value for '--iterations'"),
     Row("a seed that is a word", f"{TRAIN} --seed luck", "Invalid value for '--seed'"),
@@ -663,6 +663,7 @@ EXPERIMENTS = (
         "reproduce two-stage --data NONE --runs RUNS --out log.json",
         "dataset.json: expected a file",
     ),
+    Row("a cache in place of a file", f"--cache architecture.json {TRAIN}", "architecture.json", frames()),
     Row("no validation frames, search", SEARCH, "split: expected one of", frames()),
     Row("no validation frames, learnt CRFs", LEARNED, "split: expected one of", frames()),
     Row(

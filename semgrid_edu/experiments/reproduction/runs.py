@@ -103,7 +103,7 @@ class Run(ABC):
         path = self.folder(root) / ENDED
         record = read_json(path)
         try:
-            return record | {"seconds": float(record["seconds"]), "date": str(record["date"])}
+            return record | {"seconds": float(record["seconds"]), "date": str(record.get("date", "unknown"))}
         except (ValueError, KeyError, TypeError, OverflowError) as error:
             raise DataError(path, "the record of a run that has ended", error) from error
 
