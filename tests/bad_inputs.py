@@ -372,6 +372,12 @@ WEIGHTS = (
         tensors(lambda one: one.masked_fill(one == one.max(), np.inf)),
     ),
     Row(
+        "variances below 0",
+        EVALUATE,
+        "weights.safetensors: expected variances of at least 0",
+        tensors(lambda one: -one - 1),
+    ),
+    Row(
         "weights rounded to whole numbers",
         EVALUATE,
         "doubtful: .*weights.safetensors: .* rounded",

@@ -124,7 +124,8 @@ def check_tensors(path: str | Path, found: dict[str, Tensor], expected: dict[str
     Raises
     ------
     DataError
-        When a tensor is missing, isn't the network's, has another shape, or holds a number that isn't finite.
+        When a tensor is missing, isn't the network's, has another shape, or holds a number that isn't finite or
+        a variance below 0.
     """
     for name in sorted(found.keys() | expected.keys()):
         have, want = (
@@ -134,3 +135,5 @@ def check_tensors(path: str | Path, found: dict[str, Tensor], expected: dict[str
             raise DataError(path, f"{want} for {name}", have)
         if not found[name].isfinite().all():
             raise DataError(path, f"finite numbers for {name}", "NaN or infinity")
+        if name.endswith("running_var") and found[name].min() < 0:
+            raise DataError(path, f"variances of at least 0 for {name}", float(found[name].min()))
