@@ -21,6 +21,7 @@ from semgrid_edu.datasets import KittiRawDrive, training_cache
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.experiments.reproduction.commands import HELP
 from semgrid_edu.networks import Architecture, build_net, save_net
+from semgrid_edu.storage.caching import CACHE_VARIABLE
 from semgrid_edu.training.log import Step
 
 
@@ -77,6 +78,7 @@ def place(prepared, tmp_path, monkeypatch) -> Iterator[Path]:
     """A copy to spoil, as the current folder."""
     shutil.copytree(prepared, tmp_path / "place", copy_function=copied)
     monkeypatch.chdir(tmp_path / "place")
+    monkeypatch.setenv(CACHE_VARIABLE, "")  # so that what --cache sets is undone afterwards
     yield tmp_path / "place"
     while HELD:
         HELD.pop().__exit__(None, None, None)
