@@ -63,7 +63,7 @@ def excerpt(
     frames: Annotated[int, typer.Option(min=1, help="Number of frames.")] = 6,
 ) -> None:
     """Keep a few labelled frames of a data set, in the form in which a network takes them."""
-    from semgrid_edu.datasets.samples import write_excerpt
+    from semgrid_edu.datasets.excerpts import write_excerpt
 
     write_excerpt(data, frames, folder)
 

@@ -987,12 +987,12 @@ for name, values in learned["learnt"].items():
 # %% [markdown]
 # **A searched CRF gains pixel accuracy and still costs class accuracy.** Chosen for pixel accuracy, it gains 0.4 to 0.7
 # points of it for each of the three networks, and loses 2.2 to 3.4 points of class accuracy, a third to a bit more than
-# half of what the default loses. Chosen for class accuracy, it hardly does anything: all changes are below 0.1 point, and the weights
-# are below a tenth. **Learning ends in the same place**: all weights shrink from 4 and 3 to below 0.3. The variant that
-# gains most class accuracy, 0.24 points, has learned which labels may stand beside each other, and pays 0.15 points of
-# pixel accuracy. None of these fourteen CRFs gains in both metrics. (One search for each network and one training run
-# for each variant, on simulated streets. The ranges of the search were changed once, after we had looked at the scores
-# of an earlier search.)
+# half of what the default loses. Chosen for class accuracy, it hardly does anything: all changes are below 0.1 point,
+# and the weights are below a tenth. **Learning ends in the same place**: all weights shrink from 4 and 3 to below 0.3.
+# The variant that gains most class accuracy, 0.24 points, has learned which labels may stand beside each other, and
+# pays 0.15 points of pixel accuracy. None of these fourteen CRFs gains in both metrics. (One search for each network
+# and one training run for each variant, on simulated streets. The ranges of the search were changed once, after we had
+# looked at the scores of an earlier search.)
 #
 # ## In five lines
 #

@@ -11,8 +11,9 @@ from semgrid_edu.grid import GridSpec
 def closest_returns(frame: Frame) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Find the returns that the camera sees: the closest one at each pixel.
 
-    The LIDAR stands above the camera, so it looks over things that hide from the camera what is behind them. Such
-    hidden returns mostly share their pixels with returns of what hides them, which are closer.
+    The LIDAR stands above the camera, so it looks over things that hide from the camera what is behind them. Such a
+    hidden return is left out when it shares its pixel with a return of what hides it, which is closer. With few returns
+    most share no pixel, and stay.
 
     Parameters
     ----------

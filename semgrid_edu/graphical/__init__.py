@@ -6,7 +6,6 @@ independences off the graph, and `draw` shows it.
 """
 
 from semgrid_edu.graphical.beliefs import Beliefs
-from semgrid_edu.graphical.distance import total_variation
 from semgrid_edu.graphical.drawing import draw
 from semgrid_edu.graphical.elimination_order import min_fill_order
 from semgrid_edu.graphical.exact import eliminate, enumerate_marginals, log_total, max_product
@@ -17,6 +16,7 @@ from semgrid_edu.graphical.messages import loopy_max_product, sum_product
 from semgrid_edu.graphical.model import GraphicalModel
 from semgrid_edu.graphical.products import product
 from semgrid_edu.graphical.separation import d_separated, why_dependent
+from semgrid_edu.metrics import total_variation
 
 __all__ = [
     "Beliefs",

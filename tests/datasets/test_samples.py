@@ -6,16 +6,14 @@ import pytest
 import torch
 from tiny_drive import write_tiny_dataset
 
+from semgrid_edu.datasets.excerpts import FRAMES, read_excerpt, write_excerpt
 from semgrid_edu.datasets.samples import (
-    FRAMES,
-    read_excerpt,
     sample_drive,
     sample_frames,
     sample_image_stage,
     sample_weights,
     samples_problems,
     trained_segmenters,
-    write_excerpt,
 )
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError

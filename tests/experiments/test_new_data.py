@@ -1,6 +1,8 @@
 """Checks of new data, on cases whose answer is known: by hand, from the simulator, or from a fault made on purpose."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -52,6 +54,15 @@ def test_gaps_by_hand_and_times_that_run_backwards():
     for bad in ([1.0], [0.0, 0.2, 0.1]):
         with pytest.raises(ArgumentError, match="times"):
             time_gaps(bad)
+
+
+def test_the_checks_of_the_exercise_load_neither_torch_nor_matplotlib():
+    """They would take two seconds more in each kernel that grades one."""
+    names = ("datasets.samples", "experiments.new_data.faults")
+    code = "import sys; print({'torch', 'matplotlib'} & set(sys.modules))"
+    code = "\n".join([*(f"import semgrid_edu.{name}" for name in names), code])
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"
 
 
 def test_a_simulated_drive_has_one_clock():

@@ -397,6 +397,6 @@ assert not complaint, complaint
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "agreement", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # The comparison doesn't tell whether the *new* labels, in cells that the one-scan truth leaves open, are right: they are not in the 95 %. Nor does it tell whether the labels on which both agree are right. Both are made from the
-# same image labels with the same calibration, so both have the same error of calibration (a shared error isn't outvoted), and in both hidden returns take the label of what hides them; the filter that says what moves, and how fast, is also the
-# same in all scans. To find out one needs a witness that doesn't share these errors: a sample of cells labelled by people in the LIDAR points themselves (as in SemanticKITTI), the calibration measured again with a target, or the same place
+# same image labels with the same calibration, so both have the same error of calibration (a shared error isn't outvoted), and in both hidden returns take the label of what hides them. (The filter that says what moves, and how fast, errs as well, but
+# only the carried truth uses its velocities.) To find out one needs a witness that doesn't share these errors: a sample of cells labelled by people in the LIDAR points themselves (as in SemanticKITTI), the calibration measured again with a target, or the same place
 # seen on another day. For moving things: how far is a carried car, scan by scan, from where the scan of now has it? One point for the two gaps, one for a shared error and a measurement that doesn't share it.

@@ -273,7 +273,7 @@ assert not complaint, complaint
 # %% [markdown]
 # ## Task 5: find the fault (3 points)
 #
-# Somebody hands you ten to fifteen frames of the sample drive, in which at most one thing is wrong. Complete `find_fault`: it returns one of
+# Somebody hands you nine to fifteen frames of the sample drive, in which at most one thing is wrong. Complete `find_fault`: it returns one of
 #
 # - `"none"`;
 # - `"two frames lost"`;
@@ -338,11 +338,11 @@ assert not complaint, complaint
 # %% [markdown]
 # ## Task 6: in your own words (2 points)
 #
-# A colleague has a new drive. The poses pass the test of task 4, the borders agree, the ground is level, and the network's map has a mean confidence of 0.83, as on the
+# A colleague has a new drive. The poses pass the test of task 4, the borders agree, the ground is level, and the network's map has a mean confidence of 0.82, as on the
 # sample drive. "Then the map is right, too", he says. Which conclusion holds, which doesn't, and what would you measure, without any label, before you believe the map? Name also one fault that
 # could hide behind the good readings. Five sentences are enough.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "believe-the-map", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # The checks say that geometry holds: what needs no training (evidence, occupancy, CMCDOT) can be believed. They say nothing about the semantics, because a network that learned from other images can be wrong and as sure as before:
-# on drive 0013 the map's confidence was 0.81 and 0.83, as on the sample drive. Without labels one can ask the LIDAR: are returns from the lane called road, and those from standing things something that stands? And compare the images with the training images, as a
+# on drive 0013 the map's confidence was 0.81 and 0.83, and 0.82 on the sample drive. Without labels one can ask the LIDAR: are returns from the lane called road, and those from standing things something that stands? And compare the images with the training images, as a
 # warning, not as a measure of damage. A fault that hides: mirrored poses on a straight road, every second frame lost, or swapped colours. One point for the conclusion, one for a measurement and a fault.

@@ -12,7 +12,7 @@ from semgrid_edu.experiments.new_data.domain import mean_histograms
 from semgrid_edu.experiments.new_data.drive_checks import edge_contrast, ground_plane, time_gaps
 from semgrid_edu.experiments.new_data.ego_motion import AXES, axes_errors
 from semgrid_edu.frame import Frame
-from semgrid_edu.graphical import total_variation
+from semgrid_edu.metrics import total_variation
 
 TURN = 2.0
 """By how much a sensor is turned, degrees."""

@@ -18,7 +18,7 @@ from semgrid_edu.experiments.new_data.moving_cars import Boxes, moving_hits, rea
 from semgrid_edu.experiments.new_data.network_view import network_numbers, training_images
 from semgrid_edu.experiments.tables import markdown_table
 from semgrid_edu.frame import Frame
-from semgrid_edu.graphical import total_variation
+from semgrid_edu.metrics import total_variation
 from semgrid_edu.networks import load_net
 from semgrid_edu.occupancy import State
 from semgrid_edu.pipeline import run_pipeline

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.graphical.distance import total_variation
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.products import product
 from semgrid_edu.graphical.stages.beam import BeamWorld, beam_likelihood
+from semgrid_edu.metrics import total_variation
 
 
 class BeamBeliefs(NamedTuple):

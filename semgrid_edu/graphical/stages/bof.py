@@ -8,10 +8,10 @@ most one of them could happen. And whatever arrives is taken as independent of w
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.graphical.distance import total_variation
 from semgrid_edu.graphical.stages.cells_in_a_row import DT, SPEED, Cell, CellsInARow
 from semgrid_edu.graphical.stages.joint_row import exact_beliefs, row_evidence, row_model
 from semgrid_edu.graphical.stages.stage_graph import CutEdge, StageGraph
+from semgrid_edu.metrics import total_variation
 from semgrid_edu.occupancy import BofState, bof_predict_literal, bof_update
 
 AT_THE_EDGE = CellsInARow(({"left": 0.3, "right": 0.5}, {}, {}, {"static": 0.4}), (".x..", "..x.", "...x"))
