@@ -1,8 +1,8 @@
 """The table of bad inputs: what is spoilt, which command meets it, and what it has to say. `test_bad_inputs` tries it.
 
-Each row works on a copy of what `prepare` makes: TINY, a data set with its arrays; `weights.safetensors`, a network
-that has made a step, and `image_stage.safetensors`; RUN, a training run with a log; SAMPLES, a sample with its
-provenance.
+Each row works on a copy of what the fixture `prepared` makes: TINY, a data set with its arrays; `weights.safetensors`,
+a network that has made a step, `image_stage.safetensors`, and `fresh.safetensors`, which has made none; RUN, a training
+run with a log; SAMPLES, a sample with its provenance. Where a command says that something is doubtful, it goes on.
 """
 
 import json
@@ -44,7 +44,7 @@ Spoil = Callable[[Path], object]
 
 
 class Row(NamedTuple):
-    """One kind of bad input."""
+    """One kind of bad input: its name, the command that meets it, what that says (a pattern), and what is spoilt."""
 
     kind: str
     command: str

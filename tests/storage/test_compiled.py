@@ -8,7 +8,6 @@ import pytest
 from semgrid_edu.storage import compiled
 from semgrid_edu.storage.compiled import VARIABLE, keep_compiled_functions
 
-
 pytestmark = pytest.mark.skipif(not hasattr(os, "getuid"), reason="this system has other rights to files")
 
 
