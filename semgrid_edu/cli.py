@@ -9,11 +9,13 @@ from typing import Annotated
 import typer
 from typer.core import TyperCommand
 
+from semgrid_edu.arguments import check_arguments, tell
 from semgrid_edu.data_commands import data, report
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.experiments.commands import keep_result, reproduce
 from semgrid_edu.experiments.reproduction.commands import add_commands
 from semgrid_edu.storage.caching import CACHE_VARIABLE
+from semgrid_edu.storage.compiled import keep_compiled_functions
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 course = typer.Typer(no_args_is_help=True, help="Build the notebooks and the exercises.")
@@ -55,7 +57,8 @@ def demo(
     given = [option for option, value in named.items() if value is not None]
     if given and len(given) < len(named):
         raise ArgumentError(", ".join(named), "all three or none", f"only {' and '.join(given)}")
-    chosen = KittiRawDrive(kitti, date, drive) if kitti and date and drive else sample_drive()
+    chosen = KittiRawDrive(kitti, date, drive) if given else sample_drive()
+    tell(chosen.doubts())
     page = write_demo(chosen, sample_weights(), out, stages)
     typer.echo(f"open {page.resolve().as_uri()}\nin one picture: {page.parent / 'overview.png'}")
 
@@ -152,9 +155,11 @@ def train(
     device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu, cuda or cuda:N.")] = "auto",
 ) -> None:
     """Train a network: first its image network, then all of it on grids. torchrun runs it in several processes."""
+    from semgrid_edu.datasets.dataset_doubts import dataset_doubts
     from semgrid_edu.training.run import chosen_truth, how_to_go_on, train_network, training_params
 
     params = training_params(preset, iterations, end_to_end=not two_stage, from_imagenet=imagenet is not None)
+    tell(dataset_doubts(data, "train"))
     choices = {"preset": preset, "imagenet": imagenet, "device": device, "made": chosen_truth(truth)}
     try:
         train_network(data, out, segmenter, params, seed, resume, **choices)
@@ -177,10 +182,13 @@ def train_crf(
     """Train a CRF on the grids of a trained network: its weights, widths, and costs of labels."""
     from dataclasses import replace
 
+    from semgrid_edu.datasets.dataset_doubts import dataset_doubts
     from semgrid_edu.experiments.learned_crf import CrfVariant, train_crf_on
+    from semgrid_edu.networks.weights import weights_doubts
     from semgrid_edu.training.crf import CRF_TRAINING
     from semgrid_edu.training.run import how_to_go_on
 
+    tell(dataset_doubts(data, split) + weights_doubts(weights))
     params = replace(CRF_TRAINING, grid_iterations=iterations)
     try:
         train_crf_on(data, weights, out, CrfVariant(split, label_costs, weight_limit), params, seed, resume)
@@ -202,6 +210,8 @@ def curves(
     if len(set(names)) < len(names):
         names = list(map(str, runs))
     axes = training_curves({name: read_log(run / LOG) for name, run in zip(names, runs, strict=True)})
+    if out.suffix[1:].lower() not in (formats := axes.figure.canvas.get_supported_filetypes()):
+        raise ArgumentError("--out", f"a picture that ends in one of {', '.join(sorted(formats))}", out)
     with atomic_path(out) as path:
         axes.figure.savefig(path, dpi=150)
     typer.echo(f"written to {out}")
@@ -215,13 +225,18 @@ def evaluate(
     confusions: Annotated[Path | None, typer.Option(help="Takes each frame's confusion matrices, as .npz.")] = None,
 ) -> None:
     """Score a trained network and the baselines on the test frames."""
+    from semgrid_edu.datasets.dataset_doubts import dataset_doubts
     from semgrid_edu.experiments.evaluate import evaluate, scores_table
+    from semgrid_edu.networks.weights import weights_doubts
 
-    keep_result(
-        out,
-        lambda: evaluate(data, weights, confusions_file=confusions),
-        lambda result: scores_table(result["scores"]),
-    )
+    if confusions and confusions.suffix != ".npz":
+        raise ArgumentError("--confusions", "a file that ends in .npz", confusions)
+
+    def scored() -> dict:
+        tell(dataset_doubts(data, "train", "test") + weights_doubts(weights))
+        return evaluate(data, weights, confusions_file=confusions)
+
+    keep_result(out, scored, lambda result: scores_table(result["scores"]))
 
 
 @app.command()
@@ -248,8 +263,15 @@ def run() -> None:
     # 1.2 s instead of 0.07 s. OpenMP reads this once, when a command loads torch or numba, so it must be set before.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     try:
+        check_arguments(sys.argv[1:])
+        if told := keep_compiled_functions():
+            typer.echo(f"semgrid-edu: {told}", err=True)
         app()
     except (ArgumentError, DataError) as error:
+        sys.exit(f"semgrid-edu: {error}")
+    except RuntimeError as error:
+        if "Symlink loop" not in str(error):
+            raise
         sys.exit(f"semgrid-edu: {error}")
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""

@@ -7,6 +7,7 @@ from semgrid_edu.crf.layer import CrfLayer
 from semgrid_edu.crf.params import CrfParams
 from semgrid_edu.errors import DataError
 from semgrid_edu.networks.weights import check_tensors
+from semgrid_edu.storage.reading import parse_json
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
 
 
@@ -44,10 +45,10 @@ def load_crf(path: str | Path) -> CrfLayer:
     """
     header, tensors = read_tensors(path)
     try:
-        description = json.loads(header["crf"])
+        description = parse_json(path, header["crf"])
         start = CrfParams(normalization=description.pop("normalization"))
         layer = CrfLayer(start, **description)
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError, RuntimeError) as error:
         raise DataError(path, "the description of a CRF in the header", f"{header}: {error}") from error
     check_tensors(path, tensors, layer.state_dict())
     layer.load_state_dict(tensors)

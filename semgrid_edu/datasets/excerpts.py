@@ -4,10 +4,11 @@ from pathlib import Path
 
 import torch
 
+from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.training_cache import SEED
 from semgrid_edu.datasets.training_set import Sample, TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.storage.provenance import write_provenance
+from semgrid_edu.storage.provenance import FILE_NAME, write_provenance
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
 
 FRAMES = "frames.safetensors"
@@ -30,7 +31,10 @@ def write_excerpt(dataset_dir: str | Path, n_frames: int, folder: str | Path) ->
     ------
     ArgumentError
         When the split has fewer frames.
+    DataError
+        When the folder lies in the data set, holds it, or has the provenance of something else, which would be lost.
     """
+    _check_place(Path(folder), Path(dataset_dir))
     training, folder = TrainingSet(dataset_dir, "train"), Path(folder)
     if not 1 <= n_frames <= len(training):
         raise ArgumentError("n_frames", f"1 to {len(training)} frames", n_frames)
@@ -39,6 +43,15 @@ def write_excerpt(dataset_dir: str | Path, n_frames: int, folder: str | Path) ->
     write_tensors(folder / FRAMES, tensors)
     command = f"semgrid-edu data excerpt --data {Path(dataset_dir).name} --frames {n_frames} {folder.name}"
     write_provenance(folder, command, SEED, ("numpy", "torch", "numba"))
+
+
+def _check_place(folder: Path, dataset_dir: Path) -> None:
+    """Refuse to write an excerpt where provenance of something else is or would be mixed with its own."""
+    here, there = folder.resolve(), dataset_dir.resolve()
+    if here.is_relative_to(there) or there.is_relative_to(here) or (folder / INDEX_FILE).exists():
+        raise DataError(folder, f"a folder apart from the data set {dataset_dir}", "one that holds it or is part of it")
+    if (folder / FILE_NAME).exists() and not (folder / FRAMES).exists():
+        raise DataError(folder, "an empty folder, or an earlier excerpt", f"the {FILE_NAME} of something else")
 
 
 def read_excerpt(folder: str | Path) -> list[Sample]:

@@ -1,6 +1,5 @@
 """The index of a data set: its labelled frames, split into those for training and those for testing (section 4)."""
 
-import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,9 +7,12 @@ from typing import Any, NamedTuple
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import LABEL_SETS, LabelSet
-from semgrid_edu.storage.reading import read_text
+from semgrid_edu.storage.reading import read_json
 
 INDEX_FILE = "dataset.json"
+
+MOST_FRAMES = 10**10
+"""KITTI's files are named by the frame's number in ten digits."""
 
 
 class LabelledFrame(NamedTuple):
@@ -95,11 +97,10 @@ def load_index(dataset_dir: str | Path) -> DatasetIndex:
     """
     root = Path(dataset_dir)
     path = root / INDEX_FILE
-    try:
-        content = json.loads(read_text(path))
-    except json.JSONDecodeError as error:
-        raise DataError(path, "JSON", error) from error
+    content = read_json(path)
     name, label_set, splits = (_entry(path, content, key) for key in ("name", "label_set", "splits"))
+    if not isinstance(name, str):
+        raise DataError(path, "name: a word or two", repr(name)[:200])
     if not isinstance(label_set, str) or label_set not in LABEL_SETS:
         raise DataError(path, f"label_set: one of {', '.join(LABEL_SETS)}", repr(label_set))
     if not isinstance(splits, dict) or not all(isinstance(frames, list) and frames for frames in splits.values()):
@@ -120,7 +121,7 @@ def _frame(path: Path, entry: Any) -> LabelledFrame:
     """Check one entry of a split."""
     date, drive, frame = (_entry(path, entry, key) for key in LabelledFrame._fields)
     sound_names = all(isinstance(name, str) and re.fullmatch(r"\w+", name) for name in (date, drive))
-    if not sound_names or type(frame) is not int or frame < 0:
+    if not sound_names or type(frame) is not int or not 0 <= frame < MOST_FRAMES:
         raise DataError(path, 'a frame like {"date": "2026_01_01", "drive": "0001", "frame": 9}', entry)
     return LabelledFrame(date, drive, frame)
 

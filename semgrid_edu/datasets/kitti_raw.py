@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import cached_property, partial
 from pathlib import Path
 
@@ -10,21 +11,19 @@ from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, invert_rigid
 from semgrid_edu.datasets.calibration import read_camera, read_rectification, read_rigid
+from semgrid_edu.datasets.drive_doubts import jumps, short_scans
 from semgrid_edu.datasets.frames import FrameSequence, error_of
 from semgrid_edu.datasets.kitti_labels import KINDS, is_labelled, read_label, read_labels
 from semgrid_edu.datasets.layouts import what_is
 from semgrid_edu.datasets.oxts import imu_pose, read_packet
 from semgrid_edu.datasets.scans import read_scan
 from semgrid_edu.datasets.timestamps import read_timestamps
-from semgrid_edu.errors import DataError
+from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.frame import Frame, FrameLabels
 from semgrid_edu.storage.reading import read_png
 
 SAME_INSTANT = np.timedelta64(500, "ms")
 """How much the sensors' times of one frame may differ; at 10 Hz they should lie within 0.1 s."""
-
-SHORT_SCAN = 0.6
-"""Share of the size of a drive's median scan below which a scan was probably cut short: sound ones differ less."""
 
 _FRAME_FILE = re.compile(r"(\d{10})\.(bin|png|txt)")
 
@@ -71,6 +70,8 @@ class KittiRawDrive(FrameSequence):
 
     Raises
     ------
+    ArgumentError
+        When date or drive is empty.
     DataError
         When there is no such drive; the error says which there are. `drive[k]` raises it when a file that the frame
         needs is missing or damaged.
@@ -84,6 +85,9 @@ class KittiRawDrive(FrameSequence):
     """
 
     def __init__(self, root: str | Path, date: str, drive: str, *, images: bool = True) -> None:
+        for name, value in (("date", date), ("drive", drive)):
+            if not value:
+                raise ArgumentError(name, "such as 2011_09_26 and 0013", repr(value))
         self.date_folder, self.folder = _existing(Path(root), date, drive)
         self._sensors = ["velodyne_points", "oxts"]
         if images and (self.folder / "image_02").exists():
@@ -119,8 +123,24 @@ class KittiRawDrive(FrameSequence):
         list of str
             One line for each problem, which names the file; empty when the drive is sound.
         """
-        found = [*map(error_of, self._readers()), *self._short_scans()]
+        found = [*map(error_of, self._readers()), *self.doubts()]
         return [error for error in dict.fromkeys(found) if error]
+
+    def doubts(self) -> list[str]:
+        """List what is doubtful, as far as it can be seen without reading scans and images.
+
+        Returns
+        -------
+        list of str
+            One line for each scan that was probably cut short, and for each pose that no car can have got to since the
+            one before; it names the file.
+        """
+        scans, packets, known = [self._file("velodyne_points", k, ".bin") for k in range(len(self))], {}, []
+        for k in range(len(self)):
+            with suppress(DataError):  # what can't be read is an error of the frame, and no doubt
+                packets[self._file("oxts", k, ".txt")] = read_packet(self._file("oxts", k, ".txt"))
+                known.append(k)
+        return [*short_scans(scans), *jumps(packets, self._seconds("oxts")[np.array(known, int)])]
 
     def _readers(self) -> Iterator[Callable[[], object]]:
         """Yield a reader for each file, so that no damaged file hides another."""
@@ -169,18 +189,15 @@ class KittiRawDrive(FrameSequence):
         first = lidar[~np.isnat(lidar)][0]
         return float((lidar[k] - first) / np.timedelta64(1, "s"))
 
+    def _seconds(self, sensor: str) -> NDArray[np.float64]:
+        """Return when a sensor took each frame, seconds; NaN where that isn't known."""
+        if error_of(lambda: self._times) or np.isnat(self._times[sensor]).all():
+            return np.full(len(self), np.nan)
+        times = self._times[sensor]
+        return (times - times[~np.isnat(times)][0]) / np.timedelta64(1, "s")
+
     def _points(self, k: int) -> NDArray[np.float32]:
         return read_scan(self._file("velodyne_points", k, ".bin"))
-
-    def _short_scans(self) -> list[str]:
-        """Name the scans that are much smaller than the drive's median scan: cut short, most likely."""
-        paths = [self._file("velodyne_points", k, ".bin") for k in range(len(self))]
-        sizes = {path: path.stat().st_size for path in paths if path.exists()}
-        median = np.median(list(sizes.values())) if sizes else 0
-        expected = f"a scan about as large as the drive's others, {median:g} bytes"
-        return [
-            str(DataError(path, expected, f"{size}")) for path, size in sizes.items() if 0 < size < SHORT_SCAN * median
-        ]
 
     def _image(self, k: int) -> NDArray[np.uint8] | None:
         """Read the image, (h, w, 3); None when the drive has no folder of this camera."""

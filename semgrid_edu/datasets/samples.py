@@ -114,7 +114,8 @@ def samples_problems(folder: Path | None = None) -> list[str]:
         When there is no such folder, or it holds no samples, or one has no provenance file.
     """
     folder = samples_dir() if folder is None else folder
-    samples = sorted(path for path in folder.iterdir() if path.is_dir()) if folder.is_dir() else []
+    folders = (path for path in folder.iterdir() if path.is_dir()) if folder.is_dir() else ()
+    samples = sorted(path for path in folders if not path.name.startswith("."))
     if not samples:
         raise DataError(folder, f"folders of samples, each with a {FILE_NAME}", "none")
     return [problem for sample in samples for problem in provenance_problems(sample)]

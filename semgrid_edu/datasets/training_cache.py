@@ -1,7 +1,6 @@
 """The arrays that a network learns from, made once per data set, kept beside it and mapped from disk (section 4.1)."""
 
 import hashlib
-import json
 import shutil
 import tempfile
 from itertools import islice
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
 import semgrid_edu
+from semgrid_edu.datasets.dataset_doubts import check_label_sets
 from semgrid_edu.datasets.index import INDEX_FILE, DatasetIndex
 from semgrid_edu.datasets.kitti_raw import KittiRawDrive, drive_folder
 from semgrid_edu.datasets.resizing import resize_image, resize_labels
@@ -23,7 +23,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams, track_drive
 from semgrid_edu.storage.caching import cache_folder
 from semgrid_edu.storage.files import sha256, write_json
-from semgrid_edu.storage.reading import read_text
+from semgrid_edu.storage.reading import read_json
 from semgrid_edu.storage.workers import worker_pool
 
 SEED = 0
@@ -65,9 +65,9 @@ def cached_arrays(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> dict[
     """Return the arrays of a split's labelled frames, which are made on first use.
 
     They are kept in `cache_folder`, in a folder that is named by a hash of all that decides them: the recipe,
-    the code that makes them, dataset.json, and the drives' files by name and size. (Hashing the contents of these
-    files, about a gigabyte, at every start would take longer than reading the arrays.) When one of these changes, the
-    arrays are made anew.
+    the code that makes them, dataset.json, and the drives' files by name, size and time of their last change. (Hashing
+    the contents of these files, about a gigabyte, at every start would take longer than reading the arrays.) When one
+    of these changes, the arrays are made anew.
 
     Parameters
     ----------
@@ -92,6 +92,7 @@ def cached_arrays(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> dict[
     DataError
         When the data set, or what was kept, is damaged; or when nothing can be kept.
     """
+    check_label_sets(index, split)
     folder = cache_folder(index.root) / _key(index, split, recipe) / split
     if not folder.exists():
         _make_room(folder.parent)
@@ -100,15 +101,17 @@ def cached_arrays(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> dict[
 
 
 def _key(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> str:
-    """Hash what decides the arrays: the recipe, the code, and names and sizes of all files of the split's drives."""
+    """Hash what decides the arrays: the recipe, the code, and names, sizes and times of all files of the drives."""
     package = Path(semgrid_edu.__file__).parent
     code = [package / f"{name}.py" for name in CODE] + sorted((package / "occupancy").glob("*.py"))
     drives = index.frames_by_drive(split)
     calibration = [path for date in {date for date, _ in drives} for path in (index.root / date).glob("*.txt")]
     parts = [repr(recipe), *map(sha256, [index.root / INDEX_FILE, *code, *sorted(calibration)])]
     for date, drive in drives:
-        files = drive_folder(index.root, date, drive).rglob("*.*")
-        parts += sorted(f"{file.relative_to(index.root)} {file.stat().st_size}" for file in files)
+        files = {
+            file.relative_to(index.root): file.stat() for file in drive_folder(index.root, date, drive).rglob("*.*")
+        }
+        parts += sorted(f"{name} {found.st_size} {found.st_mtime_ns}" for name, found in files.items())
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 
@@ -188,15 +191,20 @@ def _pack(frames: list[dict[str, NDArray]]) -> dict[str, NDArray]:
 
 def _map_arrays(folder: Path) -> dict[str, NDArray]:
     """Map the arrays that the manifest lists, once they are what it says."""
-    manifest = json.loads(read_text(folder / "manifest.json"))
+    manifest = read_json(folder / "manifest.json").get("arrays")
+    if not isinstance(manifest, dict) or not all(isinstance(one, list) and one for one in manifest.values()):
+        expected = "type and shape of each array (delete the folder to make it anew)"
+        raise DataError(folder / "manifest.json", expected, repr(manifest)[:200])
     arrays = {}
-    for name, (dtype, *shape) in manifest["arrays"].items():
+    for name, described in manifest.items():
         path = folder / f"{name}.npy"
+        if not path.is_file():
+            raise DataError(path, "an array (delete the folder to make it anew)", "no such file")
         try:
             arrays[name] = np.load(path, mmap_mode="r", allow_pickle=False)
         except (OSError, ValueError, EOFError) as error:
             raise DataError(path, "an array (delete the folder to make it anew)", error) from error
         found = [str(arrays[name].dtype), *arrays[name].shape]
-        if found != [dtype, *shape]:
-            raise DataError(path, f"{[dtype, *shape]} (delete the folder to make it anew)", found)
+        if found != described:
+            raise DataError(path, f"{described} (delete the folder to make it anew)", found)
     return arrays

@@ -9,6 +9,9 @@ import typer
 reproduce = typer.Typer(no_args_is_help=True, help="Run the experiments of the lectures.")
 """What `semgrid-edu` adds to its commands."""
 
+KEPT = ("dataset.json", "provenance.json")
+"""JSON files that no result may replace."""
+
 
 @reproduce.command()
 def occupancy(
@@ -140,9 +143,12 @@ def keep_result(out: Path, compute: Callable[[], dict], table: Callable[[dict], 
     table : callable
         Turns the result into text to print.
     """
+    from semgrid_edu.errors import DataError
     from semgrid_edu.storage.files import check_writable, write_json
 
     check_writable(out)
+    if out.exists() and (out.suffix != ".json" or out.name in KEPT):
+        raise DataError(out, "a new file, or the JSON of an earlier result", "something else, which would be lost")
     result = compute()
     write_json(out, result)
     typer.echo(f"{table(result)}\n\nwritten to {out}")

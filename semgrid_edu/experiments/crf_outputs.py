@@ -153,7 +153,7 @@ def _first_scans(index: DatasetIndex, split: str) -> dict[tuple[str, str], str]:
     folders = {
         name: drive_folder(index.root, *name) / "velodyne_points" / "data" for name in index.frames_by_drive(split)
     }
-    first = {name: min(folder.glob("*.bin"), default=folder) for name, folder in folders.items()}
+    first = {name: min(folder.glob("[!.]*.bin"), default=folder) for name, folder in folders.items()}
     for folder in (path for path in first.values() if not path.is_file()):
         raise DataError(folder, "scans", "none")
     return {name: sha256(path) for name, path in first.items()}

@@ -1,6 +1,5 @@
 """A search for the CRF's parameters on drives that neither training nor test has seen (section 3.5, claim of 4.3)."""
 
-import json
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -24,6 +23,7 @@ from semgrid_edu.experiments.evaluate import scores_table
 from semgrid_edu.networks import load_net
 from semgrid_edu.storage.files import sha256, write_json
 from semgrid_edu.storage.provenance import FILE_NAME, short_path, versions
+from semgrid_edu.storage.reading import read_json
 
 
 def search_crf(
@@ -146,7 +146,7 @@ def _identity(validation_dir: str | Path, dataset_dir: str | Path, weights: str 
         name: {"name": load_index(folder).name, "sha256": sha256(folder / INDEX_FILE)} for name, folder in data.items()
     }
     record = Path(weights).with_name(FILE_NAME)
-    trained_on = json.loads(record.read_text(encoding="utf-8")).get("dataset") if record.exists() else None
+    trained_on = read_json(record).get("dataset") if record.exists() else None
     used = {"file": short_path(weights), "sha256": sha256(weights), "trained on": trained_on}
     return named | {"weights": used, "seed": seed}
 

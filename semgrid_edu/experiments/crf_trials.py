@@ -1,6 +1,5 @@
 """Trials of the search for the CRF's parameters: made, valued by each objective, and kept on disk (section 3.5)."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -15,6 +14,7 @@ from semgrid_edu.errors import DataError
 from semgrid_edu.experiments.crf_outputs import GridOutputs, refined_confusions, refined_grids
 from semgrid_edu.experiments.evaluate import scores
 from semgrid_edu.labels import LabelSet
+from semgrid_edu.storage.reading import read_json
 
 OBJECTIVES = ("pixel accuracy", "class accuracy", "pixel accuracy, class accuracy kept")
 """What a CRF is chosen for, over all labelled cells. The last asks for the best pixel accuracy among the CRFs whose
@@ -135,9 +135,12 @@ def read_trials(log: str | Path, identity: dict) -> list[Trial]:
     path = Path(log)
     if not path.exists():
         return []
+    content = read_json(path)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
         found, trials = {name: content[name] for name in identity}, content["trials"]
+        for trial in trials:
+            CrfParams(**trial["params"])
+            _ = [float(trial["scores"]["all"][name]) for name in OBJECTIVES[:2]], float(trial["seconds"])
     except (ValueError, KeyError, TypeError) as error:
         raise DataError(path, "the trials of a search, or no file", f"something else: {error!r}") from error
     if found != identity:

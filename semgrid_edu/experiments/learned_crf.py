@@ -1,5 +1,6 @@
 """Ways to learn a CRF on the grids of a network: from which drives, what, and with which loss (section 3.5)."""
 
+import math
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -111,7 +112,8 @@ def train_crf_on(
         date=f"{began:%Y-%m-%d}",
         minutes=round((datetime.now(UTC) - began).total_seconds() / 60, 1),
         resumed=resume,
-        params=asdict(params),
+        # JSON has no infinity.
+        params={name: str(value) if value == math.inf else value for name, value in asdict(params).items()},
         crf=layer.description(),
         dataset=sha256(Path(dataset_dir) / INDEX_FILE),
         network=sha256(weights),

@@ -79,8 +79,8 @@ def truth_policies(
         raise ArgumentError("lidar", f"one of {', '.join(LIDARS)}", repr(lidar))
     trials, began = TRIALS if trials is None else trials, datetime.now(UTC)
     identity = _identity(seed, grid, lidar, trials)
-    done, sums = read_parts(log, identity, "drives"), read_parts(log, identity, "sums")
-    minutes = read_parts(log, identity, "minutes").get("of all drives", 0.0)
+    done, sums = read_parts(log, identity, "drives"), read_parts(log, identity, "sums", list)
+    minutes = read_parts(log, identity, "minutes", float).get("of all drives", 0.0)
     with tqdm(total=drives, initial=len(done), desc="truth policies", unit="drive") as bar:
         for number in range(HELD_OUT + 1000 * seed + len(done), HELD_OUT + 1000 * seed + drives):
             counts = score_trials(trials, GRIDS[grid], number, lidar)
@@ -96,7 +96,7 @@ def truth_policies(
         **_legend(trials),
         "drives": done,
         "sums": sums,
-        "minutes": read_parts(log, identity, "minutes"),
+        "minutes": read_parts(log, identity, "minutes", float),
         "command": f"semgrid-edu reproduce truth-policies --seed {seed} --drives {drives} {choices}",
         "date": f"{began:%Y-%m-%d}",
         "versions": versions("numpy", "scipy", "numba", "embreex", "trimesh"),

@@ -2,8 +2,13 @@
 
 from dataclasses import dataclass, field
 
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.planes import plane_heights
+
+MOST_PIXELS, MOST_POINTS = 2**22, 2**24
+"""Pixels of an image, and points of all planes together: nine and fifteen times those of the published size. What asks
+for more is a mistake, or a damaged file, and would take all memory."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,11 @@ class Architecture:
         compared.
     reduces : bool
         Whether the 1x1 convolution reduces the planes. Without, all D x C of them go into the conv-deconv network.
+
+    Raises
+    ------
+    ArgumentError
+        When the image has no pixel, or images or planes ask for too much memory.
     """
 
     segmenter: str = "segnet"
@@ -43,3 +53,13 @@ class Architecture:
     heights: tuple[float, ...] = tuple(plane_heights().tolist())
     uses_occupancy: bool = True
     reduces: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse sizes that no computer has the memory for."""
+        height, width = self.image_size
+        if not (height >= 1 and width >= 1 and height * width <= MOST_PIXELS):
+            raise ArgumentError("image_size", f"two whole numbers, 1 to {MOST_PIXELS} pixels", self.image_size)
+        rows, columns = self.grid.shape
+        if rows * columns * len(self.heights) > MOST_POINTS:
+            found = f"{rows} x {columns} cells on {len(self.heights)} planes"
+            raise ArgumentError("grid, heights", f"at most {MOST_POINTS} points of planes", found)

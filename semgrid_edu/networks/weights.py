@@ -12,6 +12,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks.architecture import Architecture
 from semgrid_edu.networks.build import build_net
 from semgrid_edu.networks.semantic_grid import SemanticGridNet
+from semgrid_edu.storage.reading import parse_json
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
 
 IMAGE_STAGE, WEIGHTS = "image_stage.safetensors", "weights.safetensors"
@@ -60,14 +61,15 @@ def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:
     Raises
     ------
     DataError
-        When the file is missing, damaged or of another program, or its weights aren't those of the architecture in
-        its header.
+        When the file is missing, damaged or of another program, its weights aren't those of the architecture in its
+        header, or one isn't a finite number.
     """
     header, tensors = read_tensors(path)
     try:
-        net = build_net(_architecture(json.loads(header["architecture"])), camera)
-    except (KeyError, TypeError, ValueError) as error:
-        raise DataError(path, "the architecture of a network in the header", f"{header}: {error}") from error
+        net = build_net(_architecture(parse_json(path, header["architecture"])), camera)
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        found = f"{str(header)[:300]}: {error}"
+        raise DataError(path, "the architecture of a network in the header", found) from error
     check_tensors(path, tensors, net.state_dict())
     net.load_state_dict(tensors)
     return net.eval()
@@ -79,6 +81,36 @@ def _architecture(values: dict) -> Architecture:
     return Architecture(**(values | tuples | {"grid": GridSpec(**values["grid"])}))
 
 
+def weights_doubts(path: str | Path) -> list[str]:
+    """List what is doubtful about a file of weights that is to be scored as a whole network, i and o -> g.
+
+    Parameters
+    ----------
+    path : path-like
+        A file that `save_net` wrote.
+
+    Returns
+    -------
+    list of str
+        One line for each doubtful thing.
+
+    Raises
+    ------
+    DataError
+        When the file is missing or damaged, or holds a network of the image stage, whose fusion hasn't learnt yet.
+    """
+    _, tensors = read_tensors(path)
+    learns = {name: bool((steps > 0).any()) for name, steps in tensors.items() if name.endswith("num_batches_tracked")}
+    fusion = [has_learnt for name, has_learnt in learns.items() if name.startswith("fusion.")]
+    if fusion and not any(fusion) and any(learns.values()):
+        raise DataError(path, f"a whole network, such as {WEIGHTS}", "one of the image stage: its fusion hasn't learnt")
+    doubts = [] if any(fusion) else [DataError(path, "a network that has learnt", "one that hasn't made a step")]
+    learnt = [found for name, found in tensors.items() if found.is_floating_point() and found.ndim > 1]
+    if learnt and all(bool((found == found.round()).all()) for found in learnt):
+        doubts.append(DataError(path, "weights like 0.137", "whole numbers alone: were they rounded?"))
+    return [str(doubt) for doubt in doubts]
+
+
 def check_tensors(path: str | Path, found: dict[str, Tensor], expected: dict[str, Tensor]) -> None:
     """Refuse tensors that aren't the network's; the error names the first one that differs.
 
@@ -87,12 +119,13 @@ def check_tensors(path: str | Path, found: dict[str, Tensor], expected: dict[str
     path : path-like
         The file that they come from.
     found, expected : dict of str to Tensor
-        The tensors of the file and those of the network; only names and shapes are compared.
+        The tensors of the file and those of the network; names and shapes are compared.
 
     Raises
     ------
     DataError
-        When a tensor is missing, isn't the network's, or has another shape.
+        When a tensor is missing, isn't the network's, has another shape, or holds a number that isn't finite or
+        a variance below 0.
     """
     for name in sorted(found.keys() | expected.keys()):
         have, want = (
@@ -100,3 +133,7 @@ def check_tensors(path: str | Path, found: dict[str, Tensor], expected: dict[str
         )
         if have != want:
             raise DataError(path, f"{want} for {name}", have)
+        if not found[name].isfinite().all():
+            raise DataError(path, f"finite numbers for {name}", "NaN or infinity")
+        if name.endswith("running_var") and found[name].min() < 0:
+            raise DataError(path, f"variances of at least 0 for {name}", float(found[name].min()))

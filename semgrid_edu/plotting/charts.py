@@ -75,11 +75,14 @@ def training_curves(logs: TrainingLog | Mapping[str, TrainingLog], ax: Axes | No
     Raises
     ------
     ArgumentError
-        When there is no training run, or one has no steps.
+        When there is no training run, or one has no step with a finite loss.
     """
     logs = {"": logs} if isinstance(logs, TrainingLog) else logs
     if not logs or not all(len(log.loss) for log in logs.values()):
         raise ArgumentError("logs", "at least one training run, each with at least one step", list(logs) or "none")
+    for name, log in logs.items():
+        if not np.any(np.isfinite(log.loss) & (log.loss > 0)):
+            raise ArgumentError("logs", "a finite loss in each training run", f"none in {name or 'this one'}")
     if ax is None:
         _, ax = plt.subplots(figsize=(8, 4), layout="constrained")
     for number, (name, log) in enumerate(logs.items()):

@@ -1,6 +1,5 @@
 """Simulated data sets in place of those of section 4, and the sample drive: made in parallel, resumed after a stop."""
 
-import json
 from collections.abc import Iterator
 from concurrent.futures import as_completed
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from semgrid_edu.simulation.drive import SimulatedDrive
 from semgrid_edu.simulation.sensors.rig import Rig
 from semgrid_edu.simulation.street.plan import ANY, Wishes
 from semgrid_edu.simulation.street.sample_street import SAMPLE_WISHES
+from semgrid_edu.simulation.whole_drives import check_complete, remove_unfinished
 from semgrid_edu.simulation.writer import (
     DATE,
     depth_as_points,
@@ -26,8 +26,10 @@ from semgrid_edu.simulation.writer import (
     write_drive,
 )
 from semgrid_edu.storage.files import write_json
+from semgrid_edu.storage.locking import LOCK, sole_writer
 from semgrid_edu.storage.provenance import versions, write_provenance
-from semgrid_edu.storage.workplace import workplace
+from semgrid_edu.storage.reading import read_json
+from semgrid_edu.storage.workplace import check_workers, workplace
 
 FORMAT = 1
 """Raised whenever the simulator changes what a seed gives, so that old and new drives don't mix in one folder."""
@@ -149,9 +151,10 @@ def make_dataset(name: str, folder: Path, seed: int = 0, workers: int = 2, sched
     Raises
     ------
     ArgumentError
-        When there is no such data set, the seed is negative or there is no worker.
+        When there is no such data set, the seed is negative, or there are no workers or too many.
     DataError
-        When the folder holds something else, or the same with another seed or an older version.
+        When the folder holds something else, the same with another seed or an older version, or a drive that lacks
+        files; or when another process writes to it.
     """
     if name not in RECIPES:
         raise ArgumentError("name", f"one of {', '.join(RECIPES)}", repr(name))
@@ -184,26 +187,30 @@ def make_from_recipe(
     Raises
     ------
     ArgumentError
-        When the seed is negative or there is no worker.
+        When the seed is negative, or there are no workers or too many.
     DataError
-        When the folder holds something else, or the same with another seed or an older version.
+        When the folder holds something else, the same with another seed or an older version, or a drive that lacks
+        files; or when another process writes to it.
     """
     if seed < 0:
         raise ArgumentError("seed", "a whole number from 0 up", seed)
-    if workers < 1:
-        raise ArgumentError("workers", "at least one process", workers)
+    check_workers(workers)
     root = Path(folder).resolve() / recipe.name  # absolute: the machines of a cluster work in other folders
-    _claim(root, {"name": recipe.name, "seed": seed, "format": FORMAT})
-    write_calibration(root, Rig())
-    drives = [f"{k + 1:04d}" for k in range(len(recipe.routes))]
-    missing = [k for k, drive in enumerate(drives) if not drive_folder(root, DATE, drive).exists()]
-    missing.sort(key=lambda k: -recipe.routes[k].n_frames)
-    with tqdm(total=len(drives), initial=len(drives) - len(missing), desc=recipe.name, unit="drive") as bar:
-        for _ in _run(partial(_make_drive, recipe, root, seed), missing, workers, scheduler):
-            bar.update()
-    index = _index(recipe, drives, seed)
-    write_json(root / INDEX_FILE, index)
-    write_provenance(root, index["command"], seed, PACKAGES)
+    with sole_writer(root):
+        _claim(root, {"name": recipe.name, "seed": seed, "format": FORMAT})
+        write_calibration(root, Rig())
+        remove_unfinished(root / DATE)
+        drives = [f"{k + 1:04d}" for k in range(len(recipe.routes))]
+        missing = [k for k, drive in enumerate(drives) if not drive_folder(root, DATE, drive).exists()]
+        missing.sort(key=lambda k: -recipe.routes[k].n_frames)
+        with tqdm(total=len(drives), initial=len(drives) - len(missing), desc=recipe.name, unit="drive") as bar:
+            for _ in _run(partial(_make_drive, recipe, root, seed), missing, workers, scheduler):
+                bar.update()
+        for drive, route in zip(drives, recipe.routes, strict=True):
+            check_complete(drive_folder(root, DATE, drive), route.n_frames, route.labelled)
+        index = _index(recipe, drives, seed)
+        write_json(root / INDEX_FILE, index)
+        write_provenance(root, index["command"], seed, PACKAGES)
     return root
 
 
@@ -211,13 +218,10 @@ def _claim(root: Path, marker: dict) -> None:
     """Mark the folder as that of this data set, or refuse it when it holds something else."""
     path = root / "simulation.json"
     if path.exists():
-        try:
-            found = json.loads(path.read_text())
-        except ValueError as error:
-            raise DataError(path, f"data made with {marker}", f"no JSON: {error}") from error
+        found = read_json(path)
         if found != marker:
             raise DataError(path, f"data made with {marker}", f"{found}: choose another folder or remove this one")
-    elif root.exists() and any(root.iterdir()):
+    elif {path.name for path in root.iterdir()} - {LOCK}:
         raise DataError(root, "an empty folder, or one that an earlier run began", "other files")
     else:
         write_json(path, marker)

@@ -3,6 +3,7 @@
 import io
 import json
 import shutil
+import tempfile
 from collections.abc import Callable, Collection
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -20,6 +21,7 @@ from semgrid_edu.simulation.frame import SimulatedFrame
 from semgrid_edu.simulation.sensors.gps import DATAFORMAT, oxts_packet
 from semgrid_edu.simulation.sensors.rig import Rig
 from semgrid_edu.simulation.things.materials import class_of_kind
+from semgrid_edu.simulation.whole_drives import UNFINISHED, check_complete
 from semgrid_edu.storage.files import write_text
 
 DATE = "2026_01_01"
@@ -151,7 +153,8 @@ def write_drive(
 ) -> Path:
     """Write a drive: images, points, oxts, timestamps, and labels of some frames.
 
-    It grows in a hidden folder, which gets its name when the drive is whole. So a killed process leaves no half drive.
+    It grows in a hidden folder of its own, which gets the drive's name when the drive is whole. So a killed process
+    leaves no half drive, and of two processes that make the same drive the first one's stays.
 
     Parameters
     ----------
@@ -172,10 +175,35 @@ def write_drive(
     -------
     Path
         The drive's folder.
+
+    Raises
+    ------
+    DataError
+        When another process has removed what was written.
     """
     folder = drive_folder(root, DATE, drive)
-    partial = folder.with_name(f".{folder.name}.partial")
-    shutil.rmtree(partial, ignore_errors=True)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    partial = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}-", suffix=UNFINISHED))
+    _write_files(partial, simulated, labelled, label_set, points)
+    check_complete(partial, simulated.n_frames, labelled)
+    partial.chmod(0o755)
+    try:
+        partial.rename(folder)
+    except OSError:
+        shutil.rmtree(partial, ignore_errors=True)
+        if not folder.exists():  # else another process was quicker
+            raise
+    return folder
+
+
+def _write_files(
+    partial: Path,
+    simulated: SimulatedDrive,
+    labelled: Collection[int],
+    label_set: LabelSet,
+    points: Callable[[SimulatedFrame, Rig], NDArray[np.float32]],
+) -> None:
+    """Write all files of a drive to its folder."""
     for name in ("image_02/data", "velodyne_points/data", "oxts/data", "labels"):
         (partial / name).mkdir(parents=True)
     objects = {}
@@ -192,5 +220,3 @@ def write_drive(
     (partial / "oxts" / "dataformat.txt").write_text(DATAFORMAT)
     (partial / "labels" / "label_set.txt").write_text(f"{label_set.name}\n")
     (partial / "labels" / "objects.json").write_text(json.dumps(objects, separators=(",", ":")) + "\n")
-    partial.rename(folder)
-    return folder

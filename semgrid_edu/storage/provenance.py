@@ -1,6 +1,5 @@
 """Provenance: the command, seed and versions that made a result, and checksums that show whether it was changed."""
 
-import json
 import platform
 import subprocess
 from importlib.metadata import version
@@ -8,6 +7,7 @@ from pathlib import Path
 
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import sha256, write_json
+from semgrid_edu.storage.reading import read_json
 
 FILE_NAME = "provenance.json"
 
@@ -59,7 +59,7 @@ def write_provenance(folder: str | Path, command: str, seed: int, packages: tupl
     ----------
     folder : path-like
         The folder. All files below it are recorded with their SHA-256, except those in `cache/`, which can be made
-        anew, and hidden ones, which an atomic write leaves when it is killed.
+        anew, and what is hidden, alone or in a hidden folder: a writer that was killed leaves such.
     command : str
         The command that made the files.
     seed : int
@@ -112,10 +112,9 @@ def provenance_problems(folder: str | Path) -> list[str]:
     """
     folder = Path(folder)
     record = folder / FILE_NAME
-    try:
-        expected = json.loads(record.read_text())["sha256"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise DataError(record, "a provenance file with checksums", f"{type(error).__name__}: {error}") from error
+    expected = read_json(record).get("sha256")
+    if not isinstance(expected, dict):
+        raise DataError(record, "a provenance file with checksums by file name", repr(expected)[:200])
     found = _checksums(folder)
     return (
         [f"{folder / name}: missing" for name in sorted(expected.keys() - found.keys())]
@@ -134,5 +133,5 @@ def _checksums(folder: Path) -> dict[str, str]:
     return {
         name.as_posix(): sha256(path)
         for name, path in files.items()
-        if name.parts[0] not in left_out and not name.name.startswith(".")
+        if name.parts[0] not in left_out and not any(part.startswith(".") for part in name.parts)
     }

@@ -1,7 +1,9 @@
-"""Files that are read whole and checked: bytes, text and PNG images, with errors that name the file."""
+"""Files that are read whole and checked: bytes, text, JSON and PNG images, with errors that name the file."""
 
 import io
+import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +26,11 @@ def read_bytes(path: Path) -> bytes:
     Raises
     ------
     DataError
-        When the file is missing, can't be opened or is empty.
+        When the file is missing, can't be opened, is empty, or is no file but, say, a pipe, which could wait for ever.
     """
     try:
+        if path.exists() and not path.is_file():
+            raise DataError(path, "a file", "a folder" if path.is_dir() else "a pipe, a socket or a device")
         content = path.read_bytes()
     except FileNotFoundError:
         raise DataError(path, "a file", "nothing there") from None
@@ -54,6 +58,53 @@ def read_text(path: Path) -> str:
         return read_bytes(path).decode("ascii")
     except UnicodeDecodeError as error:
         raise DataError(path, "ASCII text", f"byte {error.object[error.start]:#x} at {error.start}") from error
+
+
+def read_json(path: str | Path, kind: type = dict) -> Any:
+    """Return what a JSON file holds.
+
+    Parameters
+    ----------
+    path : path-like
+        The file to read: UTF-8.
+    kind : type
+        What it has to hold: `dict` for an object, `list` for an array.
+
+    Raises
+    ------
+    DataError
+        When the file is missing, damaged, nested too deeply to be meant, or holds something else.
+    """
+    return parse_json(path, read_bytes(Path(path)), kind)
+
+
+def parse_json(path: str | Path, text: str | bytes, kind: type = dict) -> Any:
+    """Return what a piece of JSON stands for.
+
+    Parameters
+    ----------
+    path : path-like
+        Where the text comes from, for the error.
+    text : str or bytes
+        The JSON; bytes are UTF-8.
+    kind : type
+        What it has to hold: `dict` for an object, `list` for an array.
+
+    Raises
+    ------
+    DataError
+        When the text isn't JSON, is nested too deeply to be meant, or holds something else.
+    """
+    expected = "a JSON array" if kind is list else "a JSON object"
+    try:
+        content = json.loads(text)
+    except RecursionError:
+        raise DataError(path, expected, "brackets nested too deeply") from None
+    except ValueError as error:  # also numbers of thousands of digits, and bytes that aren't UTF-8
+        raise DataError(path, expected, f"no JSON: {error}"[:300]) from error
+    if not isinstance(content, kind):
+        raise DataError(path, expected, repr(content)[:200])
+    return content
 
 
 def parse_numbers(path: Path, text: str, what: str) -> NDArray[np.float64]:

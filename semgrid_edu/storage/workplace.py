@@ -31,6 +31,25 @@ def usable_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def check_workers(workers: int) -> None:
+    """Refuse a number of processes that this machine has no cores for.
+
+    Parameters
+    ----------
+    workers : int
+        Number of processes; two can share one core.
+
+    Raises
+    ------
+    ArgumentError
+        When there is none, or there are more than two and more than cores.
+    """
+    cores = usable_cores()
+    if not 1 <= workers <= max(2, cores):
+        expected = f"at least one process and at most {max(2, cores)}: {cores} cores can be used here"
+        raise ArgumentError("--workers", expected, workers)
+
+
 @contextmanager
 def workplace(workers: int | None = None, scheduler: str | None = None) -> Iterator[Workplace]:
     """Open the place where tasks are done.
@@ -51,12 +70,12 @@ def workplace(workers: int | None = None, scheduler: str | None = None) -> Itera
     Raises
     ------
     ArgumentError
-        When there is no worker, both are given, or dask.distributed isn't installed.
+        When there are no workers or too many, both are given, or dask.distributed isn't installed.
     OSError
         When the scheduler doesn't answer.
     """
-    if workers is not None and workers < 1:
-        raise ArgumentError("--workers", "at least one process", workers)
+    if workers is not None:
+        check_workers(workers)
     if workers is not None and scheduler:
         raise ArgumentError("--workers", "nothing beside --scheduler, which has workers of its own", workers)
     if scheduler:
@@ -76,5 +95,9 @@ def _cluster(address: str) -> Iterator[Workplace]:
     except ImportError:
         missing = "dask.distributed (pip install 'semgrid_edu[cluster]')"
         raise ArgumentError("--scheduler", missing, "no module named distributed") from None
-    with Client(address, set_as_default=False) as client, client.get_executor(pure=False) as executor:
+    try:
+        connected = Client(address, set_as_default=False)
+    except ValueError as error:
+        raise ArgumentError("--scheduler", "an address like tcp://HOST:PORT", f"{address}: {error}") from error
+    with connected as client, client.get_executor(pure=False) as executor:
         yield Workplace(executor, lambda: max(1, sum(client.nthreads().values())))

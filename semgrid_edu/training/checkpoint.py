@@ -6,9 +6,42 @@ from pathlib import Path
 from torch import nn
 from torch.optim import SGD
 
+from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.networks import WEIGHTS
 from semgrid_edu.networks.weights import check_tensors
+from semgrid_edu.storage.provenance import FILE_NAME as PROVENANCE
+from semgrid_edu.storage.reading import parse_json
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
+from semgrid_edu.training.log import LOG
+
+CHECKPOINT = "checkpoint.safetensors"
+"""The file from which an interrupted run goes on, in the folder of the run."""
+
+
+def check_folder(folder: Path, resume: bool) -> None:
+    """Refuse to overwrite a finished or an interrupted run, or the provenance of something else.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder of the training run to come.
+    resume : bool
+        Whether it continues an interrupted one.
+
+    Raises
+    ------
+    DataError
+        When the folder holds a run that would be lost, a data set, or the provenance of something else.
+    """
+    if (folder / INDEX_FILE).exists():
+        raise DataError(folder, "a folder for the training run alone", "a data set")
+    if (folder / PROVENANCE).exists() and not (folder / LOG).exists():
+        raise DataError(folder, "a folder for the training run alone", f"the {PROVENANCE} of something else")
+    if (folder / WEIGHTS).exists():
+        raise DataError(folder, "a folder without a trained network, which would be lost", WEIGHTS)
+    if (folder / CHECKPOINT).exists() and not resume:
+        raise DataError(folder, "a folder without an interrupted run (--resume continues it)", CHECKPOINT)
 
 
 def save_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimiser: SGD, iteration: int) -> None:
@@ -63,8 +96,9 @@ def load_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimise
     """
     header, tensors = read_tensors(path)
     try:
-        found, iteration = json.loads(header["run"]), int(header["iteration"])
-        found = dict(found)
+        found, iteration = parse_json(path, header["run"]), int(header["iteration"])
+        if iteration < 0:
+            raise ValueError(f"step {iteration}")
     except (KeyError, TypeError, ValueError) as error:
         raise DataError(path, "a checkpoint of a training run", error) from error
     _check_run(path, found, json.loads(json.dumps(run)))

@@ -13,11 +13,12 @@ from semgrid_edu.crf.layer import CrfLayer
 from semgrid_edu.crf.layer_file import save_crf
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import WEIGHTS
+from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.training.allocator import keep_freed_memory
 from semgrid_edu.training.batches import frames_of_step
-from semgrid_edu.training.checkpoint import load_checkpoint
+from semgrid_edu.training.checkpoint import CHECKPOINT, check_folder, load_checkpoint
 from semgrid_edu.training.log import LOG, Step, begin_log
-from semgrid_edu.training.loop import CHECKPOINT, check_finite, check_folder, learn, write_down
+from semgrid_edu.training.loop import check_finite, learn, write_down
 from semgrid_edu.training.loss import cross_entropy_sums, median_frequency_weights
 from semgrid_edu.training.params import TrainingParams
 
@@ -117,13 +118,23 @@ def train_crf(
         When there are too few frames, grids don't fit the layer, the checkpoint belongs to another run, or the loss
         isn't finite.
     DataError
-        When there is no checkpoint to resume from or it is damaged; or when the folder holds a run that a new one
-        would overwrite.
+        When there is no checkpoint to resume from or it is damaged; when the folder holds a run that a new one would
+        overwrite; or when another process trains in it.
     """
     folder = Path(folder)
-    check_folder(folder, resume)
     if len(truth) < params.batch_size:
         raise ArgumentError("truth", f"at least one batch of {params.batch_size} frames", f"{len(truth)} frames")
+    check_folder(folder, resume)
+    with sole_writer(folder):
+        check_folder(folder, resume)  # once more: until now another process could write to it
+        _train(layer, (log_g, occupancy, truth), folder, params, seed, resume)
+
+
+def _train(
+    layer: CrfLayer, frames: tuple[NDArray, ...], folder: Path, params: TrainingParams, seed: int, resume: bool
+) -> None:
+    """Do what `train_crf` says, in a folder that no other process writes to."""
+    truth = frames[-1]
     alpha = torch.from_numpy(median_frequency_weights(truth, layer.n_classes, params.weight_limit)).float()
     objective = CrfObjective(layer, alpha)
     learning = [parameter for parameter in layer.parameters() if parameter.requires_grad]
@@ -136,7 +147,7 @@ def train_crf(
     for iteration in steps:
         stage, optimiser.param_groups[0]["lr"] = params.stage(iteration)
         chosen = frames_of_step(len(truth), params.batch_size, iteration, seed)
-        batch = GridBatch(*(torch.from_numpy(part[chosen]) for part in (log_g, occupancy, truth)))
+        batch = GridBatch(*(torch.from_numpy(part[chosen]) for part in frames))
         loss = learn(objective, optimiser, batch, torch.device("cpu"))
         step = Step(iteration, stage, optimiser.param_groups[0]["lr"], loss)
         check_finite(step, params.learning_rate)

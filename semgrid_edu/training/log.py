@@ -75,7 +75,8 @@ def read_log(path: str | Path) -> TrainingLog:
     Raises
     ------
     DataError
-        When there is no such file, or a line isn't one of a log; the message gives the number of the line.
+        When there is no such file, a line isn't one of a log, or steps are missing or out of order; the message gives
+        the number of the line.
     """
     path = Path(path)
     if not path.is_file():
@@ -95,7 +96,13 @@ def _steps(path: Path, lines: list[str]) -> list[Step]:
     header, *others = [line.rstrip("\n") for line in lines] or [""]
     if header != HEADER.strip():
         raise DataError(path, f"{HEADER.strip()} in line 1", repr(header))
-    return [_step(path, number, line) for number, line in enumerate(others, start=2)]
+    steps = [_step(path, number, line) for number, line in enumerate(others, start=2)]
+    for number, step in enumerate(steps):
+        before = steps[number - 1].stage if number else "image"
+        if step.iteration != number or (before, step.stage) == ("grid", "image"):
+            expected = f"step {number} in line {number + 2}, with the image stage before the grid stage"
+            raise DataError(path, expected, f"step {step.iteration} of the {step.stage} stage")
+    return steps
 
 
 def _step(path: Path, number: int, line: str) -> Step:
@@ -125,7 +132,7 @@ def begin_log(path: Path, start: int) -> None:
     """
     lines = [HEADER]
     if start:
-        lines = _lines(path)[: start + 1] if path.exists() else []
+        lines = _lines(path)[: start + 1] if path.is_file() else []
         if len(lines) <= start or not lines[-1].endswith("\n"):
             raise DataError(path, f"the {start} steps that the checkpoint continues", max(len(lines) - 1, 0) or "none")
         _steps(path, lines)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict
 from pathlib import Path
 
@@ -11,12 +11,13 @@ from torch import Tensor, nn
 from tqdm.auto import trange
 
 from semgrid_edu.datasets.training_set import Sample
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, save_net
 from semgrid_edu.occupancy import N_STATES
+from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.training.allocator import keep_freed_memory
 from semgrid_edu.training.batches import draw_batch, share_of_batch
-from semgrid_edu.training.checkpoint import load_checkpoint, save_checkpoint
+from semgrid_edu.training.checkpoint import CHECKPOINT, check_folder, load_checkpoint, save_checkpoint
 from semgrid_edu.training.devices import mixed_precision
 from semgrid_edu.training.distributed import (
     in_parallel,
@@ -30,8 +31,6 @@ from semgrid_edu.training.log import LOG, Step, append_step, begin_log
 from semgrid_edu.training.loss import Objective, class_weights
 from semgrid_edu.training.params import TrainingParams
 
-CHECKPOINT = "checkpoint.safetensors"
-"""The file from which an interrupted run goes on, in the folder of the run."""
 CHECKPOINT_EVERY = 100
 """Iterations between checkpoints: an interruption costs about twenty seconds of work at most."""
 
@@ -78,12 +77,27 @@ def train(
         When the network has no architecture, the data don't fit the network, the checkpoint belongs to another run, or
         the loss isn't finite.
     DataError
-        When there is no checkpoint to resume from or it is damaged; or when the folder holds a checkpoint or a trained
-        network that a new run would overwrite.
+        When there is no checkpoint to resume from or it is damaged; when the folder holds a checkpoint or a trained
+        network that a new run would overwrite; or when another process trains in it.
     """
     params, folder, device = params or TrainingParams(), Path(folder), torch.device(device)
     check_folder(folder, resume)
     _check_dataset(net, dataset, params)
+    with sole_writer(folder) if rank() == 0 else nullcontext():
+        check_folder(folder, resume)  # once more: until now another process could write to it
+        _train(net, dataset, folder, params, seed, resume, device)
+
+
+def _train(
+    net: SemanticGridNet,
+    dataset: Sequence[Sample],
+    folder: Path,
+    params: TrainingParams,
+    seed: int,
+    resume: bool,
+    device: torch.device,
+) -> None:
+    """Do what `train` says, in a folder that no other process writes to."""
     stages = [stage for stage, n in (("image", params.image_iterations), ("grid", params.grid_iterations)) if n]
     alpha = {stage: class_weights(dataset, stage, net.n_classes, params.weight_limit) for stage in stages}
     optimiser = torch.optim.SGD(net.to(device).parameters(), lr=params.learning_rate, momentum=params.momentum)
@@ -183,27 +197,6 @@ def _gradients_as_found(net: nn.Module) -> Iterator[None]:
     finally:
         for parameter, learns in found:
             parameter.requires_grad_(learns)
-
-
-def check_folder(folder: Path, resume: bool) -> None:
-    """Refuse to overwrite a finished or an interrupted run.
-
-    Parameters
-    ----------
-    folder : Path
-        The folder of the training run to come.
-    resume : bool
-        Whether it continues an interrupted one.
-
-    Raises
-    ------
-    DataError
-        When the folder holds a run that would be lost.
-    """
-    if (folder / WEIGHTS).exists():
-        raise DataError(folder, "a folder without a trained network, which would be lost", WEIGHTS)
-    if (folder / CHECKPOINT).exists() and not resume:
-        raise DataError(folder, "a folder without an interrupted run (--resume continues it)", CHECKPOINT)
 
 
 def _check_dataset(net: SemanticGridNet, dataset: Sequence[Sample], params: TrainingParams) -> None:

@@ -24,9 +24,9 @@ from semgrid_edu.storage.files import write_bytes
 @pytest.fixture(scope="module")
 def excerpt(tmp_path_factory):
     """A data set and the excerpt of both frames of its training split."""
-    root = write_tiny_dataset(tmp_path_factory.mktemp("tiny"))
-    write_excerpt(root, 2, root / "samples" / "frames")
-    return root, root / "samples" / "frames"
+    root, samples = write_tiny_dataset(tmp_path_factory.mktemp("tiny")), tmp_path_factory.mktemp("samples")
+    write_excerpt(root, 2, samples / "frames")
+    return root, samples / "frames"
 
 
 def test_an_excerpt_holds_the_frames_of_the_training_set_bit_for_bit(excerpt):

@@ -108,6 +108,14 @@ class TestBuilt:
         with pytest.raises(AssertionError, match="made anew"):
             TrainingSet(root, "train", image_size=SMALL)
 
+    def test_a_scan_changed_in_place_is_not_in_the_cache(self, built, tmp_path):
+        """The same name and the same size, other points."""
+        root = shutil.copytree(built, tmp_path / "copy")
+        scan = root / DATE / f"{DATE}_drive_0002_sync" / "velodyne_points" / "data" / "0000000001.bin"
+        scan.write_bytes(scan.read_bytes()[16:] + scan.read_bytes()[:16])
+        with pytest.raises(AssertionError, match="made anew"):
+            TrainingSet(root, "train", image_size=SMALL)
+
     def test_damaged_array_is_named(self, built, tmp_path):
         root = shutil.copytree(built, tmp_path / "copy")
         (path,) = root.glob("cache/*/train/occupancy.npy")

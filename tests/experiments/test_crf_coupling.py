@@ -83,7 +83,7 @@ def test_what_is_done_is_not_measured_again_and_another_log_is_refused(result, m
     with pytest.raises(DataError, match="choose another file"):
         study.crf_coupling(log, seed=1, **QUICK)
     log.with_name("other.json").write_text("[]")
-    with pytest.raises(DataError, match="something else"):
+    with pytest.raises(DataError, match=r"other\.json: expected a JSON object"):
         study.crf_coupling(log.with_name("other.json"), **QUICK)
 
 

@@ -15,9 +15,11 @@ from semgrid_edu.experiments.reproduction.execute import execute_plan
 from semgrid_edu.experiments.reproduction.experiments import EXPERIMENTS
 from semgrid_edu.experiments.reproduction.one_run import check_runs_folder, claim_folder, run_one
 from semgrid_edu.experiments.reproduction.plan import estimate, plan_table, with_needs
+from semgrid_edu.experiments.reproduction.reproduce import Request, reproduce
 from semgrid_edu.experiments.reproduction.scales import SCALES, scale_named
 from semgrid_edu.networks import WEIGHTS
 from semgrid_edu.simulation.datasets import DatasetRecipe, Route, make_from_recipe
+from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.storage.workplace import Workplace, workplace
 
 A = Note("a")
@@ -162,6 +164,12 @@ def test_a_killed_plan_goes_on_with_the_same_bytes(trained, tmp_path):
     assert not second.has_ended(root)
     assert execute_plan(with_needs(tiny_training_runs()), root, here(1)) == {}
     assert results(root) == results(trained)
+
+
+def test_two_commands_never_share_a_folder_of_runs(tmp_path):
+    request = Request("table3", "quick", None, tmp_path / "runs", tmp_path / "out", workers=1)
+    with sole_writer(tmp_path / "runs"), pytest.raises(DataError, match="a folder that no other process writes to"):
+        reproduce(request, lambda _: None)
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -19,6 +20,8 @@ from semgrid_edu.simulation.datasets import RECIPES, DatasetRecipe, Route, make_
 from semgrid_edu.simulation.street.plan import Wishes
 from semgrid_edu.simulation.writer import DATE
 from semgrid_edu.storage.files import sha256
+from semgrid_edu.storage.locking import sole_writer
+from semgrid_edu.storage.provenance import provenance_problems
 
 QUIET = Wishes(density=0.2, layout="straight", styles=("park", "park"))
 TINY = DatasetRecipe("tiny", "KITTI-14", (Route("train", 2, False, QUIET), Route("test", 1, True, QUIET)))
@@ -66,6 +69,37 @@ def test_killed_in_the_middle_it_resumes_to_the_same_bytes(alone, tmp_path, monk
     resumed = make_from_recipe(TINY, tmp_path, seed=3, workers=1)
     assert contents(resumed) == contents(alone)
     assert first.stat().st_mtime_ns == written
+
+
+def test_a_second_process_is_refused(alone, tmp_path):
+    with sole_writer(tmp_path / "tiny"), pytest.raises(DataError, match="a folder that no other process writes to"):
+        make_from_recipe(TINY, tmp_path, seed=3, workers=1)
+    assert list((tmp_path / "tiny").iterdir()) == []
+
+
+def test_a_drive_with_holes_is_named_before_provenance_is_written(alone, tmp_path):
+    root = shutil.copytree(alone, tmp_path / "tiny")
+    (root / "dataset.json").unlink()
+    (root / "provenance.json").unlink()
+    (drive_folder(root, DATE, "0001") / "velodyne_points" / "data" / "0000000001.bin").unlink()
+    with pytest.raises(DataError, match=r"drive_0001_sync: expected all .* 1 missing, such as .*0000000001\.bin"):
+        make_from_recipe(TINY, tmp_path, seed=3, workers=1)
+    assert not (root / "dataset.json").exists()
+    assert not (root / "provenance.json").exists()
+
+
+def test_a_drive_that_another_worker_finished_first_stays_and_nothing_partial_does(alone, tmp_path):
+    """A worker that lost its cluster comes back late: what it writes is its own, and is dropped."""
+    root = shutil.copytree(alone, tmp_path / "tiny")
+    before = contents(root)
+    (root / DATE / f".{DATE}_drive_0001_sync-abcd.partial").mkdir()
+    partial = root / DATE / f".{DATE}_drive_0001_sync-abcd.partial" / "0000000000.png"
+    partial.write_bytes(b"half")
+    datasets._make_drive(TINY, root, 3, 0)
+    assert partial.read_bytes() == b"half"
+    assert provenance_problems(root) == []
+    partial.unlink()
+    assert contents(root) == before
 
 
 def test_workers_end_when_their_parent_is_killed(tmp_path):
@@ -130,7 +164,7 @@ def test_somebody_elses_folder_is_refused(alone, tmp_path):
         make_from_recipe(TINY, tmp_path, seed=5, workers=1)
     assert (tmp_path / "tiny" / "thesis.txt").read_text() == "precious"
     (tmp_path / "tiny" / "simulation.json").write_text("{")
-    with pytest.raises(DataError, match=r"simulation\.json: expected data made with .+, found no JSON"):
+    with pytest.raises(DataError, match=r"simulation\.json: expected a JSON object, found no JSON"):
         make_from_recipe(TINY, tmp_path, seed=5, workers=1)
 
 

@@ -11,6 +11,7 @@ from semgrid_edu.crf import CrfParams
 from semgrid_edu.crf.layer import CrfLayer
 from semgrid_edu.crf.layer_file import load_crf, save_crf
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.storage.tensors import write_tensors
 from semgrid_edu.training import CHECKPOINT, loop, weighted_cross_entropy
 from semgrid_edu.training import crf as training
@@ -33,6 +34,12 @@ def grids():
     log_g = log_softmax(3.0 * np.moveaxis(np.eye(CLASSES)[truth], -1, 1), axis=1).astype(np.float32)
     occupancy = np.moveaxis(rng.dirichlet(np.ones(4), (FRAMES, *SHAPE)), -1, 1).astype(np.float32)
     return log_g, occupancy, truth
+
+
+def test_two_training_runs_never_share_a_folder(grids, tmp_path):
+    with sole_writer(tmp_path), pytest.raises(DataError, match="a folder that no other process writes to"):
+        train_crf(new_layer(), *grids, tmp_path, QUICK)
+    assert not list(tmp_path.iterdir())
 
 
 def values(layer):

@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.cli import app
+from semgrid_edu.datasets import dataset_doubts
 from semgrid_edu.datasets.made_truth import MadeTruth
 from semgrid_edu.datasets.named_truths import POLICIES
 from semgrid_edu.datasets.training_set import Sample
@@ -49,6 +50,12 @@ class _Noise:
         occupancy = torch.rand(4, *shape, generator=self.rng).softmax(0)
         truth = torch.randint(14, shape, generator=self.rng)
         return Sample(image.to(torch.uint8), labels.to(torch.uint8), occupancy, truth.to(torch.uint8))
+
+
+@pytest.fixture(autouse=True)
+def data_without_doubts(monkeypatch):
+    """The data set isn't on disk, so nothing can be asked of it."""
+    monkeypatch.setattr(dataset_doubts, "dataset_doubts", lambda *_: [])
 
 
 class _Net:

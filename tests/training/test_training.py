@@ -17,6 +17,7 @@ from tiny_streets import CAMERA, SMALL, tiny_streets
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import IGNORE
 from semgrid_edu.networks import SEGMENTERS, SemanticGridNet, build_net
+from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
 from semgrid_edu.training import TrainingParams, checkpoint, train
 from semgrid_edu.training import loop as training
@@ -428,6 +429,12 @@ def test_no_training_is_overwritten(streets, tmp_path, monkeypatch):
         with pytest.raises(DataError, match=r"a trained network, which would be lost, found weights.safetensors"):
             train(build_net(SMALL, CAMERA), streets, tmp_path, QUICK, resume=resume)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_two_training_runs_never_share_a_folder(streets, tmp_path):
+    with sole_writer(tmp_path), pytest.raises(DataError, match="a folder that no other process writes to"):
+        train(build_net(SMALL, CAMERA), streets, tmp_path, QUICK)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_full_disk_keeps_the_checkpoint_before(streets, tmp_path, monkeypatch):

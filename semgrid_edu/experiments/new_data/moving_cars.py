@@ -1,6 +1,5 @@
 """Whether the occupancy filter, which learns nothing, finds the cars that move (section 3.2)."""
 
-import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -8,10 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.errors import DataError
 from semgrid_edu.experiments.scenes import hit_cells
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Belief, State
+from semgrid_edu.storage.reading import read_json
 
 Boxes = dict[int, list[list[float]]]
 """Boxes of moving cars by frame, each [x_min, x_max, y_min, y_max], metres in the grid frame."""
@@ -29,12 +30,21 @@ def read_boxes(path: Path) -> Boxes:
     -------
     dict of int to list
         The boxes in each frame; none when there is no such file.
+
+    Raises
+    ------
+    DataError
+        When the file holds something else.
     """
-    cars = json.loads(path.read_text()) if path.exists() else {}
+    cars = read_json(path) if path.exists() else {}
     boxes: Boxes = {}
-    for name, by_frame in cars.items():
-        for frame, box in by_frame.items() if name.startswith("car") else ():
-            boxes.setdefault(int(frame), []).append(box[:4])
+    try:
+        for name, by_frame in cars.items():
+            for frame, box in by_frame.items() if name.startswith("car") else ():
+                x_min, x_max, y_min, y_max = map(float, box[:4])
+                boxes.setdefault(int(frame), []).append([x_min, x_max, y_min, y_max])
+    except (AttributeError, TypeError, ValueError) as error:
+        raise DataError(path, "boxes of moving cars by frame, four metres each", error) from error
     return boxes
 
 
@@ -51,7 +61,7 @@ def sample_boxes(drive: KittiRawDrive) -> Boxes:
     dict of int to list
         The boxes in each frame, [x_min, x_max, y_min, y_max], metres.
     """
-    known = json.loads((drive.folder / "labels" / "objects.json").read_text())
+    known = read_json(drive.folder / "labels" / "objects.json")
     boxes: Boxes = {}
     for frame, things in known.items():
         for thing in things:

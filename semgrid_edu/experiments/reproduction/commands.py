@@ -38,7 +38,9 @@ def _command(experiment: str) -> Callable[..., None]:
         runs: Annotated[Path, typer.Option(help="Takes one folder per run; the same command goes on.")],
         out: Annotated[Path, typer.Option(help="Takes the results: JSON, Markdown and pictures.")],
         scale: Annotated[str, typer.Option(help="quick (minutes), reduced (hours) or paper (needs a GPU).")] = "quick",
-        seeds: Annotated[int | None, typer.Option(min=1, help="Number of seeds; the scale's own by default.")] = None,
+        seeds: Annotated[
+            int | None, typer.Option(min=1, max=1000, help="Number of seeds; the scale's own by default.")
+        ] = None,
         workers: Annotated[int | None, typer.Option(help="Runs at a time; one per core by default.")] = None,
         scheduler: Annotated[
             str | None, typer.Option(help="tcp://HOST:PORT of a dask.distributed cluster that does the runs.")

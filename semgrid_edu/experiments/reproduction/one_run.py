@@ -1,7 +1,6 @@
 """Doing one run: its folder claimed, what it prints kept, its end recorded (section 4)."""
 
 import contextlib
-import json
 import threading
 import time
 import traceback
@@ -15,6 +14,7 @@ from semgrid_edu.experiments.reproduction.threads import THREADS, few_threads
 from semgrid_edu.experiments.reproduction.torchrun import work_together
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import commit, versions
+from semgrid_edu.storage.reading import read_json
 
 _ONE_AT_A_TIME = threading.Lock()
 """Threads and printed output belong to a process, so it takes one run at a time, however many a cluster gives it."""
@@ -90,10 +90,7 @@ def claim_folder(run: Run, root: str | Path) -> None:
     if not path.exists():
         write_json(path, settings)
         return
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise DataError(path, "the settings of a run", error) from error
+    found = read_json(path)
     if found != settings:
         differing = sorted(name for name in settings | found if settings.get(name) != found.get(name))
         theirs, ours = ({name: one.get(name) for name in differing} for one in (found, settings))

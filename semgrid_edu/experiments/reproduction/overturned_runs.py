@@ -1,6 +1,5 @@
 """Runs that score cars lying on their tops: images that no network has seen in training (section 4.4)."""
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.networks import WEIGHTS, load_net
+from semgrid_edu.storage.reading import read_json
 
 OVERTURNED, UPRIGHT = "overturned cars", "other cars"
 """Whose cells are counted."""
@@ -84,8 +84,7 @@ class OverturnedRun(CountingRun):
         """Yield the road users of each frame."""
         index = load_index(self.frames.data.dataset_dir(root))
         for (date, drive), numbers in index.frames_by_drive(self.frames.split).items():
-            text = (drive_folder(index.root, date, drive) / "labels" / "objects.json").read_text(encoding="utf-8")
-            objects = json.loads(text)
+            objects = read_json(drive_folder(index.root, date, drive) / "labels" / "objects.json")
             yield from (objects[f"{number:010d}"] for number in numbers)
 
     def confusions(self, root: str | Path, method: str, truth: str, band: str | None = None) -> FrameConfusions:

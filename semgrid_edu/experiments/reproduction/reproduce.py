@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +14,8 @@ from semgrid_edu.experiments.reproduction.plan import estimate, plan_table, with
 from semgrid_edu.experiments.reproduction.results import write_result
 from semgrid_edu.experiments.reproduction.runs import OUTPUT, Run
 from semgrid_edu.experiments.reproduction.scales import Scale, scale_named
-from semgrid_edu.storage.workplace import usable_cores, workplace
+from semgrid_edu.storage.locking import sole_writer
+from semgrid_edu.storage.workplace import check_workers, usable_cores, workplace
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,15 @@ def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = F
     if started > 1:
         expected = f"{started}, by which each training run starts torchrun itself"
         raise ArgumentError("--processes", expected, f"a command that torchrun started {started} times")
-    root, plan = check_runs_folder(request.runs), request.plan()
+    check_workers(request.workers or 1)
+    root = check_runs_folder(request.runs)
+    with nullcontext() if plan_only else sole_writer(root):
+        return _reproduced(request, root, echo, plan_only)
+
+
+def _reproduced(request: Request, root: Path, echo: Callable[[str], None], plan_only: bool) -> str:
+    """Do what `reproduce` says, in a folder of runs that no other process writes to."""
+    plan = request.plan()
     estimated = estimate(plan, root)
     hours = estimated.hours(request.workers or usable_cores())
     told = f"{len(estimated.seconds)} of {len(plan)} runs are left, about {60 * hours:.0f} minutes"

@@ -6,6 +6,7 @@ from dataclasses import MISSING, dataclass, fields, is_dataclass
 from pathlib import Path
 
 from semgrid_edu.errors import DataError
+from semgrid_edu.storage.reading import read_json
 
 CLAIM, OUTPUT, ENDED = "run.json", "output.txt", "ended.json"
 """The files that every run has: what decides it, what it printed, and, last of all, when it ended and how long it took.
@@ -100,10 +101,10 @@ class Run(ABC):
             When the run hasn't ended, or the record is damaged.
         """
         path = self.folder(root) / ENDED
+        record = read_json(path)
         try:
-            record = json.loads(path.read_text(encoding="utf-8"))
-            return record | {"seconds": float(record["seconds"])}
-        except (OSError, ValueError, KeyError, TypeError) as error:
+            return record | {"seconds": float(record["seconds"]), "date": str(record.get("date", "unknown"))}
+        except (ValueError, KeyError, TypeError, OverflowError) as error:
             raise DataError(path, "the record of a run that has ended", error) from error
 
     def settings(self) -> dict:

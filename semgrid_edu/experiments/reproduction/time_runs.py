@@ -1,6 +1,5 @@
 """Runs that measure time: how long two networks take for a frame, in turns (section 3.4)."""
 
-import json
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,12 +8,14 @@ import numpy as np
 import torch
 from scipy import stats
 
+from semgrid_edu.errors import DataError
 from semgrid_edu.experiments.measured import Measured
 from semgrid_edu.experiments.reproduction.data_runs import ArraysRun
 from semgrid_edu.experiments.reproduction.runs import Run
 from semgrid_edu.experiments.reproduction.training_runs import GridStageRun
 from semgrid_edu.networks import WEIGHTS, SemanticGridNet, load_net, unit_image
 from semgrid_edu.storage.files import write_json
+from semgrid_edu.storage.reading import read_json
 
 TIMES = "times.json"
 """The file of the run."""
@@ -85,8 +86,12 @@ class TimeRun(Run):
         -------
         (R, 2) float64
         """
-        content = json.loads((self.folder(root) / TIMES).read_text(encoding="utf-8"))
-        return np.array(content["seconds per frame"])
+        path = self.folder(root) / TIMES
+        rounds = read_json(path).get("seconds per frame")
+        try:
+            return np.array(rounds, dtype=np.float64).reshape(-1, 2)
+        except (ValueError, TypeError) as error:
+            raise DataError(path, "the seconds per frame of two networks in each round", error) from error
 
 
 @torch.inference_mode()

@@ -1,0 +1,64 @@
+"""What every command asks first: whether its arguments are given, and what is doubtful about its data."""
+
+import os
+import re
+from collections.abc import Iterable, Sequence
+
+import typer
+
+from semgrid_edu.errors import ArgumentError
+
+LARGEST = 2**63 - 1
+"""The largest whole number that a command takes: PyTorch's generators take no larger seed."""
+
+TOLD = 20
+"""Most doubtful things of a kind that are shown one by one."""
+
+
+def check_arguments(arguments: Sequence[str]) -> None:
+    """Refuse arguments that are empty, as those of unset variables are, aren't UTF-8, or are too large numbers.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        What the user has typed, without the program's name.
+
+    Raises
+    ------
+    ArgumentError
+        When an argument is empty, isn't UTF-8, or is a whole number of more than 63 bits.
+
+    Examples
+    --------
+    >>> check_arguments(["demo", "--drive", ""])
+    Traceback (most recent call last):
+    semgrid_edu.errors.ArgumentError: --drive: expected a value, found nothing: is a variable unset?
+    """
+    for number, argument in enumerate(arguments):
+        before = arguments[number - 1] if number else ""
+        option, equals, value = argument.partition("=") if argument.startswith("--") else ("", "", argument)
+        name = option or (before if before.startswith("--") else f"argument {number + 1}")
+        if not value.strip() and (equals or not option):
+            raise ArgumentError(name, "a value", "nothing: is a variable unset?")
+        try:
+            value.encode()
+        except UnicodeEncodeError:
+            raise ArgumentError(name, "UTF-8, in which results write names down", ascii(value)) from None
+        digits = re.fullmatch(r"[+-]?0*(\d*)", value)
+        if digits and (len(digits[1]) > 19 or int(digits[1] or 0) > LARGEST):
+            raise ArgumentError(name, f"a whole number up to {LARGEST}", value[:60])
+
+
+def tell(doubts: Iterable[str]) -> None:
+    """Write what is doubtful to the standard error stream, one line each; of several processes the first one does.
+
+    Parameters
+    ----------
+    doubts : iterable of str
+        What `KittiRawDrive.doubts`, `dataset_doubts` or `weights_doubts` return.
+    """
+    doubts = list(doubts) if os.environ.get("RANK", "0") == "0" else []
+    for doubt in doubts[:TOLD]:
+        typer.echo(f"semgrid-edu: doubtful: {doubt}", err=True)
+    if len(doubts) > TOLD:
+        typer.echo(f"semgrid-edu: doubtful: {len(doubts) - TOLD} things more", err=True)

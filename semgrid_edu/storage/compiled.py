@@ -1,0 +1,66 @@
+"""Where numba keeps compiled functions, when the package and the user's own cache folder can't be written to."""
+
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+PACKAGE = Path(__file__).parents[1]
+"""The folder of the package, in which numba keeps what it compiles if it can."""
+
+VARIABLE = "NUMBA_CACHE_DIR"
+"""The environment variable that names numba's cache folder."""
+
+
+def keep_compiled_functions() -> str:
+    """Give numba a folder in the system's temporary one, if it could keep compiled functions nowhere else.
+
+    Without such a folder numba refuses to import the package. The environment variable has to be set before numba is
+    imported; worker processes inherit it.
+
+    Returns
+    -------
+    str
+        One line for the user; empty when numba finds a place by itself.
+    """
+    chosen = [Path(os.environ[VARIABLE])] if os.environ.get(VARIABLE) else []
+    if any(map(_takes_files, [*chosen, *_usual_folders()])):
+        return ""
+    os.environ[VARIABLE] = folder = str(_own_folder())
+    return f"neither the package nor your cache folder can be written to; compiled functions are kept in {folder}"
+
+
+def _usual_folders() -> list[Path]:
+    """Return where numba looks: beside the module, and in the user's cache folder."""
+    home = Path(os.path.expanduser("~"))  # noqa: PTH111 (Path.home raises an error for a user without a home)
+    return [PACKAGE / "occupancy" / "__pycache__", _user_cache(home)]
+
+
+def _user_cache(home: Path) -> Path:
+    """Return the user's cache folder as numba does."""
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", home / "AppData" / "Local"))
+    if sys.platform == "darwin":
+        return home / "Library" / "Caches"
+    return Path(os.environ.get("XDG_CACHE_HOME", home / ".cache"))
+
+
+def _takes_files(folder: Path) -> bool:
+    """Return whether files can be written to a folder, which is made when missing."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
+        return False
+    return True
+
+
+def _own_folder() -> Path:
+    """Return a folder of this user alone: compiled functions are code, which nobody else may put there."""
+    user = os.getuid() if hasattr(os, "getuid") else 0
+    folder = Path(tempfile.gettempdir()) / f"semgrid_edu-{user}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = folder.lstat()
+    if found.st_uid != user or (os.name == "posix" and found.st_mode & 0o077) or folder.is_symlink():
+        folder = Path(tempfile.mkdtemp(prefix="semgrid_edu-"))
+    return folder

@@ -1,0 +1,734 @@
+"""The table of bad inputs: what is spoilt, which command meets it, and what it has to say. `test_bad_inputs` tries it.
+
+Each row works on a copy of what the fixture `prepared` makes: TINY, a data set with its arrays; `weights.safetensors`,
+a network that has made a step, `image_stage.safetensors`, and `fresh.safetensors`, which has made none; RUN, a training
+run with a log; SAMPLES, a sample with its provenance. Where a command says that something is doubtful, it goes on.
+"""
+
+import json
+import os
+import socket
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+from safetensors.torch import load_file, save_file
+from tiny_drive import DATE
+
+from semgrid_edu.storage.locking import sole_writer
+from semgrid_edu.storage.provenance import write_provenance
+from semgrid_edu.training.log import LOG, Step, append_step, begin_log
+
+DRIVE = f"TINY/{DATE}/{DATE}_drive_0001_sync"
+SCAN = f"{DRIVE}/velodyne_points/data/000000000{{}}.bin"
+OXTS = f"{DRIVE}/oxts/data/000000000{{}}.txt"
+PHOTO = f"{DRIVE}/image_02/data/0000000000.png"
+CALIBRATION = f"TINY/{DATE}/calib_cam_to_cam.txt"
+HUGE = str(2**70)
+DEEP, LONG_NUMBER = "[" * 10**5, '{"a": ' + "9" * 5000 + "}"
+
+DEMO = f"demo --kitti TINY --date {DATE} --drive 0001 --out OUT"
+TRAIN = "train --data TINY --out OUT"
+EVALUATE = "evaluate --data TINY --weights weights.safetensors --out scores.json"
+TRAIN_CRF = "train-crf --data TINY --weights weights.safetensors --out OUT --split train"
+SEARCH = "search-crf --data TINY --test TINY --weights weights.safetensors --out log.json"
+LEARNED = "reproduce learned-crf --data TINY --validation TINY --weights weights.safetensors --runs RUNS --out log.json"
+FETCH = "data fetch kitti --drive 2011_09_26_0013 --folder OUT"
+TABLE1 = "reproduce table1 --runs RUNS --out OUT --plan"
+
+Spoil = Callable[[Path], object]
+
+
+class Row(NamedTuple):
+    """One kind of bad input: its name, the command that meets it, what that says (a pattern), and what is spoilt."""
+
+    kind: str
+    command: str
+    says: str
+    spoil: Spoil = lambda _: None
+
+
+def text(name: str, content: str) -> Spoil:
+    return lambda root: (root / name).parent.mkdir(exist_ok=True, parents=True) or (root / name).write_text(content)
+
+
+def change(name: str, old: str, new: str) -> Spoil:
+    def spoil(root: Path) -> None:
+        content = (root / name).read_text()
+        assert old in content
+        (root / name).write_text(content.replace(old, new))
+
+    return spoil
+
+
+def cut(name: str, share: float) -> Spoil:
+    def spoil(root: Path) -> None:
+        content = (root / name).read_bytes()
+        (root / name).write_bytes(content[: int(len(content) * share) // 16 * 16])
+
+    return spoil
+
+
+def shorter(name: str) -> Spoil:
+    return lambda root: (root / name).write_text("".join((root / name).read_text().splitlines(keepends=True)[:-1]))
+
+
+def gone(name: str) -> Spoil:
+    return lambda root: (root / name).unlink()
+
+
+def pipe(name: str) -> Spoil:
+    def spoil(root: Path) -> None:
+        if not hasattr(os, "mkfifo"):
+            pytest.skip("this system has no pipes among its files")
+        (root / name).unlink(missing_ok=True)
+        os.mkfifo(root / name)
+
+    return spoil
+
+
+def folder(name: str) -> Spoil:
+    def spoil(root: Path) -> None:
+        (root / name).unlink(missing_ok=True)
+        (root / name).mkdir()
+
+    return spoil
+
+
+def a_socket(name: str) -> Spoil:
+    def spoil(root: Path) -> None:
+        if not hasattr(socket, "AF_UNIX"):
+            pytest.skip("this system has no sockets among its files")
+        (root / name).unlink()
+        before = Path.cwd()
+        os.chdir((root / name).parent)  # names of sockets are short
+        with socket.socket(socket.AF_UNIX) as one:
+            one.bind((root / name).name)
+        os.chdir(before)
+
+    return spoil
+
+
+def scan(points: np.ndarray, k: int = 0) -> Spoil:
+    return lambda root: (root / SCAN.format(k)).write_bytes(np.asarray(points, "<f4").tobytes())
+
+
+def one_point(root: Path) -> None:
+    for k in range(3):
+        scan(np.array([[5.0, 0, 0, 0]]), k)(root)
+
+
+def packet(field: int, value: str, k: int = 1) -> Spoil:
+    def spoil(root: Path) -> None:
+        words = (root / OXTS.format(k)).read_text().split()
+        words[field] = value
+        (root / OXTS.format(k)).write_text(" ".join(words))
+
+    return spoil
+
+
+def tensors(make: Callable[[torch.Tensor], torch.Tensor], name: str = "weights.safetensors") -> Spoil:
+    def spoil(root: Path) -> None:
+        made = {key: make(one) if one.is_floating_point() else one for key, one in load_file(root / name).items()}
+        save_file(made, root / name, {"architecture": (root / "architecture.json").read_text()})
+
+    return spoil
+
+
+def header(**values: object) -> Spoil:
+    """Replace entries of the architecture in the header of the weights."""
+
+    def spoil(root: Path) -> None:
+        described = json.loads((root / "architecture.json").read_text()) | values
+        path = root / "weights.safetensors"
+        save_file(load_file(path), path, {"architecture": json.dumps(described)})
+
+    return spoil
+
+
+def raw_header(content: str) -> Spoil:
+    return lambda root: save_file({"a": torch.zeros(1)}, root / "weights.safetensors", {"architecture": content})
+
+
+def index(**values: object) -> Spoil:
+    def spoil(root: Path) -> None:
+        path = root / "TINY" / "dataset.json"
+        path.write_text(json.dumps(json.loads(path.read_text()) | values))
+
+    return spoil
+
+
+def frames(**values: object) -> Spoil:
+    return index(splits={"train": [{"date": DATE, "drive": "0001", "frame": 2} | values]})
+
+
+def log(*steps: Step) -> Spoil:
+    def spoil(root: Path) -> None:
+        begin_log(root / "RUN" / LOG, 0)
+        for step in steps:
+            append_step(root / "RUN" / LOG, step)
+
+    return spoil
+
+
+def checkpoint(described: dict[str, str]) -> Spoil:
+    return lambda root: (
+        (root / "OUT").mkdir() or save_file({"a": torch.zeros(1)}, root / "OUT" / "checkpoint.safetensors", described)
+    )
+
+
+def locked(name: str) -> Spoil:
+    """Lock a folder until the table's `HELD` is emptied."""
+
+    def spoil(root: Path) -> None:
+        held = sole_writer(root / name)
+        held.__enter__()
+        HELD.append(held)
+
+    return spoil
+
+
+HELD: list = []
+"""Locks of the row that is tried."""
+
+
+def sample(root: Path) -> None:
+    text("SAMPLES/one/file.txt", "as it was")(root)
+    write_provenance(root / "SAMPLES" / "one", "made", 0, ("numpy",))
+
+
+def png(name: str, size: tuple[int, int], mode: str = "RGB", value: int = 0, form: str = "png") -> Spoil:
+    return lambda root: Image.new(mode, size, value).save(root / name, form)
+
+
+NAN = np.array([[5.0, np.nan, 0, 0]] * 700)
+FAR = np.array([[5000.0, 0, 0, 0]] * 700)
+
+DRIVES = (
+    Row("a scan that is a pipe", DEMO, "0000.bin: expected a file, found a pipe", pipe(SCAN.format(0))),
+    Row("a scan that is a socket", DEMO, "0000.bin: expected a file, found a pipe, a socket", a_socket(SCAN.format(0))),
+    Row("a scan that is a folder", DEMO, "0000.bin: expected a file, found a folder", folder(SCAN.format(0))),
+    Row("a missing scan", DEMO, "0000.bin: expected a file, found nothing there", gone(SCAN.format(0))),
+    Row("an empty scan", DEMO, "0000.bin: expected a file with content", text(SCAN.format(0), "")),
+    Row(
+        "a scan of a broken number of bytes", DEMO, "0000.bin: expected points of 4 x 4", text(SCAN.format(0), "x" * 17)
+    ),
+    Row("a scan with NaN", DEMO, "0000.bin: expected finite coordinates", scan(NAN)),
+    Row("a return at five kilometres", DEMO, "0000.bin: expected finite coordinates within 250 m", scan(FAR)),
+    Row(
+        "a scan cut in half", DEMO, "doubtful: .*0000.bin: .* as large as the drive's others", cut(SCAN.format(0), 0.5)
+    ),
+    Row("scans of one point", DEMO, "doubtful: .*0000.bin: expected a scan of at least 100 points, found 1", one_point),
+    Row("a pose 4000 km away", DEMO, "doubtful: .*0001.txt: expected a place within", packet(0, "85.0")),
+    Row("a height that jumps", DEMO, "doubtful: .*0001.txt: expected a place within", packet(2, "9000.0")),
+    Row("a latitude of 91 degrees", DEMO, "0000.txt: expected latitude", packet(0, "91.0", 0)),
+    Row("a yaw in degrees", DEMO, "0000.txt: expected roll, pitch and yaw", packet(5, "180.0", 0)),
+    Row("an oxts packet with a word in it", DEMO, "0000.txt: expected numbers", packet(3, "north", 0)),
+    Row("an oxts packet of NaN", DEMO, "0000.txt: expected finite numbers", packet(3, "nan", 0)),
+    Row("an oxts packet of 29 numbers", DEMO, "0000.txt: expected 30 numbers", packet(3, "", 0)),
+    Row("a missing oxts packet", DEMO, "0000.txt: expected a file", gone(OXTS.format(0))),
+    Row("a missing image", DEMO, "0000.png: expected a file", gone(PHOTO)),
+    Row("an image cut short", DEMO, "0000.png: expected a sound PNG", cut(PHOTO, 0.5)),
+    Row("an image of another size", DEMO, "0000.png: expected RGB of 12 x 40", png(PHOTO, (30, 20))),
+    Row("a grey image", DEMO, "0000.png: expected RGB of 12 x 40", png(PHOTO, (40, 12), "L")),
+    Row("a JPEG called PNG", DEMO, "0000.png: expected a sound PNG", png(PHOTO, (40, 12), form="jpeg")),
+    Row("missing time stamps", DEMO, "timestamps.txt: expected a file", gone(f"{DRIVE}/oxts/timestamps.txt")),
+    Row("a time stamp too few", DEMO, "timestamps.txt: expected 3 lines", shorter(f"{DRIVE}/image_02/timestamps.txt")),
+    Row(
+        "time stamps in words",
+        DEMO,
+        "timestamps.txt: expected times",
+        text(f"{DRIVE}/oxts/timestamps.txt", "now\n" * 3),
+    ),
+    Row("time stamps not in ASCII", DEMO, "timestamps.txt: expected ASCII", text(f"{DRIVE}/oxts/timestamps.txt", "é")),
+    Row("no calibration", DEMO, "calib_cam_to_cam.txt: expected a file", gone(CALIBRATION)),
+    Row("a calibration without its matrix", DEMO, "calib_cam_to_cam.txt: expected", change(CALIBRATION, "P_rect", "Q")),
+    Row("a calibration that is a pipe", DEMO, "calib_cam_to_cam.txt: expected a file", pipe(CALIBRATION)),
+    Row(
+        "a drive that isn't there", DEMO.replace("0001", "0042"), "0042_sync: expected a folder, found only the drives"
+    ),
+    Row("an empty drive", DEMO.replace("0001", "''"), "--drive: expected a value, found nothing"),
+    Row("an empty date after an equals sign", "demo --kitti TINY --date= --drive 0001", "--date: expected a value"),
+    Row("a folder without dates", DEMO.replace("TINY", "RUN"), "RUN/2026_01_01: expected a folder, found no dates"),
+    Row("half a drive's name", "demo --kitti TINY", "expected all three or none"),
+    Row("a page in place of a file", DEMO.replace("OUT", "architecture.json"), "File exists"),
+    Row("no file of stages", f"{DEMO} --stages none.py", "none.py: expected a Python file"),
+    Row("stages that are a pipe", f"{DEMO} --stages my.py", "my.py: expected a Python file", pipe("my.py")),
+    Row(
+        "stages that can't be imported",
+        f"{DEMO} --stages my.py",
+        "my.py: expected .* import",
+        text("my.py", "import no"),
+    ),
+    Row("stages without a stage", f"{DEMO} --stages my.py", "my.py: expected at least one function", text("my.py", "")),
+    Row("a stage without arguments", f"{DEMO} --stages my.py", "my.py: .*refine", text("my.py", "def refine(): pass")),
+)
+
+INDEXES = (
+    Row("no index", TRAIN, "dataset.json: expected a file", gone("TINY/dataset.json")),
+    Row(
+        "an index that is no JSON",
+        TRAIN,
+        "dataset.json: expected a JSON object, found no JSON",
+        text("TINY/dataset.json", "{"),
+    ),
+    Row("an index nested 100,000 deep", TRAIN, "dataset.json: .*nested too deeply", text("TINY/dataset.json", DEEP)),
+    Row(
+        "an index with a number of 5000 digits",
+        TRAIN,
+        "dataset.json: .*no JSON",
+        text("TINY/dataset.json", LONG_NUMBER),
+    ),
+    Row("an index that is a list", TRAIN, "dataset.json: expected a JSON object", text("TINY/dataset.json", "[1]")),
+    Row(
+        "an index that isn't UTF-8",
+        TRAIN,
+        "dataset.json: ",
+        lambda r: (r / "TINY/dataset.json").write_bytes(b"\xff\xfe"),
+    ),
+    Row("an index that is a pipe", TRAIN, "dataset.json: expected a file", pipe("TINY/dataset.json")),
+    Row("an unknown label set", TRAIN, "dataset.json: expected label_set", index(label_set="COCO")),
+    Row("a label set that is a number", TRAIN, "dataset.json: expected label_set", index(label_set=14)),
+    Row(
+        "the label set of other labels",
+        TRAIN,
+        "label_set.txt: expected SYNTHIA-10.*KITTI-14",
+        index(label_set="SYNTHIA-10"),
+    ),
+    Row("splits that are numbers", TRAIN, "dataset.json: expected splits", index(splits=3)),
+    Row("a split without frames", TRAIN, "dataset.json: expected splits", index(splits={"train": []})),
+    Row(
+        "no frames to train on",
+        TRAIN,
+        "split: expected one of test",
+        index(splits={"test": [{"date": DATE, "drive": "0007", "frame": 2}]}),
+    ),
+    Row("a frame below 0", TRAIN, "dataset.json: expected a frame like", frames(frame=-1)),
+    Row("a frame of 26 digits", TRAIN, "dataset.json: expected a frame like", frames(frame=10**25)),
+    Row("a name that is a list", TRAIN, "dataset.json: expected name", index(name=["tiny"])),
+    Row("a frame that is a word", TRAIN, "dataset.json: expected a frame like", frames(frame="two")),
+    Row("a drive outside of the data set", TRAIN, "dataset.json: expected a frame like", frames(drive="../../x")),
+    Row("a drive that isn't there, in an index", TRAIN, "0042_sync: expected a folder", frames(drive="0042")),
+    Row("a frame beyond the drive", TRAIN, "expected the frame 7 that dataset.json lists", frames(frame=7)),
+    Row("a frame without labels", TRAIN, "expected image and labels of the frame 0", frames(frame=0)),
+    Row(
+        "labels of an unknown set",
+        TRAIN,
+        "label_set.txt: expected one of",
+        text(f"{DRIVE}/labels/label_set.txt", "COCO"),
+    ),
+    Row(
+        "labels of classes that aren't there",
+        TRAIN,
+        "birdseye.*expected classes 0 to 13",
+        png(f"{DRIVE}/labels/birdseye/0000000002.png", (310, 710), "L", 99),
+    ),
+    Row(
+        "a frame that lacks one of its labels",
+        TRAIN,
+        "depth/0000000002.png: expected a file",
+        gone(f"{DRIVE}/labels/depth/0000000002.png"),
+    ),
+    Row("a scan cut in half, in a data set", EVALUATE, "doubtful: .*0000.bin", cut(SCAN.format(0), 0.5)),
+    Row("a pose 4000 km away, in a data set", TRAIN, "doubtful: .*0001.txt", packet(0, "85.0")),
+)
+
+WEIGHTS = (
+    Row("no weights", EVALUATE, "weights.safetensors: expected a safetensors file", gone("weights.safetensors")),
+    Row(
+        "weights that are a pipe",
+        EVALUATE,
+        "weights.safetensors: expected a safetensors file",
+        pipe("weights.safetensors"),
+    ),
+    Row(
+        "a pickle",
+        EVALUATE,
+        "weights.safetensors: expected a safetensors",
+        text("weights.safetensors", "\x80\x04pickle"),
+    ),
+    Row(
+        "weights cut short",
+        EVALUATE,
+        "weights.safetensors: expected a safetensors file",
+        cut("weights.safetensors", 0.5),
+    ),
+    Row("empty weights", EVALUATE, "weights.safetensors: expected a safetensors file", text("weights.safetensors", "")),
+    Row(
+        "weights of the image stage",
+        EVALUATE,
+        "weights.safetensors: expected a whole network",
+        lambda r: (r / "image_stage.safetensors").replace(r / "weights.safetensors"),
+    ),
+    Row("weights of NaN", EVALUATE, "weights.safetensors: expected finite numbers", tensors(lambda one: one * np.nan)),
+    Row(
+        "one infinite weight",
+        EVALUATE,
+        "weights.safetensors: expected finite numbers",
+        tensors(lambda one: one.masked_fill(one == one.max(), np.inf)),
+    ),
+    Row(
+        "variances below 0",
+        EVALUATE,
+        "weights.safetensors: expected variances of at least 0",
+        tensors(lambda one: -one - 1),
+    ),
+    Row(
+        "weights rounded to whole numbers",
+        EVALUATE,
+        "doubtful: .*weights.safetensors: .* rounded",
+        tensors(torch.round),
+    ),
+    Row(
+        "weights that never learnt",
+        EVALUATE,
+        "doubtful: .*weights.safetensors: expected a network that has learnt",
+        lambda r: (r / "fresh.safetensors").replace(r / "weights.safetensors"),
+    ),
+    Row("a header of 10^9 pixels", EVALUATE, "weights.safetensors: .*image_size", header(image_size=[31623, 31623])),
+    Row(
+        "a header of 10^9 cells",
+        EVALUATE,
+        "weights.safetensors: .*grid",
+        header(grid={"x_min": 0, "x_max": 71, "y_min": -15.5, "y_max": 15.5, "cell": 0.001}),
+    ),
+    Row("a header with a size of words", EVALUATE, "weights.safetensors: .*header", header(image_size=["a", "b"])),
+    Row("a header of an unknown network", EVALUATE, "weights.safetensors: .*header", header(segmenter="vit")),
+    Row("a header of another network", EVALUATE, "weights.safetensors: expected", header(segmenter="fcn")),
+    Row("a header nested 100,000 deep", EVALUATE, "weights.safetensors: .*nested too deeply", raw_header(DEEP)),
+    Row("a header with a number of 5000 digits", EVALUATE, "weights.safetensors: .*no JSON", raw_header(LONG_NUMBER)),
+    Row("a header that is a list", EVALUATE, "weights.safetensors: .*a JSON object", raw_header("[]")),
+    Row(
+        "no header",
+        EVALUATE,
+        "weights.safetensors: .*header",
+        lambda r: save_file({"a": torch.zeros(1)}, r / "weights.safetensors"),
+    ),
+    Row(
+        "a CRF on the image stage",
+        TRAIN_CRF,
+        "weights.safetensors: expected a whole network",
+        lambda r: (r / "image_stage.safetensors").replace(r / "weights.safetensors"),
+    ),
+)
+
+RUNS = (
+    Row(
+        "a folder that holds a network",
+        TRAIN,
+        "OUT: expected a folder without a trained",
+        text("OUT/weights.safetensors", "x"),
+    ),
+    Row(
+        "a folder that holds a checkpoint",
+        TRAIN,
+        "OUT: expected .* interrupted run",
+        text("OUT/checkpoint.safetensors", "x"),
+    ),
+    Row("too few frames for a batch", TRAIN, "dataset: expected at least one batch of 6", frames()),
+    Row("no checkpoint to go on from", f"{TRAIN} --resume", "checkpoint.safetensors: expected a safetensors file"),
+    Row(
+        "a checkpoint whose header is a list",
+        f"{TRAIN} --resume",
+        "checkpoint.safetensors: expected a JSON object",
+        checkpoint({"run": "[1]", "iteration": "1"}),
+    ),
+    Row(
+        "a checkpoint nested 100,000 deep",
+        f"{TRAIN} --resume",
+        "checkpoint.safetensors: .*nested too deeply",
+        checkpoint({"run": DEEP, "iteration": "1"}),
+    ),
+    Row(
+        "a checkpoint of step -1",
+        f"{TRAIN} --resume",
+        "checkpoint.safetensors: expected a checkpoint",
+        checkpoint({"run": "{}", "iteration": "-1"}),
+    ),
+    Row(
+        "a checkpoint of another run",
+        f"{TRAIN} --resume",
+        "resume: expected the run of",
+        checkpoint({"run": "{}", "iteration": "1"}),
+    ),
+    Row("a training run in its data set", TRAIN.replace("OUT", "TINY"), "TINY: expected .*, found a data set"),
+    Row(
+        "a training run over other results",
+        TRAIN.replace("OUT", "SAMPLES/one"),
+        "found the provenance.json of something",
+    ),
+    Row(
+        "a CRF's training run in its data set", TRAIN_CRF.replace("OUT", "TINY"), "TINY: expected .*, found a data set"
+    ),
+    Row(
+        "a folder that another process writes to",
+        TRAIN,
+        "OUT: expected a folder that no other process writes to",
+        locked("OUT"),
+    ),
+    Row(
+        "a CRF's folder that another process writes to",
+        TRAIN_CRF,
+        "OUT: expected a folder that no other process writes to",
+        locked("OUT"),
+    ),
+    Row("a name that isn't UTF-8", "train --data TINY --out \udcff", "--out: expected UTF-8"),
+    Row("a link to itself", "curves loop --out c.png", "[Ll]oop", lambda r: (r / "loop").symlink_to(r / "loop")),
+    Row("a device that isn't there", f"{TRAIN} --device cuda:99", "--device: expected cpu"),
+    Row("an unknown device", f"{TRAIN} --device abacus", "--device: expected"),
+    Row("an unknown preset", f"{TRAIN} --preset huge", "--preset: expected compact or paper"),
+    Row("an unknown truth", f"{TRAIN} --truth guessed", "--truth: expected one of true, lidar"),
+    Row("an unknown image network", f"{TRAIN} --segmenter vit", "name: expected one of"),
+    Row("no steps", f"{TRAIN} --iterations 0", "Invalid value for '--iterations'"),
+    Row("a seed that is a word", f"{TRAIN} --seed luck", "Invalid value for '--seed'"),
+    Row("a seed below 0", f"{TRAIN} --seed=-1", "Invalid value for '--seed'"),
+    Row(
+        "a log without a finite number",
+        "curves RUN --out c.png",
+        "expected a finite loss",
+        log(Step(0, "image", 0.1, np.nan)),
+    ),
+    Row("a log without steps", "curves RUN --out c.png", "logs: expected", log()),
+    Row(
+        "a log with lines out of order",
+        "curves RUN --out c.png",
+        "log.csv: expected step 1 in line 3",
+        log(Step(0, "image", 0.1, 1.0), Step(2, "image", 0.1, 1.0), Step(1, "image", 0.1, 1.0)),
+    ),
+    Row(
+        "a log of two runs, mixed",
+        "curves RUN --out c.png",
+        "log.csv: expected step 1 in line 3",
+        log(Step(0, "image", 0.1, 1.0), Step(0, "image", 0.1, 1.0)),
+    ),
+    Row(
+        "a log that goes back to images",
+        "curves RUN --out c.png",
+        "log.csv: .*image stage before the grid stage",
+        log(Step(0, "grid", 0.1, 1.0), Step(1, "image", 0.1, 1.0)),
+    ),
+    Row(
+        "a log cut in a line",
+        "curves RUN --out c.png",
+        "log.csv: expected iteration",
+        text(f"RUN/{LOG}", "iteration,stage,learning_rate,loss\n0,im"),
+    ),
+    Row("a log that is a pipe", "curves RUN --out c.png", "log.csv: expected the log", pipe(f"RUN/{LOG}")),
+    Row("no log", "curves SAMPLES --out c.png", "log.csv: expected the log"),
+    Row("a picture of an unknown format", "curves RUN --out c.docx", "--out: expected a picture that ends in"),
+    Row("a picture without a format", "curves RUN --out c", "--out: expected a picture that ends in"),
+    Row("an unknown split for a CRF", TRAIN_CRF.replace("--split train", "--split none"), "split: expected one of"),
+    Row("a weight limit of NaN", f"{TRAIN_CRF} --weight-limit nan", "weight_limit: expected 1 or more"),
+)
+
+DATA = (
+    Row("an unknown data set", "data make maxikitti OUT", "name: expected one of minikitti"),
+    Row("a seed below 0, of data", "data make sample OUT --seed=-1", "seed: expected a whole number from 0 up"),
+    Row(
+        "data that another process makes",
+        "data make sample OUT",
+        "OUT/sample: expected a folder that no other process",
+        locked("OUT/sample"),
+    ),
+    Row("no scheduler there", "data make sample OUT --scheduler nowhere://x", "--scheduler: expected an address"),
+    Row(
+        "a damaged archive",
+        FETCH,
+        "2011_09_26_calib.zip: expected a sound zip archive",
+        text("OUT/archives/2011_09_26_calib.zip", "x"),
+    ),
+    Row("no workers", "data make sample OUT --workers 0", "--workers: expected at least one process"),
+    Row(
+        "1000 workers",
+        "data make sample OUT --workers 1000",
+        r"--workers: expected .* \d+ cores can be used here, found 1000",
+    ),
+    Row(
+        "a folder with other files",
+        "data make sample OUT",
+        "OUT/sample: expected an empty folder",
+        text("OUT/sample/thesis.txt", "x"),
+    ),
+    Row(
+        "a data set of another seed",
+        "data make sample OUT",
+        "simulation.json: expected data made with",
+        text("OUT/sample/simulation.json", '{"seed": 5}'),
+    ),
+    Row(
+        "a data set with a damaged mark",
+        "data make sample OUT",
+        "simulation.json: .*nested too deeply",
+        text("OUT/sample/simulation.json", DEEP),
+    ),
+    Row("an empty folder's name", "data make sample ''", "argument 4: expected a value"),
+    Row("an unknown archive", "data fetch nuscenes --drive 2011_09_26_0013 --folder OUT", "name: expected kitti"),
+    Row("a drive that is no date", "data fetch kitti --drive 13 --folder OUT", "drive: expected date and number"),
+    Row("samples without provenance", "data verify TINY", "provenance.json: expected a file"),
+    Row("no samples", "data verify OUT", "OUT: expected folders of samples"),
+    Row("a sample that was changed", "data verify SAMPLES", "file.txt: changed", text("SAMPLES/one/file.txt", "x")),
+    Row(
+        "provenance that is a list",
+        "data verify SAMPLES",
+        "provenance.json: expected a JSON object",
+        text("SAMPLES/one/provenance.json", "[1]"),
+    ),
+    Row(
+        "provenance with a number for its checksums",
+        "data verify SAMPLES",
+        "provenance.json: expected .*checksums",
+        text("SAMPLES/one/provenance.json", '{"sha256": 1}'),
+    ),
+    Row(
+        "provenance nested 100,000 deep",
+        "data verify SAMPLES",
+        "provenance.json: .*nested too deeply",
+        text("SAMPLES/one/provenance.json", DEEP),
+    ),
+    Row(
+        "an excerpt over its own data set",
+        "data excerpt TINY --data TINY",
+        "TINY: expected a folder apart from the data set",
+    ),
+    Row(
+        "an excerpt inside its data set",
+        "data excerpt TINY/part --data TINY",
+        "expected a folder apart from the data set",
+    ),
+    Row(
+        "an excerpt over other results",
+        "data excerpt SAMPLES/one --data TINY",
+        "expected an empty folder, or an earlier excerpt",
+    ),
+    Row("an excerpt of too many frames", "data excerpt OUT --data TINY --frames 99", "n_frames: expected 1 to 6"),
+    Row("an excerpt of no frame", "data excerpt OUT --data TINY --frames 0", "Invalid value for '--frames'"),
+)
+
+COURSE = (
+    Row("an unknown lecture to build", "course notebooks 99_none", "99_none"),
+    Row("an unknown lecture to measure", "course minutes 99_none", "99_none"),
+    Row("a course over other files", "course build SAMPLES", "SAMPLES: expected an empty folder"),
+    Row("a course over a file", "course build architecture.json", "architecture.json: expected a folder, found a file"),
+    Row("an argument too many", "course check all", "unexpected extra argument"),
+)
+
+EXPERIMENTS = (
+    Row(
+        "an unknown grid, occupancy",
+        "reproduce occupancy --grid tiny --out log.json",
+        "grid: expected paper or compact",
+    ),
+    Row("an unknown grid, streets", "reproduce streets --grid tiny --out log.json", "grid: expected paper or compact"),
+    Row("an unknown LIDAR", "reproduce truth-policies --lidar sonar --out log.json", "lidar: expected one of"),
+    Row("no drives", "reproduce occupancy --drives 0", "Invalid value for '--drives'"),
+    Row("no draws", "reproduce crf-coupling --draws 0", "Invalid value for '--draws'"),
+    Row("a result in a folder", "reproduce overfit --out TINY", "TINY: expected a file to write, found a folder"),
+    Row(
+        "another experiment's log, CRF error",
+        "reproduce crf-error --out log.json",
+        "log.json: expected a result of this",
+        text("log.json", '{"a": 1}'),
+    ),
+    Row(
+        "a log nested 100,000 deep",
+        "reproduce crf-error --out log.json",
+        "log.json: .*nested too deeply",
+        text("log.json", DEEP),
+    ),
+    Row(
+        "a log whose parts are numbers",
+        "reproduce crf-coupling --out log.json",
+        "log.json: expected a result of this",
+        text("log.json", json.dumps({"seed": 0, "draws": 20, "couplings": [], "cases": {"a": 5}})),
+    ),
+    Row(
+        "a log that is a list, policies",
+        "reproduce truth-policies --out log.json",
+        "log.json: expected a JSON object",
+        text("log.json", "[]"),
+    ),
+    Row("no real drive", "reproduce real-drive --kitti NONE --out log.json", "NONE: expected a folder of dates"),
+    Row(
+        "boxes of cars that are numbers",
+        "reproduce real-drive --kitti TINY --out log.json",
+        "moving_cars_0013.json: expected boxes",
+        text("TINY/moving_cars_0013.json", '{"car": 5}'),
+    ),
+    Row(
+        "boxes of cars of two metres",
+        "reproduce real-drive --kitti TINY --out log.json",
+        "moving_cars_0013.json: expected boxes",
+        text("TINY/moving_cars_0013.json", '{"car": {"1": [2, 3]}}'),
+    ),
+    Row(
+        "no data set to train twice on",
+        "reproduce two-stage --data NONE --runs RUNS --out log.json",
+        "dataset.json: expected a file",
+    ),
+    Row("a cache in place of a file", f"--cache architecture.json {TRAIN}", "architecture.json", frames()),
+    Row("no validation frames, search", SEARCH, "split: expected one of", frames()),
+    Row("no validation frames, learnt CRFs", LEARNED, "split: expected one of", frames()),
+    Row(
+        "provenance of weights that is a list",
+        SEARCH,
+        "provenance.json: expected a JSON object",
+        text("provenance.json", "[]"),
+    ),
+    Row(
+        "trials that are a number",
+        SEARCH,
+        "log.json: expected the trials of a search",
+        text("log.json", '{"trials": 5}'),
+    ),
+    Row(
+        "another search's trials",
+        SEARCH,
+        "log.json: expected the trials",
+        text("log.json", '{"trials": [], "seed": 0}'),
+    ),
+    Row(
+        "a result over the weights",
+        EVALUATE.replace("scores.json", "weights.safetensors"),
+        "weights.safetensors: expected a new file",
+    ),
+    Row(
+        "a result over an index",
+        EVALUATE.replace("scores.json", "TINY/dataset.json"),
+        "dataset.json: expected a new file",
+    ),
+    Row(
+        "matrices over the weights",
+        f"{EVALUATE} --confusions weights.safetensors",
+        "--confusions: expected a file that ends in .npz",
+    ),
+    Row(
+        "runs that another process does",
+        TABLE1.replace(" --plan", ""),
+        "RUNS: expected a folder that no other process",
+        locked("RUNS"),
+    ),
+    Row("a word for the number of seeds", f"{TABLE1} --seeds many", "Invalid value for '--seeds'"),
+    Row("no trials", f"{SEARCH} --trials 0", "Invalid value for '--trials'"),
+    Row("an unknown scale", TABLE1 + " --scale galactic", "--scale: expected"),
+    Row("a file in place of the runs", TABLE1.replace("RUNS", "architecture.json"), "--runs: expected a folder"),
+    Row(
+        "a run's record that is a list",
+        TABLE1,
+        "ended.json: expected a JSON object",
+        text("RUNS/data-quickkitti/ended.json", "[]"),
+    ),
+    Row(
+        "a run's record with a word for its seconds",
+        TABLE1,
+        "ended.json: expected the record",
+        text("RUNS/data-quickkitti/ended.json", '{"seconds": "long", "date": "x"}'),
+    ),
+    Row("1000 workers for runs", TABLE1.replace(" --plan", " --workers 1000"), "--workers: expected .*, found 1000"),
+    Row("no seeds", f"{TABLE1} --seeds 0", "Invalid value for '--seeds'"),
+)
+
+TABLE = (*DRIVES, *INDEXES, *WEIGHTS, *RUNS, *DATA, *COURSE, *EXPERIMENTS)

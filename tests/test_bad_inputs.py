@@ -1,0 +1,153 @@
+"""Every kind of bad input ends in one line that names it, or is done after a line that says what is doubtful."""
+
+import json
+import os
+import re
+import shlex
+import shutil
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+import typer
+from bad_inputs import HELD, HUGE, TABLE, log, sample
+from tiny_drive import DATE, write_tiny_drive
+
+import semgrid_edu.experiments.evaluate
+import semgrid_edu.training.run
+from semgrid_edu import cli, demo
+from semgrid_edu.datasets import KittiRawDrive, training_cache
+from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.experiments.reproduction.commands import HELP
+from semgrid_edu.networks import Architecture, build_net, save_net
+from semgrid_edu.storage.caching import CACHE_VARIABLE
+from semgrid_edu.training.log import Step
+
+
+@pytest.fixture(autouse=True, scope="module")
+def in_this_process():
+    """Make arrays without worker processes, which take seconds to start."""
+
+    def process(index, split, recipe):
+        by_drive = index.frames_by_drive(split).items()
+        drives = [training_cache._process_drive(index.root, *name, frames, recipe) for name, frames in by_drive]
+        return [frame for drive in drives for frame in drive]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(training_cache, "_process", process)
+        yield
+
+
+def write_dataset(root: Path) -> None:
+    """Six drives to learn from, one to test, one for validation; three frames each, the last one labelled."""
+    frames = [{"date": DATE, "drive": f"{k:04d}", "frame": 2} for k in range(1, 9)]
+    for frame in frames:
+        write_tiny_drive(root, frame["drive"])
+    splits = {"train": frames[:6], "test": frames[6:7], "validation": frames[7:]}
+    (root / "dataset.json").write_text(json.dumps({"name": "tiny", "label_set": "KITTI-14", "splits": splits}))
+
+
+@pytest.fixture(scope="module")
+def prepared(tmp_path_factory) -> Path:
+    """What every row of the table works on a copy of."""
+    root = tmp_path_factory.mktemp("prepared")
+    write_dataset(root / "TINY")
+    for split in ("train", "test", "validation"):
+        TrainingSet(root / "TINY", split)
+    net = build_net(Architecture(), KittiRawDrive(root / "TINY", DATE, "0001").camera)
+    (root / "architecture.json").write_text(json.dumps(asdict(net.architecture)))
+    save_net(net, root / "fresh.safetensors")
+    for name, learnt in (("image_stage", net.segmenter), ("weights", net)):
+        for buffer, steps in learnt.named_buffers():
+            steps += buffer.endswith("num_batches_tracked")
+        save_net(net, root / f"{name}.safetensors")
+    log(Step(0, "image", 0.1, 2.0))(root)
+    sample(root)
+    return root
+
+
+def copied(source: str, target: str) -> None:
+    """Copy a file, or link it where it is large and no row writes to it."""
+    large = "cache" in Path(source).parts or Path(source).name in ("fresh.safetensors", "image_stage.safetensors")
+    (os.link if large else shutil.copy2)(source, target)
+
+
+@pytest.fixture
+def place(prepared, tmp_path, monkeypatch) -> Iterator[Path]:
+    """A copy to spoil, as the current folder."""
+    shutil.copytree(prepared, tmp_path / "place", copy_function=copied)
+    monkeypatch.chdir(tmp_path / "place")
+    monkeypatch.setenv(CACHE_VARIABLE, "")  # so that what --cache sets is undone afterwards
+    yield tmp_path / "place"
+    while HELD:
+        HELD.pop().__exit__(None, None, None)
+    shutil.rmtree(tmp_path / "place")
+
+
+@pytest.fixture
+def no_work(monkeypatch):
+    """What is only doubtful would be done; here it isn't."""
+
+    def done(*_, **__):
+        raise SystemExit("done")
+
+    monkeypatch.setattr(demo, "write_demo", done)
+    monkeypatch.setattr(semgrid_edu.training.run, "train_network", done)
+    monkeypatch.setattr(semgrid_edu.experiments.evaluate, "evaluate", done)
+
+
+def told(arguments: list[str], monkeypatch, capsys) -> str:
+    """Run a command, which must fail; return what it says."""
+    monkeypatch.setattr("sys.argv", ["semgrid-edu", *arguments])
+    monkeypatch.setenv("COLUMNS", "300")
+    with pytest.raises(SystemExit) as caught:
+        cli.run()
+    assert caught.value.code not in (0, None)
+    says = caught.value.code if isinstance(caught.value.code, str) else ""
+    assert "\n" not in says
+    return capsys.readouterr().err + says
+
+
+@pytest.mark.parametrize("row", TABLE, ids=[row.kind for row in TABLE])
+def test_a_bad_input_is_named(row, place, request, monkeypatch, capsys):
+    if "doubtful" in row.says:
+        request.getfixturevalue("no_work")
+    row.spoil(place)
+    says = told(shlex.split(row.command), monkeypatch, capsys)
+    assert re.search(row.says, says), says
+    assert "Traceback" not in says
+    assert says.endswith("done") == ("doubtful" in row.says)
+
+
+def commands(group=None, before: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
+    """Every command of the program, as it is typed."""
+    group = group or typer.main.get_command(cli.app)
+    found = []
+    for name, one in group.commands.items():
+        found += commands(one, (*before, name)) if hasattr(one, "commands") else [(*before, name)]
+    return found
+
+
+def options(command: tuple[str, ...]) -> list[str]:
+    """The options of a command that take a value."""
+    one = typer.main.get_command(cli.app)
+    for name in command:
+        one = one.commands[name]
+    return [p.opts[0] for p in one.params if p.param_type_name == "option" and not p.is_flag and p.name != "help"]
+
+
+def test_the_table_is_long_and_meets_every_command():
+    assert len({row.kind for row in TABLE}) == len(TABLE) >= 60
+    met = {command for row in TABLE for command in commands() if shlex.split(row.command)[: len(command)] == [*command]}
+    assert {*commands()} == met | {("reproduce", name) for name in HELP}  # all of these are one command: table1's
+
+
+@pytest.mark.parametrize("command", commands(), ids=" ".join)
+def test_no_command_takes_an_empty_option_or_one_that_it_does_not_know(command, monkeypatch, capsys):
+    for option in options(command):
+        for empty in ([option, ""], [f"{option}="], [option, "  "]):
+            assert f"{option}: expected a value" in told([*command, *empty], monkeypatch, capsys)
+        if "seed" in option:
+            assert f"{option}: expected a whole number up to" in told([*command, option, HUGE], monkeypatch, capsys)
+    assert "No such option" in told([*command, "--no-such"], monkeypatch, capsys)
