@@ -42,6 +42,14 @@ def demo(
     kitti: Annotated[Path | None, typer.Option(help="A folder of KITTI raw drives, which holds the dates.")] = None,
     date: Annotated[str | None, typer.Option(help="Such as 2011_09_26.")] = None,
     drive: Annotated[str | None, typer.Option(help="Such as 0013.")] = None,
+    camera: Annotated[
+        str, typer.Option(help="image_02, the left colour camera, or image_03, the right one.")
+    ] = "image_02",
+    weights: Annotated[Path | None, typer.Option(help="A trained network; the shipped SegNet by default.")] = None,
+    frames: Annotated[
+        str | None,
+        typer.Option(help="FIRST:LAST or FIRST:LAST:STEP (LAST excluded), such as 40:120:2; all by default."),
+    ] = None,
     stages: Annotated[
         Path | None,
         typer.Option(help="A Python file with your own track, segment, sample, fuse or refine, to compare."),
@@ -50,16 +58,20 @@ def demo(
 ) -> None:
     """Run every stage over a drive, the shipped one by default, and write a page that shows it."""
     from semgrid_edu.datasets import KittiRawDrive
+    from semgrid_edu.datasets.kitti_raw import VIEWS
     from semgrid_edu.datasets.samples import sample_drive, sample_weights
     from semgrid_edu.demo import write_demo
+    from semgrid_edu.networks.weights import weights_doubts
 
     named = {"--kitti": kitti, "--date": date, "--drive": drive}
     given = [option for option, value in named.items() if value is not None]
     if given and len(given) < len(named):
         raise ArgumentError(", ".join(named), "all three or none", f"only {' and '.join(given)}")
-    chosen = KittiRawDrive(kitti, date, drive) if given else sample_drive()
-    tell(chosen.doubts())
-    page = write_demo(chosen, sample_weights(), out, stages)
+    if camera != VIEWS[0] and not given:
+        raise ArgumentError("--camera", f"{VIEWS[0]}, the only one of the shipped drive", camera)
+    chosen = KittiRawDrive(kitti, date, drive, view=camera) if given else sample_drive()
+    tell([*chosen.doubts(), *(weights_doubts(weights) if weights else ())])
+    page = write_demo(chosen, weights or sample_weights(), out, stages, frames)
     typer.echo(f"open {page.resolve().as_uri()}\nin one picture: {page.parent / 'overview.png'}")
 
 

@@ -13,11 +13,11 @@ ROTATION_TOLERANCE = 1e-4
 """The largest entry of R R^T - I that passes: KITTI prints seven digits, which leaves about 1e-6."""
 
 
-def read_camera(folder: Path) -> Camera:
-    """Read the calibration of the left colour camera, image_02.
+def read_camera(folder: Path, name: str = "image_02") -> Camera:
+    """Read the calibration of a camera; image_02 is the left one of the two that take colours, image_03 the right one.
 
     A LIDAR point x appears on the rectified image at K (T_baseline R_rect_00 T_camera0_from_lidar x). Rectified cameras
-    look in one direction and differ by a shift along their x axis, which P_rect_02 holds as fx times metres. Its last
+    look in one direction and differ by a shift along their x axis, which P_rect_0N holds as fx times metres. Its last
     column has a z term as well, 3 mm in KITTI. It is left out here, as in pykitti: beyond 10 m it moves no pixel by
     more than 0.35.
 
@@ -25,6 +25,8 @@ def read_camera(folder: Path) -> Camera:
     ----------
     folder : Path
         The folder of a date, which holds calib_cam_to_cam.txt and calib_velo_to_cam.txt.
+    name : str
+        Name of the folder that its images lie in, "image_00" to "image_03".
 
     Returns
     -------
@@ -35,18 +37,22 @@ def read_camera(folder: Path) -> Camera:
     DataError
         When a file is missing or damaged.
     """
-    K, T_camera_from_camera0, size = read_rectification(folder / "calib_cam_to_cam.txt")
+    K, T_camera_from_camera0, size = read_rectification(folder / "calib_cam_to_cam.txt", name)
     T_camera0_from_lidar = read_rigid(folder / "calib_velo_to_cam.txt")
     return Camera(K, T_camera_from_camera0 @ T_camera0_from_lidar, size)
 
 
-def read_rectification(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[int, int]]:
-    """Read what calib_cam_to_cam.txt says about the rectified camera 2.
+def read_rectification(
+    path: Path, name: str = "image_02"
+) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[int, int]]:
+    """Read what calib_cam_to_cam.txt says about a rectified camera.
 
     Parameters
     ----------
     path : Path
         The file.
+    name : str
+        Name of the folder that its images lie in, "image_00" to "image_03".
 
     Returns
     -------
@@ -63,10 +69,11 @@ def read_rectification(path: Path) -> tuple[NDArray[np.float64], NDArray[np.floa
         When the file is missing or damaged.
     """
     calibration = read_calibration(path)
-    K, T_camera_from_rectified = projection(path, calibration, "P_rect_02")
-    width, height = entry_of(path, calibration, "S_rect_02", (2,))
+    number = name.removeprefix("image_")
+    K, T_camera_from_rectified = projection(path, calibration, f"P_rect_{number}")
+    width, height = entry_of(path, calibration, f"S_rect_{number}", (2,))
     if not (width >= 1 and height >= 1 and width % 1 == 0 and height % 1 == 0):
-        raise DataError(path, "S_rect_02: width and height in pixels", [width, height])
+        raise DataError(path, f"S_rect_{number}: width and height in pixels", [width, height])
     T_rectified_from_camera0 = rigid_transform(_rotation(path, calibration, "R_rect_00"), np.zeros(3))
     return K, T_camera_from_rectified @ T_rectified_from_camera0, (int(height), int(width))
 

@@ -22,6 +22,9 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.frame import Frame, FrameLabels
 from semgrid_edu.storage.reading import read_png
 
+VIEWS = ("image_02", "image_03")
+"""The folders of the cameras that take colours."""
+
 SAME_INSTANT = np.timedelta64(500, "ms")
 """How much the sensors' times of one frame may differ; at 10 Hz they should lie within 0.1 s."""
 
@@ -67,11 +70,14 @@ class KittiRawDrive(FrameSequence):
         Number of the drive, such as "0013".
     images : bool
         Whether to read the images. Without them, as if the drive had none, reading is quicker.
+    view : str
+        The folder of the images: "image_02" for the left camera, "image_03" for the right one. Labels of simulated
+        drives are those of the left one.
 
     Raises
     ------
     ArgumentError
-        When date or drive is empty.
+        When date or drive is empty, or there is no such view.
     DataError
         When there is no such drive; the error says which there are. `drive[k]` raises it when a file that the frame
         needs is missing or damaged.
@@ -84,14 +90,17 @@ class KittiRawDrive(FrameSequence):
     ((113944, 4), (375, 1242, 3))
     """
 
-    def __init__(self, root: str | Path, date: str, drive: str, *, images: bool = True) -> None:
+    def __init__(self, root: str | Path, date: str, drive: str, *, images: bool = True, view: str = VIEWS[0]) -> None:
         for name, value in (("date", date), ("drive", drive)):
             if not value:
                 raise ArgumentError(name, "such as 2011_09_26 and 0013", repr(value))
+        if view not in VIEWS:
+            raise ArgumentError("view", " or ".join(VIEWS), repr(view))
         self.date_folder, self.folder = _existing(Path(root), date, drive)
+        self.view = view
         self._sensors = ["velodyne_points", "oxts"]
-        if images and (self.folder / "image_02").exists():
-            self._sensors.append("image_02")
+        if images and (self.folder / view).exists():
+            self._sensors.append(view)
         self._length = 1 + max((_last_frame(self.folder / sensor / "data") for sensor in self._sensors), default=-1)
         if self._length == 0:
             raise DataError(self.folder, "frames in velodyne_points/data", "none")
@@ -112,8 +121,8 @@ class KittiRawDrive(FrameSequence):
 
     @cached_property
     def camera(self) -> Camera:
-        """The calibration of image_02, the same for all frames."""
-        return read_camera(self.date_folder)
+        """The calibration of the view, the same for all frames."""
+        return read_camera(self.date_folder, self.view)
 
     def problems(self) -> list[str]:
         """Read every file of the drive and list all that is wrong with it.
@@ -144,7 +153,7 @@ class KittiRawDrive(FrameSequence):
 
     def _readers(self) -> Iterator[Callable[[], object]]:
         """Yield a reader for each file, so that no damaged file hides another."""
-        yield partial(read_rectification, self.date_folder / "calib_cam_to_cam.txt")
+        yield partial(read_rectification, self.date_folder / "calib_cam_to_cam.txt", self.view)
         yield partial(read_rigid, self.date_folder / "calib_velo_to_cam.txt")
         yield partial(read_rigid, self.date_folder / "calib_imu_to_velo.txt")
         for path in self._timestamp_files():
@@ -154,8 +163,8 @@ class KittiRawDrive(FrameSequence):
             yield partial(self._points, k)
             yield partial(read_packet, self._file("oxts", k, ".txt"))
             yield partial(self._time, k)
-            if "image_02" in self._sensors:
-                yield partial(read_png, self._file("image_02", k, ".png"), "RGB", size)
+            if self.view in self._sensors:
+                yield partial(read_png, self._file(self.view, k, ".png"), "RGB", size)
             labels, name = self.folder / "labels", f"{k:010d}.png"
             for kind in KINDS if is_labelled(labels, name) else ():
                 yield partial(read_label, labels, kind, name, size)
@@ -201,9 +210,9 @@ class KittiRawDrive(FrameSequence):
 
     def _image(self, k: int) -> NDArray[np.uint8] | None:
         """Read the image, (h, w, 3); None when the drive has no folder of this camera."""
-        if "image_02" not in self._sensors:
+        if self.view not in self._sensors:
             return None
-        return read_png(self._file("image_02", k, ".png"), "RGB", self.camera.size)
+        return read_png(self._file(self.view, k, ".png"), "RGB", self.camera.size)
 
     @cached_property
     def _T_lidar_from_imu(self) -> NDArray[np.float64]:
@@ -219,6 +228,8 @@ class KittiRawDrive(FrameSequence):
         return T_world_from_imu @ invert_rigid(self._T_lidar_from_imu)
 
     def _labels(self, k: int) -> FrameLabels | None:
+        if self.view != VIEWS[0]:
+            return None
         return read_labels(self.folder / "labels", f"{k:010d}.png", self.camera.size)
 
 

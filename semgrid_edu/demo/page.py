@@ -63,6 +63,8 @@ class Summary:
         Median time of each stage in that run, ms.
     story : StoryData, optional
         What all stories of cells have in common; without it, the page tells none.
+    choice : str
+        Which frames of the drive are shown, as `ChosenFrames.told` says it.
     """
 
     title: str
@@ -76,6 +78,7 @@ class Summary:
     comparison: Comparison | None = None
     your_milliseconds: dict[str, float] = field(default_factory=dict)
     story: StoryData | None = None
+    choice: str = ""
 
 
 def page_html(summary: Summary, frames: Sequence[FrameView]) -> str:
@@ -129,10 +132,11 @@ def _lead(summary: Summary, n_frames: int) -> str:
     size = f"{spec.x_max - spec.x_min:g} m long and {spec.y_max - spec.y_min:g} m wide"
     return (
         f"{summary.comparison.lead() + ' ' if summary.comparison else ''}"
-        f"Here are {n_frames} frames of the drive <b>{escape(summary.title)}</b>, sent through every stage of the "
-        "method. A Bayes filter turns the laser scans into a grid of what is free, what stands still and what moves. A "
-        "network gives each pixel of the camera image a score for each class. Planes above the ground carry these "
-        "scores into the same grid, where a second network fuses them with the occupancy. The result is a map, "
+        f"Here are {n_frames} frames of the drive <b>{escape(summary.title)}</b>{summary.choice}, sent through every "
+        "stage of the method. A Bayes filter turns the laser scans into a grid of what is free, what stands still and "
+        "what moves. A network gives each pixel of the camera image a score for each class. Planes above the ground "
+        "carry these scores into the same grid, where a second network fuses them with the occupancy. The result is a "
+        "map, "
         f"{size}, of what stands where. Move the slider, press play, or use the arrow keys; click a cell, and "
         "the page tells how it got its class."
     )

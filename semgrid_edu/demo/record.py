@@ -67,8 +67,9 @@ class Record:
         The grid.
     label_set : LabelSet
         The network's classes.
-    every : int
-        The page shows one frame in this many.
+    shown : range, optional
+        Numbers of the frames that the page shows. The first is that of the first frame to be recorded; all are shown
+        when left out.
     comparison : Comparison, optional
         Which stages come from a student's file. With it, each frame has two results, the package's and the student's.
     net : SemanticGridNet, optional
@@ -92,17 +93,17 @@ class Record:
         self,
         spec: GridSpec,
         label_set: LabelSet,
-        every: int = 1,
+        shown: range | None = None,
         comparison: Comparison | None = None,
         net: SemanticGridNet | None = None,
         stories: int = 1,
     ) -> None:
         self.net, self.stories, self.layout = net, stories, {}
-        self.spec, self.label_set, self.every, self.comparison = spec, label_set, every, comparison
+        self.spec, self.label_set, self.shown, self.comparison = spec, label_set, shown, comparison
         self.views: list[FrameView] = []
         self.labelled = 0
         self.liveliest: tuple[FrameResult, FrameResult | None] | None = None
-        self._frames = 0
+        self._number = shown[0] if shown else 0
         self._rows = _rows(comparison)
         self._confusion = {name: np.zeros((len(label_set),) * 2, np.int64) for name in self._rows.values()}
         self._occurs = np.zeros(256, bool)
@@ -128,9 +129,9 @@ class Record:
         if package.frame.labels is not None:
             maps["truth"] = grid_truth(package.frame.labels, package.belief.probability, self.spec)
             self._count(maps)
-        if self._frames % self.every == 0:
+        if self.shown is None or self._number in self.shown:
             self._show(package, yours, maps)
-        self._frames += 1
+        self._number += 1
 
     def milliseconds(self) -> dict[str, float]:
         """Return the median time of each of the package's own stages; the first frames also load compiled code."""
@@ -164,7 +165,7 @@ class Record:
         returns = f"Camera image with the {len(visible_points(frame)[1])} LIDAR returns that the camera sees."
         images = {"photo": photo_uri(frame.image), "points": raster_uri(points_layer(frame))}
         pose, details = frame.T_world_from_lidar.ravel().tolist(), self._details(package, maps.get("truth"))
-        clock = f"frame {self._frames}, {frame.time:.1f} s"
+        clock = f"frame {self._number}, {frame.time:.1f} s"
         view = FrameView(clock, images, {"points": returns}, {}, frame.time, pose, details)
         self._draw(view, package, tuple(MADE_BY))
         if yours is not None:

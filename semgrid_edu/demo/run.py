@@ -5,6 +5,7 @@ from pathlib import Path
 from tqdm.auto import tqdm
 
 from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.demo.chosen import ChosenFrames
 from semgrid_edu.demo.comparison import Comparison
 from semgrid_edu.demo.overview import save_overview
 from semgrid_edu.demo.page import Summary, page_html
@@ -16,14 +17,17 @@ from semgrid_edu.networks import load_net
 from semgrid_edu.pipeline import Stages, load_stages, run_side_by_side
 from semgrid_edu.storage.files import write_text
 
-SHOWN = 40
-"""Most frames that the page shows, evenly spaced, so that its size stays near 10 MB."""
-
 STORIES = 200_000
 """Most cells that have a story, in all frames together: one takes some 45 bytes of the page."""
 
 
-def write_demo(drive: KittiRawDrive, weights: str | Path, out: str | Path, stages: str | Path | None = None) -> Path:
+def write_demo(
+    drive: KittiRawDrive,
+    weights: str | Path,
+    out: str | Path,
+    stages: str | Path | None = None,
+    frames: str | None = None,
+) -> Path:
     """Run every stage over a drive and write a page that shows it.
 
     Parameters
@@ -37,6 +41,8 @@ def write_demo(drive: KittiRawDrive, weights: str | Path, out: str | Path, stage
     stages : path-like, optional
         A Python file with a student's stages, as `load_stages` reads it. The page then shows a second run with these
         stages beside the package's.
+    frames : str, optional
+        Which frames to run over and to show, such as "40:120:2", see `ChosenFrames.of`.
 
     Returns
     -------
@@ -46,27 +52,27 @@ def write_demo(drive: KittiRawDrive, weights: str | Path, out: str | Path, stage
     Raises
     ------
     ArgumentError
-        When the drive has no images.
+        When the drive has no images, or not the frames that are asked for.
     DataError
         When a file of the drive, the weights or the stages can't be read.
     StageError
         When a stage of the file raises an error, or returns what the next one can't use.
     """
-    net = load_net(weights, drive.camera)
+    chosen, net = ChosenFrames.of(len(drive), frames), load_net(weights, drive.camera)
     own, yours, comparison = Stages.of(net, keep_steps=True), (), None
     if stages is not None:
         mine = load_stages(stages)
         yours, comparison = (mine.over(own),), Comparison(Path(stages).name, mine.given)
     Path(out).mkdir(parents=True, exist_ok=True)  # before the work, to refuse a bad folder at once
     label_set = LABEL_SETS[net.architecture.label_set]
-    every = -(-len(drive) // SHOWN)
-    stories = _stories_every(-(-len(drive) // every), net.architecture.grid)
-    record = Record(net.architecture.grid, label_set, every, comparison, net, stories)
-    results = run_side_by_side(drive, own, *yours)
-    for of_frame in tqdm(results, total=len(drive), desc=drive.folder.name, unit="frame"):
+    stories = _stories_every(len(chosen.shown), net.architecture.grid)
+    record = Record(net.architecture.grid, label_set, chosen.shown, comparison, net, stories)
+    results = run_side_by_side((drive[k] for k in chosen.run), own, *yours)
+    for of_frame in tqdm(results, total=len(chosen.run), desc=drive.folder.name, unit="frame"):
         record.add(*of_frame)
     summary = Summary(
         title=drive.folder.name,
+        choice=chosen.told(len(drive)),
         spec=record.spec,
         camera=drive.camera,
         network_size=net.architecture.image_size,

@@ -21,7 +21,7 @@ from tiny_drive import (
 )
 
 from semgrid_edu.datasets import KittiRawDrive
-from semgrid_edu.errors import DataError
+from semgrid_edu.errors import ArgumentError, DataError
 
 slow_disk = settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
@@ -52,6 +52,35 @@ def frames_equal(a, b):
     kinds = ("image", "birdseye", "visible")
     same += [np.array_equal(getattr(a.labels, kind), getattr(b.labels, kind)) for kind in kinds]
     return all(same) and np.array_equal(a.labels.depth, b.labels.depth, equal_nan=True)
+
+
+class TestRightCamera:
+    @pytest.fixture
+    def right(self, root, folder):
+        """The drive with a right camera, which stands 0.5 m to the right of the left one."""
+        shutil.copytree(folder / "image_02", folder / "image_03")
+        Image.fromarray(np.zeros((*SIZE, 3), np.uint8)).save(folder / "image_03" / "data" / "0000000002.png")
+        path = root / DATE / "calib_cam_to_cam.txt"
+        P = np.c_[K, [K[0, 0] * (BASELINE - 0.5), 0, 0]]
+        numbers = " ".join(map(str, P.ravel()))
+        path.write_text(path.read_text() + f"S_rect_03: {SIZE[1]} {SIZE[0]}\nP_rect_03: {numbers}\n")
+        return KittiRawDrive(root, DATE, "0001", view="image_03")
+
+    def test_sees_its_images_from_where_it_stands(self, root, right):
+        left = KittiRawDrive(root, DATE, "0001")
+        assert not right[2].image.any()
+        assert left[2].image.any()
+        moved = right.camera.T_camera_from_lidar - left.camera.T_camera_from_lidar
+        np.testing.assert_allclose(moved[:3, 3], [-0.5, 0, 0], atol=1e-12)
+        assert right.problems() == []
+
+    def test_has_no_labels_since_those_are_of_the_left_images(self, root, right):
+        assert KittiRawDrive(root, DATE, "0001")[2].labels is not None
+        assert right[2].labels is None
+
+    def test_another_view_is_refused(self, root):
+        with pytest.raises(ArgumentError, match="image_02 or image_03"):
+            KittiRawDrive(root, DATE, "0001", view="image_00")
 
 
 class TestSoundDrive:

@@ -6,6 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
 from PIL import Image
 from read_page import Page, decode
 from tiny_drive import DATE, write_tiny_drive
@@ -14,8 +16,10 @@ from typer.testing import CliRunner
 from semgrid_edu.camera import Camera
 from semgrid_edu.cli import app
 from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.datasets.samples import sample_image_stage, sample_weights
 from semgrid_edu.datasets.truth import grid_truth
 from semgrid_edu.demo import write_demo
+from semgrid_edu.demo.chosen import ChosenFrames
 from semgrid_edu.demo.grids import arrows_path, grid_svg
 from semgrid_edu.demo.page import Summary, page_html
 from semgrid_edu.demo.rasters import classes_uri, points_layer, raster_uri, scores_layer
@@ -267,8 +271,60 @@ class TestMistakes:
             write_demo(KittiRawDrive(tmp_path, DATE, "0001"), weights, tmp_path / "file" / "out")
 
 
+class TestChoice:
+    """`--frames`, `--weights` and `--camera`."""
+
+    def test_frames_are_those_of_a_slice_and_all_between_are_run(self, weights, tmp_path, monkeypatch):
+        write_tiny_drive(tmp_path, n_frames=6)
+        read, original = [], KittiRawDrive._points
+        monkeypatch.setattr(KittiRawDrive, "_points", lambda drive, k: read.append(k) or original(drive, k))
+        page = Page(
+            write_demo(KittiRawDrive(tmp_path, DATE, "0001"), weights, tmp_path, frames="1:5:2").read_text("utf-8")
+        )
+        shown = [frame["clock"] for frame in json.loads(page.text["frames"])]
+        assert shown == ["frame 1, 0.1 s", "frame 3, 0.3 s"]
+        assert sorted(set(read)) == [1, 2, 3, 4]
+
+    def test_the_page_says_which_frames_it_shows(self, weights, tmp_path):
+        write_tiny_drive(tmp_path, n_frames=6)
+        html = write_demo(KittiRawDrive(tmp_path, DATE, "0001"), weights, tmp_path, frames=":5:2").read_text("utf-8")
+        assert "Here are 3 frames of the drive" in html
+        assert "(one in 2 of frames 0 to 4; it has 6)" in html
+
+    def test_another_network_is_taken_and_one_of_the_image_stage_refused(self, tmp_path):
+        options = ["demo", "--out", str(tmp_path), "--frames", ":1"]
+        stage = CliRunner().invoke(app, [*options, "--weights", str(sample_image_stage("fcn"))])
+        assert "image stage" in str(stage.exception)
+        result = CliRunner().invoke(app, [*options, "--weights", str(sample_weights("fcn"))])
+        assert result.exit_code == 0, result.output
+
+    def test_the_shipped_drive_has_one_camera(self):
+        result = CliRunner().invoke(app, ["demo", "--camera", "image_03"])
+        assert "--camera" in str(result.exception)
+
+
+@pytest.mark.parametrize("wanted", ["4", "a:b", "0:4:0", "9:", "3:2", "1:2:3:4", "-3:"])
+def test_a_choice_of_no_frame_is_refused(wanted):
+    with pytest.raises(ArgumentError, match=r"--frames.*0:6:2"):
+        ChosenFrames.of(6, wanted)
+
+
+@given(st.integers(1, 400), st.data())
+def test_a_choice_is_what_python_slices(n_frames, data):
+    first, last = (data.draw(st.none() | st.integers(0, n_frames)) for _ in range(2))
+    step = data.draw(st.none() | st.integers(1, 9))
+    numbers = list(range(n_frames))
+    wanted = ":".join("" if part is None else str(part) for part in (first, last, step))
+    assume(numbers[first:last])
+    chosen = ChosenFrames.of(n_frames, wanted)
+    assert list(chosen.run) == numbers[first:last]
+    assert list(chosen.shown) == numbers[first:last][:: chosen.shown.step]
+    assert chosen.shown.step == step or (step is None and len(chosen.shown) <= 40)
+    assert (chosen.told(n_frames) == "") == (list(chosen.shown) == numbers)
+
+
 def test_a_long_drive_is_shown_evenly_spaced_and_counted_whole(results):
-    record = Record(GridSpec.compact(), KITTI_14, every=2)
+    record = Record(GridSpec.compact(), KITTI_14, range(0, 3, 2))
     for result in results:
         record.add(result)
     assert [view.clock for view in record.views] == ["frame 0, 0.0 s", "frame 2, 0.2 s"]
