@@ -58,7 +58,9 @@ def drive_folder(root: str | Path, date: str, drive: str) -> Path:
 class KittiRawDrive(FrameSequence):
     """The frames of a drive. Each is read, and checked, when it is asked for.
 
-    `drive[k]` is frame k as KITTI numbers it, `drive[-1]` the last one, `drive[2:5]` a list of three.
+    `drive[k]` is frame k as KITTI numbers it, `drive[-1]` the last one, `drive[2:5]` a list of three. Some of KITTI's
+    drives have gaps, such as 0009, which lacks the scans 177 to 180. A frame in a gap keeps its number, time and image;
+    it has no points, so that the filter predicts without being corrected. `gaps` tells which these are.
 
     Parameters
     ----------
@@ -120,6 +122,12 @@ class KittiRawDrive(FrameSequence):
         )
 
     @cached_property
+    def gaps(self) -> tuple[int, ...]:
+        """Numbers of the frames without a scan that lie between frames with one."""
+        scans = [k for k in range(len(self)) if self._file("velodyne_points", k, ".bin").exists()]
+        return tuple(sorted(set(range(*scans[:: len(scans) - 1])) - set(scans))) if len(scans) > 1 else ()
+
+    @cached_property
     def camera(self) -> Camera:
         """The calibration of the view, the same for all frames."""
         return read_camera(self.date_folder, self.view)
@@ -141,15 +149,16 @@ class KittiRawDrive(FrameSequence):
         Returns
         -------
         list of str
-            One line for each scan that was probably cut short, and for each pose that no car can have got to since the
-            one before; it names the file.
+            One line for each scan that is missing between others or was probably cut short, and for each pose that no
+            car can have got to since the one before; it names the file.
         """
         scans, packets, known = [self._file("velodyne_points", k, ".bin") for k in range(len(self))], {}, []
         for k in range(len(self)):
             with suppress(DataError):  # what can't be read is an error of the frame, and no doubt
                 packets[self._file("oxts", k, ".txt")] = read_packet(self._file("oxts", k, ".txt"))
                 known.append(k)
-        return [*short_scans(scans), *jumps(packets, self._seconds("oxts")[np.array(known, int)])]
+        missing = [str(DataError(scans[k], "a scan", "none: the filter predicts over the gap")) for k in self.gaps]
+        return [*missing, *short_scans(scans), *jumps(packets, self._seconds("oxts")[np.array(known, int)])]
 
     def _readers(self) -> Iterator[Callable[[], object]]:
         """Yield a reader for each file, so that no damaged file hides another."""
@@ -186,17 +195,20 @@ class KittiRawDrive(FrameSequence):
 
     def _time(self, k: int) -> float:
         """Return the seconds since the first scan, after checking that the sensors' times agree."""
-        lidar = self._times["velodyne_points"]
-        for sensor, times in self._times.items():
+        times = {sensor: of_sensor[k] for sensor, of_sensor in self._times.items()}
+        if k in self.gaps and np.isnat(times["velodyne_points"]):
+            del times["velodyne_points"]  # a scan that was never recorded has no time in KITTI
+        (reference, time), *_ = times.items()
+        for sensor, other in times.items():
             path = self.folder / sensor / "timestamps.txt"
-            if np.isnat(times[k]):
+            if np.isnat(other):
                 raise DataError(path, f"a time in line {k + 1}", "an empty line")
-            if abs(times[k] - lidar[k]) > SAME_INSTANT:
-                lidar_path = self.folder / "velodyne_points" / "timestamps.txt"
-                expected = f"in line {k + 1} a time within {SAME_INSTANT} of {lidar[k]}, which {lidar_path} has there"
-                raise DataError(path, expected, f"{times[k]}")
-        first = lidar[~np.isnat(lidar)][0]
-        return float((lidar[k] - first) / np.timedelta64(1, "s"))
+            if abs(other - time) > SAME_INSTANT:
+                first_path = self.folder / reference / "timestamps.txt"
+                expected = f"in line {k + 1} a time within {SAME_INSTANT} of {time}, which {first_path} has there"
+                raise DataError(path, expected, f"{other}")
+        lidar = self._times["velodyne_points"]
+        return float((time - lidar[~np.isnat(lidar)][0]) / np.timedelta64(1, "s"))
 
     def _seconds(self, sensor: str) -> NDArray[np.float64]:
         """Return when a sensor took each frame, seconds; NaN where that isn't known."""
@@ -206,6 +218,8 @@ class KittiRawDrive(FrameSequence):
         return (times - times[~np.isnat(times)][0]) / np.timedelta64(1, "s")
 
     def _points(self, k: int) -> NDArray[np.float32]:
+        if k in self.gaps:
+            return np.zeros((0, 4), np.float32)
         return read_scan(self._file("velodyne_points", k, ".bin"))
 
     def _image(self, k: int) -> NDArray[np.uint8] | None:

@@ -65,6 +65,8 @@ class Summary:
         What all stories of cells have in common; without it, the page tells none.
     choice : str
         Which frames of the drive are shown, as `ChosenFrames.told` says it.
+    broken : str
+        What could not be read, so that the page ends before it; empty when all could.
     """
 
     title: str
@@ -79,6 +81,7 @@ class Summary:
     your_milliseconds: dict[str, float] = field(default_factory=dict)
     story: StoryData | None = None
     choice: str = ""
+    broken: str = ""
 
 
 def page_html(summary: Summary, frames: Sequence[FrameView]) -> str:
@@ -108,7 +111,7 @@ def page_html(summary: Summary, frames: Sequence[FrameView]) -> str:
         column=column_svg(summary.camera),
         story=_json(summary.story and asdict(summary.story)),
         lead=_lead(summary, len(frames)),
-        notice="" if summary.labelled else NOTICE,
+        notice=_broken(summary.broken) + ("" if summary.labelled else NOTICE),
         last=len(frames) - 1,
         clock=escape(first.clock),
         **{name: first.images[name] for name in ("photo", "points", "scores")},
@@ -125,6 +128,12 @@ def page_html(summary: Summary, frames: Sequence[FrameView]) -> str:
         times=times_table(summary.milliseconds, summary.your_milliseconds, summary.comparison),
         frames=_json([vars(frame) for frame in frames]),
     )
+
+
+def _broken(error: str) -> str:
+    """Return the notice that the drive could not be read to its end."""
+    notice = '<p class="notice"><b>The drive could not be read to its end.</b> The page shows what came before: {}</p>'
+    return notice.format(escape(error)) if error else ""
 
 
 def _lead(summary: Summary, n_frames: int) -> str:

@@ -165,7 +165,7 @@ class Record:
         returns = f"Camera image with the {len(visible_points(frame)[1])} LIDAR returns that the camera sees."
         images = {"photo": photo_uri(frame.image), "points": raster_uri(points_layer(frame))}
         pose, details = frame.T_world_from_lidar.ravel().tolist(), self._details(package, maps.get("truth"))
-        clock = f"frame {self._number}, {frame.time:.1f} s"
+        clock = f"frame {self._number}, {frame.time:.1f} s" + ("" if len(frame.points) else ", no scan: predicted")
         view = FrameView(clock, images, {"points": returns}, {}, frame.time, pose, details)
         self._draw(view, package, tuple(MADE_BY))
         if yours is not None:

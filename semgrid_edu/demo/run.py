@@ -1,5 +1,6 @@
 """The demo: run every stage over every frame of a drive, then write the page and its picture."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from tqdm.auto import tqdm
@@ -11,10 +12,11 @@ from semgrid_edu.demo.overview import save_overview
 from semgrid_edu.demo.page import Summary, page_html
 from semgrid_edu.demo.record import Record
 from semgrid_edu.demo.story_data import StoryData
+from semgrid_edu.errors import DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.networks import load_net
-from semgrid_edu.pipeline import Stages, load_stages, run_side_by_side
+from semgrid_edu.pipeline import FrameResult, Stages, load_stages, run_side_by_side
 from semgrid_edu.storage.files import write_text
 
 STORIES = 200_000
@@ -54,7 +56,8 @@ def write_demo(
     ArgumentError
         When the drive has no images, or not the frames that are asked for.
     DataError
-        When a file of the drive, the weights or the stages can't be read.
+        When a file of the drive, the weights or the stages can't be read. If it is a file of a later frame, the page
+        of the frames before it is written first.
     StageError
         When a stage of the file raises an error, or returns what the next one can't use.
     """
@@ -68,11 +71,11 @@ def write_demo(
     stories = _stories_every(len(chosen.shown), net.architecture.grid)
     record = Record(net.architecture.grid, label_set, chosen.shown, comparison, net, stories)
     results = run_side_by_side((drive[k] for k in chosen.run), own, *yours)
-    for of_frame in tqdm(results, total=len(chosen.run), desc=drive.folder.name, unit="frame"):
-        record.add(*of_frame)
+    broken = _record_all(tqdm(results, total=len(chosen.run), desc=drive.folder.name, unit="frame"), record)
     summary = Summary(
         title=drive.folder.name,
         choice=chosen.told(len(drive)),
+        broken=str(broken or ""),
         spec=record.spec,
         camera=drive.camera,
         network_size=net.architecture.image_size,
@@ -87,7 +90,21 @@ def write_demo(
     save_overview(*record.liveliest, record.spec, label_set, Path(out) / "overview.png", comparison)
     page = Path(out) / "index.html"
     write_text(page, page_html(summary, record.views))
+    if broken:
+        raise DataError(broken.path, broken.args[1], f"{broken.args[2]}; {page} shows the frames before it") from broken
     return page
+
+
+def _record_all(results: Iterable[tuple[FrameResult, ...]], record: Record) -> DataError | None:
+    """Record every frame up to one that can't be read, whose error is returned; raised when it is the first."""
+    try:
+        for of_frame in results:
+            record.add(*of_frame)
+    except DataError as error:
+        if not record.views:
+            raise
+        return error
+    return None
 
 
 def _stories_every(n_shown: int, spec: GridSpec) -> int:

@@ -22,6 +22,8 @@ from tiny_drive import (
 
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import State, track_drive
 
 slow_disk = settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
@@ -52,6 +54,50 @@ def frames_equal(a, b):
     kinds = ("image", "birdseye", "visible")
     same += [np.array_equal(getattr(a.labels, kind), getattr(b.labels, kind)) for kind in kinds]
     return all(same) and np.array_equal(a.labels.depth, b.labels.depth, equal_nan=True)
+
+
+class TestGap:
+    """Scans that are missing between others, as KITTI's drive 0009 lacks four."""
+
+    @pytest.fixture
+    def gap(self, tmp_path):
+        folder = write_tiny_drive(tmp_path, n_frames=6, labelled=())
+        for k in (2, 3):
+            (folder / "velodyne_points" / "data" / f"{k:010d}.bin").unlink()
+        return KittiRawDrive(tmp_path, DATE, "0001")
+
+    def test_keeps_the_time_line(self, gap, tmp_path):
+        whole = write_tiny_drive(tmp_path / "whole", n_frames=6, labelled=())
+        assert gap.gaps == (2, 3)
+        for frame, sound in zip(gap, KittiRawDrive(whole.parents[1], DATE, "0001"), strict=True):
+            assert frame.time == sound.time
+            np.testing.assert_array_equal(frame.T_world_from_lidar, sound.T_world_from_lidar)
+            np.testing.assert_array_equal(frame.image, sound.image)
+        assert [len(frame.points) > 0 for frame in gap] == [True, True, False, False, True, True]
+
+    def test_empty_lines_of_scans_never_recorded_are_no_error(self, gap):
+        times = [frame.time for frame in gap]
+        path = gap.folder / "velodyne_points" / "timestamps.txt"
+        lines = path.read_text().splitlines()
+        path.write_text("\n".join("" if k in (2, 3) else line for k, line in enumerate(lines)) + "\n")
+        again = [frame.time for frame in KittiRawDrive(gap.folder.parents[1], DATE, "0001")]
+        np.testing.assert_allclose(again, times, atol=0.02)  # the IMU's times, 17 ms later
+
+    def test_is_told_and_not_passed_over(self, gap):
+        assert [line.split(":")[0][-5:] for line in gap.doubts()] == ["2.bin", "3.bin"]
+        assert gap.problems() == gap.doubts()
+
+    def test_the_filter_predicts_over_it(self, gap):
+        beliefs = [belief.probability for belief in track_drive(gap, GridSpec.compact(), seed=0)]
+        unknown = [p[State.UNKNOWN].mean() for p in beliefs]
+        assert unknown[1] < unknown[2] < unknown[3] > unknown[4]
+
+    @pytest.mark.parametrize("k", [0, 5])
+    def test_a_scan_missing_at_an_end_is_an_error(self, tmp_path, k):
+        folder = write_tiny_drive(tmp_path, n_frames=6)
+        (folder / "velodyne_points" / "data" / f"{k:010d}.bin").unlink()
+        with pytest.raises(DataError, match=f"{k}.bin"):
+            KittiRawDrive(tmp_path, DATE, "0001")[k]
 
 
 class TestRightCamera:
@@ -195,7 +241,7 @@ LABELS = "drive/labels"
 
 DAMAGES = {
     **{f"{path} missing": (path, lambda path: path.unlink()) for path in (
-        SCAN, IMAGE, PACKET, STAMPS, CAM, VELO, IMU, f"{LABELS}/label_set.txt", f"{LABELS}/depth/0000000002.png")},
+        IMAGE, PACKET, STAMPS, CAM, VELO, IMU, f"{LABELS}/label_set.txt", f"{LABELS}/depth/0000000002.png")},
     **{f"{path} empty": (path, empty) for path in (SCAN, IMAGE, PACKET, STAMPS, CAM, VELO, IMU)},
     "odd byte count": (SCAN, cut(3)),
     "NaN coordinate": (SCAN, put(np.nan)),
@@ -263,19 +309,6 @@ def test_problems_lists_every_broken_file_at_once(root):
     assert len(problems) == len(broken)
     for path in broken:
         assert sum(problem.startswith(f"{path}: ") for problem in problems) == 1
-
-
-def test_scan_that_was_never_recorded_spoils_only_its_frame(root):
-    path_of(root, SCAN).unlink()
-    stamps = path_of(root, STAMPS)
-    first, _, last = stamps.read_text().splitlines()
-    stamps.write_text(f"{first}\n\n{last}\n")
-    drive = KittiRawDrive(root, DATE, "0001")
-    assert len(drive) == 3
-    assert drive[2].time == pytest.approx(0.2)
-    with pytest.raises(DataError, match=r"0000000001\.bin"):
-        drive[1]
-    assert len(drive.problems()) == 2
 
 
 def test_scan_cut_between_points_is_suspected(root):

@@ -263,6 +263,23 @@ class TestMistakes:
             write_demo(KittiRawDrive(tmp_path, DATE, "0001"), weights, tmp_path / "out")
         assert list((tmp_path / "out").iterdir()) == []
 
+    def test_a_later_frame_that_cannot_be_read_ends_the_page(self, weights, tmp_path):
+        folder = write_tiny_drive(tmp_path)
+        (folder / "velodyne_points" / "data" / "0000000002.bin").write_bytes(b"\0" * 7)
+        with pytest.raises(DataError, match=r"0000000002\.bin.*index.html shows the frames before it"):
+            write_demo(KittiRawDrive(tmp_path, DATE, "0001"), weights, tmp_path / "out")
+        html = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+        assert len(json.loads(Page(html).text["frames"])) == 2
+        assert "could not be read to its end" in html
+        assert "0000000002.bin" in html
+
+    def test_a_gap_is_marked(self, weights, tmp_path):
+        folder = write_tiny_drive(tmp_path)
+        (folder / "velodyne_points" / "data" / "0000000001.bin").unlink()
+        html = write_demo(KittiRawDrive(tmp_path, DATE, "0001"), weights, tmp_path / "out").read_text(encoding="utf-8")
+        clocks = [frame["clock"] for frame in json.loads(Page(html).text["frames"])]
+        assert clocks == ["frame 0, 0.0 s", "frame 1, 0.1 s, no scan: predicted", "frame 2, 0.2 s"]
+
     def test_a_folder_that_cannot_be_made_is_known_before_any_frame_is_read(self, weights, tmp_path):
         folder = write_tiny_drive(tmp_path)
         (folder / "velodyne_points" / "data" / "0000000000.bin").unlink()
