@@ -208,12 +208,16 @@ def test_the_first_loss_is_that_of_the_definition(streets, tmp_path, field, scor
 
 
 def test_a_step_goes_down_the_gradient_with_momentum(streets, tmp_path):
-    """v <- 0.9 v + dL/dw, w <- w - rate v, written out."""
-    params = replace(QUICK, image_iterations=0, grid_iterations=3, momentum=0.9, mirror=False)
+    """v <- 0.9 v + dL/dw, w <- w - rate v, written out.
+
+    Two steps, of which the second has momentum. After more, a ReLU that rounding has flipped may count for more than
+    the tolerance: both sides add up in another order.
+    """
+    params = replace(QUICK, image_iterations=0, grid_iterations=2, momentum=0.9, mirror=False)
     net = build_net(SMALL, CAMERA).train()
     alpha = torch.from_numpy(median_frequency_weights([s.truth.numpy() for s in streets], 14, params.weight_limit))
     velocities = [torch.zeros_like(w) for w in net.parameters()]
-    for k in range(3):
+    for k in range(2):
         batch = draw_batch(streets, params.batch_size, params.jitter, k, seed=3)._replace(mirrored=False)
         loss = F.cross_entropy(grid_logits(net, batch), batch.frames.truth.long(), weight=alpha.float())
         gradients = torch.autograd.grad(loss, list(net.parameters()))
@@ -224,7 +228,7 @@ def test_a_step_goes_down_the_gradient_with_momentum(streets, tmp_path):
     trained = load_file(tmp_path / "weights.safetensors")
     for name, w in net.named_parameters():
         torch.testing.assert_close(trained[name], w.detach(), rtol=1e-3, atol=1e-4)
-    assert any(draw_batch(streets, 2, 0.0, k, seed=3).mirrored for k in range(3))  # had `mirror` not been off
+    assert any(draw_batch(streets, 2, 0.0, k, seed=3).mirrored for k in range(2))  # had `mirror` not been off
 
 
 def test_a_batch_without_labels_teaches_nothing(streets, tmp_path):
