@@ -218,17 +218,17 @@ def test_a_step_goes_down_the_gradient_with_momentum(streets, tmp_path):
     alpha = torch.from_numpy(median_frequency_weights([s.truth.numpy() for s in streets], 14, params.weight_limit))
     velocities = [torch.zeros_like(w) for w in net.parameters()]
     for k in range(2):
-        batch = draw_batch(streets, params.batch_size, params.jitter, k, seed=3)._replace(mirrored=False)
+        batch = draw_batch(streets, params.batch_size, params.jitter, k, seed=2)._replace(mirrored=False)
         loss = F.cross_entropy(grid_logits(net, batch), batch.frames.truth.long(), weight=alpha.float())
         gradients = torch.autograd.grad(loss, list(net.parameters()))
         with torch.no_grad():
             for w, v, g in zip(net.parameters(), velocities, gradients, strict=True):
                 w -= params.stage(k)[1] * v.mul_(0.9).add_(g)
-    train(build_net(SMALL, CAMERA), streets, tmp_path, params, seed=3)
+    train(build_net(SMALL, CAMERA), streets, tmp_path, params, seed=2)
     trained = load_file(tmp_path / "weights.safetensors")
     for name, w in net.named_parameters():
         torch.testing.assert_close(trained[name], w.detach(), rtol=1e-3, atol=1e-4)
-    assert any(draw_batch(streets, 2, 0.0, k, seed=3).mirrored for k in range(2))  # had `mirror` not been off
+    assert any(draw_batch(streets, 2, 0.0, k, seed=2).mirrored for k in range(2))  # had `mirror` not been off
 
 
 def test_a_batch_without_labels_teaches_nothing(streets, tmp_path):
