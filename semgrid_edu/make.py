@@ -24,10 +24,11 @@ OLDEST = (3, 11)
 def environment() -> None:
     """Make `.venv` with all that demo and tests need, or bring it up to date; nothing is done when it is."""
     if sys.version_info < OLDEST:
-        sys.exit(f"Python {OLDEST[0]}.{OLDEST[1]} or later is needed, {sys.executable} is {sys.version.split()[0]}")
+        found = f"{sys.executable} is {sys.version.split()[0]}; set PYTHON=... for make"
+        sys.exit(f"Python {OLDEST[0]}.{OLDEST[1]} or later is needed, {found}")
     if MADE.exists() and all((CLONE / name).stat().st_mtime <= MADE.stat().st_mtime for name in NEEDS):
         return
-    venv.create(ENVIRONMENT, with_pip=True)
+    venv.create(ENVIRONMENT, with_pip=True, symlinks=os.name != "nt")
     _run("python", "-m", "pip", "install", "--quiet", "-c", "constraints.txt", "-e", ".[test]")
     MADE.touch()
 

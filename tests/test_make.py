@@ -21,7 +21,7 @@ def clone(tmp_path, monkeypatch):
     (tmp_path / "notebooks" / "deeper").mkdir(parents=True)
     for name in ("b.ipynb", "a.ipynb", "deeper/c.ipynb"):
         (tmp_path / "notebooks" / name).touch()
-    monkeypatch.setattr(make.venv, "create", lambda folder, with_pip: folder.mkdir(exist_ok=True))
+    monkeypatch.setattr(make.venv, "create", lambda folder, **_: folder.mkdir(exist_ok=True))
     return tmp_path
 
 

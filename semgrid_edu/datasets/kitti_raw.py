@@ -125,7 +125,8 @@ class KittiRawDrive(FrameSequence):
     def gaps(self) -> tuple[int, ...]:
         """Numbers of the frames without a scan that lie between frames with one."""
         scans = [k for k in range(len(self)) if self._file("velodyne_points", k, ".bin").exists()]
-        return tuple(sorted(set(range(*scans[:: len(scans) - 1])) - set(scans))) if len(scans) > 1 else ()
+        between = range(scans[0], scans[-1]) if scans else range(0)
+        return tuple(sorted(set(between) - set(scans)))
 
     @cached_property
     def camera(self) -> Camera:

@@ -32,8 +32,9 @@ class ChosenFrames(NamedTuple):
         n_frames : int
             Number of frames of the drive, at least one.
         wanted : str, optional
-            FIRST:LAST or FIRST:LAST:STEP, as Python slices a list: without LAST, and the page shows one frame in STEP.
-            Each may be left out. All frames by default, of which at most `SHOWN` are shown if there is no STEP.
+            FIRST:LAST or FIRST:LAST:STEP. Frames from FIRST up to the one before LAST are run, as Python slices a list,
+            and one in STEP is shown. Each number may be left out. All frames by default, of which at most `SHOWN` are
+            shown if there is no STEP.
 
         Returns
         -------

@@ -27,6 +27,9 @@ NO_TRUTH = 255
 VERDICTS = ("silent", "passed", "ground", "hit")
 """What a scan can say of a cell, see `CellScan.verdict`; a byte holds the index."""
 
+UPDATES = 10
+"""Number of the CRF's updates, the default of `mean_field`."""
+
 Maps = dict[str, NDArray[np.uint8]]
 
 
@@ -110,7 +113,7 @@ def _said(result: FrameResult, spec: GridSpec) -> Maps:
 def _neighbours(result: FrameResult, spec: GridSpec) -> Maps:
     """Return what every cell believed before the last update of the CRF."""
     unary = unary_from_probability(result.grid)
-    Q = mean_field(unary, result.belief.probability, CrfParams.for_cells(spec.cell), 9)
+    Q = mean_field(unary, result.belief.probability, CrfParams.for_cells(spec.cell), UPDATES - 1)
     return {"neighbours": np.rint(255 * Q).astype(np.uint8)}
 
 

@@ -122,6 +122,14 @@ def test_mistakes_with_axes_are_motions_too():
     }
 
 
+def test_a_gap_of_scans_is_a_gap_in_time_and_checked_around(frames):
+    silent = [replace(frame, points=frame.points[:0]) if k in (4, 5) else frame for k, frame in enumerate(frames)]
+    known = mean_histograms(training_images())
+    read = drive_readings(silent, known, every=2)
+    assert read == drive_readings([*frames[:4], *frames[6:]], known, every=2)
+    assert read["gaps"] == 1
+
+
 def test_each_fault_moves_its_own_reading(frames):
     known = mean_histograms(training_images())
     read = {name: drive_readings(make(frames), known, every=2) for name, make in FAULTS.items()}

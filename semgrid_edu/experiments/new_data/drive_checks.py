@@ -1,5 +1,6 @@
 """What every drive should pass before anything is made of it: time stamps, calibration, the ground."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -165,6 +166,22 @@ def depth_edges(points: NDArray, jump: float = 0.5) -> NDArray[np.float64]:
     edge[1:] |= nearer < -jump
     edge[:-1] |= nearer > jump
     return points[edge]
+
+
+def with_scan(frames: Sequence[Frame]) -> list[Frame]:
+    """Return the frames that have a scan; those in a gap of a drive have none.
+
+    Parameters
+    ----------
+    frames : sequence of Frame
+        Frames of a drive.
+
+    Returns
+    -------
+    list of Frame
+        In the same order.
+    """
+    return [frame for frame in frames if len(frame.points)]
 
 
 def edge_contrast(frame: Frame, yaws: ArrayLike) -> NDArray[np.float64]:

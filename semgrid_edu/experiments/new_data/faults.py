@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import rigid_transform, transform_points
 from semgrid_edu.experiments.new_data.domain import mean_histograms
-from semgrid_edu.experiments.new_data.drive_checks import edge_contrast, ground_plane, time_gaps
+from semgrid_edu.experiments.new_data.drive_checks import edge_contrast, ground_plane, time_gaps, with_scan
 from semgrid_edu.experiments.new_data.ego_motion import AXES, axes_errors
 from semgrid_edu.frame import Frame
 from semgrid_edu.metrics import total_variation
@@ -93,10 +93,12 @@ def drive_readings(frames: Sequence[Frame], known: dict[str, NDArray], every: in
     Returns
     -------
     dict of str to float
-        "gaps": number of gaps in time. "yaw": the turn of the camera at which borders in scan and image agree best,
-        degrees. "tilt": the rise of the ground ahead, degrees. "motion": how much worse than the best motion of `AXES`
-        that of the poses is, metres. "colours": how far the colours are from the known ones, total variation 0..1.
+        "gaps": number of gaps in the times of the scans. "yaw": the turn of the camera at which borders in scan and
+        image agree best, degrees. "tilt": the rise of the ground ahead, degrees. "motion": how much worse than the best
+        motion of `AXES` that of the poses is, metres. "colours": how far the colours are from the known ones, total
+        variation 0..1.
     """
+    frames = with_scan(frames)
     some = frames[::every]
     contrast = np.mean([edge_contrast(frame, YAWS) for frame in some], axis=0)
     errors, seen = axes_errors(frames), mean_histograms([frame.need_image() for frame in some])

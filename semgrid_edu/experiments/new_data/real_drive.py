@@ -11,7 +11,7 @@ from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.resizing import resize_image
 from semgrid_edu.datasets.samples import sample_drive, sample_image_stage, sample_weights
 from semgrid_edu.experiments.new_data.domain import image_statistics, mean_histograms, normalised_entropy
-from semgrid_edu.experiments.new_data.drive_checks import ground_plane, sensor_delays, share_on_image
+from semgrid_edu.experiments.new_data.drive_checks import ground_plane, sensor_delays, share_on_image, with_scan
 from semgrid_edu.experiments.new_data.ego_motion import axes_errors
 from semgrid_edu.experiments.new_data.faults import FAULTS, colour_distance, drive_readings
 from semgrid_edu.experiments.new_data.moving_cars import Boxes, moving_hits, read_boxes, sample_boxes
@@ -83,8 +83,9 @@ def measure_drive(drive: KittiRawDrive, boxes: Boxes) -> dict[str, object]:
         Numbers of the drive, of its ground, motion, images, networks and grids; JSON can hold it.
     """
     frames, net = drive[:], load_net(sample_image_stage(), drive.camera)
+    scanned = with_scan(frames)
     positions = np.array([frame.T_world_from_lidar[:3, 3] for frame in frames])
-    ground = np.mean([ground_plane(frame.points, frame.camera.lidar_height) for frame in frames[::EVERY]], axis=0)
+    ground = np.mean([ground_plane(frame.points, frame.camera.lidar_height) for frame in scanned[::EVERY]], axis=0)
     images = [resize_image(frame.need_image(), net.architecture.image_size) for frame in frames[::EVERY]]
     return {
         "frames": len(frames),
@@ -93,13 +94,13 @@ def measure_drive(drive: KittiRawDrive, boxes: Boxes) -> dict[str, object]:
         "step ms": 1000 * float(np.median(np.diff([frame.time for frame in frames]))),
         "delay ms": {name: 1000 * float(np.median(late)) for name, late in sensor_delays(drive).items()},
         "metres": float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum()),
-        "returns": float(np.mean([len(frame.points) for frame in frames])),
-        "on image": float(np.mean([share_on_image(frame.points, frame.camera) for frame in frames])),
+        "returns": float(np.mean([len(frame.points) for frame in scanned])),
+        "on image": float(np.mean([share_on_image(frame.points, frame.camera) for frame in scanned])),
         "ground": dict(zip(("height", "pitch", "roll"), map(float, ground), strict=True)),
-        "axes": axes_errors(frames),
+        "axes": axes_errors(scanned),
         "images": distances(images, training_images()) | statistics_of(images),
-        "image network": network_numbers(net, frames[::EVERY]),
-        "image network, colours matched": network_numbers(net, frames[::EVERY], matched=True),
+        "image network": network_numbers(net, scanned[::EVERY]),
+        "image network, colours matched": network_numbers(net, scanned[::EVERY], matched=True),
         "grids": grid_numbers(frames, boxes),
     }
 

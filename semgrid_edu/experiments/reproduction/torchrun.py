@@ -33,6 +33,7 @@ def work_together(run: Run, root: Path, device: str, processes: int) -> None:
     RuntimeError
         When a process fails. It has printed why.
     """
+    # The run goes to this process's own children, as multiprocessing would hand it over; no pickle is read from a file.
     task = ["-m", "semgrid_edu.experiments.reproduction.torchrun", pickle.dumps(run).hex(), str(root), device]
     command = [*STARTER, "--nproc-per-node", str(processes), *task]
     # The processes read a pipe into which nothing is written: it ends when this process does, and they with it.
