@@ -8,6 +8,20 @@ answers out of them.
 import functools
 from collections.abc import Callable
 
+import numpy as np
+
+_variant: list[int] = []
+
+
+def choose_variant(*number: int) -> None:
+    """Let hidden tests draw other inputs from now on: those of this number, or without one the usual inputs."""
+    _variant[:] = number
+
+
+def generator(seed: int) -> np.random.Generator:
+    """Return the generator from which a hidden test draws its inputs, by the variant that was chosen last."""
+    return np.random.default_rng([seed, *_variant])
+
 
 def hidden(check: Callable[[Callable], None]) -> Callable[[Callable], str]:
     """Turn a check that raises into one that returns a short complaint, or "" when all is well."""
