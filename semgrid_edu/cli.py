@@ -2,7 +2,6 @@
 
 import os
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +9,8 @@ import typer
 from typer.core import TyperCommand
 
 from semgrid_edu.arguments import check_arguments, tell
-from semgrid_edu.data_commands import data, report
+from semgrid_edu.course.commands import course
+from semgrid_edu.data_commands import data
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.experiments.commands import keep_result, reproduce
 from semgrid_edu.experiments.reproduction.commands import add_commands
@@ -18,7 +18,6 @@ from semgrid_edu.storage.caching import CACHE_VARIABLE
 from semgrid_edu.storage.compiled import keep_compiled_functions
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
-course = typer.Typer(no_args_is_help=True, help="Build the notebooks and the exercises.")
 app.add_typer(data, name="data")
 app.add_typer(course, name="course")
 app.add_typer(reproduce, name="reproduce")
@@ -73,59 +72,6 @@ def demo(
     tell([*chosen.doubts(), *(weights_doubts(weights) if weights else ())])
     page = write_demo(chosen, weights or sample_weights(), out, stages, frames)
     typer.echo(f"open {page.resolve().as_uri()}\nin one picture: {page.parent / 'overview.png'}")
-
-
-@course.callback()
-def needs_tools() -> None:
-    """Build the notebooks and the exercises."""
-    missing = [name for name in ("jupytext", "nbgrader") if find_spec(name) is None]
-    if missing:
-        sys.exit(f"semgrid-edu: {' and '.join(missing)} are needed for this: pip install 'semgrid_edu[course]'")
-
-
-@course.command()
-def notebooks(
-    names: Annotated[
-        list[str] | None, typer.Argument(help="Such as 00_tour or graphical_models; all by default.")
-    ] = None,
-) -> None:
-    """Execute lectures and companions and write the students' exercises, from their sources."""
-    from semgrid_edu.course.exercises import build_exercise, exercise_sources
-    from semgrid_edu.course.notebooks import build_lecture, companion_sources, lecture_sources, named, notebook_name
-
-    for source in named([*exercise_sources(), *lecture_sources(), *companion_sources()], names):
-        build = build_exercise if source in exercise_sources() else build_lecture
-        typer.echo(f"{notebook_name(source)}: {build(source)}")
-
-
-@course.command()
-def minutes(
-    names: Annotated[
-        list[str] | None, typer.Argument(help="Such as 00_tour, for its sections; all by default.")
-    ] = None,
-) -> None:
-    """Tell how many minutes each notebook takes a student, and what takes them."""
-    from semgrid_edu.course.minutes import minutes_table
-    from semgrid_edu.course.notebooks import companion_sources, lecture_sources, named
-
-    typer.echo(minutes_table(named([*lecture_sources(), *companion_sources()], names)))
-
-
-@course.command()
-def check() -> None:
-    """Check that every notebook agrees with its source, has run, and is fit to be shown."""
-    from semgrid_edu.course.checks import course_problems
-
-    report(course_problems(), "every notebook agrees with its source")
-
-
-@course.command()
-def build(folder: Annotated[Path, typer.Argument(help="A missing or empty folder, or a course built before.")]) -> None:
-    """Lay out a complete nbgrader course for an instructor."""
-    from semgrid_edu.course.exercises import build_course
-
-    assignments = build_course(folder)
-    typer.echo(f"{folder}: {len(assignments)} assignments, {', '.join(assignments)}; read {folder / 'README.md'}")
 
 
 class _TrainCommand(TyperCommand):

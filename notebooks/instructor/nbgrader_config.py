@@ -4,26 +4,47 @@ import os
 import sysconfig
 from pathlib import Path
 
+from nbconvert.preprocessors import ClearMetadataPreprocessor
+from nbgrader.preprocessors import (
+    AssignLatePenalties,
+    CheckCellMetadata,
+    ClearOutput,
+    LimitOutput,
+    OverwriteCells,
+    OverwriteKernelspec,
+    SaveAutoGrades,
+)
+
+from semgrid_edu.course.nbgrader_steps import ExecuteApart, MakeWhole, NoteCrashes
+
 c = get_config()  # noqa: F821 (nbgrader defines it)
 course = Path(__file__).resolve().parent
 
 c.CourseDirectory.course_id = "semgrid_edu"
 c.CourseDirectory.root = str(course)
 
+# What `nbgrader autograde` does to a submission: first it repairs it, then it runs and grades it.
+c.Autograde.sanitize_preprocessors = [
+    ClearOutput,
+    MakeWhole,
+    OverwriteKernelspec,
+    OverwriteCells,
+    CheckCellMetadata,
+]
+c.Autograde.autograde_preprocessors = [
+    ExecuteApart,
+    ClearMetadataPreprocessor,
+    LimitOutput,
+    SaveAutoGrades,
+    NoteCrashes,
+    AssignLatePenalties,
+    CheckCellMetadata,
+]
+
+c.ExecuteApart.course = str(course)
+
 # Seconds for one cell. An endless loop costs its own points and this long.
-c.Execute.timeout = 30
-
-# A test cell that a student deleted comes back for grading.
-c.OverwriteCells.add_missing_cells = True
-
-
-def put_first(variable: str, folder: str) -> None:
-    """Put a folder before the others of a search path in the environment."""
-    os.environ[variable] = os.pathsep.join(filter(None, [folder, os.environ.get(variable)]))
-
-
-# Kernels that grade inherit this, and so find the hidden tests.
-put_first("PYTHONPATH", str(course / "instructor"))
+c.ExecuteApart.timeout = 30
 
 # nbgrader calls `alembic`, which lies beside it, also when its environment isn't activated.
-put_first("PATH", sysconfig.get_path("scripts"))
+os.environ["PATH"] = os.pathsep.join(filter(None, [sysconfig.get_path("scripts"), os.environ.get("PATH")]))

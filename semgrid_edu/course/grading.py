@@ -1,8 +1,9 @@
 """Grading by nbgrader: it takes notebooks, and gives a score and a message for each test cell."""
 
 import copy
+import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import nbformat
@@ -10,10 +11,36 @@ from nbconvert.filters import strip_ansi
 from nbformat import NotebookNode
 from nbgrader.api import Gradebook
 from nbgrader.utils import is_grade, is_solution
+from sqlalchemy.exc import SAWarning
 
 from semgrid_edu.course.exercises import course_api, student_version
 from semgrid_edu.course.notebooks import read_percent, write_notebook
 from semgrid_edu.errors import ArgumentError, DataError
+
+PATIENCE = 10
+"""How often a submission is tried whose grades another process keeps from being written."""
+
+
+@dataclass(frozen=True)
+class GradeSettings:
+    """How a class is graded.
+
+    Parameters
+    ----------
+    timeout : int
+        Seconds for a cell.
+    memory : int
+        Megabytes of memory for a student's code.
+    container : tuple of str
+        A command that starts a program in a container; () for none.
+    seed_by_student : bool
+        Whether each student's hidden tests draw inputs of their own.
+    """
+
+    timeout: int = 30
+    memory: int = 4000
+    container: tuple[str, ...] = ()
+    seed_by_student: bool = False
 
 
 @dataclass(frozen=True)
@@ -131,21 +158,51 @@ def autograde(
     DataError
         When nbgrader could not grade a submission completely: the 0 in its gradebook is then not a score.
     """
+    settings = GradeSettings(timeout=timeout)
     for student, notebook in submissions.items():
-        write_notebook(notebook, _place(course, "submitted", student, assignment))
-    with course_api(course) as api:
-        api.config.Execute.timeout = timeout
-        for student in submissions:
-            result = api.autograde(assignment, student)
-            if not result["success"]:
-                place = _place(course, "submitted", student, assignment)
-                raise DataError(place, "a notebook that can be graded", result.get("log") or result["error"])
+        write_notebook(notebook, place(course, "submitted", student, assignment))
+        autograde_one(course, assignment, student, settings)
     return {student: _scores(course, assignment, student) for student in submissions}
+
+
+def autograde_one(
+    course: Path, assignment: str, student: str, settings: GradeSettings, submitted: str = "submitted"
+) -> None:
+    """Let nbgrader grade one submission.
+
+    Parameters
+    ----------
+    course : Path
+        The folder of a course that `build_course` wrote.
+    assignment, student : str
+        Whose submission.
+    settings : GradeSettings
+        How it is graded.
+    submitted : str
+        The folder in the course from which it is taken.
+
+    Raises
+    ------
+    DataError
+        When nbgrader could not grade it completely: the 0 in its gradebook is then not a score.
+    """
+    with course_api(course) as api, warnings.catch_warnings():
+        # nbgrader 0.9.6 builds a submission outside its database session.
+        warnings.filterwarnings("ignore", "Object of type <Submitted", SAWarning)
+        api.config.ExecuteApart.merge(asdict(settings) | {"container": list(settings.container)})
+        api.coursedir.submitted_directory = submitted
+        for _ in range(PATIENCE):
+            result = api.autograde(assignment, student)
+            said = result.get("log") or result.get("error", "")
+            if result["success"] or "database is locked" not in said:
+                break
+    if not result["success"]:
+        raise DataError(place(course, submitted, student, assignment), "a notebook that can be graded", said)
 
 
 def _scores(course: Path, assignment: str, student: str) -> dict[str, CellScore]:
     """Read a student's scores from the gradebook and the messages from the graded notebook."""
-    graded = nbformat.read(_place(course, "autograded", student, assignment), as_version=4)
+    graded = nbformat.read(place(course, "autograded", student, assignment), as_version=4)
     messages = {c.metadata.nbgrader.grade_id: _message(c) for c in graded.cells if is_grade(c)}
     with Gradebook(f"sqlite:///{course / 'gradebook.db'}") as gradebook:
         grades = gradebook.find_submission_notebook(assignment, assignment, student).grades
@@ -158,6 +215,16 @@ def _message(cell: NotebookNode) -> str:
     return "\n".join(f"{error.ename}: {error.evalue or strip_ansi(error.traceback[-1])}" for error in errors)
 
 
-def _place(course: Path, step: str, student: str, assignment: str) -> Path:
-    """Return the path of a student's notebook in one of nbgrader's folders."""
+def place(course: Path, step: str, student: str, assignment: str) -> Path:
+    """Return the path of a student's notebook in one of nbgrader's folders.
+
+    Parameters
+    ----------
+    course : Path
+        The folder of the course.
+    step : str
+        The folder, such as "submitted".
+    student, assignment : str
+        Whose notebook.
+    """
     return course / step / student / assignment / f"{assignment}.ipynb"

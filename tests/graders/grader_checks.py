@@ -45,8 +45,6 @@ def pack(entries) -> list[dict[str, Entry]]:
     return students
 
 
-# nbgrader 0.9.6 builds a submission outside its database session and lets sqlalchemy complain about it
-@pytest.mark.filterwarnings("ignore:Object of type <Submitted:sqlalchemy.exc.SAWarning")
 class GraderChecks:
     """The reference earns all, the stub nothing, and each entry loses what it should; tasks don't touch each other."""
 

@@ -1,0 +1,100 @@
+"""A submission, cell by cell: answers run in the student's process, tests in the grader's."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+from nbformat import NotebookNode
+from nbformat.v4 import new_output
+from nbgrader.utils import is_grade, is_solution
+
+from semgrid_edu.course.isolation.process import StudentProcess
+from semgrid_edu.course.isolation.session import AnswerEndedError, AnswerTimeoutError, Session
+from semgrid_edu.course.isolation.tests import Tests
+
+ENDS = tuple(kind.__name__ for kind in (AnswerEndedError, AnswerTimeoutError))
+"""The errors of an answer that ended its process, or had to be ended."""
+
+
+def run_submission(
+    notebook: NotebookNode,
+    trusted: Mapping[str, str],
+    start: Callable[[], StudentProcess],
+    timeout: float,
+    variant: tuple[int, ...] = (),
+) -> dict[str, str]:
+    """Run a submission, and write outputs below its cells.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        The submission.
+    trusted : mapping of str to str
+        The text of the instructor's cells, by grade_id. A test runs in the grader's process, so only with this text.
+    start : callable
+        () -> StudentProcess.
+    timeout : float
+        How long a cell may take, seconds.
+    variant : tuple of int
+        Which inputs the hidden tests draw: see `semgrid_instructor.choose_variant`.
+
+    Returns
+    -------
+    dict of str to str
+        What ended a student's process, by the grade_id of the cell in which it happened ("" for a cell of her own).
+    """
+    seen, unseen = Session(start, timeout), Session(start, timeout, secret=True)
+    tests = Tests(seen, unseen, variant)
+    try:
+        for number, cell in enumerate((c for c in notebook.cells if c.cell_type == "code"), start=1):
+            cell.execution_count = number
+            cell.outputs = _outputs(cell, trusted, tests)
+        return {cell_name(c): o.evalue for c in notebook.cells for o in c.get("outputs", []) if o.get("ename") in ENDS}
+    finally:
+        seen.stop()
+        unseen.stop()
+
+
+def cell_name(cell: NotebookNode) -> str:
+    """Return the grade_id of a cell.
+
+    Parameters
+    ----------
+    cell : NotebookNode
+        Any cell of a submission.
+
+    Returns
+    -------
+    str
+        "" for a cell without one, or with metadata that nbgrader didn't write.
+    """
+    marked = cell.metadata.get("nbgrader")
+    name = marked.get("grade_id") if isinstance(marked, dict) else None
+    return name if isinstance(name, str) else ""
+
+
+def _outputs(cell: NotebookNode, trusted: Mapping[str, str], tests: Tests) -> list[NotebookNode]:
+    """Run a cell where it belongs."""
+    is_trusted = trusted.get(cell_name(cell)) == cell.source and not is_solution(cell)
+    if is_grade(cell) and not is_solution(cell):
+        # Without an error nbgrader would give all points.
+        return (
+            tests.test(cell.source, cell_name(cell)) if is_trusted else [_error("ValueError", "not the course's test")]
+        )
+    if is_trusted:
+        tests.prepare(cell.source)
+    tests.unseen.run_later(cell.source)
+    return _as_outputs(tests.seen.run(cell.source))
+
+
+def _as_outputs(reply: dict) -> list[NotebookNode]:
+    """Return what a cell put out as a notebook holds it."""
+    streams = [new_output("stream", name=name, text=text) for name, text in reply["streams"].items() if text]
+    shown = [new_output("display_data", data=data) for data in reply["shown"]]
+    error = reply.get("error")
+    if error is None:
+        return streams + shown
+    return [*streams, *shown, _error(error["kind"], error["says"], error["traceback"])]
+
+
+def _error(kind: str, says: str, lines: Sequence[str] = ()) -> NotebookNode:
+    """Return an error as a notebook holds it."""
+    return new_output("error", ename=kind, evalue=says, traceback=[*lines] or [f"{kind}: {says}"])

@@ -1,0 +1,94 @@
+"""What is worked out once for all submissions: functions that are compiled, fonts, and whether the reference passes."""
+
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import nbformat
+from filelock import FileLock
+from nbformat import NotebookNode
+from nbgrader.utils import is_solution
+
+from semgrid_edu.course.isolation.notebook import run_submission
+from semgrid_edu.course.isolation.process import StudentProcess
+from semgrid_edu.course.isolation.tests import INSTRUCTOR
+from semgrid_edu.errors import DataError
+
+PATIENCE = 600.0
+"""Seconds that a cell of the reference may take; it compiles what others find compiled."""
+
+PASSED = "the reference passed"
+"""The name of the file that tells so."""
+
+
+def use_instructor(folder: Path) -> None:
+    """Let hidden tests be imported from a course's own folder.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder `instructor` of a course.
+    """
+    if str(folder) in sys.path[:1]:
+        return
+    sys.path.insert(0, str(folder))
+    for name in [name for name in sys.modules if name.partition(".")[0] == INSTRUCTOR]:
+        del sys.modules[name]
+
+
+def prepare(course: Path, assignment: str, start: Callable[[Path], StudentProcess]) -> Path:
+    """Grade the reference answers once, and keep what they had compiled.
+
+    Parameters
+    ----------
+    course : Path
+        A course that `build_course` wrote.
+    assignment : str
+        The exercise.
+    start : callable
+        (folder of what is prepared) -> StudentProcess, one that keeps what it compiles.
+
+    Returns
+    -------
+    Path
+        The folder of what is prepared.
+
+    Raises
+    ------
+    DataError
+        When the reference answers don't pass their own tests.
+    """
+    folder = course / "prepared" / assignment
+    folder.mkdir(parents=True, exist_ok=True)
+    with FileLock(folder.with_suffix(".lock")):
+        if not (folder / PASSED).exists():
+            _grade_reference(course, assignment, folder, start)
+            (folder / PASSED).touch()
+    return folder
+
+
+def _grade_reference(course: Path, assignment: str, folder: Path, start: Callable[[Path], StudentProcess]) -> None:
+    """Run an exercise with the instructor's answers in it."""
+    path = course / "source" / assignment / f"{assignment}.ipynb"
+    notebook = nbformat.read(path, as_version=4)
+    run_submission(notebook, instructors_cells(notebook), lambda: start(folder), PATIENCE)
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    if errors := [f"{output.ename}: {output.evalue}" for output in outputs if output.output_type == "error"]:
+        raise DataError(path, "reference answers that pass their tests", "; ".join(errors))
+
+
+def instructors_cells(notebook: NotebookNode) -> Mapping[str, str]:
+    """Return the text of the cells that aren't answers, by grade_id.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        An exercise's source.
+
+    Returns
+    -------
+    mapping of str to str
+        For `run_submission`.
+    """
+    graded = [cell for cell in notebook.cells if cell.metadata.get("nbgrader") and not is_solution(cell)]
+    return {cell.metadata.nbgrader.grade_id: cell.source for cell in graded}

@@ -1,0 +1,177 @@
+"""Plain values as bytes: what may pass between a student's process and the grader's. Never a pickle.
+
+A message is one line of JSON and, behind it, the bytes of its arrays. Reading one makes numbers, texts, containers,
+arrays and a few of the package's own records, and runs nothing that the sender wrote.
+"""
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import ArgumentError
+
+RECORDS = (
+    "semgrid_edu.grid.GridSpec",
+    "semgrid_edu.graphical.factor.Factor",
+    "semgrid_edu.camera.Camera",
+    "semgrid_edu.frame.Frame",
+    "semgrid_edu.frame.FrameLabels",
+    "semgrid_edu.labels.LabelSet",
+)
+"""The package's records that pass; the last part is the class."""
+
+KINDS = "?biufcUS"
+"""The kinds of array that pass, numpy's letters: booleans, numbers and texts."""
+
+
+class NotPlainError(TypeError):
+    """A value that can't pass."""
+
+
+def encode(value: Any, callbacks: list[Callable] | None = None) -> bytes:
+    """Turn a value into bytes.
+
+    Parameters
+    ----------
+    value : object
+        None, a boolean, number or text; a list, tuple, set or dict of such; an array of these, or what numpy makes an
+        array of (a tensor, a table); one of `RECORDS`.
+    callbacks : list of callable, optional
+        Takes the functions within `value`; the other side gets their numbers. Without it a function can't pass.
+
+    Returns
+    -------
+    bytes
+        For `decode`.
+
+    Raises
+    ------
+    NotPlainError
+        When a part of the value is something else.
+    """
+    arrays: list[NDArray] = []
+    tree = _tree(value, arrays, callbacks)
+    head = json.dumps({"value": tree, "arrays": [[array.dtype.str, array.shape] for array in arrays]})
+    return b"".join([head.encode(), b"\n", *(array.tobytes() for array in arrays)])
+
+
+def decode(data: bytes, callback: Callable[[int], Callable] | None = None) -> Any:
+    """Turn bytes into the value from which `encode` made them.
+
+    Parameters
+    ----------
+    data : bytes
+        The message.
+    callback : callable, optional
+        Turns the number of a function into a function to call in its place.
+
+    Returns
+    -------
+    object
+        The value. An array is a plain one, with memory of its own.
+
+    Raises
+    ------
+    ArgumentError
+        When the bytes are no such message.
+    """
+    head, _, rest = data.partition(b"\n")
+    try:
+        message = json.loads(head)
+        arrays = _arrays(message["arrays"], rest)
+        return _value(message["value"], arrays, callback)
+    except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError, MemoryError) as error:
+        raise ArgumentError("data", "a message of plain values", f"{type(error).__name__}: {error}") from error
+
+
+def _tree(value: Any, arrays: list[NDArray], callbacks: list[Callable] | None) -> Any:
+    """Return a value as JSON holds it; its arrays are added to the list."""
+
+    def trees(values: Any) -> list:
+        return [_tree(one, arrays, callbacks) for one in values]
+
+    if value is None or type(value) in (bool, int, float, str):
+        return value
+    if type(value) is list:
+        return trees(value)
+    for kind in (int, float, str):
+        if isinstance(value, kind) and not isinstance(value, np.generic):
+            return kind(value)
+    for kind in (tuple, set, frozenset):
+        if isinstance(value, kind):
+            return {kind.__name__: trees(value)}
+    if isinstance(value, dict):
+        return {"dict": [trees(pair) for pair in value.items()]}
+    if _path(value) in RECORDS:
+        return {"record": _path(value), "fields": trees(getattr(value, field.name) for field in fields(value))}
+    if isinstance(value, np.generic | complex):
+        return {"scalar": _tree(np.array(value), arrays, callbacks)}
+    if callable(value) and callbacks is not None:
+        callbacks.append(value)
+        return {"function": len(callbacks) - 1}
+    return _array_tree(value, arrays, callbacks)
+
+
+def _array_tree(value: Any, arrays: list[NDArray], callbacks: list[Callable] | None) -> Any:
+    """Return what numpy takes for an array, as JSON holds it."""
+    if not isinstance(value, np.ndarray) and not hasattr(value, "__array__") and not isinstance(value, range | list):
+        raise NotPlainError(f"a {type(value).__name__} where numbers, texts, arrays, lists or dicts are expected")
+    array = np.asarray(value)
+    if array.dtype.kind == "O":
+        return {"objects": _tree(array.tolist(), arrays, callbacks)}
+    if array.dtype.kind not in KINDS:
+        raise NotPlainError(f"an array of {array.dtype}, where numbers, booleans or texts are expected")
+    arrays.append(array)
+    return {"array": len(arrays) - 1}
+
+
+def _path(value: Any) -> str | None:
+    """Return where the class of a record stands."""
+    return f"{type(value).__module__}.{type(value).__qualname__}" if is_dataclass(value) else None
+
+
+def _arrays(described: list, data: bytes) -> list[NDArray]:
+    """Cut the bytes of a message into arrays."""
+    found, start = [], 0
+    for text, shape in described:
+        dtype = np.dtype(text)
+        if dtype.kind not in KINDS or not all(type(n) is int and n >= 0 for n in shape):
+            raise ValueError(f"an array of {text} and shape {shape}")
+        end = start + dtype.itemsize * math.prod(shape)
+        if end > len(data):
+            raise ValueError(f"{len(data)} bytes where {end} are needed")
+        found.append(np.frombuffer(data[start:end], dtype).reshape(shape).copy())
+        start = end
+    return found
+
+
+def _value(tree: Any, arrays: list[NDArray], callback: Callable[[int], Callable] | None) -> Any:
+    """Return the value that a tree of JSON stands for."""
+    if isinstance(tree, list):
+        return [_value(one, arrays, callback) for one in tree]
+    if not isinstance(tree, dict):
+        return tree
+    kind, content = next(iter(tree.items()))
+    if kind == "array":
+        return arrays[content]
+    if kind == "function":
+        return callback(content)
+    if kind == "record":
+        return _record(content, _value(tree["fields"], arrays, callback))
+    inner = _value(content, arrays, callback)
+    makers = {"tuple": tuple, "set": set, "frozenset": frozenset, "dict": dict, "scalar": lambda array: array[()]}
+    return np.array(inner, dtype=object) if kind == "objects" else makers[kind](inner)
+
+
+def _record(path: str, values: list) -> Any:
+    """Return a record of the package."""
+    if path not in RECORDS:
+        raise ValueError(f"a record {path!r}")
+    module, _, name = path.rpartition(".")
+    return getattr(import_module(module), name)(*values)

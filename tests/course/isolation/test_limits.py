@@ -1,0 +1,128 @@
+"""What a student's code can't reach, on a system that can limit it; elsewhere the process says what it couldn't."""
+
+import os
+import signal
+import socket
+import subprocess
+from pathlib import Path
+
+import pytest
+
+import semgrid_edu
+from semgrid_edu.course.isolation import landlock
+from semgrid_edu.course.isolation.limits import PARTS, Limits, _all_but
+from semgrid_edu.course.isolation.process import StudentProcess
+from semgrid_edu.course.notebooks import NOTEBOOKS
+
+needs_landlock = pytest.mark.skipif(not landlock.version(), reason="this system has no Landlock")
+
+
+@pytest.fixture
+def limited(session):
+    """Return a function that runs a line in a limited process, and tells the error that it raised, or its value."""
+
+    def run(line, part):
+        session.run("pass")
+        if part in session.process.unlimited:
+            pytest.skip(f"this system can't limit {part}")
+        reply = session.run(
+            f"try:\n    got = ('value', {line})\nexcept BaseException as error:\n"
+            "    got = ('error', type(error).__name__)"
+        )
+        return session.names(["got"], session)["got"] if "error" not in reply else ("error", reply["error"]["kind"])
+
+    return run
+
+
+SECRETS = [
+    str(NOTEBOOKS / "src" / "exercises" / "01_bayes.py"),
+    str(NOTEBOOKS / "instructor" / "semgrid_instructor" / "bayes.py"),
+    str(Path(semgrid_edu.__file__).parents[1] / "notebooks" / "README.md"),
+    "/etc/shadow",
+]
+
+
+@pytest.mark.parametrize("path", [path for path in SECRETS if Path(path).exists()])
+def test_secrets_cannot_be_read(limited, path):
+    assert limited(f"open({path!r}).read()", "files")[0] == "error"
+
+
+def test_a_course_cannot_be_read_changed_or_listed(limited, tmp_path):
+    (tmp_path / "gradebook.db").write_text("grades")
+    for line in (
+        f"open('{tmp_path}/gradebook.db').read()",
+        f"open('{tmp_path}/gradebook.db', 'a').write('x')",
+        f"__import__('os').listdir('{tmp_path}')",
+        f"__import__('os').remove('{tmp_path}/gradebook.db')",
+    ):
+        assert limited(line, "files") == ("error", "PermissionError")
+    assert (tmp_path / "gradebook.db").read_text() == "grades"
+
+
+def test_its_own_folder_can_be_used(limited):
+    assert limited("open('own.txt', 'w').write('x')", "files") == ("value", 1)
+    assert limited("open('own.txt').read()", "files") == ("value", "x")
+
+
+def test_libraries_and_the_sample_drive_can_be_read(limited):
+    assert limited("__import__('scipy.ndimage').__name__", "files") == ("value", "scipy")
+    line = "len(__import__('semgrid_edu.datasets.samples', fromlist=['x']).sample_drive())"
+    assert limited(line, "files")[0] == "value"
+
+
+def test_no_network(limited):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = server.getsockname()
+        got = limited(f"__import__('socket').create_connection({address!r}, 2).fileno()", "network")
+    assert got[0] == "error"
+
+
+def test_the_grader_cannot_be_stopped(limited):
+    seen = []
+    before = signal.signal(signal.SIGUSR1, lambda *_: seen.append(1))
+    limited(f"__import__('os').kill({os.getpid()}, {int(signal.SIGUSR1)})", "signals")
+    limited(f"__import__('os').kill(__import__('os').getppid(), {int(signal.SIGUSR1)})", "signals")
+    signal.signal(signal.SIGUSR1, before)
+    assert seen == []
+
+
+def test_memory_and_files_have_an_end(limited):
+    assert limited("bytearray(1_500_000_000)[:1]", "memory") == ("error", "MemoryError")
+    assert limited("open('large', 'wb').write(bytes(20_000_000))", "written files")[0] == "error"
+
+
+def test_what_it_started_ends_with_it(session):
+    session.run("import subprocess; child = subprocess.Popen(['sleep', '60.125'], start_new_session=True)")
+    if "signals" in session.process.unlimited:
+        pytest.skip("this system can't give a process namespaces of its own")
+    session.stop()
+    assert "60.125" not in subprocess.run(["ps", "ax"], capture_output=True, text=True, check=True).stdout
+
+
+def test_the_folder_is_gone_afterwards_and_never_shared(prepared):
+    first, second = (StudentProcess(Limits(), prepared) for _ in range(2))
+    assert first.folder != second.folder
+    for process in (first, second):
+        process.stop()
+        assert not process.folder.exists()
+
+
+def test_what_cannot_be_limited_is_told(prepared):
+    process = StudentProcess(Limits(), prepared)
+    process.stop()
+    assert set(process.unlimited) <= set(PARTS)
+
+
+def test_all_of_a_folder_but_one_in_it(tmp_path):
+    for name in ("a/hidden/deep", "a/open", "b"):
+        (tmp_path / name).mkdir(parents=True)
+    look, read = _all_but(tmp_path, tmp_path / "a" / "hidden")
+    assert look == [tmp_path, tmp_path / "a"]
+    assert sorted(read) == [tmp_path / "a" / "open", tmp_path / "b"]
+    assert _all_but(tmp_path / "b", tmp_path / "a" / "hidden") == ([], [tmp_path / "b"])
+    assert _all_but(tmp_path / "a" / "hidden" / "deep", tmp_path / "a" / "hidden") == ([], [])
+
+
+@needs_landlock
+def test_landlock_knows_at_least_files():
+    assert landlock.version() >= 1

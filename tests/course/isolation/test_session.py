@@ -1,0 +1,172 @@
+"""A student's process: calls look as if they were made here, and nothing that it does stops the next call."""
+
+import math
+
+import numpy as np
+import pytest
+
+from semgrid_edu.course.isolation.session import AnswerEndedError, AnswerError, AnswerTimeoutError
+
+
+def test_cells_share_names_and_display(session):
+    assert session.run("import math\nx = 3\nprint('seen')\nx")["streams"]["stdout"].startswith("seen")
+    shown = session.run("from IPython.display import display\ndisplay(x + 1)")["shown"]
+    assert shown == [{"text/plain": "4"}]
+    assert session.names(["x", "y"], session) == {"x": 3}
+
+
+def test_notebooks_own_syntax_runs(session):
+    session.run("%matplotlib inline\nvalue = await __import__('asyncio').sleep(0, 5)")
+    assert session.names(["value"], session) == {"value": 5}
+
+
+def test_a_figure_is_shown(session):
+    code = "import matplotlib.pyplot as plt\nplt.plot([1, 2])\nplt.show()"
+    assert "image/png" in session.run(code)["shown"][0]
+
+
+def test_a_call_returns_values_and_changes_arguments(answer):
+    f = answer("def f(a, b=1, *, c):\n    a += b\n    return a * c, {'b': b}")
+    array = np.ones(3)
+    result, named = f(array, c=np.float32(2))
+    np.testing.assert_array_equal(array, [2, 2, 2])
+    np.testing.assert_array_equal(result, [4, 4, 4])
+    assert named == {"b": 1}
+    assert f.__name__ == "f"
+
+
+def test_a_function_that_is_given_works_here(answer):
+    kernel, calls = np.array([[1.0, 2], [3, 4]]), []
+
+    def blur(values, /, twice=False):
+        calls.append(values)
+        return kernel @ values * (2 if twice else 1)
+
+    f = answer("def f(blur, Q):\n    return blur(Q) + blur(Q, twice=True)")
+    np.testing.assert_allclose(f(blur, np.ones(2)), [9, 21])
+    assert len(calls) == 2
+
+
+def test_an_error_of_a_function_that_is_given_reaches_the_answer(answer):
+    f = answer("def f(g):\n    try:\n        g()\n    except ValueError as error:\n        return str(error)")
+    assert "ZeroDivisionError" in f(lambda: 1 / 0)
+
+
+@pytest.mark.parametrize(
+    ("code", "kind", "says"),
+    [
+        ("raise IndexError('7')", IndexError, "7"),
+        ("return {}['key']", KeyError, "key"),
+        ("class Own(ValueError): pass\n    raise Own('mine')", ValueError, "mine"),
+        ("class Own(Exception): pass\n    raise Own('mine')", AnswerError, "Own: mine"),
+        ("b'x'.decode('ascii', 'none'); '\\xff'.encode('ascii')", AnswerError, "UnicodeEncodeError"),
+        ("exit()", AnswerError, "SystemExit"),
+        ("raise KeyboardInterrupt", AnswerError, "KeyboardInterrupt"),
+        ("return object()", TypeError, "a object where numbers"),
+        ("return (n for n in 'ab')", TypeError, "a generator where numbers"),
+        ("return f()", RecursionError, "recursion"),
+        ("return bytearray(10**10)", MemoryError, "^$"),
+    ],
+)
+def test_errors_come_back_as_what_they_are(answer, code, kind, says):
+    f = answer(f"def f():\n    {code}")
+    with pytest.raises(kind, match=says):
+        f()
+
+
+def test_an_error_tells_its_line(answer):
+    f = answer("def f(x):\n    y = x\n    return y[9]")
+    with pytest.raises(IndexError) as caught:
+        f([1])
+    assert caught.value.__notes__ == ["in your line: return y[9]"]
+
+
+def test_where_inputs_are_secret_an_error_says_its_line_alone(session, answer):
+    session.secret = True
+    f = answer("def f(x):\n    raise ValueError(f'hidden: {x}')")
+    with pytest.raises(ValueError, match="in the line") as caught:
+        f(123)
+    assert "123" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import os; os._exit(0)",
+        "import ctypes; ctypes.string_at(0)",
+        "import os; os.closerange(0, 200)",
+        "import os; os.abort()",
+        "import os; [os.write(n, b'nonsense' * 9) for n in range(3, 20) if os.path.exists(f'/proc/self/fd/{n}')]",
+    ],
+)
+def test_an_answer_that_ends_its_process_costs_one_call(session, answer, code):
+    f = answer(f"def g(x):\n    return x + 1\ndef f():\n    {code}")
+    with pytest.raises((AnswerEndedError, OSError)):
+        f()
+    session.begin()
+    assert session.names(["g"], session)["g"](1) == 2
+
+
+def test_an_answer_that_never_ends_costs_one_call(session, answer):
+    session.timeout = 2
+    f = answer(
+        "def g(x):\n    return x + 1\ndef f():\n    while True:\n        try:\n"
+        "            while True: pass\n        except BaseException: pass"
+    )
+    with pytest.raises(AnswerTimeoutError, match="before timeout, 2 s"):
+        f()
+    session.begin()
+    assert session.names(["g"], session)["g"](1) == 2
+
+
+def test_a_cell_that_ends_the_process_is_left_out_when_the_others_run_again(session):
+    session.run("x = [1]")
+    assert session.run("import os; os._exit(0)")["error"]["kind"] == "AnswerEndedError"
+    session.run("x.append(2)")
+    assert session.names(["x"], session) == {"x": [1, 2]}
+
+
+def test_exit_in_a_cell_ends_that_cell(session):
+    assert "error" in session.run("a = 1\nraise SystemExit")
+    session.run("quit()")
+    assert session.names(["a"], session) == {"a": 1}
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import warnings; warnings.simplefilter('always'); warnings.warn('w')",
+        "import sys; print('x', file=sys.stderr)",
+        "import logging; logging.warning('x')",
+        "from tqdm import tqdm; list(tqdm(range(3)))",
+        "import numpy as np; np.seterr(all='print'); np.array([1.0]) / 0",
+        "import matplotlib.pyplot as plt; plt.title('x', family='no such font'); plt.show()",
+        "print('x' * 10**6)",
+    ],
+)
+def test_what_is_said_beside_does_not_matter(answer, code):
+    assert answer(f"def f():\n    {code}\n    return 1")() == 1
+
+
+def test_what_an_answer_prints_is_kept_for_its_author(session, answer):
+    answer("def f():\n    print('here')")()
+    assert session.printed == "here\n"
+
+
+def test_memory_is_measured_where_it_is_taken(answer):
+    f = answer("import numpy as np\ndef f(n):\n    return float(np.ones(n).sum())")
+    result, megabytes = f.peak_megabytes(1_000_000)
+    assert result == 1_000_000
+    assert 8 <= megabytes < 9
+    assert f(3) == 3
+
+
+def test_cells_that_wait_run_before_the_first_call(session):
+    session.run_later("def f():\n    return x")
+    session.run_later("x = 4")
+    assert session.process is None
+    assert session.call("f", (), {}, measured=False)[0] == 4
+
+
+def test_numbers_that_are_not_finite_pass(answer):
+    assert math.isnan(answer("def f():\n    return float('nan')")())

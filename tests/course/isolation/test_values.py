@@ -1,0 +1,140 @@
+"""Values that pass between processes: back they are the same, and bytes of any other kind are refused."""
+
+import json
+import math
+from collections import OrderedDict
+from enum import IntEnum
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from semgrid_edu.course.isolation.values import NotPlainError, decode, encode
+from semgrid_edu.datasets.samples import sample_drive
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.graphical import Factor
+from semgrid_edu.grid import GridSpec
+
+scalars = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text()
+plain = st.recursive(
+    scalars, lambda inner: st.lists(inner) | st.tuples(inner, inner) | st.dictionaries(scalars, inner), max_leaves=12
+)
+
+
+@given(plain)
+def test_containers_come_back_as_they_are(value):
+    assert decode(encode(value)) == value
+
+
+@given(arrays.arrays(st.sampled_from(["<f8", "<f4", ">i2", "u1", "?", "c8", "U3"]), arrays.array_shapes(min_dims=0)))
+def test_arrays_come_back_as_they_are(array):
+    got = decode(encode([array]))[0]
+    assert got.dtype == array.dtype
+    np.testing.assert_array_equal(got, array)
+
+
+def test_kinds_of_numbers_are_kept():
+    values = [np.float32(1.5), np.int64(7), np.bool_(True), 2 + 3j]
+    got = decode(encode(values))
+    assert got == values
+    assert [type(one) for one in got[:3]] == [np.float32, np.int64, np.bool_]
+    assert math.isnan(decode(encode(float("nan"))))
+
+
+class Liar(np.ndarray):
+    """Claims to be equal to everything."""
+
+    def __eq__(self, other):
+        return np.ones(self.shape, dtype=bool)
+
+
+class State(IntEnum):
+    """A number with a name."""
+
+    FREE = 0
+    STATIC = 1
+
+
+def test_numbers_with_names_pass_as_numbers():
+    got = decode(encode([State.STATIC]))[0]
+    assert got == 1
+    assert type(got) is int
+
+
+def test_what_numpy_takes_for_an_array_passes_as_one():
+    strided = np.arange(12.0).reshape(3, 4)[:, ::2]
+    got = decode(encode([strided, np.ma.array([1, 2], mask=[0, 1]), np.ones(2).view(Liar), range(3)]))
+    np.testing.assert_array_equal(got[0], strided)
+    assert [type(one) for one in got] == [np.ndarray] * 4
+
+
+def test_ragged_arrays_and_subclasses_of_dict_pass():
+    ragged = np.array([[1, 2], [3]], dtype=object)
+    assert decode(encode(ragged)).tolist() == [[1, 2], [3]]
+    assert decode(encode(OrderedDict(a=1))) == {"a": 1}
+
+
+def test_records_of_the_package_pass():
+    spec, factor = GridSpec(0, 4, -1, 1, 0.5), Factor(("a", "b"), [[1.0, 2], [3, 4]])
+    frame = sample_drive()[0]
+    got_spec, got_factor, got_frame = decode(encode([spec, factor, frame]))
+    assert got_spec == spec
+    assert got_factor.names == factor.names
+    np.testing.assert_array_equal(got_factor.table, factor.table)
+    np.testing.assert_array_equal(got_frame.points, frame.points)
+    np.testing.assert_array_equal(got_frame.camera.K, frame.camera.K)
+
+
+def test_functions_pass_as_numbers():
+    functions = []
+    data = encode({"f": abs, "g": [len]}, functions)
+    assert functions == [abs, len]
+    assert decode(data, functions.__getitem__) == {"f": abs, "g": [len]}
+
+
+@pytest.mark.parametrize("value", [object(), abs, (n for n in "ab"), np.array(["2026-01-01"], "M8[D]"), b"text"])
+def test_anything_else_is_refused(value):
+    with pytest.raises(NotPlainError):
+        encode([value])
+
+
+class Pickled:
+    """Would run code if anything unpickled it."""
+
+    def __reduce__(self):
+        return print, ("run",)
+
+
+def test_an_object_in_an_array_is_not_pickled():
+    with pytest.raises(NotPlainError):
+        encode(np.array([Pickled()], dtype=object))
+
+
+def message(value, described=(), data=b""):
+    return json.dumps({"value": value, "arrays": list(described)}).encode() + b"\n" + data
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"\x80\x04K\x01.",
+        b"[1",
+        message({"record": "os.system", "fields": ["ls"]}),
+        message({"record": "semgrid_edu.frame.Frame", "fields": []}),
+        message({"array": 0}),
+        message({"eval": "1"}),
+        message({"dict": [[[1], 2]]}),
+        message({"array": 0}, [["<f8", [2]]], b"short"),
+        message({"array": 0}, [["O", [1]]], b"12345678"),
+        message({"array": 0}, [["<f8", [-1]]], b"12345678"),
+        message({"array": 0}, [["<f8", [10**30]]], b"12345678"),
+        message({"array": 0}, [["V9", [1]]], b"123456789"),
+        b'{"value": ' + b"[" * 100_000,
+    ],
+)
+def test_bytes_of_another_kind_are_refused(data):
+    with pytest.raises(ArgumentError, match="data"):
+        decode(data)
