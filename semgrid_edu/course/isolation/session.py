@@ -158,6 +158,7 @@ class Session:
         cells, self.cells = self.cells, []
         for code in cells:
             self.run(code)
+        self.begin()
 
     def stop(self) -> None:
         """End the process."""

@@ -15,7 +15,7 @@ import numpy as np
 from nbformat import NotebookNode
 from nbformat.v4 import new_output
 
-from semgrid_edu.course.isolation.session import Session
+from semgrid_edu.course.isolation.session import AnswerEndedError, AnswerTimeoutError, Session
 
 INSTRUCTOR = "semgrid_instructor"
 """The instructor's module, with the hidden tests; their lines aren't shown."""
@@ -61,7 +61,10 @@ class Tests:
         file = f"<{name}>"
         linecache.cache[file] = len(source), None, source.splitlines(keepends=True), file
         code = compile(source, file, "exec")
-        names = self.names | self._answers(_global_names(code))
+        try:
+            names = self.names | self._answers(_global_names(code))
+        except (AnswerEndedError, AnswerTimeoutError) as error:
+            return [_as_output(error, file)]
         import_module(INSTRUCTOR).choose_variant(*self.variant)
         self.seen.printed = ""
         for session in (self.seen, self.unseen):
@@ -72,6 +75,7 @@ class Tests:
 
     def _answers(self, names: set[str]) -> dict[str, Any]:
         """Return what names that the grader doesn't know stand for in the student's notebook."""
+        self.seen.begin()
         wanted = sorted(names - self.names.keys() - vars(builtins).keys())
         return self.seen.names(wanted, self.unseen)
 

@@ -65,7 +65,7 @@ def test_an_error_of_a_function_that_is_given_reaches_the_answer(answer):
         ("return object()", TypeError, "a object where numbers"),
         ("return (n for n in 'ab')", TypeError, "a generator where numbers"),
         ("return f()", RecursionError, "recursion"),
-        ("return bytearray(10**10)", MemoryError, "^$"),
+        ("return bytearray(10**10)", MemoryError, "bytearray"),
     ],
 )
 def test_errors_come_back_as_what_they_are(answer, code, kind, says):

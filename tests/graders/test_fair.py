@@ -1,0 +1,178 @@
+"""What runs in the student's own JupyterLab keeps its points; a task that doesn't run costs its own points alone."""
+
+import copy
+
+import pytest
+from class_of import NAME, REFERENCE, cell_of, graded, handed_in, inside
+from nbformat.v4 import new_code_cell
+from nbgrader.api import Gradebook
+
+from semgrid_edu.course.exercises import build_course, course_api
+from semgrid_edu.course.grading import place
+
+
+@pytest.fixture(scope="module")
+def course(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("course")
+    build_course(folder)
+    return folder
+
+
+NOISE = {
+    "tqdm": "from tqdm import tqdm; list(tqdm(range(3)))",
+    "logging": "import logging; logging.warning('far')",
+    "stderr": "import sys; print('far', file=sys.stderr)",
+    "warnings": "import warnings; warnings.simplefilter('always'); warnings.warn('far')",
+    "numpy-prints": "np.seterr(all='print'); np.array([1.0]) / 0",
+    "font": "import matplotlib.pyplot as plt; plt.title('a', family='no such font'); plt.show()",
+    "output": "print('x' * 100_000)",
+}
+
+
+@pytest.mark.parametrize("kind", NOISE)
+def test_what_is_said_beside_costs_nothing(course, kind):
+    assert graded(course, kind, handed_in(inside("locate", NOISE[kind]))).score == 13
+
+
+def twin(cell):
+    return new_code_cell(cell.source, metadata=copy.deepcopy(cell.metadata))
+
+
+def split(notebook):
+    k = cell_of(notebook, "transition")
+    first, second = notebook.cells[k].source.split("\n\n\n")
+    notebook.cells.insert(k + 1, twin(notebook.cells[k]))
+    notebook.cells[k].source, notebook.cells[k + 1].source = first, second
+
+
+def duplicate(notebook):
+    k = cell_of(notebook, "follow")
+    notebook.cells.insert(k, twin(notebook.cells[k]))
+
+
+def delete_setup(notebook):
+    del notebook.cells[cell_of(notebook, "setup")]
+
+
+def import_in_setup(notebook):
+    notebook.cells[cell_of(notebook, "setup")].source += "\nfrom math import log as natural"
+    cell = notebook.cells[cell_of(notebook, "transition")]
+    cell.source = cell.source.replace("np.log(2)", "natural(2)")
+
+
+def delete_a_test(notebook):
+    del notebook.cells[cell_of(notebook, "predict-wall-test")]
+
+
+def change_a_test(notebook):
+    notebook.cells[cell_of(notebook, "predict-test")].source = "pass"
+
+
+def scratch(notebook):
+    code = "before = got = belief = slips = moved = 'mine'\ndef explain(*_): raise ValueError"
+    notebook.cells.insert(cell_of(notebook, "locate-test") + 1, new_code_cell(code))
+
+
+def forget_everything_nbgrader_wrote(notebook):
+    for cell in notebook.cells:
+        if cell.metadata.get("nbgrader", {}).get("grade_id") == "locate":
+            cell.metadata.nbgrader.update(points="many", grade="?", schema_version=1)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        split,
+        duplicate,
+        delete_setup,
+        import_in_setup,
+        delete_a_test,
+        change_a_test,
+        scratch,
+        forget_everything_nbgrader_wrote,
+    ],
+)
+def test_a_changed_notebook_keeps_its_points(course, change):
+    notebook = handed_in()
+    change(notebook)
+    assert graded(course, change.__name__, notebook).score == 13
+
+
+def test_helpers_may_have_any_name(course):
+    names = ["weights", "read", "loss", "gradient", "field", "before", "got", "slips", "moved", "row", "before", "test"]
+    helpers = "\n".join(f"def {name}(x): return x" for name in names)
+    uses = "x = " + "(".join(names) + "(1" + ")" * len(names)
+    answers = {name: f"{helpers}\n{code}\n{uses}" for name, code in inside("follow", uses).items()}
+    assert graded(course, "helpers", handed_in(answers)).score == 13
+
+
+def test_lists_are_as_good_as_arrays(course):
+    as_lists = "\n\ndef as_lists(f):\n    return lambda *a, **k: np.asarray(f(*a, **k)).tolist()\n"
+    functions = {
+        "locate": "locate",
+        "predict": "predict",
+        "follow": "follow",
+        "transition": "transition",
+        "fuse": "fuse",
+    }
+    answers = {n: f"{code}{as_lists}\n{functions[n]} = as_lists({functions[n]})" for n, code in REFERENCE.items()}
+    assert graded(course, "lists", handed_in(answers)).score == 13
+
+
+ENDS = {
+    "exit": "exit()",
+    "quit": "quit()",
+    "os-exit": "import os; os._exit(0)",
+    "crash": "import ctypes; ctypes.string_at(0)",
+    "swallows": "\n    while True:\n        try:\n            while True: pass\n        except BaseException: pass",
+    "memory": "bytearray(10**11)",
+    "recursion": "return predict(belief, moved)",
+}
+
+
+@pytest.mark.parametrize("kind", ENDS)
+def test_a_task_that_ends_python_costs_its_own_points(course, kind):
+    result = graded(course, kind, handed_in(inside("predict", ENDS[kind])))
+    assert result.score == 10
+    if kind in ("os-exit", "crash", "swallows"):
+        assert result.note.startswith("Crashed: ")
+
+
+def test_a_cell_that_ends_python_costs_its_own_points(course):
+    answers = REFERENCE | {"predict": "import os\nos._exit(0)"}
+    result = graded(course, "cell-exit", handed_in(answers))
+    assert result.score == 10
+    assert "Python itself ended here" in result.note
+
+
+def test_a_deleted_task_costs_its_own_points(course):
+    notebook = handed_in()
+    for name in ("predict", "predict-test", "predict-wall-test"):
+        del notebook.cells[cell_of(notebook, name)]
+    assert graded(course, "deleted", notebook).score == 10
+
+
+def test_who_crashed_gets_feedback_and_the_written_answer_is_read(course):
+    answers = dict.fromkeys(REFERENCE, "import os\nos._exit(0)") | {"parked": "It stays occupied."}
+    result = graded(course, "all-crash", handed_in(answers))
+    assert (result.score, result.to_read) == (0, 1)
+    with course_api(course) as api:
+        assert api.generate_feedback(NAME, "all-crash")["success"]
+    page = place(course, "feedback", "all-crash", NAME).with_suffix(".html").read_text()
+    assert "Python itself ended here" in page
+    with Gradebook(f"sqlite:///{course / 'gradebook.db'}") as gradebook:
+        comments = gradebook.find_submission_notebook(NAME, NAME, "all-crash").comments
+        said = {comment.name: comment.auto_comment for comment in comments}
+    assert said["locate"].startswith("Crashed: ")
+
+
+@pytest.mark.parametrize("content", ['{"cells": [', "", "[]", '{"cells": 3, "metadata": {}, "nbformat": 4}'])
+def test_a_file_that_is_no_notebook_says_so(course, content):
+    result = graded(course, f"broken-{len(content)}", content)
+    assert (result.score, result.points) == (0, 15)
+    assert result.note.startswith("Crashed: the file can't be graded")
+
+
+def test_who_did_nothing_did_not_crash(course):
+    result = graded(course, "nothing", handed_in({}))
+    assert (result.score, result.note) == (0, "")

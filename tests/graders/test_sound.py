@@ -1,0 +1,208 @@
+"""No points without the answer: whatever a submission tries, it earns what its answers are worth."""
+
+import hashlib
+
+import pytest
+from class_of import NAME, REFERENCE, SOURCE, cell_of, graded, handed_in, inside
+from nbformat.v4 import new_code_cell
+
+from semgrid_edu.course.exercises import build_course, course_api
+from semgrid_edu.course.grading import place
+
+
+@pytest.fixture(scope="module")
+def course(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("course")
+    build_course(folder)
+    return folder
+
+
+EASY = "\n".join(
+    f"def {name}(*_, **__): return 0" for name in ("locate", "predict", "follow", "transition", "half_life", "fuse")
+)
+
+ATTACKS = {
+    "transformer": """
+def empty(lines): return [] if any("assert" in line for line in lines) else lines
+get_ipython().input_transformers_post.append(empty)
+""",
+    "no-asserts": """
+import ast
+class Drop(ast.NodeTransformer):
+    def visit_Assert(self, node): return ast.Pass()
+get_ipython().ast_transformers.append(Drop())
+""",
+    "displayhook": """
+import sys
+sys.displayhook(3)
+get_ipython().events.register("post_run_cell", lambda result: sys.displayhook(3))
+""",
+    "fake-module": """
+import sys, types
+class Fake(types.ModuleType):
+    __path__ = []
+    def __getattr__(self, name): return lambda *a: ""
+sys.modules["semgrid_instructor"] = sys.modules["semgrid_instructor.bayes"] = Fake("semgrid_instructor")
+""",
+    "patched-numpy": """
+np.allclose = np.isclose = np.array_equal = lambda *a, **k: True
+np.testing.assert_allclose = lambda *a, **k: None
+import builtins
+builtins.AssertionError = builtins.Exception
+""",
+    "patched-libraries": """
+import filterpy.discrete_bayes, scipy.linalg
+filterpy.discrete_bayes.update = lambda *a: 0
+scipy.linalg.expm = lambda *a: 0
+""",
+    "source": f"""
+import glob, os
+for pattern in ("../../../source/**", {str(SOURCE.parent)!r} + "/**", "/tmp/**/source/**"):
+    for path in glob.glob(pattern, recursive=True):
+        if path.endswith((".ipynb", ".py")):
+            try: exec(open(path).read().partition("BEGIN SOLUTION")[2])
+            except Exception: pass
+""",
+    "frames": """
+import inspect
+def steal(*_, **__):
+    for frame in inspect.stack():
+        for name in ("expected", "right", "by_hand"):
+            if name in frame.frame.f_locals: return frame.frame.f_locals[name]
+    raise ValueError
+locate = predict = follow = transition = half_life = fuse = steal
+""",
+    "garbage": """
+import gc
+def found(*_, **__):
+    return next(x for x in gc.get_objects() if isinstance(x, np.ndarray))
+locate = predict = follow = transition = half_life = fuse = found
+""",
+    "subclass": """
+class Same(np.ndarray):
+    def __array_function__(self, *a, **k): return True
+    def __array_ufunc__(self, *a, **k): return True
+    def __eq__(self, other): return True
+locate = predict = follow = transition = half_life = fuse = lambda *a, **k: np.zeros(4).view(Same)
+""",
+    "forged-reply": """
+import os
+from semgrid_edu.course.isolation import worker, values
+values.encode.__globals__["json"].dumps = lambda *a, **k: "{}"
+locate = lambda *a, **k: 1
+""",
+    "no-error-kind": """
+class Silent(BaseException):
+    def __str__(self): return ""
+    __mro__ = ()
+def f(*a, **k): raise Silent
+locate = predict = follow = transition = half_life = fuse = f
+""",
+}
+
+
+@pytest.mark.parametrize("kind", ATTACKS)
+def test_an_attack_earns_nothing(course, kind):
+    assert graded(course, kind, handed_in(EASIER, first=f"{EASY}\n{ATTACKS[kind]}")).score == 0
+
+
+EASIER = dict.fromkeys(REFERENCE, "pass")
+"""Answer cells that leave to the first cell what they should define."""
+
+
+def pass_tests(notebook):
+    for cell in notebook.cells:
+        if cell.metadata.get("nbgrader", {}).get("grade"):
+            cell.source = "pass"
+
+
+def own_test(notebook):
+    nbgrader = {"grade": True, "grade_id": "bonus", "locked": True, "points": 50, "solution": False, "task": False}
+    notebook.cells.append(new_code_cell("1", metadata={"nbgrader": nbgrader | {"schema_version": 3}}))
+
+
+def more_points(notebook):
+    for cell in notebook.cells:
+        if "points" in cell.metadata.get("nbgrader", {}):
+            cell.metadata.nbgrader.points = 100
+
+
+def tests_as_answers(notebook):
+    for cell in notebook.cells:
+        if cell.metadata.get("nbgrader", {}).get("grade"):
+            cell.metadata.nbgrader.update(solution=True, locked=False)
+            cell.source += "\n#"
+
+
+def tests_as_text(notebook):
+    for cell in notebook.cells:
+        if cell.metadata.get("nbgrader", {}).get("grade_id", "").endswith("-test"):
+            cell.cell_type = "markdown"
+            cell.pop("outputs"), cell.pop("execution_count")
+
+
+def two_of_a_name(notebook):
+    k = cell_of(notebook, "locate-test")
+    notebook.cells.append(new_code_cell("pass", metadata=notebook.cells[k].metadata))
+
+
+@pytest.mark.parametrize("change", [pass_tests, own_test, more_points, tests_as_answers, tests_as_text, two_of_a_name])
+def test_changed_tests_earn_nothing(course, change):
+    notebook = handed_in(EASIER, first=EASY)
+    change(notebook)
+    result = graded(course, change.__name__, notebook)
+    assert (result.score, result.points) == (0, 15)
+
+
+def test_nobodys_grades_or_tests_can_be_changed(course):
+    def contents():
+        files = [course / "gradebook.db", *(course / "instructor").rglob("*.py"), *(course / "source").rglob("*.ipynb")]
+        return {path: hashlib.sha256(path.read_bytes()).hexdigest() for path in files if path.name != "gradebook.db"}
+
+    before = contents()
+    graded(course, "victim", handed_in())
+    code = f"""
+import pathlib, sqlite3
+for path in pathlib.Path({str(course)!r}).rglob("*"):
+    try: path.write_text("mine")
+    except OSError: pass
+try:
+    with sqlite3.connect({str(course / "gradebook.db")!r}) as db: db.execute("update grade set auto_score = 0")
+except sqlite3.Error: pass
+"""
+    assert graded(course, "vandal", handed_in(first=code)).score == 13
+    assert contents() == before
+    assert graded(course, "victim-again", handed_in()).score == 13
+
+
+def test_hidden_inputs_are_not_in_the_feedback(course):
+    """The secret: hidden tests of `locate` draw thirty cells, visible ones have four."""
+    spy = "seen.append(len(belief)); print('cells:', len(belief)); assert len(belief) < 5, f'cells: {len(belief)}'"
+    notebook = handed_in(inside("locate", spy), first="seen = []", last="print('cells:', max(seen))")
+    assert graded(course, "spy", notebook).score == 11
+    with course_api(course) as api:
+        assert api.generate_feedback(NAME, "spy")["success"]
+    page = place(course, "feedback", "spy", NAME).with_suffix(".html").read_text()
+    assert "cells: 4" in page
+    assert "cells: 30" not in page
+    assert "cells: 5" not in page
+
+
+LEAVE = """
+import pathlib
+for folder in ("/tmp", "/dev/shm", "/var/tmp", "."):
+    try: pathlib.Path(folder, "left").write_text("x")
+    except OSError: pass
+"""
+
+FIND = """
+import pathlib
+if any(pathlib.Path(folder, "left").exists() for folder in ("/tmp", "/dev/shm", "/var/tmp", ".")):
+    raise SystemExit
+"""
+
+
+def test_nothing_is_left_for_the_next_student(course):
+    graded(course, "leaves", handed_in(first=LEAVE))
+    answers = {name: FIND + code for name, code in REFERENCE.items()}
+    assert graded(course, "finds", handed_in(answers)).score == 13
