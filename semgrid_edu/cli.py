@@ -9,7 +9,7 @@ import typer
 from typer.core import TyperCommand
 
 from semgrid_edu.arguments import check_arguments, tell
-from semgrid_edu.course.commands import course
+from semgrid_edu.course_commands import course
 from semgrid_edu.data_commands import data
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.experiments.commands import keep_result, reproduce

@@ -1,9 +1,11 @@
 """Exercises from one source: the students' notebook, and a complete nbgrader course for an instructor."""
 
+import hashlib
 import logging
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
@@ -19,9 +21,10 @@ from nbgrader.preprocessors import (
 )
 from traitlets.config import PyFileConfigLoader
 
-from semgrid_edu.course.notebooks import NOTEBOOKS, built_path, read_percent, write_notebook
+from semgrid_edu.course.notebooks import NOTEBOOKS, built_path, notebook_text, read_percent, write_notebook
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import write_json, write_text
+from semgrid_edu.storage.reading import read_json
 
 RELEASE_STEPS = (LockCells, ClearSolutions, ClearOutput, ClearHiddenTests, ComputeChecksums, CheckCellMetadata)
 """What nbgrader's generate_assignment does to a notebook, without its gradebook."""
@@ -83,10 +86,27 @@ def build_exercise(source: Path) -> Path:
     return target
 
 
-def build_course(directory: str | Path, folder: Path = NOTEBOOKS) -> list[str]:
+@dataclass(frozen=True)
+class BuiltCourse:
+    """What `build_course` has laid out.
+
+    Parameters
+    ----------
+    assignments : list of str
+        Names of the assignments.
+    kept : list of str
+        Files that the instructor changed, and that therefore stay as they are though this version has others.
+    """
+
+    assignments: list[str]
+    kept: list[str]
+
+
+def build_course(directory: str | Path, folder: Path = NOTEBOOKS) -> BuiltCourse:
     """Write a complete nbgrader course: sources, settings, the instructor's module, gradebook and released versions.
 
-    When it is run again, it brings sources and settings up to date, and leaves submissions and grades as they are.
+    When it is run again, it brings up to date what the instructor hasn't changed, and leaves all else, submissions and
+    grades as they are.
 
     Parameters
     ----------
@@ -97,26 +117,58 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS) -> list[str]:
 
     Returns
     -------
-    list of str
-        Names of the assignments.
+    BuiltCourse
+        What it holds.
 
     Raises
     ------
     DataError
-        When the folder holds something else, or nbgrader can't release an exercise.
+        When the folder holds something else, there are no exercises, or nbgrader can't release one.
     """
     directory = Path(directory).resolve()
     _refuse_what_is_not_ours(directory)
     sources = exercise_sources(folder)
+    if not sources:
+        raise DataError(folder / "src" / "exercises", "the sources of the exercises", "none")
     names = [source.stem for source in sources]
-    write_json(directory / MARKER, {"written by": f"semgrid_edu {version('semgrid_edu')}", "assignments": names})
-    _copy_instructors_part(folder / "instructor", directory)
-    for source in sources:
-        write_notebook(read_percent(source), directory / "source" / source.stem / f"{source.stem}.ipynb")
+    written, kept = _write_what_is_not_changed(directory, _course_files(folder, sources))
+    about = {"written by": f"semgrid_edu {version('semgrid_edu')}", "assignments": names, "files": written}
+    write_json(directory / MARKER, about)
     with course_api(directory) as api:
         for name in names:
             _released(api.generate_assignment(name), directory / "source" / name)
-    return names
+    return BuiltCourse(names, kept)
+
+
+def _course_files(folder: Path, sources: list[Path]) -> dict[str, str]:
+    """Return the text of each file of a course, by its path in it."""
+    instructor = folder / "instructor"
+    files = {name: instructor / name for name in ("nbgrader_config.py", "README.md")}
+    files |= {f"instructor/{path.relative_to(instructor).as_posix()}": path for path in instructor.glob("*/*.py")}
+    texts = {name: path.read_text(encoding="utf-8") for name, path in files.items()}
+    return texts | {f"source/{s.stem}/{s.stem}.ipynb": notebook_text(read_percent(s)) for s in sources}
+
+
+def _write_what_is_not_changed(directory: Path, texts: dict[str, str]) -> tuple[dict[str, str], list[str]]:
+    """Write files, but not over one that isn't as it was written before; return all digests, and what was kept."""
+    marker = directory / MARKER
+    before = read_json(marker).get("files", {}) if marker.exists() else {}
+    digests, kept = {}, []
+    for name, text in texts.items():
+        path = directory / name
+        now = _digest(path.read_bytes()) if path.exists() else before.get(name)
+        digests[name] = _digest(text.encode())
+        if now in (before.get(name), digests[name]):
+            write_text(path, text)
+        else:
+            kept.append(name)
+            digests[name] = before.get(name, "")
+    return digests, kept
+
+
+def _digest(content: bytes) -> str:
+    """Return a digest of a file."""
+    return hashlib.sha256(content).hexdigest()
 
 
 @contextmanager
@@ -151,15 +203,6 @@ def _refuse_what_is_not_ours(directory: Path) -> None:
         raise DataError(directory, "a folder", "a file")
     if directory.exists() and any(directory.iterdir()) and not (directory / MARKER).is_file():
         raise DataError(directory, f"an empty folder, or a course with its {MARKER}", "a folder with other files")
-
-
-def _copy_instructors_part(source: Path, directory: Path) -> None:
-    """Copy settings, guide and hidden tests."""
-    for name in ("nbgrader_config.py", "README.md"):
-        write_text(directory / name, (source / name).read_text(encoding="utf-8"))
-    module = Path("semgrid_instructor")
-    for path in sorted((source / module).glob("*.py")):
-        write_text(directory / "instructor" / module / path.name, path.read_text(encoding="utf-8"))
 
 
 def _released(result: dict, source: Path) -> None:

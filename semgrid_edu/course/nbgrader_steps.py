@@ -32,7 +32,15 @@ class MakeWhole(NbGraderPreprocessor):
     """
 
     def preprocess(self, nb: NotebookNode, resources: ResourcesDict) -> tuple[NotebookNode, ResourcesDict]:
-        """Repair one notebook; nbgrader's `OverwriteCells` comes after."""
+        """Repair one notebook; nbgrader's `OverwriteCells` comes after.
+
+        Parameters
+        ----------
+        nb : NotebookNode
+            The notebook.
+        resources : ResourcesDict
+            nbgrader's account of it: student, assignment, gradebook.
+        """
         where = resources["nbgrader"]
         with Gradebook(where["db_url"]) as gradebook:
             exercise = gradebook.find_notebook(where["notebook"], where["assignment"])
@@ -105,7 +113,15 @@ class ExecuteApart(NbGraderPreprocessor):
     seed_by_student = Bool(help="Whether each student's hidden tests draw inputs of their own.").tag(config=True)
 
     def preprocess(self, nb: NotebookNode, resources: ResourcesDict) -> tuple[NotebookNode, ResourcesDict]:
-        """Run one notebook."""
+        """Run one notebook.
+
+        Parameters
+        ----------
+        nb : NotebookNode
+            The notebook.
+        resources : ResourcesDict
+            nbgrader's account of it: student, assignment, gradebook.
+        """
         where, course = resources["nbgrader"], Path(self.course)
         use_instructor(course / "instructor")
         prepared = prepare(course, where["assignment"], self._starter(keeps=True))
@@ -127,7 +143,15 @@ class NoteCrashes(NbGraderPreprocessor):
     """Says in the gradebook which answers ended Python or had to be stopped: 0 points alone would say "did nothing"."""
 
     def preprocess(self, nb: NotebookNode, resources: ResourcesDict) -> tuple[NotebookNode, ResourcesDict]:
-        """Write the comments of one notebook."""
+        """Write the comments of one notebook.
+
+        Parameters
+        ----------
+        nb : NotebookNode
+            The notebook.
+        resources : ResourcesDict
+            nbgrader's account of it: student, assignment, gradebook.
+        """
         where, answer = resources["nbgrader"], ""
         with Gradebook(where["db_url"]) as gradebook:
             for cell in nb.cells:

@@ -173,8 +173,19 @@ def write_notebook(notebook: NotebookNode, path: Path) -> None:
     path : Path
         The file to write; its folder is made when missing.
     """
+    write_text(path, notebook_text(notebook))
+
+
+def notebook_text(notebook: NotebookNode) -> str:
+    """Validate a notebook, and return the text of its file.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        The notebook.
+    """
     nbformat.validate(notebook)
-    write_text(path, nbformat.writes(notebook))
+    return nbformat.writes(notebook)
 
 
 def execute(notebook: NotebookNode, folder: Path, timeout: int = 300) -> NotebookNode:

@@ -98,7 +98,7 @@ def test_exercises_with_and_without_numbers(folder, tmp_path):
     sources = exercise_sources(folder)
     assert [source.stem for source in sources] == ["00_tiny", "messages"]
     assert build_exercise(sources[1]) == folder / "exercises" / "messages.ipynb"
-    assert build_course(tmp_path / "course", folder) == ["00_tiny", "messages"]
+    assert build_course(tmp_path / "course", folder).assignments == ["00_tiny", "messages"]
     released = nbformat.read(tmp_path / "course" / "release" / "messages" / "messages.ipynb", as_version=4)
     assert [cell.source for cell in released.cells] == [cell.source for cell in student_version(sources[1]).cells]
 

@@ -3,7 +3,7 @@
 import pytest
 from typer.testing import CliRunner
 
-from semgrid_edu import cli
+from semgrid_edu import cli, course_commands
 from semgrid_edu.errors import ArgumentError
 
 
@@ -20,6 +20,6 @@ def test_unknown_lecture_is_refused():
 
 
 def test_missing_tools_are_named(monkeypatch):
-    monkeypatch.setattr(cli, "find_spec", lambda name: None)
+    monkeypatch.setattr(course_commands, "find_spec", lambda name: None)
     result = CliRunner().invoke(cli.app, ["course", "check"])
     assert "jupytext and nbgrader" in str(result.exception)

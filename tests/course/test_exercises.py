@@ -9,12 +9,10 @@ import pytest
 from tiny_course import tiny_notebooks
 
 from semgrid_edu.course.exercises import build_course, build_exercise, exercise_sources, student_version
-from semgrid_edu.course.grading import autograde, reference_answers, submission
+from semgrid_edu.course.grading import GradeSettings, autograde, autograde_one, place, reference_answers, submission
 from semgrid_edu.course.notebooks import NOTEBOOKS
 from semgrid_edu.errors import ArgumentError, DataError
-
-# nbgrader 0.9.6 builds a submission outside its database session and lets sqlalchemy complain about it
-pytestmark = pytest.mark.filterwarnings("ignore:Object of type <Submitted:sqlalchemy.exc.SAWarning")
+from semgrid_edu.storage.files import write_text
 
 
 @pytest.fixture(scope="module")
@@ -93,8 +91,6 @@ def test_feedback_tells_nothing_of_the_hidden_inputs(course, source):
     assert "98765" not in graded
 
 
-# the cell that nbgrader 0.9.6 puts back has no id
-@pytest.mark.filterwarnings("ignore:Cell is missing an id field:nbformat.warnings.MissingIDFieldWarning")
 def test_tests_that_a_student_deletes_or_edits_come_back(course, source):
     deleted, edited = (submission(source, {"twice": "def twice(x):\n    return 0"}) for _ in range(2))
     deleted.cells = [c for c in deleted.cells if c.metadata.get("nbgrader", {}).get("grade_id") != "twice-test"]
@@ -106,10 +102,11 @@ def test_tests_that_a_student_deletes_or_edits_come_back(course, source):
     assert "twice 3 is 6, got 0" in scores["deleter"]["twice-test"].message
 
 
-def test_dead_kernel_is_an_error_not_a_zero(course, source):
-    dead = {"twice": "def twice(x):\n    import os\n    os._exit(1)"}
-    with pytest.raises(DataError, match="quitter"):
-        autograde(course, "00_tiny", {"quitter": submission(source, dead)})
+def test_notebook_that_nbgrader_cannot_read_is_an_error_not_a_zero(course):
+    path = place(course, "submitted", "breaker", "00_tiny")
+    write_text(path, "{")
+    with pytest.raises(DataError, match="breaker"):
+        autograde_one(course, "00_tiny", "breaker", GradeSettings())
 
 
 def test_settings_leave_no_trace_in_the_environment(course, source):
@@ -133,6 +130,38 @@ def test_broken_source_is_refused_by_name(tmp_path):
     broken.write_text(broken.read_text().replace('"points": 2, ', ""))
     with pytest.raises(DataError, match="00_tiny"):
         build_course(tmp_path / "course", notebooks)
+
+
+CHANGED = ["nbgrader_config.py", "instructor/semgrid_instructor/tiny.py"]
+
+
+def test_what_the_instructor_changed_stays_and_is_named(tmp_path, notebooks):
+    build_course(tmp_path / "course", notebooks)
+    settings, module = (
+        tmp_path / "course" / name for name in ("nbgrader_config.py", "instructor/semgrid_instructor/tiny.py")
+    )
+    mine = settings.read_text() + "c.ExecuteApart.timeout = 99\n"
+    settings.write_text(mine)
+    built = build_course(tmp_path / "course", notebooks)
+    assert built.kept == ["nbgrader_config.py"]
+    assert settings.read_text() == mine
+    original = module.read_text()
+    changed = tiny_notebooks(tmp_path / "newer")
+    newer = changed / "instructor" / "semgrid_instructor" / "tiny.py"
+    newer.write_text(original + "\n# newer\n")
+    assert build_course(tmp_path / "course", changed).kept == ["nbgrader_config.py"]
+    assert module.read_text() == newer.read_text()
+    module.write_text(original)
+    assert build_course(tmp_path / "course", changed).kept == [
+        "nbgrader_config.py",
+        "instructor/semgrid_instructor/tiny.py",
+    ]
+
+
+def test_without_exercises_nothing_is_written(tmp_path):
+    with pytest.raises(DataError, match="sources of the exercises"):
+        build_course(tmp_path / "course", tmp_path / "nothing")
+    assert not (tmp_path / "course").exists()
 
 
 def test_answer_to_no_task_is_refused(source):

@@ -127,14 +127,14 @@ def more_points(notebook):
             cell.metadata.nbgrader.points = 100
 
 
-def tests_as_answers(notebook):
+def answers_for_tests(notebook):
     for cell in notebook.cells:
         if cell.metadata.get("nbgrader", {}).get("grade"):
             cell.metadata.nbgrader.update(solution=True, locked=False)
             cell.source += "\n#"
 
 
-def tests_as_text(notebook):
+def text_for_tests(notebook):
     for cell in notebook.cells:
         if cell.metadata.get("nbgrader", {}).get("grade_id", "").endswith("-test"):
             cell.cell_type = "markdown"
@@ -146,7 +146,9 @@ def two_of_a_name(notebook):
     notebook.cells.append(new_code_cell("pass", metadata=notebook.cells[k].metadata))
 
 
-@pytest.mark.parametrize("change", [pass_tests, own_test, more_points, tests_as_answers, tests_as_text, two_of_a_name])
+@pytest.mark.parametrize(
+    "change", [pass_tests, own_test, more_points, answers_for_tests, text_for_tests, two_of_a_name]
+)
 def test_changed_tests_earn_nothing(course, change):
     notebook = handed_in(EASIER, first=EASY)
     change(notebook)

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable, Mapping
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import nbformat
@@ -26,18 +27,21 @@ PASSED = "the reference passed"
 
 
 def use_instructor(folder: Path) -> None:
-    """Let hidden tests be imported from a course's own folder.
+    """Let test cells import the hidden tests of this course, and of no other.
 
     Parameters
     ----------
     folder : Path
         The folder `instructor` of a course.
     """
-    if str(folder) in sys.path[:1]:
+    place = folder / INSTRUCTOR / "__init__.py"
+    if getattr(sys.modules.get(INSTRUCTOR), "__file__", None) == str(place):
         return
-    sys.path.insert(0, str(folder))
     for name in [name for name in sys.modules if name.partition(".")[0] == INSTRUCTOR]:
         del sys.modules[name]
+    spec = spec_from_file_location(INSTRUCTOR, place)
+    sys.modules[INSTRUCTOR] = module_from_spec(spec)
+    spec.loader.exec_module(sys.modules[INSTRUCTOR])
 
 
 def prepare(course: Path, assignment: str, start: Callable[[Path], StudentProcess]) -> Path:

@@ -74,7 +74,13 @@ class Session:
         return reply
 
     def run_later(self, code: str) -> None:
-        """Run a cell when a function is called, and not at all when none is."""
+        """Run a cell when a function is called, and not at all when none is.
+
+        Parameters
+        ----------
+        code : str
+            The cell.
+        """
         self.waiting.append(code)
 
     def names(self, wanted: list[str], unseen: "Session") -> dict[str, Any]:
@@ -190,11 +196,11 @@ class RemoteFunction:
         self.unseen = RemoteFunction(unseen, name) if unseen else self
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
-        """Call the function; see `Session.call`."""
+        """Call the function; parameters and result are those of `Session.call`."""
         return self.session.call(self.__name__, arguments, named, measured=False)[0]
 
     def peak_megabytes(self, *arguments: Any) -> tuple[Any, float]:
-        """Call the function, and return its result and how much memory it held; see `Session.call`."""
+        """Call the function, and return its result and how much memory it held. Parameters are those of `call`."""
         return self.session.call(self.__name__, arguments, {}, measured=True)
 
 

@@ -40,7 +40,13 @@ class Tests:
         self.names: dict[str, Any] = {"__name__": "__main__"}
 
     def prepare(self, source: str) -> None:
-        """Run one of the instructor's cells that isn't a test, for what it imports and defines."""
+        """Run one of the instructor's cells that isn't a test, for what it imports and defines.
+
+        Parameters
+        ----------
+        source : str
+            The cell.
+        """
         _run(compile(source, "<prepared>", "exec"), self.names)
 
     def test(self, source: str, name: str) -> list[NotebookNode]:

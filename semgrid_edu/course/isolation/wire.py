@@ -19,7 +19,13 @@ class Wire:
         self.incoming, self.outgoing = incoming, outgoing
 
     def send(self, message: bytes) -> None:
-        """Send a message."""
+        """Send a message.
+
+        Parameters
+        ----------
+        message : bytes
+            The message.
+        """
         self.outgoing.write(len(message).to_bytes(8, "big") + message)
         self.outgoing.flush()
 

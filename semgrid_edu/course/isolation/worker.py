@@ -30,7 +30,13 @@ class Shell(InteractiveShell):
     """Runs cells as a notebook's kernel does, without a screen."""
 
     def enable_gui(self, gui: str | None = None) -> None:
-        """Take no notice of a magic that asks for a screen."""
+        """Take no notice of a magic that asks for a screen.
+
+        Parameters
+        ----------
+        gui : str, optional
+            The screen.
+        """
 
     def ask_exit(self) -> None:
         """End the cell or call that says `exit()`."""
@@ -66,11 +72,25 @@ class Worker:
             self.wire.send(reply)
 
     def limit(self, limits: dict, folder: str) -> dict:
-        """Set limits; tell which are set."""
+        """Set limits; tell which are set.
+
+        Parameters
+        ----------
+        limits : dict
+            The fields of `Limits`.
+        folder : str
+            The only folder to which the student's code may write.
+        """
         return {"done": limit_this_process(Limits(**limits), Path(folder))}
 
     def run(self, code: str) -> dict:
-        """Run a cell; tell what it put out and the error that ended it."""
+        """Run a cell; tell what it put out and the error that ended it.
+
+        Parameters
+        ----------
+        code : str
+            The cell.
+        """
         self.traceback.clear()
         with capture_output() as captured:
             result = self.shell.run_cell(code)
@@ -81,13 +101,31 @@ class Worker:
         return found
 
     def names(self, wanted: list[str]) -> dict:
-        """Tell which of these names are functions, and what the others are."""
+        """Tell which of these names are functions, and what the others are.
+
+        Parameters
+        ----------
+        wanted : list of str
+            The names.
+        """
         known = {name: self.shell.user_ns[name] for name in wanted if name in self.shell.user_ns}
         functions = [name for name, value in known.items() if callable(value)]
         return {"functions": functions, "values": {n: v for n, v in known.items() if n not in functions and _passes(v)}}
 
     def call(self, name: str, arguments: tuple, named: dict, measured: bool, sent: bytes) -> dict:
-        """Call a function; tell its result or error, what it printed, and what it changed in its arguments."""
+        """Call a function; tell its result or error, what it printed, and what it changed in its arguments.
+
+        Parameters
+        ----------
+        name : str
+            The function.
+        arguments, named : tuple, dict
+            What it is called with.
+        measured : bool
+            Whether its memory is measured.
+        sent : bytes
+            The message in which the arguments came.
+        """
         reply: dict[str, Any] = {}
         with capture_output(display=False) as captured:
             try:
@@ -154,7 +192,7 @@ def _told(error: BaseException) -> dict[str, Any]:
     return {"kind": kind, "standard": kinds[0], "says": str(error)[:MOST_TEXT], "line": line[:200]}
 
 
-def main() -> None:
+def _main() -> None:
     """Speak over standard input and output, which the student's code doesn't get."""
     wire = Wire(os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb"))
     nothing = os.open(os.devnull, os.O_RDWR)
@@ -165,4 +203,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    _main()

@@ -63,8 +63,11 @@ def build(folder: Annotated[Path, typer.Argument(help="A missing or empty folder
     """Lay out a complete nbgrader course for an instructor."""
     from semgrid_edu.course.exercises import build_course
 
-    assignments = build_course(folder)
-    typer.echo(f"{folder}: {len(assignments)} assignments, {', '.join(assignments)}; read {folder / 'README.md'}")
+    built = build_course(folder)
+    names = built.assignments
+    typer.echo(f"{folder}: {len(names)} assignments, {', '.join(names)}; read {folder / 'README.md'}")
+    for name in built.kept:
+        typer.echo(f"you changed {name}, so it stays; this version of semgrid_edu has another one", err=True)
 
 
 @course.command()
