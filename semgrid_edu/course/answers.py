@@ -40,3 +40,28 @@ def answer_array(result: Any, name: str = "it", dtype: type = float) -> NDArray:
         kind = type(result).__name__
     hint = ": are its rows equally long?" if isinstance(result, list | tuple) else ""
     raise AssertionError(f"{name} returned no array of numbers but a {kind} that holds something else{hint}")
+
+
+def answer_number(result: Any, name: str = "it") -> float:
+    """Return the result of an answer as one number, or say in a sentence why it is none.
+
+    Parameters
+    ----------
+    result : Any
+        What the answer returned: a number, or one number in an array or a list.
+    name : str
+        The subject of the sentence, as in `answer_array`.
+
+    Returns
+    -------
+    float
+        The number.
+
+    Raises
+    ------
+    AssertionError
+        When the result is None, no number, or more than one.
+    """
+    numbers = answer_array(result, name)
+    assert numbers.size == 1, f"{name} returned {numbers.size} numbers instead of one"
+    return numbers.item()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from semgrid_edu.course.answers import answer_array
+from semgrid_edu.course.answers import answer_array, answer_number
 
 
 @pytest.mark.parametrize(
@@ -33,3 +33,21 @@ def test_array_is_a_new_one():
 def test_anything_else_gets_a_sentence(result, sentence):
     with pytest.raises(AssertionError, match=sentence):
         answer_array(result, "locate")
+
+
+@pytest.mark.parametrize("result", [2, 2.0, np.float32(2), np.array(2.0), [2.0], np.array([[2]])])
+def test_one_number_in_any_wrapping_is_a_number(result):
+    assert answer_number(result) == 2.0
+
+
+@pytest.mark.parametrize(
+    ("result", "sentence"),
+    [
+        (None, "^reach returned nothing"),
+        ([1, 2], r"^reach returned 2 numbers instead of one$"),
+        ("far", "^reach returned no array of numbers but a str"),
+    ],
+)
+def test_what_is_not_one_number_gets_a_sentence(result, sentence):
+    with pytest.raises(AssertionError, match=sentence):
+        answer_number(result, "reach")
