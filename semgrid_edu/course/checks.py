@@ -22,7 +22,7 @@ from semgrid_edu.course.rules import RULES, Rule
 MAX_LINES = 25
 """Most lines of a code cell, so that a student can take it in at once."""
 
-MAX_TEST_LINES = 31
+MAX_TEST_LINES = 32
 """Most lines of an exercise's test cell: its function, and a hint for each of many mistakes."""
 
 MAX_BYTES = 2_000_000
