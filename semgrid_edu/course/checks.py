@@ -5,6 +5,7 @@ from pathlib import Path
 
 import nbformat
 from nbformat import NotebookNode
+from nbgrader.utils import is_grade
 
 from semgrid_edu.course.exceptions import EXCEPTIONS, rule_problems
 from semgrid_edu.course.exercises import exercise_sources, student_version
@@ -20,6 +21,9 @@ from semgrid_edu.course.rules import RULES, Rule
 
 MAX_LINES = 25
 """Most lines of a code cell, so that a student can take it in at once."""
+
+MAX_TEST_LINES = 32
+"""Most lines of an exercise's test cell: its function, and a hint for each of many mistakes."""
 
 MAX_BYTES = 2_000_000
 """Largest size of a lecture or companion, bytes: it has room for figures and one or two animations."""
@@ -158,19 +162,20 @@ def text_problems(notebook: NotebookNode, folder: Path) -> list[str]:
     Returns
     -------
     list of str
-        One sentence per problem, with the first line of the cell.
+        One sentence per problem, with the exercise's name for the cell, or else the cell's first line.
     """
     problems = []
     for cell in notebook.cells:
-        first = cell.source.strip().split("\n")[0][:60]
+        name = cell.metadata.get("nbgrader", {}).get("grade_id") or cell.source.strip().split("\n")[0][:60]
         lines = len(cell.source.splitlines())
-        if cell.cell_type == "code" and lines > MAX_LINES:
-            problems.append(f"cell '{first}' has {lines} lines, more than {MAX_LINES}")
+        most = MAX_TEST_LINES if is_grade(cell) else MAX_LINES
+        if cell.cell_type == "code" and lines > most:
+            problems.append(f"cell '{name}' has {lines} lines, more than {most}")
         for found in MACHINE.findall(cell.source + _printed(cell)):
-            problems.append(f"cell '{first}' names a path of one machine: {found}")
+            problems.append(f"cell '{name}' names a path of one machine: {found}")
         for target in LINK.findall(_shown(cell)):
             if not (folder / target).exists():
-                problems.append(f"cell '{first}' links to {target}, which does not exist")
+                problems.append(f"cell '{name}' links to {target}, which does not exist")
     return problems
 
 

@@ -50,10 +50,26 @@ def locate(belief, says_pole, poles, hit, false_alarm):
     log = np.log(belief) + np.log(p if says_pole else 1 - p)
     return np.exp(log - np.logaddexp.reduce(log))""",
         ),
+        right(
+            "a list, by helpers with ordinary names",
+            task="locate",
+            code="""
+before, got, slips, belief, moved = "mine", None, [], 3, {}
+
+
+def read(cell, poles, hit, false_alarm):
+    return hit if cell in poles else false_alarm
+
+
+def locate(belief, says_pole, poles, hit, false_alarm):
+    p = [read(cell, list(poles), hit, false_alarm) for cell in range(len(belief))]
+    product = [b * (q if says_pole else 1 - q) for b, q in zip(belief, p)]
+    return [q / sum(product) for q in product]""",
+        ),
         mistake(
             "no normalisation",
             task="locate",
-            loses=2,
+            loses=1,
             says="the belief sums to 0.38: divide by the sum",
             code="""
 def locate(belief, says_pole, poles, hit, false_alarm):
@@ -63,7 +79,7 @@ def locate(belief, says_pole, poles, hit, false_alarm):
         mistake(
             "divided by the largest",
             task="locate",
-            loses=2,
+            loses=1,
             says="the belief sums to 1.58",
             code="""
 def locate(belief, says_pole, poles, hit, false_alarm):
@@ -74,7 +90,7 @@ def locate(belief, says_pole, poles, hit, false_alarm):
         mistake(
             "prior forgotten",
             task="locate",
-            loses=2,
+            loses=1,
             says="you forget what was believed before",
             code="""
 def locate(belief, says_pole, poles, hit, false_alarm):
@@ -85,7 +101,7 @@ def locate(belief, says_pole, poles, hit, false_alarm):
         mistake(
             "added instead of multiplied",
             task="locate",
-            loses=2,
+            loses=1,
             says="Bayes' rule multiplies them",
             code="""
 def locate(belief, says_pole, poles, hit, false_alarm):
@@ -96,7 +112,7 @@ def locate(belief, says_pole, poles, hit, false_alarm):
         mistake(
             "hit where there is no pole",
             task="locate",
-            loses=2,
+            loses=1,
             says="`hit` belongs to cells with a pole",
             code="""
 def locate(belief, says_pole, poles, hit, false_alarm):
@@ -140,7 +156,7 @@ def locate(belief, says_pole, poles, hit, false_alarm):
         mistake(
             "argument changed in place",
             task="locate",
-            loses=2,
+            loses=1,
             says="changed its argument `belief`",
             code="""
 def locate(belief, says_pole, poles, hit, false_alarm):
@@ -163,7 +179,7 @@ def locate(belief, says_pole, poles, hit, false_alarm):
         mistake(
             "only the first two poles",
             task="locate",
-            loses=2,
+            loses=1,
             says="on inputs you haven't seen: wrong after a reading",
             code="""
 def locate(belief, says_pole, poles, hit, false_alarm):
@@ -225,7 +241,7 @@ def predict(belief, moved, ring=True):
         mistake(
             "kernel reversed",
             task="predict",
-            loses=3,
+            loses=2,
             says="the kernel is reversed",
             code="""
 def predict(belief, moved, ring=True):
@@ -238,7 +254,7 @@ def predict(belief, moved, ring=True):
         mistake(
             "kernel centred",
             task="predict",
-            loses=3,
+            loses=2,
             says="one cell too short",
             code="""
 def predict(belief, moved, ring=True):
@@ -251,7 +267,7 @@ def predict(belief, moved, ring=True):
         mistake(
             "distances counted from 1",
             task="predict",
-            loses=3,
+            loses=2,
             says="one cell too far",
             code="""
 def predict(belief, moved, ring=True):
@@ -303,7 +319,7 @@ def predict(belief, moved, ring=True):
         mistake(
             "a kernel of three written in",
             task="predict",
-            loses=3,
+            loses=2,
             says="on inputs you haven't seen: probability is lost or made",
             code="""
 def predict(belief, moved, ring=True):
@@ -433,6 +449,19 @@ def follow(belief, likelihoods, M):
         rows.append(prior)
         belief = prior * likelihood / (prior @ likelihood)
     return np.array(rows)""",
+        ),
+        right(
+            "a list of tuples",
+            task="follow",
+            code="""
+def follow(belief, likelihoods, M):
+    rows = []
+    for likelihood in likelihoods.tolist():
+        prior = [sum(b * M[i][j] for i, b in enumerate(belief)) for j in range(len(M))]
+        product = [p * q for p, q in zip(prior, likelihood)]
+        belief = tuple(p / sum(product) for p in product)
+        rows.append(belief)
+    return rows""",
         ),
         mistake(
             "no prediction",

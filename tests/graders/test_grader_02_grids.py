@@ -172,7 +172,7 @@ def update(L, occupied, free, L_min, L_max):
         mistake(
             "sign swapped",
             task="update",
-            loses=3,
+            loses=2,
             says="the sign is swapped: a hit makes a cell more occupied",
             code="""
 def update(L, occupied, free, L_min, L_max):
@@ -181,7 +181,7 @@ def update(L, occupied, free, L_min, L_max):
         mistake(
             "log10",
             task="update",
-            loses=3,
+            loses=2,
             says="that is the logarithm to base 10",
             code="""
 def update(L, occupied, free, L_min, L_max):
@@ -190,7 +190,7 @@ def update(L, occupied, free, L_min, L_max):
         mistake(
             "difference instead of ratio",
             task="update",
-            loses=3,
+            loses=2,
             says="odds are multiplied by their ratio",
             code="""
 def update(L, occupied, free, L_min, L_max):
@@ -199,7 +199,7 @@ def update(L, occupied, free, L_min, L_max):
         mistake(
             "P(z | free) forgotten",
             task="update",
-            loses=3,
+            loses=2,
             says="how likely was that return if the cell is free",
             code="""
 def update(L, occupied, free, L_min, L_max):
@@ -208,7 +208,7 @@ def update(L, occupied, free, L_min, L_max):
         mistake(
             "a likelihood taken for a probability",
             task="update",
-            loses=3,
+            loses=2,
             says="you take P(z | occupied) for P(occupied | z)",
             code="""
 def update(L, occupied, free, L_min, L_max):
@@ -217,7 +217,7 @@ def update(L, occupied, free, L_min, L_max):
         mistake(
             "old belief forgotten",
             task="update",
-            loses=3,
+            loses=2,
             says="the old belief got lost",
             code="""
 def update(L, occupied, free, L_min, L_max):
@@ -226,7 +226,7 @@ def update(L, occupied, free, L_min, L_max):
         mistake(
             "multiplied",
             task="update",
-            loses=3,
+            loses=2,
             says="Bayes' rule is an addition",
             code="""
 def update(L, occupied, free, L_min, L_max):
@@ -245,7 +245,7 @@ def update(L, occupied, free, L_min, L_max):
         mistake(
             "limits in the wrong order",
             task="update",
-            loses=3,
+            loses=2,
             says="clip takes the lower limit first",
             code="""
 def update(L, occupied, free, L_min, L_max):
@@ -290,7 +290,7 @@ def update(L, occupied, free, L_min, L_max):
         mistake(
             "limits written in",
             task="update",
-            loses=3,
+            loses=1,
             says="on inputs you haven't seen: some cells are above L_max",
             code="""
 def update(L, occupied, free, L_min, L_max):
@@ -298,8 +298,36 @@ def update(L, occupied, free, L_min, L_max):
         ),
         # ---- task 3
         right(
-            "a recursion, one scan after the other",
+            "one scan after the other, by helpers with ordinary names, and lists",
             task="fuse",
+            code="""
+spec, before, passed, hit = "mine", None, [], 3
+
+
+def got(p):
+    return np.log(p) - np.log1p(-p)
+
+
+def fuse(prior, posteriors):
+    L = np.full(posteriors.shape[1:], got(prior))
+    for p in posteriors:
+        L = L + got(p) - got(prior)
+    return (0.5 + 0.5 * np.tanh(L / 2)).tolist()""",
+        ),
+        right(
+            "likelihoods by Bayes' rule, in logarithms",
+            task="fuse",
+            code="""
+def fuse(prior, posteriors):
+    occupied = np.log(prior) + np.log(posteriors / prior).sum(axis=0)
+    free = np.log(1 - prior) + np.log((1 - posteriors) / (1 - prior)).sum(axis=0)
+    return np.exp(occupied - np.logaddexp(occupied, free))""",
+        ),
+        mistake(
+            "odds that overflow after many scans",
+            task="fuse",
+            loses=1,
+            says="so long a product ends at 0 or infinity",
             code="""
 def fuse(prior, posteriors):
     odds = np.full(posteriors.shape[1:], prior / (1 - prior))
@@ -307,9 +335,11 @@ def fuse(prior, posteriors):
         odds = odds * (p / (1 - p)) / (prior / (1 - prior))
     return odds / (1 + odds)""",
         ),
-        right(
-            "likelihoods by Bayes' rule, undone and redone",
+        mistake(
+            "likelihoods whose product overflows after many scans",
             task="fuse",
+            loses=1,
+            says="so long a product ends at 0 or infinity",
             code="""
 def fuse(prior, posteriors):
     occupied = prior * np.prod(posteriors / prior, axis=0)
@@ -317,9 +347,22 @@ def fuse(prior, posteriors):
     return occupied / (occupied + free)""",
         ),
         mistake(
+            "a probability that is exactly 1 after many scans",
+            task="fuse",
+            loses=1,
+            says="a probability of exactly 0 or 1 never comes back",
+            code="""
+def fuse(prior, posteriors):
+    belief = np.full(posteriors.shape[1:], float(prior))
+    for p in posteriors:
+        occupied, free = belief * p / prior, (1 - belief) * (1 - p) / (1 - prior)
+        belief = occupied / (occupied + free)
+    return belief""",
+        ),
+        mistake(
             "prior counted with each scan and once more",
             task="fuse",
-            loses=3,
+            loses=2,
             says="the prior is counted four times",
             code="""
 def fuse(prior, posteriors):
@@ -329,7 +372,7 @@ def fuse(prior, posteriors):
         mistake(
             "prior counted with each scan",
             task="fuse",
-            loses=3,
+            loses=2,
             says="the prior is counted three times",
             code="""
 def fuse(prior, posteriors):
@@ -339,7 +382,7 @@ def fuse(prior, posteriors):
         mistake(
             "prior subtracted once",
             task="fuse",
-            loses=3,
+            loses=2,
             says="subtract L_0 from each L_k, not from their sum",
             code="""
 def fuse(prior, posteriors):
@@ -349,7 +392,7 @@ def fuse(prior, posteriors):
         mistake(
             "prior lost",
             task="fuse",
-            loses=3,
+            loses=2,
             says="the prior got lost",
             code="""
 def fuse(prior, posteriors):
@@ -359,7 +402,7 @@ def fuse(prior, posteriors):
         mistake(
             "prior's sign swapped",
             task="fuse",
-            loses=3,
+            loses=2,
             says="the prior works the wrong way round",
             code="""
 def fuse(prior, posteriors):
@@ -384,7 +427,7 @@ def fuse(prior, posteriors):
         mistake(
             "last scan only",
             task="fuse",
-            loses=3,
+            loses=2,
             says="the two before it did",
             code="def fuse(prior, posteriors):\n    return posteriors[-1]",
         ),
@@ -398,7 +441,7 @@ def fuse(prior, posteriors):
         mistake(
             "log-odds returned",
             task="fuse",
-            loses=3,
+            loses=2,
             says="give the probability back",
             code="""
 def fuse(prior, posteriors):
@@ -408,7 +451,7 @@ def fuse(prior, posteriors):
         mistake(
             "summed over cells",
             task="fuse",
-            loses=3,
+            loses=2,
             says="sum over the scans only",
             code="""
 def fuse(prior, posteriors):
@@ -419,7 +462,7 @@ def fuse(prior, posteriors):
         mistake(
             "three scans written in",
             task="fuse",
-            loses=3,
+            loses=2,
             says="on inputs you haven't seen: one scan said nothing of a cell",
             code="""
 def fuse(prior, posteriors):
@@ -557,6 +600,19 @@ def smear(speed, dt, L_max, occupied, free):
     return passes, passes * speed * 0.1""",
         ),
         mistake(
+            "L = 0 taken for occupied",
+            task="smear",
+            loses=2,
+            says="on inputs you haven't seen: wrong where a pass ends at L = 0 exactly",
+            code="""
+def smear(speed, dt, L_max, occupied, free):
+    passes, L = 0, L_max
+    while L + np.log(occupied / free) >= 0:
+        L = L + np.log(occupied / free)
+        passes += 1
+    return passes, passes * speed * dt""",
+        ),
+        mistake(
             "one pass survived at least",
             task="smear",
             loses=2,
@@ -619,21 +675,21 @@ def beam_evidence(x, y, spec, L_hit, L_pass):
         mistake(
             "y to the right",
             task="beam-evidence",
-            loses=4,
+            loses=3,
             says="y points left and column 0 is the leftmost",
             code=beam(hit_col="np.floor((y - spec.y_min) / spec.cell)"),
         ),
         mistake(
             "row 0 at the vehicle",
             task="beam-evidence",
-            loses=4,
+            loses=3,
             says="row 0 is the farthest ahead",
             code=beam(hit_row="np.floor((x - spec.x_min) / spec.cell)"),
         ),
         mistake(
             "half a cell off",
             task="beam-evidence",
-            loses=4,
+            loses=3,
             says="a point belongs to the cell that it lies in (floor)",
             code=beam(hit_row="round((spec.x_max - x) / spec.cell)", hit_col="round((spec.y_max - y) / spec.cell)"),
         ),
@@ -680,21 +736,21 @@ def beam_evidence(x, y, spec, L_hit, L_pass):
         mistake(
             "a pass for each step",
             task="beam-evidence",
-            loses=4,
+            loses=3,
             says="one beam passes a cell once",
             code=beam().replace("evidence[row, col] = L_pass", "evidence[row, col] += L_pass"),
         ),
         mistake(
             "steps of a whole cell",
             task="beam-evidence",
-            loses=4,
+            loses=3,
             says="steps of a whole cell, or one cell a row, leave out cells",
             code=beam().replace("np.linspace(0, 1, 5001)", "np.arange(0, 1, spec.cell / np.hypot(x, y))"),
         ),
         mistake(
             "one cell a row",
             task="beam-evidence",
-            loses=4,
+            loses=3,
             says="yet it isn't free",
             code="""
 def beam_evidence(x, y, spec, L_hit, L_pass):

@@ -25,6 +25,22 @@ def in_cells(position, velocity, weight, dx, dy, x_max, y_max, cell, shape):
     return dynamic, mean""",
         ),
         right(
+            "one long row of all cells, returned as lists",
+            task="in-cells",
+            code="""
+def in_cells(position, velocity, weight, dx, dy, x_max, y_max, cell, shape):
+    H, W = shape
+    row = np.floor((x_max - position[:, 0] + dx) / cell).astype(int)
+    col = np.floor((y_max - position[:, 1] + dy) / cell).astype(int)
+    ok = (row >= 0) & (row < H) & (col >= 0) & (col < W)
+
+    def total(values):
+        return np.bincount(row[ok] * W + col[ok], values[ok], minlength=H * W).reshape(shape)
+
+    dynamic = total(weight)
+    return [dynamic.tolist(), (np.stack([total(weight * v) for v in velocity.T]) / dynamic).tolist()]""",
+        ),
+        right(
             "histograms, and 0 / 0 for NaN",
             task="in-cells",
             code="""
@@ -206,10 +222,10 @@ def in_cells(position, velocity, weight, dx, dy, x_max, y_max, cell, shape):
     return d, m / np.where(d > 0, d, 1)""",
         ),
         mistake(
-            "truncated: what is just outside is drawn in",
+            "truncated across: what is just outside is drawn in",
             task="in-cells",
             loses=2,
-            says="on inputs you haven't seen: wrong sums",
+            says="on inputs you haven't seen: wrong sums in row 0 or column 0: int() and astype(int) cut -0.6 to 0",
             code="""
 def in_cells(position, velocity, weight, dx, dy, x_max, y_max, cell, shape):
     position = position - np.array([dx, dy])
@@ -223,10 +239,44 @@ def in_cells(position, velocity, weight, dx, dy, x_max, y_max, cell, shape):
     return d, m / d""",
         ),
         mistake(
+            "int() where floor is meant",
+            task="in-cells",
+            loses=2,
+            says="int() and astype(int) cut -0.5 to 0; take np.floor first",
+            code="""
+def in_cells(position, velocity, weight, dx, dy, x_max, y_max, cell, shape):
+    dynamic, moment = np.zeros(shape), np.zeros((2, *shape))
+    for (x, y), v, w in zip(position, velocity, weight):
+        r, c = int((x_max - x + dx) / cell), int((y_max - y + dy) / cell)
+        if 0 <= r < shape[0] and 0 <= c < shape[1]:
+            dynamic[r, c] += w
+            moment[:, r, c] += w * v
+    return dynamic, moment / dynamic""",
+        ),
+        mistake(
+            "a row of H cells",
+            task="in-cells",
+            loses=2,
+            says="(row, col) is cell row * W + col",
+            code="""
+def in_cells(position, velocity, weight, dx, dy, x_max, y_max, cell, shape):
+    H, W = shape
+    row = np.floor((x_max - position[:, 0] + dx) / cell).astype(int)
+    col = np.floor((y_max - position[:, 1] + dy) / cell).astype(int)
+    ok = (row >= 0) & (row < H) & (col >= 0) & (col < W)
+    flat = row[ok] * H + col[ok]
+
+    def total(values):
+        return np.bincount(flat, values[ok], minlength=H * W).reshape(shape)
+
+    dynamic = total(weight)
+    return dynamic, np.stack([total(weight * v) for v in velocity.T]) / dynamic""",
+        ),
+        mistake(
             "the two components last",
             task="in-cells",
             loses=2,
-            says="expected velocity of shape (2, 3, 3), got (3, 3, 2)",
+            says="expected velocity of shape (2, 3, 4), got (3, 4, 2)",
             code="""
 def in_cells(position, velocity, weight, dx, dy, x_max, y_max, cell, shape):
     position = position - np.array([dx, dy])
@@ -385,7 +435,7 @@ def update(belief, occupied, free, first_sight):
         mistake(
             "no reveal",
             task="update",
-            loses=3,
+            loses=2,
             says="somebody looked, yet UNKNOWN is",
             code="""
 def update(belief, occupied, free, first_sight):
@@ -452,7 +502,7 @@ def update(belief, occupied, free, first_sight):
         mistake(
             "DYNAMIC takes P(z | free)",
             task="update",
-            loses=3,
+            loses=2,
             says="DYNAMIC takes P(z | occupied) too",
             code="""
 def update(belief, occupied, free, first_sight):
@@ -464,7 +514,7 @@ def update(belief, occupied, free, first_sight):
         mistake(
             "shared out after Bayes' rule",
             task="update",
-            loses=3,
+            loses=2,
             says="before you multiply by the evidence, not after",
             code="""
 def update(belief, occupied, free, first_sight):
@@ -476,7 +526,7 @@ def update(belief, occupied, free, first_sight):
         mistake(
             "UNKNOWN thrown away",
             task="update",
-            loses=3,
+            loses=2,
             says="UNKNOWN was thrown away",
             code="""
 def update(belief, occupied, free, first_sight):
@@ -484,6 +534,18 @@ def update(belief, occupied, free, first_sight):
     p[3] = np.where(occupied != free, 0, p[3])
     t = p.sum(axis=0)
     return np.where(t > 0, p / np.where(t > 0, t, 1), np.array([0, 0, 0, 1.0])[:, None, None])""",
+        ),
+        mistake(
+            "what is improbable taken for a contradiction",
+            task="update",
+            loses=1,
+            says="on inputs you haven't seen: a cell, surely free, explains its scan with a small probability",
+            code="""
+def update(belief, occupied, free, first_sight):
+    b = belief + np.where(occupied != free, belief[3], 0) * np.array([*first_sight, -1])[:, None, None]
+    p = b * np.stack([free, occupied, occupied, free])
+    t = p.sum(axis=0)
+    return np.where(t > 1e-3, p / np.where(t > 1e-3, t, 1), np.array([0, 0, 0, 1.0])[:, None, None])""",
         ),
         mistake(
             "contradicted only when surely free",
@@ -523,6 +585,21 @@ def systematic(weight, count, offset):
     return np.array(drawn)""",
         ),
         right(
+            "a list, by helpers with ordinary names",
+            task="systematic",
+            code="""
+weight, before, got, slips = "mine", None, [], 3
+
+
+def drawn(ends, tooth):
+    return sum(bool(end <= tooth) for end in ends)
+
+
+def systematic(weight, count, offset):
+    ends = np.cumsum(weight)
+    return [drawn(ends, (m + offset) / count * ends[-1]) for m in range(count)]""",
+        ),
+        right(
             "count the parts that end before each tooth",
             task="systematic",
             code="""
@@ -530,6 +607,21 @@ def systematic(weight, count, offset):
     ends = np.cumsum(weight)
     teeth = np.linspace(0, ends[-1], count, endpoint=False) + offset * ends[-1] / count
     return (teeth[:, None] >= ends[None]).sum(axis=1)""",
+        ),
+        mistake(
+            "two pointers with `if`",
+            task="systematic",
+            loses=3,
+            says="go on `while` a particle ends before the tooth, not `if`",
+            code="""
+def systematic(weight, count, offset):
+    drawn, n, end, total = [], 0, weight[0], sum(weight)
+    for m in range(count):
+        if end <= (m + offset) / count * total:
+            n += 1
+            end += weight[n]
+        drawn.append(n)
+    return np.array(drawn)""",
         ),
         mistake(
             "weights not normalised",
@@ -663,7 +755,7 @@ def meet(own, arrives):
         mistake(
             "not normalised after striking out",
             task="meet",
-            loses=4,
+            loses=2,
             says="sums to 0.75: divide by what is left",
             code="""
 def meet(own, arrives):
@@ -675,7 +767,7 @@ def meet(own, arrives):
         mistake(
             "nothing struck out",
             task="meet",
-            loses=4,
+            loses=2,
             says="a thing can't arrive where STATIC stands",
             code="""
 def meet(own, arrives):
@@ -687,7 +779,7 @@ def meet(own, arrives):
         mistake(
             "added to what is there",
             task="meet",
-            loses=4,
+            loses=3,
             says="sums to 1.50: divide by what is left",
             code="""
 def meet(own, arrives):
@@ -698,7 +790,7 @@ def meet(own, arrives):
         mistake(
             "added, then normalised",
             task="meet",
-            loses=4,
+            loses=3,
             says="`arrives and FREE` isn't FREE",
             code="""
 def meet(own, arrives):
@@ -721,7 +813,7 @@ def meet(own, arrives):
         mistake(
             "own dynamic mass lost",
             task="meet",
-            loses=4,
+            loses=1,
             says="the own DYNAMIC of cell (0, 1) got lost",
             code="""
 def meet(own, arrives):
@@ -733,7 +825,7 @@ def meet(own, arrives):
         mistake(
             "STATIC always wins",
             task="meet",
-            loses=3,
+            loses=2,
             says="STATIC isn't always right",
             code="""
 def meet(own, arrives):
@@ -770,7 +862,7 @@ def meet(own, arrives):
         mistake(
             "what arrives fills free space alone",
             task="meet",
-            loses=4,
+            loses=2,
             says="on inputs you haven't seen: sums are right, values are not (UNKNOWN is a state too)",
             code="""
 def meet(own, arrives):

@@ -29,14 +29,14 @@ def now_from_before(T_world_from_now, T_world_from_before):
 def plane(
     point="[x, y, height, 1]",
     T="T_camera_from_grid",
-    result="f_u * X / Z + c_u, f_v * Y / Z + c_v",
+    result="(f_u * X + skew * Y) / Z + c_u, f_v * Y / Z + c_v",
     front="Z > 0",
     inside="0 <= u <= w - 1 and 0 <= v <= h - 1",
 ):
     """Return an answer to task 3 that treats one point at a time by these expressions."""
     return f"""
 def plane_pixels(xy, height, K, T_camera_from_grid, size):
-    (f_u, _, c_u), (_, f_v, c_v), _ = K
+    (f_u, skew, c_u), (_, f_v, c_v), _ = K
     h, w = size
     pixels, visible = np.full((len(xy), 2), np.nan), np.zeros(len(xy), bool)
     for n, (x, y) in enumerate(xy):
@@ -80,6 +80,21 @@ def new_intrinsics(K, left, top, scale_u, scale_v):
     K[:2, 2] -= 0.5
     return K""",
         ),
+        right(
+            "tuples in a list, and helpers with ordinary names",
+            task="new-intrinsics",
+            code="""
+got, slips, before, by_hand = "mine", 4, None, []
+
+
+def moved(c, cut, scale):
+    return (c - cut + 0.5) * scale - 0.5
+
+
+def new_intrinsics(K, left, top, scale_u, scale_v):
+    across, down = moved(K[0][2], left, scale_u), moved(K[1][2], top, scale_v)
+    return [(K[0][0] * scale_u, 0, across), (0, K[1][1] * scale_v, down), (0, 0, 1)]""",
+        ),
         mistake(
             "half a pixel forgotten",
             task="new-intrinsics",
@@ -97,7 +112,7 @@ def new_intrinsics(K, left, top, scale_u, scale_v):
         mistake(
             "half a pixel at the end only",
             task="new-intrinsics",
-            loses=3,
+            loses=2,
             says="without a resize nothing but the cut may move c_u",
             code=intrinsics(c_u="(K[0, 2] - left) * scale_u - 0.5", c_v="(K[1, 2] - top) * scale_v - 0.5"),
         ),
@@ -121,7 +136,7 @@ def new_intrinsics(K, left, top, scale_u, scale_v):
         mistake(
             "half a pixel added, never taken off",
             task="new-intrinsics",
-            loses=3,
+            loses=2,
             says="half a pixel too much",
             code=intrinsics(c_u="(K[0, 2] - left + 0.5) * scale_u", c_v="(K[1, 2] - top + 0.5) * scale_v"),
         ),
@@ -135,21 +150,21 @@ def new_intrinsics(K, left, top, scale_u, scale_v):
         mistake(
             "cut added",
             task="new-intrinsics",
-            loses=3,
+            loses=1,
             says="everything lies 8 pixels farther to the LEFT",
             code=intrinsics(c_u="(K[0, 2] + left + 0.5) * scale_u - 0.5", c_v="(K[1, 2] + top + 0.5) * scale_v - 0.5"),
         ),
         mistake(
             "cut forgotten",
             task="new-intrinsics",
-            loses=3,
+            loses=1,
             says="pixels are counted from a new first one",
             code=intrinsics(c_u="(K[0, 2] + 0.5) * scale_u - 0.5", c_v="(K[1, 2] + 0.5) * scale_v - 0.5"),
         ),
         mistake(
             "left and top swapped",
             task="new-intrinsics",
-            loses=3,
+            loses=1,
             says="left and top are swapped",
             code=intrinsics(c_u="(K[0, 2] - top + 0.5) * scale_u - 0.5", c_v="(K[1, 2] - left + 0.5) * scale_v - 0.5"),
         ),
@@ -193,7 +208,7 @@ def new_intrinsics(K, left, top, scale_u, scale_v):
         mistake(
             "a cut rounds to whole pixels",
             task="new-intrinsics",
-            loses=3,
+            loses=1,
             says="on inputs you haven't seen: wrong principal point after a cut",
             code=intrinsics(
                 c_u="(round(K[0, 2] - left) + 0.5) * scale_u - 0.5", c_v="(round(K[1, 2] - top) + 0.5) * scale_v - 0.5"
@@ -340,6 +355,11 @@ def now_from_before(T_world_from_now, T_world_from_before):
         # ---- task 3
         right("one point at a time", task="plane-pixels", code=plane()),
         right(
+            "lists of pairs and of booleans",
+            task="plane-pixels",
+            code=plane().replace("return pixels, visible", "return pixels.tolist(), visible.tolist()"),
+        ),
+        right(
             "rotation and shift, homogeneous pixels, masks",
             task="plane-pixels",
             code="""
@@ -357,28 +377,28 @@ def plane_pixels(xy, height, K, T_camera_from_grid, size):
         mistake(
             "not divided by Z",
             task="plane-pixels",
-            loses=5,
+            loses=3,
             says="did you divide by Z?",
             code=plane(result="f_u * X + c_u * Z, f_v * Y + c_v * Z"),
         ),
         mistake(
             "height forgotten",
             task="plane-pixels",
-            loses=5,
+            loses=3,
             says="the point lies at z = height",
             code=plane(point="[x, y, 0, 1]"),
         ),
         mistake(
             "height downwards",
             task="plane-pixels",
-            loses=5,
+            loses=3,
             says="0.5 m below the ground",
             code=plane(point="[x, y, -height, 1]"),
         ),
         mistake(
             "fourth coordinate zero",
             task="plane-pixels",
-            loses=5,
+            loses=3,
             says="the fourth coordinate of a point is 1, not 0",
             code=plane(point="[x, y, height, 0]"),
         ),
@@ -392,21 +412,21 @@ def plane_pixels(xy, height, K, T_camera_from_grid, size):
         mistake(
             "v, u",
             task="plane-pixels",
-            loses=5,
+            loses=3,
             says="u counts to the right and comes first",
             code=plane(result="f_v * Y / Z + c_v, f_u * X / Z + c_u"),
         ),
         mistake(
             "no principal point",
             task="plane-pixels",
-            loses=5,
+            loses=3,
             says="the principal point is missing",
             code=plane(result="f_u * X / Z, f_v * Y / Z"),
         ),
         mistake(
             "divided by the distance",
             task="plane-pixels",
-            loses=5,
+            loses=3,
             says="you divide by the distance",
             code=plane(
                 result="[c + f * q / np.sqrt(X**2 + Y**2 + Z**2) for c, f, q in ((c_u, f_u, X), (c_v, f_v, Y))]"
@@ -415,7 +435,7 @@ def plane_pixels(xy, height, K, T_camera_from_grid, size):
         mistake(
             "f_u and f_v swapped",
             task="plane-pixels",
-            loses=5,
+            loses=3,
             says="f_u and f_v are swapped",
             code=plane(result="f_v * X / Z + c_u, f_u * Y / Z + c_v"),
         ),
@@ -427,9 +447,35 @@ def plane_pixels(xy, height, K, T_camera_from_grid, size):
             code=plane().replace("return pixels, visible", "return pixels"),
         ),
         mistake(
+            "shifted, then turned",
+            task="plane-pixels",
+            loses=3,
+            says="that is R (p - t)",
+            code=plane(T="T").replace(
+                "    h, w = size",
+                "    R, t = T_camera_from_grid[:3, :3], T_camera_from_grid[:3, 3]\n"
+                "    T = np.vstack([np.column_stack([R, -R @ t]), [0, 0, 0, 1]])\n"
+                "    h, w = size",
+            ),
+        ),
+        mistake(
+            "skew ignored",
+            task="plane-pixels",
+            loses=3,
+            says="on inputs you haven't seen: wrong where K[0, 1] isn't 0",
+            code=plane(result="f_u * X / Z + c_u, f_v * Y / Z + c_v"),
+        ),
+        mistake(
+            "nearer than half a metre is behind",
+            task="plane-pixels",
+            loses=2,
+            says="on inputs you haven't seen: a point 0.25 m in front of the camera has no pixel",
+            code=plane(front="Z > 0.5"),
+        ),
+        mistake(
             "a level camera taken for granted",
             task="plane-pixels",
-            loses=5,
+            loses=3,
             says="on inputs you haven't seen: wrong pixels (no camera is quite level",
             code=plane(T="T_level").replace(
                 "    h, w = size",
@@ -490,15 +536,15 @@ def plane_pixels(xy, height, K, T_camera_from_grid, size):
         mistake(
             "rounded to whole pixels",
             task="plane-pixels",
-            loses=5,
+            loses=3,
             says="no pixel quite whole",
-            code=plane(result="round(f_u * X / Z + c_u), round(f_v * Y / Z + c_v)"),
+            code=plane(result="round((f_u * X + skew * Y) / Z + c_u), round(f_v * Y / Z + c_v)"),
         ),
         mistake(
             "outside the image no pixel",
             task="plane-pixels",
-            loses=5,
-            says="on inputs you haven't seen: wrong pixels",
+            loses=2,
+            says="a point beside the image has a pixel all the same",
             code=plane().replace(
                 "            pixels[n]",
                 "            if 0 <= u <= w - 1 and 0 <= v <= h - 1:\n                pixels[n]",
@@ -526,14 +572,14 @@ def lands_at(x, z, z_cam, delta):
         mistake(
             "on the ground",
             task="lands-at",
-            loses=3,
+            loses=2,
             says="that is the ground",
             code=drawn(place="x * z_cam / (z_cam - z)"),
         ),
         mistake(
             "triangles swapped",
             task="lands-at",
-            loses=3,
+            loses=2,
             says="the triangles are swapped",
             code=drawn(place="x * (z_cam - z) / (z_cam - delta)"),
         ),
@@ -547,16 +593,23 @@ def lands_at(x, z, z_cam, delta):
         mistake(
             "the thing taken for on the ground",
             task="lands-at",
-            loses=3,
+            loses=2,
             says="the thing's own height is missing",
             code=drawn(place="x * z_cam / (z_cam - delta)"),
         ),
         mistake(
             "only how far it is thrown",
             task="lands-at",
-            loses=3,
+            loses=2,
             says="count from the camera",
             code=drawn(place="x * (z - delta) / (z_cam - z)"),
+        ),
+        mistake(
+            "a plane below the ground taken for one above it",
+            task="lands-at",
+            loses=2,
+            says="a plane 0.3 m below the ground isn't one 0.3 m above it",
+            code=drawn(place="x * (z_cam - abs(delta)) / (z_cam - z)"),
         ),
         mistake(
             "climbs, and yet meets",
@@ -596,9 +649,9 @@ def lands_at(x, z, z_cam, delta):
         mistake(
             "never farther than the grid",
             task="lands-at",
-            loses=3,
-            says="on inputs you haven't seen",
-            code=drawn(place="min(x * (z_cam - delta) / (z_cam - z), 25.0)"),
+            loses=2,
+            says="on inputs you haven't seen: the thing and the place where it is drawn have different pixels",
+            code=drawn(place="min(x * (z_cam - delta) / (z_cam - z), 60.0)"),
         ),
         # ---- task 5
         right("numpy's cube root", task="reach", code=far("np.cbrt(f_u * f_v * np.abs(z_cam - delta) * cell * cell)")),
@@ -690,6 +743,27 @@ def reach(cell, f_u, f_v, z_cam, delta):
             loses=2,
             says="take |z_cam - delta|",
             code=far("(f_u * f_v * (z_cam - delta) * cell**2) ** (1 / 3)"),
+        ),
+        mistake(
+            "searched up to 100 m",
+            task="reach",
+            loses=2,
+            says="on inputs you haven't seen: the cell isn't one pixel there (a depth of hundreds of metres)",
+            code="""
+def reach(cell, f_u, f_v, z_cam, delta):
+    near, distant = 1e-6, 100.0
+    for _ in range(200):
+        Z = (near + distant) / 2
+        area = f_u * f_v * abs(z_cam - delta) * cell**2 / Z**3
+        near, distant = (Z, distant) if area > 1 else (near, Z)
+    return Z""",
+        ),
+        mistake(
+            "a plane below the ground taken for one above it",
+            task="reach",
+            loses=2,
+            says="a plane 0.2 m below the ground, 0.5 m below the camera: `delta` has a sign",
+            code=far("(f_u * f_v * abs(z_cam - abs(delta)) * cell**2) ** (1 / 3)"),
         ),
         mistake(
             "cells of half a metre written in",

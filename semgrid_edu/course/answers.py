@@ -1,0 +1,67 @@
+"""What a student's answer returned, as the array that the tests compare."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def answer_array(result: Any, name: str = "it", dtype: type = float) -> NDArray:
+    """Return the result of an answer as an array, or say in a sentence why it is none.
+
+    Parameters
+    ----------
+    result : Any
+        What the answer returned: an array, a number, or lists and tuples of numbers, however deep.
+    name : str
+        The subject of the sentence: the name of the function that was to be written, or a part of its result.
+    dtype : type
+        The type of the array's entries.
+
+    Returns
+    -------
+    NDArray
+        A new array with the result's numbers.
+
+    Raises
+    ------
+    AssertionError
+        When the result is None, or no array of numbers.
+
+    Examples
+    --------
+    >>> answer_array([[1, 2], (3, 4)], "locate").shape
+    (2, 2)
+    """
+    assert result is not None, f"{name} returned nothing: did you forget `return`?"
+    try:
+        return np.array(result, dtype=dtype)
+    except (TypeError, ValueError):
+        kind = type(result).__name__
+    hint = ": are its rows equally long?" if isinstance(result, list | tuple) else ""
+    raise AssertionError(f"{name} returned no array of numbers but a {kind} that holds something else{hint}")
+
+
+def answer_number(result: Any, name: str = "it") -> float:
+    """Return the result of an answer as one number, or say in a sentence why it is none.
+
+    Parameters
+    ----------
+    result : Any
+        What the answer returned: a number, or one number in an array or a list.
+    name : str
+        The subject of the sentence, as in `answer_array`.
+
+    Returns
+    -------
+    float
+        The number.
+
+    Raises
+    ------
+    AssertionError
+        When the result is None, no number, or more than one.
+    """
+    numbers = answer_array(result, name)
+    assert numbers.size == 1, f"{name} returned {numbers.size} numbers instead of one"
+    return numbers.item()

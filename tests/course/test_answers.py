@@ -1,0 +1,53 @@
+"""Results of answers: nested lists are arrays, and what is no array gets a sentence."""
+
+import numpy as np
+import pytest
+
+from semgrid_edu.course.answers import answer_array, answer_number
+
+
+@pytest.mark.parametrize(
+    "result", [[[1, 2], [3, 4]], ((1, 2), (3, 4)), [np.array([1, 2]), (3.0, 4)], np.arange(1, 5).reshape(2, 2)]
+)
+def test_lists_and_tuples_are_arrays(result):
+    got = answer_array(result)
+    assert got.dtype == float
+    np.testing.assert_array_equal(got, [[1.0, 2.0], [3.0, 4.0]])
+
+
+def test_array_is_a_new_one():
+    result = np.zeros(3)
+    answer_array(result)[0] = 1
+    assert result[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("result", "sentence"),
+    [
+        (None, r"^locate returned nothing: did you forget `return`\?"),
+        ("0.4, 0.6", r"^locate returned no array of numbers but a str"),
+        ({"a": 1}, r"^locate returned no array of numbers but a dict"),
+        ([[1, 2], [3]], r"but a list that holds something else: are its rows equally long\?"),
+    ],
+)
+def test_anything_else_gets_a_sentence(result, sentence):
+    with pytest.raises(AssertionError, match=sentence):
+        answer_array(result, "locate")
+
+
+@pytest.mark.parametrize("result", [2, 2.0, np.float32(2), np.array(2.0), [2.0], np.array([[2]])])
+def test_one_number_in_any_wrapping_is_a_number(result):
+    assert answer_number(result) == 2.0
+
+
+@pytest.mark.parametrize(
+    ("result", "sentence"),
+    [
+        (None, "^reach returned nothing"),
+        ([1, 2], r"^reach returned 2 numbers instead of one$"),
+        ("far", "^reach returned no array of numbers but a str"),
+    ],
+)
+def test_what_is_not_one_number_gets_a_sentence(result, sentence):
+    with pytest.raises(AssertionError, match=sentence):
+        answer_number(result, "reach")

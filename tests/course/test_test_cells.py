@@ -1,0 +1,127 @@
+"""Test cells of all exercises: each is one function that relies on the setup, the answers and its own names alone.
+
+So students may call helpers and scratch variables whatever they like, and a grader may run answers in another process.
+"""
+
+import ast
+import builtins
+import functools
+import symtable
+
+import pytest
+from nbformat import NotebookNode
+from nbgrader.utils import is_grade, is_locked, is_solution
+
+from semgrid_edu.course.exercises import exercise_sources
+from semgrid_edu.course.notebooks import read_percent
+
+every_exercise = pytest.mark.parametrize("source", exercise_sources(), ids=lambda source: source.stem)
+
+
+@functools.cache
+def code_cells(source) -> list[NotebookNode]:
+    return [cell for cell in read_percent(source).cells if cell.cell_type == "code"]
+
+
+def name_of(cell: NotebookNode) -> str:
+    return cell.metadata.nbgrader.grade_id
+
+
+def defined(code: str) -> set[str]:
+    """The names that a cell leaves behind."""
+    return {symbol.get_name() for symbol in symtable.symtable(code, "cell", "exec").get_symbols() if bound(symbol)}
+
+
+def bound(symbol: symtable.Symbol) -> bool:
+    return symbol.is_assigned() or symbol.is_imported()
+
+
+def relied_on(code: str) -> set[str]:
+    """The names that a cell takes from elsewhere, builtins left out."""
+    cell = symtable.symtable(code, "cell", "exec")
+    names, tables = set(), [cell]
+    while tables:
+        table = tables.pop()
+        tables += table.get_children()
+        names |= {s.get_name() for s in table.get_symbols() if s.is_global() or (table is cell and s.is_referenced())}
+    return names - defined(code) - set(dir(builtins))
+
+
+def setup(source) -> NotebookNode:
+    return next(cell for cell in code_cells(source) if name_of(cell) == "setup")
+
+
+def answers(source) -> set[str]:
+    return set().union(*(defined(cell.source) for cell in code_cells(source) if is_solution(cell)))
+
+
+def fixtures(source) -> list[NotebookNode]:
+    """Locked cells that are neither the setup nor a test."""
+    return [c for c in code_cells(source) if is_locked(c) and not is_grade(c) and name_of(c) != "setup"]
+
+
+def checks(source) -> list[NotebookNode]:
+    return [cell for cell in code_cells(source) if is_grade(cell) and not is_solution(cell)]
+
+
+@every_exercise
+def test_each_test_cell_is_one_function_and_its_call(source):
+    for cell in checks(source):
+        function, call = ast.parse(cell.source).body
+        assert isinstance(function, ast.FunctionDef), name_of(cell)
+        assert function.name == "_test", name_of(cell)
+        assert ast.unparse(call) == "_test()", name_of(cell)
+
+
+@every_exercise
+def test_tests_rely_on_nothing_that_a_student_may_overwrite(source):
+    private = {name for cell in fixtures(source) for name in defined(cell.source)}
+    assert {name for name in private if not name.startswith("_")} == set()
+    allowed = defined(setup(source).source) | answers(source) | private
+    for cell in [*checks(source), *fixtures(source)]:
+        assert relied_on(cell.source) <= allowed, name_of(cell)
+
+
+@every_exercise
+def test_tests_change_no_name_outside(source):
+    for cell in checks(source):
+        outward = [node for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Global | ast.Nonlocal)]
+        assert outward == [], name_of(cell)
+
+
+@every_exercise
+def test_tests_look_at_results_of_answers_and_never_into_them(source):
+    for cell in checks(source):
+        nodes = list(ast.walk(ast.parse(cell.source)))
+        inside = {ast.unparse(n.value) for n in nodes if isinstance(n, ast.Attribute)} & answers(source)
+        assert inside == set(), name_of(cell)
+        assert {"inspect", "tracemalloc"} & {n.id for n in nodes if isinstance(n, ast.Name)} == set(), name_of(cell)
+
+
+@every_exercise
+def test_solutions_use_nothing_of_the_tests(source):
+    offered = {name for name in defined(setup(source).source) if not name.startswith("_")} | answers(source)
+    for cell in code_cells(source):
+        if is_solution(cell):
+            assert relied_on(cell.source) <= offered, name_of(cell)
+
+
+@every_exercise
+def test_helpers_that_only_tests_use_are_private(source):
+    used = set().union(*(relied_on(cell.source) for cell in code_cells(source) if is_solution(cell)))
+    text = "\n".join(cell.source for cell in read_percent(source).cells if cell.cell_type == "markdown")
+    helpers = [node.name for node in ast.parse(setup(source).source).body if isinstance(node, ast.FunctionDef)]
+    assert [h for h in helpers if not h.startswith("_") and h not in used and f"`{h}" not in text] == []
+
+
+@pytest.mark.parametrize(
+    ("code", "names"),
+    [
+        ("def _test():\n    got = twice(np.pi)\n    assert got == 2 * before\n\n\n_test()", {"twice", "np", "before"}),
+        ("def _test():\n    from tiny import pi\n    scale = 2\n    return [scale * pi for _ in range(3)]", set()),
+        ("def _test():\n    def inner():\n        return hidden\n    return inner()", {"hidden"}),
+        ("scale = 2\nprint(scale * before)", {"before"}),
+    ],
+)
+def test_names_that_a_cell_takes_from_elsewhere_are_found(code, names):
+    assert relied_on(code) == names
