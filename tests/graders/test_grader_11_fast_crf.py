@@ -303,49 +303,49 @@ def enclosing_simplex(y):
         mistake(
             "no repair",
             task="enclosing-simplex",
-            loses=3,
+            loses=2,
             says="Repair the sum after rounding",
             code=simplex(repair=""),
         ),
         mistake(
             "the first coordinate repaired",
             task="enclosing-simplex",
-            loses=3,
+            loses=2,
             says="change the one that was rounded up the farthest",
             code=simplex(repair="\n    origin[0] -= origin.sum()"),
         ),
         mistake(
             "the last coordinate repaired",
             task="enclosing-simplex",
-            loses=3,
+            loses=2,
             says="you changed the last coordinate",
             code=simplex(repair="\n    origin[-1] -= origin.sum()"),
         ),
         mistake(
             "sorted before the repair",
             task="enclosing-simplex",
-            loses=3,
+            loses=2,
             says="after the repair, not before",
             code=simplex(order="early"),
         ),
         mistake(
             "the largest residual steps back",
             task="enclosing-simplex",
-            loses=3,
+            loses=2,
             says="the smallest residual loses d, not the one with the largest",
             code=simplex(steps="order[:-1]"),
         ),
         mistake(
             "a step takes d and gives nothing",
             task="enclosing-simplex",
-            loses=3,
+            loses=2,
             says="corners that don't sum to 0",
             code=simplex(forward="np.zeros(size, int)", lost="size - 1"),
         ),
         mistake(
             "steps the other way",
             task="enclosing-simplex",
-            loses=3,
+            loses=2,
             says="rows are in the order 0, 2, 1",
             code=simplex(forward="-np.ones(size, int)", lost="-size", steps="order[:-1]"),
         ),
@@ -373,21 +373,21 @@ def enclosing_simplex(y):
         mistake(
             "only too large sums repaired",
             task="enclosing-simplex",
-            loses=3,
+            loses=2,
             says="on inputs you haven't seen: in 2 dimensions, where rounding leaves a negative sum",
             code=simplex(repair="\n    while origin.sum() > 0:\n        origin[np.argmin(y - origin)] -= size"),
         ),
         mistake(
             "two dimensions only",
             task="enclosing-simplex",
-            loses=3,
+            loses=2,
             says="on inputs you haven't seen",
             code=simplex(lost="3"),
         ),
         mistake(
             "endless loop",
             task="enclosing-simplex",
-            loses=3,
+            loses=2,
             says="No reply from kernel before timeout",
             code=simplex(repair="\n    while origin.sum() != 0:\n        origin[np.argmin(y - origin)] += size"),
         ),
@@ -573,6 +573,28 @@ def others_say(blur, Q):
     K[np.diag_indices(len(Q))] = 0
     return K @ Q""",
         ),
+        right(
+            "nested lists, and helpers with everyday names",
+            task="others-say",
+            code="""
+def kernel(blur, n):
+    return np.diag(blur(np.eye(n)))
+
+
+def got(all_of_it, before, slips):
+    return [[a - k * q for a, q in zip(row, old)] for row, old, k in zip(all_of_it, before, slips)]
+
+
+def others_say(blur, Q):
+    return got(blur(Q).tolist(), Q.tolist(), kernel(blur, len(Q)).tolist())""",
+        ),
+        mistake(
+            "text instead of numbers",
+            task="others-say",
+            loses=2,
+            says="others_say returned no array of numbers but a str",
+            code=own("0", "str(blur(Q))"),
+        ),
         mistake("nothing subtracted", task="others-say", loses=2, says="nothing is subtracted", code=own("0")),
         mistake("1 for every cell", task="others-say", loses=2, says="as if k_ii were 1", code=own("1")),
         mistake(
@@ -701,6 +723,19 @@ def refine(log_g, o):
         Q /= Q.sum(axis=1, keepdims=True)
         log_Q = start + sum(s * f(s * Q) - k * Q for f, s, k in kernels)
     return Q.T.reshape(C, H, W)""",
+        ),
+        right(
+            "the package's filters, nested lists, everyday names",
+            task="refine",
+            code="weights, read, loss, gradient, field, before, log_g, o, y, line = [None] * 10\n"
+            + crf(back="Q.T.reshape(log_g.shape).tolist()"),
+        ),
+        mistake(
+            "nothing refined",
+            task="refine",
+            loses=4,
+            says="you return the network's own distribution",
+            code="def refine(log_g, o):\n    return np.exp(log_g)",
         ),
         mistake(
             "all pairs",
@@ -831,14 +866,14 @@ def refine(log_g, o):
         mistake(
             "soft-max over cells",
             task="refine",
-            loses=4,
+            loses=3,
             says="the soft-max runs over classes",
             code=crf(axis="0"),
         ),
         mistake(
             "log Q returned",
             task="refine",
-            loses=4,
+            loses=3,
             says="return Q, not log Q",
             code=crf(back="np.log(Q).T.reshape(log_g.shape)"),
         ),
@@ -852,7 +887,7 @@ def refine(log_g, o):
         mistake(
             "four classes only",
             task="refine",
-            loses=4,
+            loses=3,
             says="on inputs you haven't seen",
             code=crf(cells="log_g.reshape(4, -1).T", back="Q.T.reshape(4, H, W)"),
         ),

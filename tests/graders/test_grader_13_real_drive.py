@@ -191,6 +191,13 @@ def share_on_image(points, T, K, size):
             code=share(inside="(Z > 0) & (u >= 0) & (u <= size[1] - 1)"),
         ),
         mistake(
+            "no number",
+            task="share-on-image",
+            loses=2,
+            says="share_on_image returned no array of numbers but a str",
+            code=share(result="'40 %'"),
+        ),
+        mistake(
             "a number, no share",
             task="share-on-image",
             loses=2,
@@ -232,22 +239,43 @@ def ground(points):
         mistake(
             "a negative height",
             task="ground",
-            loses=3,
+            loses=2,
             says="height is negative",
             code=plane("a, np.degrees(np.arctan(b))"),
         ),
-        mistake("the slope", task="ground", loses=3, says="degrees are asked for", code=plane("-a, b")),
-        mistake("radians", task="ground", loses=3, says="degrees are asked for", code=plane("-a, np.arctan(b)")),
+        mistake("the slope", task="ground", loses=2, says="degrees are asked for", code=plane("-a, b")),
+        mistake("radians", task="ground", loses=2, says="degrees are asked for", code=plane("-a, np.arctan(b)")),
         mistake(
-            "down is up", task="ground", loses=3, says="sign is swapped", code=plane("-a, -np.degrees(np.arctan(b))")
+            "down is up", task="ground", loses=2, says="sign is swapped", code=plane("-a, -np.degrees(np.arctan(b))")
         ),
-        mistake("x and y", task="ground", loses=3, says="order of x and y", code=plane("-a, np.degrees(np.arctan(c))")),
+        mistake("x and y", task="ground", loses=2, says="order of x and y", code=plane("-a, np.degrees(np.arctan(c))")),
         mistake(
             "the mean height",
             task="ground",
             loses=3,
             says="mean height",
             code=plane("-z.mean(), np.degrees(np.arctan(b))"),
+        ),
+        mistake(
+            "the same numbers on every road",
+            task="ground",
+            loses=3,
+            says="on a road 0.3 m higher up the height is the same",
+            code="def ground(points):\n    return 1.7, 0.573",
+        ),
+        right(
+            "nested lists, and helpers with everyday names",
+            task="ground",
+            code="""
+road, height, rise, T, K, frames, wrong, nearest = "these were names of the test cells, too".split()
+
+
+def got(before):
+    return [before[0], [float(number) for number in before[1:]]]
+
+
+"""
+            + plane("[[-a], [np.degrees(np.arctan(b))]]"),
         ),
         mistake("cars are ground", task="ground", loses=1, says="with a car on the road", code=plane(rounds="1")),
         mistake(

@@ -135,6 +135,30 @@ def multiply(f, g):
     both = Factor(*f) * Factor(*g)
     return [both.names, both.table]""",
         ),
+        right(
+            "lists, and helpers with everyday names",
+            task="multiply",
+            code="""
+before, got, slips, table, cases, street = "tests", "may", "have", "these", "names", "too"
+
+
+def read(f, names):
+    states = dict(zip(f[0], np.shape(f[1])))
+    return np.transpose(f[1], [f[0].index(n) for n in names if n in states]), [states.get(n, 1) for n in names]
+
+
+def multiply(f, g):
+    names = sorted({*f[0], *g[0]})
+    (f, f_shape), (g, g_shape) = read(f, names), read(g, names)
+    return names, (f.reshape(f_shape) * g.reshape(g_shape)).tolist()""",
+        ),
+        mistake(
+            "rows of different lengths",
+            task="multiply",
+            loses=2,
+            says="for the table multiply returned no array of numbers",
+            code="def multiply(f, g):\n    return [*f[0], *(n for n in g[0] if n not in f[0])], [[1.0], [2.0, 3.0]]",
+        ),
         mistake(
             "numpy broadcasts by place",
             task="multiply",
@@ -319,22 +343,6 @@ def posterior(factor, wanted, given):
             code=SLICED.replace("table, state, axis", "table, 0, axis") + "    return table / table.sum()",
         ),
         mistake(
-            "state 0 taken for nothing known",
-            task="posterior",
-            loses=3,
-            says="state 0 is no `False`",
-            code="""
-def posterior(factor, wanted, given):
-    names, table = factor
-    index = tuple(given.get(n) or slice(None) for n in names)
-    kept = [n for n in names if not given.get(n)]
-    table = table[index]
-    weights = table.sum(axis=tuple(k for k, n in enumerate(kept) if n != wanted))
-    if weights.sum() == 0:
-        raise ValueError("impossible")
-    return weights / weights.sum()""",
-        ),
-        mistake(
             "wanted ignored after the slice",
             task="posterior",
             loses=2,
@@ -364,6 +372,31 @@ def posterior(factor, wanted, given):
             loses=3,
             says="you took the mean over m1",
             code=SLICED.replace("table.sum(axis", "table.mean(axis") + "    return table",
+        ),
+        mistake(
+            "not normalised, but it knows the impossible",
+            task="posterior",
+            loses=2,
+            says="divide by their sum, 28",
+            code=SLICED
+            + """    if not table.any():
+        raise ValueError("impossible")
+    return table""",
+        ),
+        mistake(
+            "state 0 taken for nothing known, but it knows the impossible",
+            task="posterior",
+            loses=2,
+            says="state 0 is no `False`",
+            code="""
+def posterior(factor, wanted, given):
+    names, table = factor
+    kept = [n for n in names if not given.get(n)]
+    table = table[tuple(given.get(n) or slice(None) for n in names)]
+    weights = table.sum(axis=tuple(k for k, n in enumerate(kept) if n != wanted))
+    if weights.sum() == 0:
+        raise ValueError("impossible")
+    return weights / weights.sum()""",
         ),
         mistake(
             "not normalised",
@@ -418,7 +451,7 @@ def posterior(factor, wanted, given):
         mistake(
             "any zero is taken for impossible",
             task="posterior",
-            loses=3,
+            loses=1,
             says="a zero in one entry is no reason to raise",
             code=SLICED
             + """    if not table.all():
@@ -604,7 +637,7 @@ def separated(parents, a, b, given=()):
         mistake(
             "what is known blocks even where the two are linked",
             task="separated",
-            loses=4,
+            loses=2,
             says="neighbours are never separated",
             code=RECIPE.replace(
                 "    kept, queue",
@@ -629,7 +662,7 @@ def separated(parents, a, b, given=()):
         mistake(
             "one blocked path is enough",
             task="separated",
-            loses=4,
+            loses=2,
             says="all must be blocked",
             code=PATHS.replace(
                 "    return not walk([a])",
@@ -850,7 +883,7 @@ def eliminate(factors, order):
         mistake(
             "only the factor returned",
             task="eliminate",
-            loses=3,
+            loses=1,
             says="got one Factor",
             code=ELIMINATE.replace("return result, largest", "return result"),
         ),
@@ -950,7 +983,7 @@ def smoothed(start, M, likelihoods):
         mistake(
             "a move before the first scan",
             task="messages",
-            loses=4,
+            loses=2,
             says="no move before it",
             code=FILTERED.replace("b = [], start", "b = [], start @ M") + SMOOTHED,
         ),
@@ -964,14 +997,14 @@ def smoothed(start, M, likelihoods):
         mistake(
             "the prediction returned",
             task="messages",
-            loses=4,
+            loses=2,
             says="return the belief at the time of the scan",
             code=FILTERED.replace("rows.append(b)\n        b = b @ M", "b = b @ M\n        rows.append(b)") + SMOOTHED,
         ),
         mistake(
             "the first scan missing",
             task="messages",
-            loses=4,
+            loses=2,
             says="the first scan is missing",
             code="""
 def filtered(start, M, likelihoods):
@@ -987,21 +1020,21 @@ def filtered(start, M, likelihoods):
         mistake(
             "M transposed",
             task="messages",
-            loses=4,
+            loses=2,
             says="a belief stands to its left",
             code=FILTERED.replace("b = b @ M", "b = M @ b") + SMOOTHED,
         ),
         mistake(
             "nothing moves",
             task="messages",
-            loses=4,
+            loses=2,
             says="nothing moved between the scans",
             code=FILTERED.replace("        b = b @ M\n", "") + SMOOTHED,
         ),
         mistake(
             "each row from the start",
             task="messages",
-            loses=4,
+            loses=2,
             says="carry the belief on",
             code="""
 def filtered(start, M, likelihoods):
@@ -1037,7 +1070,7 @@ def smoothed(start, M, likelihoods):
         mistake(
             "underflow in the filter",
             task="messages",
-            loses=4,
+            loses=2,
             says="on inputs you haven't seen: NaN after hundreds of scans",
             code="""
 def filtered(start, M, likelihoods):
@@ -1053,7 +1086,7 @@ def filtered(start, M, likelihoods):
         mistake(
             "the filter starts again where it underflows",
             task="messages",
-            loses=4,
+            loses=2,
             says="on inputs you haven't seen: wrong after hundreds of scans",
             code="""
 def filtered(start, M, likelihoods):

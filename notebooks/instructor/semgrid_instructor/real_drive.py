@@ -8,21 +8,22 @@ from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import Camera, project, rigid_transform, transform_points
+from semgrid_edu.course.answers import answer_array
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.experiments.new_data.drive_checks import time_gaps
 from semgrid_edu.experiments.new_data.faults import FAULTS
-from semgrid_instructor import hidden
+from semgrid_instructor import generator, hidden
 
 
 @hidden
 def check_find_gaps(find_gaps: Callable) -> None:
     """Other sensors' periods, a long first step, and clocks that waver."""
     for seed, period in enumerate((0.02, 0.1036, 0.5, 3.0)):
-        rng = np.random.default_rng(1300 + seed)
+        rng = generator(1300 + seed)
         steps = period * rng.uniform(0.8, 1.2, 40)
         steps[[0, 11, 30]] = period * np.array([2.2, 3.0, 2.0])
         times = 100 + np.concatenate([[0.0], np.cumsum(steps)])
-        got = np.asarray(find_gaps(times.tolist())).ravel()
+        got = answer_array(find_gaps(times.tolist())).ravel()
         wanted = time_gaps(times)
         assert got.shape == wanted.shape, f"{len(got)} gaps instead of {len(wanted)} for a period of {period} s"
         assert np.array_equal(got, wanted), f"other gaps for a period of {period} s"
@@ -32,20 +33,20 @@ def check_find_gaps(find_gaps: Callable) -> None:
 def check_share_on_image(share_on_image: Callable) -> None:
     """Cameras that are turned and stand elsewhere, and images of other sizes."""
     for seed, size in enumerate(((375, 1242), (188, 621), (400, 300))):
-        rng = np.random.default_rng(1310 + seed)
+        rng = generator(1310 + seed)
         axes = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])
         turn = Rotation.from_euler("xyz", rng.normal(0, 8, 3), degrees=True).as_matrix()
         T = rigid_transform(turn @ axes, rng.normal(0, 0.5, 3))
-        K = np.array([[500.0, 0, size[1] / 2 + 9], [0, 480, size[0] / 2 - 7], [0, 0, 1]])
+        K = np.array([[500.0, 0, size[1] / 2 + 25], [0, 480, size[0] / 2 - 20], [0, 0, 1]])
         points = rng.normal(0, (15, 8, 2), (2000, 3))
         seen = project(transform_points(T, points[points[:, 0] > 0]), Camera(K, T, size))[1]
-        got = float(share_on_image(points.copy(), T, K, size))
+        got = answer_array(share_on_image(points.copy(), T, K, size)).item()
         assert np.isclose(got, seen.mean(), atol=2e-3), "another share for a camera that is turned and stands elsewhere"
 
 
 def _road(seed: int) -> tuple[NDArray, float, float]:
     """Return returns of a road that is seen from anywhere ahead, its height and its rise."""
-    rng = np.random.default_rng(seed)
+    rng = generator(seed)
     height, p, r = rng.uniform(1.2, 2.2), rng.uniform(-0.05, 0.05), rng.uniform(-0.03, 0.03)
     x, y = rng.uniform(3, 20, 300), rng.uniform(-1.5, 1.5, 300)
     return np.column_stack([x, y, -height + p * x + r * y]), height, float(np.degrees(np.arctan(p)))
@@ -56,7 +57,7 @@ def check_ground(ground: Callable) -> None:
     """Other heights, and roads that fall or lean."""
     for seed in range(1320, 1326):
         road, height, rise = _road(seed)
-        got = np.asarray(ground(road.copy()), float).ravel()
+        got = answer_array(ground(road.copy())).ravel()
         assert got.shape == (2,), f"{got.size} numbers instead of 2"
         assert np.isclose(got[0], height, atol=0.01), "another height: does the road fall or lean to a side?"
         assert np.isclose(got[1], rise, atol=0.05), "another rise: does the road fall or lean to a side?"
@@ -64,29 +65,31 @@ def check_ground(ground: Callable) -> None:
 
 @hidden
 def check_ground_with_cars(ground: Callable) -> None:
-    """Cars elsewhere and of other sizes."""
+    """Cars elsewhere and of other sizes: they must change nothing, whatever the answer says without them."""
     for seed, (start, high) in enumerate(((5.0, 0.5), (10.0, 1.5), (15.0, 3.0))):
         road, height, rise = _road(1330 + seed)
-        rng = np.random.default_rng(1340 + seed)
+        rng = generator(1340 + seed)
         road[:, 2] += rng.normal(0, 0.01, len(road))
         road[:60, 0] = rng.uniform(start, start + 4, 60)
         road[:60, 2] = -height + road[:60, 0] * np.tan(np.radians(rise)) + rng.uniform(0.3, high, 60)
-        got = np.asarray(ground(road.copy()), float).ravel()
-        assert abs(got[0] - height) < 0.02, f"a car {start:g} m ahead changes the height"
-        assert abs(got[1] - rise) < 0.2, f"a car {start:g} m ahead changes the rise"
+        clear, got = (answer_array(ground(points.copy())).ravel() for points in (road[60:], road))
+        raised = answer_array(ground(road[60:] + np.array([0, 0, 0.3]))).ravel()
+        assert np.isclose(abs(raised[0] - clear[0]), 0.3, atol=0.02), "the same height for a road that lies higher up"
+        assert abs(got[0] - clear[0]) < 0.02, f"a car {start:g} m ahead changes the height"
+        assert abs(got[1] - clear[1]) < 0.2, f"a car {start:g} m ahead changes the rise"
 
 
 @hidden
 def check_overlay(overlay: Callable) -> None:
     """Other sizes of scans, and motions in three dimensions."""
     for seed, (n, m) in enumerate(((50, 80), (300, 40), (1, 5))):
-        rng = np.random.default_rng(1350 + seed)
+        rng = generator(1350 + seed)
         T = rigid_transform(
             Rotation.from_euler("xyz", rng.normal(0, 20, 3), degrees=True).as_matrix(), rng.normal(0, 2, 3)
         )
         before, now = rng.normal(0, 10, (n, 3)), rng.normal(0, 10, (m, 3))
         wanted = np.median(KDTree(before).query(transform_points(T, now))[0])
-        got = float(overlay(before.copy(), now.copy(), T.copy()))
+        got = answer_array(overlay(before.copy(), now.copy(), T.copy())).item()
         assert np.isclose(got, wanted), f"another distance for scans of {n} and {m} returns"
 
 

@@ -17,14 +17,23 @@
 # you are wrong. Your instructor's tests use other numbers and other sizes. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
 
 # %% nbgrader={"grade": false, "grade_id": "setup", "locked": true, "schema_version": 3, "solution": false, "task": false}
-import tracemalloc
+# Names that begin with _ belong to the tests.
 import warnings
 
 import numpy as np
 
+from semgrid_edu.course.answers import answer_array
+from semgrid_edu.course.memory import peak_megabytes
 from semgrid_edu.crf import PermutohedralLattice, SeparableGaussian  # task 5 may use them
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
+
+
+def _explain(what, got, slips):
+    """Stop with a hint when the number `got` is what a common slip gives."""
+    for slip, hint in slips.items():
+        assert not np.isclose(got, slip, atol=1e-3), f"{what} {got:.4f}: {hint}"
+
 
 # %% [markdown]
 # ## Task 1: a Gaussian along rows, then along columns (2 points)
@@ -48,36 +57,37 @@ def blur_map(values, sigma):
 
 
 # %% nbgrader={"grade": true, "grade_id": "blur-map-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-# This sigma gives 0.8 to a neighbour, so 0.8 ** 4 = 0.41 at distance 2 and 0.8 ** 9 = 0.13 at distance 3. Two cells aren't 0.
-sigma = np.sqrt(-0.5 / np.log(0.8))
-values = np.array([[1.0, 0, 0, 0], [0, 0, 0, 2.0]])
-got = blur_map(values.copy(), sigma)  # by hand, cell (0, 1): 0.8 * 1 + 0.8 * 0.41 * 2 = 1.455
-assert got is not None, "blur_map returned nothing: did you forget `return`?"
-got = np.asarray(got)
-assert got.shape == (2, 4), f"expected the shape of the map, (2, 4), got {got.shape}: is it turned?"
-slips = {
-    0.8000: "row 1 isn't heard in row 0: the second pass must blur what the first pass left, not the map itself",
-    0.0000: "only columns are blurred: blur rows too, one after the other",
-    0.8548: "the factor 2 below sigma**2 is missing",
-    1.0923: "you divide by sigma instead of sigma**2",
-    1.8240: "the distance isn't squared",
-    0.3555: "nearly: the two passes have different widths",
-}
-for slip, hint in slips.items():
-    assert not np.isclose(got[0, 1], slip, atol=2e-3), f"cell (0, 1) is {got[0, 1]:.4f}: {hint}"
-assert got[0, 1] > 0.5, f"cell (0, 1) is {got[0, 1]:.4f}: that is normalised. The sum is asked for, not a mean"
-assert not np.isclose(got[0, 0], 2.28, atol=2e-3), (
-    "cell (0, 0) hears cell (1, 3) too well: your blur goes round, from the last column to the first; the map ends there"
-)
-assert not np.isclose(got[0, 0], 0.2147, atol=2e-3), "cell (0, 0) doesn't hear itself: cell i is included in the sum"
-np.testing.assert_allclose(got[0], [1.2147, 1.4554, 1.6896, 1.7342], atol=2e-3, err_msg="the upper row")
-np.testing.assert_allclose(got[1], [1.0684, 1.4592, 1.9277, 2.1074], atol=2e-3, err_msg="the lower row")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import fast_crf
+def _test():
+    # This sigma gives 0.8 to a neighbour, so 0.8 ** 4 = 0.41 at distance 2 and 0.8 ** 9 = 0.13 at distance 3. Two cells aren't 0.
+    sigma = np.sqrt(-0.5 / np.log(0.8))
+    values = np.array([[1.0, 0, 0, 0], [0, 0, 0, 2.0]])
+    got = answer_array(blur_map(values, sigma), "blur_map")  # by hand, cell (0, 1): 0.8 * 1 + 0.8 * 0.41 * 2 = 1.455
+    assert got.shape == (2, 4), f"expected the shape of the map, (2, 4), got {got.shape}: is it turned?"
+    slips = {
+        0.8000: "row 1 isn't heard in row 0: the second pass must blur what the first pass left, not the map itself",
+        0.0000: "only columns are blurred: blur rows too, one after the other",
+        0.8548: "the factor 2 below sigma**2 is missing",
+        1.0923: "you divide by sigma instead of sigma**2",
+        1.8240: "the distance isn't squared",
+        0.3555: "nearly: the two passes have different widths",
+    }
+    _explain("cell (0, 1) is", got[0, 1], slips)
+    assert got[0, 1] > 0.5, f"cell (0, 1) is {got[0, 1]:.4f}: that is normalised. The sum is asked for, not a mean"
+    slips = {
+        2.2800: "it hears cell (1, 3) too well: your blur goes round, from the last column to the first; the map ends there",
+        0.2147: "it doesn't hear itself: cell i is included in the sum",
+    }
+    _explain("cell (0, 0) is", got[0, 0], slips)
+    np.testing.assert_allclose(got, [[1.2147, 1.4554, 1.6896, 1.7342], [1.0684, 1.4592, 1.9277, 2.1074]], atol=2e-3)
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import fast_crf
 
-complaint = fast_crf.check_blur_map(blur_map)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = fast_crf.check_blur_map(blur_map)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 2: the simplex around a point (2 + 1 points)
@@ -112,7 +122,7 @@ def enclosing_simplex(y):
 
 
 # %% nbgrader={"grade": false, "grade_id": "corners-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def corner_hint(corners):
+def _corner_hint(corners):
     """Return what is wrong with the corners around y = (1.7, 1.6, -3.3), or nothing."""
     sums, remainders = corners.sum(axis=1), [sorted(set(row)) for row in (corners % 3).tolist()]
     if (sums != 0).all():
@@ -136,43 +146,54 @@ def corner_hint(corners):
 
 
 # %% nbgrader={"grade": true, "grade_id": "corners-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-y = np.array([1.7, 1.6, -3.3])  # rounded: (3, 3, -3), whose sum is 3. By hand: (3, 0, -3), residuals (-1.3, 1.6, -0.3)
-got = enclosing_simplex(y.copy())
-assert got is not None, "enclosing_simplex returned nothing: did you forget `return`?"
-assert isinstance(got, (tuple, list)), "return two arrays: corners and weights"
-assert len(got) == 2, "return two arrays: corners and weights"
-corners = np.asarray(got[0])
-assert corners.shape == (3, 3), f"expected 3 corners of 3 coordinates, got shape {corners.shape}"
-hint = corner_hint(corners)
-assert not hint, f"{corners.tolist()}: {hint}"
-np.testing.assert_array_equal(corners, [[3, 0, -3], [1, 1, -2], [2, 2, -4]], err_msg="the corners, by hand")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import fast_crf
+def _test():
+    # (1.7, 1.6, -3.3), rounded: (3, 3, -3), whose sum is 3. By hand: (3, 0, -3), residuals (-1.3, 1.6, -0.3).
+    y = np.array([1.7, 1.6, -3.3])
+    got = enclosing_simplex(y)
+    assert got is not None, "enclosing_simplex returned nothing: did you forget `return`?"
+    assert isinstance(got, (tuple, list)), "return two arrays: corners and weights"
+    assert len(got) == 2, "return two arrays: corners and weights"
+    corners = answer_array(got[0], "for the corners enclosing_simplex")
+    assert corners.shape == (3, 3), f"expected 3 corners of 3 coordinates, got shape {corners.shape}"
+    hint = _corner_hint(corners)
+    assert not hint, f"{corners.tolist()}: {hint}"
+    np.testing.assert_array_equal(corners, [[3, 0, -3], [1, 1, -2], [2, 2, -4]], err_msg="the corners, by hand")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import fast_crf
 
-complaint = fast_crf.check_corners(enclosing_simplex)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = fast_crf.check_corners(enclosing_simplex)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
 
 # %% nbgrader={"grade": true, "grade_id": "weights-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-weights = np.asarray(enclosing_simplex(y.copy())[1], dtype=float)
-assert weights.shape == (3,), f"expected one weight for each corner, shape (3,), got {weights.shape}"
-assert not np.isclose(weights.sum(), 3), "the weights sum to 3: divide the gaps by d + 1"
-assert not np.isclose(weights[1:].sum(), 2.9), "the gaps are between residuals: divide them by d + 1"
-assert not np.isclose(weights[0], 0), "the first corner gets what the others leave: 1 - 0.333 - 0.633"
-assert np.isclose(weights.sum(), 1), f"the weights sum to {weights.sum():.3f}, not to 1"
-assert not np.allclose(weights, [0.0333, 0.6333, 0.3333], atol=1e-3), (
-    "weights of corners 1 and 2 are swapped: corner 1 was reached by stepping back in the smallest residual, so its gap is the last"
-)
-assert (weights > -1e-9).all(), f"a weight is negative, {weights.round(3)}: the point would lie outside its simplex"
-np.testing.assert_allclose(
-    weights, [0.0333, 0.3333, 0.6333], atol=1e-3, err_msg="the gaps, by hand: 1.0 / 3 and 1.9 / 3"
-)
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import fast_crf
+def _test():
+    y = np.array([1.7, 1.4, -3.1])  # rounded: (3, 0, -3), whose sum is 0. By hand: residuals (-1.3, 1.4, -0.1)
+    got = enclosing_simplex(y)
+    assert isinstance(got, (tuple, list)), "return two arrays: corners and weights"
+    weights = answer_array(got[-1], "for the weights enclosing_simplex")
+    assert weights.shape == (3,), f"expected one weight for each corner, shape (3,), got {weights.shape}"
+    assert not np.isclose(weights.sum(), 3), "the weights sum to 3: divide the gaps by d + 1"
+    assert not np.isclose(weights[1:].sum(), 2.7), "the gaps are between residuals: divide them by d + 1"
+    assert not np.isclose(weights[0], 0), "the first corner gets what the others leave: 1 - 0.4 - 0.5"
+    assert np.isclose(weights.sum(), 1), f"the weights sum to {weights.sum():.3f}, not to 1"
+    assert not np.allclose(weights, [0.1, 0.5, 0.4], atol=1e-3), (
+        "weights of corners 1 and 2 are swapped: corner 1 was reached by stepping back in the smallest residual, so its gap is the last"
+    )
+    assert (weights > -1e-9).all(), f"a weight is negative, {weights.round(3)}: the point would lie outside its simplex"
+    np.testing.assert_allclose(weights, [0.1, 0.4, 0.5], atol=1e-3, err_msg="the gaps, by hand: 1.2 / 3 and 1.5 / 3")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import fast_crf
 
-complaint = fast_crf.check_weights(enclosing_simplex)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = fast_crf.check_weights(enclosing_simplex)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 3: splat, blur, slice (3 points)
@@ -209,9 +230,7 @@ def lattice_filter(simplices, values):
 
 
 # %% nbgrader={"grade": false, "grade_id": "lattice-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-# One dimension: two points share the vertex in the middle of three. By hand: splat 12, 20, 16; blurred once 11, 17, 13; twice 9.75, 14.5, 10.75.
-line = [(np.array([[0, 0], [-1, 1]]), np.array([0.75, 0.25])), (np.array([[-2, 2], [-1, 1]]), np.array([0.5, 0.5]))]
-slips = {
+_LATTICE_SLIPS = {  # what point 0 of the test gets by a common slip
     14.0000: "nothing is blurred between splat and slice",
     12.5000: "you blur along one direction only: there are d + 1",
     43.7500: "you blur with (1/2, 1, 1/2): the vertex keeps a half, its neighbours give a quarter each",
@@ -227,26 +246,31 @@ slips = {
     10.7266: "a blur must read old values only; you change vertices while others still read them",
 }
 
-# %% nbgrader={"grade": true, "grade_id": "lattice-filter-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
-got = lattice_filter(
-    line, np.array([[16.0, 0.0], [32.0, 4.0]])
-)  # first column, point 0: 0.75 * 9.75 + 0.25 * 14.5 = 10.94
-assert got is not None, "lattice_filter returned nothing: did you forget `return`?"
-got = np.asarray(got, dtype=float)
-assert got.shape == (2, 2), f"expected N rows of K values, (2, 2), got {got.shape}"
-for slip, hint in slips.items():
-    assert not np.isclose(got[0, 0], slip, atol=1e-3), f"point 0 gets {got[0, 0]:.4f}: {hint}"
-np.testing.assert_allclose(got, [[10.9375, 0.78125], [12.625, 1.1875]], atol=1e-4, err_msg="both points, by hand")
-triangle = [(np.roll([[0, 0, 0], [1, 1, -2], [2, -1, -1]], -k, axis=0), np.array([1.0, 0, 0])) for k in range(3)]
-got = np.asarray(lattice_filter(triangle, np.array([[64.0], [0], [0]])))[:, 0]  # one point on each corner of a triangle
-assert not np.allclose(got, [9, 4, 6]), "the order of the directions is 0, 1, ... d: you begin with the last"
-np.testing.assert_allclose(got, [9, 6, 4], err_msg="a triangle: each of the 3 directions joins two of its corners")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import fast_crf
 
-complaint = fast_crf.check_lattice_filter(lattice_filter)
-assert not complaint, complaint
-### END HIDDEN TESTS
+# %% nbgrader={"grade": true, "grade_id": "lattice-filter-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    # One dimension: two points share the vertex in the middle of three. By hand: splat 12, 20, 16; blurred once 11, 17, 13; twice 9.75, 14.5, 10.75.
+    left = np.array([[0, 0], [-1, 1]]), np.array([0.75, 0.25])
+    right = np.array([[-2, 2], [-1, 1]]), np.array([0.5, 0.5])
+    got = lattice_filter([left, right], np.array([[16.0, 0.0], [32.0, 4.0]]))
+    got = answer_array(got, "lattice_filter")  # first column, point 0: 0.75 * 9.75 + 0.25 * 14.5 = 10.94
+    assert got.shape == (2, 2), f"expected N rows of K values, (2, 2), got {got.shape}"
+    _explain("point 0 gets", got[0, 0], _LATTICE_SLIPS)
+    np.testing.assert_allclose(got, [[10.9375, 0.78125], [12.625, 1.1875]], atol=1e-4, err_msg="both points, by hand")
+    corners, at_first = np.array([[0, 0, 0], [1, 1, -2], [2, -1, -1]]), np.array([1.0, 0, 0])
+    triangle = [(np.roll(corners, -k, axis=0), at_first) for k in range(3)]  # one point on each corner
+    got = answer_array(lattice_filter(triangle, np.array([[64.0], [0], [0]])), "lattice_filter").ravel()
+    assert not np.array_equal(got, [9, 4, 6]), "the order of the directions is 0, 1, ... d: you begin with the last"
+    np.testing.assert_allclose(got, [9, 6, 4], err_msg="a triangle: each of the 3 directions joins two of its corners")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import fast_crf
+
+    complaint = fast_crf.check_lattice_filter(lattice_filter)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 4: what the other cells say (2 points)
@@ -268,33 +292,35 @@ def others_say(blur, Q):
 
 
 # %% nbgrader={"grade": true, "grade_id": "others-say-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-kernel = np.array([[1.1, 0.5, 0.2], [0.5, 0.9, 0.4], [0.2, 0.4, 0.8]])
-Q = np.array([[0.9, 0.1], [0.5, 0.5], [0.2, 0.8]])
-before = Q.copy()
-got = others_say(lambda values: kernel @ values, Q)  # by hand, cell 0, class 0: 0.5 * 0.5 + 0.2 * 0.2 = 0.29
-assert got is not None, "others_say returned nothing: did you forget `return`?"
-assert np.array_equal(Q, before), "others_say changed its argument `Q`: work on a copy"
-got = np.asarray(got)
-assert got.shape == (3, 2), f"expected the shape of Q, (3, 2), got {got.shape}"
-slips = {
-    1.28: "nothing is subtracted: the filter counts the cell itself",
-    0.38: "you subtract Q itself, as if k_ii were 1: this filter has another k_ii in each cell",
-    -0.34: "you subtract the sum of the kernel's row: k_ii is what comes back to cell i when cell i alone has a value",
-    0.18: "you subtract k_ii without Q: a cell tells itself k_ii * Q",
-    0.99: "that is what the cell tells itself: subtract it from the whole sum",
-    -0.29: "the sign is swapped",
-    0.1611: "you divide by the sum of the kernel's row: the sum is asked for",
-    0.56: "that is k_ii of cell 2, taken for all cells: each cell has its own",
-}
-for slip, hint in slips.items():
-    assert not np.isclose(got[0, 0], slip, atol=2e-3), f"cell 0, class 0: {got[0, 0]:.3f}: {hint}"
-np.testing.assert_allclose(got, [[0.29, 0.41], [0.53, 0.37], [0.38, 0.22]], err_msg="by hand")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import fast_crf
+def _test():
+    kernel = np.array([[1.1, 0.5, 0.2], [0.5, 0.9, 0.4], [0.2, 0.4, 0.8]])
+    Q = np.array([[0.9, 0.1], [0.5, 0.5], [0.2, 0.8]])
+    before = Q.copy()
+    got = others_say(lambda values: kernel @ values, Q)  # by hand, cell 0, class 0: 0.5 * 0.5 + 0.2 * 0.2 = 0.29
+    got = answer_array(got, "others_say")
+    assert np.array_equal(Q, before), "others_say changed its argument `Q`: work on a copy"
+    assert got.shape == (3, 2), f"expected the shape of Q, (3, 2), got {got.shape}"
+    slips = {
+        1.28: "nothing is subtracted: the filter counts the cell itself",
+        0.38: "you subtract Q itself, as if k_ii were 1: this filter has another k_ii in each cell",
+        -0.34: "you subtract the sum of the kernel's row: k_ii is what comes back to cell i when cell i alone has a value",
+        0.18: "you subtract k_ii without Q: a cell tells itself k_ii * Q",
+        0.99: "that is what the cell tells itself: subtract it from the whole sum",
+        -0.29: "the sign is swapped",
+        0.1611: "you divide by the sum of the kernel's row: the sum is asked for",
+        0.56: "that is k_ii of cell 2, taken for all cells: each cell has its own",
+    }
+    _explain("cell 0, class 0:", got[0, 0], slips)
+    np.testing.assert_allclose(got, [[0.29, 0.41], [0.53, 0.37], [0.38, 0.22]], err_msg="by hand")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import fast_crf
 
-complaint = fast_crf.check_others_say(others_say)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = fast_crf.check_others_say(others_say)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 5: a CRF of your own (3 + 1 points)
@@ -347,7 +373,7 @@ def refine(log_g, o):
 
 
 # %% nbgrader={"grade": false, "grade_id": "all-pairs", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def all_pairs(log_g, o, w=(4, 3), widths=(3.2, 0.2, 1.2), own=1, root=0.5, sign=1, rounds=10, keep=0, log=True):
+def _all_pairs(log_g, o, w=(4, 3), widths=(3.2, 0.2, 1.2), own=1, root=0.5, sign=1, rounds=10, keep=0, log=True):
     """Do the same with a matrix of all pairs; other keywords make mistakes."""
     place, flat, K = np.indices(o.shape[1:]).reshape(2, -1).T, log_g.reshape(len(log_g), -1), 0
     for weight, f in (
@@ -365,13 +391,16 @@ def all_pairs(log_g, o, w=(4, 3), widths=(3.2, 0.2, 1.2), own=1, root=0.5, sign=
     return Q.reshape(log_g.shape)
 
 
-rng = np.random.default_rng(11)
-truth, state = (np.arange(13) > 5)[:, None] + 2 * (np.arange(10) > 4), (np.arange(10) > 4) + np.zeros((13, 1), int)
-log_g = np.log(rng.dirichlet(np.ones(4), (13, 10)) * 0.7 + 0.3 * np.eye(4)[truth]).transpose(2, 0, 1)
-o = (0.1 * rng.dirichlet(np.ones(4), (13, 10)) + 0.9 * np.eye(4)[state]).transpose(2, 0, 1)
+def _street():
+    """Return the classes (13, 10) of a street, log g (4, 13, 10) that guesses them, and its occupancy o (4, 13, 10)."""
+    rng, on_right = np.random.default_rng(11), np.arange(10) > 4
+    truth, state = (np.arange(13) > 5)[:, None] + 2 * on_right, on_right + np.zeros((13, 1), int)
+    log_g = np.log(rng.dirichlet(np.ones(4), (13, 10)) * 0.7 + 0.3 * np.eye(4)[truth]).transpose(2, 0, 1)
+    return truth, log_g, (0.1 * rng.dirichlet(np.ones(4), (13, 10)) + 0.9 * np.eye(4)[state]).transpose(2, 0, 1)
+
 
 # %% nbgrader={"grade": false, "grade_id": "refine-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-slips = {
+_REFINE_SLIPS = {
     "what a cell tells itself isn't subtracted: see task 4": {"own": 0},
     "the kernels aren't normalised: D^-1/2 K D^-1/2": {"root": 0},
     "you divide by the row sums twice: scale by 1 / sqrt(D) before and after the filter": {"root": 1},
@@ -389,51 +418,63 @@ slips = {
     "each iteration starts from log_g, not from the last log Q: you add up all iterations": {"keep": 1},
 }
 
-# %% nbgrader={"grade": true, "grade_id": "refine-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
-got = refine(log_g.copy(), o.copy())
-assert got is not None, "refine returned nothing: did you forget `return`?"
-got = np.asarray(got, dtype=float)
-assert got.shape == log_g.shape, f"expected the shape of log_g, (4, 13, 10), got {got.shape}"
-assert np.isfinite(got).all(), "probabilities must be finite: subtract the largest exponent of each cell before np.exp"
-assert (got >= 0).all(), "a probability is negative: return Q, not log Q"
-sums = got.sum(axis=0)
-assert np.allclose(sums, 1, atol=1e-3), (
-    f"the classes of a cell sum to {sums.flat[0]:.3f}: the soft-max runs over classes"
-)
-certain = 40 * (np.eye(4)[truth].transpose(2, 0, 1) - 1)
-share = (np.asarray(refine(certain, o)).argmax(axis=0) == truth).mean()
-assert share > 0.9, (
-    f"a network that is certain keeps {100 * share:.0f} % of its labels: is the sign right, are classes and cells mixed up? "
-    "(C, H, W) becomes (N, C) by reshape(C, -1).T, and goes back by .T.reshape(C, H, W)"
-)
-away = {hint: np.abs(got - all_pairs(log_g, o, **slip)).mean() for hint, slip in slips.items()}
-hint, error = min(away, key=away.get), np.abs(got - all_pairs(log_g, o)).mean()
-assert error <= away[hint], f"nearer to a mistake ({away[hint]:.3f}) than to the right map ({error:.3f}): {hint}"
-assert error < 0.02, f"on average a probability is off by {error:.3f}, more than a lattice's kernel explains (0.02)"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import fast_crf
 
-complaint = fast_crf.check_refine(refine)
-assert not complaint, complaint
-### END HIDDEN TESTS
+# %% nbgrader={"grade": true, "grade_id": "refine-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    truth, log_g, o = _street()
+    got = answer_array(refine(log_g.copy(), o.copy()), "refine")
+    assert got.shape == log_g.shape, f"expected the shape of log_g, (4, 13, 10), got {got.shape}"
+    assert np.isfinite(got).all(), (
+        "probabilities must be finite: subtract the largest exponent of each cell before np.exp"
+    )
+    assert (got >= 0).all(), "a probability is negative: return Q, not log Q"
+    total = got.sum(axis=0)[0, 0]
+    assert np.allclose(got.sum(axis=0), 1, atol=1e-3), (
+        f"the classes of a cell sum to {total:.3f}: the soft-max runs over classes"
+    )
+    certain = 40 * (np.eye(4)[truth].transpose(2, 0, 1) - 1)
+    share = (answer_array(refine(certain, o.copy()), "refine").argmax(axis=0) == truth).mean()
+    assert share > 0.9, (
+        f"a network that is certain keeps {100 * share:.0f} % of its labels: is the sign right, are classes and cells mixed up? "
+        "(C, H, W) becomes (N, C) by reshape(C, -1).T, and goes back by .T.reshape(C, H, W)"
+    )
+    away = {hint: np.abs(got - _all_pairs(log_g, o, **slip)).mean() for hint, slip in _REFINE_SLIPS.items()}
+    hint, error = min(away, key=away.get), np.abs(got - _all_pairs(log_g, o)).mean()
+    assert error <= away[hint], f"nearer to a mistake ({away[hint]:.3f}) than to the right map ({error:.3f}): {hint}"
+    assert error < 0.02, f"on average a probability is off by {error:.3f}, more than a lattice's kernel explains (0.02)"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import fast_crf
+
+    complaint = fast_crf.check_refine(refine)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
 
 # %% nbgrader={"grade": true, "grade_id": "refine-memory-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-log_g, o = (np.kron(part, np.ones((1, 3, 5))) for part in (log_g, o))  # 39 x 50 cells: a matrix of all pairs has 30 MB
-tracemalloc.start()
-large = np.asarray(refine(log_g, o))
-megabytes = tracemalloc.get_traced_memory()[1] / 1e6
-tracemalloc.stop()
-assert large.shape == log_g.shape, f"on a larger map: expected {log_g.shape}, got {large.shape}"
-assert megabytes < 30, (
-    f"3120 cells took {megabytes:.0f} MB: you write all pairs down; the paper's grid would take 24 GB"
-)
-assert np.allclose(large.sum(axis=0), 1, atol=1e-3), "on a larger map the classes of a cell don't sum to 1"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import fast_crf
+def _test():
+    _, log_g, o = _street()
+    refine(log_g.copy(), o.copy())  # what is compiled on the first call isn't counted
+    log_g, o = (np.kron(part, np.ones((1, 3, 5))) for part in (log_g, o))  # 39 x 50 cells: all pairs have 30 MB
+    large, megabytes = peak_megabytes(refine, log_g.copy(), o)
+    large = answer_array(large, "refine")
+    assert large.shape == log_g.shape, f"on a larger map: expected {log_g.shape}, got {large.shape}"
+    assert not np.allclose(large, log_g), "refine gave log_g back: this point is for a map that was refined"
+    assert not np.allclose(large, np.exp(log_g)), "refine gave the network's probabilities back, not refined ones"
+    assert megabytes < 30, (
+        f"3120 cells took {megabytes:.0f} MB: you write all pairs down; the paper's grid would take 24 GB"
+    )
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import fast_crf
 
-complaint = fast_crf.check_refine_memory(refine)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = fast_crf.check_refine_memory(refine)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ### See it on the drive

@@ -17,10 +17,12 @@
 # you are wrong. Your instructor's tests use other numbers and other frames. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
 
 # %% nbgrader={"grade": false, "grade_id": "setup", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# Names that begin with _ belong to the tests.
 import warnings
 
 import numpy as np
 
+from semgrid_edu.course.answers import answer_array
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.experiments.new_data.drive_checks import edge_contrast, ground_plane, time_gaps  # for task 5
 from semgrid_edu.experiments.new_data.ego_motion import motion_between, overlay_error
@@ -46,30 +48,32 @@ def find_gaps(times):
 
 
 # %% nbgrader={"grade": true, "grade_id": "find-gaps-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-# The steps are 0.1, 0.1, 0.2, 0.1, 0.1, 0.5 and 0.1 s, their median is 0.1 s: two are gaps.
-got = find_gaps([0.0, 0.1, 0.2, 0.4, 0.5, 0.6, 1.1, 1.2])
-assert got is not None, "find_gaps returned nothing: did you forget `return`?"
-got = np.asarray(got)
-assert got.dtype != bool, "return the numbers k, not one True or False for each step"
-got = got.ravel().tolist()
-slips = {
-    (3, 6): "you name the frame after the gap: k is the frame before it",
-    (5,): "only the longest is found: compare with the median, since long gaps pull up the mean",
-    (0, 1, 3, 4, 6): "these are the steps that are no gaps: the comparison is the wrong way round",
-    (0.2, 0.5): "you return steps: return their numbers k",
-    (0.2, 0.6): "you return times: return the numbers k",
-    (): "no gap is found",
-}
-key = tuple(np.round(got, 6))
-assert key not in slips, f"got {got}: {slips[key]}"
-assert got == [2, 5], f"expected gaps after frames 2 and 5, got {got}"
-assert list(find_gaps([0.0, 0.1, 0.2, 0.3])) == [], "found a gap where all steps are equal"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import real_drive
+def _test():
+    # The steps are 0.1, 0.1, 0.2, 0.1, 0.1, 0.5 and 0.1 s, their median is 0.1 s: two are gaps.
+    found = find_gaps([0.0, 0.1, 0.2, 0.4, 0.5, 0.6, 1.1, 1.2])
+    got = answer_array(found, "find_gaps").ravel().round(6).tolist()
+    assert np.asarray(found).dtype != bool, "return the numbers k, not one True or False for each step"
+    slips = {
+        (3, 6): "you name the frame after the gap: k is the frame before it",
+        (5,): "only the longest is found: compare with the median, since long gaps pull up the mean",
+        (0, 1, 3, 4, 6): "these are the steps that are no gaps: the comparison is the wrong way round",
+        (0.2, 0.5): "you return steps: return their numbers k",
+        (0.2, 0.6): "you return times: return the numbers k",
+        (): "no gap is found",
+    }
+    assert tuple(got) not in slips, f"got {found}: {slips[tuple(got)]}"
+    assert got == [2, 5], f"expected gaps after frames 2 and 5, got {found}"
+    none = answer_array(find_gaps([0.0, 0.1, 0.2, 0.3]), "find_gaps")
+    assert none.size == 0, "found a gap where all steps are equal"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import real_drive
 
-complaint = real_drive.check_find_gaps(find_gaps)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = real_drive.check_find_gaps(find_gaps)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 2: the share of the returns that fall on the image (2 points)
@@ -94,18 +98,8 @@ def share_on_image(points, T, K, size):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "share-on-image-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-# The camera stands 1 m ahead of the LIDAR; it sees (11, y, z) at u = 50 - 10 y, v = 20 - 10 z.
-T = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, -1], [0, 0, 0, 1]])
-K = np.array([[100.0, 0, 50], [0, 100, 20], [0, 0, 1]])
-on_it = [[11, 0, 0], [11, 4, 0], [11, 0, 1.5], [21, 4, 1]]
-beside = [[11, -6, 0], [11, 7, 0], [11, 3, 2.5], [11, 2, 3], [11, 1, 4]]  # u = 110, u = -20, and thrice v < 0
-between = [[0.5, 0, 0]]  # ahead of the LIDAR, behind the camera
-behind = [[-10, 0, 0], [-10, 2, 0], [-20, 0, 1]]
-points = np.array(on_it + beside + between + behind, float)
-got = share_on_image(points.copy(), T, K, (41, 101))
-assert got is not None, "share_on_image returned nothing: did you forget `return`?"
-slips = {
+# %% nbgrader={"grade": false, "grade_id": "share-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_SHARE_SLIPS = {
     4 / 13: "you divide by the number of all returns: only those with x > 0 count",
     8 / 13: "returns behind the camera are counted as seen, and you divide by all returns: check Z > 0",
     5 / 10: "a return behind the camera is counted as seen: check Z > 0; or the upper limits are missing",
@@ -117,15 +111,32 @@ slips = {
     0.0: "nothing falls on the image: did you divide by Z, and use T the right way round?",
     4.0: "you return the number: divide by the number of returns ahead",
 }
-close = [hint for value, hint in slips.items() if np.isclose(float(got), value, atol=1e-3)]
-assert not close, f"got {float(got):.3f}: {close[0]}"
-assert np.isclose(float(got), 4 / 10), f"expected 4 of 10 returns ahead, 0.4, got {float(got):.3f}"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import real_drive
 
-complaint = real_drive.check_share_on_image(share_on_image)
-assert not complaint, complaint
-### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "share-on-image-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    # The camera stands 1 m ahead of the LIDAR; it sees (11, y, z) at u = 50 - 10 y, v = 20 - 10 z.
+    T = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, -1], [0, 0, 0, 1]])
+    K = np.array([[100.0, 0, 50], [0, 100, 20], [0, 0, 1]])
+    on_it = [[11, 0, 0], [11, 4, 0], [11, 0, 1.5], [21, 4, 1]]
+    beside = [[11, -6, 0], [11, 7, 0], [11, 3, 2.5], [11, 2, 3], [11, 1, 4]]  # u = 110, u = -20, and thrice v < 0
+    between, behind = [[0.5, 0, 0]], [[-10, 0, 0], [-10, 2, 0], [-20, 0, 1]]  # of LIDAR and camera; of both
+    points = np.array(on_it + beside + between + behind, float)
+    got = answer_array(share_on_image(points, T, K, (41, 101)), "share_on_image")
+    assert got.size == 1, f"return one number, the share; got an array of shape {got.shape}"
+    got = got.item()
+    close = [hint for value, hint in _SHARE_SLIPS.items() if np.isclose(got, value, atol=1e-3)]
+    assert not close, f"got {got:.3f}: {close[0]}"
+    assert np.isclose(got, 4 / 10), f"expected 4 of 10 returns ahead, 0.4, got {got:.3f}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import real_drive
+
+    complaint = real_drive.check_share_on_image(share_on_image)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 3: the ground below the LIDAR (2 + 1 points)
@@ -153,47 +164,58 @@ def ground(points):
 
 
 # %% nbgrader={"grade": true, "grade_id": "ground-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-# By hand: from (4, 0, -1.70) ten metres ahead, z rises by 0.40: p = 0.04, 2.29 degrees. At x = 0 the ground lies at -1.86 m.
-road = np.array([[4, 0, -1.70], [14, 0, -1.30], [4, 1, -1.69], [14, -1, -1.31]])
-got = ground(road.copy())
-assert got is not None, "ground returned nothing: did you forget `return`?"
-assert np.size(got) == 2, f"return two numbers, height and rise; got {got}"
-height, rise = map(float, got)
-assert not np.isclose(height, -1.86, atol=0.01), "the height is negative: the ground lies at -h"
-assert not np.isclose(height, 1.50, atol=0.01), "that is the mean height: extrapolate to the LIDAR's place, x = 0"
-assert not np.isclose(height, rise, atol=1e-6), "both numbers are equal"
-assert np.isclose(height, 1.86, atol=0.01), f"expected a height of 1.86 m, got {height:.3f}"
-slips = {
-    0.04: "that is the slope, or its angle in radians: degrees are asked for",
-    -2.2906: "the sign is swapped: the ground ahead is higher, so it rises",
-    0.5729: "that is the rise to the left: the order of x and y",
-}
-for slip, hint in slips.items():
-    assert not np.isclose(rise, slip, atol=2e-3), f"rise {rise:.4f}: {hint}"
-assert np.isclose(rise, 2.2906, atol=0.01), f"expected a rise of 2.29 degrees, got {rise:.3f}"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import real_drive
+def _test():
+    # By hand: from (4, 0, -1.70) ten metres ahead, z rises by 0.40: p = 0.04, 2.29 degrees. At x = 0 the ground lies at -1.86 m.
+    road = np.array([[4, 0, -1.70], [14, 0, -1.30], [4, 1, -1.69], [14, -1, -1.31]])
+    got = answer_array(ground(road), "ground")
+    assert got.size == 2, f"return two numbers, height and rise; got {got}"
+    height, rise = got.ravel()
+    assert not np.isclose(height, -1.86, atol=0.01), "the height is negative: the ground lies at -h"
+    assert not np.isclose(height, 1.50, atol=0.01), "that is the mean height: extrapolate to the LIDAR's place, x = 0"
+    assert not np.isclose(height, rise, atol=1e-6), "both numbers are equal"
+    assert np.isclose(height, 1.86, atol=0.01), f"expected a height of 1.86 m, got {height:.3f}"
+    slips = {
+        0.04: "that is the slope, or its angle in radians: degrees are asked for",
+        -2.2906: "the sign is swapped: the ground ahead is higher, so it rises",
+        0.5729: "that is the rise to the left: the order of x and y",
+    }
+    for slip, hint in slips.items():
+        assert not np.isclose(rise, slip, atol=2e-3), f"rise {rise:.4f}: {hint}"
+    assert np.isclose(rise, 2.2906, atol=0.01), f"expected a rise of 2.29 degrees, got {rise:.3f}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import real_drive
 
-complaint = real_drive.check_ground(ground)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = real_drive.check_ground(ground)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
 
 # %% nbgrader={"grade": true, "grade_id": "ground-cars-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-rng = np.random.default_rng(13)
-road = np.column_stack([rng.uniform(3, 20, 400), rng.uniform(-1.5, 1.5, 400), np.zeros(400)])
-road[:, 2] = -1.7 + 0.01 * road[:, 0] + rng.normal(0, 0.01, 400)
-road[:60, 0], road[:60, 2] = rng.uniform(12, 16, 60), rng.uniform(-1.2, -0.3, 60)  # a car
-height, rise = map(float, ground(road.copy()))
-assert abs(height - 1.7) < 0.02, (
-    f"with a car on the road the height is {height:.2f} m, not 1.70: leave out what lies off the plane, and fit again"
-)
-assert abs(rise - 0.573) < 0.2, f"with a car on the road the rise is {rise:.2f} degrees, not 0.57"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import real_drive
+def _test():
+    rng = np.random.default_rng(13)
+    road = np.column_stack([rng.uniform(3, 20, 400), rng.uniform(-1.5, 1.5, 400), np.zeros(400)])
+    road[:, 2] = -1.7 + 0.01 * road[:, 0] + rng.normal(0, 0.01, 400)
+    road[:60, 0], road[:60, 2] = rng.uniform(12, 16, 60), rng.uniform(-1.2, -0.3, 60)  # a car
+    clear = answer_array(ground(road[60:].copy()), "ground").ravel()
+    raised = answer_array(ground(road[60:] + np.array([0, 0, 0.3])), "ground").ravel()
+    assert np.isclose(abs(raised[0] - clear[0]), 0.3, atol=0.02), "on a road 0.3 m higher up the height is the same"
+    height, rise = answer_array(ground(road.copy()), "ground").ravel()
+    assert abs(height - clear[0]) < 0.02, (
+        f"with a car on the road the height is {height:.2f} m, not {clear[0]:.2f}: leave out what lies off the plane, and fit again"
+    )
+    assert abs(rise - clear[1]) < 0.2, f"with a car on the road the rise is {rise:.2f} degrees, not {clear[1]:.2f}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import real_drive
 
-complaint = real_drive.check_ground_with_cars(ground)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = real_drive.check_ground_with_cars(ground)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 4: one scan laid over another (3 points)
@@ -216,59 +238,62 @@ def overlay(before, now, T):
 
 
 # %% nbgrader={"grade": false, "grade_id": "overlay-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def nearest(a, b):
+def _nearest(a, b):
     """Return for each point of b the distance to the nearest point of a."""
     return np.linalg.norm(b[:, None] - a, axis=2).min(axis=1)
 
 
-def carried(points, T):
+def _carried(points, T):
     """Move points."""
     return points @ T[:3, :3].T + T[:3, 3]
 
 
-angle = np.radians(20)
-T = np.eye(4)
-T[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-T[:3, 3] = 1.0, 0.3, 0.05
-before = np.array([[8.0, 2, 0], [12, -3, 1], [15, 4, 0.5], [20, -1, 1], [25, 6, 0], [9, -6, 1]])
-aside = np.array([[0.1, 0, 0], [0, 0.2, 0], [0, 0, 0.3], [0.4, 0, 0], [0, 2, 0]])
-now = carried(before[:5] + aside, np.linalg.inv(T))
+def _scans():
+    """Return the scan before, (6, 3), the scan of now, (5, 3), and T_before_from_now."""
+    c, s = np.cos(np.radians(20)), np.sin(np.radians(20))
+    T = np.array([[c, -s, 0, 1.0], [s, c, 0, 0.3], [0, 0, 1, 0.05], [0, 0, 0, 1]])
+    before = np.array([[8.0, 2, 0], [12, -3, 1], [15, 4, 0.5], [20, -1, 1], [25, 6, 0], [9, -6, 1]])
+    aside = np.array([[0.1, 0, 0], [0, 0.2, 0], [0, 0, 0.3], [0.4, 0, 0], [0, 2, 0]])
+    return before, _carried(before[:5] + aside, np.linalg.inv(T)), T
+
 
 # %% nbgrader={"grade": false, "grade_id": "overlay-slips", "locked": true, "schema_version": 3, "solution": false, "task": false}
-wrong = {
-    "that is the mean: a few things that move would spoil it, take the median": nearest(before, carried(now, T)).mean(),
-    "you move by the inverse: T carries points of now into the frame of before": np.median(
-        nearest(before, carried(now, np.linalg.inv(T)))
-    ),
-    "nothing is moved: apply T to `now`": np.median(nearest(before, now)),
-    "the rotation is missing": np.median(nearest(before, now + T[:3, 3])),
-    "the shift is missing": np.median(nearest(before, now @ T[:3, :3].T)),
-    "the rotation is transposed: points are rows, so it is now @ R.T": np.median(
-        nearest(before, now @ T[:3, :3] + T[:3, 3])
-    ),
-    "you go from before to now: look for the nearest of `before` for each of `now`": np.median(
-        nearest(carried(now, T), before)
-    ),
-    "that is the squared distance": np.median(nearest(before, carried(now, T)) ** 2),
-    "heights are left out: distances are in three dimensions": np.median(
-        nearest(before[:, :2], carried(now, T)[:, :2])
-    ),
-    "you move `before`, not `now`": np.median(nearest(carried(before, T), now)),
-}
+def _overlay_slips(before, now, T):
+    """Return the distances that common slips give, by hint."""
+    moved, back = _carried(now, T), _carried(now, np.linalg.inv(T))
+    mean_hint = "that is the mean: a few things that move would spoil it, take the median"
+    distances = {
+        "you move by the inverse: T carries points of now into the frame of before": _nearest(before, back),
+        "nothing is moved: apply T to `now`": _nearest(before, now),
+        "the rotation is missing": _nearest(before, now + T[:3, 3]),
+        "the shift is missing": _nearest(before, now @ T[:3, :3].T),
+        "the rotation is transposed: points are rows, so it is now @ R.T": _nearest(before, now @ T[:3, :3] + T[:3, 3]),
+        "you go from before to now: look for the nearest of `before` for each of `now`": _nearest(moved, before),
+        "that is the squared distance": _nearest(before, moved) ** 2,
+        "heights are left out: distances are in three dimensions": _nearest(before[:, :2], moved[:, :2]),
+        "you move `before`, not `now`": _nearest(_carried(before, T), now),
+    }
+    return {mean_hint: _nearest(before, moved).mean()} | {hint: np.median(d) for hint, d in distances.items()}
+
 
 # %% nbgrader={"grade": true, "grade_id": "overlay-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
-got = overlay(before.copy(), now.copy(), T.copy())  # by hand: the distances are 0.1, 0.2, 0.3, 0.4 and 2
-assert got is not None, "overlay returned nothing: did you forget `return`?"
-assert np.size(got) == 1, f"return one number, the median; got an array of shape {np.shape(got)}"
-for hint, value in wrong.items():
-    assert not np.isclose(float(got), value, atol=1e-6), f"got {float(got):.3f}: {hint}"
-assert np.isclose(float(got), 0.3), f"expected 0.3 m, got {float(got):.3f}"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import real_drive
+def _test():
+    before, now, T = _scans()
+    got = answer_array(overlay(before.copy(), now.copy(), T.copy()), "overlay")  # by hand: 0.1, 0.2, 0.3, 0.4 and 2
+    assert got.size == 1, f"return one number, the median; got an array of shape {got.shape}"
+    got = got.item()
+    for hint, value in _overlay_slips(before, now, T).items():
+        assert not np.isclose(got, value, atol=1e-6), f"got {got:.3f}: {hint}"
+    assert np.isclose(got, 0.3), f"expected 0.3 m, got {got:.3f}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import real_drive
 
-complaint = real_drive.check_overlay(overlay)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = real_drive.check_overlay(overlay)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 5: find the fault (3 points)
@@ -314,26 +339,28 @@ def find_fault(frames):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "find-fault-frames", "locked": true, "schema_version": 3, "solution": false, "task": false}
-frames = sample_drive()[4:15]
-
 # %% nbgrader={"grade": true, "grade_id": "find-fault-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
-found = {}
-for fault in ("none", "two frames lost", "camera turned", "LIDAR tilted", "poses backwards"):
-    found[fault] = find_fault(FAULTS[fault](frames))
-    assert found[fault] is not None, f"{fault}: find_fault returned nothing: did you forget `return`?"
-assert len(set(found.values())) > 1, f"the answer is always {found['none']!r}, whatever the fault"
-assert found["none"] == "none", (
-    f"the sound drive is called {found['none']!r}: which reading is beyond its limit, and is the limit too tight?"
-)
-for fault, said in found.items():
-    assert said == fault, f"the fault is {fault!r}, you say {said!r}"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import real_drive
+def _test():
+    frames, found = sample_drive()[4:15], {}
+    for fault in ("none", "two frames lost", "camera turned", "LIDAR tilted", "poses backwards"):
+        found[fault] = find_fault(FAULTS[fault](frames))
+        assert found[fault] is not None, f"{fault}: find_fault returned nothing: did you forget `return`?"
+        assert isinstance(found[fault], str), f"{fault}: return one of the five names, got {found[fault]!r}"
+    assert len(set(found.values())) > 1, f"the answer is always {found['none']!r}, whatever the fault"
+    assert found["none"] == "none", (
+        f"the sound drive is called {found['none']!r}: which reading is beyond its limit, and is the limit too tight?"
+    )
+    for fault, said in found.items():
+        assert said == fault, f"the fault is {fault!r}, you say {said!r}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import real_drive
 
-complaint = real_drive.check_find_fault(find_fault)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = real_drive.check_find_fault(find_fault)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 6: in your own words (2 points)

@@ -18,16 +18,18 @@
 # you are wrong. Your instructor's tests use other inputs. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
 
 # %% nbgrader={"grade": false, "grade_id": "setup", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# Names that begin with _ belong to the tests.
 import warnings
 
 import numpy as np
 
+from semgrid_edu.course.answers import answer_array
 from semgrid_edu.graphical import Factor
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
 
 
-def explain(got, slips):
+def _explain(got, slips):
     """Stop with a hint when `got` is what a common slip gives."""
     for slip, hint in slips.items():
         if np.shape(got) == np.shape(slip):
@@ -57,51 +59,66 @@ def multiply(f, g):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "multiply-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-cell, beam = (("m",), np.array([0.7, 0.3])), (("z", "m"), np.array([[0.9, 0.2], [0.1, 0.8]]))
-before = cell[1].copy(), beam[1].copy()
-got = multiply(cell, beam)
-assert got is not None, "multiply returned nothing: did you forget `return`?"
-assert np.array_equal(cell[1], before[0]), "multiply changed the table of `f`: make a new one (no *=)"
-assert np.array_equal(beam[1], before[1]), "multiply changed the table of `g`: make a new one (no *=)"
-assert isinstance(got, tuple | list), f"return a pair, (names, table), got {type(got).__name__}"
-assert len(got) == 2, f"return two things, the names and the table, got {len(got)}"
-names, table = tuple(got[0]), np.asarray(got[1])
-assert len(set(names)) == len(names), f"the names {names} hold m twice: a variable that both factors have is one axis"
-assert "m" in names, "m is summed out: a product keeps every variable, the sum comes later"
-assert sorted(names) == ["m", "z"], f"the product is over m and z, yours is over {names}"
-assert table.shape == (2, 2), f"two variables of two states make a table of shape (2, 2), got {table.shape}"
-table = table if names == ("z", "m") else table.T
-slips = {
+# %% nbgrader={"grade": false, "grade_id": "product-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_PRODUCT_SLIPS = {  # rows z, columns m
     ((0.63, 0.14), (0.03, 0.24)): "the numbers of m were multiplied along the axis of z: line the axes up by name",
     ((1.6, 0.5), (0.8, 1.1)): "you added: a product multiplies",
     ((0.63, 0.07), (0.06, 0.24)): "right numbers, wrong names: your names stand in another order than your axes",
 }
-explain(table, slips)
-np.testing.assert_allclose(table, [[0.63, 0.06], [0.07, 0.24]], err_msg="rows z, columns m: 0.9 * 0.7, 0.2 * 0.3; ...")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import graphical_models
 
-complaint = graphical_models.check_multiply(multiply)
-assert not complaint, complaint
-### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "multiply-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    cell, beam = (("m",), np.array([0.7, 0.3])), (("z", "m"), np.array([[0.9, 0.2], [0.1, 0.8]]))
+    before = cell[1].copy(), beam[1].copy()
+    got = multiply(cell, beam)
+    assert got is not None, "multiply returned nothing: did you forget `return`?"
+    assert np.array_equal(cell[1], before[0]), "multiply changed the table of `f`: make a new one (no *=)"
+    assert np.array_equal(beam[1], before[1]), "multiply changed the table of `g`: make a new one (no *=)"
+    assert isinstance(got, tuple | list), f"return a pair, (names, table), got {type(got).__name__}"
+    assert len(got) == 2, f"return two things, the names and the table, got {len(got)}"
+    names, table = tuple(got[0]), answer_array(got[1], "for the table multiply")
+    assert len(set(names)) == len(names), (
+        f"the names {names} hold m twice: a variable that both factors have is one axis"
+    )
+    assert "m" in names, "m is summed out: a product keeps every variable, the sum comes later"
+    assert sorted(names) == ["m", "z"], f"the product is over m and z, yours is over {names}"
+    assert table.shape == (2, 2), f"two variables of two states make a table of shape (2, 2), got {table.shape}"
+    _explain(table if names == ("z", "m") else table.T, _PRODUCT_SLIPS)
+    wanted = [[0.63, 0.06], [0.07, 0.24]] if names == ("z", "m") else [[0.63, 0.07], [0.06, 0.24]]
+    np.testing.assert_allclose(table, wanted, err_msg="z = 0: 0.9 * 0.7, 0.2 * 0.3; z = 1: 0.1 * 0.7, 0.8 * 0.3")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import graphical_models
+
+    complaint = graphical_models.check_multiply(multiply)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
 
 # %% nbgrader={"grade": true, "grade_id": "multiply-shared-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-f, g = (("m1", "m2"), np.array([[1.0, 2.0], [3.0, 4.0]])), (("m2", "m1"), np.array([[1.0, 10.0], [100.0, 1000.0]]))
-names, table = multiply(f, g)
-table = np.asarray(table) if tuple(names) == ("m1", "m2") else np.asarray(table).T
-slips = {
-    ((1.0, 20.0), (300.0, 4000.0)): "the axes of g stand the other way round: sort them by name, not by place",
-    ((1 / 4231, 200 / 4231), (30 / 4231, 4000 / 4231)): "you divided by the sum: a product isn't normalised",
-}
-explain(table, slips)
-np.testing.assert_allclose(table, [[1, 200], [30, 4000]], err_msg="at m1 = 0, m2 = 1: f says 2 and g says 100")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import graphical_models
+def _test():
+    f = ("m1", "m2"), np.array([[1.0, 2.0], [3.0, 4.0]])
+    names, table = multiply(f, (("m2", "m1"), np.array([[1.0, 10.0], [100.0, 1000.0]])))
+    table = answer_array(table, "for the table multiply")
+    table = table if tuple(names) == ("m1", "m2") else table.T
+    slips = {
+        ((1.0, 20.0), (300.0, 4000.0)): "the axes of g stand the other way round: sort them by name, not by place",
+        ((1 / 4231, 200 / 4231), (30 / 4231, 4000 / 4231)): "you divided by the sum: a product isn't normalised",
+    }
+    _explain(table, slips)
+    np.testing.assert_allclose(table, [[1, 200], [30, 4000]], err_msg="at m1 = 0, m2 = 1: f says 2 and g says 100")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import graphical_models
 
-complaint = graphical_models.check_multiply_shared(multiply)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = graphical_models.check_multiply_shared(multiply)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 2: what is seen (2 + 1 points)
@@ -127,60 +144,73 @@ def posterior(factor, wanted, given):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "posterior-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-table = np.array([[[8.0, 2.0], [1.0, 4.0]], [[3.0, 6.0], [0.0, 16.0]]])  # axes m1, m2, z
-joint = (("m1", "m2", "z"), table.copy())
-got = posterior(joint, "m2", {"z": 1})
-assert got is not None, "posterior returned nothing: did you forget `return`?"
-assert np.array_equal(joint[1], table), "posterior changed the table it was given: make a new one"
-assert np.shape(got) == (2,), f"one probability for each of the 2 states of m2, shape (2,), got {np.shape(got)}"
-slips = {
-    (19 / 40, 21 / 40): "you summed z out: z is known, so keep only the slice at z = 1",
-    (11 / 12, 1 / 12): "that is the slice at z = 0: a known state is an index, use its value",
+# %% nbgrader={"grade": false, "grade_id": "posterior-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_POSTERIOR_SLIPS = {  # P(m2 | z = 1) by a common slip
+    (19 / 41, 22 / 41): "you summed z out: z is known, so keep only the slice at z = 1",
+    (11 / 13, 2 / 13): "that is the slice at z = 0: a known state is an index, use its value",
     (6 / 28, 22 / 28): "that is P(m1 | z = 1): the axes have moved up after the slice, or `wanted` is ignored",
     (6 / 22, 16 / 22): "you took the largest entry over m1: an unknown variable is summed out",
-    (8.0, 20.0): "these are weights: divide by their sum, 28",
+    (8, 20): "these are weights: divide by their sum, 28",
     (
-        0.2,
-        0.5,
+        8 / 41,
+        20 / 41,
     ): "these are P(m2, z = 1), the weights divided by the sum of the whole table: divide by that of the slice",
     (2 / 6, 4 / 6): "you looked at m1 = 0 only: m1 isn't known, sum over its states",
-    (4.0, 10.0): "you took the mean over m1: sum, then divide by the sum",
+    (4, 10): "you took the mean over m1: sum, then divide by the sum",
 }
-explain(got, slips)
-np.testing.assert_allclose(got, [8 / 28, 20 / 28], err_msg="m2 = 0: 2 + 6 = 8; m2 = 1: 4 + 16 = 20")
-got = posterior(joint, "m2", {"m1": 1, "z": 0})
-explain(got, {(9 / 25, 16 / 25): "z = 0 is known too: state 0 is no `False`", (6 / 22, 16 / 22): "that is z = 1"})
-np.testing.assert_allclose(got, [1, 0], err_msg="with both known one row is left: 3 and 0")
-np.testing.assert_allclose(posterior(joint, "z", {}), [12 / 40, 28 / 40], err_msg="nothing given: sum the others out")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import graphical_models
 
-complaint = graphical_models.check_posterior(posterior)
-assert not complaint, complaint
-### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "posterior-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    table = np.array([[[8.0, 2.0], [1.0, 4.0]], [[3.0, 6.0], [1.0, 16.0]]])  # axes m1, m2, z
+    joint = (("m1", "m2", "z"), table.copy())
+    got = answer_array(posterior(joint, "m2", {"z": 1}), "posterior")
+    assert np.array_equal(joint[1], table), "posterior changed the table it was given: make a new one"
+    assert got.shape == (2,), f"one probability for each of the 2 states of m2, shape (2,), got {got.shape}"
+    _explain(got, _POSTERIOR_SLIPS)
+    np.testing.assert_allclose(got, [8 / 28, 20 / 28], err_msg="m2 = 0: 2 + 6 = 8; m2 = 1: 4 + 16 = 20")
+    got = answer_array(posterior(joint, "m2", {"m1": 1, "z": 0}), "posterior")
+    _explain(got, {(9 / 26, 17 / 26): "z = 0 is known too: state 0 is no `False`", (6 / 22, 16 / 22): "that is z = 1"})
+    np.testing.assert_allclose(got, [3 / 4, 1 / 4], err_msg="with both known one row is left: 3 and 1")
+    got = answer_array(posterior(joint, "z", {}), "posterior")
+    np.testing.assert_allclose(got, [13 / 41, 28 / 41], err_msg="nothing given: sum the others out")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import graphical_models
+
+    complaint = graphical_models.check_posterior(posterior)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
 
 # %% nbgrader={"grade": true, "grade_id": "impossible-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-silent = (("m", "z"), np.array([[0.5, 0.0], [0.5, 0.0]]))  # a sensor that never says 1
-try:
-    got, raised = posterior(silent, "m", {"z": 1}), False
-except ValueError:
-    got, raised = None, True
-assert raised or got is not None, "z = 1 can't happen: raise ValueError instead of returning nothing"
-assert raised or not np.isnan(got).any(), "0 / 0 gives NaN, which spreads silently: raise ValueError instead"
-assert raised, f"z = 1 can't happen, so nothing follows from it, not even {got}: raise ValueError"
-try:
-    certain = posterior((("m", "z"), np.array([[0.5, 0.0], [0.5, 0.2]])), "m", {"z": 1})
-except ValueError:
-    certain = None
-assert certain is not None, "here z = 1 can happen: a zero in one entry is no reason to raise"
-np.testing.assert_allclose(certain, [0, 1], err_msg="only m = 1 explains z = 1")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import graphical_models
+def _test():
+    silent = (("m", "z"), np.array([[0.5, 0.0], [0.5, 0.0]]))  # a sensor that never says 1
+    try:
+        got, raised = posterior(silent, "m", {"z": 1}), False
+    except ValueError:
+        got, raised = None, True
+    assert raised or got is not None, "z = 1 can't happen: raise ValueError instead of returning nothing"
+    spread = not raised and np.isnan(answer_array(got, "posterior")).any()
+    assert not spread, "0 / 0 gives NaN, which spreads silently: raise ValueError instead"
+    assert raised, f"z = 1 can't happen, so nothing follows from it, not even {got}: raise ValueError"
+    try:
+        posterior((("m", "z"), np.array([[0.5, 0.0], [0.5, 0.2]])), "m", {"z": 1})
+        can_happen = True
+    except ValueError:
+        can_happen = False
+    assert can_happen, "here z = 1 can happen: a zero in one entry is no reason to raise"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import graphical_models
 
-complaint = graphical_models.check_impossible(posterior)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = graphical_models.check_impossible(posterior)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 3: independence read off a graph (2 + 2 points)
@@ -220,60 +250,74 @@ def separated(parents, a, b, given=()):
 
 
 # %% nbgrader={"grade": false, "grade_id": "graphs", "locked": true, "schema_version": 3, "solution": false, "task": false}
-chain = {"before": (), "now": ("before",), "after": ("now",)}
-fork = {"m": (), "z1": ("m",), "z2": ("m",)}
-collider = {"m1": (), "m2": (), "z": ("m1", "m2")}
-noisy_range = {"m1": (), "m2": (), "r": ("m1", "m2"), "z": ("r",)}
-scans = {"before": (), "now": ("before",), "after": ("now",), "z1": ("before",), "z2": ("now",), "z3": ("after",)}
-dusty = {"m": (), "dust": (), "z1": ("m", "dust"), "z2": ("m", "dust")}
-pitched = {"m1": (), "m2": (), "pitch": (), "z1": ("m1", "pitch"), "z2": ("m2", "pitch")}
+_CHAIN = {"before": (), "now": ("before",), "after": ("now",)}
+_FORK = {"m": (), "z1": ("m",), "z2": ("m",)}
+_MEET = {"m1": (), "m2": (), "z": ("m1", "m2")}
+_THREE = (
+    (_CHAIN, "before", "after", (), False, "what acts on now acts on after: the chain is open while now isn't known"),
+    (_CHAIN, "before", "after", ("now",), True, "now is known, so it blocks the chain: before has no other way"),
+    (_FORK, "z1", "z2", (), False, "both beams hint at the same cell: the fork is open while m isn't known"),
+    (_FORK, "z1", "z2", ("m",), True, "m is known, so it blocks the fork: only the sensor's own errors are left"),
+    (_MEET, "m1", "m2", (), True, "z isn't known: arrows that meet block. Take z out in step (1)"),
+    (_MEET, "m1", "m2", ("z",), False, "explaining away: a known z opens the way. Link its parents, in step (2)"),
+    (_MEET, "m1", "z", ("m2",), False, "an arrow links them: neighbours are never separated"),
+)
+
 
 # %% nbgrader={"grade": true, "grade_id": "separated-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-cases = (
-    (chain, "before", "after", (), False, "what acts on now acts on after: the chain is open while now isn't known"),
-    (chain, "before", "after", ("now",), True, "now is known, so it blocks the chain: before has no other way"),
-    (fork, "z1", "z2", (), False, "both beams hint at the same cell: the fork is open while m isn't known"),
-    (fork, "z1", "z2", ("m",), True, "m is known, so it blocks the fork: only the sensor's own errors are left"),
-    (collider, "m1", "m2", (), True, "z isn't known: arrows that meet block. Take z out in step (1)"),
-    (collider, "m1", "m2", ("z",), False, "explaining away: a known z opens the way. Link its parents, in step (2)"),
-    (collider, "m1", "z", ("m2",), False, "an arrow links them: neighbours are never separated"),
-)
-graphs = [dict(parents) for parents, *_ in cases]
-got = [separated(graph, a, b, given) for graph, (_, a, b, given, _, _) in zip(graphs, cases, strict=True)]
-assert graphs == [parents for parents, *_ in cases], "separated changed its argument `parents`: make a new dictionary"
-assert all(answer in (True, False) for answer in got), f"return True or False, got {got}"
-expected = [case[4] for case in cases]
-assert got != [not answer for answer in expected], "all answers are the opposite: True means separated, no open path"
-for answer, (_, a, b, given, right, hint) in zip(got, cases, strict=True):
-    assert answer == right, f"{a} and {b} given {given}: you say {bool(answer)}, but {hint}"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import graphical_models
+def _test():
+    graphs = [dict(parents) for parents, *_ in _THREE]
+    got = [separated(graph, a, b, given) for graph, (_, a, b, given, _, _) in zip(graphs, _THREE, strict=True)]
+    untouched = graphs == [parents for parents, *_ in _THREE]
+    assert untouched, "separated changed its argument `parents`: make a new dictionary"
+    assert all(np.shape(answer) == () and answer in (True, False) for answer in got), f"return True or False, got {got}"
+    opposite = got == [not case[4] for case in _THREE]
+    assert not opposite, "all answers are the opposite: True means separated, no open path"
+    for answer, (_, a, b, given, right, hint) in zip(got, _THREE, strict=True):
+        assert answer == right, f"{a} and {b} given {given}: you say {bool(answer)}, but {hint}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import graphical_models
 
-complaint = graphical_models.check_separated_three(separated)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = graphical_models.check_separated_three(separated)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% nbgrader={"grade": false, "grade_id": "large-graphs", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_RANGE = {"m1": (), "m2": (), "r": ("m1", "m2"), "z": ("r",)}
+_SCANS = {"before": (), "now": ("before",), "after": ("now",), "z1": ("before",), "z2": ("now",), "z3": ("after",)}
+_DUST = {"m": (), "dust": (), "z1": ("m", "dust"), "z2": ("m", "dust")}
+_PITCH = {"m1": (), "m2": (), "pitch": (), "z1": ("m1", "pitch"), "z2": ("m2", "pitch")}
+_LARGE = (
+    (_RANGE, "m1", "m2", ("z",), False, "z lies below the collider r and tells something about it, so r is open"),
+    (_RANGE, "m1", "m2", (), True, "neither r nor anything below it is known"),
+    (_SCANS, "before", "after", ("z1", "z2", "z3"), False, "a scan of now is not now: the chain stays open"),
+    (_SCANS, "before", "z3", ("now",), True, "now blocks the only way, however long it is"),
+    (_DUST, "z1", "z2", ("m",), False, "m blocks one path, and the path through dust is open: all must be blocked"),
+    (_DUST, "z1", "z2", ("m", "dust"), True, "both paths are blocked"),
+    (_PITCH, "m1", "m2", ("z1",), True, "z2 isn't known and blocks: each collider on the path must be open"),
+    (_PITCH, "m1", "m2", ("z1", "z2"), False, "both colliders are known: the path through the pitch is open"),
+    (_PITCH, "m1", "m2", ("z1", "z2", "pitch"), True, "pitch is the middle of a fork, and known: it blocks"),
+)
+
 
 # %% nbgrader={"grade": true, "grade_id": "separated-large-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-cases = (
-    (noisy_range, "m1", "m2", ("z",), False, "z lies below the collider r and tells something about it, so r is open"),
-    (noisy_range, "m1", "m2", (), True, "neither r nor anything below it is known"),
-    (scans, "before", "after", ("z1", "z2", "z3"), False, "a scan of now is not now: the chain stays open"),
-    (scans, "before", "z3", ("now",), True, "now blocks the only way, however long it is"),
-    (dusty, "z1", "z2", ("m",), False, "m blocks one path, and the path through dust is open: all must be blocked"),
-    (dusty, "z1", "z2", ("m", "dust"), True, "both paths are blocked"),
-    (pitched, "m1", "m2", ("z1",), True, "z2 isn't known and blocks: each collider on the path must be open"),
-    (pitched, "m1", "m2", ("z1", "z2"), False, "both colliders are known: the path through the pitch is open"),
-    (pitched, "m1", "m2", ("z1", "z2", "pitch"), True, "pitch is the middle of a fork, and known: it blocks"),
-)
-for parents, a, b, given, right, hint in cases:
-    answer = separated(dict(parents), a, b, given)
-    assert answer == right, f"{a} and {b} given {given}: you say {answer}, but {hint}"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import graphical_models
+def _test():
+    for parents, a, b, given, right, hint in _LARGE:
+        answer = separated(dict(parents), a, b, given)
+        assert np.shape(answer) == (), f"return True or False, got {answer}"
+        assert answer == right, f"{a} and {b} given {given}: you say {answer}, but {hint}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import graphical_models
 
-complaint = graphical_models.check_separated_large(separated)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = graphical_models.check_separated_large(separated)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 4: eliminate, and say what it costs (2 + 1 points)
@@ -305,66 +349,77 @@ def eliminate(factors, order):
 
 
 # %% nbgrader={"grade": false, "grade_id": "star", "locked": true, "schema_version": 3, "solution": false, "task": false}
-street = Factor("street", [0.5, 0.5])
-star = [street, *(Factor(("street", f"m{k}"), [[0.9, 0.1], [0.6, 0.4]]) for k in (1, 2, 3, 4))]
-agree = [[3.0, 1.0], [1.0, 3.0]]
-row = [Factor(("m1", "m2"), agree), Factor(("m2", "m3"), agree)]
-CELLS_FIRST, STREET_FIRST = ["m2", "m3", "m4", "street"], ["street", "m2", "m3", "m4"]
+_AGREE = [[3.0, 1.0], [1.0, 3.0]]
+_ROW = (Factor(("m1", "m2"), _AGREE), Factor(("m2", "m3"), _AGREE))
+_SEEN = [[0.9, 0.1], [0.6, 0.4]]
+_STAR = (Factor("street", [0.5, 0.5]), *(Factor(("street", cell), _SEEN) for cell in ("m1", "m2", "m3", "m4")))
+
 
 # %% nbgrader={"grade": true, "grade_id": "eliminate-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-got = eliminate(list(star), CELLS_FIRST)
-assert got is not None, "eliminate returned nothing: did you forget `return`?"
-assert isinstance(got, tuple | list), f"return two things, the factor and the size, got one {type(got).__name__}"
-result = got[0]
-assert isinstance(result, Factor), f"the first thing must be a Factor, got {type(result).__name__}"
-assert result.names, "nothing is left: put each sum back among the factors, it is multiplied later"
-assert result.names == ("m1",), (
-    f"m1 alone must be left, not {result.names}: take the factors you have used out of the list"
-)
-explain(result.table, {(12, 4): "multiply first, then sum: a sum of products isn't the product of the sums"})
-share = result.table[0] / result.table.sum()
-assert np.isclose(result.table.sum(), 1) or not np.isclose(share, 0.75), "right up to a factor: normalise nowhere"
-np.testing.assert_allclose(result.table, [0.75, 0.25], atol=1e-9, err_msg="P(m1): the mean of 0.9, 0.1 and 0.6, 0.4")
-other = eliminate(list(star), STREET_FIRST)[0]
-np.testing.assert_allclose(other.table, [0.75, 0.25], atol=1e-9, err_msg="another order must not change the answer")
+def _test():
+    got = eliminate(list(_STAR), ["m2", "m3", "m4", "street"])
+    assert got is not None, "eliminate returned nothing: did you forget `return`?"
+    result = got[0] if isinstance(got, tuple | list) else got
+    assert isinstance(result, Factor), f"the first thing must be a Factor, got {type(result).__name__}"
+    assert result.names, "nothing is left: put each sum back among the factors, it is multiplied later"
+    assert result.names == ("m1",), (
+        f"m1 alone must be left, not {result.names}: take the factors you have used out of the list"
+    )
+    _explain(result.table, {(12, 4): "multiply first, then sum: a sum of products isn't the product of the sums"})
+    share = result.table[0] / result.table.sum()
+    assert np.isclose(result.table.sum(), 1) or not np.isclose(share, 0.75), "right up to a factor: normalise nowhere"
+    np.testing.assert_allclose(
+        result.table, [0.75, 0.25], atol=1e-9, err_msg="P(m1): the mean of 0.9, 0.1 and 0.6, 0.4"
+    )
 
-result = eliminate(list(row), ["m2"])[0]
-assert sorted(result.names) == ["m1", "m3"], f"m1 and m3 are left, your result is over {result.names}"
-assert np.isclose(result.table.sum(), 32), (
-    f"the weights must sum to Z = 32, not {result.table.sum():.3g}: don't normalise"
-)
-np.testing.assert_allclose(np.diag(result.table), [10, 10], err_msg="m1 = m3: 3 * 3 + 1 * 1")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import graphical_models
+    got = eliminate(list(_ROW), ["m2"])
+    result = got[0] if isinstance(got, tuple | list) else got
+    assert sorted(result.names) == ["m1", "m3"], f"m1 and m3 are left, your result is over {result.names}"
+    total = result.table.sum()
+    assert np.isclose(total, 32), f"the weights must sum to Z = 32, not {total:.3g}: don't normalise"
+    np.testing.assert_allclose(np.diag(result.table), [10, 10], err_msg="m1 = m3: 3 * 3 + 1 * 1")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import graphical_models
 
-complaint = graphical_models.check_eliminate(eliminate)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = graphical_models.check_eliminate(eliminate)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
 
 # %% nbgrader={"grade": true, "grade_id": "eliminate-cost-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-largest = eliminate(list(star), CELLS_FIRST)[1]
-costs = {
-    32: "you multiplied all factors first: of each variable only those that contain it",
-    2: "count the product before the variable is summed out, and its entries, not its axes",
-    16: "that is the sum of all sizes: the largest counts",
-}
-assert largest == 4, f"largest {largest}: {costs.get(largest, 'each product here has two axes of two states')}"
-largest = eliminate(list(star), STREET_FIRST)[1]
-costs = {
-    16: "count before the variable is summed out: with the street the product still has five axes",
-    4: "street comes first in this order: keep to `order`, and keep the largest, not the last",
-    5: "five axes of two states are 32 entries: count entries, not axes",
-    60: "that is the sum of all sizes: the largest counts",
-}
-assert largest == 32, f"largest {largest}: {costs.get(largest, 'street links all four cells: five axes, 32 entries')}"
-largest = eliminate(list(row), ["m2"])[1]
-assert largest == 8, f"largest {largest}: the product over m1, m2, m3 has 8 entries before m2 is summed out"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import graphical_models
+def _test():
+    got = eliminate(list(_STAR), ["m2", "m3", "m4", "street"])
+    assert isinstance(got, tuple | list), f"return two things, the factor and the size, got one {type(got).__name__}"
+    costs = {
+        32: "you multiplied all factors first: of each variable only those that contain it",
+        2: "count the product before the variable is summed out, and its entries, not its axes",
+        16: "that is the sum of all sizes: the largest counts",
+    }
+    assert got[1] == 4, f"largest {got[1]}: {costs.get(got[1], 'each product here has two axes of two states')}"
+    largest = eliminate(list(_STAR), ["street", "m2", "m3", "m4"])[1]
+    costs = {
+        16: "count before the variable is summed out: with the street the product still has five axes",
+        4: "street comes first in this order: keep to `order`, and keep the largest, not the last",
+        5: "five axes of two states are 32 entries: count entries, not axes",
+        60: "that is the sum of all sizes: the largest counts",
+    }
+    assert largest == 32, (
+        f"largest {largest}: {costs.get(largest, 'street links all four cells: five axes, 32 entries')}"
+    )
+    largest = eliminate(list(_ROW), ["m2"])[1]
+    assert largest == 8, f"largest {largest}: the product over m1, m2, m3 has 8 entries before m2 is summed out"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import graphical_models
 
-complaint = graphical_models.check_cost(eliminate)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = graphical_models.check_cost(eliminate)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 5: forward and backward (2 + 2 points)
@@ -403,18 +458,14 @@ def smoothed(start, M, likelihoods):
 
 
 # %% nbgrader={"grade": false, "grade_id": "chain", "locked": true, "schema_version": 3, "solution": false, "task": false}
-start, M = np.array([0.6, 0.4]), np.array([[0.9, 0.1], [0.3, 0.7]])  # FREE, OCCUPIED
-likelihoods = np.array([[0.95, 0.2], [0.05, 0.8], [0.6, 0.3]])  # no return, a return, a weak hint
-
-
-def check_rows(answer):
-    """Return what an answer gives for this chain, after looking at its arguments, shape and sums."""
+def _rows(name, answer):
+    """Return what an answer gives for one cell in three scans, after looking at its arguments, shape and sums."""
+    start, M = np.array([0.6, 0.4]), np.array([[0.9, 0.1], [0.3, 0.7]])  # FREE, OCCUPIED
+    likelihoods = np.array([[0.95, 0.2], [0.05, 0.8], [0.6, 0.3]])  # no return, a return, a weak hint
     arguments = start.copy(), M.copy(), likelihoods.copy()
-    got = answer(*arguments)
-    assert got is not None, f"{answer.__name__} returned nothing: did you forget `return`?"
-    for name, array, old in zip(("start", "M", "likelihoods"), arguments, (start, M, likelihoods), strict=True):
-        assert np.array_equal(array, old), f"{answer.__name__} changed its argument `{name}`: make a new array"
-    got = np.asarray(got)
+    got = answer_array(answer(*arguments), name)
+    for argument, array, old in zip(("start", "M", "likelihoods"), arguments, (start, M, likelihoods), strict=True):
+        assert np.array_equal(array, old), f"{name} changed its argument `{argument}`: make a new array"
     assert got.shape == (3, 2), f"one row per scan, one column per state, shape (3, 2), got {got.shape}"
     sums = got.sum(axis=1)
     assert np.allclose(sums, 1), f"rows sum to {sums.round(3).tolist()}: normalise each row"
@@ -422,46 +473,46 @@ def check_rows(answer):
 
 
 # %% nbgrader={"grade": true, "grade_id": "filtered-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-got = check_rows(filtered)
-slips = {
-    (0.9022, 0.0978): "`start` belongs to the time of the first scan: no move before it",
-    (0.6, 0.4): "the first scan is missing in row 0: multiply by its likelihood",
-    (0.8262, 0.1738): "that is the belief after the move: return the belief at the time of the scan",
-}
-explain(got[0], slips)
-np.testing.assert_allclose(
-    got[0], [0.8769, 0.1231], atol=1e-4, err_msg="0.6 * 0.95 and 0.4 * 0.2, divided by their sum"
-)
-slips = {
-    (0.1255, 0.8745): "M is transposed: M[i, j] goes from i to j, so a belief stands to its left",
-    (0.3081, 0.6919): "nothing moved between the scans: multiply by M",
-    (0.0857, 0.9143): "row 1 forgets the first scan: carry the belief on, not `start`",
-    (0.1082, 0.8918): "row 1 forgets the first scan: carry the belief on, not `start`",
-    (0.8262, 0.1738): "that is the prediction: multiply by the second scan's likelihood",
-}
-explain(got[1], slips)
-np.testing.assert_allclose(got[1], [0.2290, 0.7710], atol=1e-4, err_msg="predicted 0.826, 0.174; times 0.05, 0.8")
-np.testing.assert_allclose(got[2], [0.6086, 0.3914], atol=1e-4)
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import graphical_models
+def _test():
+    got = _rows("filtered", filtered)
+    slips = {
+        (0.9022, 0.0978): "`start` belongs to the time of the first scan: no move before it",
+        (0.6, 0.4): "the first scan is missing in row 0: multiply by its likelihood",
+        (0.8262, 0.1738): "that is the belief after the move: return the belief at the time of the scan",
+    }
+    _explain(got[0], slips)
+    hand = "0.6 * 0.95 and 0.4 * 0.2, divided by their sum"
+    np.testing.assert_allclose(got[0], [0.8769, 0.1231], atol=1e-4, err_msg=hand)
+    slips = {
+        (0.1255, 0.8745): "M is transposed: M[i, j] goes from i to j, so a belief stands to its left",
+        (0.3081, 0.6919): "nothing moved between the scans: multiply by M",
+        (0.0857, 0.9143): "row 1 forgets the first scan: carry the belief on, not `start`",
+        (0.1082, 0.8918): "row 1 forgets the first scan: carry the belief on, not `start`",
+        (0.8262, 0.1738): "that is the prediction: multiply by the second scan's likelihood",
+    }
+    _explain(got[1], slips)
+    np.testing.assert_allclose(got[1], [0.2290, 0.7710], atol=1e-4, err_msg="predicted 0.826, 0.174; times 0.05, 0.8")
+    np.testing.assert_allclose(got[2], [0.6086, 0.3914], atol=1e-4)
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import graphical_models
 
-complaint = graphical_models.check_filtered(filtered)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = graphical_models.check_filtered(filtered)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
 
-# %% nbgrader={"grade": true, "grade_id": "smoothed-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-got = check_rows(smoothed)
-slips = {
+
+_test()
+
+# %% nbgrader={"grade": false, "grade_id": "smoothed-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_LAST_SLIPS = {  # the last row by a common slip
     (0.7567, 0.2433): "the last scan is counted twice: the backward message into t holds only the scans after t",
     (
         0.8235,
         0.1765,
     ): "a filter run backwards holds scan t too, so it counts twice: only the scans after t belong in the message",
-    (0.75, 0.25): "the past is missing: start from the filtered belief",
+    (0.7500, 0.2500): "the past is missing: start from the filtered belief",
 }
-explain(got[2], slips)
-np.testing.assert_allclose(got[2], [0.6086, 0.3914], atol=1e-4, err_msg="no scan follows: the last row is the filter's")
-slips = {
+_MIDDLE_SLIPS = {  # the row before it
     (0.2290, 0.7710): "that is still the filter: multiply by the backward message, which holds the likelihoods",
     (0.4093, 0.5907): "going back, M stands to the left of a column: M @ message sums over where it goes next",
     (0.0607, 0.9393): "the message from t + 1 holds the likelihood of scan t + 1, you took that of scan t",
@@ -469,18 +520,34 @@ slips = {
     (0.2763, 0.7237): "the filter is counted twice: divide the smoothed row t + 1 by its prediction first",
     (0.1934, 0.8066): "beliefs from both sides are multiplied, not averaged",
 }
-explain(got[1], slips)
-np.testing.assert_allclose(got[1], [0.3027, 0.6973], atol=1e-4, err_msg="0.229 * 0.57 and 0.771 * 0.39, normalised")
-explain(
-    got[0], {(0.6077, 0.3923): "row 0 hears of scan 1 only: pass the message on", (0.8769, 0.1231): "still the filter"}
-)
-np.testing.assert_allclose(got[0], [0.6409, 0.3591], atol=1e-4, err_msg="row 0 must hear of both later scans")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import graphical_models
 
-complaint = graphical_models.check_smoothed(smoothed)
-assert not complaint, complaint
-### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "smoothed-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    got = _rows("smoothed", smoothed)
+    if not np.allclose(got, [[0.6409, 0.3591], [0.3027, 0.6973], [0.6086, 0.3914]], atol=1e-4):
+        # By hand, the messages from later scans. What they make of your own filter is right too: its faults cost no more here.
+        yours = _rows("filtered", filtered) * [[0.05685, 0.22695], [0.57, 0.39], [1, 1]]
+        if not np.allclose(got, yours / yours.sum(axis=1, keepdims=True)):
+            _explain(got[2], _LAST_SLIPS)
+            hand = "no scan follows: the last row is the filter's"
+            np.testing.assert_allclose(got[2], [0.6086, 0.3914], atol=1e-4, err_msg=hand)
+            _explain(got[1], _MIDDLE_SLIPS)
+            hand = "0.229 * 0.57 and 0.771 * 0.39, normalised"
+            np.testing.assert_allclose(got[1], [0.3027, 0.6973], atol=1e-4, err_msg=hand)
+            still = {(0.8769, 0.1231): "still the filter"}
+            _explain(got[0], {(0.6077, 0.3923): "row 0 hears of scan 1 only: pass the message on", **still})
+            hand = "row 0 must hear of both later scans"
+            np.testing.assert_allclose(got[0], [0.6409, 0.3591], atol=1e-4, err_msg=hand)
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import graphical_models
+
+    complaint = graphical_models.check_smoothed(smoothed, filtered)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 6: in your own words (2 points)
