@@ -75,7 +75,7 @@ def times_table(
     heads = ["the package's, ms", f"{escape(comparison.file)}, ms"] if comparison else ["ms"]
     return (
         "<div><table><caption><b>How long it takes</b>Median time for a frame on the computer that made this page, "
-        f"without a GPU. A full bar is at least {SCAN_MILLISECONDS:g} ms, the time from one scan of KITTI's LIDAR to "
+        f"without a GPU. A full bar is at least {SCAN_MILLISECONDS:g}&nbsp;ms, the time from one scan of KITTI's LIDAR to "
         f"the next.{UPPER_BAR if comparison else ''}</caption>"
         f"<thead><tr><th></th><th></th>{''.join(f'<th>{head}</th>' for head in heads)}<th></th></tr></thead>"
         f"<tbody>{rows}{total}</tbody></table></div>"
