@@ -93,7 +93,7 @@ function stateStory(cell, read, past) {
   const since = past.map((then) => row(`${then.time.toFixed(1)} s`, then.states));
   const head = `<thead><tr><th></th>${stateNames.map((name) => `<th scope="col">${name}</th>`).join("")}<th></th></tr></thead>`;
   return `<h3>Its four states</h3><p>The filter's map moves with the vehicle, predicts, is updated with the scan, and draws its particles again. The grid shows the prediction updated with the returns of exactly this cell; the map's cell may lie half a cell beside it.</p>
-<table>${head}<tbody>${rows.join("")}</tbody></table><details><summary>The same place in ${past.length} frames up to this one</summary><table>${head}<tbody>${since.join("")}</tbody></table></details>`;
+<table>${head}<tbody>${rows.join("")}</tbody></table><details><summary>The same place in ${past.length} frame${past.length === 1 ? "" : "s"} up to this one</summary><table>${head}<tbody>${since.join("")}</tbody></table></details>`;
 }
 
 function bands(values) {
