@@ -6,9 +6,9 @@ BIN := .venv/bin
 export OMP_WAIT_POLICY := PASSIVE
 PYTEST := OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest
 
-.PHONY: demo test test-real notebooks lint bench clean
+.PHONY: demo test test-browser test-real notebooks lint bench clean
 
-demo test lint:
+demo test test-browser lint:
 	$(PYTHON) -m semgrid_edu.make $@
 
 test-real: .venv/made

@@ -49,13 +49,20 @@ def lint() -> None:
 def test() -> None:
     """Check the code, run every test, and run every notebook and compare what it prints."""
     lint()
-    _pytest("-n", "2", "--dist", "loadfile", "--doctest-modules", "semgrid_edu", "tests")
+    _pytest("-n", "2", "--dist", "loadfile", "--doctest-modules", "semgrid_edu", "tests", "--ignore=tests/browser")
     folder = CLONE / "notebooks"
     notebooks = [
         str(path.relative_to(CLONE)) for path in sorted([*folder.glob("*.ipynb"), *folder.glob("deeper/*.ipynb")])
     ]
     options = ("--nbval", "--nbval-current-env", "--nbval-cell-timeout=300", "-p", "no:cacheprovider")
     _run("python", "-m", "pytest", *options, "-n", "2", "--dist", "loadscope", *notebooks)
+
+
+def test_browser() -> None:
+    """Test the demo's page and a lecture's widget in a real browser; skipped where there is none."""
+    environment()
+    _run("python", "-m", "pip", "install", "--quiet", "-c", "constraints.txt", "-e", ".[browser]")
+    _pytest("tests/browser")
 
 
 def _pytest(*arguments: str) -> None:
@@ -72,7 +79,7 @@ def _run(program: str, *arguments: str, **variables: str) -> None:
         sys.exit(done.returncode)
 
 
-TARGETS = {target.__name__: target for target in (environment, demo, lint, test)}
+TARGETS = {target.__name__.replace("_", "-"): target for target in (environment, demo, lint, test, test_browser)}
 """What can be asked for, by name."""
 
 

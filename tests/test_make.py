@@ -66,6 +66,16 @@ def test_tests_are_style_tests_and_notebooks(clone, ran):
     assert all(command[-1]["OMP_WAIT_POLICY"] == "PASSIVE" for command in ran)
 
 
+def test_tests_in_a_browser_are_apart(clone, ran):
+    make.make_targets(["test-browser"])
+    assert [command[2] for command in ran] == ["pip", "pip", "pytest"]
+    assert ".[browser]" in ran[1]
+    assert ran[-1][3] == "tests/browser"
+    ran.clear()
+    make.test()
+    assert "--ignore=tests/browser" in ran[2]
+
+
 def test_an_old_python_is_refused(clone, monkeypatch):
     monkeypatch.setattr(make, "OLDEST", (sys.version_info[0], sys.version_info[1] + 1))
     with pytest.raises(SystemExit, match="or later is needed"):

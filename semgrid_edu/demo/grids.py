@@ -48,7 +48,7 @@ def grid_svg(name: str, spec: GridSpec, camera: Camera, raster: str, text: str, 
     )
     paths = f'<path class="arrows" data-arrows="{name}" d=""/>' if arrows else ""
     return (
-        f'<svg viewBox="{left - 6.5:g} {top - 1:g} {width + 7.5:g} {height + 7:g}" role="img" '
+        f'<svg viewBox="{left - 6.8:g} {top - 1:g} {width + 7.8:g} {height + 7:g}" role="img" '
         f'data-text="{name}" data-grid="{name}" aria-label="{text}">{_axes(spec)}'
         f'<svg {box} viewBox="{left:g} {top:g} {width:g} {height:g}">'
         f'<image data-image="{name}" {href} {box} preserveAspectRatio="none"/>{errors}'
@@ -102,7 +102,7 @@ def _axes(spec: GridSpec) -> str:
     ]
     middle_x, middle_y = -(spec.x_min + spec.x_max) / 2, -(spec.y_min + spec.y_max) / 2
     marks += [
-        f'<text transform="translate({left - 4.6:g} {middle_x:g})rotate(-90)">x, forward [m]</text>',
+        f'<text transform="translate({left - 4.8:g} {middle_x:g})rotate(-90)">x, forward [m]</text>',
         f'<text x="{middle_y:g}" y="{bottom + 5.3:g}">y, to the left [m]</text>',
     ]
     return "".join(marks)

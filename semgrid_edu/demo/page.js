@@ -4,8 +4,9 @@ const slider = document.getElementById("slider");
 const play = document.getElementById("play");
 const clock = document.getElementById("clock");
 const speed = document.getElementById("speed");
+const last = frames.length - 1;
 const watchers = []; // called with the number of the frame that is shown
-let timer = null;
+let timer = null; // set while the drive plays
 
 function show(k) {
   const frame = frames[k];
@@ -32,7 +33,7 @@ function show(k) {
 }
 
 function shown() { return Number(slider.value); }
-function go(k) { show(Math.max(0, Math.min(frames.length - 1, k))); }
+function go(k) { show(Math.max(0, Math.min(last, k))); }
 
 // Milliseconds until the next frame: the drive's own time at speed 1.
 function pause(k) {
@@ -41,16 +42,20 @@ function pause(k) {
 }
 
 function advance() {
-  timer = setTimeout(advance, pause((shown() + 1) % frames.length));
-  show((shown() + 1) % frames.length);
+  const k = Math.min(shown() + 1, last);
+  timer = setTimeout(advance, pause(k));
+  show(k);
+  if (k === last) toggle();
 }
 
 function toggle() {
-  if (timer === null) timer = setTimeout(advance, pause(shown()));
-  else { clearTimeout(timer); timer = null; }
+  if (timer === null) {
+    if (shown() === last) show(0);
+    timer = setTimeout(advance, pause(shown()));
+  } else { clearTimeout(timer); timer = null; }
   play.textContent = timer === null ? "▶ Play" : "❚❚ Pause";
-  play.setAttribute("aria-pressed", String(timer !== null));
   for (const region of document.querySelectorAll("[aria-live]")) region.setAttribute("aria-live", timer === null ? "polite" : "off");
+  if (timer === null) show(shown()); // a frame at rest tells more
 }
 
 slider.addEventListener("input", () => show(shown()));
@@ -62,7 +67,7 @@ document.addEventListener("keydown", (event) => {
   if (event.target.closest("select")) return; // its own keys choose an option
   const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
   if (step) { event.preventDefault(); go(shown() + step); }
-  else if (event.key === " " && event.target.tagName !== "BUTTON") { event.preventDefault(); toggle(); }
+  else if (event.key === " " && !event.target.closest("button, summary")) { event.preventDefault(); toggle(); }
 });
 // index.html#12 opens frame 12.
 function follow() { go(parseInt(location.hash.slice(1), 10) || 0); }

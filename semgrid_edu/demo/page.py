@@ -114,6 +114,7 @@ def page_html(summary: Summary, frames: Sequence[FrameView]) -> str:
         notice=_broken(summary.broken) + ("" if summary.labelled else NOTICE),
         last=len(frames) - 1,
         clock=escape(first.clock),
+        longest=max(len(frame.clock) for frame in frames),  # so that the slider keeps its length while it is moved
         **{name: first.images[name] for name in ("photo", "points", "scores")},
         **{f"{name}_text": escape(first.texts[name]) for name in ("points", "scores")},
         near=f"{near:g}",
@@ -138,7 +139,7 @@ def _broken(error: str) -> str:
 
 def _lead(summary: Summary, n_frames: int) -> str:
     spec = summary.spec
-    size = f"{spec.x_max - spec.x_min:g} m long and {spec.y_max - spec.y_min:g} m wide"
+    size = f"{spec.x_max - spec.x_min:g}&nbsp;m long and {spec.y_max - spec.y_min:g}&nbsp;m wide"
     return (
         f"{summary.comparison.lead() + ' ' if summary.comparison else ''}"
         f"Here are {n_frames} frames of the drive <b>{escape(summary.title)}</b>{summary.choice}, sent through every "

@@ -6,6 +6,7 @@ const zoom = document.getElementById("zoom");
 const errors = document.getElementById("errors");
 const hover = document.getElementById("hover");
 const grids = [...document.querySelectorAll("svg[data-grid]")];
+const stateNames = ["free", "static", "dynamic", "unknown"];
 const SVG = document.querySelector("svg").namespaceURI;
 const unpacked = new Map(); // number of a frame -> its reader, or the promise of it
 const decoded = new Map(); // pictures of the shown frame -> their colours, or the promise of them
@@ -24,21 +25,26 @@ function readerOf(k) {
   return unpacked.get(k);
 }
 
-// The cell of frame k that holds the place that was chosen; -1 when it has left the grid.
-function cellIn(k) { return cellThen(story.grid, frames[k].pose, frames[anchor.frame].pose, anchor.cell); }
+// The cell of frame k that holds the place that was chosen; -1 when it has left the grid, or none was chosen.
+function cellIn(k) { return anchor === null ? -1 : cellThen(story.grid, frames[k].pose, frames[anchor.frame].pose, anchor.cell); }
+
+// A cell of the road ahead, to begin with.
+function cellAhead() { return Math.floor(0.8 * story.grid.rows) * story.grid.cols + Math.floor(story.grid.cols / 2); }
 
 function choose(cell) { anchor = { frame: shown(), cell }; tell(shown()); }
 
 async function tell(k) {
   const mine = ++turn;
   if (anchor === null) return;
-  const cell = k === anchor.frame ? anchor.cell : cellIn(k);
+  const cell = cellIn(k);
   mark(cell);
   const read = await readerOf(k);
   if (mine !== turn) return;
   if (cell < 0 || read === null) {
-    const near = frames.map((frame, i) => i).filter((i) => frames[i].details).sort((a, b) => Math.abs(a - k) - Math.abs(b - k));
-    const reason = cell < 0 ? "The place has left the grid." : `To stay small, the page leaves out what this frame's stories need. The nearest frame that has it: ${frames[near[0]].clock}.`;
+    const away = (frame) => Math.abs(frame.time - frames[k].time);
+    const [near] = frames.filter((frame) => frame.details).sort((a, b) => away(a) - away(b));
+    const reason = cell < 0 ? "The place has left the grid." : `To stay small, the page leaves out what this frame's stories need. The nearest frame that has it: ${near.clock}.`;
+    where.textContent = "";
     telling.innerHTML = `<p>${escaped(reason)}</p>`;
     return;
   }
@@ -47,11 +53,14 @@ async function tell(k) {
     const then = await readerOf(i), at = cellThen(story.grid, frames[i].pose, frames[k].pose, cell);
     if (then) past.push({ time: frames[i].time, states: at < 0 ? [0, 0, 0, 1] : states(then, "shown", at) });
   }
-  const pulls = timer === null ? weights(story, read, cell) : null; // too slow for every frame of a drive that plays
   if (mine !== turn) return;
-  const [label, rival, refined, truth] = read("classes", cell);
+  const pulls = timer === null ? weights(story, read, cell) : null; // too slow for every frame of a drive that plays
+  const [label, rival, refined] = read("classes", cell);
+  const unfolded = telling.querySelector("details")?.open ?? false;
   where.textContent = `${place(centre(story.grid, cell))}: ${story.names[refined]}.`;
-  telling.innerHTML = [heading(cell, read), scanStory(cell, read), stateStory(cell, read, past), partStory(cell, read, label, rival), crfStory(cell, read, pulls, [label, rival, refined])].join("");
+  const said = frames[k].scanned ? scanStory(cell, read) : "<p>This frame has no scan, so the filter only predicts.</p>";
+  telling.innerHTML = [heading(cell, read), said, stateStory(cell, read, past), partStory(cell, read, label, rival), crfStory(cell, read, pulls, [label, rival, refined])].join("");
+  telling.querySelector("details").open = unfolded;
   if (pulls) drawPulls(cell, strongest(read, pulls, refined, 5));
 }
 
@@ -79,14 +88,12 @@ function scanStory(cell, read) {
 
 function stateStory(cell, read, past) {
   const words = { move: "moved", predict: "predicted", update: "updated", resample: "resampled", shown: "<b>shown</b>" };
-  const rows = Object.entries(words).map(([name, text]) => {
-    const values = states(read, name, cell);
-    return `<tr><th scope="row">${text}</th>${values.map((p) => `<td>${percent(p)}</td>`).join("")}<td class="bands">${bands(values)}</td></tr>`;
-  });
-  const since = past.map(({ time, states: values }) => `<tr><th scope="row">${time.toFixed(1)} s</th>${values.map((p) => `<td>${percent(p)}</td>`).join("")}<td class="bands">${bands(values)}</td></tr>`);
-  const head = '<thead><tr><th></th><th scope="col">free</th><th scope="col">static</th><th scope="col">dynamic</th><th scope="col">unknown</th><th></th></tr></thead>';
+  const row = (text, values) => `<tr><th scope="row">${text}</th>${values.map((p) => `<td>${percent(p)}</td>`).join("")}<td class="bands">${bands(values)}</td></tr>`;
+  const rows = Object.entries(words).map(([name, text]) => row(text, states(read, name, cell)));
+  const since = past.map((then) => row(`${then.time.toFixed(1)} s`, then.states));
+  const head = `<thead><tr><th></th>${stateNames.map((name) => `<th scope="col">${name}</th>`).join("")}<th></th></tr></thead>`;
   return `<h3>Its four states</h3><p>The filter's map moves with the vehicle, predicts, is updated with the scan, and draws its particles again. The grid shows the prediction updated with the returns of exactly this cell; the map's cell may lie half a cell beside it.</p>
-<table>${head}<tbody>${rows.join("")}</tbody></table><details><summary>The same place in ${past.length} frames up to this one</summary><table>${head}<tbody>${since.join("")}</tbody></table></details>`;
+<table>${head}<tbody>${rows.join("")}</tbody></table><details><summary>The same place in ${past.length} frame${past.length === 1 ? "" : "s"} up to this one</summary><table>${head}<tbody>${since.join("")}</tbody></table></details>`;
 }
 
 function bands(values) {
@@ -97,12 +104,12 @@ function partStory(cell, read, label, rival) {
   const of = parts(story, read, cell), image = sum(of.planes), occupancy = sum(of.occupancy);
   const heights = story.heights.map((h) => `${h.toFixed(1)} m`), order = of.scores.map((_, i) => i).sort((a, b) => Math.abs(of.scores[b]) - Math.abs(of.scores[a]));
   const ratio = Number(Math.exp(of.score).toPrecision(2)), often = ratio > 1e6 ? "more than a million" : ratio.toLocaleString("en");
-  const byClass = order.slice(0, 8), states = ["free", "static", "dynamic", "unknown"];
+  const byClass = order.slice(0, 8);
   return `<h3>Why ${escaped(story.names[label])} and not ${escaped(story.names[rival])}?</h3>
 <p>In the semantic grid ${swatch(label)} is about ${often} times as probable as ${swatch(rival)}: its fused score is higher by ${of.score.toFixed(1)}. Gradient times input splits this difference:</p>
 ${bars(["image, on the planes", "occupancy", "constants", "sum"], [image, occupancy, of.rest, of.score])}
 <p>The constants are biases and normalisations that the open ReLUs let pass: no input has a share in them. Image and occupancy count in all cells around that the network looks at. A part isn't what would change if its input were missing, and parts that cancel may be much larger than their sum. Below, each table has its own scale.</p>
-<div class="two"><div><h4>Image, by class of its scores</h4>${bars(byClass.map((i) => escaped(story.names[i])), byClass.map((i) => of.scores[i]))}<h4>Occupancy, by state</h4>${bars(states, of.occupancy)}</div>
+<div class="two"><div><h4>Image, by class of its scores</h4>${bars(byClass.map((i) => escaped(story.names[i])), byClass.map((i) => of.scores[i]))}<h4>Occupancy, by state</h4>${bars(stateNames, of.occupancy)}</div>
 <div><h4>Image, by height of the plane</h4>${bars([...heights].reverse(), [...of.planes].reverse())}</div></div>`;
 }
 
@@ -155,7 +162,7 @@ function shape(kind, attributes) {
 // Zoom: every grid shows the surroundings of the cell that was chosen, or of the road ahead.
 function zoomGrids() {
   const factor = Number(zoom.value), { x_min, x_max, y_min, y_max } = story.grid;
-  const cell = anchor === null ? cellAt(story.grid, 15, 0) : Math.max(0, cellIn(shown())), [x, y] = centre(story.grid, cell);
+  const chosen = cellIn(shown()), [x, y] = centre(story.grid, chosen < 0 ? cellAhead() : chosen);
   const clamp = (value, low, high) => Math.max(low, Math.min(high, value));
   for (const svg of grids) {
     svg.dataset.whole ??= svg.getAttribute("viewBox");
@@ -183,14 +190,16 @@ async function decode(uri) {
   return pen.getImageData(0, 0, canvas.width, canvas.height);
 }
 
+function errorsOn() { return errors.getAttribute("aria-pressed") === "true"; }
+
 async function paintErrors(k) {
-  const on = errors.getAttribute("aria-pressed") === "true", { images } = frames[k];
-  document.getElementById("errorsnote").hidden = !on;
+  const { images } = frames[k];
+  document.getElementById("errorsnote").hidden = !errorsOn();
   for (const layer of document.querySelectorAll("[data-errors]")) {
     const estimate = images[layer.dataset.errors];
-    if (!on || !images.truth || !estimate) { layer.removeAttribute("href"); continue; }
+    if (!errorsOn() || !images.truth || !estimate) { layer.removeAttribute("href"); continue; }
     const [guess, truth] = [await colours(estimate), await colours(images.truth)];
-    if (k !== shown()) return;
+    if (k !== shown() || !errorsOn()) return;
     const painted = new ImageData(guess.width, guess.height);
     for (let i = 0; i < guess.data.length; i += 4) {
       const right = [0, 1, 2].every((j) => guess.data[i + j] === truth.data[i + j]);
@@ -205,12 +214,12 @@ async function paintErrors(k) {
 
 // Hover: the class or the states of the cell below the pointer.
 async function nameAt(name, cell) {
-  const k = shown(), kind = name.replace(/^your_/, "");
-  if (kind === "occupancy" && name === kind) {
+  const k = shown();
+  if (name === "occupancy") {
     const read = await readerOf(k);
-    return read ? states(read, "shown", cell).map((p, i) => `${["free", "static", "dynamic", "unknown"][i]} ${percent(p)}`).join(", ") : "";
+    return read ? states(read, "shown", cell).map((p, i) => `${stateNames[i]} ${percent(p)}`).join(", ") : "";
   }
-  if (kind === "occupancy" || !frames[k].images[name]) return "";
+  if (name === "your_occupancy" || !frames[k].images[name]) return "";
   const { data } = await colours(frames[k].images[name]);
   return story.names[story.colours.classes.findIndex((colour) => colour.every((value, j) => value === data[4 * cell + j]))] ?? "";
 }
@@ -226,8 +235,7 @@ function stepCell(event) {
   if (!step || event.altKey || event.ctrlKey || event.metaKey) return;
   event.preventDefault();
   event.stopPropagation();
-  const { rows, cols } = story.grid, start = anchor === null ? -1 : cellIn(shown());
-  const cell = start < 0 ? cellAt(story.grid, 15, 0) : start;
+  const { rows, cols } = story.grid, chosen = cellIn(shown()), cell = chosen < 0 ? cellAhead() : chosen;
   const row = Math.max(0, Math.min(rows - 1, Math.floor(cell / cols) + step[0])), col = Math.max(0, Math.min(cols - 1, (cell % cols) + step[1]));
   choose(row * cols + col);
 }
@@ -241,21 +249,20 @@ for (const svg of grids) {
   svg.addEventListener("pointerleave", () => { hover.hidden = true; });
   svg.addEventListener("pointermove", async (event) => {
     const cell = cellBelow(svg, event), text = cell < 0 ? "" : await nameAt(svg.dataset.grid, cell);
-    hover.hidden = !text;
+    hover.hidden = !text || !svg.matches(":hover"); // the pointer may have left meanwhile
     hover.textContent = text;
     hover.style.left = `${Math.min(event.clientX + 14, innerWidth - 220)}px`;
     hover.style.top = `${event.clientY + 14}px`;
   });
 }
 zoom.addEventListener("change", () => (anchor === null ? zoomGrids() : tell(shown())));
-errors.addEventListener("click", () => { errors.setAttribute("aria-pressed", String(errors.getAttribute("aria-pressed") !== "true")); paintErrors(shown()); });
-play.addEventListener("click", () => { if (timer === null) tell(shown()); });
+errors.addEventListener("click", () => { errors.setAttribute("aria-pressed", String(!errorsOn())); paintErrors(shown()); });
 errors.hidden = !frames.some((frame) => frame.images.truth);
 watchers.push(() => decoded.clear(), tell, paintErrors);
 // index.html#12/93/30 opens frame 12 and tells the story of row 93, column 30.
 function followCell() {
-  const [, row, col] = location.hash.slice(1).split("/").map(Number);
-  if (Number.isInteger(row) && Number.isInteger(col)) choose(row * story.grid.cols + col);
+  const { rows, cols } = story.grid, [, row, col] = location.hash.slice(1).split("/").map((part) => parseInt(part, 10));
+  if (row >= 0 && row < rows && col >= 0 && col < cols) choose(row * cols + col);
 }
 window.addEventListener("hashchange", followCell);
 followCell();

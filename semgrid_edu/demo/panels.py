@@ -38,7 +38,7 @@ GRID_PANELS = (
         "o",
         "Light cells are free, dark cells hold something that stands still, orange cells something that moves. Grey "
         "cells are unknown: a grey shadow lies behind each obstacle, because no beam gets there. An arrow is as long "
-        "as the distance covered in 0.5 s.",
+        "as the distance covered in 0.5&nbsp;s.",
     ),
     Panel(
         "grid",

@@ -47,6 +47,8 @@ class FrameView:
         T_world_from_lidar, row by row.
     details : str
         What the story of a cell is told from (`demo.details`); empty for frames whose stories the page leaves out.
+    scanned : bool
+        Whether the frame has a scan; without one, the filter only predicts.
     """
 
     clock: str
@@ -56,6 +58,7 @@ class FrameView:
     time: float = 0.0
     pose: list[float] = field(default_factory=list)
     details: str = ""
+    scanned: bool = True
 
 
 class Record:
@@ -165,8 +168,9 @@ class Record:
         returns = f"Camera image with the {len(visible_points(frame)[1])} LIDAR returns that the camera sees."
         images = {"photo": photo_uri(frame.image), "points": raster_uri(points_layer(frame))}
         pose, details = frame.T_world_from_lidar.ravel().tolist(), self._details(package, maps.get("truth"))
-        clock = f"frame {self._number}, {frame.time:.1f} s" + ("" if len(frame.points) else ", no scan: predicted")
-        view = FrameView(clock, images, {"points": returns}, {}, frame.time, pose, details)
+        scanned = len(frame.points) > 0
+        clock = f"frame {self._number}, {frame.time:.1f} s" + ("" if scanned else ", no scan: predicted")
+        view = FrameView(clock, images, {"points": returns}, {}, frame.time, pose, details, scanned)
         self._draw(view, package, tuple(MADE_BY))
         if yours is not None:
             self._draw(view, yours, self.comparison.changed, YOURS)

@@ -44,7 +44,7 @@ def metrics_table(metrics: dict[str, dict[str, float]], labelled: int, compariso
 
 def _metrics_row(row: str, metrics: dict[str, dict[str, float]]) -> str:
     cells = "".join(f"<td>{100 * values[row]:.1f}</td>" for values in metrics.values())
-    return f"<tr><th>{escape(row)}</th>{cells}</tr>"
+    return f"<tr><th>{_breakable(row)}</th>{cells}</tr>"
 
 
 def times_table(
@@ -72,14 +72,19 @@ def times_table(
     replaced = comparison.stages if comparison else ()
     rows = "".join(_time_row(*_words(stage, replaced), [run[stage] for run in runs]) for stage in milliseconds)
     total = _time_row("", "all stages", [sum(run.values()) for run in runs], "total")
-    heads = ["the package's, ms", f"{escape(comparison.file)}, ms"] if comparison else ["ms"]
+    heads = ["the package's, ms", f"{_breakable(comparison.file)}, ms"] if comparison else ["ms"]
     return (
         "<div><table><caption><b>How long it takes</b>Median time for a frame on the computer that made this page, "
-        f"without a GPU. A full bar is at least {SCAN_MILLISECONDS:g} ms, the time from one scan of KITTI's LIDAR to "
-        f"the next.{UPPER_BAR if comparison else ''}</caption>"
+        f"without a GPU. A full bar is at least {SCAN_MILLISECONDS:g}&nbsp;ms, the time from one scan of KITTI's LIDAR "
+        f"to the next.{UPPER_BAR if comparison else ''}</caption>"
         f"<thead><tr><th></th><th></th>{''.join(f'<th>{head}</th>' for head in heads)}<th></th></tr></thead>"
         f"<tbody>{rows}{total}</tbody></table></div>"
     )
+
+
+def _breakable(text: str) -> str:
+    """Escape a text in which a long name of a file may go on in the next line after each underscore."""
+    return escape(text).replace("_", "_<wbr>")
 
 
 def _words(stage: str, replaced: tuple[str, ...]) -> tuple[str, str]:

@@ -4,7 +4,7 @@ class Stub {
   setAttribute(name, value) { this.attributes[name] = value; }
   getAttribute(name) { return this.attributes[name]; }
   addEventListener(type, listener) { (this.listeners[type] ??= []).push(listener); }
-  closest(tag) { return this.tagName.toLowerCase() === tag ? this : null; }
+  closest(tags) { return tags.split(", ").includes(this.tagName.toLowerCase()) ? this : null; }
   fire(type, event = {}) {
     const whole = { defaultPrevented: false, preventDefault() { this.defaultPrevented = true; }, target: this, ...event };
     for (const listener of this.listeners[type] ?? []) listener(whole);

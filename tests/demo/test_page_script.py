@@ -52,17 +52,26 @@ def test_an_arrow_with_another_key_is_left_to_the_browser(play, key):
 
 def test_the_space_key_presses_the_button_that_has_the_focus(play):
     assert play('document.fire("keydown", { key: " ", target: elements.back });\nwaiting') is None
+    assert play('document.fire("keydown", { key: " ", target: new Stub("SUMMARY") });\nwaiting') is None
     assert play('document.fire("keydown", { key: " " });\nwaiting.delay') == pytest.approx(400)
 
 
-def test_plays_in_true_time_also_over_a_gap_and_from_the_start_again(play):
+def test_plays_in_true_time_also_over_a_gap_and_stops_at_the_end(play):
     lines = """
-    elements.play.fire("click"); const delays = [waiting.delay];
-    waiting.call(); delays.push(waiting.delay, elements.clock.textContent);
-    waiting.call(); delays.push(waiting.delay, elements.clock.textContent);
+    elements.back.fire("click"); elements.play.fire("click"); const delays = [waiting.delay];
+    waiting.call(); delays.push(elements.clock.textContent, waiting.delay);
+    waiting.call(); delays.push(elements.clock.textContent, waiting, elements.play.textContent);
     delays
     """
-    assert play(lines) == pytest.approx([400, 100, "frame 3", 100, "frame 0"])
+    assert play(lines) == [pytest.approx(100), "frame 2", pytest.approx(400), "frame 3", None, "▶ Play"]
+
+
+def test_after_the_end_it_plays_from_the_start(play):
+    lines = """
+    elements.next.fire("click"); elements.play.fire("click");
+    [elements.clock.textContent, waiting.delay]
+    """
+    assert play(lines) == ["frame 0", pytest.approx(100)]
 
 
 def test_speed_divides_the_time(play):

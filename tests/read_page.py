@@ -7,7 +7,7 @@ from html.parser import HTMLParser
 
 from PIL import Image
 
-VOID_TAGS = {"meta", "img", "input", "link", "br"}
+VOID_TAGS = {"meta", "img", "input", "link", "br", "wbr"}
 
 
 class Page(HTMLParser):

@@ -1,0 +1,197 @@
+"""How the demo's page looks in a browser: on a phone, in the dark, and to those who need contrast."""
+
+import pytest
+from tiny_drive import DATE, write_tiny_drive
+
+from semgrid_edu import demo
+from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.demo import example_stages, run
+from semgrid_edu.networks import Architecture, build_net, save_net
+
+PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
+CELL = "#5/100/24"
+
+BROKEN_WORDS = """(all) => {
+  const broken = [];
+  for (const element of all) {
+    const walker = document.createTreeWalker(element, NodeFilter.SHOW_TEXT);
+    for (let node; (node = walker.nextNode()); ) {
+      for (const { 0: word, index } of node.data.matchAll(/[^\\s_-]+_?/g)) {
+        const range = document.createRange();
+        range.setStart(node, index);
+        range.setEnd(node, index + word.length);
+        if (new Set([...range.getClientRects()].map((box) => Math.round(box.top))).size > 1) broken.push(word);
+      }
+    }
+  }
+  return broken;
+}"""
+"""Words of some elements that stand on more than one line."""
+
+CONTRAST = """(all) => all.map((element) => {
+  const luminance = (colour) => colour.match(/[\\d.]+/g).slice(0, 3).map(Number)
+    .map((c) => (c / 255 <= 0.04045 ? c / 255 / 12.92 : ((c / 255 + 0.055) / 1.055) ** 2.4))
+    .reduce((total, c, i) => total + [0.2126, 0.7152, 0.0722][i] * c, 0);
+  let ground = element;
+  while (!getComputedStyle(ground).backgroundColor.startsWith("rgb(")) ground = ground.parentElement; // see-through
+  const [a, b] = [getComputedStyle(element).color, getComputedStyle(ground).backgroundColor].map(luminance);
+  return (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+})"""
+"""Contrast of some elements' text with what it stands on, by the definition of WCAG 2."""
+
+
+@pytest.fixture(scope="module")
+def tiny_page(browser, tmp_path_factory):
+    """A comparison with a student's stages, over a gap, with stories of every other frame."""
+    root = tmp_path_factory.mktemp("tiny")
+    folder = write_tiny_drive(root, n_frames=4, labelled=(0, 2))
+    (folder / "velodyne_points" / "data" / "0000000002.bin").unlink()
+    drive = KittiRawDrive(root, DATE, "0001")
+    save_net(build_net(Architecture(), drive.camera, seed=3), root / "net.safetensors")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run, "STORIES", 20_000)
+        return demo.write_demo(drive, root / "net.safetensors", root / "out", stages=example_stages.__file__)
+
+
+@pytest.fixture(params=["shipped", "tiny"])
+def phone(request, open_page):
+    """Either page on a phone, with a cell's story."""
+    page = open_page(request.getfixturevalue(f"{request.param}_page"), "#0/100/30", **PHONE)
+    page.locator("#telling h3").first.wait_for()
+    return page
+
+
+class TestPhone:
+    def test_nothing_reaches_over_the_side(self, phone):
+        sizes = "[document.documentElement.scrollWidth, innerWidth, visualViewport.scale]"
+        assert phone.evaluate(sizes) == [390, 390, 1]
+        phone.locator("#telling summary").click()
+        phone.locator("#zoom").select_option("4")
+        assert phone.evaluate(sizes) == [390, 390, 1]
+        assert phone.locator(".tables > *").evaluate_all(
+            "(all) => all.every((one) => one.scrollWidth <= one.clientWidth)"
+        )
+        over = phone.locator("body *:visible").evaluate_all(
+            "(all) => all.filter((one) => !one.closest('.aloud, svg *') && one.getBoundingClientRect().right > 390.5)"
+            ".map((one) => one.outerHTML.slice(0, 80))"
+        )
+        assert over == []
+
+    def test_the_slider_is_as_wide_as_the_page(self, phone):
+        slider, text = (phone.locator(one).bounding_box() for one in ("#slider", ".photos"))
+        assert (slider["x"], slider["width"]) == pytest.approx((text["x"], text["width"]), abs=5)
+        assert slider["width"] > 350
+
+    def test_two_grids_stand_side_by_side(self, phone):
+        boxes = [svg.bounding_box() for svg in phone.locator("svg[data-grid]").all()]
+        tops = [round(box["y"]) for box in boxes]
+        assert max(tops.count(top) for top in tops) == 2
+        assert all(box["width"] > 120 for box in boxes)
+
+    def test_no_word_of_legend_tables_and_buttons_is_broken(self, phone):
+        for part in (".legend", "table", "button", ".story h3, .story h4", ".pick"):
+            assert phone.locator(part).evaluate_all(BROKEN_WORDS) == []
+        names = phone.locator(".legend span").evaluate_all("(all) => all.map((one) => one.getClientRects().length)")
+        assert set(names) == {1}
+
+    def test_names_of_axes_and_their_numbers_keep_apart(self, phone):
+        for svg in phone.locator("svg[data-grid]").all():
+            phone.locator("#zoom").select_option("1")
+            name = svg.locator("text[transform]").bounding_box()
+            numbers = [one.bounding_box() for one in svg.locator("text.x").all()]
+            assert name["x"] + name["width"] <= min(one["x"] for one in numbers) + 0.5
+            assert name["x"] >= svg.bounding_box()["x"] - 1
+
+    def test_the_controls_keep_their_height_over_a_gap(self, phone):
+        heights = set()
+        for k in range(4):
+            phone.locator("#slider").fill(str(k))
+            heights.add(phone.locator(".controls").bounding_box()["height"])
+        assert len(heights) == 1
+
+    def test_a_tap_chooses_a_cell(self, phone):
+        svg = phone.locator("svg[data-grid=refined]")
+        svg.scroll_into_view_if_needed()
+        svg.tap()
+        phone.locator("[data-marks=grid] .mark").wait_for(state="attached")
+        assert "row 100, column 30)" not in phone.locator("#telling").inner_text()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+class TestColours:
+    def test_the_legend_has_the_colours_that_are_drawn(self, shipped, shipped_frames, scheme):
+        page = shipped("#0", color_scheme=scheme)
+        legend = dict(
+            page.locator(".legend span:not(.way)").evaluate_all(
+                "(all) => all.map((one) => [one.innerText, getComputedStyle(one, '::before').backgroundColor])"
+            )
+        )
+        drawn = page.evaluate(
+            """async (uris) => {
+                 const found = new Set();
+                 for (const uri of uris) {
+                   const { data } = await decode(uri);
+                   for (let i = 0; i < data.length; i += 4) found.add(`rgb(${data.slice(i, i + 3).join(", ")})`);
+                 }
+                 return [...found];
+               }""",
+            [frame["images"][name] for frame in shipped_frames for name in ("grid", "refined", "truth")],
+        )
+        assert set(drawn) <= set(legend.values())
+        assert len(set(legend.values())) == len(legend), "no two entries share a colour"
+        assert legend["dynamic"] != legend["unknown-dynamic"]
+        states = page.evaluate("story.colours.states.map((one) => `rgb(${one.join(', ')})`)")
+        assert states == [legend[name] for name in ("free", "static", "dynamic", "unknown")]
+
+    def test_an_arrow_in_the_legend_looks_like_one_in_the_grid(self, shipped, scheme):
+        page = shipped(color_scheme=scheme)
+        drawn = page.locator(".arrows").evaluate("(path) => getComputedStyle(path).stroke")
+        assert page.locator(".legend .way").evaluate("(one) => getComputedStyle(one, '::before').color") == drawn
+
+    def test_a_picture_is_the_same_in_both(self, shipped, scheme):
+        page = shipped(color_scheme=scheme)
+        for name in ("occupancy", "grid"):
+            style = page.locator(f"image[data-image={name}]").evaluate(
+                "(one) => ['filter', 'opacity', 'mixBlendMode'].map((name) => getComputedStyle(one)[name])"
+            )
+            assert style == ["none", "1", "normal"]
+
+    def test_text_can_be_read(self, shipped, scheme):
+        page = shipped(CELL, color_scheme=scheme)
+        page.locator("#telling h3").first.wait_for()
+        parts = (
+            "p, h1, h2, h3, h4, figcaption, figcaption b, figcaption i, caption, th, td, th i, button, output, .pick"
+        )
+        contrast = page.locator(f":is({parts}):visible").evaluate_all(CONTRAST)
+        assert len(contrast) > 100
+        assert min(contrast) >= 4.5
+
+
+def test_a_frame_without_a_scan_says_so(open_page, tiny_page):
+    page = open_page(tiny_page, "#2/100/30")
+    assert page.locator("#clock").inner_text() == "frame 2, 0.2 s, no scan: predicted"
+    page.locator("#telling", has_text="This frame has no scan").wait_for()
+
+
+def test_a_frame_without_stories_names_the_nearest_that_has_them(open_page, tiny_page):
+    page = open_page(tiny_page, "#1/100/30")
+    page.locator("#telling", has_text="The nearest frame that has it: frame 0, 0.0 s.").wait_for()
+    page.locator("#slider").fill("2")
+    page.locator("#telling h3").first.wait_for()
+
+
+def test_a_student_s_map_says_its_class_and_no_states_of_the_package(open_page, tiny_page):
+    page = open_page(tiny_page)
+    for name, silent in (("your_refined", False), ("your_occupancy", True)):
+        svg = page.locator(f"svg[data-grid={name}]")
+        svg.scroll_into_view_if_needed()
+        svg.hover()
+        page.wait_for_timeout(200)
+        assert page.locator("#hover").is_hidden() == silent
+
+
+def test_errors_are_offered_only_where_the_truth_is_known(open_page, tiny_page, tmp_path):
+    assert open_page(tiny_page).locator("#errors").is_visible()
+    unlabelled = tmp_path / "index.html"
+    unlabelled.write_text(tiny_page.read_text(encoding="utf-8").replace('"truth":', '"other":'), encoding="utf-8")
+    assert open_page(unlabelled).locator("#errors").is_hidden()

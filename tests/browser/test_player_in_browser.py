@@ -1,0 +1,193 @@
+"""The demo's page in a browser: slider, buttons, keys, address, and play in true time."""
+
+import pytest
+
+
+def frame(page) -> int:
+    return int(page.locator("#slider").input_value())
+
+
+def clock(page) -> str:
+    return page.locator("#clock").inner_text()
+
+
+def address(page, hash_: str) -> None:
+    """Change what follows # in the address."""
+    page.evaluate("hash => { location.hash = hash; }", hash_)
+    page.wait_for_timeout(50)
+
+
+def pictures(page) -> dict[str, str]:
+    return page.evaluate(
+        "Object.fromEntries([...document.querySelectorAll('[data-image]')].map((one) =>"
+        " [one.dataset.image, one.getAttribute(one.tagName === 'IMG' ? 'src' : 'href')]))"
+    )
+
+
+class TestSlider:
+    @pytest.mark.parametrize(("share", "expected"), [(0.0, 0), (1.0, -1)])
+    def test_its_ends_are_the_first_and_the_last_frame(self, shipped, shipped_frames, share, expected):
+        page = shipped("#5")
+        box = page.locator("#slider").bounding_box()
+        page.mouse.click(box["x"] + 1 + share * (box["width"] - 2), box["y"] + box["height"] / 2)
+        assert clock(page) == shipped_frames[expected]["clock"]
+
+    def test_moving_it_changes_every_picture_its_words_and_the_arrows(self, shipped, shipped_frames):
+        page = shipped()
+        for k in (7, 19, 0):
+            page.locator("#slider").fill(str(k))
+            wanted = shipped_frames[k]
+            assert clock(page) == wanted["clock"]
+            assert pictures(page) == wanted["images"]
+            assert page.locator("[data-arrows=occupancy]").get_attribute("d") == wanted["arrows"]["occupancy"]
+            assert page.locator("img[data-text=scores]").get_attribute("alt") == wanted["texts"]["scores"]
+            assert page.locator("svg[data-text=grid]").get_attribute("aria-label") == wanted["texts"]["grid"]
+
+    def test_pictures_can_be_drawn(self, shipped):
+        page = shipped("#3")
+        sizes = page.evaluate(
+            "Promise.all([...document.images].map(async (one) => { await one.decode(); return one.naturalWidth; }))"
+        )
+        assert len(sizes) == 4
+        assert min(sizes) > 100
+
+    def test_it_says_frame_and_time_to_those_who_hear_the_page(self, shipped, shipped_frames):
+        page = shipped()
+        for k in (0, 4, 11):
+            page.locator("#slider").fill(str(k))
+            assert page.locator("#slider").get_attribute("aria-valuetext") == shipped_frames[k]["clock"]
+
+    def test_it_keeps_its_length_while_it_is_moved(self, shipped):
+        page = shipped()
+        lengths = set()
+        for k in range(20):
+            page.locator("#slider").fill(str(k))
+            lengths.add(page.locator("#slider").bounding_box()["width"])
+        assert len(lengths) == 1
+
+
+def test_step_buttons_stop_at_the_ends(shipped):
+    page = shipped("#18")
+    for expected in (19, 19):
+        page.get_by_label("One frame on").click()
+        assert frame(page) == expected
+    address(page, "#1")
+    for expected in (0, 0):
+        page.get_by_label("One frame back").click()
+        assert frame(page) == expected
+
+
+class TestKeys:
+    @pytest.mark.parametrize("focus", ["body", "#slider", "#play"])
+    def test_an_arrow_moves_by_one_frame_wherever_the_focus_is(self, shipped, focus):
+        page = shipped("#5")
+        page.locator(focus).focus()
+        for key, expected in (("ArrowRight", 6), ("ArrowRight", 7), ("ArrowLeft", 6)):
+            page.keyboard.press(key)
+            assert frame(page) == expected
+
+    @pytest.mark.parametrize("held", ["Alt", "Control", "Meta"])
+    @pytest.mark.parametrize("focus", ["body", "svg[data-grid=grid]"])
+    def test_an_arrow_with_another_key_is_left_to_the_browser(self, shipped, held, focus):
+        page = shipped("#5/100/30")
+        page.evaluate("window.addEventListener('keydown', (event) => { window.taken = event.defaultPrevented; })")
+        page.locator(focus).focus()
+        page.keyboard.press(f"{held}+ArrowLeft")
+        assert page.evaluate("window.taken") is False
+        assert frame(page) == 5
+        page.locator("#telling", has_text="row 100, column 30").wait_for()
+
+    def test_arrows_in_a_list_choose_its_options(self, shipped):
+        page = shipped("#5")
+        page.locator("#speed").focus()
+        page.keyboard.press("ArrowDown")
+        assert frame(page) == 5
+
+    def test_space_plays_and_pauses_but_opens_what_can_be_unfolded(self, shipped):
+        page = shipped("#5/100/30", by_hand=True)
+        page.locator("#telling summary").focus()
+        page.keyboard.press("Space")
+        assert page.locator("#telling details").evaluate("(details) => details.open")
+        assert page.locator("#play").inner_text() == "▶ Play"
+        page.locator("body").focus()
+        page.evaluate("document.activeElement.blur()")
+        page.keyboard.press("Space")
+        assert page.locator("#play").inner_text() == "❚❚ Pause"
+        page.keyboard.press("Space")
+        assert page.locator("#play").inner_text() == "▶ Play"
+
+
+def test_the_address_is_followed(shipped):
+    page = shipped("#3")
+    assert frame(page) == 3
+    for hash_, expected in (("#12", 12), ("#99", 19), ("#x", 0), ("#7/100/30", 7)):
+        address(page, hash_)
+        assert frame(page) == expected
+    page.go_back()
+    page.wait_for_timeout(50)
+    assert frame(page) == 0
+
+
+class TestPlay:
+    def test_each_frame_comes_at_its_time_and_the_last_one_stays(self, shipped, shipped_frames):
+        page = shipped(by_hand=True)
+        page.locator("#play").click()
+        passed = 0
+        for k, view in enumerate(shipped_frames):
+            due = round(1000 * (view["time"] - shipped_frames[0]["time"]))
+            page.clock.run_for(max(0, due - 20 - passed))
+            assert frame(page) == max(0, k - 1)
+            page.clock.run_for(40 if k else 20)
+            passed = due + 20
+            assert frame(page) == k
+        assert page.locator("#play").inner_text() == "▶ Play"
+        page.clock.run_for(5000)
+        assert frame(page) == len(shipped_frames) - 1
+
+    def test_after_the_end_it_begins_again(self, shipped):
+        page = shipped("#19", by_hand=True)
+        page.locator("#play").click()
+        assert frame(page) == 0
+        page.clock.run_for(130)
+        assert frame(page) == 1
+
+    @pytest.mark.parametrize(("speed", "milliseconds"), [("2", 500), ("1", 1000), ("0.5", 2000), ("0.25", 4000)])
+    def test_speed_divides_the_time(self, shipped, speed, milliseconds):
+        page = shipped(by_hand=True)
+        page.locator("#speed").select_option(speed)
+        page.locator("#play").click()
+        page.clock.run_for(milliseconds - 10)
+        assert frame(page) == 9
+        page.clock.run_for(30)
+        assert frame(page) == 10
+
+    def test_pause_holds_the_frame(self, shipped):
+        page = shipped(by_hand=True)
+        page.locator("#play").click()
+        page.clock.run_for(330)
+        page.locator("#play").click()
+        page.clock.run_for(3000)
+        assert frame(page) == 3
+
+    def test_it_runs_by_the_clock_on_the_wall(self, shipped):
+        page = shipped()
+        seconds = page.evaluate(
+            """() => new Promise((done) => {
+                 const start = performance.now();
+                 watchers.push((k) => { if (k === 10) done((performance.now() - start) / 1000); });
+                 play.click();
+               })"""
+        )
+        assert seconds >= 0.99  # later on a busy machine, never earlier
+
+    def test_those_who_hear_the_page_hear_nothing_while_it_plays(self, shipped):
+        page = shipped("#2/100/30", by_hand=True)
+        regions = page.locator("[aria-live]")
+        live = "(all) => all.map((one) => one.getAttribute('aria-live'))"
+        assert set(regions.evaluate_all(live)) == {"polite"}
+        page.locator("#play").click()
+        page.clock.run_for(250)
+        assert set(regions.evaluate_all(live)) == {"off"}
+        page.locator("#play").click()
+        assert set(regions.evaluate_all(live)) == {"polite"}
+        assert regions.count() == 2
