@@ -200,7 +200,13 @@ class RemoteFunction:
         return self.session.call(self.__name__, arguments, named, measured=False)[0]
 
     def peak_megabytes(self, *arguments: Any) -> tuple[Any, float]:
-        """Call the function, and return its result and how much memory it held. Parameters are those of `call`."""
+        """Call the function, and return its result and how much memory it held, as `Session.call` does.
+
+        Parameters
+        ----------
+        *arguments
+            What it is called with.
+        """
         return self.session.call(self.__name__, arguments, {}, measured=True)
 
 
