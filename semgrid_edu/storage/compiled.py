@@ -24,7 +24,7 @@ def keep_compiled_functions() -> str:
         One line for the user; empty when numba finds a place by itself.
     """
     chosen = [Path(os.environ[VARIABLE])] if os.environ.get(VARIABLE) else []
-    if any(map(_takes_files, [*chosen, *_usual_folders()])):
+    if any(map(takes_files, [*chosen, *_usual_folders()])):
         return ""
     os.environ[VARIABLE] = folder = str(_own_folder())
     return f"neither the package nor your cache folder can be written to; compiled functions are kept in {folder}"
@@ -32,12 +32,12 @@ def keep_compiled_functions() -> str:
 
 def _usual_folders() -> list[Path]:
     """Return where numba looks: beside the module, and in the user's cache folder."""
+    return [PACKAGE / "occupancy" / "__pycache__", user_cache()]
+
+
+def user_cache() -> Path:
+    """Return the user's cache folder, as numba does; it need not exist."""
     home = Path(os.path.expanduser("~"))  # noqa: PTH111 (Path.home raises an error for a user without a home)
-    return [PACKAGE / "occupancy" / "__pycache__", _user_cache(home)]
-
-
-def _user_cache(home: Path) -> Path:
-    """Return the user's cache folder as numba does."""
     if sys.platform == "win32":
         return Path(os.environ.get("LOCALAPPDATA", home / "AppData" / "Local"))
     if sys.platform == "darwin":
@@ -45,8 +45,14 @@ def _user_cache(home: Path) -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME", home / ".cache"))
 
 
-def _takes_files(folder: Path) -> bool:
-    """Return whether files can be written to a folder, which is made when missing."""
+def takes_files(folder: Path) -> bool:
+    """Return whether files can be written to a folder, which is made when missing.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()

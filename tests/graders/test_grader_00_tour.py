@@ -85,7 +85,7 @@ def cell_of(x, y, x_max, y_max, cell):
             "endless loop",
             task="cell-of",
             loses=2,
-            says="No reply from kernel before timeout",
+            says="no reply before timeout",
             code="def cell_of(x, y, x_max, y_max, cell):\n    while True:\n        x -= cell",
         ),
         mistake(

@@ -346,7 +346,7 @@ def predict(belief, moved, ring=True):
             "endless loop",
             task="predict",
             loses=3,
-            says="No reply from kernel before timeout",
+            says="no reply before timeout",
             code="""
 def predict(belief, moved, ring=True):
     after = belief.copy()

@@ -580,7 +580,7 @@ def smear(speed, dt, L_max, occupied, free):
             "sign swapped: it never falls",
             task="smear",
             loses=2,
-            says="No reply from kernel before timeout",
+            says="no reply before timeout",
             code="""
 def smear(speed, dt, L_max, occupied, free):
     passes, L = 0, L_max

@@ -98,7 +98,7 @@ def antecedent(row, col, velocity, dt, cell):
             "endless loop",
             task="antecedent",
             loses=2,
-            says="No reply from kernel before timeout",
+            says="no reply before timeout",
             code="def antecedent(row, col, velocity, dt, cell):\n    while True:\n        row += 1",
         ),
         # ---- task 2

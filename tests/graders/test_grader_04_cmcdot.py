@@ -697,7 +697,7 @@ def systematic(weight, count, offset):
             "endless loop",
             task="systematic",
             loses=3,
-            says="No reply from kernel before timeout",
+            says="no reply before timeout",
             code="""
 def systematic(weight, count, offset):
     drawn, n = [], 0

@@ -480,7 +480,7 @@ def give_back(p_bar, pixels, visible, h, w):
             "waits for a loss of zero",
             task="give-back",
             loses=3,
-            says="No reply from kernel before timeout",
+            says="no reply before timeout",
             code="""
 def give_back(p_bar, pixels, visible, h, w):
     s_bar = np.zeros((len(p_bar), h, w))

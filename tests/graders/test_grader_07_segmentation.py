@@ -281,7 +281,7 @@ def receptive_field(layers):
             "waits for the list to be empty",
             task="field",
             loses=3,
-            says="No reply from kernel before timeout",
+            says="no reply before timeout",
             code="""
 def receptive_field(layers):
     field, jump = 1, 1

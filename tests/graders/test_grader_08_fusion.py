@@ -523,7 +523,7 @@ def balance(maps, n_classes):
             "endless loop",
             task="balance",
             loses=3,
-            says="No reply from kernel before timeout",
+            says="no reply before timeout",
             code="""
 def balance(maps, n_classes):
     c, f = 0, np.zeros(n_classes)

@@ -388,7 +388,7 @@ def enclosing_simplex(y):
             "endless loop",
             task="enclosing-simplex",
             loses=2,
-            says="No reply from kernel before timeout",
+            says="no reply before timeout",
             code=simplex(repair="\n    while origin.sum() != 0:\n        origin[np.argmin(y - origin)] += size"),
         ),
         # ---- task 3

@@ -15,15 +15,13 @@ from semgrid_edu.course.isolation.notebook import run_submission
 from semgrid_edu.course.isolation.process import StudentProcess
 from semgrid_edu.course.isolation.tests import INSTRUCTOR
 from semgrid_edu.errors import DataError
+from semgrid_edu.storage.compiled import takes_files, user_cache
 
 PATIENCE = 600.0
 """Seconds that a cell of the reference may take; it compiles what others find compiled."""
 
 FONTS = "import matplotlib.pyplot"
 """Lets matplotlib look for the system's fonts, which takes seconds."""
-
-PASSED = "the reference passed"
-"""The name of the file that tells so."""
 
 
 def use_instructor(folder: Path) -> None:
@@ -45,7 +43,7 @@ def use_instructor(folder: Path) -> None:
 
 
 def prepare(course: Path, assignment: str, start: Callable[[Path], StudentProcess]) -> Path:
-    """Grade the reference answers once, and keep what they had compiled.
+    """Grade the reference answers once in each course, and keep what they had compiled for all of the user's courses.
 
     Parameters
     ----------
@@ -66,13 +64,23 @@ def prepare(course: Path, assignment: str, start: Callable[[Path], StudentProces
     DataError
         When the reference answers don't pass their own tests.
     """
-    folder = course / "prepared" / assignment
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = _kept(course, assignment)
+    passed = course / "prepared" / f"{assignment} passed"
+    passed.parent.mkdir(exist_ok=True)
     with FileLock(folder.with_suffix(".lock")):
-        if not (folder / PASSED).exists():
+        if not passed.exists():
             _grade_reference(course, assignment, folder, start)
-            (folder / PASSED).touch()
+            passed.touch()
     return folder
+
+
+def _kept(course: Path, assignment: str) -> Path:
+    """Return the folder of what is prepared: in the user's cache, or in the course where that can't be written to."""
+    shared = user_cache() / "semgrid_edu" / "prepared" / assignment
+    if takes_files(shared):
+        return shared
+    (course / "prepared" / assignment).mkdir(parents=True, exist_ok=True)
+    return course / "prepared" / assignment
 
 
 def _grade_reference(course: Path, assignment: str, folder: Path, start: Callable[[Path], StudentProcess]) -> None:

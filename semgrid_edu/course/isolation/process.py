@@ -20,6 +20,7 @@ from semgrid_edu.course.isolation.limits import PARTS, Limits, threads_of_this_u
 from semgrid_edu.course.isolation.values import decode, encode
 from semgrid_edu.course.isolation.wire import Wire
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.storage.files import atomic_path
 
 WORKER = (sys.executable, "-m", "semgrid_edu.course.isolation.worker")
 
@@ -164,8 +165,14 @@ class StudentProcess:
                 with suppress(OSError):
                     pipe.close()
         if self.keeps:
-            shutil.copytree(self.folder / "prepared", self.prepared, dirs_exist_ok=True)
+            shutil.copytree(self.folder / "prepared", self.prepared, copy_function=_replace, dirs_exist_ok=True)
         shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def _replace(source: str, target: str) -> None:
+    """Copy a file, so that nobody who reads the old one meanwhile gets half of the new."""
+    with atomic_path(target) as path:
+        shutil.copyfile(source, path)
 
 
 def _called(callbacks: list[Callable], reply: dict) -> dict[str, Any]:
