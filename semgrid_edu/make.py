@@ -1,6 +1,7 @@
-"""What `make demo` and `make test` do, for machines without make: `python -m semgrid_edu.make demo`, in a clone.
+"""What `make demo`, `make test` and `make test-browser` do, for machines without make.
 
-It needs nothing but Python's own library, since it makes the environment in which everything else is installed.
+`python -m semgrid_edu.make demo` in a clone needs nothing but Python's own library, since it makes the environment in
+which everything else is installed.
 """
 
 import os

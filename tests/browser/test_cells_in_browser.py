@@ -122,6 +122,7 @@ class TestChosenCells:
         page = shipped()
         page.locator("svg[data-grid=grid]").focus()
         page.keyboard.press("ArrowUp")
+        page.locator("#telling h3").first.wait_for()
         heading = page.locator("#telling > p").first.inner_text()
         ahead, aside = re.findall(r"([\d.]+) m", heading)
         assert 5 < float(ahead) < 25

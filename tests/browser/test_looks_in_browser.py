@@ -113,8 +113,8 @@ class TestPhone:
         svg = phone.locator("svg[data-grid=refined]")
         svg.scroll_into_view_if_needed()
         svg.tap()
-        phone.locator("[data-marks=grid] .mark").wait_for(state="attached")
-        assert "row 100, column 30)" not in phone.locator("#telling").inner_text()
+        phone.locator("#telling", has_text="row 100, column 30)").wait_for(state="detached")
+        assert phone.locator("[data-marks=grid] .mark").count() == 1
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -182,12 +182,10 @@ def test_a_frame_without_stories_names_the_nearest_that_has_them(open_page, tiny
 
 def test_a_student_s_map_says_its_class_and_no_states_of_the_package(open_page, tiny_page):
     page = open_page(tiny_page)
-    for name, silent in (("your_refined", False), ("your_occupancy", True)):
-        svg = page.locator(f"svg[data-grid={name}]")
-        svg.scroll_into_view_if_needed()
-        svg.hover()
-        page.wait_for_timeout(200)
-        assert page.locator("#hover").is_hidden() == silent
+    page.locator("svg[data-grid=your_refined]").hover()
+    page.locator("#hover").wait_for()
+    page.locator("svg[data-grid=your_occupancy]").hover()
+    page.locator("#hover").wait_for(state="hidden")
 
 
 def test_errors_are_offered_only_where_the_truth_is_known(open_page, tiny_page, tmp_path):

@@ -12,9 +12,14 @@ def clock(page) -> str:
 
 
 def address(page, hash_: str) -> None:
-    """Change what follows # in the address."""
-    page.evaluate("hash => { location.hash = hash; }", hash_)
-    page.wait_for_timeout(50)
+    """Change what follows # in the address, and wait until the page has heard of it."""
+    page.evaluate(
+        """(hash) => new Promise((done) => {
+             addEventListener("hashchange", () => done(), { once: true });
+             location.hash = hash;
+           })""",
+        hash_,
+    )
 
 
 def pictures(page) -> dict[str, str]:
@@ -124,8 +129,7 @@ def test_the_address_is_followed(shipped):
         address(page, hash_)
         assert frame(page) == expected
     page.go_back()
-    page.wait_for_timeout(50)
-    assert frame(page) == 0
+    page.wait_for_function("() => shown() === 0")
 
 
 class TestPlay:
