@@ -6,7 +6,7 @@ import numpy as np
 from filterpy.discrete_bayes import update as discrete_update
 from scipy import ndimage
 
-from semgrid_edu.course.answers import answer_array
+from semgrid_edu.course.answers import answer_array, answer_arrays
 from semgrid_edu.grid import GridSpec
 from semgrid_instructor import generator, hidden
 
@@ -99,7 +99,7 @@ def check_mean(mean_and_covariance: Callable) -> None:
 def check_no_mass(mean_and_covariance: Callable) -> None:
     """NaN where nothing moves, and nowhere else; where the mean is wrong for what stands, only in free cells."""
     velocities, joint = _lattice_and_joint()
-    mean, covariance = map(answer_array, mean_and_covariance(joint.copy(), velocities.copy()))
+    mean, covariance = answer_arrays(mean_and_covariance(joint.copy(), velocities.copy()), 2)
     empty = joint[1:].sum(axis=0) == 0
     judged = empty if _mean_is_right(mean, joint, velocities) else joint.sum(axis=0) == 0
     assert np.isnan(mean[:, judged]).all(), "a mean velocity where nothing moves"
@@ -112,7 +112,7 @@ def check_no_mass(mean_and_covariance: Callable) -> None:
 def check_covariance(mean_and_covariance: Callable) -> None:
     """Compare with numpy's weighted covariance, cell by cell; where means are wrong, in cells where all moves."""
     velocities, joint = _lattice_and_joint()
-    mean, covariance = map(answer_array, mean_and_covariance(joint.copy(), velocities.copy()))
+    mean, covariance = answer_arrays(mean_and_covariance(joint.copy(), velocities.copy()), 2)
     if not _mean_is_right(mean, joint, velocities):
         joint[0] = 0
         joint /= np.maximum(joint.sum(axis=0), 1e-9)
