@@ -65,3 +65,31 @@ def answer_number(result: Any, name: str = "it") -> float:
     numbers = answer_array(result, name)
     assert numbers.size == 1, f"{name} returned {numbers.size} numbers instead of one"
     return numbers.item()
+
+
+def answer_arrays(result: Any, n_arrays: int, name: str = "it") -> list[NDArray]:
+    """Return the result of an answer as several arrays, or say in a sentence why it is something else.
+
+    Parameters
+    ----------
+    result : Any
+        What the answer returned: a tuple or list of arrays, as `answer_array` takes them.
+    n_arrays : int
+        How many there must be.
+    name : str
+        The subject of the sentence, as in `answer_array`.
+
+    Returns
+    -------
+    list of NDArray
+        New arrays with the results' numbers.
+
+    Raises
+    ------
+    AssertionError
+        When the result is None, has another length, or holds something else than arrays of numbers.
+    """
+    assert result is not None, f"{name} returned nothing: did you forget `return`?"
+    found = len(result) if isinstance(result, tuple | list) else 1
+    assert found == n_arrays, f"{name} must return {n_arrays} arrays, separated by commas; got {found}"
+    return [answer_array(part, name) for part in result]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from semgrid_edu.course.answers import answer_array, answer_number
+from semgrid_edu.course.answers import answer_array, answer_arrays, answer_number
 
 
 @pytest.mark.parametrize(
@@ -51,3 +51,23 @@ def test_one_number_in_any_wrapping_is_a_number(result):
 def test_what_is_not_one_number_gets_a_sentence(result, sentence):
     with pytest.raises(AssertionError, match=sentence):
         answer_number(result, "reach")
+
+
+def test_parts_of_a_result_are_arrays():
+    mean, covariance = answer_arrays(([1, 2], ((1, 0), (0, 1))), 2)
+    np.testing.assert_array_equal(mean, [1.0, 2.0])
+    np.testing.assert_array_equal(covariance, np.eye(2))
+
+
+@pytest.mark.parametrize(
+    ("result", "sentence"),
+    [
+        (None, r"^mix returned nothing"),
+        (np.zeros(2), r"^mix must return 2 arrays, separated by commas; got 1$"),
+        ((1, 2, 3), r"^mix must return 2 arrays, separated by commas; got 3$"),
+        (([1, 2], "x"), r"^mix returned no array of numbers but a str"),
+    ],
+)
+def test_other_parts_get_a_sentence(result, sentence):
+    with pytest.raises(AssertionError, match=sentence):
+        answer_arrays(result, 2, "mix")

@@ -124,6 +124,23 @@ def bayes_update(belief, likelihood):
     product = np.exp(log - log.max(axis=0))
     return product / np.sum(product, axis=0, keepdims=True)""",
         ),
+        right(
+            "nested lists, by helpers with ordinary names",
+            task="bayes-update",
+            code="""
+before, got, total, quiet, K, ahead = "mine", None, [], 3, {}, 0
+
+
+def wrong(states, z):
+    product = [b * p for b, p in zip(states, z)]
+    return [p / sum(product) for p in product]
+
+
+def bayes_update(belief, likelihood):
+    _, H, W = belief.shape
+    cells = [[wrong(belief[:, r, c], likelihood[:, r, c]) for c in range(W)] for r in range(H)]
+    return [[[cell[state] for cell in row] for row in cells] for state in range(4)]""",
+        ),
         mistake(
             "no normalisation",
             task="bayes-update",
@@ -251,7 +268,7 @@ def pixel_of(point, K, T_camera_from_grid):
         mistake(
             "transform inverted",
             task="pixel-of",
-            loses=3,
+            loses=2,
             says="you use the inverse transform",
             code="""
 def pixel_of(point, K, T_camera_from_grid):

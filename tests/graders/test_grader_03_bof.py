@@ -350,6 +350,28 @@ def mean_and_covariance(joint, velocities):
     return mean, covariance""",
         ),
         right(
+            "nested lists, and names that the tests have, too",
+            task="mean-and-covariance",
+            code="""
+joint, velocities, before, got, slips = "mine", None, [], 3, {}
+
+
+def mean(weights, values):
+    total = sum(weights)
+    return sum(w * v for w, v in zip(weights, values)) / total if total > 0 else float("nan")
+
+
+def mean_and_covariance(joint, velocities):
+    (_, H, W), v = joint.shape, velocities[1:]
+    m, axes = joint[1:], (0, 1)
+    means = [[[mean(m[:, r, c], v[:, i]) for c in range(W)] for r in range(H)] for i in axes]
+
+    def covariance(i, j, r, c):
+        return mean(m[:, r, c], (v[:, i] - means[i][r][c]) * (v[:, j] - means[j][r][c]))
+
+    return means, [[[[covariance(i, j, r, c) for c in range(W)] for r in range(H)] for j in axes] for i in axes]""",
+        ),
+        right(
             "moments",
             task="mean-and-covariance",
             code="""
@@ -363,7 +385,7 @@ def mean_and_covariance(joint, velocities):
         mistake(
             "not divided by the probability",
             task="mean-and-covariance",
-            loses=4,
+            loses=2,
             says="given that something moves means divided by P(DYNAMIC)",
             code="""
 def mean_and_covariance(joint, velocities):
@@ -375,7 +397,7 @@ def mean_and_covariance(joint, velocities):
         mistake(
             "what stands counted in",
             task="mean-and-covariance",
-            loses=5,
+            loses=2,
             says="what stands doesn't move",
             code="""
 def mean_and_covariance(joint, velocities):
@@ -435,7 +457,7 @@ def mean_and_covariance(joint, velocities):
         mistake(
             "NaN where there is little",
             task="mean-and-covariance",
-            loses=5,
+            loses=1,
             says="on inputs you haven't seen: NaN where something may move",
             code="""
 def mean_and_covariance(joint, velocities):

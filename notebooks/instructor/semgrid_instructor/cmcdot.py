@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from semgrid_edu.course.answers import answer_array
+from semgrid_edu.course.answers import answer_array, answer_arrays
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams, Evidence, FilterState, Particles, transition_matrix
 from semgrid_edu.occupancy import update as package_update
@@ -26,7 +26,7 @@ def check_in_cells(in_cells: Callable) -> None:
     expected, _ = velocity_moments(particles, cells, spec.shape)
     before = position + np.array([1.3, -0.4])
     got = in_cells(before, velocity, weight, 1.3, -0.4, spec.x_max, spec.y_max, spec.cell, spec.shape)
-    dynamic, mean = map(answer_array, got)
+    dynamic, mean = answer_arrays(got, 2)
     assert dynamic.shape == spec.shape, f"dynamic has the shape {dynamic.shape} instead of {spec.shape}"
     total = weight_in_cells(particles.weight, cells, spec.shape)
     wrong = ~np.isclose(dynamic, total, atol=1e-5)
@@ -46,7 +46,7 @@ def check_mix(mix: Callable) -> None:
     rng = generator(2)
     belief = rng.dirichlet(np.ones(4), size=(5, 7)).transpose(2, 0, 1)
     for M in (transition_matrix(CmcdotParams(), 0.3), rng.dirichlet(np.ones(4), size=4)):
-        after, newborn = map(answer_array, mix(belief.copy(), M.copy()))
+        after, newborn = answer_arrays(mix(belief.copy(), M.copy()), 2)
         assert after.shape == belief.shape, f"shape {after.shape} instead of {belief.shape}"
         by_cells = np.einsum("ij,ihw->jhw", M, belief)
         assert np.allclose(after, by_cells), "wrong belief after the step"

@@ -37,7 +37,7 @@ def check_resize(new_intrinsics: Callable) -> None:
     """Smaller and larger images, cut and uncut."""
     rng = generator(52)
     for size, new_size in (((188, 621), (96, 320)), ((60, 80), (150, 120)), ((50, 50), (10, 50))):
-        K = np.round(_intrinsics(rng))  # who rounds before the resize has rounded a cut, which check_crop judges
+        K = np.round(_intrinsics(rng))  # rounding before the resize is a matter of the cut, which check_crop judges
         scale_v, scale_u = new_size[0] / size[0], new_size[1] / size[1]
         got = answer_array(new_intrinsics(K.copy(), 0, 0, scale_u, scale_v))
         expected = Camera(K, np.eye(4), size).resized(new_size).K

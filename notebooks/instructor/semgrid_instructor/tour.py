@@ -5,20 +5,22 @@ from collections.abc import Callable
 import numpy as np
 
 from semgrid_edu.camera import Camera, project, rigid_transform, transform_points
+from semgrid_edu.course.answers import answer_array
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import class_accuracy, pixel_accuracy
-from semgrid_instructor import hidden
+from semgrid_instructor import generator, hidden
 
 
 @hidden
 def check_cell_of(cell_of: Callable) -> None:
     """Points anywhere in the cells of a grid that also reaches behind the vehicle."""
-    rng = np.random.default_rng(1)
+    rng = generator(1)
     spec = GridSpec(x_min=-10, x_max=30, y_min=-6, y_max=14, cell=0.2)
     centers = spec.centers()
     for row, col in rng.integers(0, spec.shape, size=(40, 2)):
         x, y = centers[row, col] + rng.uniform(-0.09, 0.09, size=2)
-        got = tuple(cell_of(float(x), float(y), spec.x_max, spec.y_max, spec.cell))
+        got = answer_array(cell_of(float(x), float(y), spec.x_max, spec.y_max, spec.cell))
+        assert got.shape == (2,), "return two numbers, row and column"
         assert got[0] == row, "wrong row (behind the vehicle x is negative; cells need not be 0.5 m)"
         assert got[1] == col, "wrong column (right of the vehicle y is negative; the grid need not be symmetric)"
 
@@ -26,11 +28,11 @@ def check_cell_of(cell_of: Callable) -> None:
 @hidden
 def check_bayes_update(bayes_update: Callable) -> None:
     """Random beliefs over a grid of another shape, with cells that are certain."""
-    rng = np.random.default_rng(2)
+    rng = generator(2)
     belief = rng.dirichlet(np.ones(4), size=(5, 7)).transpose(2, 0, 1)
     belief[:, 3, 6] = [0, 1, 0, 0]
     likelihood = rng.uniform(0.05, 1, size=belief.shape)
-    got = np.asarray(bayes_update(belief.copy(), likelihood.copy()))
+    got = answer_array(bayes_update(belief.copy(), likelihood.copy()))
     assert got.shape == belief.shape, f"shape {got.shape} instead of {belief.shape}"
     assert np.allclose(got.sum(axis=0), 1), "the states of some cells don't sum to 1"
     assert np.allclose(got[:, 3, 6], belief[:, 3, 6]), "a cell that is certain must stay certain"
@@ -40,7 +42,7 @@ def check_bayes_update(bayes_update: Callable) -> None:
 
 def _rig(seed: int) -> tuple[np.ndarray, np.ndarray, np.random.Generator]:
     """Return a camera matrix, T_camera_from_grid of a camera that looks ahead and a little aside, and the generator."""
-    rng = np.random.default_rng(seed)
+    rng = generator(seed)
     K = np.array([[700.0, 0, 610], [0, 720, 170], [0, 0, 1]])
     ahead = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])
     a = 0.1
@@ -55,31 +57,34 @@ def check_pixel_of(pixel_of: Callable) -> None:
     points = rng.uniform([4, -5, 0], [60, 5, 3], size=(30, 3))
     camera = Camera(K, np.eye(4), size=(375, 1242))
     expected, _ = project(transform_points(T_camera_from_grid, points), camera)
-    got = np.array([pixel_of(point, K, T_camera_from_grid) for point in points], dtype=float)
+    got = np.array([answer_array(pixel_of(point, K, T_camera_from_grid)) for point in points])
     assert got.shape == expected.shape, "return two numbers, u and v"
     assert np.allclose(got, expected, atol=1e-3), f"off by up to {np.abs(got - expected).max():.2g} pixels"
 
 
 @hidden
 def check_pixel_behind(pixel_of: Callable) -> None:
-    """Points behind the camera, and one in its own plane, where Z is zero."""
+    """Points behind the camera, and one in its own plane, where Z is zero.
+
+    They lie far to the left, so that they are behind by the inverse transform as well: check_pixel_of judges that.
+    """
     K, T_camera_from_grid, rng = _rig(4)
-    points = rng.uniform([-60, -5, 0], [-2, 5, 3], size=(10, 3))
+    points = rng.uniform([-60, 3, 0], [-2, 5, 3], size=(10, 3))
     for point in points:
-        assert np.isnan(np.array(pixel_of(point, K, T_camera_from_grid), dtype=float)).all(), "Z < 0, yet a pixel"
+        assert np.isnan(answer_array(pixel_of(point, K, T_camera_from_grid))).all(), "Z < 0, yet a pixel"
     ahead = np.array([[0.0, -1, 0, 0], [0, 0, -1, 1.5], [1, 0, 0, 0], [0, 0, 0, 1]])
-    beside = np.array(pixel_of(np.array([0.0, 1.0, 1.0]), K, ahead), dtype=float)
+    beside = answer_array(pixel_of(np.array([0.0, 2.0, 1.0]), K, ahead))
     assert np.isnan(beside).all(), "Z = 0: a point in the camera's own plane has no pixel"
 
 
 @hidden
 def check_accuracies(accuracies: Callable) -> None:
     """Random confusion over fourteen classes, three of them without truth, one never found."""
-    rng = np.random.default_rng(5)
+    rng = generator(5)
     for _ in range(5):
         confusion = rng.integers(0, 50, size=(14, 14))
         confusion[[2, 7, 13]] = 0
         confusion[4, 4] = 0
-        pixel, per_class = accuracies(confusion.copy())
+        pixel, per_class = answer_array(accuracies(confusion.copy()))
         assert np.isclose(pixel, pixel_accuracy(confusion)), "wrong pixel accuracy"
         assert np.isclose(per_class, class_accuracy(confusion)), "wrong class accuracy (some classes have no truth)"

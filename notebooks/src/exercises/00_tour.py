@@ -20,7 +20,10 @@ import warnings
 
 import numpy as np
 
+from semgrid_edu.course.answers import answer_array
+
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
+# Names that begin with _ belong to the tests.
 
 # %% [markdown]
 # ## Task 1: from metres to cells (2 points)
@@ -42,27 +45,30 @@ def cell_of(x, y, x_max, y_max, cell):
 
 
 # %% nbgrader={"grade": true, "grade_id": "cell-of-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-# A grid 6 m ahead, 2 m to each side, in cells of 0.5 m. By hand: 1.4 m below the top edge, 0.8 m from the left edge.
-got = cell_of(x=4.6, y=1.2, x_max=6, y_max=2, cell=0.5)
-assert got is not None, "cell_of returned nothing: did you forget `return`?"
-assert np.size(got) == 2, f"return two numbers, row and column; got {got}"
-got = tuple(got)
-slips = {
-    (1, 2): "row and column are swapped: rows count along x (forward), columns along y (left)",
-    (9, 1): "you count rows from the vehicle: row 0 is the farthest ahead, measure from x_max",
-    (2, 6): "y points left and column 0 is the leftmost: measure columns from y_max",
-    (3, 2): "you round to the nearest border: a point belongs to the cell it lies in (floor)",
-    (1, 0): "you count metres: how many cells of 0.5 m fit into 1.4 m?",
-}
-assert got not in slips, f"got {got}: {slips[got]}"
-assert got == (2, 1), f"expected row 2, column 1 for x = 4.6 m, y = 1.2 m, got {got}"
-assert all(isinstance(i, (int, np.integer)) for i in got), f"an index must be an integer, got {got}"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import tour
+def _test():
+    # A grid 6 m ahead, 2 m to each side, in cells of 0.5 m. By hand: 1.4 m below the top edge, 0.8 m from the left edge.
+    got = cell_of(x=4.6, y=1.2, x_max=6, y_max=2, cell=0.5)
+    assert answer_array(got, "cell_of").shape == (2,), f"return two numbers, row and column; got {got}"
+    got = tuple(np.asarray(got).tolist())
+    slips = {
+        (1, 2): "row and column are swapped: rows count along x (forward), columns along y (left)",
+        (9, 1): "you count rows from the vehicle: row 0 is the farthest ahead, measure from x_max",
+        (2, 6): "y points left and column 0 is the leftmost: measure columns from y_max",
+        (3, 2): "you round to the nearest border: a point belongs to the cell it lies in (floor)",
+        (1, 0): "you count metres: how many cells of 0.5 m fit into 1.4 m?",
+    }
+    assert got not in slips, f"got {got}: {slips[got]}"
+    assert got == (2, 1), f"expected row 2, column 1 for x = 4.6 m, y = 1.2 m, got {got}"
+    assert all(isinstance(i, int) for i in got), f"an index must be an integer, got {got}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import tour
 
-complaint = tour.check_cell_of(cell_of)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = tour.check_cell_of(cell_of)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 2: Bayes' rule in every cell (3 points)
@@ -84,30 +90,34 @@ def bayes_update(belief, likelihood):
 
 
 # %% nbgrader={"grade": true, "grade_id": "bayes-update-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
-belief = np.full((4, 2, 3), 0.25)
-belief[:, 0, 1] = [0.7, 0.1, 0.1, 0.1]
-belief[:, 1, 2] = [0.6, 0.2, 0.1, 0.1]
-likelihood = np.full((4, 2, 3), 0.5)  # this scan is silent everywhere ...
-likelihood[:, 1, 2] = [0.1, 0.9, 0.9, 0.5]  # ... but in cell (1, 2), where the beam came back
-before = belief.copy()
-got = bayes_update(belief, likelihood)
-assert got is not None, "bayes_update returned nothing: did you forget `return`?"
-assert np.array_equal(belief, before), "bayes_update changed its argument `belief`: make a new array (no *=, no /=)"
-assert got.shape == (4, 2, 3), f"expected the shape of the belief, (4, 2, 3), got {got.shape}"
-total = got.sum(axis=0)
-row, col = np.unravel_index(np.abs(total - 1).argmax(), total.shape)
-wrong = f"the four states of cell ({row}, {col}) sum to {total[row, col]:.2f}"
-assert np.allclose(total, 1), f"{wrong}: did you normalise over the state axis?"
-assert not np.allclose(got[:, 0, 1], 0.25), "cell (0, 1) forgot what it believed: multiply the old belief in"
-quiet = np.round(got[:, 0, 1], 2)
-assert np.allclose(quiet, before[:, 0, 1], atol=0.01), f"the scan is silent in cell (0, 1), yet 0.7, ... became {quiet}"
-np.testing.assert_allclose(got[:, 1, 2], np.array([6, 18, 9, 5]) / 38, err_msg="by hand: 0.06, 0.18, 0.09, 0.05")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import tour
+def _test():
+    belief = np.full((4, 2, 3), 0.25)
+    belief[:, 0, 1] = [0.7, 0.1, 0.1, 0.1]
+    belief[:, 1, 2] = [0.6, 0.2, 0.1, 0.1]
+    likelihood = np.full((4, 2, 3), 0.5)  # this scan is silent everywhere ...
+    likelihood[:, 1, 2] = [0.1, 0.9, 0.9, 0.5]  # ... but in cell (1, 2), where the beam came back
+    before = belief.copy()
+    got = answer_array(bayes_update(belief, likelihood), "bayes_update")
+    assert np.array_equal(belief, before), "bayes_update changed its argument `belief`: make a new array (no *=, no /=)"
+    assert got.shape == (4, 2, 3), f"expected the shape of the belief, (4, 2, 3), got {got.shape}"
+    total = got.sum(axis=0)
+    row, col = np.unravel_index(np.abs(total - 1).argmax(), total.shape)
+    wrong = f"the four states of cell ({row}, {col}) sum to {total[row, col]:.2f}"
+    assert np.allclose(total, 1), f"{wrong}: did you normalise over the state axis?"
+    assert not np.allclose(got[:, 0, 1], 0.25), "cell (0, 1) forgot what it believed: multiply the old belief in"
+    quiet = np.round(got[:, 0, 1], 2)
+    silent = np.allclose(quiet, before[:, 0, 1], atol=0.01)
+    assert silent, f"the scan is silent in cell (0, 1), yet 0.7, ... became {quiet}"
+    np.testing.assert_allclose(got[:, 1, 2], np.array([6, 18, 9, 5]) / 38, err_msg="by hand: 0.06, 0.18, 0.09, 0.05")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import tour
 
-complaint = tour.check_bayes_update(bayes_update)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = tour.check_bayes_update(bayes_update)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 3: from a point to its pixel (2 + 1 points)
@@ -134,44 +144,53 @@ def pixel_of(point, K, T_camera_from_grid):
 
 
 # %% nbgrader={"grade": true, "grade_id": "pixel-of-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-K = np.array([[100.0, 0, 50], [0, 100, 20], [0, 0, 1]])
-ahead = np.array([[0.0, -1, 0, 0], [0, 0, -1, 1.5], [1, 0, 0, 0], [0, 0, 0, 1]])  # a camera 1.5 m above the ground
-# 10 m ahead, 2 m to the right, 0.5 m up. By hand: X = 2, Y = 1, Z = 10, so u = 50 + 100 * 0.2 and v = 20 + 100 * 0.1.
-got = pixel_of(np.array([10.0, -2.0, 0.5]), K, ahead)
-assert np.size(got) == 2, f"return two numbers, u and v; got {got}"
-slips = {
-    (700, 300): "did you divide by Z?",
-    (68.3, 29.3): "you divide by the distance: Z is the depth along the camera's axis only",
-    (64.3, -265.7): "you use the inverse transform: T_camera_from_grid takes grid to camera as it is",
-    (70, 15): "the camera's place got lost: the fourth coordinate of a point is 1, not 0",
-    (30, 70): "that is (v, u): u counts to the right and comes first",
-    (20, 10): "the principal point is missing: the third column of K shifts the pixel",
-    (70.5, 30.5): "half a pixel too much: the centre of the first pixel is (0, 0)",
-    (69.5, 29.5): "half a pixel too little: the centre of the first pixel is (0, 0)",
-}
-for slip, hint in slips.items():
-    assert not np.allclose(got, slip, atol=0.1), f"got ({got[0]:.1f}, {got[1]:.1f}): {hint}"
-np.testing.assert_allclose(got, (70, 30), err_msg="X = 2, Y = 1, Z = 10")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import tour
+def _test():
+    K = np.array([[100.0, 0, 50], [0, 100, 20], [0, 0, 1]])
+    ahead = np.array([[0.0, -1, 0, 0], [0, 0, -1, 1.5], [1, 0, 0, 0], [0, 0, 0, 1]])  # a camera 1.5 m above the ground
+    # 10 m ahead, 2 m to the right, 0.5 m up. By hand: X = 2, Y = 1, Z = 10, so u = 50 + 100 * 0.2 and v = 20 + 100 * 0.1.
+    got = answer_array(pixel_of(np.array([10.0, -2.0, 0.5]), K, ahead), "pixel_of")
+    assert got.shape == (2,), f"return two numbers, u and v; got {got}"
+    slips = {
+        (700, 300): "did you divide by Z?",
+        (68.3, 29.3): "you divide by the distance: Z is the depth along the camera's axis only",
+        (64.3, -265.7): "you use the inverse transform: T_camera_from_grid takes grid to camera as it is",
+        (70, 15): "the camera's place got lost: the fourth coordinate of a point is 1, not 0",
+        (30, 70): "that is (v, u): u counts to the right and comes first",
+        (20, 10): "the principal point is missing: the third column of K shifts the pixel",
+        (70.5, 30.5): "half a pixel too much: the centre of the first pixel is (0, 0)",
+        (69.5, 29.5): "half a pixel too little: the centre of the first pixel is (0, 0)",
+    }
+    for slip, hint in slips.items():
+        assert not np.allclose(got, slip, atol=0.1), f"got ({got[0]:.1f}, {got[1]:.1f}): {hint}"
+    np.testing.assert_allclose(got, (70, 30), err_msg="X = 2, Y = 1, Z = 10")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import tour
 
-complaint = tour.check_pixel_of(pixel_of)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = tour.check_pixel_of(pixel_of)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
 
 # %% nbgrader={"grade": true, "grade_id": "pixel-behind-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-got = pixel_of(np.array([-5.0, 1.0, 0.5]), K, ahead)
-assert np.size(got) == 2, f"return (nan, nan) for a point behind the camera, got {got}"
-u, v = np.array(got, dtype=float)
-assert np.isnan([u, v]).all(), (
-    f"a point 5 m behind the camera has no pixel, got ({u:.0f}, {v:.0f}): look at the sign of Z"
-)
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import tour
+def _test():
+    K = np.array([[100.0, 0, 50], [0, 100, 20], [0, 0, 1]])
+    ahead = np.array([[0.0, -1, 0, 0], [0, 0, -1, 1.5], [1, 0, 0, 0], [0, 0, 0, 1]])
+    got = answer_array(pixel_of(np.array([-5.0, 2.0, 0.5]), K, ahead), "pixel_of")
+    assert got.shape == (2,), f"return (nan, nan) for a point behind the camera, got {got}"
+    seen = f"got ({got[0]:.0f}, {got[1]:.0f}): look at the sign of Z"
+    assert np.isnan(got).all(), f"a point 5 m behind the camera has no pixel, {seen}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import tour
 
-complaint = tour.check_pixel_behind(pixel_of)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = tour.check_pixel_behind(pixel_of)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 4: two accuracies that disagree (3 points)
@@ -195,30 +214,34 @@ def accuracies(confusion):
 
 
 # %% nbgrader={"grade": true, "grade_id": "accuracies-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
-confusion = np.array([[6, 2, 1], [2, 2, 0], [0, 0, 0]])  # nothing is truly of class 2, though one cell is called so
-got = accuracies(confusion)
-assert np.size(got) == 2, f"return pixel accuracy and class accuracy, got {got}"
-pixel, per_class = got
-assert not np.isclose(pixel, 7 / 12), "the two are swapped: pixel accuracy comes first"
-assert np.isclose(pixel, 8 / 13), f"8 of 13 cells are right, so the pixel accuracy is 0.615, got {pixel:.3f}"
-assert not np.isnan(per_class), "class 2 has no true cell: 0 / 0 is not a share, leave it out"
-slips = {
-    7 / 18: "class 2 has no true cell: leave it out of the mean instead of counting a 0",
-    5 / 12: "you divide by the columns (what was predicted): a true class is a row",
-    8 / 39: "you divide by all cells: a class is measured on its own cells only",
-    4 / 13: "you divide by all cells: a class is measured on its own cells only",
-    29 / 66: "that is intersection over union: here, a wrong prediction costs the true class only",
-    29 / 99: "that is intersection over union: here, a wrong prediction costs the true class only",
-}
-for slip, hint in slips.items():
-    assert not np.isclose(per_class, slip), f"class accuracy {per_class:.3f}: {hint}"
-assert np.isclose(per_class, 7 / 12), f"6 of 9 and 2 of 4: the mean of 0.667 and 0.5 is 0.583, got {per_class:.3f}"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import tour
+def _test():
+    confusion = np.array([[6, 2, 1], [2, 2, 0], [0, 0, 0]])  # nothing is truly of class 2, though one cell is called so
+    got = answer_array(accuracies(confusion), "accuracies")
+    assert got.shape == (2,), f"return pixel accuracy and class accuracy, got {got}"
+    pixel, per_class = got
+    assert not np.isclose(pixel, 7 / 12), "the two are swapped: pixel accuracy comes first"
+    assert np.isclose(pixel, 8 / 13), f"8 of 13 cells are right, so the pixel accuracy is 0.615, got {pixel:.3f}"
+    assert not np.isnan(per_class), "class 2 has no true cell: 0 / 0 is not a share, leave it out"
+    slips = {
+        7 / 18: "class 2 has no true cell: leave it out of the mean instead of counting a 0",
+        5 / 12: "you divide by the columns (what was predicted): a true class is a row",
+        8 / 39: "you divide by all cells: a class is measured on its own cells only",
+        4 / 13: "you divide by all cells: a class is measured on its own cells only",
+        29 / 66: "that is intersection over union: here, a wrong prediction costs the true class only",
+        29 / 99: "that is intersection over union: here, a wrong prediction costs the true class only",
+    }
+    for slip, hint in slips.items():
+        assert not np.isclose(per_class, slip), f"class accuracy {per_class:.3f}: {hint}"
+    assert np.isclose(per_class, 7 / 12), f"6 of 9 and 2 of 4: the mean of 0.667 and 0.5 is 0.583, got {per_class:.3f}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import tour
 
-complaint = tour.check_accuracies(accuracies)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = tour.check_accuracies(accuracies)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 5: in your own words (2 points)

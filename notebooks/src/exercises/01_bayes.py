@@ -180,6 +180,7 @@ def _test():
     _explain(got, slips)
     # By your own kernel: on a ring with three empty cells more on either side, what ends in those stands at a wall.
     wide = answer_array(predict(np.pad(belief, 3), moved.copy()), "predict")
+    assert wide.shape == (10,), f"expected one number for each of 10 cells, shape (10,), got {wide.shape}"
     by_ring = [wide[:4].sum(), *wide[4:6], wide[6:].sum()]
     right = np.allclose(got, by_ring) or np.allclose(got, [0.05, 0.38, 0.33, 0.24])
     assert right, f"expected 0.05, 0.38, 0.33, 0.24: from cell 2, 0.9 of 0.2 ends in cell 3; got {np.round(got, 3)}"

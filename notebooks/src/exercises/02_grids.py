@@ -163,8 +163,10 @@ def _test():
     passed, hit = (0.3, 0.7), (0.9, 0.05)
     L = np.array([[3.0, -1.5, 0.0, 4.0]])  # the last cell got above the limit before there was one
     occupied, free = np.array([hit, passed, hit, passed]).T[:, None]
-    got = answer_array(update(L.copy(), occupied, free, L_min=-2.0, L_max=3.5), "update")[0]
-    wide = answer_array(update(L.copy(), occupied, free, L_min=-50.0, L_max=50.0), "update")[0]  # your sums
+    got = answer_array(update(L.copy(), occupied.copy(), free.copy(), L_min=-2.0, L_max=3.5), "update")
+    wide = answer_array(update(L.copy(), occupied, free, L_min=-50.0, L_max=50.0), "update")  # your sums
+    assert got.shape == wide.shape == (1, 4), f"expected the shape of L, (1, 4), got {got.shape}"
+    got, wide = got[0], wide[0]
     assert not np.isclose(got[3], wide[3] - 0.5, atol=1e-3), (
         f"cell (0, 3) fell from 4 to {got[3]:.2f}: you clamp before you add, but the sum is what must stay in range"
     )
@@ -380,6 +382,7 @@ _test()
 def _test():
     spec = GridSpec(x_min=-0.5, x_max=5.5, y_min=-4.5, y_max=4.5, cell=1)
     got = answer_array(beam_evidence(9.5, 0.3, spec, L_hit=2.0, L_pass=-1.0), "beam_evidence")
+    assert got.shape == (6, 9), f"expected one number a cell, shape (6, 9), got {got.shape}"
     hit = [tuple(cell) for cell in np.argwhere(got > 0).tolist()]
     assert not hit, (
         f"the return is 4 m beyond the grid, yet cell {hit[0]} is hit: an array's row -4 is the fourth from its end"
@@ -389,7 +392,7 @@ def _test():
     short = answer_array(beam_evidence(5.2, 0.16, spec, L_hit=-1.0, L_pass=-1.0), "beam_evidence")
     by_hand = np.zeros((6, 9))
     by_hand[:, 4] = -1
-    if np.array_equal(short, by_hand):  # who gets a beam within the grid wrong has paid for it above
+    if np.array_equal(short, by_hand):  # a beam that is wrong within the grid has cost its points above
         assert (got[:, 4] == -1).all(), column
         assert (np.delete(got, 4, axis=1) == 0).all(), "the beam stays in column 4: in the grid y runs from 0 to 0.17 m"
     ### BEGIN HIDDEN TESTS

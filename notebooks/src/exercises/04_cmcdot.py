@@ -23,7 +23,7 @@ import warnings
 
 import numpy as np
 
-from semgrid_edu.course.answers import answer_array
+from semgrid_edu.course.answers import answer_array, answer_arrays
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
 # Names that begin with _ belong to the tests.
@@ -65,7 +65,7 @@ def _test():
     speed, weight = np.array([[10.0, 0], [2, 4], [-3, 1], [5, 5]]), np.array([0.1, 0.3, 0.2, 0.4])
     got = in_cells(position, speed, weight, dx=1, dy=0, x_max=3, y_max=3, cell=1, shape=(3, 4))
     assert isinstance(got, (tuple, list)), f"return two arrays, dynamic and velocity; got {got}"
-    dynamic, velocity = (answer_array(a, "in_cells") for a in got)
+    dynamic, velocity = answer_arrays(got, 2, "in_cells")
     assert dynamic.shape == (3, 4), f"expected dynamic of shape (3, 4), got {dynamic.shape}"
     assert velocity.shape == (2, 3, 4), f"expected velocity of shape (2, 3, 4), got {velocity.shape}"
     assert dynamic.any(), "we drove forward, so what stands comes nearer: subtract dx, dy"
@@ -124,10 +124,9 @@ def _test():
     belief[:, 0, 1] = [0, 0, 0, 1]  # UNKNOWN stays so
     before = belief.copy()
     got = mix(belief, M)
-    two = isinstance(got, (tuple, list)) and len(got) == 2
-    assert two, f"return two arrays, after and newborn; got {got}"
+    assert isinstance(got, (tuple, list)), f"return two arrays, after and newborn; got {got}"
     assert np.array_equal(belief, before), "mix changed its argument `belief`: make a new array"
-    after, newborn = (answer_array(a, "mix") for a in got)
+    after, newborn = answer_arrays(got, 2, "mix")
     assert after.shape == (4, 1, 2), f"expected after of shape (4, 1, 2), got {after.shape}"
     backwards = np.allclose(after[:, 0, 0], M @ before[:, 0, 0])
     assert not backwards, "M is used the wrong way round, its row is the state before"
@@ -404,6 +403,7 @@ def _test():
     own[STATIC, 0, 0] = 1
     own[FREE, 0, 1] = 1
     got = answer_array(meet(own.copy(), np.array([[1.0, 1.7]])), "meet")
+    assert got.shape == (4, 1, 2), f"return the belief, of the shape of own, (4, 1, 2); got {got.shape}"
     assert np.isfinite(got).all(), (
         "surely STATIC, and surely something arrives: that is 0/0; let particles claim 0.999 at most"
     )

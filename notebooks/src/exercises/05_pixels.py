@@ -79,9 +79,10 @@ _test()
 # %% nbgrader={"grade": true, "grade_id": "resize-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     K = np.array([[100.0, 0, 40], [0, 120, 30], [0, 0, 1]])
-    kept = answer_array(new_intrinsics(K.copy(), 0, 0, 1, 1), "new_intrinsics")[0, 2]
+    kept = answer_array(new_intrinsics(K.copy(), 0, 0, 1, 1), "new_intrinsics")
+    assert kept.shape == (3, 3), f"expected a matrix of shape (3, 3), got {kept.shape}"
     for slip, hint in {39.5: "half a pixel got lost", 40.5: "half a pixel too much"}.items():
-        assert not np.isclose(kept, slip), f"{hint}: without a resize nothing but the cut may move c_u"
+        assert not np.isclose(kept[0, 2], slip), f"{hint}: without a resize nothing but the cut may move c_u"
     # By hand: from the image's edge, c_u is 40.5; half of it 20.25; from the first centre 19.75. For v: 30.5, 7.625, 7.125.
     got = answer_array(new_intrinsics(K.copy(), 0, 0, scale_u=0.5, scale_v=0.25), "new_intrinsics")
     slips = {
