@@ -1,0 +1,93 @@
+"""A class of thirty, from handing in to the exported grades: each grade is what it should be."""
+
+import csv
+import subprocess
+import sys
+from itertools import combinations
+
+import pytest
+import test_fair as fair
+import test_grader_01_bayes as catalogue
+import test_sound as sound
+from class_of import NAME, POINTS, REFERENCE, SETTINGS, handed_in, inside
+
+from semgrid_edu.course.exercises import build_course, course_api
+from semgrid_edu.course.grade import grade_course, write_graded
+from semgrid_edu.course.grading import place
+from semgrid_edu.course.notebooks import write_notebook
+
+
+def with_entries(entries):
+    """Return a notebook in which catalogued answers stand in place of the reference, and what it should earn."""
+    answers = REFERENCE | {entry.task: entry.code for entry in entries}
+    return handed_in(answers), 13 - sum(entry.loses for entry in entries)
+
+
+def changed(change):
+    """Return a right notebook after something happened to it."""
+    notebook = handed_in()
+    change(notebook)
+    return notebook, 13
+
+
+def class_of_thirty():
+    """Return each student's notebook and the points that it should earn."""
+    entries = catalogue.TestBayes.entries
+    rights = {task: [e for e in entries if e.task == task and not e.loses] for task in POINTS}
+    wrongs = {task: [e for e in entries if e.task == task and e.loses and "timeout" not in e.says] for task in POINTS}
+    found = {"right-0": (handed_in(), 13), "untouched-0": (handed_in({}), 0)}
+    found |= {f"right-{k}": with_entries([ways[k - 1] for ways in rights.values()]) for k in (1, 2)}
+    for k, without in enumerate(combinations(POINTS, 2)):
+        answers = {task: code for task, code in REFERENCE.items() if task not in without}
+        found[f"partly-{k}"] = handed_in(answers), 13 - sum(POINTS[task] for task in without)
+    found |= {f"wrong-{k}": with_entries([ways[k % len(ways)] for ways in wrongs.values()]) for k in range(5)}
+    happened = (fair.split, fair.duplicate, fair.delete_setup, fair.import_in_setup, fair.scratch)
+    found |= {f"unlucky-{change.__name__}": changed(change) for change in happened}
+    found["unlucky-exit"] = handed_in(inside("predict", "exit()")), 10
+    hostile = ("transformer", "fake-module", "patched-numpy", "frames", "subclass")
+    found |= {f"hostile-{k}": (handed_in(sound.EASIER, sound.EASY + sound.ATTACKS[k]), 0) for k in hostile}
+    return found
+
+
+@pytest.fixture(scope="module")
+def graded(tmp_path_factory):
+    """Grade the class; return the course, the right points, and the table of scores."""
+    course = tmp_path_factory.mktemp("course")
+    build_course(course)
+    students = class_of_thirty()
+    for student, (notebook, _) in students.items():
+        write_notebook(notebook, place(course, "submitted", student, NAME))
+    seen = list(grade_course(course, SETTINGS, workers=2))
+    assert len(seen) == len(students) == 30
+    with write_graded(course).open(newline="") as file:
+        table = {row["student"]: row for row in csv.DictReader(file)}
+    return course, {student: points for student, (_, points) in students.items()}, table
+
+
+def test_each_grade_is_what_it_should_be(graded):
+    _, expected, table = graded
+    assert {student: float(row["score"]) for student, row in table.items()} == expected
+
+
+def test_what_nbgrader_exports_are_the_same_grades(graded):
+    course, expected, _ = graded
+    subprocess.run([sys.executable, "-m", "nbgrader", "export"], cwd=course, check=True, capture_output=True)
+    with (course / "grades.csv").open(newline="") as file:
+        rows = {row["student_id"]: row for row in csv.DictReader(file) if row["assignment"] == NAME}
+    assert {student: float(row["score"]) for student, row in rows.items()} == expected
+
+
+def test_everybody_gets_feedback(graded):
+    course, expected, _ = graded
+    for student in ("right-0", "untouched-0", "wrong-0", "unlucky-exit", "hostile-transformer"):
+        with course_api(course) as api:
+            assert api.generate_feedback(NAME, student)["success"]
+        page = place(course, "feedback", student, NAME).with_suffix(".html").read_text()
+        assert f"{expected[student]:.1f} / 15.0" in page
+
+
+def test_what_is_graded_is_not_graded_again_unless_it_is_handed_in_again(graded):
+    course, _, _ = graded
+    assert list(grade_course(course, SETTINGS)) == []
+    write_notebook(handed_in(), place(course, "submitted", "untouched-0", NAME))
+    assert [(one.student, one.score) for one in grade_course(course, SETTINGS)] == [("untouched-0", 13)]
