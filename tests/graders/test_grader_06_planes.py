@@ -108,7 +108,7 @@ def four_pixels(u, v, h, w):
         mistake(
             "rows and columns swapped",
             task="four-pixels",
-            loses=3,
+            loses=2,
             says="rows and columns are swapped",
             code=four(top="int(np.floor(u))", left="int(np.floor(v))").replace(
                 "a, b = u - left, v - top", "a, b = v - left, u - top"
@@ -124,42 +124,42 @@ def four_pixels(u, v, h, w):
         mistake(
             "half a pixel added",
             task="four-pixels",
-            loses=3,
+            loses=2,
             says="you add half a pixel",
             code=four().replace("(u, v, h, w):", "(u, v, h, w):\n    u, v = u + 0.5, v + 0.5"),
         ),
         mistake(
             "weights crossed",
             task="four-pixels",
-            loses=3,
+            loses=2,
             says="the nearer pixel has the larger one",
             code=four(weights="[b * a, b * (1 - a), (1 - b) * a, (1 - b) * (1 - a)]"),
         ),
         mistake(
             "weights across crossed",
             task="four-pixels",
-            loses=3,
+            loses=2,
             says="the weights across are crossed",
             code=four(weights="[(1 - b) * a, (1 - b) * (1 - a), b * a, b * (1 - a)]"),
         ),
         mistake(
             "weights down crossed",
             task="four-pixels",
-            loses=3,
+            loses=2,
             says="the weights down are crossed",
             code=four(weights="[b * (1 - a), b * a, (1 - b) * (1 - a), (1 - b) * a]"),
         ),
         mistake(
             "weights added",
             task="four-pixels",
-            loses=3,
+            loses=2,
             says="you add the weights across and down: multiply them",
             code=four(weights="[(1 - b) + (1 - a), (1 - b) + a, b + (1 - a), b + a]"),
         ),
         mistake(
             "mean of the weights",
             task="four-pixels",
-            loses=3,
+            loses=2,
             says="you take a mean of the weights",
             code=four(weights="[(2 - b - a) / 4, (1 - b + a) / 4, (b + 1 - a) / 4, (b + a) / 4]"),
         ),
@@ -173,7 +173,7 @@ def four_pixels(u, v, h, w):
         mistake(
             "nearest pixel",
             task="four-pixels",
-            loses=3,
+            loses=2,
             says="that is the nearest one, but a point reads four",
             code="""
 def four_pixels(u, v, h, w):
@@ -201,7 +201,7 @@ def four_pixels(u, v, h, w):
         mistake(
             "limits of the example written in",
             task="four-pixels",
-            loses=3,
+            loses=2,
             says="on inputs you haven't seen: wrong weights",
             code=four(top="min(int(v), 2)", left="min(int(u), 3)", last="min({} + 1, 3)"),
         ),
@@ -254,42 +254,42 @@ def sample_plane(s, pixels, visible):
         mistake(
             "u and v swapped",
             task="sample-plane",
-            loses=3,
+            loses=2,
             says="u and v are swapped",
             code=plane(n="u - np.arange(h)", m="v - np.arange(w)"),
         ),
         mistake(
             "weights crossed",
             task="sample-plane",
-            loses=3,
+            loses=2,
             says="the weights are crossed",
             code=plane(kernel="np.where(np.abs(t) < 1, np.abs(t), 0) + (t == 0)"),
         ),
         mistake(
             "nearest pixel",
             task="sample-plane",
-            loses=3,
+            loses=2,
             says="that is the nearest pixel",
             code=plane(kernel="(np.abs(t) <= 0.5).astype(float)"),
         ),
         mistake(
             "a kernel of ones",
             task="sample-plane",
-            loses=3,
+            loses=2,
             says="the weights must sum to 1",
             code=plane(kernel="(np.abs(t) < 1).astype(float)"),
         ),
         mistake(
             "the kernel without max",
             task="sample-plane",
-            loses=3,
+            loses=2,
             says="a kernel below zero",
             code=plane(kernel="1 - np.abs(t)"),
         ),
         mistake(
             "half a pixel added",
             task="sample-plane",
-            loses=3,
+            loses=2,
             says="you read half a pixel too far right and down",
             code=plane(n="np.minimum(v + 0.5, h - 1) - np.arange(h)", m="np.minimum(u + 0.5, w - 1) - np.arange(w)"),
         ),
@@ -310,7 +310,7 @@ def sample_plane(s, pixels, visible):
         mistake(
             "last row and column left out",
             task="sample-plane",
-            loses=3,
+            loses=2,
             says="point (2, 2) lies on the last pixel",
             code=plane(seen="visible[r, c] and pixels[r, c, 0] < w - 1 and pixels[r, c, 1] < h - 1"),
         ),
@@ -338,7 +338,7 @@ def sample_plane(s, pixels, visible):
         mistake(
             "the width of the example written in",
             task="sample-plane",
-            loses=3,
+            loses=2,
             says="on inputs you haven't seen: wrong values",
             code=plane(m="np.minimum(u, 2) - np.arange(w)"),
         ),
@@ -372,14 +372,14 @@ def give_back(p_bar, pixels, visible, h, w):
         mistake(
             "assigned, not added",
             task="give-back",
-            loses=3,
+            loses=2,
             says="replaces that of the first",
             code=back("s_bar[k] = np.where(x > 0, p_bar[k, r, c] * x, s_bar[k])"),
         ),
         mistake(
             "+= with repeated indices",
             task="give-back",
-            loses=3,
+            loses=2,
             says="adds once a pixel",
             code="""
 def give_back(p_bar, pixels, visible, h, w):
@@ -395,85 +395,85 @@ def give_back(p_bar, pixels, visible, h, w):
         mistake(
             "divided by the number of points",
             task="give-back",
-            loses=3,
+            loses=2,
             says="a sum has no mean in it",
             code=back(after="s_bar = s_bar / visible.sum()"),
         ),
         mistake(
             "mean over the readers",
             task="give-back",
-            loses=3,
+            loses=2,
             says="you take the mean over a pixel's readers",
             code=back(after="s_bar = s_bar / np.maximum(n_read, 1)"),
         ),
         mistake(
             "divided by the weights",
             task="give-back",
-            loses=3,
+            loses=2,
             says="you divide by the sum of the weights",
             code=back(after="s_bar = s_bar / np.where(total > 0, total, 1)"),
         ),
         mistake(
             "weights squared",
             task="give-back",
-            loses=3,
+            loses=2,
             says="the weights are squared",
             code=back("s_bar[k] += p_bar[k, r, c] * x * x"),
         ),
         mistake(
             "weights without blame",
             task="give-back",
-            loses=3,
+            loses=2,
             says="that is the sum of the weights",
             code=back("s_bar[k] += x"),
         ),
         mistake(
             "sign turned",
             task="give-back",
-            loses=3,
+            loses=2,
             says="the sign is turned",
             code=back("s_bar[k] -= p_bar[k, r, c] * x"),
         ),
         mistake(
             "classes added up",
             task="give-back",
-            loses=3,
+            loses=2,
             says="you add up the classes",
             code=back("s_bar[:] += p_bar[k, r, c] * x"),
         ),
         mistake(
             "u and v swapped",
             task="give-back",
-            loses=3,
+            loses=2,
             says="u counts columns, v counts rows",
             code=back(uv="v, u"),
         ),
         mistake(
             "all to the nearest pixel",
             task="give-back",
-            loses=3,
+            loses=2,
             says="all blame goes to the nearest pixel",
             code=back("s_bar[k, int(v + 0.5), int(u + 0.5)] += p_bar[k, r, c]"),
         ),
         mistake(
             "NaN let in",
             task="give-back",
-            loses=3,
+            loses=1,
             says="Leave it out, don't weigh it",
             code=back("s_bar[k] += visible[r, c] * p_bar[k, r, c] * x", seen="True"),
         ),
         mistake(
             "NaN sent to the first pixel",
             task="give-back",
-            loses=3,
-            says="the point that isn't visible teaches this pixel",
+            loses=1,
+            says="the point that isn't visible teaches a pixel",
             code=back(seen="True").replace("= pixels[r, c]", "= np.nan_to_num(pixels[r, c])"),
         ),
         mistake(
             "NaN taken for not visible",
             task="give-back",
-            loses=3,
-            says="on inputs you haven't seen: it isn't the transpose",
+            loses=1,
+            says="on inputs you haven't seen: points that aren't visible teach somebody",
             code=back(seen="not np.isnan(pixels[r, c]).any()"),
         ),
         mistake(
@@ -611,6 +611,30 @@ def unit_places(pixels, size, align_corners):
     w_h = np.array(size)[::-1]
     middle = (w_h - 1) / 2
     return (pixels - middle) / (middle if align_corners else w_h / 2)""",
+        ),
+        right(
+            "nested lists, and helpers with everyday names",
+            task="unit-places",
+            code="""
+weights, read, loss, slips, before, s, pixels, rows, cols = "these were names of the test cells before".split() + [0]
+
+
+def got(places, size, align_corners):
+    if np.ndim(places) > 1:
+        return [got(part, size, align_corners) for part in places]
+    lasts = [n - 1 if align_corners else n for n in size[::-1]]
+    return [2 * (x + 0.5 * (not align_corners)) / n - 1 for x, n in zip(places, lasts)]
+
+
+def unit_places(pixels, size, align_corners):
+    return got(pixels.tolist(), size, align_corners)""",
+        ),
+        mistake(
+            "rows of different lengths",
+            task="unit-places",
+            loses=2,
+            says="unit_places returned no array of numbers but a list",
+            code="def unit_places(pixels, size, align_corners):\n    return [[1.0], [0.5, 0.0]]",
         ),
         mistake(
             "w steps from centre to centre",

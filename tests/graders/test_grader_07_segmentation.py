@@ -225,7 +225,7 @@ def receptive_field(layers):
         mistake(
             "the lecture's two numbers",
             task="field",
-            loses=3,
+            loses=2,
             says="return three numbers",
             code=field(result="field, jump"),
         ),
@@ -659,6 +659,11 @@ def max_pool(maps, kernel, stride):
             says="of equal numbers the one with the smaller index wins",
             code=pool().replace("window.argmax()", "window.size - 1 - window.ravel()[::-1].argmax()"),
         ),
+        right(
+            "nested lists",
+            task="pool",
+            code=pool(result="[pooled.tolist(), indices.tolist()]"),
+        ),
         mistake(
             "one index for all channels",
             task="pool",
@@ -833,7 +838,7 @@ def atrous(maps, kernels, bias, stride, rate):
         mistake(
             "output channels summed",
             task="atrous",
-            loses=3,
+            loses=1,
             says="one output channel is missing",
             code=ATROUS.replace("return out", "return out.sum(axis=0)"),
         ),
@@ -847,7 +852,7 @@ def atrous(maps, kernels, bias, stride, rate):
         mistake(
             "rate taken for a stride",
             task="atrous",
-            loses=3,
+            loses=1,
             says="you take the rate for a stride",
             code=ATROUS.replace("rate * (n", "(n")
             .replace("rate * (m", "(m")
@@ -856,7 +861,7 @@ def atrous(maps, kernels, bias, stride, rate):
         mistake(
             "padded by 1",
             task="atrous",
-            loses=3,
+            loses=2,
             says="pad by rate, not by 1",
             code="""
 def atrous(maps, kernels, bias, stride, rate):
@@ -885,137 +890,137 @@ def atrous(maps, kernels, bias, stride, rate):
         out = out + np.tensordot(kernels[:, :, n, m], seen, axes=1)
     return out""",
         ),
-        mistake("no bias", task="atrous", loses=3, says="the bias is missing", code=ATROUS.replace("+ bias[k]", "")),
+        mistake("no bias", task="atrous", loses=1, says="the bias is missing", code=ATROUS.replace("+ bias[k]", "")),
         mistake(
             "bias for each input channel",
             task="atrous",
-            loses=3,
+            loses=1,
             says="added for each input channel",
             code=ATROUS.replace("+ bias[k]", "+ C * bias[k]"),
         ),
         mistake(
             "bias for each weight",
             task="atrous",
-            loses=3,
+            loses=1,
             says="added for each weight: once",
             code=ATROUS.replace("+ bias[k]", "+ N * N * bias[k]"),
         ),
         mistake(
             "bias for each weight and channel",
             task="atrous",
-            loses=3,
+            loses=1,
             says="added for each weight and each channel",
             code=ATROUS.replace("+ bias[k]", "+ C * N * N * bias[k]"),
         ),
         mistake(
             "channel 0 alone",
             task="atrous",
-            loses=3,
+            loses=1,
             says="that is channel 0 alone",
             code=ATROUS.replace("for c in range(C)", "for c in range(1)"),
         ),
         mistake(
             "only the last channel stays",
             task="atrous",
-            loses=3,
+            loses=1,
             says="that is the last channel alone",
             code=ATROUS.replace("for c in range(C)", "for c in range(C - 1, C)"),
         ),
         mistake(
             "mean over channels",
             task="atrous",
-            loses=3,
+            loses=1,
             says="that is the mean over channels",
             code=ATROUS.replace("+ bias[k]", "/ C + bias[k]"),
         ),
         mistake(
             "input and output channel swapped",
             task="atrous",
-            loses=3,
+            loses=1,
             says="input and output channel are swapped",
             code=ATROUS.replace("kernels[k, c,", "kernels[c, k,"),
         ),
         mistake(
             "one kernel for all inputs",
             task="atrous",
-            loses=3,
+            loses=1,
             says="each pair of channels has its own",
             code=ATROUS.replace("kernels[k, c,", "kernels[k, 0,"),
         ),
         mistake(
             "one kernel for all outputs",
             task="atrous",
-            loses=3,
+            loses=1,
             says="output 1 at the same place",
             code=ATROUS.replace("kernels[k, c,", "kernels[0, c,"),
         ),
         mistake(
             "two channels written in",
             task="atrous",
-            loses=2,
+            loses=1,
             says="on inputs you haven't seen: wrong with 3 inputs",
             code=ATROUS.replace("for c in range(C)", "for c in range(2) if c < C"),
         ),
         mistake(
             "rate ignored",
             task="atrous",
-            loses=2,
+            loses=1,
             says="the neighbour at (2, 3) answers",
             code=ATROUS.replace("rate *", "1 *"),
         ),
         mistake(
             "rate on the rows only",
             task="atrous",
-            loses=2,
+            loses=1,
             says="the neighbour at (2, 3) answers",
             code=ATROUS.replace("rate * (m", "(m"),
         ),
         mistake(
             "kernel turned round",
             task="atrous",
-            loses=2,
-            says="the kernel is turned round: the ones lie",
+            loses=1,
+            says="the kernel is turned round: the 1 lies below and to the right",
             code=ATROUS.replace("c, n, m]", "c, N - 1 - n, N - 1 - m]"),
         ),
         mistake(
             "rows of the kernel turned round",
             task="atrous",
-            loses=2,
+            loses=1,
             says="from top to bottom",
             code=ATROUS.replace("c, n, m]", "c, N - 1 - n, m]"),
         ),
         mistake(
             "columns of the kernel turned round",
             task="atrous",
-            loses=2,
+            loses=1,
             says="from left to right",
             code=ATROUS.replace("c, n, m]", "c, n, N - 1 - m]"),
         ),
         mistake(
             "one hole too many",
             task="atrous",
-            loses=2,
+            loses=1,
             says="(rate + 1) is too far",
             code=ATROUS.replace("rate *", "(rate + 1) *"),
         ),
         mistake(
             "kernel transposed",
             task="atrous",
-            loses=2,
+            loses=1,
             says="rows and columns of the kernel are swapped",
             code=ATROUS.replace("c, n, m]", "c, m, n]"),
         ),
         mistake(
             "kernel not centred",
             task="atrous",
-            loses=3,
+            loses=2,
             says="the middle weights, 5 and 14, meet",
             code=ATROUS.replace("(n - (N - 1) // 2)", "n").replace("(m - (N - 1) // 2)", "m"),
         ),
         mistake(
             "border repeated",
             task="atrous",
-            loses=2,
+            loses=1,
             says="outside is zero",
             code=ATROUS.replace("if 0 <= y < h and 0 <= x < w", "if True").replace(
                 "maps[c, y, x]", "maps[c, min(max(y, 0), h - 1), min(max(x, 0), w - 1)]"
@@ -1024,7 +1029,7 @@ def atrous(maps, kernels, bias, stride, rate):
         mistake(
             "what leaves on the right comes back on the left",
             task="atrous",
-            loses=2,
+            loses=1,
             says="outside is zero",
             code=ATROUS.replace("if 0 <= y < h and 0 <= x < w", "if True").replace(
                 "maps[c, y, x]", "maps[c, y % h, x % w]"
@@ -1033,8 +1038,8 @@ def atrous(maps, kernels, bias, stride, rate):
         mistake(
             "rate 2 written in",
             task="atrous",
-            loses=2,
-            says="on inputs you haven't seen: wrong with 2 inputs, 2 outputs, N 3, stride 1, rate 1",
+            loses=1,
+            says="on inputs you haven't seen: wrong with 1 inputs, 1 outputs, N 3, stride 1, rate 1",
             code=ATROUS.replace("rate *", "2 *"),
         ),
         mistake(
@@ -1076,7 +1081,7 @@ def atrous(maps, kernels, bias, stride, rate):
             "places one pixel on",
             task="atrous",
             loses=1,
-            says="belongs to pixel (2, 4), the ones themselves",
+            says="belongs to pixel (2v, 2u)",
             code=ATROUS.replace("stride * v", "v + (stride - 1) * (v + 1)").replace(
                 "stride * u", "u + (stride - 1) * (u + 1)"
             ),
@@ -1091,7 +1096,7 @@ def atrous(maps, kernels, bias, stride, rate):
         mistake(
             "padded by the rate whatever the kernel",
             task="atrous",
-            loses=2,
+            loses=1,
             says="kernels of 1 x 1 reach beyond nothing",
             code="""
 def atrous(maps, kernels, bias, stride, rate):
@@ -1107,8 +1112,8 @@ def atrous(maps, kernels, bias, stride, rate):
         mistake(
             "padded by 1 and the size of a larger kernel forgotten",
             task="atrous",
-            loses=2,
-            says="on inputs you haven't seen: wrong shape with 2 inputs, 3 outputs, N 5, stride 1, rate 1",
+            loses=1,
+            says="on inputs you haven't seen: wrong shape with 1 inputs, 1 outputs, N 5, stride 1, rate 1",
             code="""
 def atrous(maps, kernels, bias, stride, rate):
     N = kernels.shape[-1]
@@ -1240,7 +1245,7 @@ def add_skip(coarse, fine):
         mistake(
             "rows repeated, columns interpolated",
             task="skip",
-            loses=3,
+            loses=1,
             says="rows are interpolated too",
             code=enlarging().replace("np.apply_along_axis(enlarge, 1, coarse)", "coarse.repeat(2, axis=1)"),
         ),
@@ -1354,7 +1359,7 @@ def loss_and_gradient(scores, truth):
         mistake(
             "no gradient",
             task="loss",
-            loses=4,
+            loses=3,
             says="return two things, the loss and its gradient",
             code=loss().replace(", gradient / len(v)", ""),
         ),
@@ -1364,6 +1369,41 @@ def loss_and_gradient(scores, truth):
             loses=2,
             says="you divide by all four pixels",
             code=loss(result="-np.log(p).sum() / truth.size"),
+        ),
+        right(
+            "nested lists, and helpers with everyday names",
+            task="loss",
+            code="""
+weights, read, field, got, slips, odds, scores, truth = "these were names of the test cells, too".split()
+
+
+def gradient(P, truth):
+    known = (truth != 255).sum()
+    return [[[(P[c, v, u] - (truth[v, u] == c)) / known * (truth[v, u] != 255) for u in range(P.shape[2])]
+        for v in range(P.shape[1])] for c in range(P.shape[0])]
+
+
+def loss(log_P, truth):
+    return [-log_P[truth[place], *place] for place in np.ndindex(truth.shape) if truth[place] != 255]
+
+
+def loss_and_gradient(scores, truth):
+    shifted = scores - scores.max(axis=0)
+    log_P = shifted - np.log(np.exp(shifted).sum(axis=0))
+    return [float(np.mean(loss(log_P, truth))), gradient(np.exp(log_P), truth)]""",
+        ),
+        mistake(
+            "log P cut off",
+            task="loss",
+            loses=1,
+            says="Is log P cut off?",
+            code="""
+def loss_and_gradient(scores, truth):
+    labelled = truth != 255
+    P = np.exp(scores - scores.max(axis=0))
+    P = P / P.sum(axis=0)
+    is_true = np.arange(len(scores))[:, None, None] == truth
+    return -np.log(P[is_true] + 1e-12).mean(), labelled * (P - is_true) / labelled.sum()""",
         ),
         mistake("sum", task="loss", loses=2, says="that is the sum", code=loss(result="-np.log(p).sum()")),
         mistake(

@@ -391,28 +391,28 @@ def balance(maps, n_classes):
         mistake(
             "counted over all maps",
             task="balance",
-            loses=3,
+            loses=2,
             says="every class is counted over all maps",
             code=balance(where=""),
         ),
         mistake(
             "unlabelled cells counted",
             task="balance",
-            loses=3,
+            loses=2,
             says="unlabelled cells are counted below",
             code=balance(below="sum(m.size for m in where)"),
         ),
         mistake(
             "mean instead of median",
             task="balance",
-            loses=3,
+            loses=2,
             says="that is the mean of the frequencies over f",
             code=balance(alpha="np.mean(f[f > 0]) / f[f > 0]"),
         ),
         mistake(
             "mean of the maps' frequencies",
             task="balance",
-            loses=3,
+            loses=2,
             says="you average the frequencies of the maps",
             code="""
 def balance(maps, n_classes):
@@ -427,35 +427,35 @@ def balance(maps, n_classes):
         mistake(
             "upside down",
             task="balance",
-            loses=3,
+            loses=2,
             says="what is frequent must weigh less",
             code=balance(alpha="f[f > 0] / np.median(f[f > 0])"),
         ),
         mistake(
             "no median",
             task="balance",
-            loses=3,
+            loses=2,
             says="that is 1 / f",
             code=balance(alpha="1 / f[f > 0]"),
         ),
         mistake(
             "frequencies returned",
             task="balance",
-            loses=3,
+            loses=2,
             says="that is the frequency f itself",
             code=balance(alpha="f[f > 0]"),
         ),
         mistake(
             "the upper one in the middle",
             task="balance",
-            loses=3,
+            loses=2,
             says="you take the upper one",
             code=balance(alpha="np.sort(f[f > 0])[(f > 0).sum() // 2] / f[f > 0]"),
         ),
         mistake(
             "the lower one in the middle",
             task="balance",
-            loses=3,
+            loses=2,
             says="you take the lower one",
             code=balance(alpha="np.sort(f[f > 0])[((f > 0).sum() - 1) // 2] / f[f > 0]"),
         ),
@@ -498,7 +498,7 @@ def balance(maps, n_classes):
         mistake(
             "maps of one size only",
             task="balance",
-            loses=3,
+            loses=2,
             says="on inputs you haven't seen: it raises ValueError",
             code="""
 def balance(maps, n_classes):
@@ -572,49 +572,49 @@ def weighted_loss(logits, truth, alpha):
         mistake(
             "divided by the labelled cells",
             task="weighted-loss",
-            loses=4,
+            loses=3,
             says="you divide by the number of cells: divide by the sum of their weights",
             code=loss("-(w * of_truth).mean()"),
         ),
         mistake(
             "divided by all cells",
             task="weighted-loss",
-            loses=4,
+            loses=3,
             says="you divide by the number of cells, unlabelled ones too",
             code=loss("-(w * of_truth).sum() / truth.size"),
         ),
         mistake(
             "no weights",
             task="weighted-loss",
-            loses=4,
+            loses=3,
             says="the weights are missing",
             code=loss("-of_truth.mean()"),
         ),
         mistake(
             "the sum",
             task="weighted-loss",
-            loses=4,
+            loses=3,
             says="that is the sum: divide it",
             code=loss("-(w * of_truth).sum()"),
         ),
         mistake(
             "sign swapped",
             task="weighted-loss",
-            loses=4,
+            loses=3,
             says="the sign is swapped",
             code=loss("(w * of_truth).sum() / w.sum()"),
         ),
         mistake(
             "log10",
             task="weighted-loss",
-            loses=4,
+            loses=3,
             says="that is the logarithm to base 10",
             code=loss("-(w * of_truth).sum() / w.sum() / np.log(10)"),
         ),
         mistake(
             "unlabelled cells weigh below",
             task="weighted-loss",
-            loses=4,
+            loses=3,
             says="the unlabelled cell is counted below",
             code=loss("-(w * of_truth).sum() / alpha[np.minimum(truth, len(alpha) - 1)].sum()"),
         ),
@@ -667,21 +667,21 @@ def weighted_loss(logits, truth, alpha):
         mistake(
             "unlabelled is class 0",
             task="weighted-loss",
-            loses=4,
+            loses=3,
             says="you count the unlabelled cell as class 0",
             code=loss().replace("rows,", "truth = np.where(truth == 255, 0, truth)\n    rows,", 1),
         ),
         mistake(
             "unlabelled clipped to the last class",
             task="weighted-loss",
-            loses=4,
+            loses=3,
             says="you count the unlabelled cell as the last class",
             code=loss().replace("rows,", "truth = np.minimum(truth, len(alpha) - 1)\n    rows,", 1),
         ),
         mistake(
             "unlabelled weighs as class 0 below",
             task="weighted-loss",
-            loses=4,
+            loses=3,
             says="weighs below as class 0",
             code=loss("-(w * of_truth).sum() / alpha[np.where(truth == 255, 0, truth)].sum()"),
         ),
@@ -695,7 +695,7 @@ def weighted_loss(logits, truth, alpha):
         mistake(
             "divided by the weights of all classes",
             task="weighted-loss",
-            loses=4,
+            loses=3,
             says="you divide by the weights of all classes",
             code=loss("-(w * of_truth).sum() / alpha.sum()"),
         ),
@@ -751,6 +751,28 @@ def momentum_step(theta, delta, gradient, eta, kappa):
             code="""
 def momentum_step(theta, delta, gradient, eta, kappa):
     return theta - eta * kappa * delta - eta * gradient, gradient + delta * kappa""",
+        ),
+        right(
+            "nested lists, and helpers with everyday names",
+            task="momentum-step",
+            code="""
+weights, read, loss, gradient, planes, first = "these were names of tests".split() + [0]
+
+
+def got(theta, delta, gradient, eta, kappa):
+    delta = [[kappa * d + g for d, g in zip(*rows)] for rows in zip(np.atleast_2d(delta), np.atleast_2d(gradient))]
+    return [[t - eta * d for t, d in zip(*rows)] for rows in zip(np.atleast_2d(theta), delta)], delta
+
+
+def momentum_step(theta, delta, gradient, eta, kappa):
+    return [np.reshape(part, np.shape(theta)).tolist() for part in got(theta, delta, gradient, eta, kappa)]""",
+        ),
+        mistake(
+            "a dictionary",
+            task="momentum-step",
+            loses=2,
+            says="for delta momentum_step returned no array of numbers",
+            code="def momentum_step(theta, delta, gradient, eta, kappa):\n    return theta, {'delta': delta}",
         ),
         mistake(
             "uphill",

@@ -414,6 +414,28 @@ def fill_unknown(votes, o, near):
     filled[labelled] = votes[labelled]
     return filled""",
         ),
+        right(
+            "nested lists, and helpers with everyday names",
+            task="fill-unknown",
+            code="""
+weights, read, gradient, field, before, mask, points = "these were names of the test cells".split()
+
+
+def got(vote, states, around):
+    state = int(np.argmax(states))
+    return int(vote if vote != 255 else around if around != 255 and state != UNKNOWN else 10 + state)
+
+
+def fill_unknown(votes, o, near):
+    return [[got(votes[r, c], o[:, r, c], near[r, c]) for c in range(votes.shape[1])] for r in range(len(votes))]""",
+        ),
+        mistake(
+            "names of classes",
+            task="fill-unknown",
+            loses=2,
+            says="fill_unknown returned no array of numbers but a list",
+            code="def fill_unknown(votes, o, near):\n    return [['road'] * 4, ['car'] * 4]",
+        ),
         mistake(
             "what nobody observed is filled",
             task="fill-unknown",

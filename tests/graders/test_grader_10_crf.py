@@ -440,7 +440,7 @@ def update(Q, phi, k):
             code=updated("phi + Q @ others", others="k - np.diag(np.diag(k))").replace("+ Q", "- (1 - Q)"),
         ),
         mistake(
-            "no unary", task="update", loses=3, says="own prices phi are missing", code=updated("(1 - Q) @ others")
+            "no unary", task="update", loses=2, says="own prices phi are missing", code=updated("(1 - Q) @ others")
         ),
         mistake(
             "unary with the wrong sign",
@@ -452,7 +452,7 @@ def update(Q, phi, k):
         mistake(
             "soft-max over cells",
             task="update",
-            loses=3,
+            loses=2,
             says="you normalise over the cells",
             code=updated(least="price.min(axis=1, keepdims=True)", axis=1),
         ),
@@ -515,7 +515,7 @@ def update(Q, phi, k):
         mistake(
             "old Q multiplied in",
             task="update",
-            loses=3,
+            loses=2,
             says="you multiply by the old Q",
             code="""
 def update(Q, phi, k):
@@ -577,57 +577,57 @@ def free_energy(Q, phi, k):
         mistake(
             "pairs twice in F",
             task="free-energy",
-            loses=3,
+            loses=2,
             says="the pair is counted twice: sum over i < j only",
             code=free(pairs="2 * np.triu(k * (1 - Q.T @ Q), 1).sum()"),
         ),
         mistake(
             "entropy added",
             task="free-energy",
-            loses=3,
+            loses=2,
             says="the sign of the entropy is swapped",
             code=free(entropy="-(q * np.log(q)).sum()"),
         ),
-        mistake("no entropy", task="free-energy", loses=3, says="the entropy is missing", code=free(entropy="0")),
+        mistake("no entropy", task="free-energy", loses=2, says="the entropy is missing", code=free(entropy="0")),
         mistake(
             "agreement charged in F",
             task="free-energy",
-            loses=3,
+            loses=2,
             says="you charge the probability that the pair agrees",
             code=free(pairs="np.triu(k * (Q.T @ Q), 1).sum()"),
         ),
         mistake(
             "agreement rewarded in F",
             task="free-energy",
-            loses=3,
+            loses=2,
             says="agreement is rewarded instead",
             code=free(pairs="-np.triu(k * (Q.T @ Q), 1).sum()"),
         ),
         mistake(
             "bits",
             task="free-energy",
-            loses=3,
+            loses=2,
             says="that is the logarithm to base 2",
             code=free(entropy="(q * np.log2(q)).sum()"),
         ),
         mistake(
             "cells paired with themselves",
             task="free-energy",
-            loses=3,
+            loses=2,
             says="each cell counts as a pair with itself",
             code=free(pairs="np.triu(k * (1 - Q.T @ Q)).sum()"),
         ),
         mistake(
             "half of each cell's pair with itself",
             task="free-energy",
-            loses=3,
+            loses=2,
             says="each cell counts as half a pair with itself",
             code=free(pairs="(k * (1 - Q.T @ Q)).sum() / 2"),
         ),
         mistake(
             "twice, and with themselves",
             task="free-energy",
-            loses=3,
+            loses=2,
             says="the pair is counted twice, and each cell with itself",
             code=free(pairs="(k * (1 - Q.T @ Q)).sum()"),
         ),
@@ -662,6 +662,27 @@ def normalise(K):
     return np.array([[K[i, j] / (D[i] * D[j]) ** 0.5 for j in range(len(K))] for i in range(len(K))])""",
         ),
         right("diagonal matrices", task="normalise", code=scaled("np.diag(D**-0.5) @ K @ np.diag(D**-0.5)")),
+        right(
+            "nested lists, and helpers with everyday names",
+            task="normalise",
+            code="""
+weights, read, loss, slips, before, k, Q, phi = "these were names of the test cells, too".split()
+
+
+def got(K):
+    return [float(sum(row)) ** 0.5 for row in K]
+
+
+def normalise(K):
+    return [[entry / a / b for entry, b in zip(row, got(K))] for row, a in zip(K, got(K))]""",
+        ),
+        mistake(
+            "a string",
+            task="normalise",
+            loses=1,
+            says="normalise returned no array of numbers but a str",
+            code="def normalise(K):\n    return str(K)",
+        ),
         mistake(
             "root forgotten",
             task="normalise",

@@ -7,7 +7,7 @@
 # |---|---|---|
 # | 1 | four pixels and their weights | 2 + 1 |
 # | 2 | a plane | 2 + 1 |
-# | 3 | the way back | 3 |
+# | 3 | the way back | 2 + 1 |
 # | 4 | if the point moves | 2 |
 # | 5 | half a pixel: places for PyTorch | 1 + 1 |
 # | 6 | in your own words | 2 |
@@ -18,11 +18,21 @@
 # As everywhere in this course u runs to the right, v down, and the centre of the first pixel is (0, 0). Arrays are indexed by row, then column.
 
 # %% nbgrader={"grade": false, "grade_id": "setup", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# Names that begin with _ belong to the tests.
 import warnings
 
 import numpy as np
 
+from semgrid_edu.course.answers import answer_array
+
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
+
+
+def _explain(what, got, slips):
+    """Stop with a hint when the number `got` is what a common slip gives."""
+    for slip, hint in slips.items():
+        assert not np.isclose(got, slip, atol=2e-3), f"{what} {got:.4g}: {hint}"
+
 
 # %% [markdown]
 # ## Task 1: four pixels and their weights (2 + 1 points)
@@ -47,18 +57,8 @@ def four_pixels(u, v, h, w):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "weights-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-# By hand: across 0.75 and 0.25, down 0.6 and 0.4; so 0.45 and 0.15 in row 0, 0.30 and 0.10 in row 1.
-got = four_pixels(1.25, 0.4, h=3, w=4)
-assert np.shape(got)[:1] == (3,), f"return three things, rows, cols and weights; got {got}"
-rows, cols, weights = (np.ravel(part) for part in got)
-assert len(rows) == len(cols) == len(weights) == 4, "return four rows, four columns and four weights"
-read = {(int(r), int(c)): float(x) for r, c, x in zip(rows, cols, weights, strict=True)}
-assert len(read) > 1, f"pixel {min(read)} alone: that is the nearest one, but a point reads four"
-assert (2, 0) not in read, f"pixels {sorted(read)}: rows and columns are swapped: u counts columns, v counts rows"
-assert min(rows) >= 0, f"there is no row {min(rows)}: the centre of the first pixel is (0, 0), so take no half off"
-assert (0, 2) in read, f"pixels {sorted(read)}: u = 1.25 lies between columns 1 and 2, v = 0.4 between rows 0 and 1"
-slips = {
+# %% nbgrader={"grade": false, "grade_id": "weight-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_WEIGHT_SLIPS = {
     0.1: "the weights are crossed: the nearer pixel has the larger one",
     0.15: "the weights across are crossed: column 1 is nearer than column 2",
     0.3: "the weights down are crossed: row 0 is nearer than row 1",
@@ -67,36 +67,72 @@ slips = {
     0.3375: "you take a mean of the weights across and down: multiply them",
     0.528: "you use the distance as the crow flies: a weight across times a weight down",
 }
-for slip, hint in slips.items():
-    assert not np.isclose(read.get((0, 1), 0), slip, atol=2e-3), f"pixel (0, 1) has the weight {slip}: {hint}"
-by_hand = {(0, 1): 0.45, (0, 2): 0.15, (1, 1): 0.30, (1, 2): 0.10}
-for pixel, weight in by_hand.items():
-    assert np.isclose(read.get(pixel, 0), weight), f"pixel {pixel}: expected {weight}, got {read.get(pixel, 0):.3f}"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import planes
 
-complaint = planes.check_four_pixels(four_pixels)
-assert not complaint, complaint
-### END HIDDEN TESTS
+
+def _four(got):
+    """Return rows, columns and weights, four numbers each."""
+    assert got is not None, "four_pixels returned nothing: did you forget `return`?"
+    assert len(got) == 3, f"return three things, rows, cols and weights; got {got}"
+    names = ("for the rows", "for the columns", "for the weights")
+    rows, cols, weights = (
+        answer_array(part, f"{name} four_pixels").ravel() for part, name in zip(got, names, strict=True)
+    )
+    assert len(rows) == len(cols) == len(weights) == 4, "return four rows, four columns and four weights"
+    return rows, cols, weights
+
+
+# %% nbgrader={"grade": true, "grade_id": "weights-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    # By hand: across 0.75 and 0.25, down 0.6 and 0.4; so 0.45 and 0.15 in row 0, 0.30 and 0.10 in row 1.
+    rows, cols, weights = _four(four_pixels(1.25, 0.4, h=3, w=4))
+    read = {(int(r), int(c)): float(x) for r, c, x in zip(rows, cols, weights, strict=True)}
+    assert len(read) > 1, f"pixel {min(read)} alone: that is the nearest one, but a point reads four"
+    assert (2, 0) not in read, f"pixels {sorted(read)}: rows and columns are swapped: u counts columns, v counts rows"
+    assert min(rows) >= 0, (
+        f"there is no row {min(rows):g}: the centre of the first pixel is (0, 0), so take no half off"
+    )
+    assert (0, 2) in read, f"pixels {sorted(read)}: u = 1.25 lies between columns 1 and 2, v = 0.4 between rows 0 and 1"
+    _explain("pixel (0, 1) has the weight", read.get((0, 1), 0), _WEIGHT_SLIPS)
+    by_hand = {(0, 1): 0.45, (0, 2): 0.15, (1, 1): 0.30, (1, 2): 0.10}
+    for pixel, weight in by_hand.items():
+        assert np.isclose(read.get(pixel, 0), weight), f"pixel {pixel}: expected {weight}, got {read.get(pixel, 0):.3f}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import planes
+
+    complaint = planes.check_four_pixels(four_pixels)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
 
 # %% nbgrader={"grade": true, "grade_id": "border-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-for u, v, where in ((1.0, 1.0, "a pixel's centre"), (1.5, 2.0, "the last row"), (3.0, 0.5, "the last column")):
-    rows, cols, weights = (np.ravel(part) for part in four_pixels(u, v, h=3, w=4))
-    point, total = f"({u}, {v}), on {where}", np.sum(weights)
-    assert not np.isclose(total, 0), f"{point}: all weights are 0. Where u is an integer, floor and ceil are the same"
-    assert np.isclose(total, 1), f"{point}: the weights sum to {total:.2f}, not 1"
-    there = (rows >= 0) & (rows < 3) & (cols >= 0) & (cols < 4)
-    assert there.all(), (
-        f"{point}: you return pixel ({rows[~there][0]}, {cols[~there][0]}) of an image of 3 x 4; take one that exists"
-    )
-    mean = float(weights @ cols), float(weights @ rows)
-    assert np.allclose(mean, (u, v)), f"{point}: the pixels' mean place, by weight, must be the point; it is {mean}"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import planes
+def _test():
+    for u, v, where in ((1.0, 1.0, "a pixel's centre"), (1.5, 3.0, "the last row"), (3.0, 0.5, "the last column")):
+        rows, cols, weights = _four(four_pixels(u, v, h=4, w=4))
+        _, cols_before, weights_before = _four(four_pixels(u - 1e-6, v - 1e-6, h=4, w=4))  # a hair before the place
+        point, total = f"({u}, {v}), on {where}", weights.sum()
+        assert not np.isclose(total, 0), (
+            f"{point}: all weights are 0. Where u is an integer, floor and ceil are the same"
+        )
+        usual = np.isclose(weights_before.sum(), 1)
+        assert np.isclose(total, 1) or not usual, f"{point}: the weights sum to {total:.2f}, not 1"
+        there = (rows >= 0) & (rows < 4) & (cols >= 0) & (cols < 4)
+        missing = [(int(r), int(c)) for r, c in zip(rows[~there], cols[~there], strict=True)]
+        assert not missing, f"{point}: you return pixel {missing[0]} of an image of 4 x 4; take one that exists"
+        mean, usual = weights @ cols, np.isclose(weights_before @ cols_before, u, atol=1e-4)
+        place = f"the pixels' mean column, by weight, must be that of the point; it is {mean:.3f}"
+        assert np.isclose(mean, u) or not usual, f"{point}: {place}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import planes
 
-complaint = planes.check_border(four_pixels)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = planes.check_border(four_pixels)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 2: a plane (2 + 1 points)
@@ -120,58 +156,77 @@ def sample_plane(s, pixels, visible):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "plane-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-s = np.array([[[0.0, 10, 20], [2, 7, 20], [1, 6, 15]], [[0, 0, 0], [5, 0, 0], [0, 0, 0]]])
-pixels = np.array([[[0.25, 1.0], [1.25, 0.5]], [[2.0, 2.0], [0.0, 1.5]], [[1.0, 0.0], [1.5, 1.5]]])
-got = sample_plane(s, pixels, np.ones((3, 2), bool))
-assert got is not None, "sample_plane returned nothing: did you forget `return`?"
-assert np.shape(got) == (2, 3, 2), f"expected one value a class and point, shape (2, 3, 2), got {np.shape(got)}"
-slips = {  # of class 0, point (0, 0), at u = 0.25, v = 1: by hand 0.75 * 2 + 0.25 * 7 = 3.25
-    9.25: "u and v are swapped: u counts columns, v counts rows",
-    5.75: "the weights are crossed: column 0 is nearer than column 1",
-    2.0: "that is the nearest pixel",
-    9.0: "you add the two pixels: the weights must sum to 1",
-    -11.75: "a kernel below zero: a pixel farther than 1 away has the weight 0, not less: max(0, 1 - |t|)",
-    5.25: "you read half a pixel too far right and down: the centre of the first pixel is (0, 0)",
-}
-for slip, hint in slips.items():
-    assert not np.isclose(got[0, 0, 0], slip, atol=2e-3), f"point (0.25, 1) reads {slip} in class 0: {hint}"
-assert np.isclose(got[0, 0, 0], 3.25), f"point (0.25, 1): expected 3/4 of 2 and 1/4 of 7, 3.25, got {got[0, 0, 0]:.3f}"
-assert np.isclose(got[0, 1, 0], 15), f"point (2, 2) lies on the last pixel and reads 15, got {got[0, 1, 0]:.3f}"
-by_hand = [[[3.25, 11.375], [15, 1.5], [10, 12]], [[3.75, 0], [0, 2.5], [0, 0]]]
-np.testing.assert_allclose(got, by_hand, atol=1e-6, err_msg="all points of both classes, by hand")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import planes
+# %% nbgrader={"grade": false, "grade_id": "plane-scores", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _scores():
+    """Return scores of two classes in an image of 3 x 3, and six points in it, (3, 2, 2)."""
+    s = np.array([[[0.0, 10, 20], [2, 7, 20], [1, 6, 15]], [[0, 0, 0], [5, 0, 0], [0, 0, 0]]])
+    return s, np.array([[[0.25, 1.0], [1.25, 0.5]], [[2.0, 2.0], [0.0, 1.5]], [[1.0, 0.0], [1.5, 1.5]]])
 
-complaint = planes.check_sample_plane(sample_plane)
-assert not complaint, complaint
-### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "plane-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    got = answer_array(sample_plane(*_scores(), np.ones((3, 2), bool)), "sample_plane")
+    assert got.shape == (2, 3, 2), f"expected one value a class and point, shape (2, 3, 2), got {got.shape}"
+    slips = {  # of class 0, point (0, 0), at u = 0.25, v = 1: by hand 0.75 * 2 + 0.25 * 7 = 3.25
+        9.25: "u and v are swapped: u counts columns, v counts rows",
+        5.75: "the weights are crossed: column 0 is nearer than column 1",
+        2.0: "that is the nearest pixel",
+        9.0: "you add the two pixels: the weights must sum to 1",
+        -11.75: "a kernel below zero: a pixel farther than 1 away has the weight 0, not less: max(0, 1 - |t|)",
+        5.25: "you read half a pixel too far right and down: the centre of the first pixel is (0, 0)",
+    }
+    first, last = got[0, 0, 0], got[0, 1, 0]
+    _explain("point (0.25, 1) reads in class 0", first, slips)
+    assert np.isclose(first, 3.25), f"point (0.25, 1): expected 3/4 of 2 and 1/4 of 7, 3.25, got {first:.3f}"
+    assert np.isclose(last, 15), f"point (2, 2) lies on the last pixel and reads 15, got {last:.3f}"
+    by_hand = [[[3.25, 11.375], [15, 1.5], [10, 12]], [[3.75, 0], [0, 2.5], [0, 0]]]
+    np.testing.assert_allclose(got, by_hand, atol=1e-6, err_msg="all points of both classes, by hand")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import planes
+
+    complaint = planes.check_sample_plane(sample_plane)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
 
 # %% nbgrader={"grade": true, "grade_id": "invisible-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-nowhere = np.array([[[np.nan, np.nan], [0.25, 1.0]], [[1.0, 1.0], [-7.5, 400.0]]])
-got = sample_plane(s, nowhere, np.array([[False, True], [False, False]]))
-assert not np.isnan(got).any(), (
-    "NaN: NaN times 0 is NaN, and so is NaN in a sum. Leave such points out, don't weigh them"
-)
-assert got[0, 1, 0] == 0, (
-    f"point (1, 0) lies in the image but isn't visible (something hides it): 0, not {got[0, 1, 0]}"
-)
-assert got[0, 1, 1] == 0, f"point (1, 1) lies outside the image: 0, not {got[0, 1, 1]}"
-np.testing.assert_allclose(got[:, 0, 1], [3.25, 3.75], err_msg="the visible point reads what it read before")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import planes
+def _test():
+    s, inside = _scores()
+    full = answer_array(sample_plane(s.copy(), inside.copy(), np.ones((3, 2), bool)), "sample_plane")
+    pixels, visible = inside.copy(), np.array([[False, True], [False, False], [True, True]])
+    pixels[0, 0], pixels[1, 1] = np.nan, (-7.5, 400.0)
+    got = answer_array(sample_plane(s, pixels, visible), "sample_plane")
+    assert got.shape == full.shape == (2, 3, 2), f"expected one value a class and point, (2, 3, 2), got {got.shape}"
+    assert not np.isnan(got).any(), (
+        "NaN: NaN times 0 is NaN, and so is NaN in a sum. Leave such points out, don't weigh them"
+    )
+    hidden = f"point (1, 0) lies in the image but isn't visible (something hides it): 0, not {got[0, 1, 0]}"
+    assert got[0, 1, 0] == 0, hidden
+    assert got[0, 1, 1] == 0, f"point (1, 1) lies outside the image: 0, not {got[0, 1, 1]}"
+    assert got[:, visible].any(), "the visible points read 0: only those that aren't visible do"
+    same = "the visible points read what they read when all are visible"
+    np.testing.assert_allclose(got[:, visible], full[:, visible], err_msg=same)
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import planes
 
-complaint = planes.check_invisible(sample_plane)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = planes.check_invisible(sample_plane)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
-# ## Task 3: the way back (3 points)
+# ## Task 3: the way back (2 + 1 points)
 #
 # Now the loss speaks. `p_bar` says by how much the loss grows when a value on the plane grows, `(C, H, W)`. What does that mean for the scores? Nudge a
 # pixel in your mind: who reads it, and how much of it?
 #
-# Complete `give_back`: it returns $\bar s$, `(C, h, w)`. No automatic differentiation: numpy is enough. Points that aren't visible teach nobody.
+# Complete `give_back`: it returns $\bar s$, `(C, h, w)`. No automatic differentiation: numpy is enough. For one more point: points
+# that aren't visible teach nobody, whatever their u and v are.
 
 
 # %% nbgrader={"grade": false, "grade_id": "give-back", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -188,16 +243,14 @@ def give_back(p_bar, pixels, visible, h, w):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "give-back-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
-# Three points, two of them between columns 0 and 1 of row 0; the fourth isn't visible.
-pixels = np.array([[[0.5, 0.0], [0.25, 0.0]], [[1.25, 0.5], [np.nan, np.nan]]])
-p_bar = np.array([[[1.0, 2.0], [4.0, 100.0]], [[10.0, 20.0], [40.0, 1000.0]]])
-got = give_back(p_bar, pixels, np.array([[True, True], [True, False]]), h=3, w=4)
-assert got is not None, "give_back returned nothing: did you forget `return`?"
-assert np.shape(got) == (2, 3, 4), f"expected one number a class and pixel, shape (2, 3, 4), got {np.shape(got)}"
-assert not np.isnan(got).any(), "NaN: the point that isn't visible got in. Leave it out, don't weigh it"
-assert got[0, 1, 0] == 0, "pixel (1, 0) is read by nobody, yet it learns: u counts columns, v counts rows"
-slips = {  # of pixel (0, 0): by hand 0.5 * 1 + 0.75 * 2 = 2.0
+# %% nbgrader={"grade": false, "grade_id": "back-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _blame():
+    """Return p_bar (2, 1, 3) and pixels (1, 3, 2): three points, two of them between columns 0 and 1 of row 0."""
+    pixels = np.array([[[0.5, 0.0], [0.25, 0.0], [1.25, 0.5]]])
+    return np.array([[[1.0, 2.0, 4.0]], [[10.0, 20.0, 40.0]]]), pixels
+
+
+_BACK_SLIPS = {  # of pixel (0, 0): by hand 0.5 * 1 + 0.75 * 2 = 2.0
     1.5: "the second reader's blame replaces that of the first: add them up (`a[rows, cols] +=` adds once a pixel)",
     0.5: "only the first reader counts: add up all of them (or do you divide by the number of points?)",
     0.667: "you divide by the number of points: a sum has no mean in it",
@@ -207,19 +260,52 @@ slips = {  # of pixel (0, 0): by hand 0.5 * 1 + 0.75 * 2 = 2.0
     1.25: "that is the sum of the weights: multiply each with what the loss says of its reader",
     -2.0: "the sign is turned: this is the gradient; the step against it comes later",
     22.0: "you add up the classes: each has its own gradient",
-    102.0: "the point that isn't visible teaches this pixel: leave it out, don't send it somewhere",
 }
-for slip, hint in slips.items():
-    assert not np.isclose(got[0, 0, 0], slip, atol=2e-3), f"pixel (0, 0) gets {slip} in class 0: {hint}"
-assert not np.allclose(got, np.round(got)), "all blame goes to the nearest pixel, but a point reads up to four"
-by_hand = np.array([[2.0, 2.5, 0.5, 0], [0, 1.5, 0.5, 0], [0, 0, 0, 0]])
-np.testing.assert_allclose(got, [by_hand, 10 * by_hand], atol=1e-6, err_msg="by hand, both classes")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import planes
 
-complaint = planes.check_give_back(give_back)
-assert not complaint, complaint
-### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "give-back-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    p_bar, pixels = _blame()
+    got = answer_array(give_back(p_bar, pixels, np.ones((1, 3), bool), h=3, w=4), "give_back")
+    assert got.shape == (2, 3, 4), f"expected one number a class and pixel, shape (2, 3, 4), got {got.shape}"
+    assert got[0, 1, 0] == 0, "pixel (1, 0) is read by nobody, yet it learns: u counts columns, v counts rows"
+    _explain("pixel (0, 0) gets in class 0", got[0, 0, 0], _BACK_SLIPS)
+    assert not np.allclose(got, np.round(got)), "all blame goes to the nearest pixel, but a point reads up to four"
+    by_hand = np.array([[2.0, 2.5, 0.5, 0], [0, 1.5, 0.5, 0], [0, 0, 0, 0]])
+    np.testing.assert_allclose(got, [by_hand, 10 * by_hand], atol=1e-6, err_msg="by hand, both classes")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import planes
+
+    complaint = planes.check_give_back(give_back)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+
+# %% nbgrader={"grade": true, "grade_id": "give-back-invisible-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    # The same three points, and one that isn't visible, whose place is NaN.
+    p_bar, pixels = _blame()
+    wanted = answer_array(give_back(p_bar.copy(), pixels.copy(), np.ones((1, 3), bool), h=3, w=4), "give_back")
+    more = np.concatenate([[[[np.nan, np.nan]]], pixels], axis=1)
+    blame = np.concatenate([[[[100.0]], [[1000.0]]], p_bar], axis=2)
+    got = answer_array(give_back(blame, more, np.array([[False, True, True, True]]), h=3, w=4), "give_back")
+    assert wanted.any(), "the points that are visible teach nobody: only those that aren't have no part"
+    assert got.shape == wanted.shape, f"one point more, and the shape {wanted.shape} becomes {got.shape}"
+    assert not np.isnan(got).any(), "NaN: the point that isn't visible got in. Leave it out, don't weigh it"
+    sent = "the point that isn't visible teaches a pixel: leave it out, don't send it somewhere"
+    np.testing.assert_allclose(got, wanted, atol=1e-6, err_msg=sent)
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import planes
+
+    complaint = planes.check_give_back_invisible(give_back)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 4: if the point moves (2 points)
@@ -242,33 +328,37 @@ def slopes(s, u, v):
 
 
 # %% nbgrader={"grade": true, "grade_id": "slopes-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-s = np.array([[1.0, 5, 0], [3, 2, 4], [0, 6, 0]])
-got = slopes(s, 0.25, 0.75)
-assert np.size(got) == 2, f"return two numbers, in u and in v; got {got}"
-in_u, in_v = (float(x) for x in got)
-assert not (np.isclose(in_u, 0.75) and np.isclose(in_v, 0.25)), "the two are swapped: u to the right first, then v down"
-slips = {  # in u, by hand: row 0 rises by 4 and row 1 falls by 1; the point is 0.25 in row 0: 0.25 * 4 - 0.75 * 1
-    -0.25: "the sign is turned: the right pixel minus the left one",
-    2.75: "the rows' weights are crossed: v = 0.75 is nearer to row 1",
-    4.0: "that is row 0 alone: row 1 counts too, by its weight",
-    -1.0: "that is row 1 alone: row 0 counts too, by its weight",
-    3.0: "you add the differences of both rows: weigh them, by 0.25 and 0.75",
-    1.5: "you take the mean of both rows: weigh them, by 0.25 and 0.75",
-    0.0: "that is the slope of the nearest pixel; the bilinear value does change",
-    2.5625: "that is the value itself: how does it change?",
-    1.0: "row 1 got lost: a point between two rows listens to both",
-    0.5: "that is twice the slope: from a step to the left to a step to the right there are two steps",
-}
-for slip, hint in slips.items():
-    assert not np.isclose(in_u, slip, atol=2e-3), f"in u you have {slip}: {hint}"
-assert np.isclose(in_u, 0.25, atol=1e-4), f"in u: expected 0.25 * (5 - 1) + 0.75 * (2 - 3) = 0.25, got {in_u:.4f}"
-assert np.isclose(in_v, 0.75, atol=1e-4), f"in v: expected 0.75 * (3 - 1) + 0.25 * (2 - 5) = 0.75, got {in_v:.4f}"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import planes
+def _test():
+    s = np.array([[1.0, 5, 0], [3, 2, 4], [0, 6, 0]])
+    got = answer_array(slopes(s, 0.25, 0.75), "slopes").ravel()
+    assert got.size == 2, f"return two numbers, in u and in v; got {got}"
+    in_u, in_v = got
+    swapped = np.isclose(in_u, 0.75) and np.isclose(in_v, 0.25)
+    assert not swapped, "the two are swapped: u to the right first, then v down"
+    slips = {  # in u, by hand: row 0 rises by 4 and row 1 falls by 1; the point is 0.25 in row 0: 0.25 * 4 - 0.75 * 1
+        -0.25: "the sign is turned: the right pixel minus the left one",
+        2.75: "the rows' weights are crossed: v = 0.75 is nearer to row 1",
+        4.0: "that is row 0 alone: row 1 counts too, by its weight",
+        -1.0: "that is row 1 alone: row 0 counts too, by its weight",
+        3.0: "you add the differences of both rows: weigh them, by 0.25 and 0.75",
+        1.5: "you take the mean of both rows: weigh them, by 0.25 and 0.75",
+        0.0: "that is the slope of the nearest pixel; the bilinear value does change",
+        2.5625: "that is the value itself: how does it change?",
+        1.0: "row 1 got lost: a point between two rows listens to both",
+        0.5: "that is twice the slope: from a step to the left to a step to the right there are two steps",
+    }
+    _explain("in u you have", in_u, slips)
+    assert np.isclose(in_u, 0.25, atol=1e-4), f"in u: expected 0.25 * (5 - 1) + 0.75 * (2 - 3) = 0.25, got {in_u:.4f}"
+    assert np.isclose(in_v, 0.75, atol=1e-4), f"in v: expected 0.75 * (3 - 1) + 0.25 * (2 - 5) = 0.75, got {in_v:.4f}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import planes
 
-complaint = planes.check_slopes(slopes)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = planes.check_slopes(slopes)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 5: half a pixel, places for PyTorch (1 + 1 points)
@@ -291,48 +381,56 @@ def unit_places(pixels, size, align_corners):
 
 
 # %% nbgrader={"grade": true, "grade_id": "centres-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-# A row of five pixels, three rows high: u = 1 lies a quarter of the way from the first to the last centre; v = 2 is the last row.
-got = unit_places(np.array([[1.0, 2.0], [2.0, 1.0]]), (3, 5), align_corners=True)
-assert got is not None, "unit_places returned nothing: did you forget `return`?"
-assert np.shape(got) == (2, 2), f"two pairs in, two pairs out, shape (2, 2); got {np.shape(got)}"
-slips = {
-    -0.6: "from the first centre to the last there are w - 1 steps, not w",
-    -0.4: "that is the other convention: here -1 and 1 are the centres of the first and last pixel",
-    0.25: "places run from -1 to 1, not from 0 to 1",
-    0.0: "height and width are swapped: `size` is (h, w), u runs along the width",
-    1.0: "u and v changed places: first across, then down",
-}
-for slip, hint in slips.items():
-    assert not np.isclose(got[0][0], slip, atol=2e-3), f"align_corners=True, u = 1 goes to {slip}: {hint}"
-np.testing.assert_allclose(got, [[-0.5, 1], [0, 0]], atol=1e-6, err_msg="by hand; (2, 1) is the middle of the image")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import planes
+def _test():
+    # A row of five pixels, three rows high: u = 1 lies a quarter of the way from the first to the last centre; v = 2 is the last row.
+    got = answer_array(unit_places(np.array([[1.0, 2.0], [2.0, 1.0]]), (3, 5), align_corners=True), "unit_places")
+    assert got.shape == (2, 2), f"two pairs in, two pairs out, shape (2, 2); got {got.shape}"
+    slips = {
+        -0.6: "from the first centre to the last there are w - 1 steps, not w",
+        -0.4: "that is the other convention: here -1 and 1 are the centres of the first and last pixel",
+        0.25: "places run from -1 to 1, not from 0 to 1",
+        0.0: "height and width are swapped: `size` is (h, w), u runs along the width",
+        1.0: "u and v changed places: first across, then down",
+    }
+    _explain("align_corners=True, u = 1 goes to", got[0, 0], slips)
+    middle = "by hand; (2, 1) is the middle of the image"
+    np.testing.assert_allclose(got, [[-0.5, 1], [0, 0]], atol=1e-6, err_msg=middle)
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import planes
 
-complaint = planes.check_centres(unit_places)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = planes.check_centres(unit_places)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
 
 # %% nbgrader={"grade": true, "grade_id": "edges-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-# From edge to edge it is five pixels, and u = 1 lies one and a half of them from the first edge: 3/10 of the way.
-got = unit_places(np.array([[1.0, 2.0], [2.0, 1.0]]), (3, 5), align_corners=False)
-slips = {
-    -0.6: "u = 0 is a centre, half a pixel from the edge: add that half first",
-    -0.5: "that is the other convention: here -1 and 1 are the edges, half a pixel outside the centres",
-    0.3: "places run from -1 to 1, not from 0 to 1",
-    0.0: "height and width are swapped: `size` is (h, w), u runs along the width",
-    -0.8: "the half has the wrong sign: the first edge lies at u = -1/2, so measure from there",
-    -0.25: "from edge to edge there are w pixels, not w - 1",
-    2 / 3: "u and v changed places: first across, then down",
-}
-for slip, hint in slips.items():
-    assert not np.isclose(got[0][0], slip, atol=2e-3), f"align_corners=False, u = 1 goes to {slip:.3g}: {hint}"
-np.testing.assert_allclose(got, [[-0.4, 2 / 3], [0, 0]], atol=1e-6, err_msg="by hand; (2, 1) is the middle")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import planes
+def _test():
+    # From edge to edge it is five pixels, and u = 1 lies one and a half of them from the first edge: 3/10 of the way.
+    got = answer_array(unit_places(np.array([[1.0, 2.0], [2.0, 1.0]]), (3, 5), align_corners=False), "unit_places")
+    assert got.shape == (2, 2), f"two pairs in, two pairs out, shape (2, 2); got {got.shape}"
+    slips = {
+        -0.6: "u = 0 is a centre, half a pixel from the edge: add that half first",
+        -0.5: "that is the other convention: here -1 and 1 are the edges, half a pixel outside the centres",
+        0.3: "places run from -1 to 1, not from 0 to 1",
+        0.0: "height and width are swapped: `size` is (h, w), u runs along the width",
+        -0.8: "the half has the wrong sign: the first edge lies at u = -1/2, so measure from there",
+        -0.25: "from edge to edge there are w pixels, not w - 1",
+        2 / 3: "u and v changed places: first across, then down",
+    }
+    _explain("align_corners=False, u = 1 goes to", got[0, 0], slips)
+    np.testing.assert_allclose(got, [[-0.4, 2 / 3], [0, 0]], atol=1e-6, err_msg="by hand; (2, 1) is the middle")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import planes
 
-complaint = planes.check_edges(unit_places)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = planes.check_edges(unit_places)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 6: in your own words (2 points)

@@ -17,11 +17,21 @@
 # you are wrong. Your instructor's tests use other numbers. Your functions leave their arguments as they are. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
 
 # %% nbgrader={"grade": false, "grade_id": "setup", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# Names that begin with _ belong to the tests.
 import warnings
 
 import numpy as np
 
+from semgrid_edu.course.answers import answer_array
+
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
+
+
+def _explain(what, got, slips):
+    """Stop with a hint when the number `got` is what a common slip gives."""
+    for slip, hint in slips.items():
+        assert not np.isclose(got, slip, atol=2e-3), f"{what} {got:.5g}: {hint}"
+
 
 # %% [markdown]
 # ## Task 1: how far a chain of layers sees, and where it looks (1 + 2 points)
@@ -53,12 +63,8 @@ def receptive_field(layers):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "field-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-# Field by hand: 1 + 2 = 3; halve: + 1 = 4, jump 2; + 4 * 2 = 12; rate 2, stride 2: + 2 * 2 * 2 = 20, jump 4; + 2 * 4 = 28.
-got = receptive_field([(3, 1, 1, 1), (2, 2, 1, 0), (5, 1, 1, 2), (3, 2, 2, 1), (3, 1, 1, 0)])
-assert np.size(got) == 3, f"return three numbers, field, jump and centre; got {got}"
-field, jump, _ = got
-slips = {
+# %% nbgrader={"grade": false, "grade_id": "field-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_FIELD_SLIPS = {
     14: "the jump is forgotten: after a halving each step of a kernel is two pixels of the image",
     37: "a layer's own stride counts from the next layer on: first the field, then the jump",
     40: "a kernel of 3 adds its two neighbours, not three: kernel - 1",
@@ -73,20 +79,29 @@ slips = {
     42: "padding makes a map longer, not a kernel: the field doesn't know of it",
     4: "that is the jump: return the field first, then the jump, then the centre",
 }
-assert field not in slips, f"a field of {field}: {slips[field]}"
-assert field == 28, f"expected a field of 28 pixels, got {field}"
-assert jump == 4, f"two layers have stride 2, so outputs lie 4 pixels apart; got {jump}"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import segmentation
 
-complaint = segmentation.check_field(receptive_field)
-assert not complaint, complaint
-### END HIDDEN TESTS
 
-# %% nbgrader={"grade": true, "grade_id": "centre-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-# By hand: 0; the window of 2: + 1/2; + 0; reaching 2 to either side, padded by 1 only: + 1 * 2 = 2.5; not padded: + 1 * 4 = 6.5.
-centre = float(receptive_field([(3, 1, 1, 1), (2, 2, 1, 0), (5, 1, 1, 2), (3, 2, 2, 1), (3, 1, 1, 0)])[2])
-slips = {
+# %% nbgrader={"grade": true, "grade_id": "field-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    # Field by hand: 1 + 2 = 3; halve: + 1 = 4, jump 2; + 4 * 2 = 12; rate 2, stride 2: + 2 * 2 * 2 = 20, jump 4; + 2 * 4 = 28.
+    layers = [(3, 1, 1, 1), (2, 2, 1, 0), (5, 1, 1, 2), (3, 2, 2, 1), (3, 1, 1, 0)]
+    got = answer_array(receptive_field(layers), "receptive_field").ravel()
+    assert got.size >= 2, f"return three numbers, field, jump and centre; got {got}"
+    _explain("a field of", got[0], _FIELD_SLIPS)
+    assert got[0] == 28, f"expected a field of 28 pixels, got {got[0]:g}"
+    assert got[1] == 4, f"two layers have stride 2, so outputs lie 4 pixels apart; got {got[1]:g}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import segmentation
+
+    complaint = segmentation.check_field(receptive_field)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% nbgrader={"grade": false, "grade_id": "centre-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_CENTRE_SLIPS = {
     13.5: "the padding is forgotten: zeros before a map move output 0 to the left",
     9.5: "padding counts in steps of its layer's input: a zero is as wide as the jump",
     2.5: "the jump is forgotten: after a halving each step is two pixels of the image",
@@ -104,14 +119,25 @@ slips = {
     3.0: "you walk from the last layer to the first: `layers` begins at the image, where the jump is 1",
     -6.5: "the sign: what a kernel reaches to the right is added, padding is subtracted",
 }
-assert centre not in slips, f"a centre of {centre}: {slips[centre]}"
-assert centre == 6.5, f"expected a centre of 1/2 + 2 + 4 = 6.5, got {centre}"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import segmentation
 
-complaint = segmentation.check_centre(receptive_field)
-assert not complaint, complaint
-### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "centre-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    # By hand: 0; the window of 2: + 1/2; + 0; reaching 2 to either side, padded by 1 only: + 1 * 2 = 2.5; not padded: + 1 * 4 = 6.5.
+    layers = [(3, 1, 1, 1), (2, 2, 1, 0), (5, 1, 1, 2), (3, 2, 2, 1), (3, 1, 1, 0)]
+    got = answer_array(receptive_field(layers), "receptive_field").ravel()
+    assert got.size == 3, f"return three numbers, field, jump and centre; got {got}"
+    _explain("a centre of", got[2], _CENTRE_SLIPS)
+    assert got[2] == 6.5, f"expected a centre of 1/2 + 2 + 4 = 6.5, got {got[2]:g}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import segmentation
+
+    complaint = segmentation.check_centre(receptive_field)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 2: pooling with windows that overlap, and the way back (1 + 1 + 1 points)
@@ -154,43 +180,50 @@ def unpool(values, indices, shape):
 
 
 # %% nbgrader={"grade": false, "grade_id": "pool-maps", "locked": true, "schema_version": 3, "solution": false, "task": false}
-# The maps of the next tests. In channel 0 two windows share the 7, and none has the 9; in channel 1 there are ties.
-maps = np.zeros((2, 5, 8))
-maps[0, 0, [1, 6, 7]] = 1, 2, 9
-maps[0, 1, [2, 3]] = 7, 2
-maps[0, [2, 3, 4, 4], [0, 4, 0, 3]] = 3, 5, 4, 6
-maps[1, [0, 1, 3], [3, 3, 1]] = 2, 2, 5
-print(maps.astype(int))
+def _maps():
+    """Return the maps of the next tests. In channel 0 two windows share the 7, and none has the 9; in channel 1 there are ties."""
+    maps = np.zeros((2, 5, 8))
+    maps[0, 0, [1, 6, 7]] = 1, 2, 9
+    maps[0, 1, [2, 3]] = 7, 2
+    maps[0, [2, 3, 4, 4], [0, 4, 0, 3]] = 3, 5, 4, 6
+    maps[1, [0, 1, 3], [3, 3, 1]] = 2, 2, 5
+    return maps
+
+
+print(_maps().astype(int))
+
 
 # %% nbgrader={"grade": true, "grade_id": "pool-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-got = max_pool(maps.copy(), kernel=3, stride=2)
-assert got is not None, "max_pool returned nothing: did you forget `return`?"
-assert len(got) == 2, "return two arrays, the maxima and their indices"
-pooled = np.asarray(got[0])
-slips = {0: "the smallest number", 11 / 9: "the mean", 1: "the largest of 2 x 2 pixels, and not of 3 x 3,"}
-for slip, hint in slips.items():
-    assert not np.isclose(pooled.flat[0], slip), f"{slip:.2f} is {hint} of the first window, its largest is 7"
-slips = {
-    (2, 3, 6): "your windows begin one pixel apart: take one every `stride` pixels",
-    (2, 1, 2): "your windows don't overlap: they begin `stride` pixels apart, not `kernel`",
-    (2, 2, 4): "the last window of a row has fewer than three columns: only whole windows count",
-    (2, 3, 4): "windows at the border have fewer than 3 x 3 pixels: only whole windows count",
-    (2, 3): "you take the maximum over channels too: each channel has its own",
-}
-shape = pooled.shape
-assert shape == (2, 2, 3), f"maxima of shape {shape}: {slips.get(shape, '2 channels of 2 x 3 windows were expected')}"
-np.testing.assert_allclose(pooled, [[[7, 7, 2], [4, 6, 5]], [[0, 2, 0], [5, 0, 0]]], err_msg="window by window")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import segmentation
+def _test():
+    got = max_pool(_maps(), kernel=3, stride=2)
+    assert got is not None, "max_pool returned nothing: did you forget `return`?"
+    alone = isinstance(got, np.ndarray) and got.ndim == 3
+    pooled = answer_array(got if alone else got[0], "for the maxima max_pool")
+    slips = {0: "the smallest number", 11 / 9: "the mean", 1: "the largest of 2 x 2 pixels, and not of 3 x 3,"}
+    for slip, hint in slips.items():
+        assert not np.isclose(pooled.flat[0], slip), f"{slip:.2f} is {hint} of the first window, its largest is 7"
+    slips = {
+        (2, 3, 6): "your windows begin one pixel apart: take one every `stride` pixels",
+        (2, 1, 2): "your windows don't overlap: they begin `stride` pixels apart, not `kernel`",
+        (2, 2, 4): "the last window of a row has fewer than three columns: only whole windows count",
+        (2, 3, 4): "windows at the border have fewer than 3 x 3 pixels: only whole windows count",
+        (2, 3): "you take the maximum over channels too: each channel has its own",
+    }
+    hint = slips.get(pooled.shape, "2 channels of 2 x 3 windows were expected")
+    assert pooled.shape == (2, 2, 3), f"maxima of shape {pooled.shape}: {hint}"
+    np.testing.assert_allclose(pooled, [[[7, 7, 2], [4, 6, 5]], [[0, 2, 0], [5, 0, 0]]], err_msg="window by window")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import segmentation
 
-complaint = segmentation.check_maxima(max_pool)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = segmentation.check_maxima(max_pool)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
 
-# %% nbgrader={"grade": true, "grade_id": "indices-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-indices = np.asarray(max_pool(maps.copy(), kernel=3, stride=2)[1])
-assert indices.shape == (2, 2, 3), f"one index a window, row * w + column, shape (2, 2, 3); got {indices.shape}"
-slips = {
+
+_test()
+
+# %% nbgrader={"grade": false, "grade_id": "index-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_INDEX_SLIPS = {
     7: "that is the index in the window: after unpooling nobody would know which window; count in the whole map",
     23: "you multiply the row by the height: a row of the map has w = 8 numbers",
     19: "you count column by column: numpy and PyTorch count row by row",
@@ -201,49 +234,66 @@ slips = {
     26: "the window begins at row 2, column 2, not at 1, 1: windows are `stride` pixels apart",
     44: "windows begin `stride` pixels apart, not `kernel`",
 }
-found = int(indices[0, 1, 1])
-assert found not in slips, f"the index of 6 is {found}: {slips[found]}"
-assert found == 35, f"6 is in row 4, column 3, so its index is 4 * 8 + 3 = 35, got {found}"
-assert indices[1, 1, 0] != 65, "the index of 5 in channel 1 is 65: don't count channel 0, each channel begins at 0"
-assert indices[1, 0, 1] != 11, "2 stands in row 0 and in row 1: of equal numbers the one with the smaller index wins"
-np.testing.assert_array_equal(indices[0], [[10, 10, 6], [32, 35, 28]], err_msg="channel 0; 7 is in two windows")
-np.testing.assert_array_equal(indices[1], [[0, 3, 4], [25, 18, 20]], err_msg="channel 1: of equal numbers the first")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import segmentation
 
-complaint = segmentation.check_indices(max_pool)
-assert not complaint, complaint
-### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "indices-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    got = max_pool(_maps(), kernel=3, stride=2)
+    two = not (isinstance(got, np.ndarray) and got.ndim == 3) and len(got) == 2
+    assert two, "return two arrays, the maxima and their indices"
+    indices = answer_array(got[1], "for the indices max_pool")
+    assert indices.shape == (2, 2, 3), f"one index a window, row * w + column, shape (2, 2, 3); got {indices.shape}"
+    _explain("the index of 6 is", indices[0, 1, 1], _INDEX_SLIPS)
+    found = indices[0, 1, 1]
+    assert found == 35, f"6 is in row 4, column 3, so its index is 4 * 8 + 3 = 35, got {found:g}"
+    assert indices[1, 1, 0] != 65, "the index of 5 in channel 1 is 65: don't count channel 0, each channel begins at 0"
+    tie = "2 stands in row 0 and in row 1: of equal numbers the one with the smaller index wins"
+    assert indices[1, 0, 1] != 11, tie
+    np.testing.assert_array_equal(indices[0], [[10, 10, 6], [32, 35, 28]], err_msg="channel 0; 7 is in two windows")
+    np.testing.assert_array_equal(indices[1], [[0, 3, 4], [25, 18, 20]], err_msg=f"channel 1: {tie}")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import segmentation
+
+    complaint = segmentation.check_indices(max_pool)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
 
 # %% nbgrader={"grade": true, "grade_id": "unpool-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-indices = np.array([[[10, 10, 6], [32, 35, 28]], [[0, 3, 4], [25, 18, 20]]])
-values = np.arange(12.0, 0, -1).reshape(2, 2, 3)  # 12 11 10 / 9 8 7 and 6 5 4 / 3 2 1
-got = np.asarray(unpool(values.copy(), indices.copy(), (2, 5, 8)))
-assert np.shape(got) == (2, 5, 8), f"expected the shape that was asked for, (2, 5, 8), got {np.shape(got)}"
-assert np.count_nonzero(got) < 12, "more than eleven numbers aren't zero: a value goes to one place, not to a window"
-assert got[1].any(), "channel 1 is empty: an index counts in its own channel"
-assert got[0, 2, 0] == 0, (
-    "row 2, column 0 isn't zero: index 10 is row 10 // 8 = 1, column 10 % 8 = 2: divide by the width"
-)
-slips = {
-    11: "the second value has replaced the first. (numpy's maps[indices] += values adds only once where an index repeats.)",
-    12: "only the first value, or the larger, has got there",
-    11.5: "that is their mean",
-}
-at_7 = float(got[0, 1, 2])
-assert at_7 not in slips, (
-    f"two windows name row 1, column 2, with 12 and 11, and it is {at_7:g}: {slips[at_7]}. They add up"
-)
-by_hand = np.zeros((2, 5, 8))
-by_hand[0, [1, 0, 4, 4, 3], [2, 6, 0, 3, 4]] = 23, 10, 9, 8, 7
-by_hand[1, [0, 0, 0, 3, 2, 2], [0, 3, 4, 1, 2, 4]] = 6, 5, 4, 3, 2, 1
-np.testing.assert_allclose(got, by_hand, err_msg="each value where its index says, 12 + 11 where two say the same")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import segmentation
+def _test():
+    indices = np.array([[[10, 10, 6], [32, 35, 28]], [[0, 3, 4], [25, 18, 20]]])
+    values = np.arange(12.0, 0, -1).reshape(2, 2, 3)  # 12 11 10 / 9 8 7 and 6 5 4 / 3 2 1
+    got = answer_array(unpool(values, indices, (2, 5, 8)), "unpool")
+    assert got.shape == (2, 5, 8), f"expected the shape that was asked for, (2, 5, 8), got {got.shape}"
+    assert np.count_nonzero(got) < 12, (
+        "more than eleven numbers aren't zero: a value goes to one place, not to a window"
+    )
+    assert got[1].any(), "channel 1 is empty: an index counts in its own channel"
+    assert got[0, 2, 0] == 0, (
+        "row 2, column 0 isn't zero: index 10 is row 10 // 8 = 1, column 10 % 8 = 2: divide by the width"
+    )
+    slips = {
+        11: "the second value has replaced the first. (numpy's maps[indices] += values adds only once where an index repeats.)",
+        12: "only the first value, or the larger, has got there",
+        11.5: "that is their mean",
+    }
+    _explain("two windows name row 1, column 2, with 12 and 11, and they add up; it is", got[0, 1, 2], slips)
+    by_hand = np.zeros((2, 5, 8))
+    by_hand[0, [1, 0, 4, 4, 3], [2, 6, 0, 3, 4]] = 23, 10, 9, 8, 7
+    by_hand[1, [0, 0, 0, 3, 2, 2], [0, 3, 4, 1, 2, 4]] = 6, 5, 4, 3, 2, 1
+    np.testing.assert_allclose(got, by_hand, err_msg="each value where its index says, 12 + 11 where two say the same")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import segmentation
 
-complaint = segmentation.check_unpool(unpool)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = segmentation.check_unpool(unpool)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 3: a layer, with channels, holes and stride (1 + 1 + 1 points)
@@ -276,22 +326,20 @@ def atrous(maps, kernels, bias, stride, rate):
 
 
 # %% nbgrader={"grade": false, "grade_id": "layer-inputs", "locked": true, "schema_version": 3, "solution": false, "task": false}
-# The layer of the next tests. For output 0, input 0 meets 1 2 3 / 4 5 6 / 7 8 9, input 1 meets 10 11 12 / 13 14 15 / 16 17 18.
-inputs, kernels, bias = np.zeros((2, 5, 8)), np.arange(1.0, 37).reshape(2, 2, 3, 3), np.array([0.5, 0.25])
-inputs[:, 2, 4] = 1, 100
+def _kernels():
+    """Return kernels (2, 2, 3, 3): for output 0 input 0 meets 1 2 3 / 4 5 6 / 7 8 9, input 1 meets 10 11 12 / 13 14 15 / 16 17 18."""
+    return np.arange(1.0, 37).reshape(2, 2, 3, 3)
 
-# %% nbgrader={"grade": true, "grade_id": "atrous-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-got = np.asarray(atrous(inputs.copy(), kernels.copy(), bias.copy(), stride=1, rate=2))
-slips = {
-    (): "atrous returned nothing: did you forget `return`?",
-    (2, 2, 5, 8): "sum over the input channels",
-    (5, 8): "one output channel is missing, or the two are summed",
-    (2, 3, 4): "you take the rate for a stride: it is the weights that lie apart, not the outputs",
-    (2, 3, 6): "with rate 2 the kernel reaches 2 pixels beyond the border: pad by rate, not by 1",
-    (2, 1, 4): "the border is missing: pad with zeros on each side",
-}
-assert got.shape == (2, 5, 8), f"shape {got.shape}: {slips.get(got.shape, '2 outputs of 5 x 8 were expected')}"
-slips = {  # by hand 5 + 14 * 100 + 0.5
+
+def _one_layer(maps, kernel, stride, rate):
+    """Return the output of `atrous` for one map and one kernel, without bias: this is about holes and stride alone."""
+    got = atrous(maps[None].copy(), kernel[None, None].copy(), np.zeros(1), stride, rate)
+    got = answer_array(got, "atrous")
+    return got.reshape(got.shape[-2:]) if got.size and got.shape[:-2].count(1) == got.ndim - 2 else got
+
+
+# %% nbgrader={"grade": false, "grade_id": "channel-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_CHANNEL_SLIPS = {  # by hand 5 + 14 * 100 + 0.5
     1405: "the bias is missing",
     1406: "the bias is added for each input channel: once is enough",
     1409.5: "the bias is added for each weight: once is enough",
@@ -302,73 +350,112 @@ slips = {  # by hand 5 + 14 * 100 + 0.5
     2305.5: "input and output channel are swapped: kernels are (K, C, N, N)",
     505.5: "all inputs meet the kernel of channel 0: each pair of channels has its own",
 }
-middle = round(float(got[0, 2, 4]), 6)
-assert middle not in slips, f"output 0 at the ones themselves, (2, 4), is {middle:g}: {slips[middle]}"
-assert middle == 1405.5, f"the middle weights, 5 and 14, meet 1 and 100: expected 5 + 1400 + 0.5, got {middle:g}"
-assert np.isclose(got[1, 2, 4], 3223.25), f"output 1 at the same place: expected 23 + 3200 + 0.25, got {got[1, 2, 4]:g}"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import segmentation
 
-complaint = segmentation.check_channels(atrous)
-assert not complaint, complaint
-### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "atrous-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    inputs = np.zeros((2, 5, 8))
+    inputs[:, 2, 4] = 1, 100
+    got = answer_array(atrous(inputs, _kernels(), np.array([0.5, 0.25]), stride=1, rate=1), "atrous")
+    slips = {
+        (2, 2, 5, 8): "sum over the input channels",
+        (5, 8): "one output channel is missing, or the two are summed",
+        (2, 3, 6): "the border is missing: pad with zeros on each side",
+    }
+    assert got.shape == (2, 5, 8), f"shape {got.shape}: {slips.get(got.shape, '2 outputs of 5 x 8 were expected')}"
+    _explain("output 0 at the ones themselves, (2, 4), is", got[0, 2, 4], _CHANNEL_SLIPS)
+    middle, other = got[:, 2, 4]
+    hand = "the middle weights, 5 and 14, meet 1 and 100"
+    assert np.isclose(middle, 1405.5), f"{hand}: expected 5 + 1400 + 0.5, got {middle:g}"
+    assert np.isclose(other, 3223.25), f"output 1 at the same place: expected 23 + 3200 + 0.25, got {other:g}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import segmentation
+
+    complaint = segmentation.check_channels(atrous)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% nbgrader={"grade": false, "grade_id": "hole-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_HOLE_SHAPES = {
+    (3, 4): "you take the rate for a stride: it is the weights that lie apart, not the outputs",
+    (3, 6): "with rate 2 the kernel reaches 2 pixels beyond the border: pad by rate, not by 1",
+    (1, 4): "the border is missing: pad with zeros on each side",
+}
+_HOLE_SLIPS = {
+    1: "the kernel is turned round: the 1 lies below and to the right, so it meets 9",
+    3: "the kernel is turned round from top to bottom: the 1 lies below, so it meets its last row",
+    7: "the kernel is turned round from left to right: the 1 lies to the right, so it meets its last column",
+    0: "nothing arrives there: (rate + 1) is too far, rate is the distance from weight to weight",
+}
+
 
 # %% nbgrader={"grade": true, "grade_id": "holes-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-got = np.asarray(atrous(inputs.copy(), kernels.copy(), bias.copy(), stride=1, rate=2))[0]
-assert not np.isclose(got[2, 3], 1506.5), "the neighbour at (2, 3) answers: with rate 2 the kernel skips it"
-slips = {
-    1001.5: "the kernel is turned round: the ones lie below and to the right, so they meet 9 and 18",
-    1203.5: "the kernel is turned round from top to bottom: the ones lie below, so they meet its last row",
-    1607.5: "the kernel is turned round from left to right: the ones lie to the right, so they meet its last column",
-    0.5: "nothing arrives there: (rate + 1) is too far, rate is the distance from weight to weight",
-}
-corner = round(float(got[0, 2]), 6)
-assert corner not in slips, f"output 0 at (0, 2) is {corner:g}: {slips[corner]}"
-assert not np.isclose(got[4, 4], 1304.5), "rows and columns of the kernel are swapped: n counts rows, m columns"
-by_hand = [[1809.5, 1708.5, 1607.5], [1506.5, 1405.5, 1304.5], [1203.5, 1102.5, 1001.5]]
-np.testing.assert_allclose(got[::2, 2::2], by_hand, err_msg="output 0 at every second pixel around the ones")
-ones = np.asarray(atrous(np.ones((2, 5, 8)), kernels.copy(), bias.copy(), stride=1, rate=2))
-corner = float(ones[0, 0, 0])  # by hand 5 + 6 + 8 + 9 and 14 + 15 + 17 + 18
-assert np.isclose(corner, 92.5), f"maps of ones give {corner:g} in the corner, not 28 + 64 + 0.5: outside is zero"
-try:
-    got = np.asarray(atrous(inputs.copy(), kernels[:, :, 1:2, 1:2].copy(), bias.copy(), stride=1, rate=2))
-except IndexError:
-    raise AssertionError("kernels of 1 x 1 are refused: take N from kernels.shape") from None
-assert got.shape != (2, 9, 12), "kernels of 1 x 1 reach beyond nothing: pad by rate * (N - 1) / 2"
-assert got.shape == (2, 5, 8), f"kernels of 1 x 1, stride 1: expected the shape (2, 5, 8), got {got.shape}"
-assert np.isclose(got[0, 2, 4], 1405.5), (
-    f"a kernel of 1 x 1 meets the pixel itself: expected 1405.5, got {got[0, 2, 4]:g}"
-)
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import segmentation
+def _test():
+    # One map with a 1 at (2, 4), one kernel, 1 2 3 / 4 5 6 / 7 8 9, no bias.
+    dot, kernel = np.zeros((5, 8)), _kernels()[0, 0]
+    dot[2, 4] = 1
+    got = _one_layer(dot, kernel, stride=1, rate=2)
+    assert got.shape == (5, 8), (
+        f"shape {got.shape}: {_HOLE_SHAPES.get(got.shape, 'with stride 1 it is that of the map')}"
+    )
+    assert not np.isclose(got[2, 3], 6), "the neighbour at (2, 3) answers: with rate 2 the kernel skips it"
+    _explain("the output at (0, 2) is", got[0, 2], _HOLE_SLIPS)
+    assert not np.isclose(got[4, 4], 4), "rows and columns of the kernel are swapped: n counts rows, m columns"
+    hand = "the output at every second pixel around the 1"
+    np.testing.assert_allclose(got[::2, 2:7:2], [[9, 8, 7], [6, 5, 4], [3, 2, 1]], err_msg=hand)
+    corner = _one_layer(np.ones((5, 8)), kernel, stride=1, rate=2)[0, 0]
+    assert np.isclose(corner, 28), f"a map of ones gives {corner:g} in the corner, not 5 + 6 + 8 + 9: outside is zero"
+    try:
+        got = _one_layer(dot, kernel[1:2, 1:2], stride=1, rate=2)
+    except IndexError:
+        raise AssertionError("kernels of 1 x 1 are refused: take N from kernels.shape") from None
+    assert got.shape != (9, 12), "kernels of 1 x 1 reach beyond nothing: pad by rate * (N - 1) / 2"
+    assert got.shape == (5, 8), f"kernels of 1 x 1, stride 1: expected 5 x 8 outputs, got {got.shape}"
+    assert np.isclose(got[2, 4], 5), f"a kernel of 1 x 1 meets the pixel itself: expected 5, got {got[2, 4]:g}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import segmentation
 
-complaint = segmentation.check_holes(atrous)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = segmentation.check_holes(atrous)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
 
 # %% nbgrader={"grade": true, "grade_id": "stride-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-got = np.asarray(atrous(inputs.copy(), kernels.copy(), bias.copy(), stride=2, rate=2))
-slips = {
-    (2, 5, 8): "the stride is ignored",
-    (2, 2, 4): "of five rows the stride keeps 0, 2 and 4: three",
-    (2, 3, 8): "the stride counts across as well as down",
-    (2, 5, 4): "the stride counts down as well as across",
-}
-assert got.shape == (2, 3, 4), f"shape {got.shape}: {slips.get(got.shape, '2 outputs of 3 x 4 were expected')}"
-middle, corner = float(got[0, 1, 2]), float(got[0, 0, 1])
-assert np.isclose(middle, 1405.5), (
-    f"output 0 at (1, 2) belongs to pixel (2, 4), the ones themselves: 1405.5, got {middle:g}"
-)
-assert not np.isclose(corner, 0.5), (
-    "output 0 at (0, 1) is 0.5, nothing but bias: the rate counts inputs, also where a stride leaves outputs out"
-)
-assert np.isclose(corner, 1809.5), f"output 0 at (0, 1) belongs to pixel (0, 2): expected 1809.5, got {corner:g}"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import segmentation
+def _test():
+    # One map with a 1 at (2, 3), one kernel, 1 2 3 / 4 5 6 / 7 8 9, no bias. Your outputs with stride 1 tell what is right.
+    dot = np.zeros((5, 8))
+    dot[2, 3] = 1
+    full, got = (_one_layer(dot, _kernels()[0, 0], stride, rate=1) for stride in (1, 2))
+    assert np.count_nonzero(full) == 9, "with stride 1 the nine outputs around the 1 must hear of it, and no others"
+    slips = {
+        (5, 8): "the stride is ignored",
+        (2, 4): "of five rows the stride keeps 0, 2 and 4: three",
+        (3, 8): "the stride counts across as well as down",
+        (5, 4): "the stride counts down as well as across",
+    }
+    wanted = full[::2, ::2]
+    assert got.shape == wanted.shape, f"shape {got.shape}: {slips.get(got.shape, f'{wanted.shape} was expected')}"
+    assert got.any() or not wanted.any(), (
+        "all outputs are 0: the rate counts inputs, also where a stride leaves outputs out"
+    )
+    np.testing.assert_allclose(
+        got, wanted, err_msg="output (v, u) belongs to pixel (2v, 2u): every second one of stride 1"
+    )
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import segmentation
 
-complaint = segmentation.check_layer(atrous)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = segmentation.check_stride(atrous)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 4: a skip: enlarge, crop, add (2 + 1 points)
@@ -396,52 +483,58 @@ def add_skip(coarse, fine):
 
 
 # %% nbgrader={"grade": true, "grade_id": "skip-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-coarse, fine = np.array([[[4.0, 8, 0, 8]]]), np.zeros((1, 2, 7))
-fine[0, :, 3] = 10
-got = np.asarray(add_skip(coarse, fine))
-assert np.count_nonzero(fine) == 2, "add_skip changed its argument `fine`: make a new array (no +=)"
-assert np.shape(got) != (1, 2, 8), "a column too many: the fine map has only seven, cut off the last one"
-assert np.shape(got) == (1, 2, 7), f"expected the shape of the fine map, (1, 2, 7), got {np.shape(got)}"
-assert not np.allclose(got, fine), "the coarse scores got lost"
-slips = {  # of columns 0 to 2; by hand 4, a quarter of the way from 4 to 8, three quarters of it
-    (4, 4, 8): "each value is repeated (nearest): interpolate between the places 2i + 1/2",
-    (4, 6, 8): "you put value i at column 2i: it covers 2i and 2i + 1, so it belongs between them",
-    (4, 5.714, 7.429): "the ends are aligned (align_corners): the first value belongs to 1/2, not to 0",
-    (5, 7, 6): "the first column is cut off: cut at the right end",
-    (4, 5.429, 7.714): "you stretch the coarse map to seven columns: double it to eight, then cut one off",
-    (3, 5, 7): "before the first place, 1/2, the value stays at 4: neither extrapolate nor mix with zeros",
-    (2, 2.5, 3.5): "that is the mean: a skip adds",
-}
-head = got[0, 0, :3]
-for slip, hint in slips.items():
-    assert not np.allclose(head, slip, atol=1e-3), f"columns 0 to 2 are {head.round(2).tolist()}: {hint}"
-assert not np.isclose(got[0, 0, 3], 6), "column 3 is 6, the coarse map alone: add the fine scores"
-assert not np.isclose(got[0, 0, 3], 60), "column 3 is 60: a skip adds scores, it doesn't multiply them"
-np.testing.assert_allclose(got[0, 0], [4, 5, 7, 16, 2, 2, 6], err_msg="row 0; coarse alone: 4 5 7 6 2 2 6")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import segmentation
+def _test():
+    coarse, fine = np.array([[[4.0, 8, 0, 8]]]), np.zeros((1, 2, 7))
+    fine[0, :, 3] = 10
+    got = answer_array(add_skip(coarse, fine), "add_skip")
+    assert np.count_nonzero(fine) == 2, "add_skip changed its argument `fine`: make a new array (no +=)"
+    assert got.shape != (1, 2, 8), "a column too many: the fine map has only seven, cut off the last one"
+    assert got.shape == (1, 2, 7), f"expected the shape of the fine map, (1, 2, 7), got {got.shape}"
+    assert not np.allclose(got, fine), "the coarse scores got lost"
+    slips = {  # of columns 0 to 2; by hand 4, a quarter of the way from 4 to 8, three quarters of it
+        (4, 4, 8): "each value is repeated (nearest): interpolate between the places 2i + 1/2",
+        (4, 6, 8): "you put value i at column 2i: it covers 2i and 2i + 1, so it belongs between them",
+        (4, 5.714, 7.429): "the ends are aligned (align_corners): the first value belongs to 1/2, not to 0",
+        (5, 7, 6): "the first column is cut off: cut at the right end",
+        (4, 5.429, 7.714): "you stretch the coarse map to seven columns: double it to eight, then cut one off",
+        (3, 5, 7): "before the first place, 1/2, the value stays at 4: neither extrapolate nor mix with zeros",
+        (2, 2.5, 3.5): "that is the mean: a skip adds",
+    }
+    for slip, hint in slips.items():
+        assert not np.allclose(got[0, 0, :3], slip, atol=1e-3), f"columns 0 to 2 are {got[0, 0, :3].round(2)}: {hint}"
+    assert not np.isclose(got[0, 0, 3], 6), "column 3 is 6, the coarse map alone: add the fine scores"
+    assert not np.isclose(got[0, 0, 3], 60), "column 3 is 60: a skip adds scores, it doesn't multiply them"
+    np.testing.assert_allclose(got[0, 0], [4, 5, 7, 16, 2, 2, 6], err_msg="row 0; coarse alone: 4 5 7 6 2 2 6")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import segmentation
 
-complaint = segmentation.check_skip(add_skip)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = segmentation.check_skip_columns(add_skip)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
 
 # %% nbgrader={"grade": true, "grade_id": "rows-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-coarse, fine = np.array([[[0.0], [4]], [[8], [0]]]), np.full((2, 3, 2), 10.0)  # two classes, two rows, one column
-got = np.asarray(add_skip(coarse, fine))
-assert np.shape(got) == (2, 3, 2), f"expected the shape of the fine map, (2, 3, 2), got {np.shape(got)}: cut rows too"
-assert not np.allclose(got[0, :, 0], [10, 10, 14]), "the rows are repeated: rows are interpolated too"
-np.testing.assert_allclose(
-    got[:, :, 0], [[10, 11, 13], [18, 16, 12]], err_msg="by hand 0 1 3 and 8 6 2, and 10 to each"
-)
-np.testing.assert_allclose(
-    got[:, :, 1], got[:, :, 0], err_msg="the coarse map has one column, so both columns are alike"
-)
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import segmentation
+def _test():
+    coarse, fine = np.array([[[0.0], [4]], [[8], [0]]]), np.full((2, 3, 2), 10.0)  # two classes, two rows, one column
+    got = answer_array(add_skip(coarse, fine), "add_skip")
+    assert got.shape == (2, 3, 2), f"expected the shape of the fine map, (2, 3, 2), got {got.shape}: cut rows too"
+    assert not np.allclose(got[0, :, 0], [10, 10, 14]), "the rows are repeated: rows are interpolated too"
+    hand = "by hand 0 1 3 and 8 6 2, and 10 to each"
+    np.testing.assert_allclose(got[:, :, 0], [[10, 11, 13], [18, 16, 12]], err_msg=hand)
+    hand = "the coarse map has one column, so both columns are alike"
+    np.testing.assert_allclose(got[:, :, 1], got[:, :, 0], err_msg=hand)
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import segmentation
 
-complaint = segmentation.check_skip(add_skip)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = segmentation.check_skip_rows(add_skip)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 5: the loss of an image, and its gradient (1 + 2 + 1 points)
@@ -472,17 +565,13 @@ def loss_and_gradient(scores, truth):
 
 
 # %% nbgrader={"grade": false, "grade_id": "loss-image", "locked": true, "schema_version": 3, "solution": false, "task": false}
-# The image of the next tests: three classes, two rows, two columns. Scores are logarithms of odds: P(true class) is 4/8, 1/8; -, 4/8.
-odds = np.array([[[4.0, 1], [1, 2]], [[2, 3], [1, 4]], [[2, 4], [6, 2]]])
-scores, truth = np.log(odds), np.array([[0, 0], [255, 1]])
+def _image():
+    """Return scores (3, 2, 2) and classes (2, 2). Scores are logarithms of odds: P(true class) is 4/8, 1/8; -, 4/8."""
+    odds = np.array([[[4.0, 1], [1, 2]], [[2, 3], [1, 4]], [[2, 4], [6, 2]]])
+    return np.log(odds), np.array([[0, 0], [255, 1]])
 
-# %% nbgrader={"grade": true, "grade_id": "loss-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-got = loss_and_gradient(scores, truth)
-assert isinstance(got, tuple | list), f"return two things, the loss and its gradient; got {got}"
-assert np.array_equal(scores, np.log(odds)), "loss_and_gradient changed its argument `scores`: make a new array (no -=)"
-loss = got[0]
-assert np.ndim(loss) == 0, f"expected one number first, the mean, got shape {np.shape(loss)}"
-slips = {
+
+_LOSS_SLIPS = {
     0.866: "you divide by all four pixels: one isn't labelled, so divide by three",
     3.466: "that is the sum: take the mean over the labelled pixels",
     -1.155: "the sign is swapped: a loss is -log P, which is never below zero",
@@ -499,22 +588,31 @@ slips = {
     0.627: "the soft-max runs over the rows of the image: sum over the classes, axis 0",
     2.542: "the soft-max runs over the whole image: each pixel's classes sum to 1, so sum over axis 0",
 }
-for slip, hint in slips.items():
-    assert not np.isclose(loss, slip, atol=2e-3), f"a loss of {loss:.3f}: {hint}"
-assert np.isclose(loss, 1.1552, atol=1e-3), f"expected (log 2 + log 8 + log 2) / 3 = 1.155, got {loss:.3f}"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import segmentation
 
-complaint = segmentation.check_loss(loss_and_gradient)
-assert not complaint, complaint
-### END HIDDEN TESTS
 
-# %% nbgrader={"grade": true, "grade_id": "gradient-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-# By hand, the pixel in row 0, column 1: P is 1/8, 3/8, 4/8 and class 0 is true, so (1/8 - 1, 3/8, 4/8), and a third of it in the mean.
-gradient = np.asarray(loss_and_gradient(np.log(odds), truth)[1])
-assert gradient.shape == (3, 2, 2), f"one derivative a score, shape (3, 2, 2), got {gradient.shape}"
-assert np.allclose(gradient[:, 1, 0], 0), "the pixel that isn't labelled has no part in the loss: its gradient is 0"
-slips = {
+# %% nbgrader={"grade": true, "grade_id": "loss-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    scores, truth = _image()
+    got = loss_and_gradient(scores, truth)
+    assert np.array_equal(scores, _image()[0]), (
+        "loss_and_gradient changed its argument `scores`: make a new array (no -=)"
+    )
+    loss = answer_array(got[0] if isinstance(got, tuple | list) else got, "for the loss loss_and_gradient")
+    assert loss.ndim == 0, f"expected one number first, the mean, got shape {loss.shape}"
+    _explain("a loss of", loss, _LOSS_SLIPS)
+    assert np.isclose(loss, 1.1552, atol=1e-3), f"expected (log 2 + log 8 + log 2) / 3 = 1.155, got {loss:.3f}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import segmentation
+
+    complaint = segmentation.check_loss(loss_and_gradient)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% nbgrader={"grade": false, "grade_id": "gradient-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_GRADIENT_SLIPS = {
     -0.875: "that is the gradient of this pixel's loss: in a mean of three it counts a third",
     -0.219: "you divide by all four pixels: one isn't labelled, so divide by three",
     -0.073: "you divide by all scores of the image: the mean is over three labelled pixels",
@@ -523,47 +621,74 @@ slips = {
     -2.667: "that is the derivative by P, -1 / P: go on to the scores",
     -0.036: "that is the derivative of the mean of -P: the loss is the mean of -log P",
 }
-of_true = float(gradient[0, 0, 1])
-for slip, hint in slips.items():
-    assert not np.isclose(of_true, slip, atol=2e-3), (
-        f"by the true class's score in row 0, column 1: {of_true:.3f}: {hint}"
-    )
-assert np.isclose(of_true, -0.2917, atol=1e-3), f"by the true class's score: expected -7/24 = -0.292, got {of_true:.3f}"
-others = gradient[1:, 0, 1]
-assert others.any(), "the other classes' scores have a gradient too: they stand in the sum below the fraction"
-np.testing.assert_allclose(others, [1 / 8, 1 / 6], err_msg="by the other two scores, 3/8 and 4/8, a third of each")
-np.testing.assert_allclose(
-    gradient[:, 1, 1], [1 / 12, -1 / 6, 1 / 12], err_msg="row 1, column 1, where class 1 is true"
-)
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import segmentation
 
-complaint = segmentation.check_gradient(loss_and_gradient)
-assert not complaint, complaint
-### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "gradient-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    # By hand, the pixel in row 0, column 1: P is 1/8, 3/8, 4/8 and class 0 is true, so (1/8 - 1, 3/8, 4/8), and a third of it in the mean.
+    got = loss_and_gradient(*_image())
+    assert isinstance(got, tuple | list), f"return two things, the loss and its gradient; got {got}"
+    gradient = answer_array(got[1], "for the gradient loss_and_gradient")
+    assert gradient.shape == (3, 2, 2), f"one derivative a score, shape (3, 2, 2), got {gradient.shape}"
+    assert np.allclose(gradient[:, 1, 0], 0), "the pixel that isn't labelled has no part in the loss: its gradient is 0"
+    of_true, *others = gradient[:, 0, 1]
+    _explain("by the true class's score in row 0, column 1:", of_true, _GRADIENT_SLIPS)
+    assert np.isclose(of_true, -0.2917, atol=1e-3), (
+        f"by the true class's score: expected -7/24 = -0.292, got {of_true:.3f}"
+    )
+    assert np.any(others), "the other classes' scores have a gradient too: they stand in the sum below the fraction"
+    np.testing.assert_allclose(others, [1 / 8, 1 / 6], err_msg="by the other two scores, 3/8 and 4/8, a third of each")
+    hand = "row 1, column 1, where class 1 is true"
+    np.testing.assert_allclose(gradient[:, 1, 1], [1 / 12, -1 / 6, 1 / 12], err_msg=hand)
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import segmentation
+
+    complaint = segmentation.check_gradient(loss_and_gradient)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+
+# %% nbgrader={"grade": false, "grade_id": "large-pixel", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _one_pixel(answer, score_0, score_1, truth):
+    """Return what an answer says of one pixel of two classes: the loss, one number, and its gradient."""
+    got = answer(np.array([[[score_0]], [[score_1]]], float), np.array([[truth]]))
+    assert isinstance(got, tuple | list), f"return two things, the loss and its gradient; got {got}"
+    loss = answer_array(got[0], "for the loss loss_and_gradient").mean()
+    return loss, answer_array(got[1], "for the gradient loss_and_gradient")
+
 
 # %% nbgrader={"grade": true, "grade_id": "large-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-loss, gradient = loss_and_gradient(np.array([[[1000.0]], [[1003.0]]]), np.array([[1]]))
-assert not np.isnan(loss), (
-    "scores of 1000 and 1003 give no number, for e^1000 overflows: subtract the pixel's largest score"
-)
-assert np.isclose(loss, 0.0486, atol=1e-4), f"scores 1000 and 1003 must give what 0 and 3 give, 0.049; got {loss:.4f}"
-assert not np.isnan(gradient).any(), "the loss is right, the gradient no number: subtract the largest score there too"
-loss, gradient = loss_and_gradient(np.array([[[-1000.0, 500]], [[0.0, 500]]]), np.array([[0, 1]]))
-assert np.isfinite(loss), (
-    "a score of -1000 against 0 costs 1000, not infinity: keep log P, don't take the logarithm of P"
-)
-assert np.isclose(loss, (1000 + np.log(2)) / 2), f"expected (1000 + 0.693) / 2 = 500.35, got {loss:.2f}"
-by_hand = [[[-0.5, 0.25]], [[0.5, -0.25]]]
-np.testing.assert_allclose(
-    gradient, by_hand, atol=1e-6, err_msg="P is 0 and 1, then 1/2 and 1/2; half of it in the mean"
-)
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import segmentation
+def _test():
+    loss, gradient = _one_pixel(loss_and_gradient, 1000, 1003, truth=1)
+    small, gradient_small = _one_pixel(loss_and_gradient, 0, 3, truth=1)
+    assert not np.isnan(loss), (
+        "scores of 1000 and 1003 give no number, for e^1000 overflows: subtract the pixel's largest score"
+    )
+    assert np.isclose(loss, small), f"scores 1000 and 1003 must give what 0 and 3 give, {small:.3f}; got {loss:.4f}"
+    right = not np.isnan(gradient).any()
+    assert right, "the loss is right, the gradient no number: subtract the largest score there too"
+    assert np.allclose(gradient, gradient_small), "scores 1000 and 1003 must give the gradient that 0 and 3 give"
+    loss, gradient = _one_pixel(loss_and_gradient, -1000, 0, truth=0)
+    half, gradient_half = _one_pixel(loss_and_gradient, -500, 0, truth=0)
+    assert np.isfinite(loss), (
+        "a score of -1000 against 0 costs 1000, not infinity: keep log P, don't take the logarithm of P"
+    )
+    twice = abs(loss) > 100 and np.isclose(loss, 2 * half)
+    assert twice, f"-1000 against 0 must cost twice what -500 does: {loss:.1f} and {half:.1f}. Is log P cut off?"
+    right = gradient.any() and np.allclose(gradient, gradient_half)
+    assert right, "-1000 and 0 must give the gradient that -500 and 0 give: P is 0 and 1"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import segmentation
 
-complaint = segmentation.check_large(loss_and_gradient)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = segmentation.check_large(loss_and_gradient)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 6: in your own words (2 points)

@@ -19,12 +19,22 @@
 # All of it is plain numpy: no network library is needed, and arguments are never changed.
 
 # %% nbgrader={"grade": false, "grade_id": "setup", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# Names that begin with _ belong to the tests.
 import warnings
 
 import numpy as np
 
+from semgrid_edu.course.answers import answer_array
+
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
 IGNORE = 255
+
+
+def _explain(what, got, slips):
+    """Stop with a hint when the number `got` is what a common slip gives."""
+    for slip, hint in slips.items():
+        assert not np.isclose(got, slip, atol=1e-3), f"{what} {got:.4g}: {hint}"
+
 
 # %% [markdown]
 # ## Task 1: the 1x1 reduction (2 points)
@@ -45,15 +55,14 @@ def reduce_planes(planes, theta, beta):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "reduce-planes-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-# Two classes, two planes, one row of two cells. By hand, map 0 in the second cell: 0.5 + 1 * 1 - 1 * 0 + 2 * 4 + 0.5 * 2 = 10.5.
-planes = np.array([[[[3.0, 1.0]], [[1.0, 0.0]]], [[[0.0, 4.0]], [[2.0, 2.0]]]])
-theta, beta = np.array([[[1.0, -1.0], [2.0, 0.5]], [[0.0, 1.0], [1.0, 1.0]]]), np.array([0.5, -4.0])
-got = reduce_planes(planes.copy(), theta.copy(), beta.copy())
-assert got is not None, "reduce_planes returned nothing: did you forget `return`?"
-got = np.asarray(got)
-assert np.shape(got) == (2, 1, 2), f"expected K maps of one row and two columns, (2, 1, 2), got {np.shape(got)}"
-slips = {
+# %% nbgrader={"grade": false, "grade_id": "reduction", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _reduction():
+    """Return planes (2, 2, 1, 2), theta (2, 2, 2) and beta (2,): two classes, two planes, one row of two cells, two maps."""
+    planes = np.array([[[[3.0, 1.0]], [[1.0, 0.0]]], [[[0.0, 4.0]], [[2.0, 2.0]]]])
+    return planes, np.array([[[1.0, -1.0], [2.0, 0.5]], [[0.0, 1.0], [1.0, 1.0]]]), np.array([0.5, -4.0])
+
+
+_REDUCED_SLIPS = {
     -1.5: "class and plane are swapped: theta is (K, C, D), planes (C, D, H, W), so theta[k, c, d] belongs to planes[c, d]",
     10.0: "the bias is missing: add beta[k], once",
     6.0: "your bias changes along the columns: beta[k] belongs to map k, to all cells of it",
@@ -67,16 +76,25 @@ slips = {
     2.774: "you apply a soft-max over classes: planes hold scores, and they stay scores",
     2.783: "you apply a soft-max over planes: planes hold scores, and they stay scores",
 }
-for slip, hint in slips.items():
-    assert not np.isclose(got[0, 0, 1], slip, atol=2e-3), f"map 0, second cell: {got[0, 0, 1]:.3f}: {hint}"
-assert not np.isclose(got[1, 0, 0], 0), "map 1, first cell is 0 where -1 is right: the ReLU comes later"
-np.testing.assert_allclose(got, [[[3.5, 10.5]], [[-1, 2]]], err_msg="the four sums, by hand")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import fusion
 
-complaint = fusion.check_reduce_planes(reduce_planes)
-assert not complaint, complaint
-### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "reduce-planes-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    # By hand, map 0 in the second cell: 0.5 + 1 * 1 - 1 * 0 + 2 * 4 + 0.5 * 2 = 10.5.
+    got = answer_array(reduce_planes(*_reduction()), "reduce_planes")
+    assert got.shape == (2, 1, 2), f"expected K maps of one row and two columns, (2, 1, 2), got {got.shape}"
+    _explain("map 0, second cell:", got[0, 0, 1], _REDUCED_SLIPS)
+    assert not np.isclose(got[1, 0, 0], 0), "map 1, first cell is 0 where -1 is right: the ReLU comes later"
+    np.testing.assert_allclose(got, [[[3.5, 10.5]], [[-1, 2]]], err_msg="the four sums, by hand")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import fusion
+
+    complaint = fusion.check_reduce_planes(reduce_planes)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 2: its way back (2 + 1 points)
@@ -98,60 +116,72 @@ def reduce_back(planes, theta, blamed):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "theta-bar-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-# The planes of task 1. By hand, theta[0, 0, 0] was multiplied by 3 in the first cell and by 1 in the second: 2 * 3 - 1 * 1 = 5.
-blamed = np.array([[[2.0, -1.0]], [[0.0, 3.0]]])
-got = reduce_back(planes.copy(), theta.copy(), blamed.copy())
-assert got is not None, "reduce_back returned nothing: did you forget `return`?"
-assert len(got) == 3, "return three arrays: by theta, by beta, by the planes"
-theta_bar, beta_bar = (np.asarray(part) for part in got[:2])
-assert np.shape(theta_bar) == (2, 2, 2), f"by theta: one number a weight, shape (2, 2, 2), got {np.shape(theta_bar)}"
-assert np.shape(beta_bar) == (2,), f"by beta: one number a map, (K,) = (2,), got {np.shape(beta_bar)}"
-slips = {
+# %% nbgrader={"grade": false, "grade_id": "theta-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_THETA_SLIPS = {
     2.5: "that is the mean over cells: a weight that is used in every cell gets the sum",
     4.0: "blame is lost: sum planes times blamed over cells, not each by itself",
     6.0: "that is the first cell alone: the weight is used in every cell, so sum over them",
     8.0: "you sum over the reduced maps too: theta[k] is used in map k alone",
     1.0: "that is theta itself: the derivative of theta * p by theta is p",
 }
-for slip, hint in slips.items():
-    assert not np.isclose(theta_bar[0, 0, 0], slip, atol=1e-6), f"by theta[0, 0, 0]: {theta_bar[0, 0, 0]:.2f}: {hint}"
-by_hand = [[[5, 2], [-4, 2]], [[3, 0], [12, 6]]]
-assert not np.allclose(theta_bar, np.swapaxes(by_hand, 1, 2)), "class and plane are swapped in the derivative by theta"
-np.testing.assert_allclose(theta_bar, by_hand, err_msg="by theta: sum over cells of planes[c, d] * blamed[k]")
-assert not np.allclose(beta_bar, [0.5, 1.5]), "by beta: that is the mean over cells, take the sum"
-assert not np.allclose(beta_bar, 1), "by beta: 1 is that of a map by its bias; multiply by what comes from behind"
-np.testing.assert_allclose(beta_bar, [1, 3], err_msg="by beta: the sum over cells of blamed[k]")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import fusion
 
-complaint = fusion.check_theta_bar(reduce_back)
-assert not complaint, complaint
-### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "theta-bar-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    # The planes of task 1. By hand, theta[0, 0, 0] was multiplied by 3 in the first cell and by 1 in the second: 2 * 3 - 1 * 1 = 5.
+    planes, theta, _ = _reduction()
+    got = reduce_back(planes, theta, np.array([[[2.0, -1.0]], [[0.0, 3.0]]]))
+    assert got is not None, "reduce_back returned nothing: did you forget `return`?"
+    assert len(got) >= 2, "return three arrays: by theta, by beta, by the planes"
+    theta_bar, beta_bar = answer_array(got[0], "by theta reduce_back"), answer_array(got[1], "by beta reduce_back")
+    assert theta_bar.shape == (2, 2, 2), f"by theta: one number a weight, shape (2, 2, 2), got {theta_bar.shape}"
+    assert beta_bar.shape == (2,), f"by beta: one number a map, (K,) = (2,), got {beta_bar.shape}"
+    _explain("by theta[0, 0, 0]:", theta_bar[0, 0, 0], _THETA_SLIPS)
+    by_hand = [[[5, 2], [-4, 2]], [[3, 0], [12, 6]]]
+    swapped = np.allclose(theta_bar, np.swapaxes(by_hand, 1, 2))
+    assert not swapped, "class and plane are swapped in the derivative by theta"
+    np.testing.assert_allclose(theta_bar, by_hand, err_msg="by theta: sum over cells of planes[c, d] * blamed[k]")
+    assert not np.allclose(beta_bar, [0.5, 1.5]), "by beta: that is the mean over cells, take the sum"
+    assert not np.allclose(beta_bar, 1), "by beta: 1 is that of a map by its bias; multiply by what comes from behind"
+    np.testing.assert_allclose(beta_bar, [1, 3], err_msg="by beta: the sum over cells of blamed[k]")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import fusion
+
+    complaint = fusion.check_theta_bar(reduce_back)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
 
 # %% nbgrader={"grade": true, "grade_id": "planes-bar-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-# By hand, the score of class 1 on plane 0 in the second cell went into map 0 by 2 and into map 1 by 1: 2 * -1 + 1 * 3 = 1.
-planes_bar = np.asarray(reduce_back(planes.copy(), theta.copy(), blamed.copy())[2])
-assert np.shape(planes_bar) == (2, 2, 1, 2), (
-    f"by planes: one number a score, (C, D, H, W) = (2, 2, 1, 2), got {np.shape(planes_bar)}"
-)
-slips = {
-    -2.0: "that is the blame of map 0 alone: a score went into all K maps, so sum over k",
-    3.0: "that is the blame of map 1 alone: a score went into all K maps, so sum over k",
-    0.5: "that is the mean over maps: sum over k",
-    2.0: "the weights are missing: what comes from behind goes back by the weight by which the score went in",
-    4.0: "class and plane are swapped: theta[k, c, d] belongs to planes[c, d]",
-}
-for slip, hint in slips.items():
-    assert not np.isclose(planes_bar[1, 0, 0, 1], slip, atol=1e-6), f"class 1, plane 0, second cell: {slip:g}: {hint}"
-by_hand = [[[[2, -1]], [[-2, 4]]], [[[4, 1]], [[1, 2.5]]]]
-np.testing.assert_allclose(planes_bar, by_hand, err_msg="by planes: sum over k of theta[k, c, d] * blamed[k]")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import fusion
+def _test():
+    # By hand, the score of class 1 on plane 0 in the second cell went into map 0 by 2 and into map 1 by 1: 2 * -1 + 1 * 3 = 1.
+    planes, theta, _ = _reduction()
+    got = reduce_back(planes, theta, np.array([[[2.0, -1.0]], [[0.0, 3.0]]]))
+    assert len(got) == 3, "return three arrays: by theta, by beta, by the planes"
+    got = answer_array(got[2], "by planes reduce_back")
+    assert got.shape == (2, 2, 1, 2), f"by planes: one number a score, (C, D, H, W) = (2, 2, 1, 2), got {got.shape}"
+    slips = {
+        -2.0: "that is the blame of map 0 alone: a score went into all K maps, so sum over k",
+        3.0: "that is the blame of map 1 alone: a score went into all K maps, so sum over k",
+        0.5: "that is the mean over maps: sum over k",
+        2.0: "the weights are missing: what comes from behind goes back by the weight by which the score went in",
+        4.0: "class and plane are swapped: theta[k, c, d] belongs to planes[c, d]",
+    }
+    _explain("class 1, plane 0, second cell:", got[1, 0, 0, 1], slips)
+    by_hand = [[[[2, -1]], [[-2, 4]]], [[[4, 1]], [[1, 2.5]]]]
+    np.testing.assert_allclose(got, by_hand, err_msg="by planes: sum over k of theta[k, c, d] * blamed[k]")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import fusion
 
-complaint = fusion.check_planes_bar(reduce_back)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = fusion.check_planes_bar(reduce_back)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 3: median frequency balancing (2 + 1 points)
@@ -181,45 +211,62 @@ def balance(maps, n_classes):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "balance-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-first = np.array([[0, 0, 0, 0], [0, 0, 1, 1], [255, 255, 255, 255]])  # 8 labelled cells
-second = np.array([[0, 0, 0, 0], [2, 2, 2, 2], [2, 3, 255, 255]])  # 10 labelled cells
-got = balance([first.copy(), second.copy()], n_classes=4)  # by hand: f = 10/18, 2/8, 5/10, 1/10, their median 0.375
-assert got is not None, "balance returned nothing: did you forget `return`?"
-assert np.shape(got) == (4,), f"expected one weight a class, shape (4,), got {np.shape(got)}"
-slips = {
-    0.350: "every class is counted over all maps: below stand the cells of the maps in which it occurs",
-    0.700: "unlabelled cells are counted below: only labelled ones are",
-    0.632: "that is the mean of the frequencies over f: take their median",
-    0.652: "you average the frequencies of the maps: count the cells of all maps first, then divide once",
-    1.481: "that is f / median: what is frequent must weigh less",
-    1.800: "that is 1 / f: the median stands above",
-    0.556: "that is the frequency f itself: the weight is median / f",
-    0.900: "of an even number of frequencies the median is the mean of the two in the middle, you take the upper one",
-    0.450: "of an even number of frequencies the median is the mean of the two in the middle, you take the lower one",
-}
-for slip, hint in slips.items():
-    assert not np.isclose(got[0], slip, atol=1e-3), f"class 0 weighs {got[0]:.3f}: {hint}"
-np.testing.assert_allclose(got, [0.675, 1.5, 0.75, 3.75], err_msg="0.375 over 10/18, 2/8, 5/10, 1/10")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import fusion
+# %% nbgrader={"grade": false, "grade_id": "class-maps", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _maps():
+    """Return two maps of classes, one with 8 labelled cells, one with 10."""
+    first = np.array([[0, 0, 0, 0], [0, 0, 1, 1], [255, 255, 255, 255]])
+    return [first, np.array([[0, 0, 0, 0], [2, 2, 2, 2], [2, 3, 255, 255]])]
 
-complaint = fusion.check_balance(balance)
-assert not complaint, complaint
-### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "balance-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    # By hand: f = 10/18, 2/8, 5/10, 1/10, their median 0.375.
+    got = answer_array(balance(_maps(), n_classes=4), "balance")
+    assert got.shape == (4,), f"expected one weight a class, shape (4,), got {got.shape}"
+    slips = {
+        0.350: "every class is counted over all maps: below stand the cells of the maps in which it occurs",
+        0.700: "unlabelled cells are counted below: only labelled ones are",
+        0.632: "that is the mean of the frequencies over f: take their median",
+        0.652: "you average the frequencies of the maps: count the cells of all maps first, then divide once",
+        1.481: "that is f / median: what is frequent must weigh less",
+        1.800: "that is 1 / f: the median stands above",
+        0.556: "that is the frequency f itself: the weight is median / f",
+        0.900: "of an even number of frequencies the median is the mean of the two in the middle, you take the upper one",
+        0.450: "of an even number of frequencies the median is the mean of the two in the middle, you take the lower one",
+    }
+    _explain("class 0 weighs", got[0], slips)
+    np.testing.assert_allclose(got, [0.675, 1.5, 0.75, 3.75], err_msg="0.375 over 10/18, 2/8, 5/10, 1/10")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import fusion
+
+    complaint = fusion.check_balance(balance)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
 
 # %% nbgrader={"grade": true, "grade_id": "absent-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-got = balance([first.copy(), second.copy()], n_classes=5)  # no cell is of class 4
-assert np.isfinite(got).all(), f"the weights are {got}: class 4 doesn't occur, so don't divide by its frequency"
-assert not np.isclose(got[0], 0.45), "class 0 weighs 0.45: absent class 4 pulls the median down, leave it out there"
-assert got[4] == 0, f"class 4 doesn't occur, so its weight is 0, got {got[4]:g}"
-np.testing.assert_allclose(got, [0.675, 1.5, 0.75, 3.75, 0], err_msg="the others weigh as much as before")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import fusion
+def _test():
+    before = answer_array(balance(_maps(), n_classes=4), "balance")
+    got = answer_array(balance(_maps(), n_classes=5), "balance")  # no cell is of class 4
+    assert np.isfinite(got).all(), f"the weights are {got}: class 4 doesn't occur, so don't divide by its frequency"
+    assert got.shape == (5,), f"expected one weight a class, shape (5,), got {got.shape}"
+    pulled = f"class 0 weighs {got[0]:.3g} in place of {before[0]:.3g}: absent class 4 pulls the median down, leave it out there"
+    assert np.isclose(got[0], before[0]), pulled
+    assert got[4] == 0, f"class 4 doesn't occur, so its weight is 0, got {got[4]:g}"
+    assert got.any(), "all weights are 0: those of classes that occur aren't"
+    np.testing.assert_allclose(got[:4], before, err_msg="the others weigh as much as without class 4")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import fusion
 
-complaint = fusion.check_absent(balance)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = fusion.check_absent(balance)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 4: a weighted loss (3 + 1 points)
@@ -247,16 +294,13 @@ def weighted_loss(logits, truth, alpha):
 
 
 # %% nbgrader={"grade": false, "grade_id": "loss-cells", "locked": true, "schema_version": 3, "solution": false, "task": false}
-# The cells of the next tests. Soft-max by hand: (1/2, 1/2), (3/4, 1/4) and an unlabelled cell. Truth 0 and 1: (1 * log 2 + 3 * log 4) / (1 + 3) = 1.213.
-logits = np.array([[[0.0, np.log(3), 2.0]], [[0.0, 0.0, 0.0]]])
-truth, alpha = np.array([[0, 1, IGNORE]]), np.array([1.0, 3.0])
-one_label = np.array([[0, IGNORE, IGNORE]])
+def _cells():
+    """Return logits (2, 1, 3), truth (1, 3) and alpha (2,). Soft-max by hand: (1/2, 1/2), (3/4, 1/4) and an unlabelled cell."""
+    logits = np.array([[[0.0, np.log(3), 2.0]], [[0.0, 0.0, 0.0]]])
+    return logits, np.array([[0, 1, IGNORE]]), np.array([1.0, 3.0])
 
-# %% nbgrader={"grade": true, "grade_id": "weighted-loss-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
-got = weighted_loss(logits.copy(), truth.copy(), alpha.copy())
-assert got is not None, "weighted_loss returned nothing: did you forget `return`?"
-assert np.size(got) == 1, f"expected one number, got an array of shape {np.shape(got)}"
-slips = {
+
+_LOSS_SLIPS = {
     2.426: "you divide by the number of cells: divide by the sum of their weights",
     1.617: "you divide by the number of cells, unlabelled ones too: divide by the sum of the weights of labelled ones",
     1.040: "the weights are missing, or cancel: each cell counts by the alpha of its true class",
@@ -273,35 +317,60 @@ slips = {
     2.666: "your soft-max runs over all numbers at once: each cell has its own, over the classes, axis 0",
     0.0: "there is no soft-max, or it runs down the rows of the map: it is over the classes, axis 0",
 }
-for slip, hint in slips.items():
-    assert not np.isclose(got, slip, atol=1e-3), f"the loss is {float(got):.3f}: {hint}"
-np.testing.assert_allclose(got, 1.213, atol=1e-3, err_msg="(1 * log 2 + 3 * log 4) / 4")
-hint = "with the first cell alone labelled it is 1 * log 2 / 1; 0.173: you divide by the weights of all classes"
-np.testing.assert_allclose(weighted_loss(logits.copy(), one_label, alpha), 0.693, atol=1e-3, err_msg=hint)
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import fusion
 
-complaint = fusion.check_weighted_loss(weighted_loss)
-assert not complaint, complaint
-### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "weighted-loss-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    # By hand, truth 0 and 1: (1 * log 2 + 3 * log 4) / (1 + 3) = 1.213.
+    got = answer_array(weighted_loss(*_cells()), "weighted_loss")
+    assert got.size == 1, f"expected one number, got an array of shape {got.shape}"
+    _explain("the loss is", got.item(), _LOSS_SLIPS)
+    np.testing.assert_allclose(got, 1.213, atol=1e-3, err_msg="(1 * log 2 + 3 * log 4) / 4")
+    logits, _, alpha = _cells()
+    got = answer_array(weighted_loss(logits, np.array([[0, IGNORE, IGNORE]]), alpha), "weighted_loss")
+    hint = "with the first cell alone labelled it is 1 * log 2 / 1; 0.173: you divide by the weights of all classes"
+    np.testing.assert_allclose(got, 0.693, atol=1e-3, err_msg=hint)
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import fusion
+
+    complaint = fusion.check_weighted_loss(weighted_loss)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
 
 # %% nbgrader={"grade": true, "grade_id": "large-logits-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-large = np.array([[[1000.0, -1000.0]], [[1000.0 + np.log(3), -1000.0]]])  # soft-max by hand: (1/4, 3/4) and (1/2, 1/2)
-got = weighted_loss(large, np.array([[0, 1]]), alpha)
-assert np.isfinite(got), (
-    f"the loss is {got}: e^1000 overflows and e^-1000 vanishes; subtract the largest logit of each cell first"
-)
-hint = "if you added a small number against log 0, or subtracted one number from all cells, don't: subtract each cell's largest"
-np.testing.assert_allclose(got, (np.log(4) + 3 * np.log(2)) / 4, atol=1e-6, err_msg=f"(log 4 + 3 log 2) / 4; {hint}")
-got = weighted_loss(np.array([[[-1000.0]], [[0.0]]]), np.array([[0]]), alpha)
-assert np.isfinite(got), f"the loss is {got}: a truth that trails by 1000 costs 1000; keep log g, g itself is 0 here"
-np.testing.assert_allclose(got, 1000, err_msg="a truth that trails by 1000 costs 1000")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import fusion
+def _test():
+    def loss(*logits, truth=(0,)):
+        """Return the answer's loss for a row of cells: the logits of class 0, then those of class 1."""
+        got = weighted_loss(np.array(logits, float)[:, None], np.array([truth]), np.array([1.0, 3.0]))
+        return answer_array(got, "weighted_loss").mean()
 
-complaint = fusion.check_large_logits(weighted_loss)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    got = loss([1000, -1000], [1000 + np.log(3), -1000], truth=(0, 1))
+    small = loss([0, 0], [np.log(3), 0], truth=(0, 1))  # the same soft-max, (1/4, 3/4) and (1/2, 1/2)
+    assert np.isfinite(got), (
+        f"the loss is {got}: e^1000 overflows and e^-1000 vanishes; subtract the largest logit of each cell first"
+    )
+    hint = "if you added a small number against log 0, or subtracted one number from all cells, don't: subtract each cell's largest"
+    np.testing.assert_allclose(got, small, atol=1e-6, err_msg=f"logits of 1000 and -1000 against 0; {hint}")
+    got, half = loss([-1000], [0]), loss([-500], [0])
+    assert np.isfinite(got), (
+        f"the loss is {got}: a truth that trails by 1000 costs 1000; keep log g, g itself is 0 here"
+    )
+    cut = "a truth that trails by 1000 must cost twice as much as by 500: don't add a small number against log 0"
+    assert abs(got) > 100, f"the loss is {got:.4g}; {cut}"
+    np.testing.assert_allclose(got, 2 * half, rtol=1e-3, err_msg=cut)
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import fusion
+
+    complaint = fusion.check_large_logits(weighted_loss)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 5: one step with momentum, and its rate (2 + 1 points)
@@ -322,14 +391,8 @@ def momentum_step(theta, delta, gradient, eta, kappa):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "momentum-step-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-theta, delta, gradient = np.array([1.0, 2.0]), np.array([0.5, -1.0]), np.array([0.2, 0.4])
-got = momentum_step(theta, delta, gradient, eta=0.2, kappa=0.9)
-assert got is not None, "momentum_step returned nothing: did you forget `return`?"
-assert len(got) == 2, "return two arrays: the new theta and the new delta"
-assert np.array_equal(theta, [1, 2]), "momentum_step changed its argument `theta`: make a new array (no -=)"
-assert np.array_equal(delta, [0.5, -1]), "momentum_step changed its argument `delta`: make a new array (no *= or +=)"
-slips = {
+# %% nbgrader={"grade": false, "grade_id": "momentum-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_STEP_SLIPS = {
     1.130: "the step goes uphill: theta - eta * delta",
     0.906: "the gradient is damped by 1 - kappa: add it whole",
     0.902: "the rate counts twice: delta has none, only the step has",
@@ -343,17 +406,35 @@ slips = {
     0.860: "the old delta doesn't fade: multiply it by kappa",
     0.950: "the gradient is subtracted from delta and delta from theta: two minus signs go uphill",
 }
-for slip, hint in slips.items():
-    assert not np.isclose(got[0][0], slip, atol=1e-3), f"the first parameter is {got[0][0]:.3f}: {hint}"
-np.testing.assert_allclose(got[0], [0.87, 2.1], err_msg="theta by hand: 1 - 0.2 * 0.65, 2 + 0.2 * 0.5")
-assert not np.allclose(got[1], [0.13, -0.1]), "delta is returned with the rate in it: give back delta itself"
-np.testing.assert_allclose(got[1], [0.65, -0.5], err_msg="delta by hand: 0.45 + 0.2, -0.9 + 0.4")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import fusion
 
-complaint = fusion.check_momentum_step(momentum_step)
-assert not complaint, complaint
-### END HIDDEN TESTS
+
+# %% nbgrader={"grade": true, "grade_id": "momentum-step-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    theta, delta, gradient = np.array([1.0, 2.0]), np.array([0.5, -1.0]), np.array([0.2, 0.4])
+    got = momentum_step(theta, delta, gradient, eta=0.2, kappa=0.9)
+    assert got is not None, "momentum_step returned nothing: did you forget `return`?"
+    assert len(got) == 2, "return two arrays: the new theta and the new delta"
+    assert np.array_equal(theta, [1, 2]), "momentum_step changed its argument `theta`: make a new array (no -=)"
+    same = np.array_equal(delta, [0.5, -1])
+    assert same, "momentum_step changed its argument `delta`: make a new array (no *= or +=)"
+    new_theta, new_delta = (
+        answer_array(got[0], "for theta momentum_step"),
+        answer_array(got[1], "for delta momentum_step"),
+    )
+    assert new_theta.shape == (2,), f"theta has two parameters, and became {new_theta.shape}"
+    _explain("the first parameter is", new_theta[0], _STEP_SLIPS)
+    np.testing.assert_allclose(new_theta, [0.87, 2.1], err_msg="theta by hand: 1 - 0.2 * 0.65, 2 + 0.2 * 0.5")
+    assert not np.allclose(new_delta, [0.13, -0.1]), "delta is returned with the rate in it: give back delta itself"
+    np.testing.assert_allclose(new_delta, [0.65, -0.5], err_msg="delta by hand: 0.45 + 0.2, -0.9 + 0.4")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import fusion
+
+    complaint = fusion.check_momentum_step(momentum_step)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # Complete `cosine_rate`: in training step `step` of `steps`, the first being 0, it returns `eta` times a factor that falls from 1 to 0 along half a cosine:
@@ -369,28 +450,32 @@ def cosine_rate(eta, step, steps):
 
 
 # %% nbgrader={"grade": true, "grade_id": "cosine-rate-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-got = cosine_rate(eta=0.4, step=2, steps=5)  # by hand: cos 72 degrees = 0.309, so 0.4 * (1 + 0.309) / 2 = 0.262
-assert got is not None, "cosine_rate returned nothing: did you forget `return`?"
-slips = {
-    0.1236: "that is eta * cos: it falls to -eta. Add 1, then halve",
-    0.5236: "halve it: the first step would have twice the rate",
-    0.0382: "that is a whole cosine, which comes up again: the angle runs from 0 to pi",
-    0.3236: "that is a quarter of a cosine, which ends at full slope: the angle runs from 0 to pi",
-    0.2400: "that is a straight line",
-    0.2000: "the last step gets rate 0: only a step number `steps` would have none",
-    0.1382: "the angle runs backwards, or is a step ahead: step 0 has the full rate",
-    0.0066: "the angle is in degrees, and numpy takes radians",
-}
-for slip, hint in slips.items():
-    assert not np.isclose(got, slip, atol=1e-3), f"0.4 in step 2 of 5 becomes {got:.4f}: {hint}"
-np.testing.assert_allclose(got, 0.2618, atol=1e-4, err_msg="0.4 * (1 + cos 72 degrees) / 2")
-assert np.isclose(cosine_rate(0.4, 0, 5), 0.4), f"step 0 has the full rate, 0.4, got {cosine_rate(0.4, 0, 5):.3f}"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import fusion
+def _test():
+    # By hand: cos 72 degrees = 0.309, so 0.4 * (1 + 0.309) / 2 = 0.262.
+    got = answer_array(cosine_rate(eta=0.4, step=2, steps=5), "cosine_rate").mean()
+    slips = {
+        0.1236: "that is eta * cos: it falls to -eta. Add 1, then halve",
+        0.5236: "halve it: the first step would have twice the rate",
+        0.0382: "that is a whole cosine, which comes up again: the angle runs from 0 to pi",
+        0.3236: "that is a quarter of a cosine, which ends at full slope: the angle runs from 0 to pi",
+        0.2400: "that is a straight line",
+        0.2000: "the last step gets rate 0: only a step number `steps` would have none",
+        0.1382: "the angle runs backwards, or is a step ahead: step 0 has the full rate",
+        0.0066: "the angle is in degrees, and numpy takes radians",
+    }
+    _explain("0.4 in step 2 of 5 becomes", got, slips)
+    np.testing.assert_allclose(got, 0.2618, atol=1e-4, err_msg="0.4 * (1 + cos 72 degrees) / 2")
+    first = answer_array(cosine_rate(0.4, 0, 5), "cosine_rate").mean()
+    assert np.isclose(first, 0.4), f"step 0 has the full rate, 0.4, got {first:.3f}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import fusion
 
-complaint = fusion.check_cosine_rate(cosine_rate)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = fusion.check_cosine_rate(cosine_rate)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 6: in your own words (2 points)

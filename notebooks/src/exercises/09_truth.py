@@ -17,11 +17,13 @@
 # you are wrong. Your instructor's tests use other numbers and other sizes. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
 
 # %% nbgrader={"grade": false, "grade_id": "setup", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# Names that begin with _ belong to the tests.
 import warnings
 
 import numpy as np
 from scipy import ndimage  # task 3 may use it
 
+from semgrid_edu.course.answers import answer_array
 from semgrid_edu.labels import KITTI_14
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
@@ -55,10 +57,10 @@ def depth_picture(points, K, size):
 
 
 # %% nbgrader={"grade": false, "grade_id": "depth-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-# A camera of 4 rows and 6 columns; row 1 looks level, column 2 straight ahead. By hand: u = 2 + 10 X / Z, v = 1 + 10 Y / Z.
-K = np.array([[10.0, 0, 2], [0, 10.0, 1], [0, 0, 1]])
-points = np.array(
-    [
+def _picture():
+    """Return points (9, 3), K of a camera whose row 1 looks level and column 2 straight ahead, and the picture, (4, 6), by hand."""
+    K = np.array([[10.0, 0, 2], [0, 10.0, 1], [0, 0, 1]])  # by hand: u = 2 + 10 X / Z, v = 1 + 10 Y / Z
+    points = [
         [0.0, 1.0, 10.0],  # u = 2, v = 2
         [0.0, 2.0, 20.0],  # the same pixel, farther away
         [0.0, 0.5, 5.0],  # the same pixel, closer
@@ -69,13 +71,13 @@ points = np.array(
         [3.2, 0.0, 10.0],  # u = 5.2: beyond the centre of the last pixel, which is 5
         [0.0, -1.04, 10.0],  # v = -0.04: above the centre of the first row
     ]
-)
-wanted = np.full((4, 6), np.nan)
-wanted[2, 2], wanted[0, 4], wanted[2, 4] = 5.0, 20.0, 10.0
+    wanted = np.full((4, 6), np.nan)
+    wanted[2, 2], wanted[0, 4], wanted[2, 4] = 5.0, 20.0, 10.0
+    return np.array(points), K, wanted
 
 
 # %% nbgrader={"grade": false, "grade_id": "depth-other-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def depth_hint(got):
+def _depth_hint(got):
     """Return what is wrong with a picture whose pixel (2, 2) may be right, or nothing."""
     if np.isclose(got[2, 2], np.sqrt(25.25), atol=1e-3):
         return "row 2, column 2 holds the distance of the return: the depth is Z, along the optical axis"
@@ -90,31 +92,34 @@ def depth_hint(got):
 
 
 # %% nbgrader={"grade": true, "grade_id": "depth-picture-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-got = depth_picture(points.copy(), K, (4, 6))
-assert got is not None, "depth_picture returned nothing: did you forget `return`?"
-got = np.asarray(got, dtype=float)
-assert got.shape != (6, 4), "the picture is turned: rows (v) come first, then columns (u)"
-assert got.shape == (4, 6), f"expected a picture of height 4 and width 6, got shape {got.shape}"
-assert not np.isinf(got).any(), "a pixel without a return is np.nan, not infinite"
-assert not (got == 0).any(), "a pixel without a return is np.nan, not 0"
-slips = {
-    30.0: "that is the last return in the list, or the farthest: of several the closest counts",
-    10.0: "that is the first return in the list: of several the closest counts",
-    16.25: "that is the mean of all four: between the car in front and the wall behind there is nothing. Take the closest",
-    0.5: "that is Y: the depth is Z, along the optical axis",
-    0.2: "that is 1 / Z",
-}
-for slip, hint in slips.items():
-    assert not np.isclose(got[2, 2], slip), f"row 2, column 2: {got[2, 2]:.2f}: {hint}"
-hint = depth_hint(got)
-assert not hint, hint
-np.testing.assert_allclose(got, wanted, err_msg="the whole picture, by hand")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import truth
+def _test():
+    points, K, wanted = _picture()
+    got = answer_array(depth_picture(points, K, (4, 6)), "depth_picture")
+    assert got.shape != (6, 4), "the picture is turned: rows (v) come first, then columns (u)"
+    assert got.shape == (4, 6), f"expected a picture of height 4 and width 6, got shape {got.shape}"
+    assert not np.isinf(got).any(), "a pixel without a return is np.nan, not infinite"
+    assert not (got == 0).any(), "a pixel without a return is np.nan, not 0"
+    slips = {
+        30.0: "that is the last return in the list, or the farthest: of several the closest counts",
+        10.0: "that is the first return in the list: of several the closest counts",
+        16.25: "that is the mean of all four: between the car in front and the wall behind there is nothing. Take the closest",
+        0.5: "that is Y: the depth is Z, along the optical axis",
+        0.2: "that is 1 / Z",
+    }
+    for slip, hint in slips.items():
+        assert not np.isclose(got[2, 2], slip), f"row 2, column 2: {got[2, 2]:.2f}: {hint}"
+    hint = _depth_hint(got)
+    assert not hint, hint
+    np.testing.assert_allclose(got, wanted, err_msg="the whole picture, by hand")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import truth
 
-complaint = truth.check_depth_picture(depth_picture)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = truth.check_depth_picture(depth_picture)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 2: votes in a cell (2 points)
@@ -143,43 +148,54 @@ def count_votes(cells, classes, n_cells):
 
 
 # %% nbgrader={"grade": false, "grade_id": "votes-cells", "locked": true, "schema_version": 3, "solution": false, "task": false}
-PEDESTRIAN, SIGNAGE = KITTI_14.index("pedestrian"), KITTI_14.index("signage")
-in_cell = [
-    [ROAD, ROAD, ROAD, CAR],  # one return from a car, three from the road
-    [SIDEWALK, ROAD, SIDEWALK],  # ground alone: the most frequent
-    [SKY, SKY, ROAD],  # sky gets no vote
-    [],  # no return
-    [255, 255, SIDEWALK],  # 255 is no label
-    [SIGNAGE, PEDESTRIAN, ROAD, ROAD, ROAD],  # two that stand, equally frequent
-    [SKY, 255],  # nothing that counts
-    [ROAD, CAR, CAR, PEDESTRIAN, VEGETATION, VEGETATION, VEGETATION],  # the most frequent of those that stand
-]
-cells = np.repeat(np.arange(8), [len(one) for one in in_cell])
-classes = np.array([label for one in in_cell for label in one])
-order = np.random.default_rng(9).permutation(len(cells))  # returns come in no order
+_PEDESTRIAN, _SIGNAGE = KITTI_14.index("pedestrian"), KITTI_14.index("signage")
+
+
+def _returns():
+    """Return cells and classes, (23,) each, in no order; `in_cell` holds the classes of each of the eight cells."""
+    in_cell = [
+        [ROAD, ROAD, ROAD, CAR],  # one return from a car, three from the road
+        [SIDEWALK, ROAD, SIDEWALK],  # ground alone: the most frequent
+        [SKY, SKY, ROAD],  # sky gets no vote
+        [],  # no return
+        [255, 255, SIDEWALK],  # 255 is no label
+        [_SIGNAGE, _PEDESTRIAN, ROAD, ROAD, ROAD],  # two that stand, equally frequent
+        [SKY, 255],  # nothing that counts
+        [ROAD, CAR, CAR, _PEDESTRIAN, VEGETATION, VEGETATION, VEGETATION],  # the most frequent of those that stand
+    ]
+    cells = np.repeat(np.arange(8), [len(one) for one in in_cell])
+    classes = np.array([label for one in in_cell for label in one])
+    order = np.random.default_rng(9).permutation(len(cells))
+    return cells[order], classes[order]
+
 
 # %% nbgrader={"grade": true, "grade_id": "count-votes-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-got = count_votes(cells[order].copy(), classes[order].copy(), 8)
-assert got is not None, "count_votes returned nothing: did you forget `return`?"
-got = np.asarray(got)
-assert got.shape == (8,), f"expected one class for each of 8 cells, got shape {got.shape}"
-assert got[3] == 255, f"cell 3 has no return and got class {got[3]}: a cell without a vote is 255"
-assert got[2] != SKY, "cell 2 became sky: such a label lies at an outline, and gets no vote"
-assert got[4] != 255, "cell 4: 255 isn't a class that wins votes; SIDEWALK has one"
-assert got[6] != SKY, "cell 6 became sky: such a label gets no vote"
-assert got[6] == 255, f"cell 6 has neither a class with a meaning nor a vote, and got {got[6]}: it is 255"
-assert got[0] != ROAD, "cell 0: three returns from the road outvoted the car. What stands wins, be it one vote"
-assert got[7] != VEGETATION, "cell 7: the ground outvoted what stands, or vegetation counts as standing: it is ground"
-assert got[7] != PEDESTRIAN, "cell 7: of those that stand the most frequent wins, not the one with the largest number"
-assert got[5] != SIGNAGE, "cell 5: of equally frequent classes the one with the smallest number wins"
-assert got[1] == SIDEWALK, "cell 1: sidewalk has two votes, road one"
-np.testing.assert_array_equal(got, [CAR, SIDEWALK, ROAD, 255, SIDEWALK, PEDESTRIAN, 255, CAR], err_msg="all, by hand")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import truth
+def _test():
+    got = answer_array(count_votes(*_returns(), 8), "count_votes")
+    assert got.shape == (8,), f"expected one class for each of 8 cells, got shape {got.shape}"
+    assert got[3] == 255, f"cell 3 has no return and got class {got[3]:g}: a cell without a vote is 255"
+    assert got[2] != SKY, "cell 2 became sky: such a label lies at an outline, and gets no vote"
+    assert got[4] != 255, "cell 4: 255 isn't a class that wins votes; SIDEWALK has one"
+    assert got[6] != SKY, "cell 6 became sky: such a label gets no vote"
+    assert got[6] == 255, f"cell 6 has neither a class with a meaning nor a vote, and got {got[6]:g}: it is 255"
+    assert got[0] != ROAD, "cell 0: three returns from the road outvoted the car. What stands wins, be it one vote"
+    ground = "cell 7: the ground outvoted what stands, or vegetation counts as standing: it is ground"
+    assert got[7] != VEGETATION, ground
+    most = "cell 7: of those that stand the most frequent wins, not the one with the largest number"
+    assert got[7] != _PEDESTRIAN, most
+    assert got[5] != _SIGNAGE, "cell 5: of equally frequent classes the one with the smallest number wins"
+    assert got[1] == SIDEWALK, "cell 1: sidewalk has two votes, road one"
+    by_hand = [CAR, SIDEWALK, ROAD, 255, SIDEWALK, _PEDESTRIAN, 255, CAR]
+    np.testing.assert_array_equal(got, by_hand, err_msg="all, by hand")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import truth
 
-complaint = truth.check_count_votes(count_votes)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = truth.check_count_votes(count_votes)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 3: closing a gap (2 points)
@@ -204,41 +220,46 @@ def close_mask(mask, reach):
 
 
 # %% nbgrader={"grade": false, "grade_id": "masks", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def as_mask(*rows):
+def _mask(*rows):
     """Turn rows of # and . into a mask."""
     return np.array([[c == "#" for c in row] for row in rows])
 
 
-mask = as_mask("...........", "#..#.....#.", "...........")
+_DOTS = _mask("...........", "#..#.....#.", "...........")
+
 
 # %% nbgrader={"grade": true, "grade_id": "close-mask-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-before = mask.copy()
-got = close_mask(mask, 1)  # by hand: the gap of two cells is closed, the one of five isn't; nothing else changes
-assert got is not None, "close_mask returned nothing: did you forget `return`?"
-assert np.array_equal(mask, before), "close_mask changed its argument `mask`: work on a copy"
-got = np.asarray(got).astype(bool)
-assert got.shape == (3, 11), f"expected the shape of the mask, (3, 11), got {got.shape}: cut the surrounding cells off"
-assert got.any(), "nothing is left: you eroded first, and no square fits into single cells. Dilate first, then erode"
-assert not got[[0, 2]].any(), (
-    "the rows beside have True cells: that is the dilated mask. Erode it too, by the same reach"
-)
-assert got[1, 0], "the cell at the edge of the map is lost: surround the map with False cells before you dilate"
-assert got[mask].all(), "a cell of the mask is lost: closing only adds. Did you erode before you dilated?"
-assert got[1, 1:3].all(), "the gap of two cells is still open: with a reach of 1 gaps up to two cells close"
-assert not got[1, 4:9].any(), (
-    "the gap of five cells is closed in part: with a reach of 1 only gaps up to two cells close"
-)
-upright = np.asarray(close_mask(mask.T.copy(), 1)).astype(bool)
-turned = as_mask("...........", "####.....#.", "...........").T
-assert np.array_equal(upright, turned), "turned upright: gaps between rows aren't closed like gaps between columns"
-one_less = np.asarray(close_mask(as_mask(".....", ".#...", "....."), 1)).astype(bool)
-assert one_less.sum() == 1, f"a single cell became {one_less.sum()} cells: closing moves no outline"
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import truth
+def _test():
+    mask = _DOTS.copy()
+    got = answer_array(
+        close_mask(mask, 1), "close_mask", dtype=bool
+    )  # by hand: the gap of two cells is closed, no more
+    assert np.array_equal(mask, _DOTS), "close_mask changed its argument `mask`: work on a copy"
+    size = f"expected the shape of the mask, (3, 11), got {got.shape}: cut the surrounding cells off"
+    assert got.shape == (3, 11), size
+    early = "nothing is left: you eroded first, and no square fits into single cells. Dilate first, then erode"
+    assert got.any(), early
+    wide = "the rows beside have True cells: that is the dilated mask. Erode it too, by the same reach"
+    assert not got[[0, 2]].any(), wide
+    assert got[1, 0], "the cell at the edge of the map is lost: surround the map with False cells before you dilate"
+    assert got[_DOTS].all(), "a cell of the mask is lost: closing only adds. Did you erode before you dilated?"
+    assert got[1, 1:3].all(), "the gap of two cells is still open: with a reach of 1 gaps up to two cells close"
+    five = "the gap of five cells is closed in part: with a reach of 1 only gaps up to two cells close"
+    assert not got[1, 4:9].any(), five
+    upright = answer_array(close_mask(_DOTS.T.copy(), 1), "close_mask", dtype=bool)
+    turned = _mask("...........", "####.....#.", "...........").T
+    assert np.array_equal(upright, turned), "turned upright: gaps between rows aren't closed like gaps between columns"
+    one_less = answer_array(close_mask(_mask(".....", ".#...", "....."), 1), "close_mask", dtype=bool)
+    assert one_less.sum() == 1, f"a single cell became {one_less.sum()} cells: closing moves no outline"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import truth
 
-complaint = truth.check_close_mask(close_mask)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = truth.check_close_mask(close_mask)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 4: what has no label (2 points)
@@ -264,46 +285,49 @@ def fill_unknown(votes, o, near):
 
 
 # %% nbgrader={"grade": false, "grade_id": "small-map", "locked": true, "schema_version": 3, "solution": false, "task": false}
-votes = np.array([[ROAD, 255, 255, 255], [255, 255, 255, CAR]])
-near = np.array([[ROAD, ROAD, 255, 255], [255, SIDEWALK, 255, CAR]])
-o = np.array(
-    [
-        [[0.7, 0.6, 0.4, 0.1], [0.2, 0.2, 0.1, 0.1]],  # FREE
-        [[0.1, 0.2, 0.3, 0.5], [0.1, 0.2, 0.1, 0.1]],  # STATIC
-        [[0.1, 0.1, 0.2, 0.2], [0.6, 0.1, 0.2, 0.1]],  # DYNAMIC
-        [[0.1, 0.1, 0.1, 0.2], [0.1, 0.5, 0.6, 0.7]],  # UNKNOWN
-    ]
-)
+def _small_map():
+    """Return votes (2, 4), the occupancy o (4, 2, 4) and near (2, 4)."""
+    free = [[0.7, 0.6, 0.4, 0.1], [0.2, 0.2, 0.1, 0.1]]
+    static = [[0.1, 0.2, 0.3, 0.5], [0.1, 0.2, 0.1, 0.1]]
+    dynamic = [[0.1, 0.1, 0.2, 0.2], [0.6, 0.1, 0.2, 0.1]]
+    unknown = [[0.1, 0.1, 0.1, 0.2], [0.1, 0.5, 0.6, 0.7]]
+    votes = np.array([[ROAD, 255, 255, 255], [255, 255, 255, CAR]])
+    return (
+        votes,
+        np.array([free, static, dynamic, unknown]),
+        np.array([[ROAD, ROAD, 255, 255], [255, SIDEWALK, 255, CAR]]),
+    )
+
 
 # %% nbgrader={"grade": true, "grade_id": "fill-unknown-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-before = votes.copy()
-got = fill_unknown(votes, o.copy(), near.copy())
-assert got is not None, "fill_unknown returned nothing: did you forget `return`?"
-assert np.array_equal(votes, before), "fill_unknown changed its argument `votes`: work on a copy"
-got = np.asarray(got)
-assert got.shape == (2, 4), (
-    f"expected the shape of the votes, (2, 4), got {got.shape}: the most probable state of a cell is a maximum over axis 0"
-)
-assert not (got == 255).any(), (
-    f"{(got == 255).sum()} cells are still 255: each cell without a label is one of the four unknowns"
-)
-assert got[1, 3] == CAR, f"cell (1, 3) has a vote, CAR, and became {got[1, 3]}: a vote stays, whatever the filter says"
-assert got[1, 1] != SIDEWALK, (
-    "cell (1, 1) became sidewalk, but the filter has not observed it (UNKNOWN 0.5): clean-up leaves it alone"
-)
-assert got[0, 1] == ROAD, f"cell (0, 1) is observed, and the nearest label is ROAD: it takes that, not {got[0, 1]}"
-assert got[0, 2] != 13 or got[1, 2] != 10, (
-    "FREE and UNKNOWN are swapped: class 10 is unknown-free, 13 unknown-unobserved"
-)
-assert got[0, 2] != FREE, f"cell (0, 2) got {got[0, 2]}, the number of its state: the unknown classes begin at 10"
-assert got[1, 0] != 11, "cell (1, 0) is rather DYNAMIC (0.6) than STATIC (0.1): class 12"
-np.testing.assert_array_equal(got, [[ROAD, ROAD, 10, 11], [12, 13, 13, CAR]], err_msg="all cells, by hand")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import truth
+def _test():
+    votes, o, near = _small_map()
+    got = answer_array(fill_unknown(votes, o, near), "fill_unknown")
+    assert np.array_equal(votes, _small_map()[0]), "fill_unknown changed its argument `votes`: work on a copy"
+    axis = "the most probable state of a cell is a maximum over axis 0"
+    assert got.shape == (2, 4), f"expected the shape of the votes, (2, 4), got {got.shape}: {axis}"
+    left = (got == 255).sum()
+    assert not left, f"{left} cells are still 255: each cell without a label is one of the four unknowns"
+    vote = f"cell (1, 3) has a vote, CAR, and became {got[1, 3]:g}: a vote stays, whatever the filter says"
+    assert got[1, 3] == CAR, vote
+    blind = "cell (1, 1) became sidewalk, but the filter has not observed it (UNKNOWN 0.5): clean-up leaves it alone"
+    assert got[1, 1] != SIDEWALK, blind
+    seen = f"cell (0, 1) is observed, and the nearest label is ROAD: it takes that, not {got[0, 1]:g}"
+    assert got[0, 1] == ROAD, seen
+    swapped = "FREE and UNKNOWN are swapped: class 10 is unknown-free, 13 unknown-unobserved"
+    assert got[0, 2] != 13 or got[1, 2] != 10, swapped
+    assert got[0, 2] != FREE, f"cell (0, 2) got {got[0, 2]:g}, the number of its state: the unknown classes begin at 10"
+    assert got[1, 0] != 11, "cell (1, 0) is rather DYNAMIC (0.6) than STATIC (0.1): class 12"
+    np.testing.assert_array_equal(got, [[ROAD, ROAD, 10, 11], [12, 13, 13, CAR]], err_msg="all cells, by hand")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import truth
 
-complaint = truth.check_fill_unknown(fill_unknown)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = truth.check_fill_unknown(fill_unknown)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 5: a moving car, carried by its velocity (3 points)
@@ -332,10 +356,9 @@ def carry_window(points, moves, velocity, seconds, T_now_from_then):
 
 
 # %% nbgrader={"grade": false, "grade_id": "carry-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-# The vehicle has driven 4 m ahead in 0.5 s and turned left by 90 degrees. A point ahead of it then is to its right now.
-T_now_from_then = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 4], [0, 0, 1, 0], [0, 0, 0, 1]])
-points = np.array(
-    [
+def _window():
+    """Return points, moves and velocity. The vehicle has driven 4 m ahead in 0.5 s since, and turned left by 90 degrees."""
+    points = [
         [10.0, 0.0, -1.0],  # a post: stands, although its cell has a velocity
         [20.0, 3.0, -0.5],  # a car at 10 m/s along x: 5 m farther on now, at (25, 3)
         [20.0, -3.0, -0.5],  # moves, velocity unknown
@@ -343,11 +366,11 @@ points = np.array(
         [6.0, -1.0, 0.0],  # moves to the left at 2 m/s: at (6, 0) now
         [9.0, 4.0, 0.0],  # moves; only one part of its velocity is known
     ]
-)
-moves = np.array([False, True, True, False, True, True])
-velocity = np.array([[3.0, 3.0], [10.0, 0.0], [np.nan, np.nan], [np.nan, np.nan], [0.0, 2.0], [1.0, np.nan]])
-by_hand = np.array([[0.0, -6, -1.0], [3.0, -21, -0.5], [2.0, -4, 0.5], [0.0, -2, 0.0]])
-slips = {
+    velocity = [[3.0, 3.0], [10.0, 0.0], [np.nan, np.nan], [np.nan, np.nan], [0.0, 2.0], [1.0, np.nan]]
+    return np.array(points), np.array([False, True, True, False, True, True]), np.array(velocity)
+
+
+_CAR_SLIPS = {
     (3.0, -16.0): "the car was left where it was: add velocity times time before the transform",
     (3.0, -11.0): "the car went backward: it is 0.5 s later now, so it is farther along its velocity",
     (3.0, -26.0): "the car went 10 m: that is its velocity; in 0.5 s it covers half of that",
@@ -357,32 +380,35 @@ slips = {
     (3.0, -25.0): "the vehicle's turn is there, its 4 m are missing: a transform rotates, then shifts",
 }
 
-# %% nbgrader={"grade": true, "grade_id": "carry-window-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
-kept = points.copy()
-got = carry_window(kept, moves.copy(), velocity.copy(), 0.5, T_now_from_then)
-assert got is not None, "carry_window returned nothing: did you forget `return`?"
-assert np.array_equal(kept, points), "carry_window changed its argument `points`: work on a copy"
-got = np.asarray(got, dtype=float)
-assert got.shape[1:] == (3,), f"expected x, y, z of each return, (M, 3), got shape {got.shape}"
-assert np.isfinite(got).all(), (
-    "a return has NaN: what moves with an unknown velocity is left out, and what stands has no velocity to add"
-)
-assert len(got) != 6, "6 returns came back: what moves with an unknown velocity is left out"
-assert len(got) != 5, "5 returns came back: a velocity is unknown when either of its parts is NaN"
-assert len(got) != 2, (
-    "2 returns came back: these are the moving ones, or the standing ones, alone. Both belong to the map"
-)
-assert len(got) == 4, f"{len(got)} returns came back, 4 by hand: what stands stays, known velocity or not"
-for (x, y), hint in slips.items():
-    assert not np.allclose(got[1, :2], (x, y), atol=1e-6), f"the car is put at ({x}, {y}): {hint}"
-assert not np.allclose(got[0, :2], (1.5, -7.5), atol=1e-6), "the post was carried: only what `moves` is"
-np.testing.assert_allclose(got, by_hand, atol=1e-9, err_msg="all four returns, by hand")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import truth
 
-complaint = truth.check_carry_window(carry_window)
-assert not complaint, complaint
-### END HIDDEN TESTS
+# %% nbgrader={"grade": true, "grade_id": "carry-window-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    points, moves, velocity = _window()
+    T_now_from_then = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 4], [0, 0, 1, 0], [0, 0, 0, 1]])
+    got = answer_array(carry_window(points, moves, velocity, 0.5, T_now_from_then), "carry_window")
+    assert np.array_equal(points, _window()[0]), "carry_window changed its argument `points`: work on a copy"
+    assert got.shape[1:] == (3,), f"expected x, y, z of each return, (M, 3), got shape {got.shape}"
+    nan = "a return has NaN: what moves with an unknown velocity is left out, and what stands has no velocity to add"
+    assert np.isfinite(got).all(), nan
+    assert len(got) != 6, "6 returns came back: what moves with an unknown velocity is left out"
+    assert len(got) != 5, "5 returns came back: a velocity is unknown when either of its parts is NaN"
+    alone = "these are the moving ones, or the standing ones, alone. Both belong to the map"
+    assert len(got) != 2, f"2 returns came back: {alone}"
+    assert len(got) == 4, f"{len(got)} returns came back, 4 by hand: what stands stays, known velocity or not"
+    for (x, y), hint in _CAR_SLIPS.items():
+        assert not np.allclose(got[1, :2], (x, y), atol=1e-6), f"the car is put at ({x}, {y}): {hint}"
+    assert not np.allclose(got[0, :2], (1.5, -7.5), atol=1e-6), "the post was carried: only what `moves` is"
+    by_hand = [[0.0, -6, -1.0], [3.0, -21, -0.5], [2.0, -4, 0.5], [0.0, -2, 0.0]]
+    np.testing.assert_allclose(got, by_hand, atol=1e-9, err_msg="all four returns, by hand")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import truth
+
+    complaint = truth.check_carry_window(carry_window)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ### See it on the drive

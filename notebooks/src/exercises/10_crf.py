@@ -21,10 +21,13 @@
 # changed.
 
 # %% nbgrader={"grade": false, "grade_id": "setup", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# Names that begin with _ belong to the tests.
 import warnings
 from itertools import product
 
 import numpy as np
+
+from semgrid_edu.course.answers import answer_array
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
 
@@ -41,6 +44,13 @@ def shifted(maps, dr, dc):
     H, W = maps.shape[-2:]
     padded = np.pad(maps, [(0, 0)] * (maps.ndim - 2) + [(REACH, REACH)] * 2)
     return padded[..., REACH + dr : REACH + dr + H, REACH + dc : REACH + dc + W]
+
+
+# %% nbgrader={"grade": false, "grade_id": "explain", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _explain(what, got, slips, atol=1e-4):
+    """Stop with a hint when `got` is what a common slip gives."""
+    for slip, hint in slips.items():
+        assert not np.allclose(got, slip, atol=atol), f"{what} {np.round(got, 4)}: {hint}"
 
 
 # %% [markdown]
@@ -66,7 +76,7 @@ def pair_price(c_i, c_j, o_i, o_j, w1, w2, alpha, beta, gamma):
 
 
 # %% nbgrader={"grade": false, "grade_id": "pair-price-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-slips = {
+_PRICE_SLIPS = {
     2.2828: "the widths aren't squared: divide by 2 sigma^2",
     1.3229: "the 2 is missing: divide by 2 sigma^2",
     4.5284: "you square the 2 as well: divide by 2 * sigma**2, not by (2 * sigma)**2",
@@ -86,23 +96,25 @@ slips = {
     2.1861: "the two terms are multiplied: add them",
 }
 
-# %% nbgrader={"grade": true, "grade_id": "pair-price-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-# By hand: |c_i - c_j|^2 = 1 + 4 = 5 and |o_i - o_j|^2 = 0.04 + 0.04 + 0.01 + 0.01 = 0.1, so 4 exp(-5/18 - 0.8) + 3 exp(-5/8) = 2.967.
-places, states = np.array([[3.0, 1.0], [4.0, 3.0]]), np.array([[0.7, 0.2, 0.1, 0.0], [0.5, 0.4, 0.0, 0.1]])
-got = pair_price(*places, *states, w1=4, w2=3, alpha=3, beta=0.25, gamma=2)
-assert got is not None, "pair_price returned nothing: did you forget `return`?"
-assert np.size(got) == 1, (
-    f"expected one number, got an array of shape {np.shape(got)}: sum the squares of the differences"
-)
-for slip, hint in slips.items():
-    assert not np.isclose(got, slip, atol=1e-4), f"the price is {float(got):.4f}: {hint}"
-np.testing.assert_allclose(got, 2.9672, atol=1e-4, err_msg="4 exp(-5/18 - 0.8) + 3 exp(-5/8)")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import crf
 
-complaint = crf.check_pair_price(pair_price)
-assert not complaint, complaint
-### END HIDDEN TESTS
+# %% nbgrader={"grade": true, "grade_id": "pair-price-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    # By hand: |c_i - c_j|^2 = 1 + 4 = 5 and |o_i - o_j|^2 = 0.04 + 0.04 + 0.01 + 0.01 = 0.1, so 4 exp(-5/18 - 0.8) + 3 exp(-5/8) = 2.967.
+    places, states = np.array([[3.0, 1.0], [4.0, 3.0]]), np.array([[0.7, 0.2, 0.1, 0.0], [0.5, 0.4, 0.0, 0.1]])
+    got = pair_price(*places, *states, w1=4, w2=3, alpha=3, beta=0.25, gamma=2)
+    got = answer_array(got, "pair_price")
+    assert got.size == 1, f"expected one number, got an array of shape {got.shape}: sum the squares of the differences"
+    _explain("the price is", got.item(), _PRICE_SLIPS)
+    np.testing.assert_allclose(got, 2.9672, atol=1e-4, err_msg="4 exp(-5/18 - 0.8) + 3 exp(-5/8)")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import crf
+
+    complaint = crf.check_pair_price(pair_price)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 2: energy, and exact marginals (2 + 3 points)
@@ -125,7 +137,7 @@ def energy(labels, phi, k):
 
 
 # %% nbgrader={"grade": false, "grade_id": "energy-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-slips = {
+_ENERGY_SLIPS = {
     7.3: "each pair is counted twice, as (i, j) and as (j, i): sum over i < j only",
     3.2: "you charge the pairs that agree: different labels cost",
     39.2: "you charge the pairs that agree, and each cell with itself: different labels cost",
@@ -146,22 +158,25 @@ slips = {
     7.8207: "`phi` holds prices already, -log of probabilities: don't take the logarithm again",
 }
 
-# %% nbgrader={"grade": true, "grade_id": "energy-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-phi = np.array([[0.1, 2.0, 0.3, 1.4], [1.9, 0.4, 1.5, 0.2], [1.2, 0.7, 0.6, 2.2], [0.8, 1.1, 1.7, 0.9]])
-k = np.array([[9, 0.5, 1.5, 0.3], [0.5, 9, 0.7, 0.2], [1.5, 0.7, 9, 1.1], [0.3, 0.2, 1.1, 9]])
-# By hand: 0.1 + 1.1 + 0.3 + 0.2 = 1.7 for the cells. Only cells 0 and 2 agree, so five pairs: 0.5 + 0.3 + 0.7 + 0.2 + 1.1 = 2.8.
-got = energy(np.array([0, 3, 0, 1]), phi.copy(), k.copy())
-assert got is not None, "energy returned nothing: did you forget `return`?"
-assert np.size(got) == 1, f"expected one number, got an array of shape {np.shape(got)}"
-for slip, hint in slips.items():
-    assert not np.isclose(got, slip, atol=1e-3), f"the energy is {float(got):.3f}: {hint}"
-np.testing.assert_allclose(got, 4.5, err_msg="1.7 for the cells and 2.8 for five pairs")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import crf
 
-complaint = crf.check_energy(energy)
-assert not complaint, complaint
-### END HIDDEN TESTS
+# %% nbgrader={"grade": true, "grade_id": "energy-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    phi = np.array([[0.1, 2.0, 0.3, 1.4], [1.9, 0.4, 1.5, 0.2], [1.2, 0.7, 0.6, 2.2], [0.8, 1.1, 1.7, 0.9]])
+    k = np.array([[9, 0.5, 1.5, 0.3], [0.5, 9, 0.7, 0.2], [1.5, 0.7, 9, 1.1], [0.3, 0.2, 1.1, 9]])
+    # By hand: 0.1 + 1.1 + 0.3 + 0.2 = 1.7 for the cells. Only cells 0 and 2 agree, so five pairs: 0.5 + 0.3 + 0.7 + 0.2 + 1.1 = 2.8.
+    got = answer_array(energy(np.array([0, 3, 0, 1]), phi, k), "energy")
+    assert got.size == 1, f"expected one number, got an array of shape {got.shape}"
+    _explain("the energy is", got.item(), _ENERGY_SLIPS, atol=1e-3)
+    np.testing.assert_allclose(got, 4.5, err_msg="1.7 for the cells and 2.8 for five pairs")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import crf
+
+    complaint = crf.check_energy(energy)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # Every labelling has the probability $P(x) = e^{-E(x)} / Z$. Complete `marginals`: it returns, in an array `(C, N)`, the probability of each class in each cell, summed over all $C^N$
@@ -183,7 +198,7 @@ def marginals(phi, k):
 
 
 # %% nbgrader={"grade": false, "grade_id": "marginals-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-slips = {
+_MARGINAL_SLIPS = {
     (0.321, 0.178, 0.143): "the numbers of a cell don't sum to 1: divide by Z, the sum over all labellings",
     (0.238, 0.132, 0.106): "you divide by the sum over all cells as well: in each cell the classes sum to 1",
     (0.179, 0.621, 0.654): "cheap labellings must be probable: exp(-E), not exp(E)",
@@ -196,23 +211,25 @@ slips = {
     (1, 0, 0): "that is the most likely labelling: a probability of each class is asked for",
 }
 
-# %% nbgrader={"grade": true, "grade_id": "marginals-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
-phi = np.array([[0.2, 0.9, 1.2], [1.6, 0.4, 0.3]])
-k = np.array([[0, 0.8, 0.3], [0.8, 0, 1.1], [0.3, 1.1, 0]])
-got = marginals(phi.copy(), k.copy())
-assert got is not None, "marginals returned nothing: did you forget `return`?"
-got = np.asarray(got, dtype=float)
-assert got.shape == (2, 3), f"expected a row per class and a column per cell, (2, 3), got {got.shape}"
-for slip, hint in slips.items():
-    assert not np.allclose(got[0], slip, atol=1.1e-3), f"class 0 has {got[0].round(3)} in the three cells: {hint}"
-np.testing.assert_allclose(got[0], [0.7156, 0.3975, 0.3192], atol=1e-4, err_msg="class 0 in the three cells")
-np.testing.assert_allclose(got.sum(axis=0), 1, err_msg="the classes of each cell sum to 1")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import crf
 
-complaint = crf.check_marginals(marginals)
-assert not complaint, complaint
-### END HIDDEN TESTS
+# %% nbgrader={"grade": true, "grade_id": "marginals-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    phi = np.array([[0.2, 0.9, 1.2], [1.6, 0.4, 0.3]])
+    k = np.array([[0, 0.8, 0.3], [0.8, 0, 1.1], [0.3, 1.1, 0]])
+    got = answer_array(marginals(phi, k), "marginals")
+    assert got.shape == (2, 3), f"expected a row per class and a column per cell, (2, 3), got {got.shape}"
+    _explain("class 0 has, in the three cells,", got[0], _MARGINAL_SLIPS, atol=1.1e-3)
+    np.testing.assert_allclose(got[0], [0.7156, 0.3975, 0.3192], atol=1e-4, err_msg="class 0 in the three cells")
+    np.testing.assert_allclose(got.sum(axis=0), 1, err_msg="the classes of each cell sum to 1")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import crf
+
+    complaint = crf.check_marginals(marginals)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 3: one mean-field update (2 + 1 points)
@@ -237,7 +254,7 @@ def update(Q, phi, k):
 
 
 # %% nbgrader={"grade": false, "grade_id": "update-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-slips = {
+_UPDATE_SLIPS = {
     (0.885, 0.094, 0.108): "a cell counts itself: the diagonal of k must be left out",
     (0.655, 0.144, 0.319): "different labels are rewarded: they must cost; check the sign of the sum",
     (0.296, 0.382, 0.296): "the cells' own prices phi are missing",
@@ -257,47 +274,54 @@ slips = {
     (-1.250, -2.900, -2.340): "those are minus the prices: take the exponential, then divide by Z_i",
 }
 
-# %% nbgrader={"grade": true, "grade_id": "update-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-Q = np.array([[0.6, 0.2, 0.3], [0.3, 0.5, 0.1], [0.1, 0.3, 0.6]])
-phi = np.array([[0.4, 1.6, 1.1], [1.3, 0.7, 2.0], [1.9, 1.0, 0.5]])
-k = np.array([[5, 0.8, 0.3], [0.8, 5, 1.4], [0.3, 1.4, 5]])
-before = Q.copy()
-got = update(Q, phi.copy(), k.copy())
-assert got is not None, "update returned nothing: did you forget `return`?"
-assert np.array_equal(Q, before), "update changed its argument `Q`: make a new array, all cells use the old one"
-got = np.asarray(got, dtype=float)
-assert got.shape == (3, 3), f"expected the shape of Q, (3, 3), got {got.shape}"
-# By hand, cell 0: prices 0.4 + 0.8 * 0.8 + 0.3 * 0.7 = 1.25, 1.3 + 0.8 * 0.5 + 0.3 * 0.9 = 1.97, 1.9 + 0.8 * 0.7 + 0.3 * 0.4 = 2.58.
-for slip, hint in slips.items():
-    assert not np.allclose(got[0], slip, atol=1.1e-3), f"class 0 has {got[0].round(3)} in the three cells: {hint}"
-by_hand = [[0.5710, 0.2314, 0.2968], [0.2779, 0.3384, 0.1678], [0.1510, 0.4302, 0.5354]]
-np.testing.assert_allclose(got, by_hand, atol=1e-4, err_msg="a row per class, a column per cell")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import crf
 
-complaint = crf.check_update(update)
-assert not complaint, complaint
-### END HIDDEN TESTS
+# %% nbgrader={"grade": true, "grade_id": "update-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    Q = np.array([[0.6, 0.2, 0.3], [0.3, 0.5, 0.1], [0.1, 0.3, 0.6]])
+    phi = np.array([[0.4, 1.6, 1.1], [1.3, 0.7, 2.0], [1.9, 1.0, 0.5]])
+    k = np.array([[5, 0.8, 0.3], [0.8, 5, 1.4], [0.3, 1.4, 5]])
+    before = Q.copy()
+    got = answer_array(update(Q, phi, k), "update")
+    assert np.array_equal(Q, before), "update changed its argument `Q`: make a new array, all cells use the old one"
+    assert got.shape == (3, 3), f"expected the shape of Q, (3, 3), got {got.shape}"
+    # By hand, cell 0: prices 0.4 + 0.8 * 0.8 + 0.3 * 0.7 = 1.25, 1.3 + 0.8 * 0.5 + 0.3 * 0.9 = 1.97, 1.9 + 0.8 * 0.7 + 0.3 * 0.4 = 2.58.
+    _explain("class 0 has, in the three cells,", got[0], _UPDATE_SLIPS, atol=1.1e-3)
+    by_hand = [[0.5710, 0.2314, 0.2968], [0.2779, 0.3384, 0.1678], [0.1510, 0.4302, 0.5354]]
+    np.testing.assert_allclose(got, by_hand, atol=1e-4, err_msg="a row per class, a column per cell")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import crf
+
+    complaint = crf.check_update(update)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
 
 # %% nbgrader={"grade": true, "grade_id": "update-limits-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-dear = np.array(
-    [[2000.0, 3.0], [2001.0, np.inf], [9000.0, 3.0]]
-)  # every class of cell 0 is dear, class 1 of cell 1 impossible
-got = update(np.full((3, 2), 1 / 3), dear, np.zeros((2, 2)))
-assert np.isfinite(got).all(), (
-    "a result isn't finite: exp(-2000) is 0 on a computer, so subtract each cell's smallest price first"
-)
-hint = (
-    "2001 against 2000 is 1 / (1 + e), as 1 against 0; if you subtract one number from all cells, take each cell's own"
-)
-np.testing.assert_allclose(got[:, 0], [0.7311, 0.2689, 0], atol=1e-4, err_msg=hint)
-np.testing.assert_allclose(got[:, 1], [0.5, 0, 0.5], err_msg="an impossible class gets 0, the other two share the cell")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import crf
+def _test():
+    # Every class is dear, and class 1 of cell 1 is impossible; then the same with 2000 less for each.
+    Q, k, less = np.full((3, 2), 1 / 3), np.zeros((2, 2)), np.array([[0.0, 3.0], [1.0, np.inf], [7000.0, 3.0]])
+    got = answer_array(update(Q.copy(), less + 2000, k.copy()), "update")
+    assert np.isfinite(got).all(), (
+        "a result isn't finite: exp(-2000) is 0 on a computer, so subtract each cell's smallest price first"
+    )
+    wanted = answer_array(update(Q.copy(), less, k.copy()), "update")
+    assert np.isfinite(wanted).all(), (
+        "a result isn't finite where a class is impossible: its price is inf, its weight 0"
+    )
+    hint = "2001 against 2000 is 1 / (1 + e), as 1 against 0; if you subtract one number from all cells, take each cell's own"
+    np.testing.assert_allclose(got, wanted, atol=1e-4, err_msg=hint)
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import crf
 
-complaint = crf.check_update_limits(update)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = crf.check_update_limits(update)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 4: the free energy (2 + 1 points)
@@ -321,7 +345,7 @@ def free_energy(Q, phi, k):
 
 
 # %% nbgrader={"grade": false, "grade_id": "free-energy-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-slips = {
+_FREE_SLIPS = {
     1.2547: "the pair is counted twice: sum over i < j only",
     2.9193: "the sign of the entropy is swapped: uncertainty makes F smaller, so add Q log Q, which is negative",
     1.8080: "the entropy is missing: that is the mean energy",
@@ -340,33 +364,46 @@ slips = {
     -0.6967: "the sign of all of it is swapped: F is an energy, and mean field makes it small",
 }
 
-# %% nbgrader={"grade": true, "grade_id": "free-energy-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-Q, phi, k = np.array([[0.8, 0.3], [0.2, 0.7]]), np.array([[0.5, 1.2], [1.4, 0.3]]), np.array([[2, 0.9], [0.9, 2]])
-# By hand: prices 0.40 + 0.28 + 0.36 + 0.21 = 1.25; the pair agrees with 0.24 + 0.14 = 0.38, so 0.9 * 0.62 = 0.558; minus an entropy of 1.1113.
-got = free_energy(Q.copy(), phi.copy(), k.copy())
-assert got is not None, "free_energy returned nothing: did you forget `return`?"
-assert np.size(got) == 1, f"expected one number, got an array of shape {np.shape(got)}"
-for slip, hint in slips.items():
-    assert not np.isclose(got, slip, atol=1e-4), f"F is {float(got):.4f}: {hint}"
-np.testing.assert_allclose(got, 0.6967, atol=1e-4, err_msg="1.25 + 0.558 - 1.1113")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import crf
 
-complaint = crf.check_free_energy(free_energy)
-assert not complaint, complaint
-### END HIDDEN TESTS
+# %% nbgrader={"grade": true, "grade_id": "free-energy-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    Q, phi, k = np.array([[0.8, 0.3], [0.2, 0.7]]), np.array([[0.5, 1.2], [1.4, 0.3]]), np.array([[2, 0.9], [0.9, 2]])
+    # By hand: prices 0.40 + 0.28 + 0.36 + 0.21 = 1.25; the pair agrees with 0.24 + 0.14 = 0.38, so 0.9 * 0.62 = 0.558; minus an entropy of 1.1113.
+    got = answer_array(free_energy(Q, phi, k), "free_energy")
+    assert got.size == 1, f"expected one number, got an array of shape {got.shape}"
+    _explain("F is", got.item(), _FREE_SLIPS)
+    np.testing.assert_allclose(got, 0.6967, atol=1e-4, err_msg="1.25 + 0.558 - 1.1113")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import crf
+
+    complaint = crf.check_free_energy(free_energy)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
 
 # %% nbgrader={"grade": true, "grade_id": "free-energy-limits-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-got = free_energy(np.array([[1.0, 0.5], [0.0, 0.5]]), np.array([[0.5, 1.2], [np.inf, 0.3]]), k.copy())
-assert not np.isnan(got), "F is NaN: 0 * log 0 and 0 * inf count as 0; leave out what has probability 0"
-assert np.isfinite(got), f"F is {got}, but the impossible class has probability 0 and costs nothing"
-np.testing.assert_allclose(got, 1.0069, atol=1e-4, err_msg="0.5 + 0.75 + 0.9 * 0.5 - log 2")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import crf
+def _test():
+    # Class 1 of cell 0 is impossible, and its Q is 0; then its Q is nearly 0, and its price 5.
+    k = np.array([[2, 0.9], [0.9, 2]])
+    at, near = np.array([[1.0, 0.5], [0.0, 0.5]]), np.array([[1 - 1e-9, 0.5], [1e-9, 0.5]])
+    got = answer_array(free_energy(at, np.array([[0.5, 1.2], [np.inf, 0.3]]), k.copy()), "free_energy")
+    assert not np.isnan(got).any(), "F is NaN: 0 * log 0 and 0 * inf count as 0; leave out what has probability 0"
+    assert np.isfinite(got).all(), f"F is {got}, but the impossible class has probability 0 and costs nothing"
+    nearly = answer_array(free_energy(near, np.array([[0.5, 1.2], [5.0, 0.3]]), k.copy()), "free_energy")
+    hint = "a probability of 0 must give what a tiny one gives"
+    np.testing.assert_allclose(got, nearly, atol=1e-4, err_msg=hint)
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import crf
 
-complaint = crf.check_free_energy_limits(free_energy)
-assert not complaint, complaint
-### END HIDDEN TESTS
+    complaint = crf.check_free_energy_limits(free_energy)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## Task 5: normalisation, and a CRF of your own (1 + 3 points)
@@ -384,7 +421,7 @@ def normalise(K):
 
 
 # %% nbgrader={"grade": false, "grade_id": "normalise-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-slips = {
+_NORMALISE_SLIPS = {
     0.1858: "the square roots are missing: divide by sqrt(D_i D_j)",
     0.3529: "you divide each row by its sum: then k_ij isn't k_ji; divide by the root of both sums",
     0.3158: "you divide each column by its sum: then k_ij isn't k_ji; divide by the root of both sums",
@@ -398,26 +435,27 @@ slips = {
     1.0015: "you divide by means: D is a sum",
 }
 
-# %% nbgrader={"grade": true, "grade_id": "normalise-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-K = np.array(
-    [[1, 0.6, 0.1], [0.6, 1, 0.3], [0.1, 0.3, 1]]
-)  # row sums 1.7, 1.9, 1.4: cells 0 and 1 get 0.6 / sqrt(1.7 * 1.9) = 0.334
-before = K.copy()
-got = normalise(K)
-assert got is not None, "normalise returned nothing: did you forget `return`?"
-assert np.array_equal(K, before), "normalise changed its argument: make a new array"
-got = np.asarray(got, dtype=float)
-assert got.shape == (3, 3), f"expected the shape of K, (3, 3), got {got.shape}"
-for slip, hint in slips.items():
-    assert not np.isclose(got[0, 1], slip, atol=1e-4), f"cells 0 and 1 get {got[0, 1]:.4f}: {hint}"
-by_hand = [[0.5882, 0.3338, 0.0648], [0.3338, 0.5263, 0.1839], [0.0648, 0.1839, 0.7143]]
-np.testing.assert_allclose(got, by_hand, atol=1e-4, err_msg="K_ij / sqrt(D_i D_j)")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import crf
 
-complaint = crf.check_normalise(normalise)
-assert not complaint, complaint
-### END HIDDEN TESTS
+# %% nbgrader={"grade": true, "grade_id": "normalise-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    # Row sums 1.7, 1.9, 1.4: cells 0 and 1 get 0.6 / sqrt(1.7 * 1.9) = 0.334.
+    K = np.array([[1, 0.6, 0.1], [0.6, 1, 0.3], [0.1, 0.3, 1]])
+    before = K.copy()
+    got = answer_array(normalise(K), "normalise")
+    assert np.array_equal(K, before), "normalise changed its argument: make a new array"
+    assert got.shape == (3, 3), f"expected the shape of K, (3, 3), got {got.shape}"
+    _explain("cells 0 and 1 get", got[0, 1], _NORMALISE_SLIPS)
+    by_hand = [[0.5882, 0.3338, 0.0648], [0.3338, 0.5263, 0.1839], [0.0648, 0.1839, 0.7143]]
+    np.testing.assert_allclose(got, by_hand, atol=1e-4, err_msg="K_ij / sqrt(D_i D_j)")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import crf
+
+    complaint = crf.check_normalise(normalise)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # Now put it together on a map of H x W cells. The matrix of all pairs of the sample drive's 8804 cells would fill 600 MB, so let a cell pay only to cells that are at most
@@ -460,7 +498,7 @@ def refine(log_g, o):
 
 
 # %% nbgrader={"grade": false, "grade_id": "refine-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-slips = {
+_REFINE_SLIPS = {
     (0.9996, 0.9982, 0.9990): "a cell counts itself: the offset (0, 0) is no pair, it only counts in D",
     (0.9991, 0.9986, 0.9278): "the offset (0, 0) is missing in D",
     (0.9973, 0.9960, 0.9452): "nothing is normalised: divide by the roots of D",
@@ -484,28 +522,30 @@ slips = {
     (0.9220, 0.8858, 0.6809): "only the nearest neighbours count: go up to REACH",
 }
 
-# %% nbgrader={"grade": true, "grade_id": "refine-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
-g = np.array([[[0.7, 0.3, 0.5]], [[0.2, 0.6, 0.1]], [[0.1, 0.1, 0.4]]])  # three classes, one row of three cells
-o = np.array([[[0.8, 0.9, 0.1]], [[0.1, 0.0, 0.7]], [[0.0, 0.1, 0.1]], [[0.1, 0.0, 0.1]]])  # FREE, FREE, STATIC
-log_g = np.log(g)
-got = refine(log_g, o)
-assert got is not None, "refine returned nothing: did you forget `return`?"
-assert np.array_equal(log_g, np.log(g)), "refine changed its argument `log_g`: make a new array"
-got = np.asarray(got, dtype=float)
-assert got.shape == (3, 1, 3), f"expected the shape of log_g, (3, 1, 3), got {got.shape}"
-assert np.isfinite(got).all(), (
-    "a result isn't finite: did you divide by a sum of a neighbour beyond the border, which is 0?"
-)
-assert np.allclose(got.sum(axis=0), 1), "the classes of each cell must sum to 1, over axis 0"
-for slip, hint in slips.items():
-    assert not np.allclose(got[0, 0], slip, atol=5e-4), f"class 0 has {got[0, 0].round(3)} in the three cells: {hint}"
-np.testing.assert_allclose(got[0, 0], [0.9458, 0.8850, 0.7536], atol=1e-4, err_msg="class 0 in the three cells")
-### BEGIN HIDDEN TESTS
-from semgrid_instructor import crf
 
-complaint = crf.check_refine(refine)
-assert not complaint, complaint
-### END HIDDEN TESTS
+# %% nbgrader={"grade": true, "grade_id": "refine-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    g = np.array([[[0.7, 0.3, 0.5]], [[0.2, 0.6, 0.1]], [[0.1, 0.1, 0.4]]])  # three classes, one row of three cells
+    o = np.array([[[0.8, 0.9, 0.1]], [[0.1, 0.0, 0.7]], [[0.0, 0.1, 0.1]], [[0.1, 0.0, 0.1]]])  # FREE, FREE, STATIC
+    log_g = np.log(g)
+    got = answer_array(refine(log_g, o), "refine")
+    assert np.array_equal(log_g, np.log(g)), "refine changed its argument `log_g`: make a new array"
+    assert got.shape == (3, 1, 3), f"expected the shape of log_g, (3, 1, 3), got {got.shape}"
+    assert np.isfinite(got).all(), (
+        "a result isn't finite: did you divide by a sum of a neighbour beyond the border, which is 0?"
+    )
+    assert np.allclose(got.sum(axis=0), 1), "the classes of each cell must sum to 1, over axis 0"
+    _explain("class 0 has, in the three cells,", got[0, 0], _REFINE_SLIPS, atol=5e-4)
+    np.testing.assert_allclose(got[0, 0], [0.9458, 0.8850, 0.7536], atol=1e-4, err_msg="class 0 in the three cells")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import crf
+
+    complaint = crf.check_refine(refine)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
 
 # %% [markdown]
 # ## See it on the sample drive (no points)
