@@ -8,7 +8,7 @@ from nbgrader.utils import is_grade, is_solution
 
 from semgrid_edu.course.isolation.process import StudentProcess
 from semgrid_edu.course.isolation.session import AnswerEndedError, AnswerTimeoutError, Session
-from semgrid_edu.course.isolation.tests import Tests
+from semgrid_edu.course.isolation.tests import CellTests
 
 ENDS = tuple(kind.__name__ for kind in (AnswerEndedError, AnswerTimeoutError))
 """The errors of an answer that ended its process, or had to be ended."""
@@ -42,7 +42,7 @@ def run_submission(
         What ended a student's process, by the grade_id of the cell in which it happened ("" for a cell of her own).
     """
     seen, unseen = Session(start, timeout), Session(start, timeout, secret=True)
-    tests = Tests(seen, unseen, variant)
+    tests = CellTests(seen, unseen, variant)
     try:
         for number, cell in enumerate((c for c in notebook.cells if c.cell_type == "code"), start=1):
             cell.execution_count = number
@@ -71,7 +71,7 @@ def cell_name(cell: NotebookNode) -> str:
     return name if isinstance(name, str) else ""
 
 
-def _outputs(cell: NotebookNode, trusted: Mapping[str, str], tests: Tests) -> list[NotebookNode]:
+def _outputs(cell: NotebookNode, trusted: Mapping[str, str], tests: CellTests) -> list[NotebookNode]:
     """Run a cell where it belongs."""
     is_trusted = trusted.get(cell_name(cell)) == cell.source and not is_solution(cell)
     if is_grade(cell) and not is_solution(cell):

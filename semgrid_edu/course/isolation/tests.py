@@ -24,7 +24,7 @@ SHOWN = 2000
 """Characters of what an answer printed while a test ran."""
 
 
-class Tests:
+class CellTests:
     """The test cells of one submission.
 
     Parameters
@@ -38,6 +38,7 @@ class Tests:
     def __init__(self, seen: Session, unseen: Session, variant: tuple[int, ...]) -> None:
         self.seen, self.unseen, self.variant = seen, unseen, variant
         self.names: dict[str, Any] = {"__name__": "__main__"}
+        self.used: set[str] = set()
 
     def prepare(self, source: str) -> None:
         """Run one of the instructor's cells that isn't a test, for what it imports and defines.
@@ -47,7 +48,9 @@ class Tests:
         source : str
             The cell.
         """
-        _run(compile(source, "<prepared>", "exec"), self.names)
+        code = compile(source, "<prepared>", "exec")
+        self.used |= _global_names(code)
+        _run(code, self.names)
 
     def test(self, source: str, name: str) -> list[NotebookNode]:
         """Run a test cell.
@@ -68,16 +71,25 @@ class Tests:
         linecache.cache[file] = len(source), None, source.splitlines(keepends=True), file
         code = compile(source, file, "exec")
         try:
-            names = self.names | self._answers(_global_names(code))
+            answers = self._answers(self.used | _global_names(code))
         except (AnswerEndedError, AnswerTimeoutError) as error:
             return [_as_output(error, file)]
         import_module(INSTRUCTOR).choose_variant(*self.variant)
         self.seen.printed = ""
         for session in (self.seen, self.unseen):
             session.begin()
-        error = _run(code, names)
+        error = self._run_among(code, answers)
         printed = [new_output("stream", name="stdout", text=self.seen.printed[:SHOWN])] if self.seen.printed else []
         return printed + ([] if error is None else [_as_output(error, file)])
+
+    def _run_among(self, code: CodeType, answers: dict[str, Any]) -> Exception | None:
+        """Run a test among the instructor's names and the answers; both are afterwards as they were."""
+        before = dict(self.names)
+        self.names.update(answers)
+        error = _run(code, self.names)
+        self.names.clear()
+        self.names.update(before)
+        return error
 
     def _answers(self, names: set[str]) -> dict[str, Any]:
         """Return what names that the grader doesn't know stand for in the student's notebook."""
