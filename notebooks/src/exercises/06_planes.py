@@ -72,6 +72,7 @@ _WEIGHT_SLIPS = {
 def _four(got):
     """Return rows, columns and weights, four numbers each."""
     assert got is not None, "four_pixels returned nothing: did you forget `return`?"
+    assert np.iterable(got), f"return three things, rows, cols and weights; got {got}"
     assert len(got) == 3, f"return three things, rows, cols and weights; got {got}"
     names = ("for the rows", "for the columns", "for the weights")
     rows, cols, weights = (

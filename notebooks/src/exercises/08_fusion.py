@@ -132,6 +132,7 @@ def _test():
     planes, theta, _ = _reduction()
     got = reduce_back(planes, theta, np.array([[[2.0, -1.0]], [[0.0, 3.0]]]))
     assert got is not None, "reduce_back returned nothing: did you forget `return`?"
+    assert np.iterable(got), "return three arrays: by theta, by beta, by the planes"
     assert len(got) >= 2, "return three arrays: by theta, by beta, by the planes"
     theta_bar, beta_bar = answer_array(got[0], "by theta reduce_back"), answer_array(got[1], "by beta reduce_back")
     assert theta_bar.shape == (2, 2, 2), f"by theta: one number a weight, shape (2, 2, 2), got {theta_bar.shape}"
@@ -160,6 +161,7 @@ def _test():
     # By hand, the score of class 1 on plane 0 in the second cell went into map 0 by 2 and into map 1 by 1: 2 * -1 + 1 * 3 = 1.
     planes, theta, _ = _reduction()
     got = reduce_back(planes, theta, np.array([[[2.0, -1.0]], [[0.0, 3.0]]]))
+    assert np.iterable(got), "return three arrays: by theta, by beta, by the planes"
     assert len(got) == 3, "return three arrays: by theta, by beta, by the planes"
     got = answer_array(got[2], "by planes reduce_back")
     assert got.shape == (2, 2, 1, 2), f"by planes: one number a score, (C, D, H, W) = (2, 2, 1, 2), got {got.shape}"
@@ -413,6 +415,7 @@ def _test():
     theta, delta, gradient = np.array([1.0, 2.0]), np.array([0.5, -1.0]), np.array([0.2, 0.4])
     got = momentum_step(theta, delta, gradient, eta=0.2, kappa=0.9)
     assert got is not None, "momentum_step returned nothing: did you forget `return`?"
+    assert np.iterable(got), "return two arrays: the new theta and the new delta"
     assert len(got) == 2, "return two arrays: the new theta and the new delta"
     assert np.array_equal(theta, [1, 2]), "momentum_step changed its argument `theta`: make a new array (no -=)"
     same = np.array_equal(delta, [0.5, -1])

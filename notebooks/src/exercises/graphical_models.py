@@ -101,8 +101,10 @@ _test()
 # %% nbgrader={"grade": true, "grade_id": "multiply-shared-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     f = ("m1", "m2"), np.array([[1.0, 2.0], [3.0, 4.0]])
-    names, table = multiply(f, (("m2", "m1"), np.array([[1.0, 10.0], [100.0, 1000.0]])))
-    table = answer_array(table, "for the table multiply")
+    got = multiply(f, (("m2", "m1"), np.array([[1.0, 10.0], [100.0, 1000.0]])))
+    assert isinstance(got, tuple | list), f"return a pair, (names, table), got {type(got).__name__}"
+    names, table = got[0], answer_array(got[1], "for the table multiply")
+    assert sorted(names) == ["m1", "m2"], f"the product is over m1 and m2, yours is over {names}"
     table = table if tuple(names) == ("m1", "m2") else table.T
     slips = {
         ((1.0, 20.0), (300.0, 4000.0)): "the axes of g stand the other way round: sort them by name, not by place",
