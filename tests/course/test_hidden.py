@@ -38,3 +38,13 @@ def test_error_becomes_a_sentence(hidden, error, sentence):
 
 def test_nothing_to_complain_about(hidden):
     assert hidden(lambda function: None)(answer) == ""
+
+
+def test_every_answer_works_where_it_is_not_seen(hidden):
+    class Answer:
+        __name__ = "answer"
+        unseen = "not seen"
+
+    asked = []
+    assert hidden(lambda *answers: asked.extend(answers))(Answer(), Answer()) == ""
+    assert asked == ["not seen", "not seen"]

@@ -25,13 +25,13 @@ def generator(seed: int) -> np.random.Generator:
     return np.random.default_rng([seed, *_variant])
 
 
-def hidden(check: Callable[[Callable], None]) -> Callable[[Callable], str]:
-    """Turn a check that raises into one that returns a short complaint, or "" when all is well."""
+def hidden(check: Callable[..., None]) -> Callable[..., str]:
+    """Turn a check that raises into one that returns a short complaint about the first answer, "" when all is well."""
 
     @functools.wraps(check)
-    def complaint(answer: Callable) -> str:
+    def complaint(answer: Callable, *others: Callable) -> str:
         try:
-            check(getattr(answer, "unseen", answer))
+            check(*(getattr(one, "unseen", one) for one in (answer, *others)))
         except AssertionError as error:
             return f"{answer.__name__}, on inputs you haven't seen: {error}"
         except (KeyboardInterrupt, AnswerTimeoutError):

@@ -272,21 +272,16 @@ def _follows(got: np.ndarray, forward: np.ndarray, later: np.ndarray) -> bool:
     return usable[:50].all() and np.allclose(got[usable], _smoothed_by(forward, later)[usable])
 
 
-def check_smoothed(smoothed: Callable, filtered: Callable) -> str:
+@hidden
+def check_smoothed(smoothed: Callable, filtered: Callable) -> None:
     """Four states, one scan only, and hundreds of scans; a fault of `filtered` costs nothing here."""
-
-    @hidden
-    def check(smoothed: Callable) -> None:
-        for chain in (_chain(28, 1, 3), _chain(28, 6, 4), _long_chain(29)):
-            got = answer_array(smoothed(*(array.copy() for array in chain)))
-            forward, later = _in_logarithms(*chain)
-            assert got.shape == forward.shape, f"shape {got.shape} instead of {forward.shape}"
-            if not np.allclose(got, _smoothed_by(forward, later)):
-                yours = answer_array(filtered(*(array.copy() for array in chain)))
-                fault = "wrong" if np.isfinite(got).all() else "NaN"
-                advice = " after hundreds of scans: normalise the message on the way" if len(got) == LONG else ""
-                assert _follows(got, yours, later), fault + (
-                    advice or f" with {len(got)} scans and {len(chain[0])} states"
-                )
-
-    return check(smoothed)
+    for chain in (_chain(28, 1, 3), _chain(28, 6, 4), _long_chain(29)):
+        got = answer_array(smoothed(*(array.copy() for array in chain)))
+        forward, later = _in_logarithms(*chain)
+        assert got.shape == forward.shape, f"shape {got.shape} instead of {forward.shape}"
+        if not np.allclose(got, _smoothed_by(forward, later)):
+            yours = answer_array(filtered(*(array.copy() for array in chain)))
+            fault = "wrong" if np.isfinite(got).all() else "NaN"
+            advice = " after hundreds of scans: normalise the message on the way" if len(got) == LONG else ""
+            about = advice or f" with {len(got)} scans and {len(chain[0])} states"
+            assert _follows(got, yours, later), fault + about
