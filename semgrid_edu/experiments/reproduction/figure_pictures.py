@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import matplotlib.pyplot as plt
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from numpy.typing import NDArray
 
@@ -60,8 +61,18 @@ def _draw(part: SubFigure, grids: dict[str, NDArray], columns: dict[str, str], l
         for ax, (name, title) in zip(line[1:], columns.items(), strict=True):
             grid_labels(spec, grids[name][row], label_set, ax=ax, legend=False)
             ax.set_title(title if row == 0 else "", fontsize="medium")
-            ax.label_outer()
+            _keep_outer_labels(ax, first=ax is line[1], last=row == n_rows - 1)
     class_legend(axes[0, -1], label_set, grids["true"])
+
+
+def _keep_outer_labels(ax: Axes, first: bool, last: bool) -> None:
+    """Name the axes of a grid where no other grid stands to its left, or below it."""
+    if not first:
+        ax.set_ylabel("")
+        ax.tick_params(labelleft=False)
+    if not last:
+        ax.set_xlabel("")
+        ax.tick_params(labelbottom=False)
 
 
 def _spec_of(shape: tuple[int, int]) -> GridSpec:
