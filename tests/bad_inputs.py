@@ -622,6 +622,8 @@ EXPERIMENTS = (
         "reproduce occupancy --grid tiny --out log.json",
         "grid: expected paper or compact",
     ),
+    Row("an unknown device, runs", f"{TABLE1} --device abacus", "--device: expected"),
+    Row("too many processes", f"{TABLE1} --processes 1000", "Invalid value for '--processes'"),
     Row("an unknown grid, streets", "reproduce streets --grid tiny --out log.json", "grid: expected paper or compact"),
     Row("an unknown LIDAR", "reproduce truth-policies --lidar sonar --out log.json", "lidar: expected one of"),
     Row("no drives", "reproduce occupancy --drives 0", "Invalid value for '--drives'"),

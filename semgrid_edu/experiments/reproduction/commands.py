@@ -48,7 +48,7 @@ def _command(experiment: str) -> Callable[..., None]:
         device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu, cuda or cuda:N.")] = "cpu",
         processes: Annotated[
             int,
-            typer.Option(min=1, help="Processes of each training run, started by torchrun; on cuda a GPU for each."),
+            typer.Option(min=1, max=256, help="Processes of each training run, by torchrun; on cuda a GPU for each."),
         ] = 1,
         plan: Annotated[bool, typer.Option("--plan", help="Only tell the runs and how long they will take.")] = False,
     ) -> None:

@@ -16,6 +16,7 @@ from semgrid_edu.experiments.reproduction.runs import OUTPUT, Run
 from semgrid_edu.experiments.reproduction.scales import Scale, scale_named
 from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.storage.workplace import check_workers, usable_cores, workplace
+from semgrid_edu.training.devices import choose_device
 
 
 @dataclass(frozen=True)
@@ -95,14 +96,16 @@ def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = F
     Raises
     ------
     ArgumentError
-        When something that was asked for doesn't exist, or when torchrun started this process: two of them would do the
-        same runs in the same folders.
+        When something that was asked for doesn't exist, such as a GPU for each process, or when torchrun started this
+        process: two of them would do the same runs in the same folders.
     """
     started = int(os.environ.get("WORLD_SIZE", 1))
     if started > 1:
         expected = f"{started}, by which each training run starts torchrun itself"
         raise ArgumentError("--processes", expected, f"a command that torchrun started {started} times")
     check_workers(request.workers or 1)
+    if request.scheduler is None:
+        choose_device(request.device, request.processes - 1)
     root = check_runs_folder(request.runs)
     with nullcontext() if plan_only else sole_writer(root):
         return _reproduced(request, root, echo, plan_only)
