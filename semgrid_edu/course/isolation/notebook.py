@@ -1,6 +1,7 @@
 """A submission, cell by cell: answers run in the student's process, tests in the grader's."""
 
 import json
+import re
 from collections.abc import Callable, Mapping, Sequence
 
 from nbformat import NotebookNode
@@ -109,11 +110,21 @@ def _outputs(cell: NotebookNode, trusted: Mapping[str, str], tests: Tests) -> li
 def _as_outputs(reply: dict) -> list[NotebookNode]:
     """Return what a cell put out as a notebook holds it."""
     streams = [new_output("stream", name=name, text=text) for name, text in reply["streams"].items() if text]
-    shown = [new_output("display_data", data=data) for data in reply["shown"]]
+    shown = [new_output("display_data", data=data) for data in map(_harmless, reply["shown"]) if data]
     error = reply.get("error")
     if error is None:
         return streams + shown
     return [*streams, *shown, _error(error["kind"], error["says"], error["traceback"])]
+
+
+def _harmless(shown: dict[str, str]) -> dict[str, str]:
+    """Return text and pictures. HTML and SVG could hold scripts, which would run in the browser of who grades."""
+    pictures = ("image/png", "image/jpeg")
+    return {
+        kind: data
+        for kind, data in shown.items()
+        if kind == "text/plain" or (kind in pictures and re.fullmatch(r"[A-Za-z0-9+/=\s]*", data))
+    }
 
 
 def _error(kind: str, says: str, lines: Sequence[str] = ()) -> NotebookNode:
