@@ -5,6 +5,7 @@ import io
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import astuple, dataclass, field, fields
+from glob import has_magic
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -175,6 +176,9 @@ def grade_one(course: Path, assignment: str, student: str, settings: GradeSettin
         When nbgrader can't grade even an empty submission.
     """
     path = place(course, "submitted", student, assignment)
+    if has_magic(student):
+        note = f"{CRASHED}nbgrader takes * ? [ in a student's name for a pattern: rename the folder"
+        return Graded(student, assignment, 0, 0, 0, note)
     try:
         _refuse_links_and_size(path)
         nbformat.validate(nbformat.read(path, as_version=4))

@@ -141,7 +141,10 @@ class Session:
         if "changed" in reply:
             put_back((arguments, named), reply["changed"])
         if "error" in reply:
-            raise _as_error(reply["error"], self.secret)
+            told = reply["error"]
+            # A line that is in no cell was put there to tell something else.
+            known = any(told["line"] in cell for cell in self.cells)
+            raise _as_error(told | {"line": told["line"] if known else ""}, self.secret)
         return reply["result"], reply.get("megabytes", float("nan"))
 
     def _catch_up(self) -> None:
@@ -233,7 +236,7 @@ def _as_error(told: dict[str, Any], secret: bool) -> Exception:
     try:
         error = kind(says)
     except TypeError:
-        error = AnswerError(f"{told['kind']}: {says}")
+        error = AnswerError(f"{kind.__name__}: {says}")
     if told["line"]:
         error.add_note(f"in your line: {told['line']}")
     return error
