@@ -146,7 +146,7 @@ def pass_tests(notebook):
             cell.source = "pass"
 
 
-def tests_before_their_helpers(notebook):
+def helpers_after_tests(notebook):
     fakes = "def answer_array(*a): return [1, 0, 0, 0]\ndef answer_number(*a): return 0.34657\ndef _explain(*a): pass"
     notebook.cells.insert(0, new_code_cell(f"{fakes}\nnp = {{}}"))
     notebook.cells.append(notebook.cells.pop(cell_of(notebook, "setup")))
@@ -193,7 +193,7 @@ def two_of_a_name(notebook):
     "change",
     [
         pass_tests,
-        tests_before_their_helpers,
+        helpers_after_tests,
         own_test,
         more_points,
         answers_for_tests,
@@ -245,13 +245,13 @@ def test_hidden_inputs_are_not_in_the_feedback(course):
 
 TELLS = {
     "line": "import linecache; linecache.getline = lambda *a: f'cells: {len(belief)}'; assert len(belief) < 5",
-    "class": "kind = type(f'cells: {len(belief)}', (UnicodeDecodeError,), {})\n    if len(belief) > 5: raise kind('a', b'', 0, 1, '')",
+    "class": "if len(belief) > 5: raise type(f'cells: {len(belief)}', (UnicodeDecodeError,), {})(*UNREADABLE)",
 }
 
 
 @pytest.mark.parametrize("kind", TELLS)
 def test_an_error_does_not_tell_hidden_inputs(course, kind):
-    notebook = handed_in(inside("locate", TELLS[kind]))
+    notebook = handed_in(inside("locate", TELLS[kind]), first="UNREADABLE = 'ascii', b'x', 0, 1, ''")
     assert graded(course, f"tells-{kind}", notebook).score == 11
     graded_notebook = place(course, "autograded", f"tells-{kind}", NAME).read_text()
     assert "cells: 30" not in graded_notebook
@@ -276,7 +276,7 @@ display({"image/svg+xml": "<svg onload=" + "'alert(3)'/>", "image/png": '"><scri
     for number in range(1, 9):
         assert f"<script>alert({number})" not in page
     assert "onerror" not in page
-    assert "onload=" not in page
+    assert "<svg onload=" not in page
     assert "<strong>bold</strong>" in page
 
 
