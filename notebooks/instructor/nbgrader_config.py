@@ -41,6 +41,9 @@ c.Autograde.autograde_preprocessors = [
     CheckCellMetadata,
 ]
 
+# The formgrader and feedback show a submission's text without the scripts that it may hold.
+c.HTMLExporter.filters = {"strip_files_prefix": "semgrid_edu.course.nbgrader_steps.without_scripts"}
+
 c.ExecuteApart.course = str(course)
 
 # Seconds for one cell. An endless loop costs its own points and this long.

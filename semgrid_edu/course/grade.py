@@ -5,6 +5,7 @@ import io
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import astuple, dataclass, field, fields
+from glob import has_magic
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -22,6 +23,9 @@ from semgrid_edu.storage.files import write_text
 
 UNREADABLE = "unreadable"
 """The folder with notebooks that stand in for files that can't be read."""
+
+LARGEST = 100_000_000
+"""Bytes of a submission with all its files."""
 
 GRADED = "graded.csv"
 """The file with one line for each submission."""
@@ -172,12 +176,17 @@ def grade_one(course: Path, assignment: str, student: str, settings: GradeSettin
         When nbgrader can't grade even an empty submission.
     """
     path = place(course, "submitted", student, assignment)
+    if has_magic(student):
+        note = f"{CRASHED}nbgrader takes * ? [ in a student's name for a pattern: rename the folder"
+        return Graded(student, assignment, 0, 0, 0, note)
     try:
+        _refuse_links_and_size(path)
         nbformat.validate(nbformat.read(path, as_version=4))
         autograde_one(course, assignment, student, settings)
         return _result(course, assignment, student)
     except Exception as error:
-        note = f"{CRASHED}the file can't be graded: {str(error).splitlines()[0][:200]}"
+        says = [*str(error).splitlines(), type(error).__name__][0][:200]
+        note = f"{CRASHED}the file can't be graded: {says}"
     _stand_in(course, assignment, student, note)
     autograde_one(course, assignment, student, settings, UNREADABLE)
     with _gradebook(course) as gradebook:
@@ -185,6 +194,15 @@ def grade_one(course: Path, assignment: str, student: str, settings: GradeSettin
             comment.auto_comment = note
         gradebook.db.commit()
     return _result(course, assignment, student)
+
+
+def _refuse_links_and_size(path: Path) -> None:
+    """Raise when a submission holds links, which nbgrader would follow to other people's files, or is huge."""
+    folder = path.parent
+    if links := [one for one in (folder.parent, folder, *folder.rglob("*")) if one.is_symlink()]:
+        raise DataError(links[0].name, "a file or folder", "a link")
+    if (size := sum(one.lstat().st_size for one in folder.rglob("*"))) > LARGEST:
+        raise DataError(path.name, f"at most {LARGEST} bytes with all files beside it", size)
 
 
 def _stand_in(course: Path, assignment: str, student: str, note: str) -> None:

@@ -4,7 +4,9 @@ import zlib
 from collections.abc import Callable
 from pathlib import Path
 
+import bleach
 from nbconvert.exporters.exporter import ResourcesDict
+from nbconvert.filters import strip_files_prefix
 from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell, new_markdown_cell
 from nbgrader.api import Gradebook, SourceCell
@@ -20,6 +22,16 @@ from semgrid_edu.course.isolation.process import StudentProcess
 
 CRASHED = "Crashed: "
 """How a comment begins that says what ended Python."""
+
+SHOWN_TAGS = (
+    *bleach.ALLOWED_TAGS,
+    *("br", "dd", "del", "div", "dl", "dt", "h1", "h2", "h3", "h4", "h5", "h6", "hr", "img", "p", "pre", "s", "span"),
+    *("sub", "sup", "table", "tbody", "td", "th", "thead", "tr"),
+)
+"""What Markdown makes, and nothing that runs."""
+
+KEPT = ("kernelspec", "language_info")
+"""What is kept of a notebook's metadata."""
 
 CRASHES = "crashes"
 """Under this name `ExecuteApart` hands over to `NoteCrashes` what ended a student's process."""
@@ -45,6 +57,8 @@ class MakeWhole(NbGraderPreprocessor):
         with Gradebook(where["db_url"]) as gradebook:
             exercise = gradebook.find_notebook(where["notebook"], where["assignment"])
             blanks = {cell.name: _blank(cell, exercise) for cell in exercise.source_cells}
+        # Any other metadata would be the student's: widgets, a title, what else is shown in feedback.
+        nb.metadata = NotebookNode({name: nb.metadata[name] for name in KEPT if name in nb.metadata})
         _mark(nb.cells, blanks)
         nb.cells = _with_own_versions(nb.cells, blanks)
         _insert_missing(nb.cells, blanks)
@@ -75,7 +89,7 @@ def _mark(cells: list[NotebookNode], blanks: dict[str, NotebookNode]) -> None:
     left = dict(blanks)
     for cell in reversed(cells):
         blank = left.pop(cell_name(cell), None)
-        cell.metadata.pop("nbgrader", None)
+        cell.metadata = NotebookNode()
         if blank is not None:
             cell.metadata["nbgrader"] = blank.metadata.nbgrader.copy()
 
@@ -137,6 +151,19 @@ class ExecuteApart(NbGraderPreprocessor):
         """Return what starts a process for a student's code."""
         limits = Limits(memory=self.memory)
         return lambda prepared: StudentProcess(limits, prepared, keeps, tuple(self.container))
+
+
+def without_scripts(html: str) -> str:
+    """Return the HTML of a text cell without all that could run in a browser: that of the instructor is logged in.
+
+    Parameters
+    ----------
+    html : str
+        What nbconvert made of Markdown. This takes the place of its filter `strip_files_prefix`, the last that nbgrader
+        applies.
+    """
+    attributes = {**bleach.ALLOWED_ATTRIBUTES, "*": ["class", "id"], "img": ["src", "alt"]}
+    return bleach.clean(strip_files_prefix(html), tags=SHOWN_TAGS, attributes=attributes)
 
 
 class NoteCrashes(NbGraderPreprocessor):

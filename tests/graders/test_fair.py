@@ -26,6 +26,11 @@ NOISE = {
     "numpy-prints": "np.seterr(all='print'); np.array([1.0]) / 0",
     "font": "import matplotlib.pyplot as plt; plt.title('a', family='no such font'); plt.show()",
     "output": "print('x' * 100_000)",
+    "not-text": "print(chr(0xD800))",
+    "strict": "import warnings; warnings.simplefilter('error'); np.seterr(all='raise')",
+    "shell": "get_ipython().system('echo 1')",
+    "thread": "import threading, time; threading.Thread(target=time.sleep, args=(9,)).start()",
+    "table": "from IPython.display import HTML, display; [display(HTML('<td>' * 10**6)) for _ in range(9)]",
 }
 
 

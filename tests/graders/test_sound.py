@@ -1,13 +1,16 @@
 """No points without the answer: whatever a submission tries, it earns what its answers are worth."""
 
 import hashlib
+import time
 
 import pytest
-from class_of import NAME, REFERENCE, SOURCE, cell_of, graded, handed_in, inside
-from nbformat.v4 import new_code_cell
+from class_of import NAME, REFERENCE, SETTINGS, SOURCE, cell_of, graded, handed_in, inside
+from nbformat.v4 import new_code_cell, new_markdown_cell
 
 from semgrid_edu.course.exercises import build_course, course_api
-from semgrid_edu.course.grading import place
+from semgrid_edu.course.grade import grade_one
+from semgrid_edu.course.grading import GradeSettings, place
+from semgrid_edu.course.notebooks import write_notebook
 
 
 @pytest.fixture(scope="module")
@@ -91,6 +94,33 @@ from semgrid_edu.course.isolation import worker, values
 values.encode.__globals__["json"].dumps = lambda *a, **k: "{}"
 locate = lambda *a, **k: 1
 """,
+    "ends-loops": "locate = predict = follow = transition = half_life = fuse = lambda *a, **k: next(iter(()))",
+    "more-names": """
+import __main__
+names = __main__.Worker.names
+def more(self, wanted):
+    return {"functions": [*wanted, "answer_array", "answer_number", "_explain", "isinstance"], "values": {"np": 0}}
+__main__.Worker.names = more
+def answer_array(*a): return [1, 0, 0, 0]
+def answer_number(*a): return 0.34657
+def _explain(*a): pass
+""",
+    "does-nothing": "locate = predict = follow = transition = half_life = fuse = lambda *a, **k: a[0] if a else 0",
+    "empty": "locate = predict = follow = transition = half_life = fuse = lambda *a, **k: np.zeros((0, 4))",
+    "nested-reply": """
+import __main__
+send = __main__.Wire.send
+__main__.Wire.send = lambda self, data: send(self, b'{"value": [' + b"[]," * 60_000_000 + b"[]]}")
+""",
+    "repeated-array": """
+import __main__, json
+def call(self, data):
+    tree = {"dict": [["result", {"objects": [{"array": 0}] * 1000}]]}
+    head = json.dumps({"value": tree, "arrays": [["|u1", [10_000_000]]]}).encode()
+    send(self, head + b"\\n" + bytes(10_000_000))
+send = __main__.Wire.send
+__main__.Wire.send = call
+""",
     "no-error-kind": """
 class Silent(BaseException):
     def __str__(self): return ""
@@ -114,6 +144,19 @@ def pass_tests(notebook):
     for cell in notebook.cells:
         if cell.metadata.get("nbgrader", {}).get("grade"):
             cell.source = "pass"
+
+
+def helpers_after_tests(notebook):
+    fakes = "def answer_array(*a): return [1, 0, 0, 0]\ndef answer_number(*a): return 0.34657\ndef _explain(*a): pass"
+    notebook.cells.insert(0, new_code_cell(f"{fakes}\nnp = {{}}"))
+    notebook.cells.append(notebook.cells.pop(cell_of(notebook, "setup")))
+
+
+def raw_for_tests(notebook):
+    text_for_tests(notebook)
+    for cell in notebook.cells:
+        if cell.metadata.get("nbgrader", {}).get("grade_id", "").endswith("-test"):
+            cell.cell_type = "raw"
 
 
 def own_test(notebook):
@@ -147,7 +190,17 @@ def two_of_a_name(notebook):
 
 
 @pytest.mark.parametrize(
-    "change", [pass_tests, own_test, more_points, answers_for_tests, text_for_tests, two_of_a_name]
+    "change",
+    [
+        pass_tests,
+        helpers_after_tests,
+        own_test,
+        more_points,
+        answers_for_tests,
+        text_for_tests,
+        raw_for_tests,
+        two_of_a_name,
+    ],
 )
 def test_changed_tests_earn_nothing(course, change):
     notebook = handed_in(EASIER, first=EASY)
@@ -188,6 +241,83 @@ def test_hidden_inputs_are_not_in_the_feedback(course):
     assert "cells: 4" in page
     assert "cells: 30" not in page
     assert "cells: 5" not in page
+
+
+TELLS = {
+    "line": "import linecache; linecache.getline = lambda *a: f'cells: {len(belief)}'; assert len(belief) < 5",
+    "class": "if len(belief) > 5: raise type(f'cells: {len(belief)}', (UnicodeDecodeError,), {})(*UNREADABLE)",
+}
+
+
+@pytest.mark.parametrize("kind", TELLS)
+def test_an_error_does_not_tell_hidden_inputs(course, kind):
+    notebook = handed_in(inside("locate", TELLS[kind]), first="UNREADABLE = 'ascii', b'x', 0, 1, ''")
+    assert graded(course, f"tells-{kind}", notebook).score == 11
+    graded_notebook = place(course, "autograded", f"tells-{kind}", NAME).read_text()
+    assert "cells: 30" not in graded_notebook
+
+
+def test_feedback_runs_no_scripts(course):
+    show = """
+from IPython.display import HTML, Javascript, display
+display(HTML("<script>" + "alert(1)</script>"))
+display(Javascript("alert" + "(2)"))
+display({"image/svg+xml": "<svg onload=" + "'alert(3)'/>", "image/png": '"><script>' + "alert(4)</script>"}, raw=True)
+"""
+    notebook = handed_in(first=show)
+    text = "<script>alert(5)</script><img src=x onerror='alert(6)'> **bold** $a < b$"
+    notebook.cells.append(new_markdown_cell(text))
+    notebook.metadata["title"] = "<script>alert(7)</script>"
+    notebook.metadata["widgets"] = {"application/vnd.jupyter.widget-state+json": {"x": "<script>alert(8)</script>"}}
+    assert graded(course, "scripts", notebook).score == 13
+    with course_api(course) as api:
+        assert api.generate_feedback(NAME, "scripts")["success"]
+    page = place(course, "feedback", "scripts", NAME).with_suffix(".html").read_text()
+    for number in range(1, 9):
+        assert f"<script>alert({number})" not in page
+    assert "onerror" not in page
+    assert "<svg onload=" not in page
+    assert "<strong>bold</strong>" in page
+
+
+def test_nothing_that_lies_beside_a_notebook_runs(course, tmp_path):
+    folder = place(course, "submitted", "beside", NAME).parent
+    names = ("nbgrader_config", "sitecustomize", "numpy", "filterpy", "semgrid_instructor/__init__", "ipython_config")
+    for name in names:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / f"{name}.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')")
+    assert graded(course, "beside", handed_in()).score == 13
+    assert not (tmp_path / "ran").exists()
+
+
+def test_links_are_not_followed(course):
+    graded(course, "owner", handed_in())
+    folder = place(course, "submitted", "borrower", NAME).parent
+    folder.parent.mkdir()
+    folder.symlink_to(place(course, "submitted", "owner", NAME).parent)
+    result = grade_one(course, NAME, "borrower", SETTINGS)
+    assert result.score == 0
+    assert "a link" in result.note
+
+
+def test_many_cells_that_never_end_are_stopped(course):
+    notebook = handed_in(first="def f(): pass")
+    notebook.cells[1:1] = [new_code_cell("while True: pass") for _ in range(30)]
+    path = place(course, "submitted", "endless", NAME)
+    write_notebook(notebook, path)
+    began = time.monotonic()
+    result = grade_one(course, NAME, "endless", GradeSettings(timeout=1))
+    assert result.score == 0
+    assert "used up their time" in result.note
+    assert time.monotonic() - began < 100
+
+
+def test_a_name_that_nbgrader_takes_for_a_pattern_reaches_nobody_else(course):
+    before = graded(course, "neighbour", handed_in())
+    for name in ("*", "neighbou[r]"):
+        result = graded(course, name, handed_in({}))
+        assert "rename the folder" in result.note
+    assert grade_one(course, NAME, "neighbour", SETTINGS) == before
 
 
 LEAVE = """

@@ -66,6 +66,7 @@ def check_predict_wall(predict: Callable) -> None:
         belief, moved = rng.dirichlet(np.ones(n_cells)), rng.dirichlet(np.ones(reach))
         got = answer_array(predict(belief.copy(), moved.copy(), ring=False))
         assert got.shape == belief.shape, f"shape {got.shape} instead of {belief.shape}"
+        assert not np.allclose(got, belief), "nothing has moved"
         beyond = np.convolve(belief, moved)
         expected = np.append(beyond[: n_cells - 1], beyond[n_cells - 1 :].sum())
         wide = answer_array(predict(np.pad(belief, reach), moved.copy()))

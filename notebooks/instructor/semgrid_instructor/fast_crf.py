@@ -133,5 +133,7 @@ def check_refine(refine: Callable) -> None:
 def check_refine_memory(refine: Callable) -> None:
     """Whether memory grows with the number of cells, not of pairs."""
     log_g, o = _street(128, 4, (45, 44))
-    _, megabytes = peak_megabytes(refine, log_g, o)
+    refined, megabytes = peak_megabytes(refine, log_g, o)
+    refined = answer_array(refined)
+    assert np.ptp(refined) > 0, "NaN, or the same number everywhere"
     assert megabytes < 25, f"1980 cells took {megabytes:.0f} MB"

@@ -3,11 +3,12 @@
 import os
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import semgrid_edu
-from semgrid_edu.course.isolation import landlock
+from semgrid_edu.course.isolation import landlock, seccomp
 from semgrid_edu.storage.shipped import shipped_folder
 
 PARTS = ("memory", "written files", "processes", "files", "network", "signals")
@@ -31,7 +32,7 @@ class Limits:
     memory : int
         How much memory its code may take, megabytes.
     written : int
-        The size of the largest file that it may write, megabytes.
+        The size of the largest file that it may write, megabytes; all its files may take three times as much.
     processes : int
         How many processes and threads the user may have in all.
     """
@@ -56,10 +57,12 @@ def limit_this_process(limits: Limits, folder: Path) -> list[str]:
     list of str
         Those of `PARTS` that have been limited.
     """
+    _be_first_to_end()
     done = _limit_resources(limits)
     if landlock.version():
         done += landlock.restrict(*_readable(), [folder, Path("/dev/null")])
-    return done
+    # Landlock knows of networks only TCP; without sockets there is none.
+    return [*done, "network"] if seccomp.refuse_calls() else done
 
 
 def threads_of_this_user() -> int:
@@ -85,10 +88,17 @@ def _limit_resources(limits: Limits) -> list[str]:
         "memory": (resource.RLIMIT_AS, pages * resource.getpagesize() + limits.memory * MEGABYTE),
         "written files": (resource.RLIMIT_FSIZE, limits.written * MEGABYTE),
     }
+    _set(resource.RLIMIT_CORE, 0)
     # The superuser is exempt from this one.
     if os.getuid():
         wanted["processes"] = resource.RLIMIT_NPROC, limits.processes
     return [part for part, (kind, value) in wanted.items() if _set(kind, value)]
+
+
+def _be_first_to_end() -> None:
+    """Let Linux end this process and its children before any other when all memory is taken."""
+    with suppress(OSError):
+        Path("/proc/self/oom_score_adj").write_text("1000")
 
 
 def _set(kind: int, value: int) -> bool:

@@ -1,5 +1,7 @@
 """A submission, cell by cell: answers run in the student's process, tests in the grader's."""
 
+import json
+import re
 from collections.abc import Callable, Mapping, Sequence
 
 from nbformat import NotebookNode
@@ -9,6 +11,9 @@ from nbgrader.utils import is_grade, is_solution
 from semgrid_edu.course.isolation.process import StudentProcess
 from semgrid_edu.course.isolation.session import AnswerEndedError, AnswerTimeoutError, Session
 from semgrid_edu.course.isolation.tests import CellTests
+
+MOST_OUTPUT = 30_000_000
+"""Characters of all outputs of a notebook that are kept."""
 
 ENDS = tuple(kind.__name__ for kind in (AnswerEndedError, AnswerTimeoutError))
 """The errors of an answer that ended its process, or had to be ended."""
@@ -43,10 +48,12 @@ def run_submission(
     """
     seen, unseen = Session(start, timeout), Session(start, timeout, secret=True)
     tests = CellTests(seen, unseen, variant)
+    room = MOST_OUTPUT
     try:
+        _prepare(notebook, trusted, tests)
         for number, cell in enumerate((c for c in notebook.cells if c.cell_type == "code"), start=1):
             cell.execution_count = number
-            cell.outputs = _outputs(cell, trusted, tests)
+            cell.outputs, room = _kept(_outputs(cell, trusted, tests), room)
         return {cell_name(c): o.evalue for c in notebook.cells for o in c.get("outputs", []) if o.get("ename") in ENDS}
     finally:
         seen.stop()
@@ -71,16 +78,31 @@ def cell_name(cell: NotebookNode) -> str:
     return name if isinstance(name, str) else ""
 
 
+def _prepare(notebook: NotebookNode, trusted: Mapping[str, str], tests: CellTests) -> None:
+    """Run the instructor's cells that aren't tests, in the course's order, whatever order the student gave them."""
+    cells = {cell_name(cell): cell for cell in notebook.cells if cell.cell_type == "code"}
+    for name, source in trusted.items():
+        if name in cells and not is_grade(cells[name]) and not is_solution(cells[name]):
+            tests.prepare(source)
+
+
+def _kept(outputs: list[NotebookNode], room: int) -> tuple[list[NotebookNode], int]:
+    """Return outputs, shortened when the notebook has no room left for them, and the room that is left then."""
+    size = len(json.dumps(outputs))
+    if size <= room:
+        return outputs, room - size
+    says = "all outputs together are too long to be shown"
+    return [_error(one.ename[:99], says) for one in outputs if one.output_type == "error"], room
+
+
 def _outputs(cell: NotebookNode, trusted: Mapping[str, str], tests: CellTests) -> list[NotebookNode]:
     """Run a cell where it belongs."""
-    is_trusted = trusted.get(cell_name(cell)) == cell.source and not is_solution(cell)
     if is_grade(cell) and not is_solution(cell):
+        is_trusted = trusted.get(cell_name(cell)) == cell.source
         # Without an error nbgrader would give all points.
         return (
             tests.test(cell.source, cell_name(cell)) if is_trusted else [_error("ValueError", "not the course's test")]
         )
-    if is_trusted:
-        tests.prepare(cell.source)
     tests.unseen.run_later(cell.source)
     return _as_outputs(tests.seen.run(cell.source))
 
@@ -88,11 +110,21 @@ def _outputs(cell: NotebookNode, trusted: Mapping[str, str], tests: CellTests) -
 def _as_outputs(reply: dict) -> list[NotebookNode]:
     """Return what a cell put out as a notebook holds it."""
     streams = [new_output("stream", name=name, text=text) for name, text in reply["streams"].items() if text]
-    shown = [new_output("display_data", data=data) for data in reply["shown"]]
+    shown = [new_output("display_data", data=data) for data in map(_harmless, reply["shown"]) if data]
     error = reply.get("error")
     if error is None:
         return streams + shown
     return [*streams, *shown, _error(error["kind"], error["says"], error["traceback"])]
+
+
+def _harmless(shown: dict[str, str]) -> dict[str, str]:
+    """Return text and pictures. HTML and SVG could hold scripts, which would run in the browser of who grades."""
+    pictures = ("image/png", "image/jpeg")
+    return {
+        kind: data
+        for kind, data in shown.items()
+        if kind == "text/plain" or (kind in pictures and re.fullmatch(r"[A-Za-z0-9+/=\s]*", data))
+    }
 
 
 def _error(kind: str, says: str, lines: Sequence[str] = ()) -> NotebookNode:

@@ -16,7 +16,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from semgrid_edu.course.isolation.limits import PARTS, Limits, threads_of_this_user
+from semgrid_edu.course.isolation.folder import delete, takes_too_much
+from semgrid_edu.course.isolation.limits import MEGABYTE, PARTS, Limits, threads_of_this_user
 from semgrid_edu.course.isolation.values import decode, encode
 from semgrid_edu.course.isolation.wire import Wire
 from semgrid_edu.errors import ArgumentError
@@ -24,11 +25,14 @@ from semgrid_edu.storage.files import atomic_path
 
 WORKER = (sys.executable, "-m", "semgrid_edu.course.isolation.worker")
 
-ALONE = ("unshare", "--user", "--map-root-user", "--net", "--ipc", "--pid", "--mount-proc", "--fork", "--kill-child")
+ALONE = ("unshare", "--user", "--map-current-user", "--net", "--ipc", "--pid", "--mount-proc", "--fork", "--kill-child")
 """Starts a program that sees no network and no processes but its own (util-linux; needs no privileges)."""
 
 KEPT = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT")
 """What a student's process inherits of the environment."""
+
+WATCHED = 0.5
+"""Seconds from one look at the files of a process to the next."""
 
 STARTED = 60.0
 """Seconds that a process may take to start."""
@@ -78,6 +82,7 @@ class StudentProcess:
         self.received: queue.Queue[bytes | None] = queue.Queue()
         self.speaker = threading.Thread(target=self._speak, daemon=True)
         self.speaker.start()
+        threading.Thread(target=self._watch, args=(3 * limits.written * MEGABYTE,), daemon=True).start()
         self.unlimited = [] if container else self._limit(limits, alone)
 
     def _limit(self, limits: Limits, alone: tuple[str, ...]) -> list[str]:
@@ -106,6 +111,18 @@ class StudentProcess:
                 self.received.put(self.wire.receive())
             except (OSError, ValueError, MemoryError):
                 self.received.put(None)
+
+    def _watch(self, most: int) -> None:
+        """End the process when all its files together become too large, or too many."""
+        while self.process.poll() is None:
+            if takes_too_much(self.folder, most):
+                self._kill()
+            time.sleep(WATCHED)
+
+    def _kill(self) -> None:
+        """End the process and those in its session."""
+        with suppress(OSError):
+            os.killpg(self.process.pid, signal.SIGKILL) if hasattr(os, "killpg") else self.process.kill()
 
     def ask(self, message: dict, deadline: float, callbacks: list[Callable] | None = None) -> dict[str, Any]:
         """Send a message and return the reply.
@@ -156,8 +173,7 @@ class StudentProcess:
     def stop(self) -> None:
         """End the process with all that it has started, and delete its folder."""
         self.sent.put(None)
-        with suppress(OSError):
-            os.killpg(self.process.pid, signal.SIGKILL) if hasattr(os, "killpg") else self.process.kill()
+        self._kill()
         self.process.wait()
         self.speaker.join(timeout=1)
         if not self.speaker.is_alive():
@@ -166,7 +182,7 @@ class StudentProcess:
                     pipe.close()
         if self.keeps:
             shutil.copytree(self.folder / "prepared", self.prepared, copy_function=_replace, dirs_exist_ok=True)
-        shutil.rmtree(self.folder, ignore_errors=True)
+        delete(self.folder)
 
 
 def _replace(source: str, target: str) -> None:

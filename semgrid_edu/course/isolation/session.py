@@ -8,6 +8,9 @@ from typing import Any
 from semgrid_edu.course.isolation.process import ProcessEndedError, StudentProcess
 from semgrid_edu.course.isolation.put_back import put_back
 
+ALL = 20
+"""How many times the time of a cell all cells and calls together may take."""
+
 
 class AnswerTimeoutError(Exception):
     """An answer has not come back in time."""
@@ -45,11 +48,12 @@ class Session:
         self.cells: list[str] = []
         self.waiting: list[str] = []
         self.printed = ""
+        self.left_in_all = ALL * timeout
         self.begin()
 
     def begin(self) -> None:
         """Let the time of a cell begin."""
-        self.deadline = time.monotonic() + self.timeout
+        self.left = self.timeout
 
     def run(self, code: str) -> dict[str, Any]:
         """Run a cell; one that ends the process, or doesn't end, is left out from then on.
@@ -100,8 +104,9 @@ class Session:
             notebook doesn't define are left out.
         """
         reply = self._ask({"do": "names", "wanted": wanted})
-        functions = {name: RemoteFunction(self, name, unseen) for name in reply.get("functions", [])}
-        return reply.get("values", {}) | functions
+        # The reply may hold any names; those that weren't asked for would replace what the tests rely on.
+        functions = {name: RemoteFunction(self, name, unseen) for name in reply.get("functions", []) if name in wanted}
+        return {name: value for name, value in reply.get("values", {}).items() if name in wanted} | functions
 
     def call(self, name: str, arguments: tuple, named: dict, measured: bool) -> tuple[Any, float]:
         """Call a function of the notebook, and change the arguments that it changes.
@@ -136,7 +141,10 @@ class Session:
         if "changed" in reply:
             put_back((arguments, named), reply["changed"])
         if "error" in reply:
-            raise _as_error(reply["error"], self.secret)
+            told = reply["error"]
+            # A line that is in no cell was put there to tell something else.
+            known = any(told["line"] in cell for cell in self.cells)
+            raise _as_error(told | {"line": told["line"] if known else ""}, self.secret)
         return reply["result"], reply.get("megabytes", float("nan"))
 
     def _catch_up(self) -> None:
@@ -146,21 +154,29 @@ class Session:
         self.begin()
 
     def _ask(self, message: dict, callbacks: list[Callable] | None = None) -> dict[str, Any]:
-        """Ask the process, one that is alive."""
+        """Ask the process, one that is alive; only the time that passes meanwhile counts as the student's."""
+        if self.left_in_all <= 0:
+            raise AnswerTimeoutError(f"all cells together have used up their time, {ALL * self.timeout:g} s")
         if self.process is None:
             self._start_again()
+        began = time.monotonic()
         try:
-            return self.process.ask(message, self.deadline, callbacks)
+            return self.process.ask(message, began + self.left, callbacks)
         except TimeoutError:
             self.process = None
             raise AnswerTimeoutError(f"no reply before timeout, {self.timeout:g} s: does a loop never end?") from None
         except ProcessEndedError:
             self.process = None
             raise AnswerEndedError("Python itself ended here: by exit(), a crash, or for want of memory?") from None
+        finally:
+            self.left -= time.monotonic() - began
+            self.left_in_all -= time.monotonic() - began
 
     def _start_again(self) -> None:
         """Start a process, and run in it the cells that ran before."""
+        began = time.monotonic()
         self.process = self.start()
+        self.left_in_all -= time.monotonic() - began
         cells, self.cells = self.cells, []
         for code in cells:
             self.run(code)
@@ -213,13 +229,14 @@ class RemoteFunction:
 def _as_error(told: dict[str, Any], secret: bool) -> Exception:
     """Return the error that an answer raised, of the same standard kind."""
     kind = getattr(builtins, told["standard"], Exception)
-    if not issubclass(kind, Exception) or kind is Exception:
+    # A StopIteration would silently end a loop of the test.
+    if not issubclass(kind, Exception) or kind is Exception or issubclass(kind, StopIteration | StopAsyncIteration):
         kind, told = AnswerError, told | {"says": f"{told['kind']}: {told['says']}"}
     says = f"in the line `{told['line']}`" if secret else told["says"]
     try:
         error = kind(says)
     except TypeError:
-        error = AnswerError(f"{told['kind']}: {says}")
+        error = AnswerError(f"{kind.__name__}: {says}")
     if told["line"]:
         error.add_note(f"in your line: {told['line']}")
     return error

@@ -30,6 +30,16 @@ KINDS = "?biufcUS"
 """The kinds of array that pass, numpy's letters: booleans, numbers and texts."""
 
 
+MOST_BYTES = 150_000_000
+"""Bytes of all arrays of a message."""
+
+MOST_JSON = 20_000_000
+"""Bytes of a message outside its arrays: lists of a million numbers, and what the grader can hold a hundred times."""
+
+MOST_KEYS = 20_000
+"""Entries of a set or dict: keys chosen so that all collide take the square of their number to put in."""
+
+
 class NotPlainError(TypeError):
     """A value that can't pass."""
 
@@ -58,6 +68,8 @@ def encode(value: Any, callbacks: list[Callable] | None = None) -> bytes:
     arrays: list[NDArray] = []
     tree = _tree(value, arrays, callbacks)
     head = json.dumps({"value": tree, "arrays": [[array.dtype.str, array.shape] for array in arrays]})
+    if len(head) > MOST_JSON or sum(array.nbytes for array in arrays) > MOST_BYTES:
+        raise NotPlainError("more than can be sent: is it as long as it should be, and an array rather than a list?")
     return b"".join([head.encode(), b"\n", *(array.tobytes() for array in arrays)])
 
 
@@ -83,6 +95,8 @@ def decode(data: bytes, callback: Callable[[int], Callable] | None = None) -> An
     """
     head, _, rest = data.partition(b"\n")
     try:
+        if len(head) > MOST_JSON:
+            raise ValueError(f"{len(head)} bytes of JSON")
         message = json.loads(head)
         arrays = _arrays(message["arrays"], rest)
         return _value(message["value"], arrays, callback)
@@ -103,6 +117,8 @@ def _tree(value: Any, arrays: list[NDArray], callbacks: list[Callable] | None) -
     for kind in (int, float, str):
         if isinstance(value, kind) and not isinstance(value, np.generic):
             return kind(value)
+    if isinstance(value, set | frozenset | dict) and len(value) > MOST_KEYS:
+        raise NotPlainError(f"a {type(value).__name__} of {len(value)} entries, more than {MOST_KEYS}")
     for kind in (tuple, set, frozenset):
         if isinstance(value, kind):
             return {kind.__name__: trees(value)}
@@ -136,8 +152,8 @@ def _path(value: Any) -> str | None:
     return f"{type(value).__module__}.{type(value).__qualname__}" if is_dataclass(value) else None
 
 
-def _arrays(described: list, data: bytes) -> list[NDArray]:
-    """Cut the bytes of a message into arrays."""
+def _arrays(described: list, data: bytes) -> dict[int, NDArray]:
+    """Cut the bytes of a message into arrays, each of which may stand in one place of the value."""
     found, start = [], 0
     for text, shape in described:
         dtype = np.dtype(text)
@@ -148,10 +164,10 @@ def _arrays(described: list, data: bytes) -> list[NDArray]:
             raise ValueError(f"{len(data)} bytes where {end} are needed")
         found.append(np.frombuffer(data[start:end], dtype).reshape(shape).copy())
         start = end
-    return found
+    return dict(enumerate(found))
 
 
-def _value(tree: Any, arrays: list[NDArray], callback: Callable[[int], Callable] | None) -> Any:
+def _value(tree: Any, arrays: dict[int, NDArray], callback: Callable[[int], Callable] | None) -> Any:
     """Return the value that a tree of JSON stands for."""
     if isinstance(tree, list):
         return [_value(one, arrays, callback) for one in tree]
@@ -159,12 +175,14 @@ def _value(tree: Any, arrays: list[NDArray], callback: Callable[[int], Callable]
         return tree
     kind, content = next(iter(tree.items()))
     if kind == "array":
-        return arrays[content]
+        return arrays.pop(content)
     if kind == "function":
         return callback(content)
     if kind == "record":
         return _record(content, _value(tree["fields"], arrays, callback))
     inner = _value(content, arrays, callback)
+    if kind in ("set", "frozenset", "dict") and len(inner) > MOST_KEYS:
+        raise ValueError(f"a {kind} of {len(inner)} entries")
     makers = {"tuple": tuple, "set": set, "frozenset": frozenset, "dict": dict, "scalar": lambda array: array[()]}
     return np.array(inner, dtype=object) if kind == "objects" else makers[kind](inner)
 

@@ -2,7 +2,7 @@
 
 from typing import BinaryIO
 
-LONGEST = 500_000_000
+LONGEST = 200_000_000
 """Bytes of a message that are still read."""
 
 

@@ -25,6 +25,9 @@ from semgrid_edu.course.isolation.wire import Wire
 MOST_TEXT = 20_000
 """Characters of a text that are kept."""
 
+MOST_SHOWN = 5_000_000
+"""Characters of all that a cell displays, pictures among it, that are kept."""
+
 
 class Shell(InteractiveShell):
     """Runs cells as a notebook's kernel does, without a screen."""
@@ -41,6 +44,16 @@ class Shell(InteractiveShell):
     def ask_exit(self) -> None:
         """End the cell or call that says `exit()`."""
         raise SystemExit
+
+    def system(self, cmd: str) -> None:
+        """Run a line that begins with "!", without the terminal that IPython gives it elsewhere.
+
+        Parameters
+        ----------
+        cmd : str
+            The line.
+        """
+        self.system_raw(cmd)
 
 
 class Worker:
@@ -95,9 +108,9 @@ class Worker:
         with capture_output() as captured:
             result = self.shell.run_cell(code)
         error = result.error_before_exec or result.error_in_exec
-        found = {"streams": _streams(captured), "shown": [_shown(one) for one in captured.outputs]}
+        found = {"streams": _streams(captured), "shown": _shown(captured.outputs)}
         if error is not None:
-            found["error"] = _told(error) | {"traceback": [line[:MOST_TEXT] for line in self.traceback]}
+            found["error"] = _told(error) | {"traceback": [_text(line) for line in self.traceback]}
         return found
 
     def names(self, wanted: list[str]) -> dict:
@@ -175,12 +188,24 @@ def _traced(measured: bool) -> Iterator[Callable[[], float]]:
 
 def _streams(captured: Any) -> dict[str, str]:
     """Return what was printed."""
-    return {"stdout": captured.stdout[:MOST_TEXT], "stderr": captured.stderr[:MOST_TEXT]}
+    return {"stdout": _text(captured.stdout), "stderr": _text(captured.stderr)}
 
 
-def _shown(output: RichOutput) -> dict[str, str]:
-    """Return what was displayed, as far as it is text or a picture in text."""
-    return {kind: data for kind, data in output.data.items() if isinstance(data, str)}
+def _text(text: str) -> str:
+    """Return the beginning of a text, with a question mark for what can't be written to a file."""
+    return text[:MOST_TEXT].encode("utf-8", "replace").decode()
+
+
+def _shown(outputs: list[RichOutput]) -> list[dict[str, str]]:
+    """Return what was displayed, as far as it is text or a picture in text, and not too much."""
+    kept, size = [], 0
+    for output in outputs:
+        data = {kind: data for kind, data in output.data.items() if isinstance(data, str)}
+        size += sum(map(len, data.values()))
+        if size > MOST_SHOWN:
+            break
+        kept.append(data)
+    return kept
 
 
 def _told(error: BaseException) -> dict[str, Any]:
@@ -189,7 +214,7 @@ def _told(error: BaseException) -> dict[str, Any]:
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename.startswith("<ipython")]
     line = linecache.getline(frames[-1].filename, frames[-1].lineno).strip() if frames else ""
     kind = type(error).__name__
-    return {"kind": kind, "standard": kinds[0], "says": str(error)[:MOST_TEXT], "line": line[:200]}
+    return {"kind": kind, "standard": kinds[0], "says": _text(str(error)), "line": _text(line)[:200]}
 
 
 def _main() -> None:

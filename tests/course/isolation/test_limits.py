@@ -1,6 +1,8 @@
 """What a student's code can't reach, on a system that can limit it; elsewhere the process says what it couldn't."""
 
+import errno
 import os
+import platform
 import signal
 import socket
 import subprocess
@@ -9,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import semgrid_edu
-from semgrid_edu.course.isolation import landlock
+from semgrid_edu.course.isolation import landlock, seccomp
 from semgrid_edu.course.isolation.limits import PARTS, Limits, _all_but
 from semgrid_edu.course.isolation.process import StudentProcess
 from semgrid_edu.course.notebooks import NOTEBOOKS
@@ -75,6 +77,42 @@ def test_no_network(limited):
         address = server.getsockname()
         got = limited(f"__import__('socket').create_connection({address!r}, 2).fileno()", "network")
     assert got[0] == "error"
+
+
+@pytest.mark.parametrize("kind", ["AF_INET, SOCK_DGRAM", "AF_UNIX, SOCK_STREAM", "AF_NETLINK, SOCK_RAW"])
+def test_no_socket_of_any_kind(limited, kind):
+    family, way = (f"__import__('socket').{name}" for name in kind.split(", "))
+    assert limited(f"__import__('socket').socket({family}, {way}).fileno()", "network") == ("error", "PermissionError")
+
+
+@pytest.mark.parametrize("name", seccomp.NUMBERS.get(platform.machine(), {}))
+def test_calls_that_were_given_up_are_refused(session, name):
+    number = seccomp.NUMBERS[platform.machine()][name]
+    session.run(f"import ctypes\nlibc = ctypes.CDLL(None, use_errno=True)\ngot = libc.syscall({number}, 0, 0, 0, 0, 0)")
+    session.run("error = ctypes.get_errno()")
+    assert session.names(["got", "error"], session) == {"got": -1, "error": errno.EPERM}
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "for k in range(100): open(f'{k}', 'wb').write(bytes(2_000_000))",
+        "for k in range(30_000): open(f'{k}', 'w')",
+    ],
+    ids=["large", "many"],
+)
+def test_all_files_together_have_an_end(session, code):
+    assert session.run(f"{code}\nimport time; time.sleep(3)")["error"]["kind"] == "AnswerEndedError"
+
+
+def test_a_folder_that_cannot_be_listed_is_gone_afterwards(session):
+    session.run(
+        "import os\nfor k in range(1500):\n    os.mkdir('d')\n    os.chdir('d')\nos.chdir(os.environ['HOME'])\n"
+        "os.mkdir('closed')\nopen('closed/x', 'w')\nos.chmod('closed', 0)\nos.symlink('/etc', 'link')\nos.chmod('.', 0)"
+    )
+    folder = session.process.folder
+    session.stop()
+    assert not folder.exists()
 
 
 def test_the_grader_cannot_be_stopped(limited):

@@ -1,6 +1,7 @@
 """A student's process: calls look as if they were made here, and nothing that it does stops the next call."""
 
 import math
+import time
 
 import numpy as np
 import pytest
@@ -13,6 +14,41 @@ def test_cells_share_names_and_display(session):
     shown = session.run("from IPython.display import display\ndisplay(x + 1)")["shown"]
     assert shown == [{"text/plain": "4"}]
     assert session.names(["x", "y"], session) == {"x": 3}
+
+
+def test_no_reply_names_what_was_not_asked_for(session):
+    session.run(
+        "import __main__\nf = 1\n"
+        "__main__.Worker.names = lambda self, wanted: "
+        "{'functions': [*wanted, 'isinstance'], 'values': {'np': 1, 'answer_array': 2}}"
+    )
+    assert set(session.names(["f"], session)) == {"f"}
+
+
+def test_shell_commands_run(session):
+    assert "error" not in session.run("!echo 1\nx = 1")
+    assert session.names(["x"], session) == {"x": 1}
+
+
+def test_too_many_pictures_are_left_out(session):
+    reply = session.run("from IPython.display import HTML, display\nfor _ in range(9): display(HTML('x' * 10**6))")
+    assert "error" not in reply
+    assert 1 <= len(reply["shown"]) < 9
+
+
+def test_only_the_students_own_time_counts(session, answer):
+    session.timeout = 1
+    f = answer("def f():\n    return 1")
+    session.begin()
+    time.sleep(1.2)
+    assert f() == 1
+
+
+def test_all_cells_together_have_an_end(session):
+    session.run("pass")
+    session.left_in_all = 0.3
+    assert session.run("while True: pass")["error"]["kind"] == "AnswerTimeoutError" or session.left_in_all <= 0
+    assert "used up their time" in session.run("x = 1")["error"]["says"]
 
 
 def test_notebooks_own_syntax_runs(session):
@@ -65,6 +101,7 @@ def test_an_error_of_a_function_that_is_given_reaches_the_answer(answer):
         ("return object()", TypeError, "a object where numbers"),
         ("return (n for n in 'ab')", TypeError, "a generator where numbers"),
         ("return f()", RecursionError, "recursion"),
+        ("raise StopIteration('ends loops')", AnswerError, "StopIteration"),
         ("return bytearray(10**10)", MemoryError, "bytearray"),
     ],
 )
@@ -142,6 +179,10 @@ def test_exit_in_a_cell_ends_that_cell(session):
         "import numpy as np; np.seterr(all='print'); np.array([1.0]) / 0",
         "import matplotlib.pyplot as plt; plt.title('x', family='no such font'); plt.show()",
         "print('x' * 10**6)",
+        "print(chr(0xD800))",
+        "import warnings; warnings.simplefilter('error')",
+        "import numpy as np; np.seterr(all='raise')",
+        "import threading, time; threading.Thread(target=time.sleep, args=(9,)).start()",
     ],
 )
 def test_what_is_said_beside_does_not_matter(answer, code):

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from semgrid_edu.course.isolation.values import NotPlainError, decode, encode
+from semgrid_edu.course.isolation.values import MOST_JSON, MOST_KEYS, NotPlainError, decode, encode
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import Factor
@@ -112,6 +112,14 @@ def test_an_object_in_an_array_is_not_pickled():
         encode(np.array([Pickled()], dtype=object))
 
 
+@pytest.mark.parametrize(
+    "value", [set(range(MOST_KEYS + 1)), [0.123456789] * 2_000_000, np.zeros(200_000_000, dtype=np.uint8)]
+)
+def test_what_the_other_side_would_refuse_is_not_sent(value):
+    with pytest.raises(NotPlainError, match="more than"):
+        encode(value)
+
+
 def message(value, described=(), data=b""):
     return json.dumps({"value": value, "arrays": list(described)}).encode() + b"\n" + data
 
@@ -133,6 +141,9 @@ def message(value, described=(), data=b""):
         message({"array": 0}, [["<f8", [10**30]]], b"12345678"),
         message({"array": 0}, [["V9", [1]]], b"123456789"),
         b'{"value": ' + b"[" * 100_000,
+        message([{"array": 0}, {"array": 0}], [["<f8", [1]]], b"12345678"),
+        message({"dict": [[k * (2**61 - 1), 0] for k in range(MOST_KEYS + 1)]}),
+        b'{"value": [' + b"[]," * (MOST_JSON // 3) + b"[]]}",
     ],
 )
 def test_bytes_of_another_kind_are_refused(data):
