@@ -59,11 +59,16 @@ def check() -> None:
 
 
 @course.command()
-def build(folder: Annotated[Path, typer.Argument(help="A missing or empty folder, or a course built before.")]) -> None:
+def build(
+    folder: Annotated[Path, typer.Argument(help="A missing or empty folder, or a course built before.")],
+    lectures: Annotated[
+        str | None, typer.Option(help="Address or path at which students find 00_tour.ipynb; exercises link there.")
+    ] = None,
+) -> None:
     """Lay out a complete nbgrader course for an instructor."""
     from semgrid_edu.course.exercises import build_course
 
-    built = build_course(folder)
+    built = build_course(folder, lectures=lectures)
     names = built.assignments
     typer.echo(f"{folder}: {len(names)} assignments, {', '.join(names)}; read {folder / 'README.md'}")
     for name in built.kept:

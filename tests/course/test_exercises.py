@@ -1,6 +1,7 @@
 """Student versions and the instructor's course, against what nbgrader itself makes of the same source."""
 
 import os
+import re
 import subprocess
 import sys
 
@@ -10,6 +11,7 @@ from tiny_course import tiny_notebooks
 
 from semgrid_edu.course.exercises import build_course, build_exercise, exercise_sources, student_version
 from semgrid_edu.course.grading import GradeSettings, autograde, autograde_one, place, reference_answers, submission
+from semgrid_edu.course.links import point_links
 from semgrid_edu.course.notebooks import NOTEBOOKS
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.files import write_text
@@ -156,6 +158,37 @@ def test_what_the_instructor_changed_stays_and_is_named(tmp_path, notebooks):
         "nbgrader_config.py",
         "instructor/semgrid_instructor/tiny.py",
     ]
+
+
+RELATIVE = r"\]\((?!https?://)"
+
+
+def released_links(course):
+    return "\n".join(path.read_text() for path in sorted((course / "release").glob("*/*.ipynb")))
+
+
+def test_released_exercises_link_to_where_students_find_the_lectures(tmp_path):
+    notebooks = tiny_notebooks(tmp_path / "notebooks")
+    source = notebooks / "src" / "exercises" / "00_tiny.py"
+    source.write_text(source.read_text().replace("# # A tiny exercise", "# See [the tour](../00_tour.ipynb)."))
+    course = tmp_path / "course"
+    build_course(course, notebooks)
+    assert "See the tour." in released_links(course)
+    build_course(course, notebooks, "https://course.example/lectures/")
+    assert "See [the tour](https://course.example/lectures/00_tour.ipynb)." in released_links(course)
+    build_course(course, notebooks)
+    assert "https://course.example/lectures/00_tour.ipynb" in released_links(course), "it is remembered"
+    assert build_course(course, notebooks, "../lectures").kept == []
+    assert "See [the tour](../lectures/00_tour.ipynb)." in released_links(course)
+    with pytest.raises(ArgumentError, match="blanks"):
+        build_course(course, notebooks, "my lectures")
+
+
+@pytest.mark.parametrize("source", exercise_sources(), ids=lambda source: source.stem)
+def test_no_link_of_a_released_exercise_is_dead(source):
+    text = "\n".join(cell.source for cell in student_version(source).cells if cell.cell_type == "markdown")
+    assert "](../" in text, "an exercise links to its lecture"
+    assert not re.search(RELATIVE, point_links(text, "")), "a link that course build doesn't know"
 
 
 def test_without_exercises_nothing_is_written(tmp_path):
