@@ -116,7 +116,7 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS, lectures: str 
     folder : Path
         The folder of notebooks.
     lectures : str, optional
-        Where students find the lectures, to which exercises then link: see `point_links`. What was said last by default.
+        Where students find the lectures, to which exercises link: see `point_links`. What was said last by default.
 
     Returns
     -------

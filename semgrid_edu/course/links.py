@@ -1,4 +1,4 @@
-"""Links to code and notebooks: in the registers' tables, which are shown in the folder of notebooks, and in exercises."""
+"""Links to code and notebooks: in the registers' tables, shown in the folder of notebooks, and in exercises."""
 
 import re
 from importlib import import_module
