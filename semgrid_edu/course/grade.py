@@ -146,7 +146,8 @@ def is_graded(course: Path, assignment: str, student: str) -> bool:
             grades = gradebook.find_submission_notebook(assignment, assignment, student).grades
         except MissingEntry:
             return False
-        return all(grade.auto_score is not None or grade.needs_manual_grade for grade in grades)
+        scores = [(grade.auto_score, grade.manual_score) for grade in grades if not grade.needs_manual_grade]
+        return (None, None) not in scores
 
 
 def grade_one(course: Path, assignment: str, student: str, settings: GradeSettings) -> Graded:

@@ -7,12 +7,14 @@ import sys
 
 import nbformat
 import pytest
+from nbgrader.api import Gradebook
 from tiny_course import tiny_notebooks
 
 from semgrid_edu.course.exercises import build_course, build_exercise, exercise_sources, student_version
+from semgrid_edu.course.grade import grade_one, is_graded, write_graded
 from semgrid_edu.course.grading import GradeSettings, autograde, autograde_one, place, reference_answers, submission
 from semgrid_edu.course.links import point_links
-from semgrid_edu.course.notebooks import NOTEBOOKS
+from semgrid_edu.course.notebooks import NOTEBOOKS, write_notebook
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.files import write_text
 
@@ -82,6 +84,17 @@ def test_scores_come_from_nbgrader_and_a_second_build_keeps_them(course, noteboo
     rows = [line.split(",") for line in (course / "grades.csv").read_text().splitlines()]
     score, student = rows[0].index("score"), rows[0].index("student_id")
     assert {row[student]: float(row[score]) for row in rows[1:]} == {"right": 2, "stub": 0, "wrong": 0}
+
+
+def test_a_written_answer_that_was_read_stays_read(course, source):
+    write_notebook(submission(source, reference_answers(source)), place(course, "submitted", "reader", "00_tiny"))
+    assert grade_one(course, "00_tiny", "reader", GradeSettings()).to_read == 1
+    with Gradebook(f"sqlite:///{course / 'gradebook.db'}") as gradebook:
+        grade = gradebook.find_grade("why", "00_tiny", "00_tiny", "reader")
+        grade.manual_score, grade.needs_manual_grade = 1, False  # what formgrader writes
+        gradebook.db.commit()
+    assert is_graded(course, "00_tiny", "reader"), "or else it would be graded again, and wait for a person again"
+    assert "reader,00_tiny,3.0,3.0,0," in write_graded(course).read_text()
 
 
 def test_feedback_tells_nothing_of_the_hidden_inputs(course, source):
