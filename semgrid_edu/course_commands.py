@@ -91,10 +91,12 @@ def grade(
     ] = False,
 ) -> None:
     """Grade a class with nbgrader: students' code runs in processes of its own, apart from tests and gradebook."""
-    from semgrid_edu.course.grade import grade_course, write_graded
+    from semgrid_edu.course.grade import grade_course, missing_limits, write_graded
     from semgrid_edu.course.grading import GradeSettings
 
     settings = GradeSettings(timeout, memory, tuple(shlex.split(container)), seed_by_student)
+    if missing := missing_limits(settings):
+        typer.echo(f"this system can't limit for students' code: {', '.join(missing)}; the guide says more", err=True)
     try:
         for one in grade_course(folder, settings, assignments or (), again, workers):
             if one.note:

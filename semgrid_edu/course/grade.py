@@ -2,6 +2,7 @@
 
 import csv
 import io
+import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import astuple, dataclass, field, fields
@@ -15,6 +16,8 @@ from tqdm import tqdm
 
 from semgrid_edu.course.exercises import MARKER
 from semgrid_edu.course.grading import GradeSettings, autograde_one, place
+from semgrid_edu.course.isolation.limits import Limits
+from semgrid_edu.course.isolation.process import StudentProcess
 from semgrid_edu.course.nbgrader_steps import CRASHED
 from semgrid_edu.course.notebooks import write_notebook
 from semgrid_edu.errors import ArgumentError, DataError
@@ -126,6 +129,27 @@ def grade_course(
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
+
+
+def missing_limits(settings: GradeSettings) -> list[str]:
+    """Return what this system can't limit for students' code.
+
+    Parameters
+    ----------
+    settings : GradeSettings
+        How a class is graded.
+
+    Returns
+    -------
+    list of str
+        Of `limits.PARTS`; empty with a container, whose own command says what is limited.
+    """
+    if settings.container:
+        return []
+    with tempfile.TemporaryDirectory() as nothing:
+        process = StudentProcess(Limits(memory=settings.memory), Path(nothing))
+        process.stop()
+    return process.unlimited
 
 
 def is_graded(course: Path, assignment: str, student: str) -> bool:
