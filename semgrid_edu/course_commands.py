@@ -59,11 +59,16 @@ def check() -> None:
 
 
 @course.command()
-def build(folder: Annotated[Path, typer.Argument(help="A missing or empty folder, or a course built before.")]) -> None:
+def build(
+    folder: Annotated[Path, typer.Argument(help="A missing or empty folder, or a course built before.")],
+    lectures: Annotated[
+        str | None, typer.Option(help="Address or path at which students find 00_tour.ipynb; exercises link there.")
+    ] = None,
+) -> None:
     """Lay out a complete nbgrader course for an instructor."""
     from semgrid_edu.course.exercises import build_course
 
-    built = build_course(folder)
+    built = build_course(folder, lectures=lectures)
     names = built.assignments
     typer.echo(f"{folder}: {len(names)} assignments, {', '.join(names)}; read {folder / 'README.md'}")
     for name in built.kept:
@@ -86,10 +91,12 @@ def grade(
     ] = False,
 ) -> None:
     """Grade a class with nbgrader: students' code runs in processes of its own, apart from tests and gradebook."""
-    from semgrid_edu.course.grade import grade_course, write_graded
+    from semgrid_edu.course.grade import grade_course, missing_limits, write_graded
     from semgrid_edu.course.grading import GradeSettings
 
     settings = GradeSettings(timeout, memory, tuple(shlex.split(container)), seed_by_student)
+    if missing := missing_limits(settings):
+        typer.echo(f"this system can't limit for students' code: {', '.join(missing)}; the guide says more", err=True)
     try:
         for one in grade_course(folder, settings, assignments or (), again, workers):
             if one.note:

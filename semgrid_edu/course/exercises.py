@@ -21,6 +21,7 @@ from nbgrader.preprocessors import (
 )
 from traitlets.config import PyFileConfigLoader
 
+from semgrid_edu.course.links import point_links
 from semgrid_edu.course.notebooks import NOTEBOOKS, built_path, notebook_text, read_percent, write_notebook
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import write_json, write_text
@@ -102,7 +103,7 @@ class BuiltCourse:
     kept: list[str]
 
 
-def build_course(directory: str | Path, folder: Path = NOTEBOOKS) -> BuiltCourse:
+def build_course(directory: str | Path, folder: Path = NOTEBOOKS, lectures: str | None = None) -> BuiltCourse:
     """Write a complete nbgrader course: sources, settings, the instructor's module, gradebook and released versions.
 
     When it is run again, it brings up to date what the instructor hasn't changed, and leaves all else, submissions and
@@ -114,6 +115,8 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS) -> BuiltCourse
         The folder of the course: missing, empty, or with a course that was written before.
     folder : Path
         The folder of notebooks.
+    lectures : str, optional
+        Where students find the lectures, to which exercises link: see `point_links`. What was said last by default.
 
     Returns
     -------
@@ -130,29 +133,44 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS) -> BuiltCourse
     sources = exercise_sources(folder)
     if not sources:
         raise DataError(folder / "src" / "exercises", "the sources of the exercises", "none")
-    names = [source.stem for source in sources]
-    written, kept = _write_what_is_not_changed(directory, _course_files(folder, sources))
-    about = {"written by": f"semgrid_edu {version('semgrid_edu')}", "assignments": names, "files": written}
-    write_json(directory / MARKER, about)
+    names, before = [source.stem for source in sources], _written_before(directory)
+    lectures = before.get("lectures", "") if lectures is None else lectures
+    written, kept = _write_what_is_not_changed(directory, _course_files(folder, sources, lectures), before)
+    about = {"written by": f"semgrid_edu {version('semgrid_edu')}", "assignments": names}
+    write_json(directory / MARKER, about | {"lectures": lectures, "files": written})
     with course_api(directory) as api:
         for name in names:
             _released(api.generate_assignment(name), directory / "source" / name)
     return BuiltCourse(names, kept)
 
 
-def _course_files(folder: Path, sources: list[Path]) -> dict[str, str]:
+def _written_before(directory: Path) -> dict:
+    """Return what the course says of itself; {} for one that is still to be written."""
+    marker = directory / MARKER
+    return read_json(marker) if marker.exists() else {}
+
+
+def _course_files(folder: Path, sources: list[Path], lectures: str) -> dict[str, str]:
     """Return the text of each file of a course, by its path in it."""
     instructor = folder / "instructor"
-    files = {name: instructor / name for name in ("nbgrader_config.py", "README.md")}
+    files = {name: instructor / name for name in ("nbgrader_config.py", "README.md", "Containerfile")}
     files |= {f"instructor/{path.relative_to(instructor).as_posix()}": path for path in instructor.glob("*/*.py")}
     texts = {name: path.read_text(encoding="utf-8") for name, path in files.items()}
-    return texts | {f"source/{s.stem}/{s.stem}.ipynb": notebook_text(read_percent(s)) for s in sources}
+    return texts | {f"source/{s.stem}/{s.stem}.ipynb": _source_text(s, lectures) for s in sources}
 
 
-def _write_what_is_not_changed(directory: Path, texts: dict[str, str]) -> tuple[dict[str, str], list[str]]:
+def _source_text(source: Path, lectures: str) -> str:
+    """Return an exercise as the instructor gets it: with solutions, and links that its students can follow."""
+    notebook = read_percent(source)
+    for cell in notebook.cells:
+        if cell.cell_type == "markdown":
+            cell.source = point_links(cell.source, lectures)
+    return notebook_text(notebook)
+
+
+def _write_what_is_not_changed(directory: Path, texts: dict[str, str], about: dict) -> tuple[dict[str, str], list[str]]:
     """Write files, but not over one that isn't as it was written before; return all digests, and what was kept."""
-    marker = directory / MARKER
-    before = read_json(marker).get("files", {}) if marker.exists() else {}
+    before = about.get("files", {})
     digests, kept = {}, []
     for name, text in texts.items():
         path = directory / name

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import astuple, dataclass, field, fields
@@ -16,6 +17,8 @@ from tqdm import tqdm
 
 from semgrid_edu.course.exercises import MARKER
 from semgrid_edu.course.grading import GradeSettings, autograde_one, place
+from semgrid_edu.course.isolation.limits import Limits
+from semgrid_edu.course.isolation.process import StudentProcess
 from semgrid_edu.course.nbgrader_steps import CRASHED
 from semgrid_edu.course.notebooks import write_notebook
 from semgrid_edu.errors import ArgumentError, DataError
@@ -132,6 +135,27 @@ def grade_course(
             raise
 
 
+def missing_limits(settings: GradeSettings) -> list[str]:
+    """Return what this system can't limit for students' code.
+
+    Parameters
+    ----------
+    settings : GradeSettings
+        How a class is graded.
+
+    Returns
+    -------
+    list of str
+        Of `limits.PARTS`; empty with a container, whose own command says what is limited.
+    """
+    if settings.container:
+        return []
+    with tempfile.TemporaryDirectory() as nothing:
+        process = StudentProcess(Limits(memory=settings.memory), Path(nothing))
+        process.stop()
+    return process.unlimited
+
+
 def is_graded(course: Path, assignment: str, student: str) -> bool:
     """Return whether a submission has been graded, all of it and as it is now.
 
@@ -150,7 +174,8 @@ def is_graded(course: Path, assignment: str, student: str) -> bool:
             grades = gradebook.find_submission_notebook(assignment, assignment, student).grades
         except MissingEntry:
             return False
-        return all(grade.auto_score is not None or grade.needs_manual_grade for grade in grades)
+        scores = [(grade.auto_score, grade.manual_score) for grade in grades if not grade.needs_manual_grade]
+        return (None, None) not in scores
 
 
 def grade_one(course: Path, assignment: str, student: str, settings: GradeSettings) -> Graded:

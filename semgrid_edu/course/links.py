@@ -1,5 +1,6 @@
-"""Links to code and notebooks, for the registers' tables, which are shown in the folder of notebooks."""
+"""Links to code and notebooks: in the registers' tables, shown in the folder of notebooks, and in exercises."""
 
+import re
 from importlib import import_module
 
 from semgrid_edu.errors import ArgumentError
@@ -80,3 +81,37 @@ def notebook_link(place: str | None, folder: str = "") -> str:
     name, _, part = place.partition("#")
     title = name[:2] if name[:2].isdigit() else name.rpartition("/")[2].replace("_", " ")
     return f"[{title}]({folder}{name}.ipynb), `{part}`"
+
+
+def point_links(text: str, lectures: str) -> str:
+    """Let an exercise link to the lectures where its students find them.
+
+    Parameters
+    ----------
+    text : str
+        A text cell of an exercise. Its links to notebooks begin with `../`, the folder of notebooks.
+    lectures : str
+        The address of the folder that holds `00_tour.ipynb`, or its path from a student's copy of the exercise; "" when
+        students can't open it. Then the link's text stays alone.
+
+    Returns
+    -------
+    str
+        The text with links that live.
+
+    Raises
+    ------
+    ArgumentError
+        When the folder can't stand in a link.
+
+    Examples
+    --------
+    >>> point_links("The lecture is [00: the tour](../00_tour.ipynb).", "https://course.example/lectures")
+    'The lecture is [00: the tour](https://course.example/lectures/00_tour.ipynb).'
+    >>> point_links("The lecture is [00: the tour](../00_tour.ipynb).", "")
+    'The lecture is 00: the tour.'
+    """
+    if re.search(r"[\s()<>]", lectures):
+        raise ArgumentError("lectures", "an address or a path without blanks, parentheses and < or >", lectures)
+    new = rf"[\1]({lectures.rstrip('/')}/\2)" if lectures else r"\1"
+    return re.sub(r"\[([^\]]*)\]\(\.\./([^)]*)\)", lambda link: link.expand(new), text)

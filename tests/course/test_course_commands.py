@@ -4,6 +4,10 @@ import pytest
 from typer.testing import CliRunner
 
 from semgrid_edu import cli, course_commands
+from semgrid_edu.course import grade
+from semgrid_edu.course.exercises import build_course
+from semgrid_edu.course.grading import GradeSettings
+from semgrid_edu.course.isolation.limits import PARTS
 from semgrid_edu.errors import ArgumentError
 
 
@@ -23,3 +27,12 @@ def test_missing_tools_are_named(monkeypatch):
     monkeypatch.setattr(course_commands, "find_spec", lambda name: None)
     result = CliRunner().invoke(cli.app, ["course", "check"])
     assert "jupytext and nbgrader" in str(result.exception)
+
+
+def test_grading_says_what_the_system_cannot_limit(tmp_path, monkeypatch):
+    assert set(grade.missing_limits(GradeSettings())) < set(PARTS)
+    assert grade.missing_limits(GradeSettings(container=("no-such-program",))) == []
+    monkeypatch.setattr(grade, "missing_limits", lambda settings: ["network", "files"])
+    build_course(tmp_path / "course")
+    result = CliRunner().invoke(cli.app, ["course", "grade", str(tmp_path / "course")], catch_exceptions=False)
+    assert "can't limit for students' code: network, files" in result.output

@@ -1,16 +1,20 @@
 """Student versions and the instructor's course, against what nbgrader itself makes of the same source."""
 
 import os
+import re
 import subprocess
 import sys
 
 import nbformat
 import pytest
+from nbgrader.api import Gradebook
 from tiny_course import tiny_notebooks
 
 from semgrid_edu.course.exercises import build_course, build_exercise, exercise_sources, student_version
+from semgrid_edu.course.grade import grade_one, is_graded, write_graded
 from semgrid_edu.course.grading import GradeSettings, autograde, autograde_one, place, reference_answers, submission
-from semgrid_edu.course.notebooks import NOTEBOOKS
+from semgrid_edu.course.links import point_links
+from semgrid_edu.course.notebooks import NOTEBOOKS, write_notebook
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.files import write_text
 
@@ -80,6 +84,17 @@ def test_scores_come_from_nbgrader_and_a_second_build_keeps_them(course, noteboo
     rows = [line.split(",") for line in (course / "grades.csv").read_text().splitlines()]
     score, student = rows[0].index("score"), rows[0].index("student_id")
     assert {row[student]: float(row[score]) for row in rows[1:]} == {"right": 2, "stub": 0, "wrong": 0}
+
+
+def test_a_written_answer_that_was_read_stays_read(course, source):
+    write_notebook(submission(source, reference_answers(source)), place(course, "submitted", "reader", "00_tiny"))
+    assert grade_one(course, "00_tiny", "reader", GradeSettings()).to_read == 1
+    with Gradebook(f"sqlite:///{course / 'gradebook.db'}") as gradebook:
+        grade = gradebook.find_grade("why", "00_tiny", "00_tiny", "reader")
+        grade.manual_score, grade.needs_manual_grade = 1, False  # what formgrader writes
+        gradebook.db.commit()
+    assert is_graded(course, "00_tiny", "reader"), "or else it would be graded again, and wait for a person again"
+    assert "reader,00_tiny,3.0,3.0,0," in write_graded(course).read_text()
 
 
 def test_feedback_tells_nothing_of_the_hidden_inputs(course, source):
@@ -156,6 +171,37 @@ def test_what_the_instructor_changed_stays_and_is_named(tmp_path, notebooks):
         "nbgrader_config.py",
         "instructor/semgrid_instructor/tiny.py",
     ]
+
+
+RELATIVE = r"\]\((?!https?://)"
+
+
+def released_links(course):
+    return "\n".join(path.read_text() for path in sorted((course / "release").glob("*/*.ipynb")))
+
+
+def test_released_exercises_link_to_where_students_find_the_lectures(tmp_path):
+    notebooks = tiny_notebooks(tmp_path / "notebooks")
+    source = notebooks / "src" / "exercises" / "00_tiny.py"
+    source.write_text(source.read_text().replace("# # A tiny exercise", "# See [the tour](../00_tour.ipynb)."))
+    course = tmp_path / "course"
+    build_course(course, notebooks)
+    assert "See the tour." in released_links(course)
+    build_course(course, notebooks, "https://course.example/lectures/")
+    assert "See [the tour](https://course.example/lectures/00_tour.ipynb)." in released_links(course)
+    build_course(course, notebooks)
+    assert "https://course.example/lectures/00_tour.ipynb" in released_links(course), "it is remembered"
+    assert build_course(course, notebooks, "../lectures").kept == []
+    assert "See [the tour](../lectures/00_tour.ipynb)." in released_links(course)
+    with pytest.raises(ArgumentError, match="blanks"):
+        build_course(course, notebooks, "my lectures")
+
+
+@pytest.mark.parametrize("source", exercise_sources(), ids=lambda source: source.stem)
+def test_no_link_of_a_released_exercise_is_dead(source):
+    text = "\n".join(cell.source for cell in student_version(source).cells if cell.cell_type == "markdown")
+    assert "](../" in text, "an exercise links to its lecture"
+    assert not re.search(RELATIVE, point_links(text, "")), "a link that course build doesn't know"
 
 
 def test_without_exercises_nothing_is_written(tmp_path):

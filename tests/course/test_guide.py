@@ -1,0 +1,87 @@
+"""The instructor's guide names commands that exist, and its numbers are those of exercises and lectures."""
+
+import json
+import re
+
+import nbformat
+import pytest
+from nbgrader.apps.dbapp import DbApp
+from nbgrader.apps.nbgraderapp import NbGraderApp
+from nbgrader.utils import is_grade, is_solution
+from packaging.requirements import Requirement
+from typer.main import get_command
+
+from semgrid_edu import cli
+from semgrid_edu.course.exercises import exercise_sources
+from semgrid_edu.course.grading import tasks
+from semgrid_edu.course.minutes import reading_time
+from semgrid_edu.course.notebooks import NOTEBOOKS, built_path, lecture_sources, read_percent
+
+CLONE = NOTEBOOKS.parent
+GUIDE = (NOTEBOOKS / "instructor" / "README.md").read_text(encoding="utf-8")
+EXERCISES = {source.stem: source for source in exercise_sources()}
+
+
+def minutes_of_exercise(source):
+    return int(re.search(r"About (\d+) minutes", read_percent(source).cells[0].source)[1])
+
+
+def commands(program):
+    return [line.partition(program)[2].split() for line in re.findall(rf"{program} [^`\n]*", GUIDE)]
+
+
+def test_every_command_of_ours_exists_with_its_options():
+    ours = get_command(cli.app)
+    for words in commands("semgrid-edu"):
+        if words[0] not in ("course", "demo"):
+            continue
+        command = ours.commands[words[0]]
+        command = command.commands[words[1]] if words[0] == "course" else command
+        known = {name for parameter in command.params for name in parameter.opts}
+        named = {word for word in words if re.fullmatch(r"--[a-z-]+", word)}
+        assert named <= known, words
+
+
+def test_every_command_of_nbgrader_exists():
+    found = [words for words in commands("nbgrader") if words[0].isidentifier()]
+    assert {words[0] for words in found} >= {"autograde", "db", "export", "generate_feedback", "zip_collect"}
+    for words in found:
+        assert words[0] in NbGraderApp.subcommands, words
+        assert words[0] != "db" or words[1] in DbApp.subcommands
+
+
+@pytest.mark.parametrize("name", EXERCISES)
+def test_the_table_of_points_is_right(name):
+    minutes, points = re.search(rf"^\| `{name}` \| (\d+) \| ([\d =]+) \|", GUIDE, re.MULTILINE).groups()
+    assert int(minutes) == minutes_of_exercise(EXERCISES[name])
+    source = read_percent(EXERCISES[name])
+    worth = {c.metadata.nbgrader.grade_id: c.metadata.nbgrader.points for c in source.cells if is_grade(c)}
+    by_task, total = points.split(" = ")
+    assert int(total) == sum(worth.values()) == sum(map(int, by_task.split()))
+    written = [c.metadata.nbgrader.grade_id for c in source.cells if is_grade(c) and is_solution(c)]
+    assert [worth[one] for one in written] == [int(by_task.split()[-1])], "the last task is the written question"
+    assert set(written) < set(tasks(EXERCISES[name]))
+
+
+def test_the_hours_of_the_seven_weeks_are_right():
+    lectures = {s.stem[:2]: reading_time(nbformat.read(built_path(s), as_version=4)).minutes for s in lecture_sources()}
+    exercises = {name[:2]: minutes_of_exercise(source) for name, source in EXERCISES.items()}
+    weeks = re.findall(r"^\| \d \| ([^|]+) \| ([^|]+) \| ([^|]+) \|", GUIDE, re.MULTILINE)
+    assert len(weeks) == 7
+    taught = [number for lecture, _, _ in weeks for number in re.findall(r"\d\d", lecture)]
+    assert sorted(taught) == sorted(lectures)
+    for lecture, exercise, hours in weeks:
+        counted = sum(lectures[n] for n in re.findall(r"\d\d", lecture))
+        counted += sum(exercises[n] for n in re.findall(r"\d\d", exercise))
+        assert eval(hours.replace(" 1/2", ".5")) == pytest.approx(counted / 60, abs=0.75), lecture
+
+
+def test_files_for_other_places_are_what_these_places_read():
+    container = json.loads((CLONE / ".devcontainer" / "devcontainer.json").read_text())
+    assert container["image"].startswith("python:3.11")
+    assert container["postCreateCommand"] == "python -m semgrid_edu.make environment"
+    options, package = (CLONE / ".binder" / "requirements.txt").read_text().splitlines()
+    assert options == "-c ../constraints.txt"
+    assert (CLONE / ".binder" / options.removeprefix("-c ")).resolve() == (CLONE / "constraints.txt").resolve()
+    assert package == "-e ."
+    assert Requirement((CLONE / ".binder" / "runtime.txt").read_text().strip().replace("-", "==")).name == "python"
