@@ -265,7 +265,7 @@ display(Javascript("alert" + "(2)"))
 display({"image/svg+xml": "<svg onload=" + "'alert(3)'/>", "image/png": '"><script>' + "alert(4)</script>"}, raw=True)
 """
     notebook = handed_in(first=show)
-    text = "<script>alert(5)</script><img src=x onerror='alert(6)'> **bold** $a < b$"
+    text = "**bold** $a < b$\n\n<script>alert(5)</script><img src=x onerror='alert(6)'>"
     notebook.cells.append(new_markdown_cell(text))
     notebook.metadata["title"] = "<script>alert(7)</script>"
     notebook.metadata["widgets"] = {"application/vnd.jupyter.widget-state+json": {"x": "<script>alert(8)</script>"}}
