@@ -79,7 +79,8 @@ class Worker:
             if message["do"] == "call":
                 message["sent"] = data
             try:
-                reply = encode(getattr(self, message.pop("do"))(**message))
+                # Functions that were given go back by their numbers, among arguments that were changed.
+                reply = encode(getattr(self, message.pop("do"))(**message), [])
             except NotPlainError as error:
                 reply = encode({"error": _told(error)})
             self.wire.send(reply)

@@ -83,6 +83,13 @@ def test_a_function_that_is_given_works_here(answer):
     assert len(calls) == 2
 
 
+def test_arguments_beside_a_function_are_changed_too(answer):
+    f, given, array = answer("def f(g, a, *, h):\n    a *= 2"), [abs], np.ones(2)
+    f(given, array, h=len)
+    np.testing.assert_array_equal(array, [2, 2])
+    assert given == [abs]
+
+
 def test_an_error_of_a_function_that_is_given_reaches_the_answer(answer):
     f = answer("def f(g):\n    try:\n        g()\n    except ValueError as error:\n        return str(error)")
     assert "ZeroDivisionError" in f(lambda: 1 / 0)
