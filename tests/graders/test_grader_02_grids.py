@@ -245,7 +245,7 @@ def update(L, occupied, free, L_min, L_max):
         mistake(
             "limits in the wrong order",
             task="update",
-            loses=2,
+            loses=3,
             says="clip takes the lower limit first",
             code="""
 def update(L, occupied, free, L_min, L_max):

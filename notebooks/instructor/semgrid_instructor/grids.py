@@ -63,7 +63,7 @@ def check_clamp(update: Callable) -> None:
     L *= 3
     got = answer_array(update(L.copy(), occupied.copy(), free.copy(), -1.2, 2.7))
     sums = answer_array(update(L.copy(), occupied.copy(), free.copy(), -50.0, 50.0))
-    assert (sums < -1.2).any() & (sums > 2.7).any(), "with wide limits no cell passes the narrow ones"
+    assert np.ptp(sums) > 0, "with wide limits all cells are the same"
     assert got.max() <= 2.7 + 1e-9, "some cells are above L_max"
     assert got.min() >= -1.2 - 1e-9, "some cells are below L_min"
     assert np.allclose(got, np.clip(sums, -1.2, 2.7)), "cells within the limits are wrong"
@@ -95,8 +95,8 @@ def check_fuse_many(fuse: Callable) -> None:
             "NaN after thousands of scans: a long product ends at 0 or infinity; add logarithms"
         )
         alone = answer_array(fuse(0.5, last.copy()))
-        assert alone.size == last.size, f"shape {alone.shape} for one scan of 2 x 3 cells"
-        assert (np.argsort(alone.ravel()) == np.argsort(last.ravel())).all(), "the last scan doesn't change the result"
+        opposite = answer_array(fuse(0.5, 1 - last))
+        assert not np.allclose(alone, opposite), "it doesn't matter what the last scan says"
         stuck = "thousands of scans that cancel leave a trace: no belief comes back from exactly 0 or 1; add logarithms"
         assert np.allclose(got, alone, atol=1e-6), stuck
 
