@@ -1543,7 +1543,7 @@ def loss_and_gradient(scores, truth):
             "derivative by P",
             task="loss",
             loses=3,
-            says="that is the derivative by P, -1 / P",
+            says="that is the derivative with respect to P, -1 / P",
             code=loss(gradient="np.where(gradient < 0, -1 / P, 0) / len(v)"),
         ),
         mistake(

@@ -290,7 +290,7 @@ def reduce_back(planes, theta, blamed):
             "class and plane swapped",
             task="reduce-back",
             loses=2,
-            says="class and plane are swapped in the derivative by theta",
+            says="class and plane are swapped in the derivative with respect to theta",
             code=back(theta_bar="np.einsum('khw,cdhw->kdc', blamed, planes)"),
         ),
         mistake(

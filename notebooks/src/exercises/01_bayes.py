@@ -224,7 +224,7 @@ def _test():
     got = answer_array(follow(belief.copy(), likelihoods.copy(), M.copy()), "follow")
     assert got.shape != (4, 2), "four rows for three scans: leave out the belief from before the first scan"
     assert got.shape != (2,), "only one belief came back: return that after each scan, one row a scan"
-    assert got.shape == (3, 2), f"expected a row a scan, shape (3, 2), got {got.shape}"
+    assert got.shape == (3, 2), f"expected one row for each scan, shape (3, 2), got {got.shape}"
     sums = got.sum(axis=1)
     wrong = np.abs(sums - 1).argmax()
     assert np.allclose(sums, 1), f"the belief after scan {wrong} sums to {sums[wrong]:.2f}: normalise each belief"

@@ -545,7 +545,7 @@ _test()
 #
 # $$ P(c) = \frac{e^{s_c}}{\sum_{c'} e^{s_{c'}}} $$
 #
-# Complete `loss_and_gradient`: it returns two things, the loss and its derivative by each score, `(C, h, w)`. The lecture has the derivative of one pixel's loss; what
+# Complete `loss_and_gradient`: it returns two things, the loss and its derivative with respect to each score, `(C, h, w)`. The lecture has the derivative of one pixel's loss; what
 # becomes of it in a mean, and what does a pixel teach that nobody has labelled? `scores` stays as it is.
 #
 # For the last point both must stay right where scores are thousands, of either sign, or thousands apart: adding the same to all scores of a pixel changes nothing, so add
@@ -554,7 +554,7 @@ _test()
 
 # %% nbgrader={"grade": false, "grade_id": "loss", "locked": false, "schema_version": 3, "solution": true, "task": false}
 def loss_and_gradient(scores, truth):
-    """Return the mean over labelled pixels of -log P(true class), and its derivative by the scores."""
+    """Return the mean over labelled pixels of -log P(true class), and its derivative with respect to the scores."""
     ### BEGIN SOLUTION
     labelled = truth != 255
     shifted = scores - scores.max(axis=0)
@@ -619,7 +619,7 @@ _GRADIENT_SLIPS = {
     -0.073: "you divide by all scores of the image: the mean is over three labelled pixels",
     0.292: "the sign is swapped: a higher score of the true class makes the loss smaller",
     0.042: "that is P alone: probability minus truth, where truth is 1 for the true class",
-    -2.667: "that is the derivative by P, -1 / P: go on to the scores",
+    -2.667: "that is the derivative with respect to P, -1 / P: go on to the scores",
     -0.036: "that is the derivative of the mean of -P: the loss is the mean of -log P",
 }
 

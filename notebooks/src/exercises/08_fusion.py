@@ -140,7 +140,7 @@ def _test():
     _explain("by theta[0, 0, 0]:", theta_bar[0, 0, 0], _THETA_SLIPS)
     by_hand = [[[5, 2], [-4, 2]], [[3, 0], [12, 6]]]
     swapped = np.allclose(theta_bar, np.swapaxes(by_hand, 1, 2))
-    assert not swapped, "class and plane are swapped in the derivative by theta"
+    assert not swapped, "class and plane are swapped in the derivative with respect to theta"
     np.testing.assert_allclose(theta_bar, by_hand, err_msg="by theta: sum over cells of planes[c, d] * blamed[k]")
     assert not np.allclose(beta_bar, [0.5, 1.5]), "by beta: that is the mean over cells, take the sum"
     assert not np.allclose(beta_bar, 1), "by beta: 1 is that of a map by its bias; multiply by what comes from behind"
