@@ -140,7 +140,7 @@ def _test():
     assert np.array_equal(moved, before[1]), "predict changed its argument `moved`: make a new array"
     assert got.shape == (4,), f"expected one number for each of the 4 cells, shape (4,), got {got.shape}"
     slips = {
-        (0.30, 0.17, 0.12, 0.41): "that drives backwards: who arrives in cell n by d cells comes from n - d",
+        (0.30, 0.17, 0.12, 0.41): "that drives backwards: what arrives in cell n after d cells comes from n - d",
         (0.12, 0.41, 0.30, 0.17): "the kernel is reversed: moved[0] is the probability of staying",
         (0.38, 0.33, 0.20, 0.09): "one cell too short: moved[0] means 0 cells; the kernel isn't centred",
         (0.20, 0.09, 0.38, 0.33): "one cell too far: moved[0] means 0 cells",
