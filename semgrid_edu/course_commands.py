@@ -91,16 +91,26 @@ def grade(
     ] = False,
 ) -> None:
     """Grade a class with nbgrader: students' code runs in processes of its own, apart from tests and gradebook."""
+    from semgrid_edu.course.failures import UngradedError
     from semgrid_edu.course.grade import grade_course, missing_limits, write_graded
     from semgrid_edu.course.grading import GradeSettings
+    from semgrid_edu.course.handed_in import misplaced
 
     settings = GradeSettings(timeout, memory, tuple(shlex.split(container)), seed_by_student)
+    for path in misplaced(folder):
+        typer.echo(f"not graded: expected submitted/STUDENT/EXERCISE/EXERCISE.ipynb, found {path}", err=True)
     if missing := missing_limits(settings):
         typer.echo(f"this system can't limit for students' code: {', '.join(missing)}; the guide says more", err=True)
+    ungraded = ""
     try:
         for one in grade_course(folder, settings, assignments or (), again, workers):
             if one.note:
                 typer.echo(f"{one.student}, {one.assignment}: {one.note}", err=True)
     except KeyboardInterrupt:
-        sys.exit("semgrid-edu: interrupted; the same command goes on")
-    typer.echo(f"all scores so far: {write_graded(folder, assignments or ())}")
+        sys.exit(f"semgrid-edu: interrupted; the same command {'begins again' if again else 'goes on'}")
+    except UngradedError as error:
+        ungraded = str(error)
+    typer.echo(f"all scores so far: {write_graded(folder)}")
+    if ungraded:
+        told = "these stay ungraded, through no fault of the students; mend it, then the same command without --again"
+        sys.exit(f"semgrid-edu: {told}:\n{ungraded}")

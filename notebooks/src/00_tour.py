@@ -12,7 +12,7 @@
 #
 # **Prerequisites.** Python with numpy; a matrix times a vector; conditional probability. No deep learning.
 #
-# **Time.** 40 minutes, of which the computer needs less than one.
+# **Time.** 65 minutes, of which the computer needs less than one.
 #
 # **Paper.** Erkent, Wolf, Laugier, *End-to-End Learning of Semantic Grid Estimation Deep Neural Network with
 # Occupancy Grids*, Unmanned Systems 7(3), 2019. Sections 3 and 4 from far above; equation (1), Bayes' rule of section
@@ -98,8 +98,8 @@ plt.rcParams["figure.dpi"] = 80
 # | [09](09_truth.ipynb) | | where ground truth comes from, and how wrong it is |
 # | [10](10_crf.ipynb) | $g \to g$ | the CRF by hand: equations (3) and (4) |
 # | [11](11_fast_crf.ipynb) | $g \to g$ | the fast CRF |
-# | 12 | all | the paper's experiments, every claim put to the test |
-# | 13 | all | a real drive: KITTI on your disk |
+# | [12](12_experiments.ipynb) | all | the paper's experiments, every claim put to the test |
+# | [13](13_real_drive.ipynb) | all | a real drive: KITTI on your disk |
 
 # %% [markdown]
 # ## A map with forward up

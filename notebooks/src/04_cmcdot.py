@@ -14,7 +14,7 @@
 #
 # **Prerequisites.** Lectures 01 to 03: Bayes' rule on a line, evidence of a scan, occupancy with velocity.
 #
-# **Time.** 45 minutes, of which the computer needs less than one.
+# **Time.** 160 minutes, best in two sittings; the computer needs less than one.
 #
 # **Paper.** Section 3.2, its four numbered steps. The filter is that of Rummelhard, Nègre, Laugier, *Conditional
 # Monte Carlo Dense Occupancy Tracker*, ITSC 2015. The paper tells the steps in words; the formulas here are this

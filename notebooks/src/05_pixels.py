@@ -14,7 +14,7 @@
 # **Prerequisites.** Lecture 00: the grid, a first look at equation (1). A matrix times a vector; a rotation as a
 # matrix.
 #
-# **Time.** 45 minutes, of which the computer needs less than one.
+# **Time.** 110 minutes, best in two sittings; the computer needs less than one.
 #
 # **Paper.** Section 3.3, equation (1).
 #

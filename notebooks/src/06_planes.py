@@ -14,7 +14,7 @@
 # **Prerequisites.** Lecture 05: equation (1) gives a pixel (u, v) to each point of each plane. Derivatives and the
 # chain rule; a matrix times a vector.
 #
-# **Time.** 45 minutes, of which the computer needs less than one.
+# **Time.** 120 minutes, best in two sittings; the computer needs less than one.
 #
 # **Paper.** Section 3.3, equation (2), after Jaderberg et al. (2015).
 #

@@ -14,7 +14,7 @@
 #
 # **Prerequisites.** Lecture 00. Lecture 06, for bilinear sampling and what a gradient is. No deep learning.
 #
-# **Time.** 45 minutes, of which the computer needs less than one.
+# **Time.** 115 minutes, best in two sittings; the computer needs less than one.
 #
 # **Paper.** Section 3.1, which names the three networks: SegNet, FCN and DeepLab v2. Their own publications are at
 # the end.
@@ -858,7 +858,7 @@ print(
 # %% [markdown]
 # The first two columns are pixel accuracy and class accuracy, the mean over classes. A few points lie between the
 # three, on one street, with one seed each: no ground to rank them. The paper's first claim, SegNet before FCN before
-# DeepLab when images are few, is put to the test in lecture 12.
+# DeepLab when images are few, is put to the test in lecture [12](12_experiments.ipynb).
 #
 # The pictures differ more than the numbers. SegNet's borders are detailed and ragged, with specks; FCN and DeepLab,
 # which score every eighth pixel, draw smooth blobs. Sharp isn't right, though: of the pixels of signage each

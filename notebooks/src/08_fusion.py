@@ -15,7 +15,7 @@
 # **Prerequisites.** Lectures 05 and 06 (equations (1) and (2), the adjoint of sampling) and 07 (image networks,
 # pooling indices, skips). The chain rule.
 #
-# **Time.** 45 minutes, of which the computer needs one.
+# **Time.** 135 minutes, best in two sittings; the computer needs one.
 #
 # **Paper.** Sections 3.4 and 4.1, figures 4 and 5; claims 6, 7 and 9.
 #
@@ -214,7 +214,7 @@ plt.show()
 # out from the vehicle at the bottom: on the planes everything that stands is smeared away from the camera, and one
 # cell at a time nobody can tell how far. Some maps have picked the road, some what is *not* road, some mark the
 # corners that the camera doesn't see. None is a finished answer. Whether the reduction costs accuracy and saves time
-# (claim 8) is measured in lecture 12.
+# (claim 8) is measured in lecture [12](12_experiments.ipynb).
 #
 # ## Where it stands: $o$ joins
 #
@@ -464,7 +464,7 @@ plt.show()
 # %% [markdown]
 # Behind each name stands the number of its cells, behind each bar the weight $\alpha_c$. On the left unobserved and
 # road have most of the say. In the middle every class that is in all six frames has the same say. But then one cell
-# of unknown-dynamic weighs as much as 300 unobserved ones, and a training hangs on 25 cells. So the package keeps
+# of unknown-dynamic weighs as much as 300 unobserved ones, and the training hangs on 25 cells. So the package keeps
 # weights between 1/4 and 4 (`weight_limit`); the paper has no such limit. On the right is the compromise.
 #
 # ## One step downhill, with momentum
@@ -965,7 +965,7 @@ for name in ("segnet", "fcn", "deeplab"):
 # map is even better without the others. The reverse isn't true, but differs. Without the first metre FCN loses the
 # road, SegNet and DeepLab keep most of it. We don't know why: coarse scores, which blur the road upwards,
 # don't explain it, for FCN's are as coarse as DeepLab's. Would a network with six planes *learn* as much, and faster?
-# That takes new training runs, lecture 12.
+# That takes new training runs: lecture [12](12_experiments.ipynb) has networks with 1, 2, 5 and 10 planes.
 #
 # ## End to end, or in two stages?
 #

@@ -960,8 +960,8 @@ for name in ("road", "sidewalk", "car", "pedestrian", "bicycle", "signage"):
 # - *What the annotator overlooked.* The recipe carries the absence of a label as faithfully as a label.
 #
 # What does it cost to *learn* from such a truth? A network might even out errors that vary from frame to frame,
-# and copy those that don't. We claim neither here: one has to train on both kinds of truth and measure it
-# (`semgrid-edu train --truth lidar` makes such a truth).
+# and copy those that don't. The companion [what wrong labels cost](deeper/09_truth_costs.ipynb) measures it: one
+# network, eight kinds of labels.
 #
 # ## In five lines
 #

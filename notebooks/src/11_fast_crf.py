@@ -721,11 +721,12 @@ def enlarged(array, shape):
 
 
 sizes, grids = [(20, 15), (40, 30), (60, 40)], [(40, 30), (80, 60), (142, 62), (355, 155), (502, 219)]
-naive_times = [seconds(lambda s=s: mean_field_naive(*piece(*s), params)) for s in sizes]
+naive_times = [seconds(lambda s=s: mean_field_naive(*piece(*s), params), 3) for s in sizes]
 inputs = [(enlarged(unary, (14, *g)), enlarged(o, (4, *g))) for g in grids]
 fast_times = [seconds(lambda i=i: mean_field(*i, params), 3) for i in inputs]
 numbers = (2, 8, 14, 16, 17, 32, 33, 48)
-class_times = [seconds(lambda n=n: mean_field(enlarged(unary, (n, *spec.shape)), o, params), 3) for n in numbers]
+repeated = [enlarged(unary, (n, *spec.shape)) for n in numbers]
+class_times = [seconds(lambda r=r: mean_field(r, o, params), 15) for r in repeated]
 of_lattice = [compare(mean_field(*cells, params, n), settled)[0] for n in ROUNDS]
 
 # %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"] alt="left: error against iterations, the naive way falls steadily, the lattice levels off; middle: time against the number of cells on logarithmic axes, the naive way steeper than the lattice; right: time against classes, in steps of 16"
@@ -762,8 +763,8 @@ for infer in (mean_field_naive, mean_field_accurate, mean_field):
 # cells share is taken out by the normalisation.
 #
 # **Time** (middle and right). Both axes of the middle picture are logarithmic. Twice the cells cost the lattice about
-# twice the time, and all pairs about four times. With the classes, time grows in steps of 16, because the package
-# fills them up to a multiple of 16. So 2 classes cost about as much as 16.
+# twice the time, and all pairs about four times. With the classes, time jumps after 16 and after 32, because the
+# package fills them up to a multiple of 16. So 2 classes cost nearly as much as 16.
 #
 # **A third way** is in the last table. `mean_field_accurate` computes the Gaussian exactly for all cells in a window of
 # four widths around each cell, without writing a matrix down. Its kernel error is far smaller. Its time is proportional

@@ -6,13 +6,13 @@ from nbformat import NotebookNode
 
 from semgrid_edu.course.rules import RULES, Rule
 
-NOT_YET = frozenset({"minutes", "predictions", "plot code", "alternative texts", "resolution"})
+NOT_YET = frozenset({"predictions", "plot code", "alternative texts", "resolution"})
 
 EXCEPTIONS: Mapping[str, frozenset[str]] = {
     "00_tour": NOT_YET,
     "01_bayes": frozenset({"alternative texts"}),
-    "02_grids": NOT_YET - {"minutes", "resolution"} | {"length"},
-    "03_bof": NOT_YET - {"minutes", "resolution"} | {"length"},
+    "02_grids": NOT_YET - {"resolution"} | {"length"},
+    "03_bof": NOT_YET - {"resolution"} | {"length"},
     "04_cmcdot": NOT_YET | {"length"},
     "05_pixels": NOT_YET | {"length"},
     "06_planes": NOT_YET | {"length"},

@@ -21,6 +21,7 @@ from nbgrader.preprocessors import (
 )
 from traitlets.config import PyFileConfigLoader
 
+from semgrid_edu.course.failures import causes, why
 from semgrid_edu.course.links import point_links
 from semgrid_edu.course.notebooks import NOTEBOOKS, built_path, notebook_text, read_percent, write_notebook
 from semgrid_edu.errors import DataError
@@ -140,7 +141,7 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS, lectures: str 
     write_json(directory / MARKER, about | {"lectures": lectures, "files": written})
     with course_api(directory) as api:
         for name in names:
-            _released(api.generate_assignment(name), directory / "source" / name)
+            _release(api, name, directory / "source" / name)
     return BuiltCourse(names, kept)
 
 
@@ -223,7 +224,9 @@ def _refuse_what_is_not_ours(directory: Path) -> None:
         raise DataError(directory, f"an empty folder, or a course with its {MARKER}", "a folder with other files")
 
 
-def _released(result: dict, source: Path) -> None:
-    """Raise when nbgrader did not do what it was asked."""
+def _release(api: NbGraderAPI, name: str, source: Path) -> None:
+    """Let nbgrader release an exercise; raise when it doesn't."""
+    with causes(api.log) as found:
+        result = api.generate_assignment(name)
     if not result["success"]:
-        raise DataError(source, "an exercise that nbgrader can release", result.get("log") or result["error"])
+        raise DataError(source, "an exercise that nbgrader can release", why(result, found))

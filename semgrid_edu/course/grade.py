@@ -2,9 +2,11 @@
 
 import csv
 import io
+import shutil
 import tempfile
+import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import astuple, dataclass, field, fields
 from glob import has_magic
 from multiprocessing import get_context
@@ -15,20 +17,17 @@ from nbformat.v4 import new_markdown_cell
 from nbgrader.api import Gradebook, MissingEntry
 from tqdm import tqdm
 
-from semgrid_edu.course.exercises import MARKER
+from semgrid_edu.course.failures import UngradedError, in_one_line
 from semgrid_edu.course.grading import GradeSettings, autograde_one, place
-from semgrid_edu.course.isolation.limits import Limits
-from semgrid_edu.course.isolation.process import StudentProcess
+from semgrid_edu.course.handed_in import check_file, check_time, submissions
+from semgrid_edu.course.isolation.prepared import prepare, starter
 from semgrid_edu.course.nbgrader_steps import CRASHED
 from semgrid_edu.course.notebooks import write_notebook
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import write_text
 
 UNREADABLE = "unreadable"
 """The folder with notebooks that stand in for files that can't be read."""
-
-LARGEST = 100_000_000
-"""Bytes of a submission with all its files."""
 
 GRADED = "graded.csv"
 """The file with one line for each submission."""
@@ -56,37 +55,6 @@ class Graded:
     points: float
     to_read: int
     note: str = field(default="")
-
-
-def submissions(course: Path, assignments: Sequence[str] = ()) -> list[tuple[str, str]]:
-    """Return what was handed in.
-
-    Parameters
-    ----------
-    course : Path
-        A course that `build_course` wrote.
-    assignments : sequence of str
-        Only these; all when empty.
-
-    Returns
-    -------
-    list of (str, str)
-        Assignment and student of each file `submitted/STUDENT/ASSIGNMENT/ASSIGNMENT.ipynb`.
-
-    Raises
-    ------
-    DataError
-        When the folder is no course.
-    ArgumentError
-        When there is no such assignment.
-    """
-    if not (course / MARKER).is_file():
-        raise DataError(course, f"a course with its {MARKER}; `semgrid-edu course build` writes one", "none")
-    known = sorted(folder.name for folder in (course / "source").iterdir())
-    if unknown := set(assignments) - set(known):
-        raise ArgumentError("assignments", f"some of {', '.join(known)}", ", ".join(sorted(unknown)))
-    found = (path.parent for path in (course / "submitted").glob("*/*/*.ipynb") if path.stem == path.parent.name)
-    return sorted((at.name, at.parent.name) for at in found if at.name in (assignments or known))
 
 
 def grade_course(
@@ -119,24 +87,53 @@ def grade_course(
     Raises
     ------
     DataError
-        When the folder is no course, or a reference answer doesn't pass its own tests.
+        When the folder is no course.
     ArgumentError
         When there is no such assignment.
+    UngradedError
+        In the end, when submissions stay ungraded for a reason that isn't theirs; it names them, one a line.
     """
-    course = course.resolve()
+    course, began = course.resolve(), time.time()
     wanted = [one for one in submissions(course, assignments) if again or not is_graded(course, *one)]
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
-        waiting = [pool.submit(grade_one, course, *one, settings) for one in wanted]
         try:
-            for done in tqdm(as_completed(waiting), "submissions", len(waiting)):
-                yield done.result()
+            failed = _failing_references(pool, course, settings, [assignment for assignment, _ in wanted])
+            ready = [one for one in wanted if one[0] not in failed]
+            waiting = {pool.submit(grade_one, course, *one, settings): one for one in ready}
+            yield from _as_they_end(course, waiting, failed, began)
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
+    if failed:
+        raise UngradedError("\n".join(f"{which}: {says}" for which, says in failed.items()))
+
+
+def _as_they_end(
+    course: Path, waiting: dict[Future, tuple[str, str]], failed: dict[str, str], began: float
+) -> Iterator[Graded]:
+    """Yield results; tell of submissions that have none, since their grading failed or its process was ended."""
+    for done in tqdm(as_completed(waiting), "submissions", len(waiting)):
+        try:
+            yield done.result()
+        except Exception as error:
+            _forget(course, *waiting[done], began)
+            failed[", ".join(reversed(waiting[done]))] = in_one_line(error)
+
+
+def _failing_references(
+    pool: ProcessPoolExecutor, course: Path, settings: GradeSettings, assignments: Sequence[str]
+) -> dict[str, str]:
+    """Grade the reference answers of exercises; return what is wrong, by exercise, where they fail."""
+    trials = {
+        name: pool.submit(prepare, course, name, settings.memory, settings.container)
+        for name in dict.fromkeys(assignments)
+    }
+    errors = {name: trial.exception() for name, trial in trials.items()}
+    return {name: in_one_line(error) for name, error in errors.items() if error is not None}
 
 
 def missing_limits(settings: GradeSettings) -> list[str]:
-    """Return what this system can't limit for students' code.
+    """Start a process as students' code gets it, and return what can't be limited.
 
     Parameters
     ----------
@@ -147,11 +144,14 @@ def missing_limits(settings: GradeSettings) -> list[str]:
     -------
     list of str
         Of `limits.PARTS`; empty with a container, whose own command says what is limited.
+
+    Raises
+    ------
+    OSError
+        When the process or the container doesn't start.
     """
-    if settings.container:
-        return []
     with tempfile.TemporaryDirectory() as nothing:
-        process = StudentProcess(Limits(memory=settings.memory), Path(nothing))
+        process = starter(settings.memory, settings.container)(Path(nothing))
         process.stop()
     return process.unlimited
 
@@ -166,16 +166,25 @@ def is_graded(course: Path, assignment: str, student: str) -> bool:
     assignment, student : str
         Whose submission.
     """
-    submitted, graded = (place(course, step, student, assignment) for step in ("submitted", "autograded"))
-    if not graded.exists() or graded.stat().st_mtime < submitted.stat().st_mtime:
+    if not _is_up_to_date(course, assignment, student):
         return False
     with _gradebook(course) as gradebook:
-        try:
-            grades = gradebook.find_submission_notebook(assignment, assignment, student).grades
-        except MissingEntry:
-            return False
-        scores = [(grade.auto_score, grade.manual_score) for grade in grades if not grade.needs_manual_grade]
-        return (None, None) not in scores
+        return _has_scores(gradebook, assignment, student)
+
+
+def _is_up_to_date(course: Path, assignment: str, student: str) -> bool:
+    """Return whether nbgrader has made its notebook of a submission after that was handed in."""
+    submitted, graded = (place(course, step, student, assignment) for step in ("submitted", "autograded"))
+    return graded.exists() and graded.stat().st_mtime >= submitted.stat().st_mtime
+
+
+def _has_scores(gradebook: Gradebook, assignment: str, student: str) -> bool:
+    """Return whether every test cell of a submission has a score, or waits for a person."""
+    try:
+        grades = gradebook.find_submission_notebook(assignment, assignment, student).grades
+    except MissingEntry:
+        return False
+    return all(grade.needs_manual_grade or (grade.auto_score, grade.manual_score) != (None, None) for grade in grades)
 
 
 def grade_one(course: Path, assignment: str, student: str, settings: GradeSettings) -> Graded:
@@ -197,37 +206,52 @@ def grade_one(course: Path, assignment: str, student: str, settings: GradeSettin
 
     Raises
     ------
-    DataError
-        When nbgrader can't grade even an empty submission.
+    UngradedError
+        When grading fails for a reason that isn't the submission's; it then has no grade.
     """
-    path = place(course, "submitted", student, assignment)
     if has_magic(student):
         note = f"{CRASHED}nbgrader takes * ? [ in a student's name for a pattern: rename the folder"
         return Graded(student, assignment, 0, 0, 0, note)
     try:
-        _refuse_links_and_size(path)
-        nbformat.validate(nbformat.read(path, as_version=4))
-        autograde_one(course, assignment, student, settings)
-        return _result(course, assignment, student)
+        if fault := _graded_or_fault(course, assignment, student, settings):
+            _grade_stand_in(course, assignment, student, settings, f"{CRASHED}the file can't be graded: {fault}")
+        with _gradebook(course) as gradebook:
+            return _result(gradebook, assignment, student)
     except Exception as error:
-        says = [*str(error).splitlines(), type(error).__name__][0][:200]
-        note = f"{CRASHED}the file can't be graded: {says}"
+        _forget(course, assignment, student)
+        raise UngradedError(in_one_line(error)) from error
+    except BaseException:
+        _forget(course, assignment, student)
+        raise
+
+
+def _graded_or_fault(course: Path, assignment: str, student: str, settings: GradeSettings) -> str:
+    """Grade a submission; return what is wrong with its file, "" when it has been graded."""
+    path = place(course, "submitted", student, assignment)
+    check_time(path)
+    try:
+        check_file(path)
+        autograde_one(course, assignment, student, settings)
+    except DataError as error:
+        return error.args[2] if error.path == path else in_one_line(error)
+    return ""
+
+
+def _forget(course: Path, assignment: str, student: str, since: float = 0.0) -> None:
+    """Delete what an unfinished grading left since some time: the submission then counts as not graded."""
+    graded = place(course, "autograded", student, assignment)
+    if graded.exists() and graded.stat().st_mtime >= since:
+        shutil.rmtree(graded.parent, ignore_errors=True)
+
+
+def _grade_stand_in(course: Path, assignment: str, student: str, settings: GradeSettings, note: str) -> None:
+    """Grade the exercise as students get it in place of a file that can't be graded; say so in the gradebook."""
     _stand_in(course, assignment, student, note)
     autograde_one(course, assignment, student, settings, UNREADABLE)
     with _gradebook(course) as gradebook:
         for comment in gradebook.find_submission_notebook(assignment, assignment, student).comments:
             comment.auto_comment = note
         gradebook.db.commit()
-    return _result(course, assignment, student)
-
-
-def _refuse_links_and_size(path: Path) -> None:
-    """Raise when a submission holds links, which nbgrader would follow to other people's files, or is huge."""
-    folder = path.parent
-    if links := [one for one in (folder.parent, folder, *folder.rglob("*")) if one.is_symlink()]:
-        raise DataError(links[0].name, "a file or folder", "a link")
-    if (size := sum(one.lstat().st_size for one in folder.rglob("*"))) > LARGEST:
-        raise DataError(path.name, f"at most {LARGEST} bytes with all files beside it", size)
 
 
 def _stand_in(course: Path, assignment: str, student: str, note: str) -> None:
@@ -237,15 +261,12 @@ def _stand_in(course: Path, assignment: str, student: str, note: str) -> None:
     write_notebook(notebook, place(course, UNREADABLE, student, assignment))
 
 
-def _result(course: Path, assignment: str, student: str) -> Graded:
+def _result(gradebook: Gradebook, assignment: str, student: str) -> Graded:
     """Read what a submission has from the gradebook."""
-    with _gradebook(course) as gradebook:
-        found = gradebook.find_submission_notebook(assignment, assignment, student)
-        crashes = [
-            comment.auto_comment for comment in found.comments if (comment.auto_comment or "").startswith(CRASHED)
-        ]
-        to_read = sum(grade.needs_manual_grade for grade in found.grades)
-        return Graded(student, assignment, found.score, found.max_score, to_read, "; ".join(dict.fromkeys(crashes)))
+    found = gradebook.find_submission_notebook(assignment, assignment, student)
+    crashes = [comment.auto_comment for comment in found.comments if (comment.auto_comment or "").startswith(CRASHED)]
+    to_read = sum(grade.needs_manual_grade for grade in found.grades)
+    return Graded(student, assignment, found.score, found.max_score, to_read, "; ".join(dict.fromkeys(crashes)))
 
 
 def _gradebook(course: Path) -> Gradebook:
@@ -253,15 +274,13 @@ def _gradebook(course: Path) -> Gradebook:
     return Gradebook(f"sqlite:///{course / 'gradebook.db'}")
 
 
-def write_graded(course: Path, assignments: Sequence[str] = ()) -> Path:
+def write_graded(course: Path) -> Path:
     """Write what all submissions have so far, one line each, as a spreadsheet reads it.
 
     Parameters
     ----------
     course : Path
         The course.
-    assignments : sequence of str
-        Only these; all when empty.
 
     Returns
     -------
@@ -271,8 +290,9 @@ def write_graded(course: Path, assignments: Sequence[str] = ()) -> Path:
     text = io.StringIO()
     table = csv.writer(text)
     table.writerow(column.name for column in fields(Graded))
-    for one in submissions(course, assignments):
-        if is_graded(course, *one):
-            table.writerow(astuple(_result(course, *one)))
+    with _gradebook(course) as gradebook:
+        for one in submissions(course):
+            if _is_up_to_date(course, *one) and _has_scores(gradebook, *one):
+                table.writerow(astuple(_result(gradebook, *one)))
     write_text(course / GRADED, text.getvalue())
     return course / GRADED

@@ -14,6 +14,7 @@ from nbgrader.utils import is_grade, is_solution
 from sqlalchemy.exc import SAWarning
 
 from semgrid_edu.course.exercises import course_api, student_version
+from semgrid_edu.course.failures import NOT_THE_FILE, UngradedError, causes, why, will_pass
 from semgrid_edu.course.notebooks import read_percent, write_notebook
 from semgrid_edu.errors import ArgumentError, DataError
 
@@ -155,8 +156,8 @@ def autograde(
 
     Raises
     ------
-    DataError
-        When nbgrader could not grade a submission completely: the 0 in its gradebook is then not a score.
+    DataError, UngradedError
+        As `autograde_one`.
     """
     settings = GradeSettings(timeout=timeout)
     for student, notebook in submissions.items():
@@ -184,7 +185,9 @@ def autograde_one(
     Raises
     ------
     DataError
-        When nbgrader could not grade it completely: the 0 in its gradebook is then not a score.
+        When nbgrader could not grade this file completely: the 0 in its gradebook is then not a score.
+    UngradedError
+        When it could not for a reason that isn't the file's, such as a full disk or a gradebook that stays locked.
     """
     with course_api(course) as api, warnings.catch_warnings():
         # nbgrader 0.9.6 builds a submission outside its database session.
@@ -192,11 +195,14 @@ def autograde_one(
         api.config.ExecuteApart.merge(asdict(settings) | {"container": list(settings.container)})
         api.coursedir.submitted_directory = submitted
         for _ in range(PATIENCE):
-            result = api.autograde(assignment, student)
-            said = result.get("log") or result.get("error", "")
-            if result["success"] or "database is locked" not in said:
+            with causes(api.log) as found:
+                result = api.autograde(assignment, student)
+            if result["success"] or not any(map(will_pass, found)):
                 break
     if not result["success"]:
+        said = why(result, found)
+        if not found or isinstance(found[-1], NOT_THE_FILE):
+            raise UngradedError(said)
         raise DataError(place(course, submitted, student, assignment), "a notebook that can be graded", said)
 
 

@@ -1,7 +1,6 @@
 """What this course adds to nbgrader's autograde: submissions are made whole, and run apart from their tests."""
 
 import zlib
-from collections.abc import Callable
 from pathlib import Path
 
 import bleach
@@ -15,10 +14,8 @@ from nbgrader.utils import is_grade, is_solution
 from traitlets import Bool, Integer, Unicode
 from traitlets import List as ListTrait
 
-from semgrid_edu.course.isolation.limits import Limits
 from semgrid_edu.course.isolation.notebook import cell_name, run_submission
-from semgrid_edu.course.isolation.prepared import prepare, use_instructor
-from semgrid_edu.course.isolation.process import StudentProcess
+from semgrid_edu.course.isolation.prepared import prepare, starter
 
 CRASHED = "Crashed: "
 """How a comment begins that says what ended Python."""
@@ -137,20 +134,14 @@ class ExecuteApart(NbGraderPreprocessor):
             nbgrader's account of it: student, assignment, gradebook.
         """
         where, course = resources["nbgrader"], Path(self.course)
-        use_instructor(course / "instructor")
-        prepared = prepare(course, where["assignment"], self._starter(keeps=True))
+        prepared = prepare(course, where["assignment"], self.memory, tuple(self.container))
         with Gradebook(where["db_url"]) as gradebook:
             exercise = gradebook.find_notebook(where["notebook"], where["assignment"])
             trusted = {cell.name: cell.source for cell in exercise.source_cells}
         variant = (zlib.crc32(where["student"].encode()),) if self.seed_by_student else ()
-        start = self._starter()
+        start = starter(self.memory, tuple(self.container))
         resources[CRASHES] = run_submission(nb, trusted, lambda: start(prepared), self.timeout, variant)
         return nb, resources
-
-    def _starter(self, keeps: bool = False) -> Callable[[Path], StudentProcess]:
-        """Return what starts a process for a student's code."""
-        limits = Limits(memory=self.memory)
-        return lambda prepared: StudentProcess(limits, prepared, keeps, tuple(self.container))
 
 
 def without_scripts(html: str) -> str:

@@ -2,12 +2,13 @@
 
 import json
 import re
+from datetime import datetime
 
 import nbformat
 import pytest
 from nbgrader.apps.dbapp import DbApp
 from nbgrader.apps.nbgraderapp import NbGraderApp
-from nbgrader.utils import is_grade, is_solution
+from nbgrader.utils import is_grade, is_solution, parse_utc
 from packaging.requirements import Requirement
 from typer.main import get_command
 
@@ -48,6 +49,26 @@ def test_every_command_of_nbgrader_exists():
     for words in found:
         assert words[0] in NbGraderApp.subcommands, words
         assert words[0] != "db" or words[1] in DbApp.subcommands
+
+
+def test_a_platforms_file_names_are_read():
+    pattern = re.search(r"named_regexp='(.*)'", GUIDE)[1]
+    found = re.match(pattern, re.search(r"This is for `(ada_\S+)`", GUIDE)[1]).groupdict()
+    assert (found["student_id"], found["file_id"]) == ("ada", "01_bayes")
+    for time, hour in (("17-12-00", 17), ("05-32-10", 5), ("23-59-59", 23), ("00-00-00", 0)):
+        stamp = re.match(pattern, f"ada_attempt_2027-03-31-{time}_01_bayes.ipynb")["timestamp"]
+        assert parse_utc(stamp) == datetime(2027, 3, 31, hour)
+
+
+@pytest.mark.parametrize("name", EXERCISES)
+def test_the_minutes_a_point_are_right_to_half_a_minute(name):
+    minutes, total, each = re.search(rf"^\| `{name}` \| (\d+) \| [\d ]+= (\d+) \| ([\d /]+) \|", GUIDE, re.M).groups()
+    assert float(each.replace(" 1/2", ".5")) == pytest.approx(int(minutes) / int(total), abs=0.26)
+
+
+@pytest.mark.parametrize("name", EXERCISES)
+def test_the_written_question_comes_last(name):
+    assert is_solution(read_percent(EXERCISES[name]).cells[-1])
 
 
 @pytest.mark.parametrize("name", EXERCISES)

@@ -4,6 +4,7 @@ import sys
 
 import pytest
 
+from semgrid_edu.course.isolation.session import AnswerTimeoutError
 from semgrid_edu.course.notebooks import NOTEBOOKS
 
 
@@ -25,7 +26,7 @@ def answer():
     [
         (AssertionError("values are wrong"), "values are wrong"),
         (IndexError("7"), "it raises IndexError: 7"),
-        (KeyboardInterrupt(), "it does not come to an end"),
+        (AnswerTimeoutError("no reply"), "it does not come to an end"),
     ],
 )
 def test_error_becomes_a_sentence(hidden, error, sentence):
@@ -34,6 +35,15 @@ def test_error_becomes_a_sentence(hidden, error, sentence):
         raise error
 
     assert check(answer) == f"answer, on inputs you haven't seen: {sentence}"
+
+
+def test_an_instructor_who_interrupts_is_no_complaint_about_the_answer(hidden):
+    @hidden
+    def check(function):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        check(answer)
 
 
 def test_nothing_to_complain_about(hidden):

@@ -1,8 +1,20 @@
-"""Give each entry of an exercise's catalogue its own test."""
+"""A course for each that asks for one, and a test for each entry of an exercise's catalogue."""
+
+import shutil
 
 import pytest
 
+from semgrid_edu.course.exercises import build_course
+
 pytest.register_assert_rewrite("grader_checks")
+
+
+@pytest.fixture(scope="session")
+def new_course(tmp_path_factory):
+    """Return a function that lays out a course of its own at each call; built once, then copied."""
+    built = tmp_path_factory.mktemp("built")
+    build_course(built)
+    return lambda: shutil.copytree(built, tmp_path_factory.mktemp("course"), dirs_exist_ok=True)
 
 
 def pytest_generate_tests(metafunc):

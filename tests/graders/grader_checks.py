@@ -5,12 +5,11 @@ from dataclasses import dataclass
 
 import pytest
 
-from semgrid_edu.course.exercises import build_course
 from semgrid_edu.course.grading import autograde, reference_answers, submission, tasks
 from semgrid_edu.course.notebooks import NOTEBOOKS
 
-TIMEOUT = 12
-"""Seconds for a cell: enough for any answer and for all imports on a busy machine, and what an endless loop costs."""
+TIMEOUT = {"answer": 12, "endless loop": 4}
+"""Seconds for a cell: enough for any answer on a busy machine; what each call of an endless loop costs."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +21,11 @@ class Entry:
     code: str
     loses: float = 0
     says: str = ""
+
+    @property
+    def kind(self) -> str:
+        """Whether the answer ends, as `TIMEOUT` names it."""
+        return "endless loop" if "before timeout" in self.says else "answer"
 
 
 def mistake(title: str, *, task: str, loses: float, says: str, code: str) -> Entry:
@@ -38,11 +42,18 @@ def pack(entries) -> list[dict[str, Entry]]:
     """Share entries out to students: each answers every task with at most one entry, so that few runs try them all."""
     students: list[dict[str, Entry]] = []
     for entry in entries:
-        free = next((student for student in students if entry.task not in student), None)
+        free = next(
+            (student for student in students if entry.task not in student and kind(student) == entry.kind), None
+        )
         if free is None:
             students.append(free := {})
         free[entry.task] = entry
     return students
+
+
+def kind(student: dict[str, Entry]) -> str:
+    """The kind of all of a student's entries."""
+    return next(iter(student.values())).kind
 
 
 class GraderChecks:
@@ -58,16 +69,17 @@ class GraderChecks:
 
     @pytest.fixture(scope="class")
     @classmethod
-    def graded(cls, source, tmp_path_factory):
+    def graded(cls, source, new_course):
         """Every student's score of every task: (score, points, message), by student and task."""
-        course = tmp_path_factory.mktemp("course")
-        build_course(course)
         reference = reference_answers(source)
-        students = {"reference": reference, "stub": {}}
+        course, students = new_course(), {"answer": {"reference": reference, "stub": {}}, "endless loop": {}}
         for number, answers in enumerate(pack(cls.entries)):
-            students[f"student-{number}"] = reference | {task: entry.code for task, entry in answers.items()}
-        notebooks = {student: submission(source, answers) for student, answers in students.items()}
-        scores = autograde(course, cls.exercise, notebooks, timeout=TIMEOUT)
+            codes = {task: entry.code for task, entry in answers.items()}
+            students[kind(answers)][f"student-{number}"] = reference | codes
+        scores = {}
+        for which, seconds in TIMEOUT.items():
+            notebooks = {name: submission(source, answers) for name, answers in students[which].items()}
+            scores |= autograde(course, cls.exercise, notebooks, timeout=seconds)
         return {student: cls.by_task(source, cells) for student, cells in scores.items()}
 
     @staticmethod

@@ -11,7 +11,7 @@ import test_grader_01_bayes as catalogue
 import test_sound as sound
 from class_of import NAME, POINTS, REFERENCE, SETTINGS, handed_in, inside
 
-from semgrid_edu.course.exercises import build_course, course_api
+from semgrid_edu.course.exercises import course_api
 from semgrid_edu.course.grade import grade_course, write_graded
 from semgrid_edu.course.grading import place
 from semgrid_edu.course.notebooks import write_notebook
@@ -50,10 +50,9 @@ def class_of_thirty():
 
 
 @pytest.fixture(scope="module")
-def graded(tmp_path_factory):
+def graded(new_course):
     """Grade the class; return the course, the right points, and the table of scores."""
-    course = tmp_path_factory.mktemp("course")
-    build_course(course)
+    course = new_course()
     students = class_of_thirty()
     for student, (notebook, _) in students.items():
         write_notebook(notebook, place(course, "submitted", student, NAME))

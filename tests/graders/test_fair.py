@@ -7,15 +7,13 @@ from class_of import NAME, REFERENCE, cell_of, graded, handed_in, inside
 from nbformat.v4 import new_code_cell
 from nbgrader.api import Gradebook
 
-from semgrid_edu.course.exercises import build_course, course_api
+from semgrid_edu.course.exercises import course_api
 from semgrid_edu.course.grading import place
 
 
 @pytest.fixture(scope="module")
-def course(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("course")
-    build_course(folder)
-    return folder
+def course(new_course):
+    return new_course()
 
 
 NOISE = {

@@ -7,17 +7,15 @@ import pytest
 from class_of import NAME, REFERENCE, SETTINGS, SOURCE, cell_of, graded, handed_in, inside
 from nbformat.v4 import new_code_cell, new_markdown_cell
 
-from semgrid_edu.course.exercises import build_course, course_api
+from semgrid_edu.course.exercises import course_api
 from semgrid_edu.course.grade import grade_one
 from semgrid_edu.course.grading import GradeSettings, place
 from semgrid_edu.course.notebooks import write_notebook
 
 
 @pytest.fixture(scope="module")
-def course(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("course")
-    build_course(folder)
-    return folder
+def course(new_course):
+    return new_course()
 
 
 EASY = "\n".join(

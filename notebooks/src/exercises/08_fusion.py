@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Exercise 08: reduction, fusion, training
 #
-# Six small functions from which a training is made, and one question to answer in words. About 80 minutes.
+# Six small functions that training is made of, and one question to answer in words. About 80 minutes.
 # The lecture is [08: reduction, fusion, training end to end](../08_fusion.ipynb).
 #
 # | task | about | points |

@@ -9,7 +9,7 @@ from nbformat.v4 import new_output
 from nbgrader.utils import is_grade, is_solution
 
 from semgrid_edu.course.isolation.process import StudentProcess
-from semgrid_edu.course.isolation.session import AnswerEndedError, AnswerTimeoutError, Session
+from semgrid_edu.course.isolation.session import AnswerEndedError, AnswerTimeoutError, NoProcessError, Session
 from semgrid_edu.course.isolation.tests import CellTests
 
 MOST_OUTPUT = 30_000_000
@@ -45,6 +45,11 @@ def run_submission(
     -------
     dict of str to str
         What ended a student's process, by the grade_id of the cell in which it happened ("" for a cell of her own).
+
+    Raises
+    ------
+    ChildProcessError
+        When no process could be started for her code: that says nothing about her answers.
     """
     seen, unseen = Session(start, timeout), Session(start, timeout, secret=True)
     tests = CellTests(seen, unseen, variant)
@@ -55,6 +60,8 @@ def run_submission(
             cell.execution_count = number
             cell.outputs, room = _kept(_outputs(cell, trusted, tests), room)
         return {cell_name(c): o.evalue for c in notebook.cells for o in c.get("outputs", []) if o.get("ename") in ENDS}
+    except NoProcessError as error:
+        raise ChildProcessError(str(error)) from error
     finally:
         seen.stop()
         unseen.stop()

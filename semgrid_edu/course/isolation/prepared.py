@@ -11,6 +11,7 @@ from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell
 from nbgrader.utils import is_solution
 
+from semgrid_edu.course.isolation.limits import Limits
 from semgrid_edu.course.isolation.notebook import run_submission
 from semgrid_edu.course.isolation.process import StudentProcess
 from semgrid_edu.course.isolation.tests import INSTRUCTOR
@@ -42,7 +43,27 @@ def use_instructor(folder: Path) -> None:
     spec.loader.exec_module(sys.modules[INSTRUCTOR])
 
 
-def prepare(course: Path, assignment: str, start: Callable[[Path], StudentProcess]) -> Path:
+def starter(memory: int, container: tuple[str, ...], keeps: bool = False) -> Callable[[Path], StudentProcess]:
+    """Return what starts a process for a student's code.
+
+    Parameters
+    ----------
+    memory : int
+        Megabytes of memory for the process.
+    container : tuple of str
+        A command that starts a program in a container; () for none.
+    keeps : bool
+        Whether the process keeps what it compiles.
+
+    Returns
+    -------
+    callable
+        (folder of what is prepared) -> StudentProcess.
+    """
+    return lambda prepared: StudentProcess(Limits(memory=memory), prepared, keeps, container)
+
+
+def prepare(course: Path, assignment: str, memory: int, container: tuple[str, ...] = ()) -> Path:
     """Grade the reference answers once in each course, and keep what they had compiled for all of the user's courses.
 
     Parameters
@@ -51,8 +72,10 @@ def prepare(course: Path, assignment: str, start: Callable[[Path], StudentProces
         A course that `build_course` wrote.
     assignment : str
         The exercise.
-    start : callable
-        (folder of what is prepared) -> StudentProcess, one that keeps what it compiles.
+    memory : int
+        Megabytes of memory for the process.
+    container : tuple of str
+        A command that starts a program in a container: what passes outside needn't pass in there. () for none.
 
     Returns
     -------
@@ -64,12 +87,13 @@ def prepare(course: Path, assignment: str, start: Callable[[Path], StudentProces
     DataError
         When the reference answers don't pass their own tests.
     """
+    use_instructor(course / "instructor")
     folder = _kept(course, assignment)
-    passed = course / "prepared" / f"{assignment} passed"
+    passed = course / "prepared" / f"{assignment} passed{' in a container' if container else ''}"
     passed.parent.mkdir(exist_ok=True)
     with FileLock(folder.with_suffix(".lock")):
         if not passed.exists():
-            _grade_reference(course, assignment, folder, start)
+            _grade_reference(course, assignment, folder, starter(memory, container, keeps=True))
             passed.touch()
     return folder
 

@@ -2,6 +2,7 @@
 
 import os
 import queue
+import shlex
 import shutil
 import signal
 import subprocess
@@ -57,6 +58,11 @@ class StudentProcess:
         A command before the worker's that starts it in a container, such as ("docker", "run", ...); otherwise it is
         started in namespaces of its own where the system can.
 
+    Raises
+    ------
+    ChildProcessError
+        When the process ends, or stays silent, before any code of a student has run in it.
+
     Attributes
     ----------
     unlimited : list of str
@@ -83,7 +89,21 @@ class StudentProcess:
         self.speaker = threading.Thread(target=self._speak, daemon=True)
         self.speaker.start()
         threading.Thread(target=self._watch, args=(3 * limits.written * MEGABYTE,), daemon=True).start()
-        self.unlimited = [] if container else self._limit(limits, alone)
+        self.unlimited = self._greeted(limits, alone, container)
+
+    def _greeted(self, limits: Limits, alone: tuple[str, ...], container: tuple[str, ...]) -> list[str]:
+        """Wait for the first reply; return what could not be limited."""
+        try:
+            if not container:
+                return self._limit(limits, alone)
+            self.ask({"do": "names", "wanted": []}, time.monotonic() + STARTED)
+            return []
+        except (ProcessEndedError, TimeoutError):
+            told = f"no Python that answers was started by: {shlex.join(container or WORKER)}"
+            raise ChildProcessError(told) from None
+        except KeyboardInterrupt:
+            self.stop()
+            raise
 
     def _limit(self, limits: Limits, alone: tuple[str, ...]) -> list[str]:
         """Let the process limit itself; return what it couldn't."""

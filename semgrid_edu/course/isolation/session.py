@@ -24,6 +24,13 @@ class AnswerError(Exception):
     """An answer has raised an error that isn't one of Python's own."""
 
 
+class NoProcessError(BaseException):
+    """No process could be started for the student's code.
+
+    It isn't an `Exception`: tests catch those, and would take it for a fault of the answer.
+    """
+
+
 class Session:
     """A student's notebook in a process of its own, which is started again when it has ended.
 
@@ -175,7 +182,10 @@ class Session:
     def _start_again(self) -> None:
         """Start a process, and run in it the cells that ran before."""
         began = time.monotonic()
-        self.process = self.start()
+        try:
+            self.process = self.start()
+        except Exception as error:
+            raise NoProcessError(f"no process could be started for students' code: {error}") from error
         self.left_in_all -= time.monotonic() - began
         cells, self.cells = self.cells, []
         for code in cells:

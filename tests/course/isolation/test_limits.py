@@ -6,6 +6,7 @@ import platform
 import signal
 import socket
 import subprocess
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -143,6 +144,17 @@ def test_the_folder_is_gone_afterwards_and_never_shared(prepared):
     for process in (first, second):
         process.stop()
         assert not process.folder.exists()
+
+
+def test_who_interrupts_its_start_leaves_no_folder(prepared, tmp_path, monkeypatch):
+    def interrupted(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(StudentProcess, "_limit", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        StudentProcess(Limits(), prepared)
+    assert list(tmp_path.iterdir()) == [prepared]
 
 
 def test_what_cannot_be_limited_is_told(prepared):

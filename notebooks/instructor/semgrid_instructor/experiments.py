@@ -1,0 +1,123 @@
+"""Hidden tests of exercise 12, the experiments: the package's own statistics and metrics are the reference."""
+
+from collections.abc import Callable
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.course.answers import answer_array, answer_number
+from semgrid_edu.crf import expected_calibration_error, reliability
+from semgrid_edu.experiments.confusions import drive_confusions
+from semgrid_edu.experiments.measured import Measured
+from semgrid_edu.experiments.reproduction.verdicts import Statement, verdict
+from semgrid_edu.experiments.statistics import drive_interval, paired_interval
+from semgrid_edu.metrics import METRICS, class_accuracy
+from semgrid_instructor import generator, hidden
+
+
+def _matrices(seed: int, n: int, n_classes: int) -> NDArray[np.int64]:
+    """Return confusion matrices of drives of unequal size, in each of which all classes occur."""
+    rng = generator(seed)
+    size = rng.integers(1, 8, (n, 1, 1))
+    return size * (rng.integers(1, 9, (n, n_classes, n_classes)) + 15 * np.eye(n_classes, dtype=int))
+
+
+@hidden
+def check_drive_scores(drive_scores: Callable) -> None:
+    """More classes, drives of one frame, and classes that are called but don't occur."""
+    counts = _matrices(120, 9, 4)
+    counts[[1, 4, 7], 2] = 0
+    drives = ["0003", "0001", "0003", "0002", "0001", "0009", "0002", "0001", "0003"]
+    got = drive_scores(counts.copy(), list(drives))
+    names = list(dict.fromkeys(drives))
+    assert isinstance(got, dict), "no dictionary"
+    assert set(got) == set(names), f"other drives: {list(got)}"
+    for name, matrix in zip(names, drive_confusions(counts, drives), strict=True):
+        absent = " that lacks a class" if (matrix.sum(axis=1) == 0).any() else ""
+        score = answer_number(got[name])
+        assert np.isclose(score, class_accuracy(matrix)), f"a wrong score, four classes, of a drive{absent}"
+
+
+@hidden
+def check_judge(judge: Callable) -> None:
+    """Pairs of many intervals, both directions, several limits."""
+    ends = [(-0.9, -0.6), (-0.9, 0.2), (-0.2, 0.4), (0.3, 0.4), (0.6, 0.9)]
+    some = [(low, high, limit, above) for (low, high), limit, above in product(ends, (-0.5, 0.5), (True, False))]
+    for pair in generator(119).choice(len(some), (150, 2)):
+        first, second = (some[k] for k in pair)
+        for seeds, drives in ((3, 10), (5, 110), (1, 110), (3, 2)):
+            statements = [Statement("", _value(low, high), limit, above) for low, high, limit, above in (first, second)]
+            wanted = verdict(statements, seeds, drives).removesuffix(" (too small)")
+            got = judge([first, second], seeds, drives)
+            sides = " and ".join("above" if one[3] else "below" for one in (first, second))
+            right = isinstance(got, str) and got == wanted
+            assert right, f"{got!r} instead of {wanted!r}, {seeds} seeds, {drives} drives, claimed {sides}"
+
+
+def _value(low: float, high: float) -> Measured:
+    """Return a number with its interval."""
+    return {"mean": (low + high) / 2, "low": low, "high": high, "seeds": []}
+
+
+@hidden
+def check_jackknife(jackknife_interval: Callable) -> None:
+    """Other numbers of drives and classes, other metrics and levels."""
+    for seed, (n, n_classes) in enumerate(((3, 2), (12, 4), (25, 3))):
+        matrices = _matrices(121 + seed, n, n_classes)
+        for (name, metric), level in product(METRICS.items(), (0.95, 0.8)):
+            got = answer_array(jackknife_interval(matrices.copy(), metric, level))
+            _compare(got, drive_interval(matrices[None], metric, level), f"{name}, {n} drives, level {level}")
+
+
+@hidden
+def check_paired(paired: Callable, jackknife: Callable) -> None:
+    """Other numbers of drives and classes, other metrics and levels; or what the jackknife of task 3 makes of them."""
+    for seed, (n, n_classes) in enumerate(((4, 2), (15, 4))):
+        a = _matrices(124 + seed, n, n_classes)
+        b = a + generator(127 + seed).integers(0, 6, a.shape)
+        for (name, metric), level in product(METRICS.items(), (0.95, 0.8)):
+            got = answer_array(paired(a.copy(), b.copy(), metric, level))
+            wanted = paired_interval(a[None], b[None], metric, level)
+            try:
+                _compare(got, wanted, f"{name}, {n} drives, level {level}")
+            except AssertionError:
+                if not _is_difference(got, wanted[1]) or not np.allclose(got, _by_own(jackknife, a, b, metric, level)):
+                    raise
+
+
+def _is_difference(got: NDArray, wanted: float) -> bool:
+    """Return whether these may be the ends and the middle of an interval that is made with a wrong jackknife."""
+    return got.shape == (3,) and np.ptp(got) > 0 and np.abs(got - wanted).min() < abs(wanted)
+
+
+def _by_own(jackknife: Callable, a: NDArray, b: NDArray, metric: Callable, level: float) -> NDArray:
+    """Return what the jackknife of task 3 gives for the difference; NaN where it gives nothing."""
+    try:
+        return answer_array(
+            jackknife(np.stack([a, b], axis=1), lambda two: metric(two[0]) - metric(two[1]), level)
+        ).reshape(3)
+    except Exception:
+        return np.full(3, np.nan)
+
+
+def _compare(got: NDArray, wanted: tuple, where: str) -> None:
+    """Compare an interval, within a thirtieth of its width: the jackknife has variants that differ by less."""
+    low, mean, high = wanted
+    assert got.shape == (3,), f"{where}: not three numbers"
+    assert np.isclose(got[1], mean, atol=1e-6), f"{where}: the number in the middle is wrong"
+    assert np.allclose(got, wanted, atol=(high - low) / 30), f"{where}: wrong width: does it follow the level and V?"
+
+
+@hidden
+def check_calibration(calibration_error: Callable) -> None:
+    """More classes, other numbers of groups, and cells without a label."""
+    rng = generator(126)
+    for n_classes, bins in ((3, 10), (14, 10), (4, 5), (2, 1)):
+        probability = rng.dirichlet(np.full(n_classes, 0.4), 400)
+        right = rng.random(400) < 0.7  # more often than unsure cells say, less often than sure ones
+        truth = np.where(right, probability.argmax(axis=1), rng.integers(0, n_classes, 400))
+        truth[rng.random(400) < 0.1] = 255
+        wanted = expected_calibration_error(reliability(probability.T, truth, bins))
+        got = answer_number(calibration_error(probability.copy(), truth.copy(), bins))
+        assert np.isclose(got, wanted, atol=1e-3), f"wrong with {n_classes} classes and {bins} groups"

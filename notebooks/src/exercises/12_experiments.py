@@ -1,0 +1,391 @@
+# %% [markdown]
+# # Exercise 12: the experiments
+#
+# Five functions with which you can judge a claim from confusion matrices, and one question to answer in words. About 90 minutes.
+# The lecture is [12: the experiments](../12_experiments.ipynb).
+#
+# | task | about | points |
+# |---|---|---|
+# | 1 | frames pooled into drives, and class accuracy | 2 |
+# | 2 | the rule of verdicts | 2 |
+# | 3 | the jackknife over drives | 3 |
+# | 4 | a paired difference | 2 |
+# | 5 | expected calibration error | 3 |
+# | 6 | in your own words | 2 |
+#
+# Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
+# you are wrong. Your instructor's tests use other numbers and other sizes. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
+
+# %% nbgrader={"grade": false, "grade_id": "setup", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# Names that begin with _ belong to the tests.
+import warnings
+
+import numpy as np
+from scipy import stats  # stats.t.ppf(p, df) is the p-quantile of Student's distribution with df degrees of freedom
+
+from semgrid_edu.course.answers import answer_array, answer_number
+from semgrid_edu.metrics import pixel_accuracy  # the tests of tasks 3 and 4 use it
+
+warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
+
+
+def _explain(what, got, slips, atol):
+    """Stop with a hint when `got` is what a common slip gives."""
+    for slip, hint in slips.items():
+        assert not np.isclose(got, slip, atol=atol), f"{what} {got:.4f}: {hint}"
+
+
+def _three(result, name):
+    """Return the three numbers of an interval."""
+    numbers = answer_array(result, name)
+    assert numbers.size == 3, f"{name} must return three numbers: low, what is in the middle, high"
+    return numbers.ravel()
+
+
+# %% [markdown]
+# ## Task 1: frames pooled into drives (2 points)
+#
+# `counts` holds one confusion matrix per frame, `(F, C, C)`: row truth, column prediction. `drives` is a list of F names, the drive of each frame. Frames of a drive
+# aren't always neighbours in the list.
+#
+# Complete `drive_scores`: it returns a dictionary that gives for each drive its class accuracy. First the matrices of its frames are *summed*, then the metric is
+# taken: the mean over classes of the share of the class's cells that are called right. A class without a true cell in the drive is left out of the mean.
+
+
+# %% nbgrader={"grade": false, "grade_id": "drive-scores", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def drive_scores(counts, drives):
+    """Return the class accuracy of each drive, by its name."""
+    ### BEGIN SOLUTION
+    scores = {}
+    for drive in dict.fromkeys(drives):
+        total = sum(matrix for matrix, name in zip(counts, drives, strict=True) if name == drive)
+        cells = total.sum(axis=1)
+        scores[drive] = float(np.mean(np.diag(total)[cells > 0] / cells[cells > 0]))
+    return scores
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": true, "grade_id": "drive-scores-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    counts = np.array([[[8, 2], [0, 0]], [[6, 2], [0, 0]], [[1, 9], [2, 2]]])
+    got = drive_scores(
+        counts.copy(), ["a", "b", "a"]
+    )  # by hand, drive a: [[9, 11], [2, 2]], so (9/20 + 2/4) / 2 = 0.475
+    assert got is not None, "drive_scores returned nothing: did you forget `return`?"
+    assert isinstance(got, dict), f"return a dictionary, a score by each drive's name, not {type(got).__name__}"
+    assert set(got) == {"a", "b"}, f"expected the drives a and b, got {list(got)}"
+    a, b = (answer_number(got[drive], f"drive_scores, for drive {drive},") for drive in ("a", "b"))
+    slips = {
+        0.5500: "you average the scores of its frames: sum the matrices first, then take the metric once",
+        0.4583: "that is pixel accuracy: all right cells over all cells. Take a mean over classes",
+        0.4860: "you divide by the columns: cells *called* a class. Divide by the rows, the cells that *are* of the class",
+        0.8000: "only one frame of drive a counts: its frames aren't neighbours in the list",
+        0.3000: "only the last frame of drive a counts: add the matrices, don't overwrite",
+        0.5179: "all drives are summed: keep them apart",
+    }
+    _explain("drive a:", a, slips, 1e-3)
+    assert np.isclose(a, 0.475), f"drive a: {a:.4f}, by hand 0.475"
+    as_zero = "a class without true cells is left out of the mean, it doesn't count as 0"
+    _explain("drive b:", b, {0.375: as_zero, 0.875: as_zero.replace("as 0", "as 1")}, 1e-3)
+    assert not np.isnan(b), "drive b: not a number: you divide by the 0 cells of a class that doesn't occur"
+    assert np.isclose(b, 0.75), f"drive b: {b:.4f}, by hand 6/8 = 0.75"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import experiments
+
+    complaint = experiments.check_drive_scores(drive_scores)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% [markdown]
+# ## Task 2: the rule of verdicts (2 points)
+#
+# A claim is a list of statements. Each is a tuple `(low, high, limit, above)`: the interval of a number, the limit that it is compared with, and whether the claim says
+# that the number is above the limit (`True`) or below it (`False`). Complete `judge`: it returns
+#
+# - `"cannot tell"` with fewer than 3 seeds or fewer than 10 drives, whatever the intervals are;
+# - `"not reproduced"` when at least one interval lies entirely on the other side of its limit than claimed;
+# - `"reproduced"` when every interval lies entirely on the claimed side of its limit;
+# - `"cannot tell"` otherwise.
+
+
+# %% nbgrader={"grade": false, "grade_id": "judge", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def judge(statements, seeds, drives):
+    """Return the verdict on a claim."""
+    ### BEGIN SOLUTION
+    if seeds < 3 or drives < 10:
+        return "cannot tell"
+    claimed = [low > limit if above else high < limit for low, high, limit, above in statements]
+    opposite = [high < limit if above else low > limit for low, high, limit, above in statements]
+    if any(opposite):
+        return "not reproduced"
+    return "reproduced" if all(claimed) else "cannot tell"
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": true, "grade_id": "judge-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    yes, unclear, no = (0.2, 1.0, 0.0, True), (-0.3, 0.9, 0.0, True), (-2.0, -0.4, 0.0, True)
+    cases = (
+        ([yes], "reproduced", "an interval that lies above its limit, as claimed"),
+        ([unclear], "cannot tell", "an interval that holds its limit"),
+        ([no], "not reproduced", "an interval that lies below, where above was claimed"),
+        ([yes, unclear], "cannot tell", "*every* interval must lie on the claimed side"),
+        ([unclear, no], "not reproduced", "one interval on the other side decides, also beside an unclear one"),
+        ([yes, no], "not reproduced", "one interval on the other side decides, also beside one that holds"),
+        ([(-2.0, -0.4, 0.0, False)], "reproduced", "here the claim says *below*, and the interval lies below"),
+        ([(0.2, 1.0, 0.0, False)], "not reproduced", "here the claim says *below*, and the interval lies above"),
+        ([(0.2, 0.6, 0.5, True)], "cannot tell", "the limit is 0.5, not 0"),
+        (
+            [(-0.3, 0.4, -0.5, True)],
+            "reproduced",
+            "the limit is -0.5: a claim that something costs less than half a point",
+        ),
+    )
+    for statements, wanted, hint in cases:
+        got = judge(list(statements), 3, 10)
+        assert got is not None, "judge returned nothing: did you forget `return`?"
+        assert isinstance(got, str), (
+            f"judge returned a {type(got).__name__}: return one of the three verdicts, as a string"
+        )
+        assert got == wanted, f"{statements} with 3 seeds and 10 drives: {got!r} instead of {wanted!r}: {hint}"
+    assert judge([yes], 2, 110) == "cannot tell", "2 seeds are too few, whatever the interval"
+    assert judge([no], 2, 110) == "cannot tell", "2 seeds are too few, also for 'not reproduced'"
+    assert judge([yes], 5, 9) == "cannot tell", "9 drives are too few, whatever the interval"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import experiments
+
+    complaint = experiments.check_judge(judge)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% [markdown]
+# ## Task 3: the jackknife over drives (3 points)
+#
+# `matrices` are the confusion matrices of V drives, `(V, C, C)`, `metric` is a function of one matrix, such as `pixel_accuracy`, and `level` how often the interval
+# should hold the true value. With $\theta$ the metric of the summed matrix, $\theta_{-v}$ that of the sum without drive $v$, and $\bar\theta$ the mean of the $\theta_{-v}$,
+#
+# $$ \theta \pm t \sqrt{\frac{V - 1}{V} \sum_{v} \left( \theta_{-v} - \bar\theta \right)^2} $$
+#
+# where $t$ is the quantile of Student's distribution with $V - 1$ degrees of freedom that leaves $(1 - \text{level})/2$ on *each* side.
+#
+# Complete `jackknife_interval`: it returns `low, score, high`.
+
+
+# %% nbgrader={"grade": false, "grade_id": "jackknife", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def jackknife_interval(matrices, metric, level=0.95):
+    """Return low, score, high."""
+    ### BEGIN SOLUTION
+    V, total = len(matrices), matrices.sum(axis=0)
+    without = np.array([metric(total - matrix) for matrix in matrices])
+    half = stats.t.ppf((1 + level) / 2, V - 1) * np.sqrt((V - 1) / V * ((without - without.mean()) ** 2).sum())
+    return metric(total) - half, metric(total), metric(total) + half
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": false, "grade_id": "jackknife-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_HALF_WIDTHS = {
+    0.1864: "1.96 is for very many drives; Student's quantile for 3 degrees of freedom is 3.18",
+    0.0951: "that is the standard error. Multiply it by Student's quantile",
+    0.2640: "Student's quantile has V - 1 degrees of freedom, not V",
+    0.2238: "the quantile must leave 2.5 % on each side, so take the one of 0.975",
+    0.1009: "you treat the scores without one drive like independent scores. They differ little, so their squares are scaled *up*: see the formula",
+    0.2017: "the variance of the scores without one drive must be scaled up: see the formula",
+    0.1747: "the mean of the squares isn't their sum: see the formula",
+    0.3494: "the factor (V - 1) / V is missing",
+    0.4035: "the factor is (V - 1) / V, not V / (V - 1)",
+    0.2956: "you use the score of each drive alone. Use the score of all drives *without* it",
+    0.0288: "the root is missing",
+    0.6052: "the factor is (V - 1) / V, not V - 1",
+}
+
+
+# %% nbgrader={"grade": true, "grade_id": "jackknife-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    # Four drives: 80 of 100, 150 of 200, 45 of 50 and 70 of 150 cells right. All: 345/500 = 0.69. Left out: 0.6625, 0.65, 0.6667, 0.7857.
+    matrices = np.array([[[80, 20], [0, 0]], [[150, 50], [0, 0]], [[45, 5], [0, 0]], [[70, 80], [0, 0]]])
+    low, score, high = _three(jackknife_interval(matrices.copy(), pixel_accuracy), "jackknife_interval")
+    middles = {
+        0.7292: "that is the mean of the drives' scores. Sum the matrices first: a drive with more cells counts for more",
+        0.6912: "that is the mean of the scores without one drive. The interval is around the score of *all* drives",
+    }
+    _explain("the score is", score, middles, 1e-4)
+    assert np.isclose(score, 0.69, atol=1e-4), f"the score is {score:.4f}; by hand 345/500 = 0.69"
+    half = (high - low) / 2
+    _explain("it reaches to each side by", half, _HALF_WIDTHS, 4e-4)
+    assert np.isclose(score - low, high - score), "the interval isn't symmetric around the score"
+    assert np.isclose(half, 0.3026, atol=1e-3), f"it reaches {half:.4f} to each side; expected 0.3026"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import experiments
+
+    complaint = experiments.check_jackknife(jackknife_interval)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% [markdown]
+# ## Task 4: a paired difference (2 points)
+#
+# `a` and `b` are the confusion matrices of two methods on the **same** V drives, `(V, C, C)` each: `a[v]` and `b[v]` belong to the same drive. Leave a drive out of *both*
+# at once, and see what that does to `metric(a) - metric(b)`.
+#
+# Complete `paired_interval`: it returns `low, difference, high`, by the jackknife of task 3 with the difference in place of $\theta$. (You may call your
+# `jackknife_interval`, whose mistakes cost nothing here, or write the formula again. What could you hand to it, such that it leaves out both matrices of a drive?)
+
+
+# %% nbgrader={"grade": false, "grade_id": "paired", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def paired_interval(a, b, metric, level=0.95):
+    """Return low, difference, high of metric(a) - metric(b)."""
+    ### BEGIN SOLUTION
+    V, of_a, of_b = len(a), a.sum(axis=0), b.sum(axis=0)
+    difference = metric(of_a) - metric(of_b)
+    without = np.array([metric(of_a - x) - metric(of_b - y) for x, y in zip(a, b, strict=True)])
+    half = stats.t.ppf((1 + level) / 2, V - 1) * np.sqrt((V - 1) / V * ((without - without.mean()) ** 2).sum())
+    return difference - half, difference, difference + half
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": false, "grade_id": "paired-data", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _of_cells(right, cells):
+    """Return one matrix per drive, of cells that are called right and others."""
+    return np.array([[[r, n - r], [0, 0]] for r, n in zip(right, cells, strict=True)])
+
+
+def _by_own_jackknife(jackknife, a, b):
+    """Return what the jackknife of task 3 gives for the difference, be it right or not; NaN where it gives nothing."""
+    try:
+        pairs = np.stack([a, b], axis=1)
+        return _three(jackknife(pairs, lambda two: pixel_accuracy(two[0]) - pixel_accuracy(two[1])), "it")
+    except Exception:
+        return np.full(3, np.nan)
+
+
+# %% nbgrader={"grade": false, "grade_id": "paired-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _explain_paired(low, difference, high):
+    """Stop with a hint when the difference of the two methods, or its interval, is what a common slip gives."""
+    assert difference > 0, f"the difference is {difference:.4f}: a is better, and a - b is asked for"
+    mean = "that is the mean of the drives' differences. Sum the matrices first, as in task 3"
+    _explain("the difference is", difference, {0.0225: mean}, 2e-4)
+    assert low <= high, "low is above high: the ends of two separate intervals can't simply be subtracted"
+    half = (high - low) / 2
+    other = "that is the interval of two methods on *different* drives: their variances are added. On the same drives what they share cancels"
+    added = "you add the two half-widths: on the same drives what they share cancels"
+    _explain("it reaches to each side by", half, {0.2650: other, 0.3748: added}, 1e-3)
+    taken = "you subtract the two half-widths: widths of intervals don't work like that. Look at the difference itself"
+    alone = "you use each drive's own difference. Use the difference of the scores *without* the drive"
+    _explain("it reaches to each side by", half, {0.0058: taken, 0.0080: alone}, 1e-4)
+
+
+# %% nbgrader={"grade": true, "grade_id": "paired-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    a = _of_cells((90, 140, 40, 60), (100, 200, 50, 100))  # 330 of 450
+    b = _of_cells((88, 134, 39, 58), (100, 200, 50, 100))  # 319 of 450: the difference is 11/450 = 0.0244
+    got = _three(paired_interval(a.copy(), b.copy(), pixel_accuracy), "paired_interval")
+    wanted = [0.01127, 0.02444, 0.03762]
+    if not np.allclose(got, wanted, atol=2e-4):
+        # What is wrong in your task 3 has cost its points there, and costs none here.
+        own = _by_own_jackknife(jackknife_interval, a, b)
+        if not np.allclose(got, own) or got[0] == got[2]:
+            _explain_paired(*got)
+            right, half = np.isclose(got[1], 0.02444, atol=2e-4), (got[2] - got[0]) / 2
+            assert right, f"the difference is {got[1]:.4f}; by hand 11/450 = 0.0244"
+            assert np.isclose(half, 0.01317, atol=2e-4), f"it reaches {half:.4f} to each side; expected 0.0132"
+            assert np.allclose(got, wanted, atol=2e-4), "the interval isn't symmetric around the difference"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import experiments
+
+    complaint = experiments.check_paired(paired_interval, jackknife_interval)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% [markdown]
+# ## Task 5: expected calibration error (3 points)
+#
+# `probability` is `(N, C)`, one distribution per cell; `truth` is `(N,)`, the true class of each cell, or 255 where there is no label. A method calls a cell by its most
+# probable class, and is as *sure* as that probability says. Sort the labelled cells into `bins` groups of equal width by how sure it is: 0 to 0.1, 0.1 to 0.2, ... with 10
+# bins. A cell with probability 1 belongs to the last group. Then
+#
+# $$ \text{ECE} = \sum_{b} \frac{n_b}{N} \left| \text{accuracy}_b - \text{confidence}_b \right| $$
+#
+# with $n_b$ the number of labelled cells in group $b$, $N$ that of all labelled cells, accuracy the share of the group's cells that are called right, and confidence the mean of
+# how sure it is of them. Empty groups add nothing.
+#
+# Complete `calibration_error`: it returns the ECE.
+
+
+# %% nbgrader={"grade": false, "grade_id": "calibration", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def calibration_error(probability, truth, bins=10):
+    """Return the expected calibration error over the labelled cells."""
+    ### BEGIN SOLUTION
+    labelled = truth != 255
+    sure = probability[labelled].max(axis=1)
+    right = probability[labelled].argmax(axis=1) == truth[labelled]
+    group = np.minimum((sure * bins).astype(int), bins - 1)
+    gaps = [(group == b).mean() * abs(right[group == b].mean() - sure[group == b].mean()) for b in np.unique(group)]
+    return float(np.sum(gaps))
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": false, "grade_id": "calibration-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_CALIBRATION = {
+    0.2700: "you take the plain mean of the groups: weight each by its share of the cells",
+    0.0810: "you take the plain mean of ten groups, most of them empty: weight each by its share of the cells",
+    0.8100: "the gaps are added without weights: weight each by its share of the cells",
+    0.2271: "the gaps of the groups cancel: take the absolute value in each group, before you add up",
+    0.0835: "the gaps are squared: take their absolute values",
+    0.2929: "confidence is the mean of how sure the cells of the group are, not the middle of the group",
+    0.3067: "that is the largest gap, not their weighted sum",
+    0.4243: "you compare cell by cell. Compare the means of each group",
+    0.3214: "a cell with probability 1 has got a group of its own: it belongs to the last group",
+    0.1786: "a cell with probability 1 is in no group: it belongs to the last one",
+    0.3844: "cells without a label count as wrong: leave them out",
+    0.2233: "N is the number of labelled cells, not of all",
+    0.2014: "how sure a method is, is the probability of the class that it calls, not of the true class",
+    0.5129: "how sure a method is, is its largest probability, not that of the first class",
+}
+
+
+# %% nbgrader={"grade": true, "grade_id": "calibration-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    # Seven labelled cells. Sure by 0.62, 0.64, 0.66: one is right. 0.79: right. 0.92, 0.96, 1: two are right.
+    first = np.array([0.62, 0.66, 0.21, 0.55, 0.96, 1.0, 0.08, 0.64, 0.9])
+    probability, truth = np.stack([first, 1 - first], axis=1), np.array([1, 1, 1, 255, 0, 1, 1, 0, 255])
+    # By hand: 3/7 * |1/3 - 0.64| + 1/7 * |1 - 0.79| + 3/7 * |2/3 - 0.96| = (0.92 + 0.21 + 0.88) / 7 = 0.2871
+    got = answer_number(calibration_error(probability, truth), "calibration_error")
+    assert not np.isnan(got), "not a number: an empty group has no mean. It adds nothing"
+    assert got >= 0, f"{got:.4f} is negative: take the absolute value of the gap in each group, before you add up"
+    _explain("", got, _CALIBRATION, 6e-4)
+    assert np.isclose(got, 0.2871, atol=1e-3), f"{got:.4f}; by hand 0.2871"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import experiments
+
+    complaint = experiments.check_calibration(calibration_error)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% [markdown]
+# ## Task 6: in your own words (2 points)
+#
+# A colleague writes: "We tried eight variants. The best of them gains 1.2 points of class accuracy over the usual network: the 95 % interval over our 4000 test frames goes from 0.9 to
+# 1.5. So our part is a clear improvement. Another part changed nothing (interval from -2 to 2), so it can be left out." You learn that the frames come from twelve drives, and
+# that each variant was trained once. Name four things that are wrong with these conclusions, and say for each what you would do in its place. Six sentences are enough.
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "four-things", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
+# (1) Frames of a drive aren't independent: the interval must be over the twelve drives, and will be much wider. (2) One seed: nothing is known of how training runs differ, so both networks
+# must be trained with at least three seeds, the same for both, and the difference paired. (3) The best of eight on the test drives is partly luck: choose on validation drives and test the
+# chosen one once, or correct the level for eight comparisons. (4) An interval from -2 to 2 doesn't show that nothing changed, only that up to two points couldn't be seen: state beforehand
+# how large a loss is acceptable, and ask whether the interval lies above that. (Also welcome: a class in few drives may decide class accuracy; which drives were left out of training;
+# the rule should have been written before the numbers.) Half a point for each of four.

@@ -1,0 +1,230 @@
+"""A failure that is the grader's own costs no student a point: it is told, and the next call grades what it left."""
+
+import errno
+import sqlite3
+import sys
+from pathlib import Path
+
+import pytest
+from nbconvert.writers import FilesWriter
+from nbgrader.api import Gradebook, InvalidEntry
+from tiny_course import tiny_notebooks
+from typer.testing import CliRunner
+
+from semgrid_edu import cli
+from semgrid_edu.course import grading, nbgrader_steps
+from semgrid_edu.course.exercises import build_course
+from semgrid_edu.course.failures import UngradedError
+from semgrid_edu.course.grade import grade_course, grade_one, is_graded, missing_limits, write_graded
+from semgrid_edu.course.grading import GradeSettings, place, reference_answers, submission
+from semgrid_edu.course.handed_in import misplaced
+from semgrid_edu.course.isolation.limits import Limits
+from semgrid_edu.course.isolation.notebook import run_submission
+from semgrid_edu.course.isolation.prepared import instructors_cells
+from semgrid_edu.course.isolation.process import StudentProcess
+from semgrid_edu.course.notebooks import write_notebook
+from semgrid_edu.errors import DataError
+from semgrid_edu.storage.files import write_text
+
+TINY = "00_tiny"
+DEAD = GradeSettings(container=("false",))
+
+
+@pytest.fixture(scope="module")
+def notebooks(tmp_path_factory):
+    return tiny_notebooks(tmp_path_factory.mktemp("notebooks"))
+
+
+@pytest.fixture(scope="module")
+def right(notebooks):
+    source = notebooks / "src" / "exercises" / f"{TINY}.py"
+    return submission(source, reference_answers(source) | {"why": "Since 2 is 2."})
+
+
+@pytest.fixture(scope="module")
+def course(notebooks, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("courses") / "course"
+    build_course(folder, notebooks)
+    return folder
+
+
+@pytest.fixture
+def handed_in(course, right, request):
+    """Hand in a right notebook; return the student's name, another one in each test."""
+    student = request.node.name.translate(str.maketrans("[]", "--"))
+    write_notebook(right, place(course, "submitted", student, TINY))
+    return student
+
+
+def stays_ungraded(course, student, settings=GradeSettings(timeout=5)):  # noqa: B008 (it is frozen)
+    """Grade in vain; return what is told."""
+    with pytest.raises(UngradedError) as told:
+        grade_one(course, TINY, student, settings)
+    assert not is_graded(course, TINY, student)
+    assert f"\n{student}," not in write_graded(course).read_text()
+    return str(told.value)
+
+
+def is_graded_next_time(course, student):
+    result = grade_one(course, TINY, student, GradeSettings(timeout=5))
+    assert (result.score, result.to_read, result.note) == (2, 1, "")
+    return is_graded(course, TINY, student)
+
+
+def test_a_gradebook_that_stays_locked(course, handed_in, monkeypatch, caplog):
+    monkeypatch.setattr(grading, "PATIENCE", 1)
+    held = sqlite3.connect(course / "gradebook.db", isolation_level=None)
+    held.execute("BEGIN IMMEDIATE")
+    with pytest.raises(UngradedError, match="database is locked"):
+        grade_one(course, TINY, handed_in, GradeSettings())
+    held.close()
+    assert "Rolling back" not in caplog.text, "with a page of traceback"
+    assert not is_graded(course, TINY, handed_in)
+    assert is_graded_next_time(course, handed_in)
+
+
+def test_a_gradebook_in_which_another_process_was_first_is_tried_again(course, handed_in, monkeypatch):
+    first = [InvalidEntry("UNIQUE constraint failed: student.id")]
+    enter = Gradebook.update_or_create_student
+
+    def enter_late(*arguments, **named):
+        if first:
+            raise first.pop()
+        return enter(*arguments, **named)
+
+    monkeypatch.setattr(Gradebook, "update_or_create_student", enter_late)
+    assert is_graded_next_time(course, handed_in)
+
+
+@pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), MemoryError()], ids=repr)
+def test_a_machine_without_room(course, handed_in, monkeypatch, error):
+    def write(*arguments, **named):
+        raise error
+
+    with monkeypatch.context() as full:
+        full.setattr(FilesWriter, "write", write)
+        assert type(error).__name__ in stays_ungraded(course, handed_in)
+    assert is_graded_next_time(course, handed_in)
+
+
+def test_an_interruption(course, handed_in, monkeypatch):
+    def interrupted(*arguments):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as changed:
+        changed.setattr(nbgrader_steps, "run_submission", interrupted)
+        assert stays_ungraded(course, handed_in) == "KeyboardInterrupt"
+    assert is_graded_next_time(course, handed_in)
+
+
+def test_a_container_that_does_not_start(course, handed_in):
+    assert is_graded_next_time(course, handed_in), "the reference has passed, outside the container"
+    assert "no Python that answers was started by: false" in stays_ungraded(course, handed_in, DEAD)
+    with pytest.raises(OSError, match="started by: false"):
+        missing_limits(DEAD)
+
+
+def test_a_command_that_starts_the_worker_is_a_container(course, handed_in):
+    settings = GradeSettings(container=("env", f"PATH={Path(sys.executable).parent}"))
+    assert missing_limits(settings) == []
+    assert grade_one(course, TINY, handed_in, settings).score == 2
+
+
+def test_no_process_for_the_hidden_tests(course, right, tmp_path):
+    started = []
+
+    def start():
+        if started:
+            raise OSError(errno.ENOMEM, "Cannot allocate memory")
+        started.append(StudentProcess(Limits(), tmp_path))
+        return started[0]
+
+    cells = instructors_cells(right) | {"twice-test": "_ = twice.unseen(3)"}
+    test = next(cell for cell in right.cells if cell.metadata.get("nbgrader", {}).get("grade_id") == "twice-test")
+    test.source, before = cells["twice-test"], test.source
+    with pytest.raises(ChildProcessError, match="Cannot allocate memory"):
+        run_submission(right, cells, start, 5)
+    test.source = before
+
+
+def test_a_time_that_cannot_be_read_is_the_instructors(course, handed_in):
+    note = place(course, "submitted", handed_in, TINY).with_name("timestamp.txt")
+    note.write_text("on Monday, late")
+    assert "timestamp.txt: expected a time" in stays_ungraded(course, handed_in)
+    note.write_text("2027-03-01 17:12:00 UTC")
+    assert is_graded_next_time(course, handed_in)
+
+
+def test_a_text_that_cannot_be_written_is_the_files(course, right):
+    path = place(course, "submitted", "surrogate", TINY)
+    write_notebook(right, path)
+    path.write_text(path.read_text().replace("Since 2 is 2", "\\ud800"))
+    result = grade_one(course, TINY, "surrogate", GradeSettings())
+    assert (result.score, result.points) == (0, 3)
+    assert "the file can't be graded: UnicodeEncodeError" in result.note
+    assert is_graded(course, TINY, "surrogate")
+
+
+@pytest.fixture
+def broken_reference(notebooks, right, tmp_path):
+    """A course whose hidden test fails its own reference, with a right submission; the fixture gives a way to mend."""
+    course = tmp_path / "course"
+    build_course(course, notebooks)
+    write_notebook(right, place(course, "submitted", "ada", TINY))
+    module = course / "instructor" / "semgrid_instructor" / "tiny.py"
+    text = module.read_text()
+    module.write_text(text.replace("197530", "1 / 0"))
+    return course, lambda: module.write_text(text)
+
+
+def test_reference_answers_that_crash(broken_reference):
+    course, mend = broken_reference
+    result = CliRunner().invoke(cli.app, ["course", "grade", str(course), "--workers", "1"])
+    assert result.exit_code != 0
+    assert "expected reference answers that pass their tests" in str(result.exception)
+    assert not is_graded(course, TINY, "ada")
+    mend()
+    assert [(one.student, one.score) for one in grade_course(course, GradeSettings())] == [("ada", 2)]
+
+
+def test_who_failed_is_named_in_the_end_after_all_others(course, handed_in, right):
+    write_notebook(right, place(course, "submitted", "late", TINY))
+    place(course, "submitted", "late", TINY).with_name("timestamp.txt").write_text("late")
+    result = CliRunner().invoke(cli.app, ["course", "grade", str(course), TINY, "--workers", "1"])
+    assert result.exit_code != 0
+    assert f"late, {TINY}: " in str(result.exception)
+    assert f"\n{handed_in},{TINY},2.0," in (course / "graded.csv").read_text()
+
+
+def test_what_lies_in_the_wrong_place_is_named(course, handed_in):
+    folder = place(course, "submitted", handed_in, TINY).parent
+    write_text(folder / "draft.ipynb", "beside one that is graded")
+    wrong = [f"submitted/bob/{TINY}/{TINY} (1).ipynb", "submitted/bob/00_tyni/00_tyni.ipynb", "submitted/cy.ipynb"]
+    for name in wrong:
+        write_text(course / name, "{}")
+    assert {path.as_posix() for path in misplaced(course)} == set(wrong)
+
+
+def test_graded_csv_keeps_the_other_exercises(notebooks, right, tmp_path):
+    second = notebooks / "src" / "exercises" / "01_tiny.py"
+    second.write_text((notebooks / "src" / "exercises" / f"{TINY}.py").read_text())
+    course = tmp_path / "course"
+    build_course(course, notebooks)
+    second.unlink()
+    for name in (TINY, "01_tiny"):
+        write_notebook(right, place(course, "submitted", "ada", name))
+        result = CliRunner().invoke(cli.app, ["course", "grade", str(course), name, "--workers", "1"])
+        assert result.exit_code == 0
+    assert [line.split(",")[1] for line in (course / "graded.csv").read_text().splitlines()[1:]] == [TINY, "01_tiny"]
+
+
+def test_nbgraders_refusal_is_one_line(course, notebooks, handed_in):
+    grade_one(course, TINY, handed_in, GradeSettings())
+    source = notebooks / "src" / "exercises" / f"{TINY}.py"
+    text = source.read_text()
+    source.write_text(text[: text.rindex("# %% [markdown]")])
+    with pytest.raises(DataError, match="Cannot add or remove cells") as told:
+        build_course(course, notebooks)
+    source.write_text(text)
+    build_course(course, notebooks)
+    assert "\n" not in str(told.value)
