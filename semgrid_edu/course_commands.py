@@ -92,7 +92,8 @@ def grade(
 ) -> None:
     """Grade a class with nbgrader: students' code runs in processes of its own, apart from tests and gradebook."""
     from semgrid_edu.course.failures import UngradedError
-    from semgrid_edu.course.grade import grade_course, missing_limits, write_graded
+    from semgrid_edu.course.grade import grade_course, missing_limits
+    from semgrid_edu.course.graded import write_graded
     from semgrid_edu.course.grading import GradeSettings
     from semgrid_edu.course.handed_in import misplaced
 

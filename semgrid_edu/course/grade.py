@@ -1,60 +1,27 @@
 """A whole class: every submission that was collected, graded by nbgrader on all cores."""
 
-import csv
-import io
-import shutil
 import tempfile
-import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from dataclasses import astuple, dataclass, field, fields
 from glob import has_magic
 from multiprocessing import get_context
 from pathlib import Path
 
 import nbformat
 from nbformat.v4 import new_markdown_cell
-from nbgrader.api import Gradebook, MissingEntry
 from tqdm import tqdm
 
 from semgrid_edu.course.failures import UngradedError, in_one_line
+from semgrid_edu.course.graded import Graded, forget, is_graded, open_gradebook, result_of, unfinished
 from semgrid_edu.course.grading import GradeSettings, autograde_one, place
 from semgrid_edu.course.handed_in import check_file, check_time, submissions
 from semgrid_edu.course.isolation.prepared import prepare, starter
 from semgrid_edu.course.nbgrader_steps import CRASHED
 from semgrid_edu.course.notebooks import write_notebook
 from semgrid_edu.errors import DataError
-from semgrid_edu.storage.files import write_text
 
 UNREADABLE = "unreadable"
 """The folder with notebooks that stand in for files that can't be read."""
-
-GRADED = "graded.csv"
-"""The file with one line for each submission."""
-
-
-@dataclass(frozen=True)
-class Graded:
-    """The result of one submission.
-
-    Parameters
-    ----------
-    student, assignment : str
-        Whose it is.
-    score, points : float
-        What it has so far, and what it could have.
-    to_read : int
-        Written answers that wait for a person.
-    note : str
-        What ended Python or could not be read; "" when all went well.
-    """
-
-    student: str
-    assignment: str
-    score: float
-    points: float
-    to_read: int
-    note: str = field(default="")
 
 
 def grade_course(
@@ -93,14 +60,14 @@ def grade_course(
     UngradedError
         In the end, when submissions stay ungraded for a reason that isn't theirs; it names them, one a line.
     """
-    course, began = course.resolve(), time.time()
+    course = course.resolve()
     wanted = [one for one in submissions(course, assignments) if again or not is_graded(course, *one)]
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         try:
             failed = _failing_references(pool, course, settings, [assignment for assignment, _ in wanted])
             ready = [one for one in wanted if one[0] not in failed]
             waiting = {pool.submit(grade_one, course, *one, settings): one for one in ready}
-            yield from _as_they_end(course, waiting, failed, began)
+            yield from _as_they_end(course, waiting, failed)
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
@@ -108,15 +75,13 @@ def grade_course(
         raise UngradedError("\n".join(f"{which}: {says}" for which, says in failed.items()))
 
 
-def _as_they_end(
-    course: Path, waiting: dict[Future, tuple[str, str]], failed: dict[str, str], began: float
-) -> Iterator[Graded]:
+def _as_they_end(course: Path, waiting: dict[Future, tuple[str, str]], failed: dict[str, str]) -> Iterator[Graded]:
     """Yield results; tell of submissions that have none, since their grading failed or its process was ended."""
     for done in tqdm(as_completed(waiting), "submissions", len(waiting)):
         try:
             yield done.result()
         except Exception as error:
-            _forget(course, *waiting[done], began)
+            forget(course, *waiting[done])
             failed[", ".join(reversed(waiting[done]))] = in_one_line(error)
 
 
@@ -156,37 +121,6 @@ def missing_limits(settings: GradeSettings) -> list[str]:
     return process.unlimited
 
 
-def is_graded(course: Path, assignment: str, student: str) -> bool:
-    """Return whether a submission has been graded, all of it and as it is now.
-
-    Parameters
-    ----------
-    course : Path
-        The course.
-    assignment, student : str
-        Whose submission.
-    """
-    if not _is_up_to_date(course, assignment, student):
-        return False
-    with _gradebook(course) as gradebook:
-        return _has_scores(gradebook, assignment, student)
-
-
-def _is_up_to_date(course: Path, assignment: str, student: str) -> bool:
-    """Return whether nbgrader has made its notebook of a submission after that was handed in."""
-    submitted, graded = (place(course, step, student, assignment) for step in ("submitted", "autograded"))
-    return graded.exists() and graded.stat().st_mtime >= submitted.stat().st_mtime
-
-
-def _has_scores(gradebook: Gradebook, assignment: str, student: str) -> bool:
-    """Return whether every test cell of a submission has a score, or waits for a person."""
-    try:
-        grades = gradebook.find_submission_notebook(assignment, assignment, student).grades
-    except MissingEntry:
-        return False
-    return all(grade.needs_manual_grade or (grade.auto_score, grade.manual_score) != (None, None) for grade in grades)
-
-
 def grade_one(course: Path, assignment: str, student: str, settings: GradeSettings) -> Graded:
     """Grade one submission; a file that can't be read is graded as an empty one, and the note says so.
 
@@ -213,16 +147,12 @@ def grade_one(course: Path, assignment: str, student: str, settings: GradeSettin
         note = f"{CRASHED}nbgrader takes * ? [ in a student's name for a pattern: rename the folder"
         return Graded(student, assignment, 0, 0, 0, note)
     try:
-        if fault := _graded_or_fault(course, assignment, student, settings):
-            _grade_stand_in(course, assignment, student, settings, f"{CRASHED}the file can't be graded: {fault}")
-        with _gradebook(course) as gradebook:
-            return _result(gradebook, assignment, student)
+        with unfinished(course, assignment, student):
+            if fault := _graded_or_fault(course, assignment, student, settings):
+                _grade_stand_in(course, assignment, student, settings, f"{CRASHED}the file can't be graded: {fault}")
+            return result_of(course, assignment, student)
     except Exception as error:
-        _forget(course, assignment, student)
         raise UngradedError(in_one_line(error)) from error
-    except BaseException:
-        _forget(course, assignment, student)
-        raise
 
 
 def _graded_or_fault(course: Path, assignment: str, student: str, settings: GradeSettings) -> str:
@@ -237,18 +167,11 @@ def _graded_or_fault(course: Path, assignment: str, student: str, settings: Grad
     return ""
 
 
-def _forget(course: Path, assignment: str, student: str, since: float = 0.0) -> None:
-    """Delete what an unfinished grading left since some time: the submission then counts as not graded."""
-    graded = place(course, "autograded", student, assignment)
-    if graded.exists() and graded.stat().st_mtime >= since:
-        shutil.rmtree(graded.parent, ignore_errors=True)
-
-
 def _grade_stand_in(course: Path, assignment: str, student: str, settings: GradeSettings, note: str) -> None:
     """Grade the exercise as students get it in place of a file that can't be graded; say so in the gradebook."""
     _stand_in(course, assignment, student, note)
     autograde_one(course, assignment, student, settings, UNREADABLE)
-    with _gradebook(course) as gradebook:
+    with open_gradebook(course) as gradebook:
         for comment in gradebook.find_submission_notebook(assignment, assignment, student).comments:
             comment.auto_comment = note
         gradebook.db.commit()
@@ -259,40 +182,3 @@ def _stand_in(course: Path, assignment: str, student: str, note: str) -> None:
     notebook = nbformat.read(course / "release" / assignment / f"{assignment}.ipynb", as_version=4)
     notebook.cells.insert(0, new_markdown_cell(f"**{note}**"))
     write_notebook(notebook, place(course, UNREADABLE, student, assignment))
-
-
-def _result(gradebook: Gradebook, assignment: str, student: str) -> Graded:
-    """Read what a submission has from the gradebook."""
-    found = gradebook.find_submission_notebook(assignment, assignment, student)
-    crashes = [comment.auto_comment for comment in found.comments if (comment.auto_comment or "").startswith(CRASHED)]
-    to_read = sum(grade.needs_manual_grade for grade in found.grades)
-    return Graded(student, assignment, found.score, found.max_score, to_read, "; ".join(dict.fromkeys(crashes)))
-
-
-def _gradebook(course: Path) -> Gradebook:
-    """Open the gradebook of a course."""
-    return Gradebook(f"sqlite:///{course / 'gradebook.db'}")
-
-
-def write_graded(course: Path) -> Path:
-    """Write what all submissions have so far, one line each, as a spreadsheet reads it.
-
-    Parameters
-    ----------
-    course : Path
-        The course.
-
-    Returns
-    -------
-    Path
-        The file, `graded.csv` in the course.
-    """
-    text = io.StringIO()
-    table = csv.writer(text)
-    table.writerow(column.name for column in fields(Graded))
-    with _gradebook(course) as gradebook:
-        for one in submissions(course):
-            if _is_up_to_date(course, *one) and _has_scores(gradebook, *one):
-                table.writerow(astuple(_result(gradebook, *one)))
-    write_text(course / GRADED, text.getvalue())
-    return course / GRADED

@@ -11,7 +11,8 @@ from nbgrader.api import Gradebook
 from tiny_course import tiny_notebooks
 
 from semgrid_edu.course.exercises import build_course, build_exercise, exercise_sources, student_version
-from semgrid_edu.course.grade import grade_one, is_graded, write_graded
+from semgrid_edu.course.grade import grade_one
+from semgrid_edu.course.graded import is_graded, write_graded
 from semgrid_edu.course.grading import GradeSettings, autograde, autograde_one, place, reference_answers, submission
 from semgrid_edu.course.links import point_links
 from semgrid_edu.course.notebooks import NOTEBOOKS, write_notebook

@@ -2,6 +2,7 @@
 
 import errno
 import sqlite3
+import subprocess
 import sys
 from pathlib import Path
 
@@ -15,7 +16,8 @@ from semgrid_edu import cli
 from semgrid_edu.course import grading, nbgrader_steps
 from semgrid_edu.course.exercises import build_course
 from semgrid_edu.course.failures import UngradedError
-from semgrid_edu.course.grade import grade_course, grade_one, is_graded, missing_limits, write_graded
+from semgrid_edu.course.grade import grade_course, grade_one, missing_limits
+from semgrid_edu.course.graded import is_graded, write_graded
 from semgrid_edu.course.grading import GradeSettings, place, reference_answers, submission
 from semgrid_edu.course.handed_in import misplaced
 from semgrid_edu.course.isolation.limits import Limits
@@ -114,6 +116,27 @@ def test_an_interruption(course, handed_in, monkeypatch):
     with monkeypatch.context() as changed:
         changed.setattr(nbgrader_steps, "run_submission", interrupted)
         assert stays_ungraded(course, handed_in) == "KeyboardInterrupt"
+    assert is_graded_next_time(course, handed_in)
+
+
+DIES = """
+import os, sys
+from pathlib import Path
+from semgrid_edu.course import nbgrader_steps
+from semgrid_edu.course.grade import grade_one
+from semgrid_edu.course.grading import GradeSettings
+nbgrader_steps.run_submission = lambda *arguments: os._exit(9)
+grade_one(Path(sys.argv[1]), sys.argv[2], sys.argv[3], GradeSettings())
+"""
+
+
+def test_a_grader_that_is_killed_while_it_grades_again(course, handed_in):
+    assert is_graded_next_time(course, handed_in)
+    died = subprocess.run([sys.executable, "-c", DIES, course, TINY, handed_in], check=False, capture_output=True)
+    assert died.returncode == 9
+    assert place(course, "autograded", handed_in, TINY).exists(), "a half-made notebook, beside the old scores"
+    assert not is_graded(course, TINY, handed_in)
+    assert f"\n{handed_in}," not in write_graded(course).read_text()
     assert is_graded_next_time(course, handed_in)
 
 

@@ -12,7 +12,8 @@ import test_sound as sound
 from class_of import NAME, POINTS, REFERENCE, SETTINGS, handed_in, inside
 
 from semgrid_edu.course.exercises import course_api
-from semgrid_edu.course.grade import grade_course, write_graded
+from semgrid_edu.course.grade import grade_course
+from semgrid_edu.course.graded import write_graded
 from semgrid_edu.course.grading import place
 from semgrid_edu.course.notebooks import write_notebook
 
