@@ -536,9 +536,10 @@ for name, faults in measured["faults"].items():
 #
 # The geometry has passed. So everything that learns nothing should work on any drive that passes: the evidence of a
 # scan, the ground filter, CMCDOT. The cars that move are the test. On the sample drive the simulator knows their boxes.
-# On drive 0013 the boxes of two overtaking cars were found by hand.
+# On drive 0013 the boxes of two overtaking cars were found by hand. (On another kind of processor the first number may
+# differ by a per cent, because a particle filter magnifies rounding errors.)
 
-# %%
+# %% tags=["nbval-ignore-output"]
 boxes = {} if KITTI else sample_boxes(drive)
 hits = [moving_hits(r.frame, r.belief, boxes.get(k, []), spec) for k, r in enumerate(results) if k >= 10]
 hits = np.concatenate(hits)

@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import qmc
 
 from semgrid_edu.crf.params import CrfParams
 from semgrid_edu.errors import ArgumentError
@@ -144,5 +143,8 @@ def _ends(cell: float) -> NDArray[np.float64]:
 
 def _halton(index: int, seed: int) -> NDArray[np.float64]:
     """Return one point of the scrambled sequence."""
+    # It takes half a second, and most who refine a map never search.
+    from scipy.stats import qmc
+
     sequence = qmc.Halton(len(FACTORS), scramble=True, seed=seed)
     return sequence.fast_forward(index).random(1)[0]

@@ -1,27 +1,23 @@
 """Pictures of graphical models: circles are variables, arrows conditional distributions, black squares factors.
 
-daft (https://docs.daft-pgm.org) draws nodes, edges and plates; this module decides where they stand and what they say.
+`nodes` draws them; this module decides where they stand and what they say. matplotlib is imported where it is used: it
+takes half a second, and those who only infer don't need it.
 """
 
 import re
 from collections.abc import Iterable, Mapping
 from itertools import chain, count
+from typing import TYPE_CHECKING
 
-import daft
-import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.graphical.layout import Place, automatic
+from semgrid_edu.graphical.layout import NODE, Place, automatic
 from semgrid_edu.graphical.model import GraphicalModel
 from semgrid_edu.graphical.variables import as_names, check_name
 
-NODE = 0.56
-"""Diameter of a node, when neighbours are 1 apart."""
-
-SQUARE = 0.14
-"""Side of a factor."""
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 MARGIN = 0.45
 """How far a plate and the picture reach beyond the centres of nodes, at least."""
@@ -35,13 +31,10 @@ INCHES = 0.8
 FONT_SIZES = 8.0, 12.0
 """Points: labels are never smaller than the first, nor larger than the second."""
 
-HIGHLIGHT = "#d95f02"
-"""Outline of the highlighted node, which is three times as thick as the others: colour isn't the only mark."""
-
 
 def draw(
     model: GraphicalModel,
-    ax: Axes | None = None,
+    ax: "Axes | None" = None,
     *,
     observed: str | Iterable[str] = (),
     highlight: str | Iterable[str] = (),
@@ -49,7 +42,7 @@ def draw(
     labels: Mapping[str, str] | None = None,
     equations: Mapping[str, str] | None = None,
     plates: Mapping[str, Iterable[str]] | None = None,
-) -> Axes:
+) -> "Axes":
     r"""Draw a model: arrows from parents to children, or the factor graph of an undirected model.
 
     Parameters
@@ -89,6 +82,8 @@ def draw(
     >>> beam = GraphicalModel([Factor("m", [0.8, 0.2]), Factor(("m", "z"), [[0.9, 0.1], [0.2, 0.8]])], {"z": ("m",)})
     >>> ax = draw(beam, observed="z", highlight="m", positions=in_rows(["m"], ["z"]))
     """
+    from semgrid_edu.graphical.nodes import model_edges, plate_boxes, render, variable_nodes
+
     labels, equations = labels or {}, equations or {}
     plates = {text: as_names(of) for text, of in (plates or {}).items()}
     observed, highlight = as_names(observed), as_names(highlight)
@@ -99,15 +94,15 @@ def draw(
     boxes = {text: _box(text, of, places, said, texts) for text, of in plates.items()}
     low, high = _extent(places, said, boxes, texts.values())
     if ax is None:
+        import matplotlib.pyplot as plt
+
         ax = plt.subplots(figsize=INCHES * (high - low), layout="constrained")[1]
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     ax.set_axis_off()
     size = _font_size(ax, high - low)
-    nodes = {
-        name: _variable(name, places[name], text, size, name in observed, name in highlight)
-        for name, text in said.items()
-    }
-    _render([*_plates(boxes, size), *_edges(model, places, nodes), *nodes.values()], ax)
+    widths = {name: 2 * _half_width(text) for name, text in said.items()}
+    nodes = variable_nodes(places, said, widths, size, observed, highlight)
+    render([*plate_boxes(boxes, size), *model_edges(model, places, nodes), *nodes.values()], ax)
     for text, place in texts.values():
         ax.text(*place, text, fontsize=size, ha="left", va="center")
     return ax
@@ -159,44 +154,9 @@ def _symbol(letter: str, index: str) -> str:
     return f"${letter}_{{{index}}}$" if index else f"${letter}$"
 
 
-def _variable(name: str, place: Place, text: str, size: float, observed: bool, highlight: bool) -> daft.Node:
-    style = {"ec": HIGHLIGHT, "lw": 3.0} if highlight else {}
-    return daft.Node(
-        name, text, *place, aspect=_half_width(text) / (NODE / 2), observed=observed, fontsize=size, plot_params=style
-    )
-
-
 def _half_width(text: str) -> float:
     """Return how far a node reaches to either side of its centre: words make it wider."""
     return max(NODE, LETTER * _letters(text)) / 2
-
-
-def _edges(model: GraphicalModel, places: Mapping[str, Place], nodes: Mapping[str, daft.Node]) -> list:
-    """Return the arrows of a directed model, or the squares of an undirected one and the lines to them."""
-    if model.parents is not None:
-        arrow = {"head_length": 0.14, "head_width": 0.1}
-        return [
-            daft.Edge(nodes[above], nodes[child], plot_params=arrow)
-            for child, family in model.parents.items()
-            for above in family
-        ]
-    things = []
-    for label, factor in zip(model.labels, model.factors, strict=True):
-        if factor.names:
-            square = daft.Node(
-                label, "", *places[label], scale=SQUARE / NODE, plot_params={"fc": "k"}, shape="rectangle"
-            )
-            # daft can't end an upright line at a rectangle, so lines end at a circle under the square.
-            circle = daft.Node(label, "", *places[label], scale=SQUARE / NODE)
-            things += [daft.Edge(nodes[name], circle, directed=False) for name in factor.names] + [square]
-    return things
-
-
-def _plates(boxes: Mapping[str, tuple[np.ndarray, np.ndarray]], size: float) -> list[daft.Plate]:
-    return [
-        daft.Plate([*low, *(high - low)], label=text, fontsize=size, rect_params={"fc": "none"})
-        for text, (low, high) in boxes.items()
-    ]
 
 
 def _box(text: str, names: tuple[str, ...], places, said, texts) -> tuple[np.ndarray, np.ndarray]:
@@ -235,15 +195,7 @@ def _letters(text: str) -> int:
     return len(re.sub(r"\\[A-Za-z]+", "x", text).translate(str.maketrans("", "", "${}_^\\")))
 
 
-def _font_size(ax: Axes, extent: np.ndarray) -> float:
+def _font_size(ax: "Axes", extent: np.ndarray) -> float:
     """Return points that fit a node at the scale of the axes, within `FONT_SIZES`."""
     width, height = ax.get_window_extent().size / ax.figure.dpi * 72
     return float(np.clip(0.24 * min(width / extent[0], height / extent[1]), *FONT_SIZES))
-
-
-def _render(things: Iterable, ax: Axes) -> None:
-    """Draw daft's objects into our axes: `daft.PGM.render` would open a figure of its own."""
-    context = daft.PGM(grid_unit=1.0, node_unit=NODE)._ctx
-    context._ax = ax
-    for thing in things:
-        thing.render(context)

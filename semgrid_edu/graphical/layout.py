@@ -10,6 +10,9 @@ from semgrid_edu.graphical.model import GraphicalModel
 Place = tuple[float, float]
 """x to the right, y upwards."""
 
+NODE = 0.56
+"""Diameter of a node, when neighbours are 1 apart."""
+
 CLEARANCE = 0.4
 """An edge that passes a node nearer than this seems to end there."""
 

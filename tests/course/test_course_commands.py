@@ -1,6 +1,7 @@
 """The `semgrid-edu course` commands say what they did, and what they could not do."""
 
 import pytest
+from tiny_course import tiny_notebooks
 from typer.testing import CliRunner
 
 from semgrid_edu import cli, course_commands
@@ -32,6 +33,6 @@ def test_missing_tools_are_named(monkeypatch):
 def test_grading_says_what_the_system_cannot_limit(tmp_path, monkeypatch):
     assert set(grade.missing_limits(GradeSettings())) < set(PARTS)
     monkeypatch.setattr(grade, "missing_limits", lambda settings: ["network", "files"])
-    build_course(tmp_path / "course")
+    build_course(tmp_path / "course", tiny_notebooks(tmp_path / "notebooks"))
     result = CliRunner().invoke(cli.app, ["course", "grade", str(tmp_path / "course")], catch_exceptions=False)
     assert "can't limit for students' code: network, files" in result.output
