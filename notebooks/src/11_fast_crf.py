@@ -614,6 +614,7 @@ print(f"the network's label is changed in {(right.argmax(0) != log_g.argmax(0)).
 for name, wrong_own in (("nothing subtracted", 0 * own), ("as if Gaussian", as_if_gaussian)):
     wrong = mean_field_by_filters(unary, filters, wrong_own)
     off = np.abs(wrong - right).max(axis=0)
+    assert off.max() > 0.2
     print(f"{name}: a probability is off by more than 0.1 in {(off > 0.1).sum()} cells, by {off.max():.2f} at most;")
     print(f"    another label in {(wrong.argmax(0) != right.argmax(0)).sum()} cells")
 share = bilateral.diagonal / params.w_bilateral
@@ -675,7 +676,9 @@ def relative_error(features, some):
 
 
 part = features_of(o[:, 60:120, 8:48], params)
-print(f"error of the kernel on the drive: {100 * relative_error(part, np.arange(0, 2400, 24)):.0f} %")
+on_drive = relative_error(part, np.arange(0, 2400, 24))
+print(f"error of the kernel on the drive: {100 * on_drive:.0f} %")
+assert 0.2 < on_drive < 0.3
 for d in (1, 2, 3, 5, 7):
     cloud = np.random.default_rng(d).normal(size=(2000, d))
     print(f"a cloud of 2000 points in {d} dimensions: {100 * relative_error(cloud, np.arange(100)):.0f} %")
@@ -713,6 +716,9 @@ print("iterations   kernel error: |dQ|, labels      convergence error: |dQ|, lab
 for n in ROUNDS:
     kernel_error, stop_error = compare(mean_field(*cells, params, n), exactly[n]), compare(exactly[n], settled)
     print("{:6d} {:21.4f} {:8.1f} %".format(n, *kernel_error), "{:22.4f} {:8.1f} %".format(*stop_error))
+    if n == 10:
+        assert max(kernel_error[0], stop_error[0]) < 0.0025
+        assert min(kernel_error[1], stop_error[1]) > 98
 
 
 # %% jupyter={"source_hidden": true}
@@ -848,10 +854,13 @@ for widths in ((0.3, 0.2), (1, 0.2), (3.2, 0.2), (10, 0.2), (3.2, 0.02), (3.2, 2
     w1, w2 = 4 / np.median(gaussian), 3 / (2 * np.pi * params.sigma_gamma**2)
     plain = replace(other, normalization="none", w_bilateral=w1, w_spatial=w2)
     print("{:4.1f} {:5.2f}".format(*widths), f"{np.median(of_lattice / gaussian):13.2f}", end="       ")
+    errors = []
     for settings in (other, plain):
         nearly, exact = (infer(*cells, settings) for infer in (mean_field, mean_field_naive))
         off, alike = compare(nearly, exact)
+        errors.append(off)
         print(f"{off:7.4f} {np.abs(nearly - exact).max():6.2f} {alike:6.1f} %", end="   ")
+    assert errors[0] < errors[1]
     print()
 
 # %% [markdown]
@@ -885,9 +894,14 @@ ways = {
 print(f"{'':<14}", *(f"{name:>9}" for name in ways))
 for name in ("road", "sidewalk", "building", "car", "pedestrian", "signage"):
     c = KITTI_14.index(name)
-    print(f"{name:<14}", *(f"{100 * n[c, c] / n[c].sum():7.0f} %" for n in ways.values()))
-print(f"{'pixel accuracy':<14}", *(f"{100 * pixel_accuracy(n):7.1f} %" for n in ways.values()))
-print(f"{'class accuracy':<14}", *(f"{100 * class_accuracy(n):7.1f} %" for n in ways.values()))
+    found = [n[c, c] / n[c].sum() for n in ways.values()]
+    assert abs(found[1] - found[2]) < 0.015
+    print(f"{name:<14}", *(f"{100 * share:7.0f} %" for share in found))
+pixels, classes = ([metric(n) for n in ways.values()] for metric in (pixel_accuracy, class_accuracy))
+print(f"{'pixel accuracy':<14}", *(f"{100 * share:7.1f} %" for share in pixels))
+print(f"{'class accuracy':<14}", *(f"{100 * share:7.1f} %" for share in classes))
+assert min(pixels[1:]) > pixels[0]
+assert max(classes[1:]) < classes[0] - 0.05
 
 # %% [markdown]
 # The CRF finds more of road and sidewalk, and less of building, car, pedestrian and signage. Lattice and window differ by

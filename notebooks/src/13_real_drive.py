@@ -545,6 +545,7 @@ hits = [moving_hits(r.frame, r.belief, boxes.get(k, []), spec) for k, r in enume
 hits = np.concatenate(hits)
 if len(hits):
     print(f"this drive: of {len(hits)} hit cells of moving cars, {100 * hits.mean():.0f} % are called DYNAMIC")
+    assert hits.mean() > 0.9
 for name, one in measured["drives"].items():
     cars = f"{one['grids']['moving cells']:4d} cells of moving cars, DYNAMIC: {one['grids']['found']:.2f}"
     print(f"{name:<10} {cars}; {one['returns']:.0f} returns in a scan")

@@ -61,7 +61,7 @@ def unfinished(course: Path, assignment: str, student: str) -> Iterator[None]:
     try:
         write_text(mark, "")
         yield
-        mark.unlink()
+        mark.unlink(missing_ok=True)
     except BaseException:
         forget(course, assignment, student)
         raise
@@ -80,7 +80,7 @@ def forget(course: Path, assignment: str, student: str) -> None:
     mark = _mark(course, assignment, student)
     if mark.exists():
         shutil.rmtree(place(course, "autograded", student, assignment).parent, ignore_errors=True)
-        mark.unlink()
+        mark.unlink(missing_ok=True)
 
 
 def _mark(course: Path, assignment: str, student: str) -> Path:
