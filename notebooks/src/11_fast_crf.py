@@ -89,8 +89,8 @@ plt.show()
 # %% [markdown]
 # The middle map took ten iterations of mean field over 8804 cells and 14 classes. There are 39 million pairs of these
 # cells, and lecture 10 would have visited all of them in each iteration. In this lecture we find out how to avoid that.
-# (The occupancy grid comes from a particle filter, which magnifies rounding errors. On another kind of processor, some
-# numbers that are printed below may therefore differ a little from those in the text.)
+# (The occupancy grid comes from a particle filter, which magnifies rounding errors. So on another kind of processor some
+# printed numbers differ a little from those in the text.)
 #
 # ## The graph, and a second graph that computes
 #
@@ -878,7 +878,7 @@ for widths in ((0.3, 0.2), (1, 0.2), (3.2, 0.2), (10, 0.2), (3.2, 0.02), (3.2, 2
 # true cells of a class are found.
 
 
-# %% tags=["nbval-ignore-output"]
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 def confusion(refine):
     """Return the confusion matrix over ten frames of the drive."""
     labels = [refine(log_g, o).argmax(axis=0) for log_g, o in zip(said, occupancies, strict=True)]
