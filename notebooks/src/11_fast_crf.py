@@ -737,7 +737,7 @@ repeated = [enlarged(unary, (n, *spec.shape)) for n in numbers]
 class_times = [seconds(lambda r=r: mean_field(r, o, params), 15) for r in repeated]
 of_lattice = [compare(mean_field(*cells, params, n), settled)[0] for n in ROUNDS]
 
-# %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"] alt="left: error against iterations, the naive way falls steadily, the lattice levels off; middle: time against the number of cells on logarithmic axes, the naive way steeper than the lattice; right: time against classes, in steps of 16"
+# %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"] alt="left: error against iterations, the naive way falls steadily, the lattice levels off; middle: time against the number of cells on logarithmic axes, the naive way steeper than the lattice; right: time against classes, which about doubles from 2 to 48 classes"
 fig, axes = plt.subplots(1, 3, figsize=(13, 3.7), layout="constrained")
 axes[0].semilogy(ROUNDS, [compare(exactly[n], settled)[0] for n in ROUNDS], "o-", color="0.2", label="all pairs")
 axes[0].semilogy(ROUNDS, of_lattice, "s--", color="#d55e00", label="lattice")
@@ -771,8 +771,9 @@ for infer in (mean_field_naive, mean_field_accurate, mean_field):
 # cells share is taken out by the normalisation.
 #
 # **Time** (middle and right). Both axes of the middle picture are logarithmic. Twice the cells cost the lattice about
-# twice the time, and all pairs about four times. With the classes, time jumps after 16 and after 32, because the
-# package fills them up to a multiple of 16. So 2 classes cost nearly as much as 16.
+# twice the time, and all pairs about four times. With the classes, time grows slowly: 48 of them cost about
+# twice as much as 2. One reason is that the package fills them up to a multiple of 16. On a quiet machine you see steps
+# after 16 and after 32; in a picture made on a busy one, chance hides them.
 #
 # **A third way** is in the last table. `mean_field_accurate` computes the Gaussian exactly for all cells in a window of
 # four widths around each cell, without writing a matrix down. Its kernel error is far smaller. Its time is proportional
