@@ -464,7 +464,7 @@ plt.show()
 # %% [markdown]
 # Behind each name stands the number of its cells, behind each bar the weight $\alpha_c$. On the left unobserved and
 # road have most of the say. In the middle every class that is in all six frames has the same say. But then one cell
-# of unknown-dynamic weighs as much as 300 unobserved ones, and the training hangs on 25 cells. So the package keeps
+# of unknown-dynamic weighs as much as 300 unobserved ones, and training depends on 25 cells. So the package keeps
 # weights between 1/4 and 4 (`weight_limit`); the paper has no such limit. On the right is the compromise.
 #
 # ## One step downhill, with momentum
