@@ -35,7 +35,7 @@ from semgrid_edu.occupancy import (
     scan_evidence_literal,
     sensor,
 )
-from semgrid_edu.occupancy.tracking import LIDAR_PERIOD
+from semgrid_edu.occupancy.cmcdot import LIDAR_PERIOD
 
 Drive = list[tuple[NDArray, PlanarMotion]]
 WHOLE = "whole step"

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import psutil
 
-from semgrid_edu.course.exercises import build_course, exercise_sources
-from semgrid_edu.course.grade import grade_course
-from semgrid_edu.course.grading import GradeSettings, place, reference_answers, submission
-from semgrid_edu.course.notebooks import write_notebook
+from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, place, reference_answers, submission
+from semgrid_edu.workshop.course.nbgrader.build import build_course, exercise_sources
+from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course
+from semgrid_edu.workshop.course.notebooks.build import write_notebook
 
 EXERCISES, STUDENTS, WORKERS = 9, 7, 2
 CLASS = 200

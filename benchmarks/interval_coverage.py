@@ -10,9 +10,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.experiments.statistics import Metric, drive_interval, paired_interval
-from semgrid_edu.experiments.tables import markdown_table, per_cent
 from semgrid_edu.metrics import METRICS
+from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
+from semgrid_edu.workshop.scoring.statistics import Metric, drive_interval, paired_interval
 
 SEEDS, DRIVES, TRIALS, RESAMPLES = 3, 20, 2000, 200
 

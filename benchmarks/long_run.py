@@ -17,10 +17,10 @@ import numpy as np
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.illustrations.boxes import Box, scan_boxes
 from semgrid_edu.occupancy import Belief, Cmcdot, CmcdotParams, PlanarMotion
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import versions
+from semgrid_edu.workshop.illustrations.boxes import Box, scan_boxes
 
 RADIUS, SPEED = 25.0, 5.0
 """Of the circle on which the vehicle drives, metres, and how fast, m/s: one lap takes half a minute."""

@@ -9,11 +9,11 @@ the simplest cure and for the one that was chosen.
 import argparse
 from datetime import UTC, datetime
 
-from semgrid_edu.experiments.suspects import BARRED, MENDED, SUSPECTS, measure_suspects
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.simulation.named_streets import TEST_STREETS
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import versions
+from semgrid_edu.workshop.attic.suspects import BARRED, MENDED, SUSPECTS, measure_suspects
+from semgrid_edu.workshop.simulation.named_streets import TEST_STREETS
 
 CLOSELY = ("walls", "mesh and hedge")
 CURES = (next(iter(SUSPECTS)), BARRED, MENDED)

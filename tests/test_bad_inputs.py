@@ -14,15 +14,16 @@ import typer
 from bad_inputs import HELD, HUGE, TABLE, log, sample
 from tiny_drive import DATE, write_tiny_drive
 
-import semgrid_edu.experiments.evaluate
 import semgrid_edu.training.run
-from semgrid_edu import cli, demo
+import semgrid_edu.workshop.scoring.evaluate
 from semgrid_edu.datasets import KittiRawDrive, training_cache
 from semgrid_edu.datasets.training_set import TrainingSet
-from semgrid_edu.experiments.reproduction.commands import HELP
 from semgrid_edu.networks import Architecture, build_net, save_net
-from semgrid_edu.storage.caching import CACHE_VARIABLE
+from semgrid_edu.storage.compiled import CACHE_VARIABLE
 from semgrid_edu.training.log import Step
+from semgrid_edu.workshop import demo
+from semgrid_edu.workshop.commands import main as cli
+from semgrid_edu.workshop.commands.reproduce import HELP
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -94,7 +95,7 @@ def no_work(monkeypatch):
 
     monkeypatch.setattr(demo, "write_demo", done)
     monkeypatch.setattr(semgrid_edu.training.run, "train_network", done)
-    monkeypatch.setattr(semgrid_edu.experiments.evaluate, "evaluate", done)
+    monkeypatch.setattr(semgrid_edu.workshop.scoring.evaluate, "evaluate", done)
 
 
 def told(arguments: list[str], monkeypatch, capsys) -> str:

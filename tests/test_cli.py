@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from semgrid_edu.cli import run
+from semgrid_edu.workshop.commands.main import run
 
 
 @pytest.mark.parametrize(

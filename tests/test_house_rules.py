@@ -129,7 +129,7 @@ def test_no_two_public_things_share_a_name():
     for module in TREES.keys() - {
         "cli.py",
         "course_commands.py",
-        "experiments/commands.py",
+        "workshop/commands/experiments.py",
     }:  # a command has the name of what it runs
         for node in definitions(TREES[module].body):
             places[node.name].add(module)

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from semgrid_edu import make
+import make
 
 
 @pytest.fixture
@@ -91,7 +91,7 @@ def test_what_cannot_be_asked_for_is_refused(asked):
 def test_it_needs_nothing_but_python():
     """A fresh machine has none of the package's dependencies: -S leaves out what is installed beside Python."""
     done = subprocess.run(
-        [sys.executable, "-S", "-E", "-m", "semgrid_edu.make"],
+        [sys.executable, "-S", "-E", "make.py"],
         cwd=make.CLONE,
         capture_output=True,
         text=True,

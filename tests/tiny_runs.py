@@ -11,12 +11,12 @@ from pathlib import Path
 import torch
 from tiny_drive import DATE, write_tiny_drive
 
-from semgrid_edu.experiments.reproduction import data_runs
-from semgrid_edu.experiments.reproduction.data_runs import ArraysRun, DataRun
-from semgrid_edu.experiments.reproduction.runs import Run
-from semgrid_edu.experiments.reproduction.training_runs import GridStageRun, ImageStageRun
-from semgrid_edu.experiments.reproduction.variants import Variant
-from semgrid_edu.simulation.datasets import DatasetRecipe, Route
+from semgrid_edu.workshop.paper.runs import data_runs
+from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun, DataRun
+from semgrid_edu.workshop.paper.runs.training_runs import GridStageRun, ImageStageRun
+from semgrid_edu.workshop.paper.runs.variants import Variant
+from semgrid_edu.workshop.scheduler.runs import Run
+from semgrid_edu.workshop.simulation.datasets import DatasetRecipe, Route
 
 data_runs.RECIPE_OF["tiny"] = DatasetRecipe("tiny", "KITTI-14", (Route("train", 2, False),) * 6)
 

@@ -15,7 +15,7 @@ from nbgrader.preprocessors import (
     SaveAutoGrades,
 )
 
-from semgrid_edu.course.nbgrader_steps import ExecuteApart, MakeWhole, NoteCrashes
+from semgrid_edu.workshop.course.nbgrader.preprocessors import ExecuteApart, MakeWhole, NoteCrashes
 
 c = get_config()  # noqa: F821 (nbgrader defines it)
 course = Path(__file__).resolve().parent
@@ -42,7 +42,7 @@ c.Autograde.autograde_preprocessors = [
 ]
 
 # The formgrader and feedback show a submission's text without the scripts that it may hold.
-c.HTMLExporter.filters = {"strip_files_prefix": "semgrid_edu.course.nbgrader_steps.without_scripts"}
+c.HTMLExporter.filters = {"strip_files_prefix": "semgrid_edu.workshop.course.nbgrader.preprocessors.without_scripts"}
 
 c.ExecuteApart.course = str(course)
 

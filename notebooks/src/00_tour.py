@@ -34,11 +34,11 @@ from scipy import ndimage
 
 from semgrid_edu import plotting
 from semgrid_edu.camera import Camera, project
-from semgrid_edu.course.equations import equation_table
-from semgrid_edu.course.stages import stage_table
-from semgrid_edu.datasets.resizing import resize_image, resize_labels
+from semgrid_edu.workshop.course.registers.equations import equation_table
+from semgrid_edu.workshop.course.registers.stage_models import stage_table
+from semgrid_edu.datasets.training_cache import resize_image, resize_labels
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
-from semgrid_edu.datasets.truth import grid_truth
+from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, frequency_weighted_iou, pixel_accuracy, semantic_cells

@@ -53,14 +53,14 @@ from semgrid_edu.occupancy import (
 
 # %%
 from semgrid_edu.occupancy.evidence import Evidence
-from semgrid_edu.occupancy.evidence_literal import walk_ray
-from semgrid_edu.occupancy.ground_literal import walk_sector
+from semgrid_edu.occupancy.literal.evidence import walk_ray
+from semgrid_edu.occupancy.literal.evidence import walk_sector
 from semgrid_edu.occupancy.polar import beyond_reach
-from semgrid_edu.illustrations.boxes import Box, cells_in, scan_boxes
-from semgrid_edu.simulation.drive import SimulatedDrive
-from semgrid_edu.simulation.named_streets import named_street
-from semgrid_edu.simulation.things.materials import Kind
-from semgrid_edu.simulation.street.plan import Wishes
+from semgrid_edu.workshop.illustrations.boxes import Box, cells_in, scan_boxes
+from semgrid_edu.workshop.simulation.drive import SimulatedDrive
+from semgrid_edu.workshop.simulation.named_streets import named_street
+from semgrid_edu.workshop.simulation.things.materials import Kind
+from semgrid_edu.workshop.simulation.street.plan import Wishes
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 

@@ -34,11 +34,11 @@ from semgrid_edu.occupancy import Bof, BofParams, BofState, Evidence, LogOddsGri
 from semgrid_edu.occupancy import VelocityLattice, WorldModel, bof_predict, bof_predict_literal, bof_update
 from semgrid_edu.occupancy import bof_velocity, scan_evidence, smear_area, transition_matrix
 from semgrid_edu.graphical import eliminate
-from semgrid_edu.graphical.stages.bof import bof_beliefs, expected_things
-from semgrid_edu.graphical.stages.cells_in_a_row import Cell, CellsInARow
-from semgrid_edu.graphical.stages.joint_row import row_evidence, row_model
-from semgrid_edu.illustrations.boxes import Box, cells_in, scan_boxes
-from semgrid_edu.occupancy.bof_literal import clear_wakes_literal, mass_that_left, strike_out
+from semgrid_edu.stage_models.bof import bof_beliefs, expected_things
+from semgrid_edu.stage_models.cells_in_a_row import Cell, CellsInARow
+from semgrid_edu.stage_models.joint_row import row_evidence, row_model
+from semgrid_edu.workshop.illustrations.boxes import Box, cells_in, scan_boxes
+from semgrid_edu.occupancy.literal.bof import clear_wakes_literal, mass_that_left, strike_out
 from semgrid_edu.occupancy.bof_steps import origins
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI

@@ -36,24 +36,24 @@ from ipywidgets import FloatSlider, IntSlider, SelectionSlider, interact
 
 from semgrid_edu import plotting
 from semgrid_edu.datasets import KittiRawDrive
-from semgrid_edu.datasets.kitti_raw import drive_folder
+from semgrid_edu.datasets.readers.kitti_raw import drive_folder
 from semgrid_edu.datasets.samples import sample_drive
-from semgrid_edu.illustrations.blur import SCHEMES, measure_blur, winding_road
-from semgrid_edu.illustrations.convergence import measure_convergence
-from semgrid_edu.experiments.occupancy import occupancy_table
-from semgrid_edu.experiments.scenes import hit_cells
-from semgrid_edu.graphical.stages import cmcdot_stage
+from semgrid_edu.workshop.illustrations.blur import SCHEMES, measure_blur, winding_road
+from semgrid_edu.workshop.illustrations.convergence import measure_convergence
+from semgrid_edu.workshop.studies.filter.occupancy import occupancy_table
+from semgrid_edu.workshop.studies.filter.scenes import hit_cells
+from semgrid_edu.stage_models import cmcdot_stage
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import confusion_matrix
-from semgrid_edu.illustrations.boxes import Box, cells_in, scan_boxes
+from semgrid_edu.workshop.illustrations.boxes import Box, cells_in, scan_boxes
 
 # %%
 from semgrid_edu.occupancy import (
     Cmcdot, CmcdotParams, Evidence, FilterState, Particles, PlanarMotion, State, VelocityLattice,
     move, predict, resample, scan_evidence, track_drive, transition_matrix, update,
 )  # fmt: skip
-from semgrid_edu.occupancy.cells import OUTSIDE
-from semgrid_edu.occupancy.moving_map import scroll
+from semgrid_edu.occupancy.state import OUTSIDE
+from semgrid_edu.occupancy.planar_motion import scroll
 from semgrid_edu.occupancy.particles import cells_at, cells_of
 from semgrid_edu.occupancy.resampling import systematic_resample
 from semgrid_edu.occupancy.steps import reveal

@@ -35,17 +35,17 @@ import torch.nn.functional as F
 from ipywidgets import IntSlider, interact
 
 from semgrid_edu import plotting
-from semgrid_edu.datasets.resizing import resize_image, resize_labels
+from semgrid_edu.datasets.training_cache import resize_image, resize_labels
 from semgrid_edu.datasets.samples import sample_drive, sample_image_stage
-from semgrid_edu.illustrations.pole_nets import draw_poles, score_poles, train_pole_net
-from semgrid_edu.illustrations.thin_pole import MECHANISMS, apply_mechanism, place_and_width
+from semgrid_edu.workshop.illustrations.pole_nets import draw_poles, score_poles, train_pole_net
+from semgrid_edu.workshop.illustrations.thin_pole import MECHANISMS, apply_mechanism, place_and_width
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 
 # %%
 from semgrid_edu.networks import build_segmenter, load_net
-from semgrid_edu.networks.deeplab import interpolate
-from semgrid_edu.networks.fcn import enlarge
+from semgrid_edu.networks.backbones.deeplab import interpolate
+from semgrid_edu.networks.backbones.fcn import enlarge
 from semgrid_edu.networks.imagenet import imagenet_tensors
 from semgrid_edu.plotting.images import draw_image
 

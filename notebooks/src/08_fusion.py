@@ -42,14 +42,14 @@ from ipywidgets import FloatRangeSlider, interact
 from semgrid_edu import plotting
 from semgrid_edu.training.batches import Batch, draw_batch, grid_logits
 from semgrid_edu.camera import rigid_transform
-from semgrid_edu.datasets.resizing import resize_image
+from semgrid_edu.datasets.training_cache import resize_image
 from semgrid_edu.datasets.samples import sample_drive, sample_frames, sample_image_stage, sample_weights
 from semgrid_edu.datasets.training_set import Sample
-from semgrid_edu.datasets.truth import grid_truth
+from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.training.loss import class_frequencies, class_weights, median_frequency_weights
-from semgrid_edu.training.allocator import keep_freed_memory
+from semgrid_edu.training.devices import keep_freed_memory
 
 # %%
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy, semantic_cells

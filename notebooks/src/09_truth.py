@@ -36,15 +36,21 @@ from semgrid_edu import plotting
 from semgrid_edu.camera import Camera, invert_rigid, project, rigid_transform, transform_points
 from semgrid_edu.datasets.ground_truth import Moment, TruthFlaws, TruthPolicy, carry_labels, close_and_spread
 from semgrid_edu.datasets.ground_truth import drive_truth, flawed_drive, gather_returns, lidar_truth
-from semgrid_edu.datasets.returns import closest_returns
+from semgrid_edu.datasets.readers.project_lidar import closest_returns
 from semgrid_edu.datasets.samples import sample_drive
-from semgrid_edu.datasets.truth import grid_truth
-from semgrid_edu.experiments.truth_counts import BAND_EDGES, TruthCounts
-from semgrid_edu.experiments.truth_policies import counts_of, simulated_drive
+from semgrid_edu.datasets.grid_truth import grid_truth
+from semgrid_edu.workshop.studies.ground_truth.truth_counts import BAND_EDGES, TruthCounts
+from semgrid_edu.workshop.studies.ground_truth.truth_policies import counts_of, simulated_drive
 from semgrid_edu.frame import Frame
 from semgrid_edu.graphical import d_separated
-from semgrid_edu.graphical.stages import LabelWorld, made_label_stage, wrong_label
+from semgrid_edu.stage_models import LabelWorld, made_label_stage, wrong_label
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.workshop.studies.ground_truth.pictures import (
+    difference_kinds,
+    policy_errors,
+    truth_difference,
+    truth_errors,
+)
 
 # %% jupyter={"source_hidden": true}
 from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
@@ -74,7 +80,7 @@ N_SEMANTIC = KITTI_14.n_semantic
 
 # %% jupyter={"source_hidden": true} alt="three maps: the true classes, the classes made from LIDAR and image labels, and where they differ; letters mark grass called fence, unlabelled road beyond 46 m, a labelled ring near the vehicle, and cars with road in them"
 made = lidar_truth(frame, o, spec)
-fig = plotting.truth_difference(spec, truth, made, KITTI_14)
+fig = truth_difference(spec, truth, made, KITTI_14)
 for letter, (y, x) in {"A": (-8, 13), "B": (2, 55), "C": (6, 7), "D": (7.5, 29)}.items():
     for ax in fig.axes[1:]:
         ax.annotate(letter, (y, x), ha="center", va="center", bbox={"boxstyle": "circle", "fc": "w", "ec": "k"})
@@ -608,7 +614,7 @@ print("wrong labels:", ", ".join(f"{name} {100 * of_class[KITTI_14.index(name)]:
 assert min(of_class[KITTI_14.index(name)] for name in thin) > 0.5 > 0.25 > of_class[CAR] > of_class[ROAD]
 
 # %% jupyter={"source_hidden": true} alt="three charts of errors against distance with one line per class: cells with another label, cells without a label, which rises from below 20 to 90 per cent, and wrong labels, highest for signage, bicycle and fence"
-plotting.truth_errors(counts_of(result, PAPER), result["bands"], KITTI_14)
+truth_errors(counts_of(result, PAPER), result["bands"], KITTI_14)
 plt.show()
 
 # %% [markdown]
@@ -776,7 +782,7 @@ assert max(abs(extra[line]) for line in "jlm") < 1
 
 # %% jupyter={"source_hidden": true} alt="bars of three kinds of error for fifteen policies: cells with another label, cells without a label, wrong labels; accumulated scans miss fewest cells and have more wrong labels, except where only what the camera sees is kept"
 chosen = {name: result["sums"][name] for _, name in policies}
-plotting.policy_errors(result | {"sums": chosen})
+policy_errors(result | {"sums": chosen})
 plt.show()
 
 # %% [markdown]
@@ -815,7 +821,7 @@ def draw_policy(policy, ax, title=""):
     """Make the truth by a policy, draw where it differs from the true one, and write its shares below."""
     grid = drive_truth(real_like, NOW, spec, policy)
     colours = np.array(list(plotting.truth.DIFFERENCES.values()), np.uint8)
-    plotting.grids.draw_map(spec, colours[plotting.difference_kinds(truth, grid, N_SEMANTIC)], ax)
+    plotting.grids.draw_map(spec, colours[difference_kinds(truth, grid, N_SEMANTIC)], ax)
     shares = TruthCounts.of_frame(grid, truth, standing, spec, KITTI_14).shares(axis=(0, 1))
     ax.set(title=title, ylabel="")
     ax.set_xlabel(f"found {100 * shares['found']:.0f} %, wrong {100 * shares['wrong']:.0f} %")

@@ -36,11 +36,11 @@ from semgrid_edu.crf import CrfParams, damping, energy, exact_marginals, free_en
 from semgrid_edu.crf import log_partition, mean_field, mean_field_naive, mean_field_sequential, mean_field_updates
 from semgrid_edu.crf import most_likely, pair_weights, unary_from_probability
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
-from semgrid_edu.datasets.truth import grid_truth
+from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.graphical import d_separated
-from semgrid_edu.graphical.stages import crf_stage
-from semgrid_edu.graphical.stages.crf import UNDECIDED, all_free, coupled, two_classes
-from semgrid_edu.graphical.stages.crf_coupling import coupling_sweep, critical_coupling
+from semgrid_edu.stage_models import crf_stage
+from semgrid_edu.stage_models.crf import UNDECIDED, all_free, coupled, two_classes
+from semgrid_edu.stage_models.crf import coupling_sweep, critical_coupling
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy

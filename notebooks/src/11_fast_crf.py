@@ -39,11 +39,11 @@ from semgrid_edu.crf import CrfParams, PermutohedralLattice, SeparableGaussian, 
 from semgrid_edu.crf import damping, lattice_literal, mean_field, mean_field_accurate, mean_field_naive
 from semgrid_edu.crf import mean_field_updates, unary_from_log_probability
 from semgrid_edu.crf.mean_field import bilateral_kernel
-from semgrid_edu.crf.simplices import elevation, peak
+from semgrid_edu.crf.lattice.simplices import elevation, peak
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
-from semgrid_edu.datasets.truth import grid_truth
+from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.graphical import d_separated, draw
-from semgrid_edu.graphical.stages import crf_stage
+from semgrid_edu.stage_models import crf_stage
 
 # %% jupyter={"source_hidden": true}
 from semgrid_edu.grid import GridSpec

@@ -44,22 +44,23 @@ from semgrid_edu.crf.temperature import Reliability
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.index import load_index
 from semgrid_edu.datasets.samples import sample_drive, sample_image_stage
-from semgrid_edu.datasets.truth import grid_truth
-from semgrid_edu.experiments.measured import compared, shown, shown_seeds
-from semgrid_edu.experiments.reproduction.paper import NETWORKS
-from semgrid_edu.experiments.reproduction.pictures import accuracy_picture, confusion_picture
-from semgrid_edu.experiments.reproduction.variants import Variant
-from semgrid_edu.experiments.reproduction.verdicts import Statement, verdict
-from semgrid_edu.experiments.statistics import drive_interval, paired_interval
+from semgrid_edu.datasets.grid_truth import grid_truth
+from semgrid_edu.workshop.scoring.score_with_interval import compared, shown, shown_seeds
+from semgrid_edu.workshop.paper.runs.paper import NETWORKS
+from semgrid_edu.workshop.paper.reports.pictures import accuracy_picture, confusion_picture
+from semgrid_edu.workshop.paper.runs.variants import Variant
+from semgrid_edu.workshop.paper.reports.verdicts import Statement, verdict
+from semgrid_edu.workshop.scoring.statistics import drive_interval, paired_interval
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import METRICS, class_accuracy, confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import build_net, load_net
 from semgrid_edu.occupancy import track_drive
 from semgrid_edu.pipeline import network_image
+from semgrid_edu.workshop.paper.reports.forest import draw_score, forest_plot
 
 # %% jupyter={"source_hidden": true}
-from semgrid_edu.simulation.datasets import DatasetRecipe, Route, make_from_recipe
+from semgrid_edu.workshop.simulation.datasets import DatasetRecipe, Route, make_from_recipe
 from semgrid_edu.training import median_frequency_weights
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
@@ -84,7 +85,7 @@ def chart(ax, values, fontsize=10):
     """Draw differences, one row each, with a dashed line at zero."""
     ax.axvline(0, color="0.5", lw=1, ls="--")
     for place, value in enumerate(values.values()):
-        plotting.draw_score(ax, place, value)
+        draw_score(ax, place, value)
     ax.set_yticks(range(len(values)), list(values), fontsize=fontsize)
     ax.set_ylim(len(values) - 0.4, -0.6)
     ax.grid(axis="x", alpha=0.3)
@@ -383,7 +384,7 @@ rows = {
     "B - 75": compared(B, as_matrices((75, 75, 75, 75)), pixel_accuracy),
     "A - B": compared(A, B, pixel_accuracy),
 }
-plotting.forest_plot(rows, right_ax, "points", reference=0)
+forest_plot(rows, right_ax, "points", reference=0)
 plt.show()
 
 # %% [markdown]
@@ -543,7 +544,7 @@ print(f"after Bonferroni's correction (bars {wider:.1f} times as long) at most {
 # ## What "reproduced" means
 #
 # It is tempting to look at the numbers and then decide what counts as success. So the rule was written down before the
-# numbers were ([verdicts.py](../semgrid_edu/experiments/reproduction/verdicts.py)). Each claim is split into statements
+# numbers were ([verdicts.py](../semgrid_edu/workshop/paper/reports/verdicts.py)). Each claim is split into statements
 # "this number is above (or below) that limit". Then the claim is
 #
 # - **reproduced** if every interval lies entirely on the claimed side of its limit;
@@ -870,7 +871,7 @@ def draw_reliability(ax):
 fig, axes = plt.subplots(1, 3, figsize=(12, 3.8), layout="constrained")
 draw_calibration(axes[0])
 for place, row in enumerate(ablations["distance"]):
-    plotting.draw_score(axes[1], place, row["pixel accuracy"])
+    draw_score(axes[1], place, row["pixel accuracy"])
 axes[1].set_yticks(range(len(ablations["distance"])), [row["what"] for row in ablations["distance"]])
 axes[1].invert_yaxis()
 axes[1].set(title="semantic cells, true labels", xlabel="pixel accuracy [%]")

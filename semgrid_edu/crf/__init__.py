@@ -1,16 +1,15 @@
 """The fully connected CRF that refines the semantic grid: energy, exact inference, mean field, naive and fast."""
 
-from semgrid_edu.crf.accurate import mean_field_accurate
-from semgrid_edu.crf.dense import energy, free_energy, gram_matrix, pair_weights
-from semgrid_edu.crf.doctor import check
+from semgrid_edu.crf.accurate import WindowedGaussian, mean_field_accurate
+from semgrid_edu.crf.doctor.check import check
+from semgrid_edu.crf.doctor.finding import Finding, Findings
+from semgrid_edu.crf.energy import energy, free_energy, gram_matrix, pair_weights
 from semgrid_edu.crf.exact import crf_model, exact_marginals, log_partition, most_likely
-from semgrid_edu.crf.faults.finding import Finding, Findings
-from semgrid_edu.crf.lattice import PermutohedralLattice
-from semgrid_edu.crf.lattice_literal import enclosing_simplex_literal, lattice_literal
+from semgrid_edu.crf.lattice.lattice import PermutohedralLattice
+from semgrid_edu.crf.lattice.literal import enclosing_simplex_literal, lattice_literal
 from semgrid_edu.crf.mean_field import mean_field
 from semgrid_edu.crf.naive import damping, mean_field_naive, mean_field_sequential, mean_field_updates
 from semgrid_edu.crf.params import CrfParams, unary_from_log_probability, unary_from_probability
-from semgrid_edu.crf.search import next_point, params_at, pareto_front, point_of
 from semgrid_edu.crf.spatial import SeparableGaussian
 from semgrid_edu.crf.temperature import (
     Reliability,
@@ -20,7 +19,6 @@ from semgrid_edu.crf.temperature import (
     negative_log_likelihood,
     reliability,
 )
-from semgrid_edu.crf.windowed import WindowedGaussian
 
 __all__ = [
     "CrfParams",
@@ -50,11 +48,7 @@ __all__ = [
     "mean_field_updates",
     "most_likely",
     "negative_log_likelihood",
-    "next_point",
     "pair_weights",
-    "params_at",
-    "pareto_front",
-    "point_of",
     "reliability",
     "unary_from_log_probability",
     "unary_from_probability",

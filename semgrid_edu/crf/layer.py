@@ -1,15 +1,23 @@
-"""The CRF as a layer of a network: mean field unrolled in torch, with weights, widths and label costs that learn."""
+"""The CRF as a layer of a network: mean field unrolled in torch, with weights, widths and label costs that learn.
 
+Trained CRF layers on disk: safetensors files with a header that says how to build the layer again.
+"""
+
+import json
 import math
+from pathlib import Path
 
 import torch
 from torch import Tensor, nn
 
 from semgrid_edu.crf.naive import NEVER
-from semgrid_edu.crf.pair_kernels import Pairs, bilateral_pairs, spatial_pairs
+from semgrid_edu.crf.pair_window import Pairs, bilateral_pairs, spatial_pairs
 from semgrid_edu.crf.params import CrfParams, check_stop
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.networks.weights import check_tensors
 from semgrid_edu.occupancy import N_STATES
+from semgrid_edu.storage.reading import parse_json
+from semgrid_edu.storage.tensors import read_tensors, write_tensors
 
 REACH = 4
 """Half the side of the window in sigma_alpha, unless told otherwise: a pair beyond has at most exp(-8) = 0.0003 of the
@@ -211,3 +219,47 @@ def step_size(pairs: Pairs, compatibility: Tensor) -> Tensor:
     eigenvalues = torch.linalg.eigvalsh(differences @ compatibility @ differences)
     rows = pairs.sums(torch.ones_like(pairs.own))
     return 1 / (1 + (eigenvalues[0].neg().relu() * pairs.own + eigenvalues[-1].relu() * rows) / 2)
+
+
+def save_crf(layer: CrfLayer, path: str | Path) -> None:
+    """Write a layer's weights, widths and label costs, atomically.
+
+    Parameters
+    ----------
+    layer : CrfLayer
+        The layer.
+    path : path-like
+        The safetensors file to write.
+    """
+    tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in layer.state_dict().items()}
+    write_tensors(path, tensors, {"crf": json.dumps(layer.description())})
+
+
+def load_crf(path: str | Path) -> CrfLayer:
+    """Read a trained CRF.
+
+    Parameters
+    ----------
+    path : path-like
+        A file that `save_crf` wrote.
+
+    Returns
+    -------
+    CrfLayer
+        The layer.
+
+    Raises
+    ------
+    DataError
+        When the file is missing, damaged or of another program.
+    """
+    header, tensors = read_tensors(path)
+    try:
+        description = parse_json(path, header["crf"])
+        start = CrfParams(normalization=description.pop("normalization"))
+        layer = CrfLayer(start, **description)
+    except (KeyError, TypeError, ValueError, OverflowError, RuntimeError) as error:
+        raise DataError(path, "the description of a CRF in the header", f"{header}: {error}") from error
+    check_tensors(path, tensors, layer.state_dict())
+    layer.load_state_dict(tensors)
+    return layer

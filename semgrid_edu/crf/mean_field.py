@@ -4,8 +4,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.crf.arithmetic import FAST, exponential
-from semgrid_edu.crf.lattice import PermutohedralLattice
+from semgrid_edu.crf.lattice.arithmetic import FAST, exponential
+from semgrid_edu.crf.lattice.lattice import PermutohedralLattice
 from semgrid_edu.crf.naive import NEVER, damping
 from semgrid_edu.crf.params import NARROWEST, CrfParams, check_inputs, check_stop
 from semgrid_edu.crf.spatial import SeparableGaussian

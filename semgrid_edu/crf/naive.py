@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import log_softmax, softmax
 
-from semgrid_edu.crf.dense import gram_matrix, pair_weights
+from semgrid_edu.crf.energy import gram_matrix, pair_weights
 from semgrid_edu.crf.params import CrfParams, check_inputs, check_stop
 
 NEVER = 1e30

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from semgrid_edu.crf.arithmetic import FAST
+from semgrid_edu.crf.lattice.arithmetic import FAST
 from semgrid_edu.crf.params import NARROWEST
 
 

@@ -6,10 +6,9 @@ What needs torch is imported where it is used: torch takes seconds, and those wh
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from semgrid_edu.datasets.kitti_raw import KittiRawDrive
+from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.storage.provenance import FILE_NAME, provenance_problems
-from semgrid_edu.storage.shipped import shipped_folder
+from semgrid_edu.storage.provenance import FILE_NAME, provenance_problems, shipped_folder
 
 if TYPE_CHECKING:
     from semgrid_edu.datasets.training_set import Sample
@@ -90,7 +89,7 @@ def _trained_folder(segmenter: str) -> Path:
 
 def sample_frames() -> list["Sample"]:
     """Return the shipped labelled frames of minikitti's training split, for experiments that take a minute."""
-    from semgrid_edu.datasets.excerpts import read_excerpt
+    from semgrid_edu.datasets.training_set import read_excerpt
 
     return read_excerpt(samples_dir() / "frames")
 

@@ -1,4 +1,7 @@
-"""The arrays that a network learns from, made once per data set, kept beside it and mapped from disk (section 4.1)."""
+"""The arrays that a network learns from, made once per data set, kept beside it and mapped from disk (section 4.1).
+
+Images and their labels with fewer pixels, as a coarser sensor would have taken them (section 4.1).
+"""
 
 import hashlib
 import shutil
@@ -9,22 +12,60 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 from tqdm.auto import tqdm
 
 import semgrid_edu
-from semgrid_edu.datasets.dataset_doubts import check_label_sets
+from semgrid_edu.datasets.doubts import check_label_sets
+from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.datasets.index import INDEX_FILE, DatasetIndex
-from semgrid_edu.datasets.kitti_raw import KittiRawDrive, drive_folder
-from semgrid_edu.datasets.resizing import resize_image, resize_labels
-from semgrid_edu.datasets.returns import seen_returns
-from semgrid_edu.datasets.truth import grid_truth
+from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive, drive_folder
+from semgrid_edu.datasets.readers.project_lidar import seen_returns
 from semgrid_edu.errors import DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams, track_drive
-from semgrid_edu.storage.caching import cache_folder
+from semgrid_edu.storage.compiled import cache_folder
 from semgrid_edu.storage.files import sha256, write_json
 from semgrid_edu.storage.reading import read_json
-from semgrid_edu.storage.workers import worker_pool
+from semgrid_edu.storage.workplace import worker_pool
+
+
+def resize_image(image: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
+    """Average an image over larger pixels; its calibration becomes `camera.resized(size)`.
+
+    Parameters
+    ----------
+    image : (h, w, 3) uint8
+        RGB.
+    size : (int, int)
+        The new height and width, pixels.
+
+    Returns
+    -------
+    (*size, 3) uint8
+    """
+    return np.asarray(Image.fromarray(image).resize(size[::-1], Image.Resampling.BOX))
+
+
+def resize_labels(labels: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
+    """Give each larger pixel the class that covers most of it; between two equal shares the smaller number wins.
+
+    Parameters
+    ----------
+    labels : (h, w) uint8
+        The class of each pixel; 255 (unlabelled) counts as a class.
+    size : (int, int)
+        The new height and width, pixels.
+
+    Returns
+    -------
+    (*size,) uint8
+    """
+    classes = np.unique(labels)
+    masks = (Image.fromarray((labels == c).astype(np.float32)) for c in classes)
+    shares = [np.asarray(mask.resize(size[::-1], Image.Resampling.BOX)) for mask in masks]
+    return classes[np.argmax(shares, axis=0)]
+
 
 SEED = 0
 """Seed for the particles of the occupancy filter, in each drive."""

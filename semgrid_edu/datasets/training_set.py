@@ -1,4 +1,7 @@
-"""The training set: image, occupancy grid and truth of each labelled frame of a split (section 4.1)."""
+"""The training set: image, occupancy grid and truth of each labelled frame of a split (section 4.1).
+
+A few labelled frames of a data set in one file: how the shipped ones were kept (section 4.1).
+"""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -10,14 +13,16 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets.calibration import read_camera
-from semgrid_edu.datasets.index import DatasetIndex, load_index
-from semgrid_edu.datasets.made_truth import MadeTruth, made_grids
-from semgrid_edu.datasets.training_cache import ArrayRecipe, cached_arrays
-from semgrid_edu.errors import DataError
+from semgrid_edu.datasets.cached_labels import MadeTruth, made_grids
+from semgrid_edu.datasets.index import INDEX_FILE, DatasetIndex, load_index
+from semgrid_edu.datasets.readers.calibration import read_camera
+from semgrid_edu.datasets.training_cache import SEED, ArrayRecipe, cached_arrays
+from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture
 from semgrid_edu.occupancy import CmcdotParams
+from semgrid_edu.storage.provenance import FILE_NAME, write_provenance
+from semgrid_edu.storage.tensors import read_tensors, write_tensors
 
 
 class Sample(NamedTuple):
@@ -148,3 +153,71 @@ def _shared_camera(index: DatasetIndex, split: str) -> Camera:
         if not (same and np.array_equal(camera.T_camera_from_lidar, other.T_camera_from_lidar)):
             raise DataError(index.root / date, f"the calibration of {first}, as one network serves both", "another")
     return camera
+
+
+FRAMES = "frames.safetensors"
+"""Name of the file that holds an excerpt."""
+
+
+def write_excerpt(dataset_dir: str | Path, n_frames: int, folder: str | Path) -> None:
+    """Keep a few labelled frames of a data set's split "train", evenly spread over it.
+
+    Parameters
+    ----------
+    dataset_dir : path-like
+        The data set, such as data/minikitti.
+    n_frames : int
+        How many frames.
+    folder : path-like
+        The folder that takes `frames.safetensors` and `provenance.json`.
+
+    Raises
+    ------
+    ArgumentError
+        When the split has fewer frames.
+    DataError
+        When the folder lies in the data set, holds it, or has the provenance of something else, which would be lost.
+    """
+    _check_place(Path(folder), Path(dataset_dir))
+    training, folder = TrainingSet(dataset_dir, "train"), Path(folder)
+    if not 1 <= n_frames <= len(training):
+        raise ArgumentError("n_frames", f"1 to {len(training)} frames", n_frames)
+    chosen = [training[k * len(training) // n_frames] for k in range(n_frames)]
+    tensors = dict(zip(Sample._fields, map(torch.stack, zip(*chosen, strict=True)), strict=True))
+    write_tensors(folder / FRAMES, tensors)
+    command = f"semgrid-edu data excerpt --data {Path(dataset_dir).name} --frames {n_frames} {folder.name}"
+    write_provenance(folder, command, SEED, ("numpy", "torch", "numba"))
+
+
+def _check_place(folder: Path, dataset_dir: Path) -> None:
+    """Refuse to write an excerpt where provenance of something else is or would be mixed with its own."""
+    here, there = folder.resolve(), dataset_dir.resolve()
+    if here.is_relative_to(there) or there.is_relative_to(here) or (folder / INDEX_FILE).exists():
+        raise DataError(folder, f"a folder apart from the data set {dataset_dir}", "one that holds it or is part of it")
+    if (folder / FILE_NAME).exists() and not (folder / FRAMES).exists():
+        raise DataError(folder, "an empty folder, or an earlier excerpt", f"the {FILE_NAME} of something else")
+
+
+def read_excerpt(folder: str | Path) -> list[Sample]:
+    """Read the frames that `write_excerpt` kept.
+
+    Parameters
+    ----------
+    folder : path-like
+        The folder that it wrote to.
+
+    Returns
+    -------
+    list of Sample
+
+    Raises
+    ------
+    DataError
+        When the file is missing or damaged.
+    """
+    path = Path(folder) / FRAMES
+    _, tensors = read_tensors(path)
+    try:
+        return [Sample(*frame) for frame in zip(*(tensors[name] for name in Sample._fields), strict=True)]
+    except (KeyError, ValueError) as error:
+        raise DataError(path, f"labelled frames: {', '.join(Sample._fields)}", error) from error

@@ -5,16 +5,13 @@ are exact and efficient, `sum_product` is exact on trees, `mean_field_graph` app
 independences off the graph, and `draw` shows it.
 """
 
-from semgrid_edu.graphical.beliefs import Beliefs
 from semgrid_edu.graphical.drawing import draw
-from semgrid_edu.graphical.elimination_order import min_fill_order
-from semgrid_edu.graphical.exact import eliminate, enumerate_marginals, log_total, max_product
-from semgrid_edu.graphical.factor import Factor
+from semgrid_edu.graphical.exact import eliminate, enumerate_marginals, log_total, max_product, min_fill_order
+from semgrid_edu.graphical.factor import Factor, product
 from semgrid_edu.graphical.layout import in_rows
 from semgrid_edu.graphical.mean_field import mean_field_graph
-from semgrid_edu.graphical.messages import loopy_max_product, sum_product
+from semgrid_edu.graphical.messages import Beliefs, loopy_max_product, sum_product
 from semgrid_edu.graphical.model import GraphicalModel
-from semgrid_edu.graphical.products import product
 from semgrid_edu.graphical.separation import d_separated, why_dependent
 from semgrid_edu.metrics import total_variation
 

@@ -82,7 +82,7 @@ def draw(
     >>> beam = GraphicalModel([Factor("m", [0.8, 0.2]), Factor(("m", "z"), [[0.9, 0.1], [0.2, 0.8]])], {"z": ("m",)})
     >>> ax = draw(beam, observed="z", highlight="m", positions=in_rows(["m"], ["z"]))
     """
-    from semgrid_edu.graphical.nodes import model_edges, plate_boxes, render, variable_nodes
+    from semgrid_edu.graphical.layout import model_edges, plate_boxes, render, variable_nodes
 
     labels, equations = labels or {}, equations or {}
     plates = {text: as_names(of) for text, of in (plates or {}).items()}

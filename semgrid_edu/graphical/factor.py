@@ -2,10 +2,14 @@
 
 Product, sum, maximum, slice: every algorithm of this package is a sequence of these four (Koller and Friedman,
 Probabilistic Graphical Models, section 4.2 and chapter 9).
+
+Products of factors: of a few, as they are; of thousands, with powers of two taken out on the way.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from math import frexp
+from functools import reduce
+from math import frexp, prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -224,3 +228,65 @@ class Factor:
         """
         power = frexp(self.table.max())[1]
         return Factor(self.names, np.ldexp(self.table, -power)), power
+
+
+MAX_ENTRIES = 10**7
+"""The largest table that a product may have: 80 MB of float64."""
+
+
+def product(factors: Iterable[Factor]) -> Factor:
+    """Multiply factors, after checking that the table of the product isn't too large.
+
+    Parameters
+    ----------
+    factors : iterable of Factor
+        None at all gives the constant 1.
+
+    Returns
+    -------
+    Factor
+
+    Raises
+    ------
+    ArgumentError
+        When the product has more than `MAX_ENTRIES` entries; the message names its variables.
+    """
+    return reduce(Factor.__mul__, _checked(factors), Factor((), 1.0))
+
+
+def rescaled_product(factors: Iterable[Factor]) -> tuple[Factor, int]:
+    """Multiply factors of which there may be thousands: a power of two is taken out after each.
+
+    Parameters
+    ----------
+    factors : iterable of Factor
+        None at all gives the constant 1.
+
+    Returns
+    -------
+    Factor
+        Their product divided by 2^n; its largest entry is from 1/2 to 1.
+    int
+        n.
+
+    Raises
+    ------
+    ArgumentError
+        As `product` does.
+    """
+    total, power = Factor((), 1.0).rescaled()
+    for factor in _checked(factors):
+        total, more = (total * factor).rescaled()
+        power += more
+    return total, power
+
+
+def _checked(factors: Iterable[Factor]) -> tuple[Factor, ...]:
+    factors = tuple(factors)
+    states = shared_cardinalities(factor.cardinalities for factor in factors)
+    entries = prod(states.values())
+    if entries > MAX_ENTRIES:
+        raise ArgumentError(
+            f"clique ({', '.join(states)})", f"a table of at most {MAX_ENTRIES:,} entries", f"{entries:,}"
+        )
+    return factors

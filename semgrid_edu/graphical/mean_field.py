@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from scipy.special import softmax, xlogy
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.graphical.beliefs import TOLERANCE, Beliefs
 from semgrid_edu.graphical.exact import NOTHING
-from semgrid_edu.graphical.factor import Factor
+from semgrid_edu.graphical.factor import Factor, rescaled_product
+from semgrid_edu.graphical.messages import TOLERANCE, Beliefs
 from semgrid_edu.graphical.model import GraphicalModel, possible
-from semgrid_edu.graphical.products import rescaled_product
 
 Independent = dict[str, NDArray[np.float64]]
 """One distribution per variable, {name: (K,)}."""

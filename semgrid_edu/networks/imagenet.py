@@ -6,8 +6,8 @@ import torch
 from torch import Tensor
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.networks.registry import SEGMENTERS
-from semgrid_edu.networks.segmenter import Segmenter
+from semgrid_edu.networks.backbones.registry import SEGMENTERS
+from semgrid_edu.networks.backbones.segmenter import Segmenter
 from semgrid_edu.networks.weights import check_tensors
 from semgrid_edu.storage.tensors import read_tensors
 

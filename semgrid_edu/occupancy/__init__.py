@@ -7,14 +7,14 @@ before it: the binary grid, and the exact filter on a lattice of velocities.
 """
 
 from semgrid_edu.occupancy.bof import Bof
-from semgrid_edu.occupancy.bof_literal import bof_predict_literal, bof_update_literal
-from semgrid_edu.occupancy.bof_state import BofParams, BofState
+from semgrid_edu.occupancy.bof_state import BofParams, BofState, VelocityLattice
 from semgrid_edu.occupancy.bof_steps import bof_move, bof_predict, bof_update, bof_velocity
-from semgrid_edu.occupancy.cmcdot import Cmcdot
-from semgrid_edu.occupancy.cmcdot_literal import move_literal, predict_literal, resample_literal, update_literal
+from semgrid_edu.occupancy.cmcdot import Cmcdot, track_drive
 from semgrid_edu.occupancy.evidence import Evidence, Measurement, Sensor, scan_evidence
-from semgrid_edu.occupancy.evidence_literal import scan_evidence_literal
 from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
+from semgrid_edu.occupancy.literal.bof import bof_predict_literal, bof_update_literal
+from semgrid_edu.occupancy.literal.cmcdot import move_literal, predict_literal, resample_literal, update_literal
+from semgrid_edu.occupancy.literal.evidence import scan_evidence_literal
 from semgrid_edu.occupancy.log_odds import (
     LogOddsGrid,
     LogOddsParams,
@@ -23,14 +23,11 @@ from semgrid_edu.occupancy.log_odds import (
     smear_area,
     update_log_odds,
 )
-from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.sensor import Scan, SensorModel
 from semgrid_edu.occupancy.state import N_STATES, Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import move, predict, resample, update
-from semgrid_edu.occupancy.tracking import track_drive
-from semgrid_edu.occupancy.velocity_lattice import VelocityLattice
-from semgrid_edu.occupancy.world import WorldModel, transition_matrix
+from semgrid_edu.occupancy.world import CmcdotParams, WorldModel, transition_matrix
 
 __all__ = [
     "N_STATES",

@@ -5,10 +5,8 @@ from numpy.typing import NDArray
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
 from semgrid_edu.occupancy.bof_steps import bof_move, bof_predict, bof_update, bof_velocity
-from semgrid_edu.occupancy.local_belief import local_belief
-from semgrid_edu.occupancy.moving_map import MAX_YAW, map_around, scroll
-from semgrid_edu.occupancy.observation import observe
-from semgrid_edu.occupancy.planar_motion import PlanarMotion
+from semgrid_edu.occupancy.local_belief import local_belief, observe
+from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, map_around, scroll
 from semgrid_edu.occupancy.state import Belief
 
 

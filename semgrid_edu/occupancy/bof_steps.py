@@ -7,9 +7,8 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
 from semgrid_edu.occupancy.cellwise import clear_wakes, meet, mix, ratio
 from semgrid_edu.occupancy.evidence import Evidence
-from semgrid_edu.occupancy.moving_map import look_up
 from semgrid_edu.occupancy.particles import slow_down
-from semgrid_edu.occupancy.planar_motion import PlanarMotion
+from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up
 from semgrid_edu.occupancy.state import FilterState, Particles, State, check_shape
 from semgrid_edu.occupancy.steps import update
 from semgrid_edu.occupancy.world import WorldModel, transition_matrix

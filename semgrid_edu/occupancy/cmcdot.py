@@ -1,21 +1,23 @@
-"""CMCDOT, the Conditional Monte Carlo Dense Occupancy Tracker (paper, section 3.2; Rummelhard et al., ITSC 2015)."""
+"""CMCDOT, the Conditional Monte Carlo Dense Occupancy Tracker (paper, section 3.2; Rummelhard et al., ITSC 2015).
 
+The filter over a whole drive: ego-motion from the poses of its frames (paper, section 3.2).
+"""
+
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.local_belief import local_belief
-from semgrid_edu.occupancy.moving_map import MAX_YAW, look_up, map_around, scroll
-from semgrid_edu.occupancy.observation import observe
-from semgrid_edu.occupancy.params import CmcdotParams
+from semgrid_edu.occupancy.local_belief import local_belief, observe, velocity_moments
 from semgrid_edu.occupancy.particles import cells_of, transform
-from semgrid_edu.occupancy.planar_motion import PlanarMotion
+from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll
 from semgrid_edu.occupancy.state import Belief, FilterState, Particles
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN, move, predict, resample, update
-from semgrid_edu.occupancy.velocities import velocity_moments
+from semgrid_edu.occupancy.world import CmcdotParams
 
 
 class Cmcdot:
@@ -130,3 +132,50 @@ def _keep_memory_of_a_step() -> None:
     In a process that once freed a buffer of 25 MB, such as an image network's, up to 50 MB stay. So this frees one.
     """
     np.empty(3 * 2**23, np.uint8)
+
+
+LIDAR_PERIOD = 0.1
+"""Seconds between two scans of a scanner that turns at 10 Hz, as KITTI's does: the time step of the first frame."""
+
+
+def track_drive(
+    frames: Iterable[Frame],
+    spec: GridSpec,
+    params: CmcdotParams | None = None,
+    seed: int | np.random.Generator = 0,
+    keep_steps: bool = False,
+) -> Iterator[Belief]:
+    """Filter the scans of a drive, one after the other.
+
+    Parameters
+    ----------
+    frames : iterable of Frame
+        The frames of the drive in the order of time.
+    spec : GridSpec
+        The grid in which the filter hands out its beliefs, (H, W) cells.
+    params : CmcdotParams, optional
+        What the filter assumes of the world and of its sensor, and how it spends its particles.
+    seed : int or numpy.random.Generator
+        Seed or source of all random numbers that the filter draws.
+    keep_steps : bool
+        Whether each belief also tells what the filter's map held after each step (`Belief.steps`).
+
+    Yields
+    ------
+    Belief
+        The belief after each frame, in the grid frame of that instant.
+
+    Raises
+    ------
+    ArgumentError
+        When frames run backwards in time, or a scan or pose isn't finite.
+    """
+    tracker, before = Cmcdot(spec, params, seed, keep_steps), None
+    for frame in frames:
+        if before is None:
+            motion, dt = PlanarMotion(), LIDAR_PERIOD
+        else:
+            motion = PlanarMotion.from_poses(before.T_world_from_lidar, frame.T_world_from_lidar)
+            dt = frame.time - before.time
+        yield tracker.step(frame.points_grid, motion, dt)
+        before = frame

@@ -12,7 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.occupancy.points import check_points
+from semgrid_edu.occupancy.evidence import check_points
 from semgrid_edu.occupancy.polar import beams_of
 
 

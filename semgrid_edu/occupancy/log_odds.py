@@ -8,9 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.evidence import Evidence, Sensor, check_sensor
-from semgrid_edu.occupancy.moving_map import MAX_YAW, look_up, map_around, scroll
-from semgrid_edu.occupancy.observation import observe
-from semgrid_edu.occupancy.planar_motion import PlanarMotion
+from semgrid_edu.occupancy.local_belief import observe
+from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll
 from semgrid_edu.occupancy.sensor import SensorModel
 
 TINY = np.float32(1e-30)

@@ -11,9 +11,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.cells import OUTSIDE, cell_of
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.state import Particles
+from semgrid_edu.occupancy.state import OUTSIDE, Particles, cell_of
 
 SLOW = np.float32(16)
 """Beside 1, exp(-16) hardly counts in single precision, so exponentials beyond it needn't be computed."""

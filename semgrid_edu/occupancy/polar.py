@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.occupancy.cells import OUTSIDE, cell_of
+from semgrid_edu.occupancy.state import OUTSIDE, cell_of
 
 ROUGH = 3e-5
 """Radians that `rough_azimuth` may err by; it errs by less than half of that (Abramowitz and Stegun, 4.4.47)."""

@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence import Evidence
+from semgrid_edu.occupancy.evidence import Evidence, check_points, without_own_returns
 from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.points import check_points, without_own_returns
 from semgrid_edu.occupancy.polar import beyond_reach, count_returns, fill_gaps, polar_profile, reach
 
 

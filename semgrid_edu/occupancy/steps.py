@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.cellwise import bayes, clear_wakes, make_room, meet, mix, represent
 from semgrid_edu.occupancy.evidence import Evidence
-from semgrid_edu.occupancy.moving_map import look_up
-from semgrid_edu.occupancy.params import CmcdotParams
 from semgrid_edu.occupancy.particles import (
     by_origin,
     cells_at,
@@ -20,10 +18,10 @@ from semgrid_edu.occupancy.particles import (
     transform,
     weight_in_cells,
 )
-from semgrid_edu.occupancy.planar_motion import PlanarMotion
+from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up
 from semgrid_edu.occupancy.resampling import draw_again, draw_newborn
 from semgrid_edu.occupancy.state import FilterState, Particles, State, check_shape
-from semgrid_edu.occupancy.world import WorldModel, transition_matrix
+from semgrid_edu.occupancy.world import CmcdotParams, WorldModel, transition_matrix
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 NOTHING_KNOWN = np.array([0, 0, 0, 1], dtype=np.float32)

@@ -4,10 +4,9 @@
 what each hands to the next, and `load_stages` reads a student's own functions from a file.
 """
 
-from semgrid_edu.pipeline.frame_work import FrameResult, network_image
+from semgrid_edu.pipeline.checks import StageError
 from semgrid_edu.pipeline.from_file import load_stages
-from semgrid_edu.pipeline.run import run_pipeline, run_side_by_side
-from semgrid_edu.pipeline.seams import StageError
+from semgrid_edu.pipeline.run import FrameResult, network_image, run_pipeline, run_side_by_side
 from semgrid_edu.pipeline.stages import STAGES, Stages
 
 __all__ = [

@@ -9,7 +9,7 @@ import numpy as np
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import N_STATES, Belief
-from semgrid_edu.pipeline.seams import Seam
+from semgrid_edu.pipeline.checks import Seam
 
 TAKES_TURNS = "a generator that takes a frame, yields its belief, and only then takes the next"
 

@@ -1,9 +1,8 @@
 """Planes above the ground and the image's scores on them: s -> p, equations (1) and (2) (paper, section 3.3)."""
 
 from semgrid_edu.planes.literal import sample_planes_naive
-from semgrid_edu.planes.operator import PlaneOperator
 from semgrid_edu.planes.pixels import plane_heights, plane_pixels
-from semgrid_edu.planes.sampler import PlaneSampler
+from semgrid_edu.planes.sampler import PlaneOperator, PlaneSampler
 from semgrid_edu.planes.sparse import SparseMatrix, bilinear_matrix
 
 __all__ = [

@@ -6,28 +6,25 @@ numbers fall from left to right. Arrays are never flipped: row 0 is the farthest
 """
 
 from semgrid_edu.plotting.animations import MAX_ANIMATION_BYTES, Animation, animate
-from semgrid_edu.plotting.charts import confusion, training_curves
+from semgrid_edu.plotting.charts import confusion, training_curves, velocity_ellipse, velocity_spread
 from semgrid_edu.plotting.colours import (
     DEPTH_RANGE,
     HEADING_COLOURS,
     STATE_COLOURS,
     STATE_NAMES,
     WHEEL_SPEED,
+    class_legend,
     depth_colours,
     occupancy_colours,
     velocity_colours,
 )
-from semgrid_edu.plotting.forest import draw_score, forest_plot
 from semgrid_edu.plotting.grids import grid_labels, grid_values, label_maps, occupancy, velocity, velocity_arrows
 from semgrid_edu.plotting.images import image_labels, image_values, plane_on_image, points_on_image
 from semgrid_edu.plotting.inference import coupling_errors, error_against_time, picks_a_side
 from semgrid_edu.plotting.lattice import LatticeFrame, draw_lattice_frame, draw_triangles, lattice_story, vertex_places
-from semgrid_edu.plotting.legends import class_legend
 from semgrid_edu.plotting.lines import belief_history, probability_line, probability_lines, state_history
 from semgrid_edu.plotting.moving import animate_occupancy, particles, velocity_wheel
-from semgrid_edu.plotting.spread import velocity_ellipse, velocity_spread
 from semgrid_edu.plotting.story import draw_cell_story as cell_story
-from semgrid_edu.plotting.truth import difference_kinds, policy_errors, truth_difference, truth_errors
 
 FIGURE_DPI = 110
 """Dots per inch of every figure in a notebook: `plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI`."""
@@ -50,12 +47,9 @@ __all__ = [
     "confusion",
     "coupling_errors",
     "depth_colours",
-    "difference_kinds",
     "draw_lattice_frame",
-    "draw_score",
     "draw_triangles",
     "error_against_time",
-    "forest_plot",
     "grid_labels",
     "grid_values",
     "image_labels",
@@ -68,13 +62,10 @@ __all__ = [
     "picks_a_side",
     "plane_on_image",
     "points_on_image",
-    "policy_errors",
     "probability_line",
     "probability_lines",
     "state_history",
     "training_curves",
-    "truth_difference",
-    "truth_errors",
     "velocity",
     "velocity_arrows",
     "velocity_colours",

@@ -12,8 +12,7 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.occupancy import State
-from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, occupancy_colours
-from semgrid_edu.plotting.legends import class_legend, colour_legend
+from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, class_legend, colour_legend, occupancy_colours
 
 ARROW_SECONDS = 0.5
 """Time, seconds, after which what moves will be where its arrow ends."""

@@ -12,8 +12,7 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LabelSet
-from semgrid_edu.plotting.colours import DEPTH_RANGE, depth_colours
-from semgrid_edu.plotting.legends import class_legend
+from semgrid_edu.plotting.colours import DEPTH_RANGE, class_legend, depth_colours
 
 
 def points_on_image(frame: Frame, ax: Axes | None = None, size: float = 3.0, colour_bar: bool = True) -> Axes:

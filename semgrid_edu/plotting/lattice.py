@@ -10,8 +10,8 @@ from matplotlib.collections import LineCollection
 from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.crf import enclosing_simplex_literal
-from semgrid_edu.crf.lattice_literal import Vertex, blur_literal, splat_literal, step
-from semgrid_edu.crf.simplices import elevation
+from semgrid_edu.crf.lattice.literal import Vertex, blur_literal, splat_literal, step
+from semgrid_edu.crf.lattice.simplices import elevation
 
 MARK = 50.0
 """Area of the mark of a point, or of a vertex that holds one point, in points squared."""

@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES
-from semgrid_edu.plotting.legends import colour_legend
+from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, colour_legend
 
 TOP = 1.25
 """Upper end of an axis as a multiple of its largest number, so that there is room for the number itself."""

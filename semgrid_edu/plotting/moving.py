@@ -16,11 +16,11 @@ from semgrid_edu.plotting.colours import (
     STATE_COLOURS,
     STATE_NAMES,
     WHEEL_SPEED,
+    colour_legend,
     occupancy_colours,
     velocity_colours,
 )
 from semgrid_edu.plotting.grids import draw_map
-from semgrid_edu.plotting.legends import colour_legend
 
 MAX_POINTS = 10_000
 """Largest number of particles in a picture, because more would only hide each other."""

@@ -8,9 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES
+from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, colour_legend
 from semgrid_edu.plotting.images import draw_image
-from semgrid_edu.plotting.legends import colour_legend
 from semgrid_edu.story import CellStory
 
 FOR, AGAINST = "#6a1b9a", "#d9902f"

@@ -1,4 +1,7 @@
-"""Provenance: the command, seed and versions that made a result, and checksums that show whether it was changed."""
+"""Provenance: the command, seed and versions that made a result, and checksums that show whether it was changed.
+
+Folders that are shipped with the package: in a clone they lie beside it, in a wheel inside it.
+"""
 
 import platform
 import subprocess
@@ -8,6 +11,32 @@ from pathlib import Path
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import sha256, write_json
 from semgrid_edu.storage.reading import read_json
+
+PACKAGE = Path(__file__).resolve().parents[1]
+"""The folder of the package."""
+
+
+def shipped_folder(name: str) -> Path:
+    """Return where a shipped folder is.
+
+    Parameters
+    ----------
+    name : str
+        Its name in a clone, such as "data_samples". A wheel holds only the parts that pyproject.toml names.
+
+    Returns
+    -------
+    Path
+        The folder inside the package where there is one, as in a wheel; else the one beside the package.
+
+    Examples
+    --------
+    >>> (shipped_folder("data_samples") / "sample").is_dir()
+    True
+    """
+    inside = PACKAGE / name
+    return inside if inside.is_dir() else PACKAGE.parent / name
+
 
 FILE_NAME = "provenance.json"
 

@@ -3,12 +3,10 @@
 `cell_story` follows one cell of one frame. `contribution_maps` does the costliest part for all cells at once.
 """
 
-from semgrid_edu.story.contributions import Contributions, cell_contributions
-from semgrid_edu.story.maps import ContributionMaps, contribution_maps
-from semgrid_edu.story.place import place_history
-from semgrid_edu.story.pull import NeighbourPull, neighbour_pull, weights_of_cell
-from semgrid_edu.story.said import CellScan, cell_scan
-from semgrid_edu.story.tell import CellStory, cell_story
+from semgrid_edu.story.cell_evidence import CellScan, cell_scan, place_history
+from semgrid_edu.story.cell_story import CellStory, cell_story
+from semgrid_edu.story.contributions import ContributionMaps, Contributions, cell_contributions, contribution_maps
+from semgrid_edu.story.crf_messages import NeighbourPull, neighbour_pull, weights_of_cell
 
 __all__ = [
     "CellScan",

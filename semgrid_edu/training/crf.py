@@ -9,14 +9,13 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from tqdm.auto import trange
 
-from semgrid_edu.crf.layer import CrfLayer
-from semgrid_edu.crf.layer_file import save_crf
+from semgrid_edu.crf.layer import CrfLayer, save_crf
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import WEIGHTS
 from semgrid_edu.storage.locking import sole_writer
-from semgrid_edu.training.allocator import keep_freed_memory
 from semgrid_edu.training.batches import frames_of_step
 from semgrid_edu.training.checkpoint import CHECKPOINT, check_folder, load_checkpoint
+from semgrid_edu.training.devices import keep_freed_memory
 from semgrid_edu.training.log import LOG, Step, begin_log
 from semgrid_edu.training.loop import check_finite, learn, write_down
 from semgrid_edu.training.loss import cross_entropy_sums, median_frequency_weights

@@ -1,10 +1,32 @@
-"""The device that a training run computes on, and the precision that it computes with (section 4.1)."""
+"""The device that a training run computes on, and the precision that it computes with (section 4.1).
 
+The system's memory allocator and the large buffers that every training step makes and frees (section 4.1).
+"""
+
+import ctypes
 import re
+import sys
 
 import torch
 
 from semgrid_edu.errors import ArgumentError
+
+M_TRIM_THRESHOLD, M_TOP_PAD, M_MMAP_MAX = -1, -2, -4
+"""Options of `mallopt`, as glibc's malloc.h numbers them."""
+
+
+def keep_freed_memory() -> None:
+    """Let this process keep the memory that it frees, for the next buffer of that size.
+
+    On Linux, glibc hands freed buffers above 32 MB back to the system at once, and the system clears every page of the
+    next such buffer anew when it is touched. The twenty planes of a batch are larger than that: at the paper's scale,
+    sampling them took 30 ms with glibc's defaults and 12 ms with kept memory. The price is that the process never
+    shrinks below its peak. On systems other than Linux with glibc nothing changes.
+    """
+    if sys.platform == "linux" and hasattr(libc := ctypes.CDLL(None), "mallopt"):
+        libc.mallopt(M_MMAP_MAX, 0)
+        libc.mallopt(M_TRIM_THRESHOLD, 2**31 - 1)
+        libc.mallopt(M_TOP_PAD, 2**26)
 
 
 def choose_device(name: str = "auto", process: int = 0) -> torch.device:

@@ -5,9 +5,8 @@ from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+from semgrid_edu.datasets.cached_labels import POLICIES, MadeTruth
 from semgrid_edu.datasets.index import INDEX_FILE
-from semgrid_edu.datasets.made_truth import MadeTruth
-from semgrid_edu.datasets.named_truths import POLICIES
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec

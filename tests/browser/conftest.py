@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from read_page import Page
 
-from semgrid_edu import demo
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
+from semgrid_edu.workshop import demo
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 NO_LIBRARY = "needs playwright: pip install -c constraints.txt -e '.[browser]', or make test-browser"

@@ -3,10 +3,10 @@
 import pytest
 from tiny_drive import DATE, write_tiny_drive
 
-from semgrid_edu import demo
 from semgrid_edu.datasets import KittiRawDrive
-from semgrid_edu.demo import example_stages, run
 from semgrid_edu.networks import Architecture, build_net, save_net
+from semgrid_edu.workshop import demo
+from semgrid_edu.workshop.demo import example_stages, run
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
 CELL = "#5/100/24"

@@ -4,9 +4,9 @@ import nbformat
 import pytest
 from tiny_course import EXERCISE, tiny_notebooks
 
-from semgrid_edu.course import checks
-from semgrid_edu.course.exercises import build_course, build_exercise, exercise_sources, student_version
-from semgrid_edu.course.notebooks import (
+from semgrid_edu.workshop.course import checks
+from semgrid_edu.workshop.course.nbgrader.build import build_course, build_exercise, exercise_sources, student_version
+from semgrid_edu.workshop.course.notebooks.build import (
     build_lecture,
     built_path,
     companion_sources,

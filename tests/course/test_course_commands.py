@@ -4,12 +4,13 @@ import pytest
 from tiny_course import tiny_notebooks
 from typer.testing import CliRunner
 
-from semgrid_edu import cli, course_commands
-from semgrid_edu.course import grade
-from semgrid_edu.course.exercises import build_course
-from semgrid_edu.course.grading import GradeSettings
-from semgrid_edu.course.isolation.limits import PARTS
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.workshop.commands import course as course_commands
+from semgrid_edu.workshop.commands import main as cli
+from semgrid_edu.workshop.course.nbgrader import grade_class as grade
+from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings
+from semgrid_edu.workshop.course.nbgrader.build import build_course
+from semgrid_edu.workshop.course.sandbox.limits import PARTS
 
 
 def test_build_lays_out_a_course_and_points_to_its_guide(tmp_path):

@@ -12,8 +12,14 @@ from nbconvert import HTMLExporter
 from nbformat.v4 import new_code_cell, new_notebook, new_output
 from PIL import Image
 
-from semgrid_edu.course.figures import JUST_NOTICEABLE, cielab, finish_figures, palette_png, resolution
 from semgrid_edu.plotting import animate
+from semgrid_edu.workshop.course.notebooks.figures import (
+    JUST_NOTICEABLE,
+    cielab,
+    finish_figures,
+    palette_png,
+    resolution,
+)
 
 
 def stored(pixels, **options):

@@ -12,11 +12,11 @@ from nbgrader.utils import is_grade, is_solution, parse_utc
 from packaging.requirements import Requirement
 from typer.main import get_command
 
-from semgrid_edu import cli
-from semgrid_edu.course.exercises import exercise_sources
-from semgrid_edu.course.grading import tasks
-from semgrid_edu.course.minutes import reading_time
-from semgrid_edu.course.notebooks import NOTEBOOKS, built_path, lecture_sources, read_percent
+from semgrid_edu.workshop.commands import main as cli
+from semgrid_edu.workshop.course.nbgrader.autograde import tasks
+from semgrid_edu.workshop.course.nbgrader.build import exercise_sources
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, built_path, lecture_sources, read_percent
+from semgrid_edu.workshop.course.notebooks.minutes import reading_time
 
 CLONE = NOTEBOOKS.parent
 GUIDE = (NOTEBOOKS / "instructor" / "README.md").read_text(encoding="utf-8")
@@ -100,7 +100,7 @@ def test_the_hours_of_the_seven_weeks_are_right():
 def test_files_for_other_places_are_what_these_places_read():
     container = json.loads((CLONE / ".devcontainer" / "devcontainer.json").read_text())
     assert container["image"].startswith("python:3.11")
-    assert container["postCreateCommand"] == "python -m semgrid_edu.make environment"
+    assert container["postCreateCommand"] == "python make.py environment"
     options, package = (CLONE / ".binder" / "requirements.txt").read_text().splitlines()
     assert options == "-c ../constraints.txt"
     assert (CLONE / ".binder" / options.removeprefix("-c ")).resolve() == (CLONE / "constraints.txt").resolve()

@@ -4,8 +4,8 @@ import sys
 
 import pytest
 
-from semgrid_edu.course.isolation.session import AnswerTimeoutError
-from semgrid_edu.course.notebooks import NOTEBOOKS
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
+from semgrid_edu.workshop.course.sandbox.session import AnswerTimeoutError
 
 
 @pytest.fixture

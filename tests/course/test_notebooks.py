@@ -3,9 +3,9 @@
 import nbformat
 import pytest
 
-from semgrid_edu.course import checks
-from semgrid_edu.course.notebooks import build_lecture, lecture_sources, named, read_percent
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.workshop.course import checks
+from semgrid_edu.workshop.course.notebooks.build import build_lecture, lecture_sources, named, read_percent
 
 LECTURE = """\
 # %% [markdown]

@@ -7,10 +7,9 @@ import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 from PIL import Image
 
-from semgrid_edu.course.exceptions import EXCEPTIONS, rule_problems
-from semgrid_edu.course.notebooks import lecture_sources, read_percent
-from semgrid_edu.course.rules import RULES
 from semgrid_edu.plotting import Animation
+from semgrid_edu.workshop.course.notebooks.build import lecture_sources, read_percent
+from semgrid_edu.workshop.course.notebooks.rules import EXCEPTIONS, RULES, rule_problems
 
 QUESTION = "**Predict before you run.** How many?\n\n<details><summary>Answer</summary>Two.</details>"
 FIGURE = "fig, ax = plt.subplots()\nax.plot([1, 2])\nplt.show()"

@@ -2,10 +2,10 @@
 
 import pytest
 
-from semgrid_edu.course import stages
-from semgrid_edu.course.links import find_code
-from semgrid_edu.course.notebooks import NOTEBOOKS, read_percent
-from semgrid_edu.course.stages import STAGES, StageModel, stage_table
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
+from semgrid_edu.workshop.course.registers import stage_models as stages
+from semgrid_edu.workshop.course.registers.equations import find_code
+from semgrid_edu.workshop.course.registers.stage_models import STAGES, StageModel, stage_table
 
 EXAMPLE = StageModel(
     "bof",
@@ -42,7 +42,7 @@ def test_a_row_links_model_check_and_lecture(monkeypatch):
     monkeypatch.setattr(stages, "STAGES", (EXAMPLE, in_a_cell))
     _, _, bof, tour = stage_table().splitlines()
     assert bof == (
-        "| BOF: four cells | [`bof_predict_literal`](../semgrid_edu/occupancy/bof_literal.py) "
+        "| BOF: four cells | [`bof_predict_literal`](../semgrid_edu/occupancy/literal/bof.py) "
         "| [`test_exact`](../tests/occupancy/test_bof.py) | [03](03_bof.ipynb), `bof-predict` |"
     )
     assert "| [graphical models](deeper/graphical_models.ipynb), `all` | to come |" in tour

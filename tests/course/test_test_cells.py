@@ -12,8 +12,8 @@ import pytest
 from nbformat import NotebookNode
 from nbgrader.utils import is_grade, is_locked, is_solution
 
-from semgrid_edu.course.exercises import exercise_sources
-from semgrid_edu.course.notebooks import read_percent
+from semgrid_edu.workshop.course.nbgrader.build import exercise_sources
+from semgrid_edu.workshop.course.notebooks.build import read_percent
 
 every_exercise = pytest.mark.parametrize("source", exercise_sources(), ids=lambda source: source.stem)
 

@@ -12,21 +12,22 @@ from nbgrader.api import Gradebook, InvalidEntry
 from tiny_course import tiny_notebooks
 from typer.testing import CliRunner
 
-from semgrid_edu import cli
-from semgrid_edu.course import grading, nbgrader_steps
-from semgrid_edu.course.exercises import build_course
-from semgrid_edu.course.failures import UngradedError
-from semgrid_edu.course.grade import grade_course, grade_one, missing_limits
-from semgrid_edu.course.graded import is_graded, write_graded
-from semgrid_edu.course.grading import GradeSettings, place, reference_answers, submission
-from semgrid_edu.course.handed_in import misplaced
-from semgrid_edu.course.isolation.limits import Limits
-from semgrid_edu.course.isolation.notebook import run_submission
-from semgrid_edu.course.isolation.prepared import instructors_cells
-from semgrid_edu.course.isolation.process import StudentProcess
-from semgrid_edu.course.notebooks import write_notebook
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import write_text
+from semgrid_edu.workshop.commands import main as cli
+from semgrid_edu.workshop.course.nbgrader import autograde as grading
+from semgrid_edu.workshop.course.nbgrader import preprocessors as nbgrader_steps
+from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, place, reference_answers, submission
+from semgrid_edu.workshop.course.nbgrader.build import build_course
+from semgrid_edu.workshop.course.nbgrader.failures import UngradedError
+from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course, grade_one, missing_limits
+from semgrid_edu.workshop.course.nbgrader.gradebook import is_graded, write_graded
+from semgrid_edu.workshop.course.nbgrader.submissions import misplaced
+from semgrid_edu.workshop.course.notebooks.build import write_notebook
+from semgrid_edu.workshop.course.sandbox.limits import Limits
+from semgrid_edu.workshop.course.sandbox.notebook import run_submission
+from semgrid_edu.workshop.course.sandbox.prepared import instructors_cells
+from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 
 TINY = "00_tiny"
 DEAD = GradeSettings(container=("false",))
@@ -122,9 +123,9 @@ def test_an_interruption(course, handed_in, monkeypatch):
 DIES = """
 import os, sys
 from pathlib import Path
-from semgrid_edu.course import nbgrader_steps
-from semgrid_edu.course.grade import grade_one
-from semgrid_edu.course.grading import GradeSettings
+from semgrid_edu.workshop.course.nbgrader import preprocessors as nbgrader_steps
+from semgrid_edu.workshop.course.nbgrader.grade_class import grade_one
+from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings
 nbgrader_steps.run_submission = lambda *arguments: os._exit(9)
 grade_one(Path(sys.argv[1]), sys.argv[2], sys.argv[3], GradeSettings())
 """

@@ -5,8 +5,8 @@ import sys
 import pytest
 from nbgrader.utils import is_grade
 
-from semgrid_edu.course.exercises import exercise_sources
-from semgrid_edu.course.notebooks import NOTEBOOKS, read_percent
+from semgrid_edu.workshop.course.nbgrader.build import exercise_sources
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@
 import shutil
 from pathlib import Path
 
-from semgrid_edu.course.notebooks import NOTEBOOKS
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 
 EXERCISE = """\
 # %% [markdown]

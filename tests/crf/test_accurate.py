@@ -18,7 +18,7 @@ from semgrid_edu.crf import (
     mean_field_naive,
     unary_from_probability,
 )
-from semgrid_edu.crf.windowed import RADIUS
+from semgrid_edu.crf.accurate import RADIUS
 
 BOTH = pytest.mark.parametrize("normalization", ["symmetric", "none"])
 

@@ -10,10 +10,9 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import log_softmax, softmax
 
 from semgrid_edu.crf import CrfParams, Finding, check, mean_field, unary_from_probability
-from semgrid_edu.crf.faults.scale import scale_of
-from semgrid_edu.crf.faults.shapes import SHAPE_ERROR
-from semgrid_edu.crf.faults.states import REFUSED
-from semgrid_edu.crf.faults.unary import WORSE
+from semgrid_edu.crf.doctor.shapes import SHAPE_ERROR
+from semgrid_edu.crf.doctor.states import REFUSED
+from semgrid_edu.crf.doctor.unary import WORSE, scale_of
 from semgrid_edu.datasets.samples import sample_drive, sample_weights, trained_segmenters
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec

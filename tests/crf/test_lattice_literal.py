@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
 from semgrid_edu.crf import PermutohedralLattice, lattice_literal
-from semgrid_edu.crf.lattice_literal import (
+from semgrid_edu.crf.lattice.literal import (
     blur_literal,
     enclosing_simplex_literal,
     slice_literal,

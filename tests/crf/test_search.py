@@ -5,9 +5,10 @@ from dataclasses import astuple
 import numpy as np
 import pytest
 
-from semgrid_edu.crf import CrfParams, next_point, params_at, pareto_front, point_of
-from semgrid_edu.crf import search as rules
+from semgrid_edu.crf import CrfParams
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.workshop.studies.crf import search_point as rules
+from semgrid_edu.workshop.studies.crf.search_point import next_point, params_at, pareto_front, point_of
 
 OPTIMUM = np.array([0.2, 0.9, 0.5, 0.35, 0.0])
 

@@ -7,9 +7,9 @@ import pytest
 from tiny_drive import DATE, write_packet, write_tiny_dataset, write_tiny_drive
 
 from semgrid_edu.datasets import KittiRawDrive
-from semgrid_edu.datasets.dataset_doubts import dataset_doubts
-from semgrid_edu.datasets.drive_doubts import FASTEST, jumps
-from semgrid_edu.datasets.oxts import read_packet
+from semgrid_edu.datasets.doubts import dataset_doubts
+from semgrid_edu.datasets.readers.drive_doubts import FASTEST, jumps
+from semgrid_edu.datasets.readers.oxts import read_packet
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.errors import ArgumentError, DataError
 

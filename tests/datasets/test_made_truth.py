@@ -7,9 +7,10 @@ import pytest
 import torch
 from tiny_drive import DATE, write_tiny_dataset
 
-from semgrid_edu.datasets import KittiRawDrive, made_truth, training_cache
+from semgrid_edu.datasets import KittiRawDrive, training_cache
+from semgrid_edu.datasets import cached_labels as made_truth
+from semgrid_edu.datasets.cached_labels import MadeTruth
 from semgrid_edu.datasets.ground_truth import NO_FLAWS, TruthFlaws, TruthPolicy, lidar_truth
-from semgrid_edu.datasets.made_truth import MadeTruth
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec

@@ -6,7 +6,6 @@ import pytest
 import torch
 from tiny_drive import write_tiny_dataset
 
-from semgrid_edu.datasets.excerpts import FRAMES, read_excerpt, write_excerpt
 from semgrid_edu.datasets.samples import (
     sample_drive,
     sample_frames,
@@ -15,7 +14,7 @@ from semgrid_edu.datasets.samples import (
     samples_problems,
     trained_segmenters,
 )
-from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.datasets.training_set import FRAMES, TrainingSet, read_excerpt, write_excerpt
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.networks import load_net
 from semgrid_edu.storage.files import write_bytes

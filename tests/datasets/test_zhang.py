@@ -6,7 +6,8 @@ from PIL import Image
 from scipy.io import savemat
 from tiny_drive import BASELINE, CAMERA_FROM_LIDAR, LIDAR_FROM_IMU, SIZE, K, write_packet, write_tiny_drive
 
-from semgrid_edu.datasets import KittiRawDrive, KittiTrackingRun, ZhangDrive, ZhangLabels, zhang, zhang_raw_drive
+from semgrid_edu.datasets import KittiRawDrive, KittiTrackingRun, ZhangDrive, ZhangLabels, zhang_raw_drive
+from semgrid_edu.datasets.readers import zhang
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import IGNORE, KITTI_14
 

@@ -12,20 +12,20 @@ import pytest
 from read_page import Page
 from tiny_drive import DATE, write_tiny_drive
 
-import semgrid_edu.demo.page as page_module
+import semgrid_edu.workshop.demo.page as page_module
 from semgrid_edu.crf import CrfParams
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
-from semgrid_edu.demo import write_demo
-from semgrid_edu.demo.details import PART_STEP, REACH_STEP, VERDICTS, label_and_rival_maps, states_bytes
-from semgrid_edu.demo.record import Record
-from semgrid_edu.demo.run import STORIES, _stories_every
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import Architecture, build_net, load_net, save_net
 from semgrid_edu.pipeline import Stages, run_pipeline
 from semgrid_edu.story import cell_story, weights_of_cell
-from semgrid_edu.story.tell import label_and_rival
+from semgrid_edu.story.cell_story import label_and_rival
+from semgrid_edu.workshop.demo import write_demo
+from semgrid_edu.workshop.demo.details import PART_STEP, REACH_STEP, VERDICTS, label_and_rival_maps, states_bytes
+from semgrid_edu.workshop.demo.record import Record
+from semgrid_edu.workshop.demo.run import STORIES, _stories_every
 
 SPEC = GridSpec.compact()
 CELLS = [(81, 31), (82, 25), (120, 33), (30, 5), (0, 0), (141, 61)]

@@ -12,18 +12,18 @@ from read_page import Page, decode
 from tiny_drive import DATE, write_tiny_drive
 from typer.testing import CliRunner
 
-from semgrid_edu.cli import app
 from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
-from semgrid_edu.datasets.truth import grid_truth
-from semgrid_edu.demo import example_stages, write_demo
-from semgrid_edu.demo.comparison import MADE_BY, Comparison
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import load_net
 from semgrid_edu.occupancy import State
 from semgrid_edu.pipeline import StageError, Stages, load_stages, run_side_by_side
+from semgrid_edu.workshop.commands.main import app
+from semgrid_edu.workshop.demo import example_stages, write_demo
+from semgrid_edu.workshop.demo.comparison import MADE_BY, Comparison
 
 EXAMPLE = Path(example_stages.__file__)
 

@@ -14,16 +14,9 @@ from tiny_drive import DATE, write_tiny_drive
 from typer.testing import CliRunner
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.cli import app
 from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.datasets.samples import sample_image_stage, sample_weights
-from semgrid_edu.datasets.truth import grid_truth
-from semgrid_edu.demo import write_demo
-from semgrid_edu.demo.chosen import ChosenFrames
-from semgrid_edu.demo.grids import arrows_path, grid_svg
-from semgrid_edu.demo.page import Summary, page_html
-from semgrid_edu.demo.rasters import classes_uri, points_layer, raster_uri, scores_layer
-from semgrid_edu.demo.record import FrameView, Record
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
@@ -31,6 +24,13 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import Architecture, build_net, save_net
 from semgrid_edu.pipeline import STAGES, run_pipeline
 from semgrid_edu.plotting import depth_colours
+from semgrid_edu.workshop.commands.main import app
+from semgrid_edu.workshop.demo import write_demo
+from semgrid_edu.workshop.demo.grids import arrows_path, grid_svg
+from semgrid_edu.workshop.demo.page import Summary, page_html
+from semgrid_edu.workshop.demo.rasters import classes_uri, points_layer, raster_uri, scores_layer
+from semgrid_edu.workshop.demo.record import FrameView, Record
+from semgrid_edu.workshop.demo.run import ChosenFrames
 
 
 @pytest.fixture(scope="module")

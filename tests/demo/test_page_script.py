@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-import semgrid_edu.demo.page as page_module
+import semgrid_edu.workshop.demo.page as page_module
 
 PLAYER = Path(page_module.__file__).with_name("page.js").read_text(encoding="utf-8").replace('"use strict";', "")
 STUB = Path(__file__).with_name("page_stub.js").read_text(encoding="utf-8")

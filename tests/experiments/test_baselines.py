@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from semgrid_edu.experiments.baselines import majority_class
 from semgrid_edu.labels import KITTI_14
+from semgrid_edu.workshop.scoring.single_sources import majority_class
 
 ROAD, WALK, CAR = (KITTI_14.index(name) for name in ("road", "sidewalk", "car"))
 

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.experiments.cell_scores import CellScores, Estimate, hit_cell_groups
-from semgrid_edu.experiments.cell_truth import CellTruth, pool_truth
-from semgrid_edu.experiments.scenes import KnownScene, SceneHistory
 from semgrid_edu.frame import LABEL_GRID, Frame
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.illustrations.boxes import Box, cells_in, scan_boxes
 from semgrid_edu.occupancy import Belief, PlanarMotion, SensorModel, State
-from semgrid_edu.simulation.things.materials import Kind
+from semgrid_edu.workshop.illustrations.boxes import Box, cells_in, scan_boxes
+from semgrid_edu.workshop.simulation.things.materials import Kind
+from semgrid_edu.workshop.studies.filter.cell_scores import CellScores, Estimate, hit_cell_groups
+from semgrid_edu.workshop.studies.filter.cell_truth import CellTruth, pool_truth
+from semgrid_edu.workshop.studies.filter.scenes import KnownScene, SceneHistory
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 ROW = GridSpec(0, 1, 0, 5, 1)

@@ -3,18 +3,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from semgrid_edu.experiments.confusions import FrameConfusions
-from semgrid_edu.experiments.measured import measured, on_cells, shown, shown_seeds
-from semgrid_edu.experiments.reproduction.claim_statements import called, called_void
-from semgrid_edu.experiments.reproduction.claims import CLAIMS
-from semgrid_edu.experiments.reproduction.deviations import deviations
-from semgrid_edu.experiments.reproduction.paper import NETWORKS, TABLE_1_SCORES, TABLE_3_CONFUSION
-from semgrid_edu.experiments.reproduction.scales import SCALES
-from semgrid_edu.experiments.reproduction.score_runs import NETWORK, WITH_CRF
-from semgrid_edu.experiments.reproduction.time_runs import time_saved
-from semgrid_edu.experiments.reproduction.verdicts import Statement, verdict
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.metrics import METRICS, pixel_accuracy
+from semgrid_edu.workshop.paper.reports.claim_statements import called, called_void
+from semgrid_edu.workshop.paper.reports.claims import CLAIMS
+from semgrid_edu.workshop.paper.reports.deviations import deviations
+from semgrid_edu.workshop.paper.reports.verdicts import Statement, verdict
+from semgrid_edu.workshop.paper.runs.paper import NETWORKS, TABLE_1_SCORES, TABLE_3_CONFUSION
+from semgrid_edu.workshop.paper.runs.scales import SCALES
+from semgrid_edu.workshop.paper.runs.score_runs import NETWORK, WITH_CRF
+from semgrid_edu.workshop.paper.runs.time_runs import time_saved
+from semgrid_edu.workshop.scoring.confusions import FrameConfusions
+from semgrid_edu.workshop.scoring.score_with_interval import measured, on_cells, shown, shown_seeds
 
 DRIVES, CELLS = 12, 2000
 

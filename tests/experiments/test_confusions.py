@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.experiments.confusions import (
+from semgrid_edu.labels import KITTI_14
+from semgrid_edu.storage.tensors import write_arrays
+from semgrid_edu.workshop.scoring.confusions import (
     FrameConfusions,
     drive_confusions,
     frame_confusions,
@@ -12,8 +14,6 @@ from semgrid_edu.experiments.confusions import (
     save_confusions,
     seed_confusions,
 )
-from semgrid_edu.labels import KITTI_14
-from semgrid_edu.storage.arrays import write_arrays
 
 ROAD, CAR = (KITTI_14.index(name) for name in ("road", "car"))
 

@@ -6,14 +6,14 @@ from sklearn.metrics import confusion_matrix
 
 from semgrid_edu.camera import project, transform_points
 from semgrid_edu.crf import expected_calibration_error
-from semgrid_edu.experiments.distances import distance_bands
-from semgrid_edu.experiments.reproduction.calibration_errors import EXACT, CalibrationError
-from semgrid_edu.experiments.reproduction.counting import BANDS, CountingRun, GridCounts, distance_band_names
-from semgrid_edu.experiments.reproduction.overturned_runs import boxes_on
-from semgrid_edu.experiments.reproduction.score_runs import SEARCHED
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.paper.runs.counting import BANDS, CountingRun, GridCounts, distance_band_names
+from semgrid_edu.workshop.paper.runs.overturned_runs import boxes_on
+from semgrid_edu.workshop.paper.runs.score_runs import SEARCHED
+from semgrid_edu.workshop.paper.runs.variants import EXACT, CalibrationError
+from semgrid_edu.workshop.scoring.distances import distance_bands
+from semgrid_edu.workshop.simulation.sensors.rig import Rig
 
 SPEC = GridSpec(0.0, 71.0, -15.5, 15.5, 0.5)
 

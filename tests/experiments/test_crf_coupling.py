@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from semgrid_edu import plotting
-from semgrid_edu.cli import run
 from semgrid_edu.crf import crf_model, exact_marginals, log_partition, mean_field_naive, most_likely
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.experiments import crf_coupling as study
-from semgrid_edu.experiments.all_labellings import visit_labellings
-from semgrid_edu.experiments.potts_messages import potts_max_product, potts_sum_product
 from semgrid_edu.graphical import loopy_max_product, sum_product
-from semgrid_edu.graphical.stages.crf import all_free, coupled, two_classes
+from semgrid_edu.stage_models.crf import all_free, coupled, two_classes
+from semgrid_edu.workshop.attic.all_labellings import visit_labellings
+from semgrid_edu.workshop.attic.potts_messages import potts_max_product, potts_sum_product
+from semgrid_edu.workshop.commands.main import run
+from semgrid_edu.workshop.studies.crf import crf_coupling as study
 
 QUICK = {"draws": 2, "grids": [(1, 2), (2, 2)], "classes": [2], "couplings": [0.0, 2.0], "fine": [0.0, 1.0]}
 

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from tiny_drive import DATE, write_tiny_dataset, write_tiny_drive
 
-from semgrid_edu.crf import search as rules
 from semgrid_edu.datasets import KittiRawDrive, training_cache
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.experiments import crf_search
-from semgrid_edu.experiments.crf_scores import gains_by_metric, gains_text
-from semgrid_edu.experiments.crf_trials import objective_values
-from semgrid_edu.experiments.evaluate import evaluate
-from semgrid_edu.experiments.statistics import paired_interval
 from semgrid_edu.metrics import pixel_accuracy
 from semgrid_edu.networks import Architecture, build_net, save_net
+from semgrid_edu.workshop.scoring.evaluate import evaluate
+from semgrid_edu.workshop.scoring.statistics import paired_interval
+from semgrid_edu.workshop.studies.crf import crf_search
+from semgrid_edu.workshop.studies.crf import search_point as rules
+from semgrid_edu.workshop.studies.crf.crf_scores import gains_by_metric, gains_text
+from semgrid_edu.workshop.studies.crf.crf_search import objective_values
 
 TRIALS = 6
 
@@ -51,7 +51,7 @@ def quick(monkeypatch):
 
     monkeypatch.setattr(training_cache, "_process", process)
     monkeypatch.setattr(rules, "EXPLORED", 3)
-    monkeypatch.setattr("semgrid_edu.experiments.crf_trials.perf_counter", count().__next__)
+    monkeypatch.setattr("semgrid_edu.workshop.studies.crf.crf_search.perf_counter", count().__next__)
 
 
 @pytest.fixture(scope="module")

@@ -9,15 +9,15 @@ from tiny_drive import write_tiny_dataset
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets import KittiRawDrive, training_cache
-from semgrid_edu.experiments.confusions import FrameConfusions, frame_confusions, load_confusions
-from semgrid_edu.experiments.evaluate import compared_grids, evaluate, intervals, scores, scores_table
-from semgrid_edu.experiments.statistics import drive_interval
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import pixel_accuracy
 from semgrid_edu.networks import Architecture, build_net, save_net
 from semgrid_edu.pipeline import StageError
 from semgrid_edu.storage.files import sha256
+from semgrid_edu.workshop.scoring.confusions import FrameConfusions, frame_confusions, load_confusions
+from semgrid_edu.workshop.scoring.evaluate import compared_grids, evaluate, intervals, scores, scores_table
+from semgrid_edu.workshop.scoring.statistics import drive_interval
 
 ROAD, CAR, FREE, STATIC = (KITTI_14.index(name) for name in ("road", "car", "unknown-free", "unknown-static"))
 TRUTH = np.array([[[ROAD, CAR], [FREE, STATIC]]], np.uint8)

@@ -9,15 +9,15 @@ from test_crf_search import write_validation
 from tiny_drive import DATE, write_tiny_dataset
 from typer.testing import CliRunner
 
-from semgrid_edu.cli import app
-from semgrid_edu.crf.layer_file import load_crf
+from semgrid_edu.crf.layer import load_crf
 from semgrid_edu.datasets import KittiRawDrive, training_cache
 from semgrid_edu.errors import DataError
-from semgrid_edu.experiments import learned_crf, learned_crf_scores
-from semgrid_edu.experiments.evaluate import evaluate
 from semgrid_edu.networks import WEIGHTS, Architecture, build_net, save_net
 from semgrid_edu.storage.provenance import provenance_problems
 from semgrid_edu.training.crf import CRF_TRAINING
+from semgrid_edu.workshop.commands.main import app
+from semgrid_edu.workshop.scoring.evaluate import evaluate
+from semgrid_edu.workshop.studies.crf import learned_crf, learned_crf_scores
 
 QUICK = replace(CRF_TRAINING, grid_iterations=1)
 

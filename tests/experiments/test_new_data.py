@@ -13,7 +13,11 @@ import semgrid_edu
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.new_data.domain import (
+from semgrid_edu.frame import Frame
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import KITTI_14
+from semgrid_edu.occupancy import track_drive
+from semgrid_edu.workshop.studies.new_drive.domain import (
     agrees_with_lidar,
     image_histograms,
     image_statistics,
@@ -21,7 +25,7 @@ from semgrid_edu.experiments.new_data.domain import (
     mean_histograms,
     normalised_entropy,
 )
-from semgrid_edu.experiments.new_data.drive_checks import (
+from semgrid_edu.workshop.studies.new_drive.drive_checks import (
     depth_edges,
     edge_contrast,
     ground_plane,
@@ -29,15 +33,11 @@ from semgrid_edu.experiments.new_data.drive_checks import (
     share_on_image,
     time_gaps,
 )
-from semgrid_edu.experiments.new_data.ego_motion import AXES, axes_errors, motion_between, overlay_error
-from semgrid_edu.experiments.new_data.faults import FAULTS, TURN, YAWS, colour_distance, drive_readings
-from semgrid_edu.experiments.new_data.moving_cars import moving_hits, read_boxes, sample_boxes
-from semgrid_edu.experiments.new_data.network_view import training_images
-from semgrid_edu.experiments.new_data.real_drive import real_drive_table
-from semgrid_edu.frame import Frame
-from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import KITTI_14
-from semgrid_edu.occupancy import track_drive
+from semgrid_edu.workshop.studies.new_drive.ego_motion import AXES, axes_errors, motion_between, overlay_error
+from semgrid_edu.workshop.studies.new_drive.faults import FAULTS, TURN, YAWS, colour_distance, drive_readings
+from semgrid_edu.workshop.studies.new_drive.moving_cars import moving_hits, read_boxes, sample_boxes
+from semgrid_edu.workshop.studies.new_drive.network_view import training_images
+from semgrid_edu.workshop.studies.new_drive.real_drive import real_drive_table
 
 COMMITTED = Path(semgrid_edu.__file__).parents[1] / "docs" / "results" / "real_drive.json"
 

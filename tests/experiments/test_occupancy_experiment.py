@@ -7,20 +7,20 @@ from pathlib import Path
 import pytest
 
 import semgrid_edu
-from semgrid_edu.cli import run
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.cell_scores import CellScores, Estimate
-from semgrid_edu.experiments.occupancy import GRIDS, LIDARS, METHODS, compare_filters, occupancy_table
-from semgrid_edu.experiments.scenes import known_scenes
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Cmcdot, SensorModel
-from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive
-from semgrid_edu.simulation.sensors.rig import Rig
-from semgrid_edu.simulation.street.plan import Wishes
-from semgrid_edu.simulation.street.traffic import Traffic
-from semgrid_edu.simulation.street.trajectories import STAND, Pace, Trajectory
-from semgrid_edu.simulation.things.cars import car_size
-from semgrid_edu.simulation.things.materials import Kind
+from semgrid_edu.workshop.commands.main import run
+from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
+from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.simulation.street.plan import Wishes
+from semgrid_edu.workshop.simulation.street.traffic import Traffic
+from semgrid_edu.workshop.simulation.street.trajectories import STAND, Pace, Trajectory
+from semgrid_edu.workshop.simulation.things.cars import car_size
+from semgrid_edu.workshop.simulation.things.materials import Kind
+from semgrid_edu.workshop.studies.filter.cell_scores import CellScores, Estimate
+from semgrid_edu.workshop.studies.filter.occupancy import GRIDS, LIDARS, METHODS, compare_filters, occupancy_table
+from semgrid_edu.workshop.studies.filter.scenes import known_scenes
 
 COMMITTED = Path(semgrid_edu.__file__).parents[1] / "docs" / "results" / "occupancy.json"
 WALKERS = "walking pedestrians, to 25 m"
@@ -73,7 +73,9 @@ def test_the_committed_comparison_says_the_same_of_all_its_drives(lidar, grid):
 
 def test_the_command_writes_what_compare_returns_and_prints_it_as_a_table(tmp_path, monkeypatch, capsys):
     out = tmp_path / "occupancy.json"
-    monkeypatch.setattr("semgrid_edu.experiments.occupancy.compare_filters", partial(compare_filters, frames=2))
+    monkeypatch.setattr(
+        "semgrid_edu.workshop.studies.filter.occupancy.compare_filters", partial(compare_filters, frames=2)
+    )
     arguments = ["reproduce", "occupancy", "--seed", "1", "--drives", "2", "--grid", "compact", "--out", str(out)]
     monkeypatch.setattr("sys.argv", ["semgrid-edu", *arguments])
     with pytest.raises(SystemExit, match="0"):

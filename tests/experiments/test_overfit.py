@@ -9,11 +9,11 @@ from sklearn.metrics import accuracy_score
 from tiny_streets import CAMERA, SMALL, tiny_streets
 from typer.testing import CliRunner
 
-from semgrid_edu.cli import app
-from semgrid_edu.experiments import overfit
 from semgrid_edu.labels import IGNORE
 from semgrid_edu.networks import SEGMENTERS, build_net
 from semgrid_edu.training.batches import draw_batch
+from semgrid_edu.workshop.commands.main import app
+from semgrid_edu.workshop.studies.training import overfit
 
 
 @pytest.fixture(autouse=True)

@@ -5,21 +5,21 @@ import numpy as np
 import pytest
 from tiny_runs import Note
 
-from semgrid_edu.experiments.confusions import FrameConfusions
-from semgrid_edu.experiments.reproduction.accuracy_tables import (
+from semgrid_edu.labels import KITTI_14, SYNTHIA_10
+from semgrid_edu.workshop.paper.reports.accuracy_tables import (
     accuracy_markdown,
     accuracy_rows,
     crf_gains,
     network_gains,
 )
-from semgrid_edu.experiments.reproduction.confusion_table import confusion_markdown, confusion_result
-from semgrid_edu.experiments.reproduction.experiments import EXPERIMENTS, Experiment
-from semgrid_edu.experiments.reproduction.paper import TABLE_1_SCORES
-from semgrid_edu.experiments.reproduction.pictures import accuracy_picture, confusion_picture
-from semgrid_edu.experiments.reproduction.results import write_result
-from semgrid_edu.experiments.reproduction.scales import SCALES
-from semgrid_edu.experiments.reproduction.score_runs import WITH_CRF
-from semgrid_edu.labels import KITTI_14, SYNTHIA_10
+from semgrid_edu.workshop.paper.reports.confusion_table import confusion_markdown, confusion_result
+from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS, Experiment
+from semgrid_edu.workshop.paper.reports.pictures import accuracy_picture, confusion_picture
+from semgrid_edu.workshop.paper.reports.results import write_result
+from semgrid_edu.workshop.paper.runs.paper import TABLE_1_SCORES
+from semgrid_edu.workshop.paper.runs.scales import SCALES
+from semgrid_edu.workshop.paper.runs.score_runs import WITH_CRF
+from semgrid_edu.workshop.scoring.confusions import FrameConfusions
 
 
 class Counted:

@@ -11,16 +11,16 @@ import pytest
 from tiny_runs import HandMadeData, Note, results, tiny_training_runs, wait_for
 
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.experiments.reproduction.execute import execute_plan
-from semgrid_edu.experiments.reproduction.experiments import EXPERIMENTS
-from semgrid_edu.experiments.reproduction.one_run import check_runs_folder, claim_folder, run_one
-from semgrid_edu.experiments.reproduction.plan import estimate, plan_table, with_needs
-from semgrid_edu.experiments.reproduction.reproduce import Request, reproduce
-from semgrid_edu.experiments.reproduction.scales import SCALES, scale_named
 from semgrid_edu.networks import WEIGHTS
-from semgrid_edu.simulation.datasets import DatasetRecipe, Route, make_from_recipe
 from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.storage.workplace import Workplace, workplace
+from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS
+from semgrid_edu.workshop.paper.reports.reproduce import Request, reproduce
+from semgrid_edu.workshop.paper.runs.scales import SCALES, scale_named
+from semgrid_edu.workshop.scheduler.execute import execute_plan
+from semgrid_edu.workshop.scheduler.one_run import check_runs_folder, claim_folder, run_one
+from semgrid_edu.workshop.scheduler.plan import estimate, plan_table, with_needs
+from semgrid_edu.workshop.simulation.datasets import DatasetRecipe, Route, make_from_recipe
 
 A = Note("a")
 B, C = Note("b", (A,)), Note("c", (A,))
@@ -139,8 +139,8 @@ SCRIPT = """
 import sys
 from pathlib import Path
 from tiny_runs import tiny_training_runs
-from semgrid_edu.experiments.reproduction.execute import execute_plan
-from semgrid_edu.experiments.reproduction.plan import with_needs
+from semgrid_edu.workshop.scheduler.execute import execute_plan
+from semgrid_edu.workshop.scheduler.plan import with_needs
 from semgrid_edu.storage.workplace import workplace
 if __name__ == "__main__":
     with workplace(1) as place:

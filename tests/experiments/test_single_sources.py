@@ -5,14 +5,14 @@ import pytest
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.single_sources import (
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import KITTI_14
+from semgrid_edu.workshop.scoring.single_sources import (
     classes_of_states,
     ground_pixels,
     inverse_perspective,
     majority_by_state,
 )
-from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import KITTI_14
 
 ROAD, WALK, CAR, SKY = (KITTI_14.index(name) for name in ("road", "sidewalk", "car", "sky"))
 FREE, STATIC, DYNAMIC, UNOBSERVED = 10, 11, 12, 13

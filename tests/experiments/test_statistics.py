@@ -6,9 +6,9 @@ from interval_coverage import RATIOS, coverage, population
 from scipy import stats
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.measured import compared, measured
-from semgrid_edu.experiments.statistics import drive_interval, paired_interval
 from semgrid_edu.metrics import METRICS, class_accuracy, pixel_accuracy
+from semgrid_edu.workshop.scoring.score_with_interval import compared, measured
+from semgrid_edu.workshop.scoring.statistics import drive_interval, paired_interval
 
 
 def matrices(right):

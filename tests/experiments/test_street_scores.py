@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, Camera
-from semgrid_edu.cli import run
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.cell_truth import CellTruth
-from semgrid_edu.experiments.mover_times import convoy_pairs
-from semgrid_edu.experiments.scenes import KnownScene
-from semgrid_edu.experiments.street_scores import StreetScores
-from semgrid_edu.experiments.streets import measure_streets, streets_tables
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Belief, PlanarMotion, State
-from semgrid_edu.simulation.street.actors import Actor
-from semgrid_edu.simulation.street.trajectories import Pace, Trajectory
-from semgrid_edu.simulation.things.materials import Kind
+from semgrid_edu.workshop.commands.main import run
+from semgrid_edu.workshop.simulation.street.actors import Actor
+from semgrid_edu.workshop.simulation.street.trajectories import Pace, Trajectory
+from semgrid_edu.workshop.simulation.things.materials import Kind
+from semgrid_edu.workshop.studies.filter.cell_truth import CellTruth
+from semgrid_edu.workshop.studies.filter.detection_latency import convoy_pairs
+from semgrid_edu.workshop.studies.filter.scenes import KnownScene
+from semgrid_edu.workshop.studies.filter.street_scores import StreetScores
+from semgrid_edu.workshop.studies.filter.streets import measure_streets, streets_tables
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 ROW = GridSpec(2, 3, -11, -3, 1)
@@ -159,7 +159,7 @@ def test_cars_on_one_line_at_one_pace_form_a_convoy():
 
 def test_the_command_writes_what_measure_returns_and_prints_it_as_tables(tmp_path, monkeypatch, capsys):
     out, short = tmp_path / "streets.json", partial(measure_streets, frames=3, streets=("mesh", "convoy"))
-    monkeypatch.setattr("semgrid_edu.experiments.streets.measure_streets", short)
+    monkeypatch.setattr("semgrid_edu.workshop.studies.filter.streets.measure_streets", short)
     arguments = ["reproduce", "streets", "--seed", "1", "--drives", "1", "--grid", "compact", "--out", str(out)]
     monkeypatch.setattr("sys.argv", ["semgrid-edu", *arguments])
     with pytest.raises(SystemExit, match="0"):

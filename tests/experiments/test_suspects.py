@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.street_scores import StreetScores
-from semgrid_edu.experiments.suspects import (
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import FilterState, Particles, State, predict
+from semgrid_edu.workshop.attic.suspects import (
     BEFORE,
     GROUPS,
     SUSPECTS,
@@ -17,10 +18,9 @@ from semgrid_edu.experiments.suspects import (
     opaque,
     without_pillars,
 )
-from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import FilterState, Particles, State, predict
-from semgrid_edu.simulation.named_streets import named_street
-from semgrid_edu.simulation.things.materials import Kind
+from semgrid_edu.workshop.simulation.named_streets import named_street
+from semgrid_edu.workshop.simulation.things.materials import Kind
+from semgrid_edu.workshop.studies.filter.street_scores import StreetScores
 
 
 def points_of(change, street="mesh"):

@@ -6,27 +6,26 @@ import numpy as np
 import pytest
 from tiny_runs import HandMadeData
 
-from semgrid_edu.datasets import made_truth, training_cache
-from semgrid_edu.datasets.made_truth import MadeTruth
-from semgrid_edu.datasets.named_truths import POLICIES
-from semgrid_edu.experiments.confusions import FrameConfusions
-from semgrid_edu.experiments.reproduction import truth_costs as costs
-from semgrid_edu.experiments.reproduction.data_runs import ArraysRun, DataRun
-from semgrid_edu.experiments.reproduction.execute import execute_plan
-from semgrid_edu.experiments.reproduction.experiments import EXPERIMENTS
-from semgrid_edu.experiments.reproduction.label_runs import LABELS, LabelsRun
-from semgrid_edu.experiments.reproduction.plan import with_needs
-from semgrid_edu.experiments.reproduction.scales import SCALES
-from semgrid_edu.experiments.reproduction.truth_cost_tables import (
-    LEARNED_FROM,
-    truth_costs_markdown,
-    truth_costs_picture,
-)
-from semgrid_edu.experiments.truth_trials import TRIALS
+from semgrid_edu.datasets import cached_labels as made_truth
+from semgrid_edu.datasets import training_cache
+from semgrid_edu.datasets.cached_labels import POLICIES, MadeTruth
 from semgrid_edu.labels import KITTI_14, UNKNOWN_OF_STATE
 from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.storage.workplace import Workplace
 from semgrid_edu.training.run import chosen_truth
+from semgrid_edu.workshop.paper.reports import truth_costs as costs
+from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS
+from semgrid_edu.workshop.paper.reports.truth_costs import (
+    LEARNED_FROM,
+    truth_costs_markdown,
+    truth_costs_picture,
+)
+from semgrid_edu.workshop.paper.runs.data_runs import LABELS, ArraysRun, DataRun, LabelsRun
+from semgrid_edu.workshop.paper.runs.scales import SCALES
+from semgrid_edu.workshop.scheduler.execute import execute_plan
+from semgrid_edu.workshop.scheduler.plan import with_needs
+from semgrid_edu.workshop.scoring.confusions import FrameConfusions
+from semgrid_edu.workshop.studies.ground_truth.truth_counts import TRIALS
 
 REDUCED = SCALES["reduced"]
 LABORATORY = {

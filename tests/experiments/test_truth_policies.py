@@ -6,20 +6,19 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from semgrid_edu.cli import app
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.ground_truth import NO_FLAWS, TruthPolicy
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.experiments import truth_policies as laboratory
-from semgrid_edu.experiments.truth_counts import BAND_EDGES, COUNTED, TruthCounts
-from semgrid_edu.experiments.truth_tables import class_table, distance_table, policy_table
-from semgrid_edu.experiments.truth_trials import TRIALS, Trial
 from semgrid_edu.frame import LABEL_GRID
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.simulation.drive import SimulatedDrive
-from semgrid_edu.simulation.writer import write_calibration, write_drive
+from semgrid_edu.workshop.commands.main import app
+from semgrid_edu.workshop.simulation.drive import SimulatedDrive
+from semgrid_edu.workshop.simulation.writer import write_calibration, write_drive
+from semgrid_edu.workshop.studies.ground_truth import truth_policies as laboratory
+from semgrid_edu.workshop.studies.ground_truth.truth_counts import BAND_EDGES, COUNTED, TRIALS, Trial, TruthCounts
+from semgrid_edu.workshop.studies.ground_truth.truth_tables import class_table, distance_table, policy_table
 
 ROAD, WALK, CAR = (KITTI_14.index(name) for name in ("road", "sidewalk", "car"))
 FREE, HIDDEN = KITTI_14.index("unknown-free"), KITTI_14.index("unknown-unobserved")

@@ -3,10 +3,10 @@ import torch
 from sklearn.metrics import accuracy_score
 from tiny_drive import write_tiny_dataset
 
-from semgrid_edu.experiments import two_stage
 from semgrid_edu.labels import IGNORE
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, load_net
 from semgrid_edu.training import CHECKPOINT, TrainingParams
+from semgrid_edu.workshop.studies.training import two_stage
 
 QUICK = TrainingParams(image_iterations=1, grid_iterations=1, batch_size=2)
 

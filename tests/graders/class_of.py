@@ -2,10 +2,10 @@
 
 from nbformat.v4 import new_code_cell
 
-from semgrid_edu.course.grade import grade_one
-from semgrid_edu.course.grading import GradeSettings, place, reference_answers, submission
-from semgrid_edu.course.isolation.notebook import cell_name
-from semgrid_edu.course.notebooks import NOTEBOOKS, write_notebook
+from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, place, reference_answers, submission
+from semgrid_edu.workshop.course.nbgrader.grade_class import grade_one
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, write_notebook
+from semgrid_edu.workshop.course.sandbox.notebook import cell_name
 
 NAME = "01_bayes"
 SOURCE = NOTEBOOKS / "src" / "exercises" / f"{NAME}.py"

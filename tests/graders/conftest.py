@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from semgrid_edu.course.exercises import build_course
+from semgrid_edu.workshop.course.nbgrader.build import build_course
 
 pytest.register_assert_rewrite("grader_checks")
 

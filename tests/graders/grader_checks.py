@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import pytest
 
-from semgrid_edu.course.grading import autograde, reference_answers, submission, tasks
-from semgrid_edu.course.notebooks import NOTEBOOKS
+from semgrid_edu.workshop.course.nbgrader.autograde import autograde, reference_answers, submission, tasks
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 
 TIMEOUT = {"answer": 12, "endless loop": 4}
 """Seconds for a cell: enough for any answer on a busy machine; what each call of an endless loop costs."""

@@ -11,11 +11,11 @@ import test_grader_01_bayes as catalogue
 import test_sound as sound
 from class_of import NAME, POINTS, REFERENCE, SETTINGS, handed_in, inside
 
-from semgrid_edu.course.exercises import course_api
-from semgrid_edu.course.grade import grade_course
-from semgrid_edu.course.graded import write_graded
-from semgrid_edu.course.grading import place
-from semgrid_edu.course.notebooks import write_notebook
+from semgrid_edu.workshop.course.nbgrader.autograde import place
+from semgrid_edu.workshop.course.nbgrader.build import course_api
+from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course
+from semgrid_edu.workshop.course.nbgrader.gradebook import write_graded
+from semgrid_edu.workshop.course.notebooks.build import write_notebook
 
 
 def with_entries(entries):

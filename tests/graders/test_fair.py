@@ -7,8 +7,8 @@ from class_of import NAME, REFERENCE, cell_of, graded, handed_in, inside
 from nbformat.v4 import new_code_cell
 from nbgrader.api import Gradebook
 
-from semgrid_edu.course.exercises import course_api
-from semgrid_edu.course.grading import place
+from semgrid_edu.workshop.course.nbgrader.autograde import place
+from semgrid_edu.workshop.course.nbgrader.build import course_api
 
 
 @pytest.fixture(scope="module")

@@ -648,7 +648,7 @@ def beam_evidence(x, y, spec, L_hit, L_pass):
             "the package's walk",
             task="beam-evidence",
             code="""
-from semgrid_edu.occupancy.evidence_literal import walk_ray
+from semgrid_edu.occupancy.literal.evidence import walk_ray
 
 def beam_evidence(x, y, spec, L_hit, L_pass):
     evidence = np.zeros(spec.shape)

@@ -10,8 +10,6 @@ from grader_checks import GraderChecks, mistake, right
 from scipy.ndimage import gaussian_filter
 from scipy.special import log_softmax
 
-from semgrid_edu.course.grading import reference_answers
-from semgrid_edu.course.notebooks import NOTEBOOKS, read_percent
 from semgrid_edu.crf import (
     CrfParams,
     energy,
@@ -22,8 +20,10 @@ from semgrid_edu.crf import (
     mean_field_sequential,
     pair_weights,
 )
-from semgrid_edu.graphical.stages.crf import all_free
 from semgrid_edu.pipeline import load_stages
+from semgrid_edu.stage_models.crf import all_free
+from semgrid_edu.workshop.course.nbgrader.autograde import reference_answers
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 
 
 def price(result, apart="np.sum((c_i - c_j) ** 2)", unlike="np.sum((o_i - o_j) ** 2)"):

@@ -7,10 +7,10 @@ import pytest
 from class_of import NAME, REFERENCE, SETTINGS, SOURCE, cell_of, graded, handed_in, inside
 from nbformat.v4 import new_code_cell, new_markdown_cell
 
-from semgrid_edu.course.exercises import course_api
-from semgrid_edu.course.grade import grade_one
-from semgrid_edu.course.grading import GradeSettings, place
-from semgrid_edu.course.notebooks import write_notebook
+from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, place
+from semgrid_edu.workshop.course.nbgrader.build import course_api
+from semgrid_edu.workshop.course.nbgrader.grade_class import grade_one
+from semgrid_edu.workshop.course.notebooks.build import write_notebook
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +88,8 @@ locate = predict = follow = transition = half_life = fuse = lambda *a, **k: np.z
 """,
     "forged-reply": """
 import os
-from semgrid_edu.course.isolation import worker, values
+from semgrid_edu.workshop.course.sandbox import worker
+from semgrid_edu.workshop.course.sandbox import values
 values.encode.__globals__["json"].dumps = lambda *a, **k: "{}"
 locate = lambda *a, **k: 1
 """,

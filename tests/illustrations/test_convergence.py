@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from semgrid_edu.illustrations.boxes import cells_in
-from semgrid_edu.illustrations.convergence import (
+from semgrid_edu.workshop.illustrations.boxes import cells_in
+from semgrid_edu.workshop.illustrations.convergence import (
     SPEC,
     evidence_of_boxes,
     measure_convergence,

@@ -4,7 +4,7 @@ import torch
 from torch import nn
 
 from semgrid_edu.networks import Vgg, build_segmenter
-from semgrid_edu.networks.fcn import enlarge
+from semgrid_edu.networks.backbones.fcn import enlarge
 
 PAPER = (64, 128, 256, 512, 512)
 

@@ -2,9 +2,14 @@
 
 import pytest
 
-from semgrid_edu.course.checks import MAX_BYTES_TOGETHER, companion_problems, exercise_problems, lecture_problems
-from semgrid_edu.course.exercises import exercise_sources
-from semgrid_edu.course.notebooks import NOTEBOOKS, built_path, companion_sources, lecture_sources
+from semgrid_edu.workshop.course.checks import (
+    MAX_BYTES_TOGETHER,
+    companion_problems,
+    exercise_problems,
+    lecture_problems,
+)
+from semgrid_edu.workshop.course.nbgrader.build import exercise_sources
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, built_path, companion_sources, lecture_sources
 
 
 @pytest.mark.parametrize("source", lecture_sources(), ids=lambda source: source.stem)

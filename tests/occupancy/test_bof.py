@@ -9,9 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.scenes import hit_cells
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.illustrations.boxes import Box, cells_in, scan_boxes
 from semgrid_edu.occupancy import (
     Bof,
     BofParams,
@@ -34,6 +32,8 @@ from semgrid_edu.occupancy import (
 )
 from semgrid_edu.occupancy.particles import cells_of, weight_in_cells
 from semgrid_edu.occupancy.resampling import draw_velocities
+from semgrid_edu.workshop.illustrations.boxes import Box, cells_in, scan_boxes
+from semgrid_edu.workshop.studies.filter.scenes import hit_cells
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 GRID = GridSpec(0, 3, -1, 1, 0.5)

@@ -39,8 +39,8 @@ from semgrid_edu.occupancy import (
     update,
     update_literal,
 )
+from semgrid_edu.occupancy.literal.particles import cells_at_literal, cells_of_literal, systematic_resample_literal
 from semgrid_edu.occupancy.particles import cells_at, cells_of
-from semgrid_edu.occupancy.particles_literal import cells_at_literal, cells_of_literal, systematic_resample_literal
 from semgrid_edu.occupancy.resampling import systematic_resample
 
 GRID = GridSpec(0, 6, -2, 2, 1)

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.illustrations.boxes import Box, cells_in, scan_boxes
 from semgrid_edu.occupancy import (
     Bof,
     BofParams,
@@ -23,6 +22,7 @@ from semgrid_edu.occupancy import (
     smear_area,
     update_log_odds,
 )
+from semgrid_edu.workshop.illustrations.boxes import Box, cells_in, scan_boxes
 
 SPEC = GridSpec(0, 40, -5, 5, 0.5)
 FREELY = LogOddsParams(lowest=1e-12, highest=1 - 1e-12)

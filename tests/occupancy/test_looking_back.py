@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.streets import measure_streets
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
     CmcdotParams,
@@ -21,8 +20,9 @@ from semgrid_edu.occupancy import (
     update_literal,
 )
 from semgrid_edu.occupancy.bof_steps import origins
+from semgrid_edu.occupancy.literal.particles import cells_at_literal
 from semgrid_edu.occupancy.particles import cells_at, cells_of
-from semgrid_edu.occupancy.particles_literal import cells_at_literal
+from semgrid_edu.workshop.studies.filter.streets import measure_streets
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 ROW = GridSpec(0, 16, 0, 1, 1)

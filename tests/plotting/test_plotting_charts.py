@@ -2,10 +2,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from semgrid_edu import plotting
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.plotting import training_curves
 from semgrid_edu.training.log import TrainingLog
+from semgrid_edu.workshop.paper.reports.forest import forest_plot
 
 
 def _log(image=200, grid=100):
@@ -56,7 +56,7 @@ def test_a_forest_shows_each_interval_and_every_seed():
         "network": {"mean": 0.8, "low": 0.7, "high": 0.9, "seeds": [0.75, 0.8, 0.85]},
         "baseline": {"mean": 0.5, "low": 0.4, "high": 0.65, "seeds": [0.5]},
     }
-    ax = plotting.forest_plot(rows, reference=0.6)
+    ax = forest_plot(rows, reference=0.6)
     assert [text.get_text() for text in ax.get_yticklabels()] == ["network", "baseline"]
     lines = {(line.get_label(), round(float(line.get_ydata()[0]))): line.get_xdata() for line in ax.lines[1:]}
     np.testing.assert_allclose(lines["95 % interval", 0], [70, 90])
@@ -68,4 +68,4 @@ def test_a_forest_shows_each_interval_and_every_seed():
     assert [text.get_text() for text in ax.texts] == ["80.0 (70.0 to 90.0)", "50.0 (40.0 to 65.0)"]
     assert ax.yaxis_inverted()
     with pytest.raises(ArgumentError, match="rows"):
-        plotting.forest_plot({})
+        forest_plot({})

@@ -5,7 +5,7 @@ import numpy as np
 
 from semgrid_edu import plotting
 from semgrid_edu.crf import enclosing_simplex_literal, lattice_literal
-from semgrid_edu.crf.simplices import elevation
+from semgrid_edu.crf.lattice.simplices import elevation
 
 
 def street():

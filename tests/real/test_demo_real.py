@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from semgrid_edu.datasets import KittiRawDrive
-from semgrid_edu.demo import write_demo
 from semgrid_edu.networks import Architecture, build_net, save_net
 from semgrid_edu.plotting.images import visible_points
+from semgrid_edu.workshop.demo import write_demo
 
 pytestmark = pytest.mark.real
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from semgrid_edu.datasets import KittiRawDrive
-from semgrid_edu.experiments.scenes import hit_cells
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import State, track_drive
+from semgrid_edu.workshop.studies.filter.scenes import hit_cells
 
 pytestmark = pytest.mark.real
 

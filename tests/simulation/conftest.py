@@ -2,8 +2,8 @@
 
 import pytest
 
-from semgrid_edu.simulation.drive import SimulatedDrive
-from semgrid_edu.simulation.street.plan import Wishes
+from semgrid_edu.workshop.simulation.drive import SimulatedDrive
+from semgrid_edu.workshop.simulation.street.plan import Wishes
 
 BUSY = Wishes(layout="junction", styles=("suburb", "town"), density=0.9, speed=8.0)
 

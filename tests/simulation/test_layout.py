@@ -5,10 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from semgrid_edu.simulation.street.ground import KERB_HEIGHT, ground_height, ground_kind, ground_kinds, lane_mark
-from semgrid_edu.simulation.street.layout import Road, Side, to_road, to_world
-from semgrid_edu.simulation.street.terrain import Extent, ground_mesh
-from semgrid_edu.simulation.things.materials import Kind
+from semgrid_edu.workshop.simulation.street.ground import (
+    KERB_HEIGHT,
+    ground_height,
+    ground_kind,
+    ground_kinds,
+    lane_mark,
+)
+from semgrid_edu.workshop.simulation.street.layout import Road, Side, to_road, to_world
+from semgrid_edu.workshop.simulation.street.terrain import Extent, ground_mesh
+from semgrid_edu.workshop.simulation.things.materials import Kind
 
 SIDE = Side(edge=4.0, strip=0.0, walk=2.0, bank_rise=0.8, bank_width=3.0)
 STRAIGHT = Road(0.0, 0.0, 0.0, 3.5, 1, 1, SIDE, SIDE, 0.0, 0.0, False, False, 4.0, False, False)

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.experiments.mover_times import convoy_pairs
 from semgrid_edu.frame import LABEL_GRID
-from semgrid_edu.simulation.drive import PERIOD, SimulatedDrive
-from semgrid_edu.simulation.named_streets import TEST_STREETS, named_street
-from semgrid_edu.simulation.sensors.rig import Rig
-from semgrid_edu.simulation.street.casts import overturned_car
-from semgrid_edu.simulation.street.plan import ANY, YARD, Wishes, draw_plan
-from semgrid_edu.simulation.street.trajectories import Departure
-from semgrid_edu.simulation.things.materials import Kind, Material
+from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
+from semgrid_edu.workshop.simulation.named_streets import TEST_STREETS, named_street
+from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.simulation.street.plan import ANY, YARD, Wishes, draw_plan
+from semgrid_edu.workshop.simulation.street.road_users import overturned_car
+from semgrid_edu.workshop.simulation.street.trajectories import Departure
+from semgrid_edu.workshop.simulation.things.materials import Kind, Material
+from semgrid_edu.workshop.studies.filter.detection_latency import convoy_pairs
 
 FENCED = ("mesh", "mesh and hedge", "hedge", "glass", "posts", "walls")
 SEEDS = (0, 1, 2)

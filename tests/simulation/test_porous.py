@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from semgrid_edu.simulation.sensors.instant import Instant
-from semgrid_edu.simulation.sensors.porous import PorousMesh
-from semgrid_edu.simulation.sensors.raycast import MISS, RayMesh
-from semgrid_edu.simulation.things import see_through
-from semgrid_edu.simulation.things.materials import Kind, Material
-from semgrid_edu.simulation.things.primitives import box, quads
-from semgrid_edu.simulation.things.shapes import Shape
+from semgrid_edu.workshop.simulation.sensors.instant import Instant
+from semgrid_edu.workshop.simulation.sensors.porous import PorousMesh
+from semgrid_edu.workshop.simulation.sensors.raycast import MISS, RayMesh
+from semgrid_edu.workshop.simulation.things import see_through
+from semgrid_edu.workshop.simulation.things.materials import Kind, Material
+from semgrid_edu.workshop.simulation.things.primitives import box, quads
+from semgrid_edu.workshop.simulation.things.shapes import Shape
 
 N = 20_000
 FOUR_SIGMA = 4 / np.sqrt(4 * N)

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, project, rigid_transform, transform_points
-from semgrid_edu.simulation.sensors.camera import take_picture
-from semgrid_edu.simulation.sensors.instant import Instant
-from semgrid_edu.simulation.sensors.lidar import scan
-from semgrid_edu.simulation.sensors.raycast import RayMesh
-from semgrid_edu.simulation.sensors.rig import Lidar, Rig
-from semgrid_edu.simulation.street.layout import Road, Side
-from semgrid_edu.simulation.street.light import Light
-from semgrid_edu.simulation.things.materials import Kind, Material
-from semgrid_edu.simulation.things.primitives import box, quads
+from semgrid_edu.workshop.simulation.sensors.camera import take_picture
+from semgrid_edu.workshop.simulation.sensors.instant import Instant
+from semgrid_edu.workshop.simulation.sensors.lidar import scan
+from semgrid_edu.workshop.simulation.sensors.raycast import RayMesh
+from semgrid_edu.workshop.simulation.sensors.rig import Lidar, Rig
+from semgrid_edu.workshop.simulation.street.layout import Road, Side
+from semgrid_edu.workshop.simulation.street.light import Light
+from semgrid_edu.workshop.simulation.things.materials import Kind, Material
+from semgrid_edu.workshop.simulation.things.primitives import box, quads
 
 SIDE = Side(5.0, 0.0, 2.0, 0.0, 3.0)
 ROAD = Road(0.0, 0.0, 0.0, 3.5, 1, 1, SIDE, SIDE, 0.0, 0.0, False, False, 4.0, False, True)

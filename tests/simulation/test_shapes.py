@@ -4,15 +4,14 @@ import numpy as np
 import pytest
 import trimesh
 
-from semgrid_edu.simulation.things.bicycles import bicycle
-from semgrid_edu.simulation.things.buildings import House, build_house
-from semgrid_edu.simulation.things.cars import BODIES, car, car_size
-from semgrid_edu.simulation.things.furniture import FENCES, SIGNS, fence, sign
-from semgrid_edu.simulation.things.materials import Kind, Material
-from semgrid_edu.simulation.things.people import Person, rider, walker
-from semgrid_edu.simulation.things.plants import TREES, bush, hedge, tree
-from semgrid_edu.simulation.things.primitives import ball, box, quads, tube
-from semgrid_edu.simulation.things.shapes import merge
+from semgrid_edu.workshop.simulation.things.buildings import House, build_house
+from semgrid_edu.workshop.simulation.things.cars import BODIES, car, car_size
+from semgrid_edu.workshop.simulation.things.furniture import FENCES, SIGNS, fence, sign
+from semgrid_edu.workshop.simulation.things.materials import Kind, Material
+from semgrid_edu.workshop.simulation.things.people import Person, bicycle, rider, walker
+from semgrid_edu.workshop.simulation.things.plants import TREES, bush, hedge, tree
+from semgrid_edu.workshop.simulation.things.primitives import ball, box, quads, tube
+from semgrid_edu.workshop.simulation.things.shapes import merge
 
 STYLE = {"colour": (0.5, 0.5, 0.5), "material": Material.MATTE, "kind": Kind.POLE}
 

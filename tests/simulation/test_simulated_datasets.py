@@ -12,16 +12,16 @@ from pathlib import Path
 import pytest
 
 from semgrid_edu.datasets import KittiRawDrive, load_index
-from semgrid_edu.datasets.kitti_raw import drive_folder
+from semgrid_edu.datasets.readers.kitti_raw import drive_folder
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.simulation import datasets
-from semgrid_edu.simulation.datasets import RECIPES, DatasetRecipe, Route, make_dataset, make_from_recipe
-from semgrid_edu.simulation.street.plan import Wishes
-from semgrid_edu.simulation.writer import DATE
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.storage.provenance import provenance_problems
+from semgrid_edu.workshop.simulation import datasets
+from semgrid_edu.workshop.simulation.datasets import RECIPES, DatasetRecipe, Route, make_dataset, make_from_recipe
+from semgrid_edu.workshop.simulation.street.plan import Wishes
+from semgrid_edu.workshop.simulation.writer import DATE
 
 QUIET = Wishes(density=0.2, layout="straight", styles=("park", "park"))
 TINY = DatasetRecipe("tiny", "KITTI-14", (Route("train", 2, False, QUIET), Route("test", 1, True, QUIET)))
@@ -104,7 +104,7 @@ def test_a_drive_that_another_worker_finished_first_stays_and_nothing_partial_do
 
 def test_workers_end_when_their_parent_is_killed(tmp_path):
     code = (
-        "from semgrid_edu.simulation.datasets import make_dataset\n"
+        "from semgrid_edu.workshop.simulation.datasets import make_dataset\n"
         "if __name__ == '__main__':\n    make_dataset('minikitti', {!r})"
     )
     script = tmp_path / "run.py"

@@ -8,12 +8,20 @@ from embreex.rtcore_scene import EmbreeScene
 from semgrid_edu.camera import transform_points
 from semgrid_edu.frame import LABEL_GRID
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
-from semgrid_edu.simulation.drive import SimulatedDrive
-from semgrid_edu.simulation.street.footprints import ROUND, SQUARE, Footprint, collides, footprint_table, outline, stamp
-from semgrid_edu.simulation.street.layout import outside_asphalt, to_road
-from semgrid_edu.simulation.street.plan import Wishes
-from semgrid_edu.simulation.things.materials import Kind, class_of_kind
-from semgrid_edu.simulation.things.shapes import merge
+from semgrid_edu.workshop.simulation.drive import SimulatedDrive
+from semgrid_edu.workshop.simulation.street.footprints import (
+    ROUND,
+    SQUARE,
+    Footprint,
+    collides,
+    footprint_table,
+    outline,
+    stamp,
+)
+from semgrid_edu.workshop.simulation.street.layout import outside_asphalt, to_road
+from semgrid_edu.workshop.simulation.street.plan import Wishes
+from semgrid_edu.workshop.simulation.things.materials import Kind, class_of_kind
+from semgrid_edu.workshop.simulation.things.shapes import merge
 
 
 def test_stamp_equals_the_literal_test_of_every_cell():

@@ -9,9 +9,9 @@ from PIL import Image
 
 from semgrid_edu.camera import invert_rigid
 from semgrid_edu.datasets import KittiRawDrive
-from semgrid_edu.simulation.drive import SimulatedDrive
-from semgrid_edu.simulation.street.plan import Wishes
-from semgrid_edu.simulation.writer import DATE, depth_to_png, write_calibration, write_drive
+from semgrid_edu.workshop.simulation.drive import SimulatedDrive
+from semgrid_edu.workshop.simulation.street.plan import Wishes
+from semgrid_edu.workshop.simulation.writer import DATE, depth_to_png, write_calibration, write_drive
 
 
 @pytest.fixture(scope="module")

@@ -3,8 +3,8 @@
 import tomllib
 import zlib
 
-from semgrid_edu.storage import shipped
-from semgrid_edu.storage.shipped import shipped_folder
+from semgrid_edu.storage import provenance as shipped
+from semgrid_edu.storage.provenance import shipped_folder
 
 CLONE = shipped.PACKAGE.parent
 LARGEST = 12_000_000

@@ -14,12 +14,12 @@ from torch import nn
 from semgrid_edu import plotting
 from semgrid_edu.crf import CrfParams, mean_field_naive, pair_weights, unary_from_probability
 from semgrid_edu.datasets import KittiRawDrive
-from semgrid_edu.datasets.truth import grid_truth
+from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture, build_net
 from semgrid_edu.occupancy import CmcdotParams, SensorModel, scan_evidence, track_drive
-from semgrid_edu.occupancy.cmcdot_literal import update_literal
+from semgrid_edu.occupancy.literal.cmcdot import update_literal
 from semgrid_edu.occupancy.state import FilterState, Particles
 from semgrid_edu.pipeline import Stages, run_pipeline
 from semgrid_edu.planes import plane_pixels
@@ -32,7 +32,7 @@ from semgrid_edu.story import (
     place_history,
     weights_of_cell,
 )
-from semgrid_edu.story.tell import label_and_rival
+from semgrid_edu.story.cell_story import label_and_rival
 
 SPEC = GridSpec.compact()
 CELLS = [(81, 31), (82, 25), (120, 33), (30, 5), (0, 0), (141, 61)]

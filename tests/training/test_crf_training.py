@@ -8,8 +8,7 @@ import torch
 from scipy.special import log_softmax
 
 from semgrid_edu.crf import CrfParams
-from semgrid_edu.crf.layer import CrfLayer
-from semgrid_edu.crf.layer_file import load_crf, save_crf
+from semgrid_edu.crf.layer import CrfLayer, load_crf, save_crf
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.storage.tensors import write_tensors

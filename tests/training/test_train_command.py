@@ -8,10 +8,8 @@ import torch
 from typer.testing import CliRunner
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.cli import app
-from semgrid_edu.datasets import dataset_doubts
-from semgrid_edu.datasets.made_truth import MadeTruth
-from semgrid_edu.datasets.named_truths import POLICIES
+from semgrid_edu.datasets import doubts as dataset_doubts
+from semgrid_edu.datasets.cached_labels import POLICIES, MadeTruth
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.networks import SEGMENTERS, Architecture, Fcn, load_net
@@ -20,6 +18,7 @@ from semgrid_edu.storage.provenance import provenance_problems
 from semgrid_edu.training import CHECKPOINT
 from semgrid_edu.training import run as experiment
 from semgrid_edu.training.log import LOG, Step, append_step, begin_log
+from semgrid_edu.workshop.commands.main import app
 
 
 class _Noise:

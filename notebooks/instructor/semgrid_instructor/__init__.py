@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from semgrid_edu.course.isolation.session import AnswerTimeoutError
+from semgrid_edu.workshop.course.sandbox.session import AnswerTimeoutError
 
 _variant: list[int] = []
 

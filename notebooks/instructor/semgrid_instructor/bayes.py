@@ -6,7 +6,7 @@ import numpy as np
 from filterpy import discrete_bayes
 from scipy.linalg import expm
 
-from semgrid_edu.course.answers import answer_array, answer_number
+from semgrid_edu.answers import answer_array, answer_number
 from semgrid_edu.occupancy import CmcdotParams, transition_matrix
 from semgrid_instructor import generator, hidden
 

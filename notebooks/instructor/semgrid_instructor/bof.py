@@ -6,7 +6,7 @@ import numpy as np
 from filterpy.discrete_bayes import update as discrete_update
 from scipy import ndimage
 
-from semgrid_edu.course.answers import answer_array, answer_arrays
+from semgrid_edu.answers import answer_array, answer_arrays
 from semgrid_edu.grid import GridSpec
 from semgrid_instructor import generator, hidden
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import softmax
 
-from semgrid_edu.course.answers import answer_array
+from semgrid_edu.answers import answer_array
 from semgrid_instructor import generator, hidden
 
 W1, W2 = 4.0, 3.0

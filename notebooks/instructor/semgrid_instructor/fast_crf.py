@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from semgrid_edu.course.answers import answer_array
-from semgrid_edu.course.memory import peak_megabytes
-from semgrid_edu.crf.lattice_literal import blur_literal, enclosing_simplex_literal
+from semgrid_edu.answers import answer_array
+from semgrid_edu.answers import peak_megabytes
+from semgrid_edu.crf.lattice.literal import blur_literal, enclosing_simplex_literal
 from semgrid_instructor import generator, hidden
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_softmax
 
-from semgrid_edu.course.answers import answer_array
+from semgrid_edu.answers import answer_array
 from semgrid_instructor import generator, hidden
 
 SIZES = ((3, 4, 5, 2, 3), (1, 2, 1, 4, 1), (5, 1, 3, 3, 2))

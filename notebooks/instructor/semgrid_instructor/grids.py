@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit, logit
 
-from semgrid_edu.course.answers import answer_array, answer_number
+from semgrid_edu.answers import answer_array, answer_number
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence_literal import walk_ray
+from semgrid_edu.occupancy.literal.evidence import walk_ray
 from semgrid_instructor import generator, hidden
 
 CLIPPED = 0.05

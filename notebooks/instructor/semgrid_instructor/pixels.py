@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import Camera, invert_rigid, project, rigid_transform, transform_points
-from semgrid_edu.course.answers import answer_array, answer_number
+from semgrid_edu.answers import answer_array, answer_number
 from semgrid_instructor import generator, hidden
 
 AXES = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])

@@ -28,9 +28,9 @@ from IPython.display import Markdown
 
 # %% jupyter={"source_hidden": true}
 from semgrid_edu import plotting
-from semgrid_edu.experiments.occupancy import markdown_table, per_cent
-from semgrid_edu.experiments.street_scores import LEAST_DYNAMIC, StreetScores
-from semgrid_edu.experiments.suspects import (
+from semgrid_edu.workshop.studies.filter.occupancy import markdown_table, per_cent
+from semgrid_edu.workshop.studies.filter.street_scores import LEAST_DYNAMIC, StreetScores
+from semgrid_edu.workshop.attic.suspects import (
     BARRED, BEFORE, MENDED, SUSPECTS, Suspect, counts, run_filter, scenes_of,
 )  # fmt: skip
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate
@@ -39,7 +39,7 @@ from semgrid_edu.occupancy import (
     Cmcdot, CmcdotParams, Evidence, FilterState, Particles, State, predict, update,
 )  # fmt: skip
 from semgrid_edu.occupancy.cellwise import clear_wakes, meet
-from semgrid_edu.occupancy.moving_map import look_up
+from semgrid_edu.occupancy.planar_motion import look_up
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 FREE, STATIC, DYNAMIC, UNKNOWN = State

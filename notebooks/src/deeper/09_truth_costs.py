@@ -23,9 +23,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from semgrid_edu import plotting
-from semgrid_edu.experiments.measured import shown
-from semgrid_edu.experiments.reproduction.truth_cost_tables import LEARNED_FROM
+from semgrid_edu.workshop.scoring.score_with_interval import shown
+from semgrid_edu.workshop.paper.reports.truth_costs import LEARNED_FROM
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate
+from semgrid_edu.workshop.paper.reports.forest import forest_plot
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 result = json.loads(Path("../../docs/results/reduced/truth-costs.json").read_text(encoding="utf-8"))
@@ -135,7 +136,7 @@ for judge, name in JUDGES.items():
 _, *others = rows
 fig, axes = plt.subplots(1, 2, figsize=(12.5, 4.6), layout="constrained", width_ratios=(1.4, 1))
 lost = {LEARNED_FROM[truth]: rows[truth]["differences"]["true"]["semantic"]["pixel accuracy"] for truth in others}
-plotting.forest_plot(lost, axes[0], "right cells: difference from the usual network [points]", reference=0)
+forest_plot(lost, axes[0], "right cells: difference from the usual network [points]", reference=0)
 for (truth, row), marker in zip(rows.items(), "oXsD*v^<", strict=True):
     of_labels, of_network = (
         100 * scores["semantic"]["pixel accuracy"]["mean"] for scores in (row["labels"], row["scores"]["true"])
@@ -273,4 +274,4 @@ assert all(rows[truth]["distances"]["20-30 m"]["difference"]["high"] < 0 for tru
 # - Northcutt, Athalye, Mueller, *Pervasive label errors in test sets destabilize machine learning benchmarks*, NeurIPS
 #   2021: who may judge.
 # - [The results](../../docs/results/reduced/truth-costs.md) with all metrics, and
-#   [the policies](../../semgrid_edu/datasets/named_truths.py).
+#   [the policies](../../semgrid_edu/datasets/cached_labels.py).

@@ -24,9 +24,9 @@ from IPython.display import Markdown
 
 from semgrid_edu import plotting
 from semgrid_edu.crf import free_energy, log_partition, mean_field_updates
-from semgrid_edu.experiments.crf_coupling import COUPLINGS, random_crf
-from semgrid_edu.experiments.crf_error import crf_error_tables
-from semgrid_edu.graphical.stages.crf import coupled
+from semgrid_edu.workshop.studies.crf.crf_coupling import COUPLINGS, random_crf
+from semgrid_edu.workshop.studies.crf.crf_error import crf_error_tables
+from semgrid_edu.stage_models.crf import coupled
 from semgrid_edu.plotting.inference import coupling_errors, error_against_time
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI

@@ -755,7 +755,7 @@ plt.show()
 # | [08](../08_fusion.ipynb) fusion | planes and occupancy point to the class of each cell | **image to occupancy**, **class to occupancy**, **class to class of the next frame** |
 # | [10](../10_crf.ipynb), [11](../11_fast_crf.ipynb) CRF | classes of cells, each pair linked by a factor | none in the model, **all** in mean field's answer |
 #
-# `semgrid_edu.graphical.stages` builds these graphs at toy size; the field `cut` of each lists its edges with the
+# `semgrid_edu.stage_models` builds these graphs at toy size; the field `cut` of each lists its edges with the
 # price.
 #
 # ## Where this breaks

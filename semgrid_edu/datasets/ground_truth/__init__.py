@@ -17,9 +17,8 @@ from semgrid_edu.datasets.ground_truth.flaws import (
     flawed_labels,
     miscalibrated,
 )
-from semgrid_edu.datasets.ground_truth.making import drive_truth, lidar_truth
+from semgrid_edu.datasets.ground_truth.making import drive_truth, in_sight, lidar_truth
 from semgrid_edu.datasets.ground_truth.policy import TruthPolicy
-from semgrid_edu.datasets.ground_truth.sight import in_sight
 from semgrid_edu.datasets.ground_truth.sweep import EgoVelocity, deskew_scan, ego_velocity, skew_scan, sweep_times
 from semgrid_edu.datasets.ground_truth.window import LabelledReturns, Moment, gather_returns
 

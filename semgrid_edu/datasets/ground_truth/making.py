@@ -1,4 +1,7 @@
-"""A semantic grid made from image labels and LIDAR scans by a policy: the paper's ground truth, and others (4)."""
+"""A semantic grid made from image labels and LIDAR scans by a policy: the paper's ground truth, and others (4).
+
+Which cells the camera sees, as far as a LIDAR scan tells: no farther than the last return in their direction (4).
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -6,15 +9,49 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.camera import invert_rigid, project, transform_points
 from semgrid_edu.datasets.ground_truth.carrying import carry_labels, close_and_spread, close_gaps, unknown_numbers
 from semgrid_edu.datasets.ground_truth.policy import TruthPolicy
-from semgrid_edu.datasets.ground_truth.sight import in_sight
 from semgrid_edu.datasets.ground_truth.window import Moment, gather_returns
+from semgrid_edu.datasets.readers.project_lidar import seen_returns
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import State
 from semgrid_edu.occupancy.state import check_shape
+
+SIGHT_COLUMNS = 100
+"""Number of directions into which the image is divided, as wide as one column of the coarse simulated LIDAR."""
+
+
+def in_sight(frame: Frame, spec: GridSpec) -> NDArray[np.bool_]:
+    """Return which cells lie in the sight of the camera.
+
+    The image is divided into upright strips. In each strip the camera sees as far as the farthest of the returns that
+    the camera sees (`seen_returns`).
+
+    Parameters
+    ----------
+    frame : Frame
+        The frame; its points and its calibration are used.
+    spec : GridSpec
+        The grid.
+
+    Returns
+    -------
+    (H, W) bool
+    """
+    centers = np.concatenate([spec.centers(), np.full((*spec.shape, 1), frame.camera.lidar_height)], axis=-1)
+    T_camera_from_grid = frame.camera.T_camera_from_grid
+    pixels, ahead = project(transform_points(T_camera_from_grid, centers), frame.camera)
+    height, width = frame.camera.size
+    strips = np.where(ahead, np.nan_to_num(pixels[..., 0]) * SIGHT_COLUMNS / width, 0).astype(int)
+    eye = invert_rigid(T_camera_from_grid)[:2, 3]
+    distance = np.hypot(*np.moveaxis(spec.centers() - eye, -1, 0))
+    seen_pixels, seen_cells = seen_returns(frame, spec, (height, width))
+    farthest = np.zeros(SIGHT_COLUMNS)
+    np.maximum.at(farthest, seen_pixels % width * SIGHT_COLUMNS // width, distance.ravel()[seen_cells])
+    return ahead & (distance <= farthest[strips])
 
 
 def lidar_truth(

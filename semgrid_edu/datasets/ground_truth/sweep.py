@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
 from semgrid_edu.occupancy import PlanarMotion
-from semgrid_edu.occupancy.tracking import LIDAR_PERIOD
+from semgrid_edu.occupancy.cmcdot import LIDAR_PERIOD
 
 
 class EgoVelocity(NamedTuple):

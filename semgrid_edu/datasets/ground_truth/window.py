@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from semgrid_edu.camera import invert_rigid, transform_points
 from semgrid_edu.datasets.ground_truth.policy import TruthPolicy
 from semgrid_edu.datasets.ground_truth.sweep import deskew_scan, ego_velocity
-from semgrid_edu.datasets.returns import closest_returns
+from semgrid_edu.datasets.readers.project_lidar import closest_returns
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec

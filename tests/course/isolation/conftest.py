@@ -2,9 +2,9 @@
 
 import pytest
 
-from semgrid_edu.course.isolation.limits import Limits
-from semgrid_edu.course.isolation.process import StudentProcess
-from semgrid_edu.course.isolation.session import Session
+from semgrid_edu.workshop.course.sandbox.limits import Limits
+from semgrid_edu.workshop.course.sandbox.process import StudentProcess
+from semgrid_edu.workshop.course.sandbox.session import Session
 
 
 @pytest.fixture

@@ -12,10 +12,11 @@ from pathlib import Path
 import pytest
 
 import semgrid_edu
-from semgrid_edu.course.isolation import landlock, seccomp
-from semgrid_edu.course.isolation.limits import PARTS, Limits, _all_but
-from semgrid_edu.course.isolation.process import StudentProcess
-from semgrid_edu.course.notebooks import NOTEBOOKS
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
+from semgrid_edu.workshop.course.sandbox import linux as landlock
+from semgrid_edu.workshop.course.sandbox import linux as seccomp
+from semgrid_edu.workshop.course.sandbox.limits import PARTS, Limits, _all_but
+from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 
 needs_landlock = pytest.mark.skipif(not landlock.version(), reason="this system has no Landlock")
 

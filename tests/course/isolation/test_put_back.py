@@ -5,7 +5,7 @@ import copy
 import numpy as np
 import pytest
 
-from semgrid_edu.course.isolation.put_back import put_back
+from semgrid_edu.workshop.course.sandbox.values import put_back
 
 
 def change_all(array, rows, names, both):

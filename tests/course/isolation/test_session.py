@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from semgrid_edu.course.isolation.session import AnswerEndedError, AnswerError, AnswerTimeoutError
+from semgrid_edu.workshop.course.sandbox.session import AnswerEndedError, AnswerError, AnswerTimeoutError
 
 
 def test_cells_share_names_and_display(session):

@@ -2,9 +2,9 @@
 
 import pytest
 
-from semgrid_edu.course.isolation.prepared import use_instructor
-from semgrid_edu.course.isolation.tests import CellTests
-from semgrid_edu.course.notebooks import NOTEBOOKS
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
+from semgrid_edu.workshop.course.sandbox.notebook import CellTests
+from semgrid_edu.workshop.course.sandbox.prepared import use_instructor
 
 
 @pytest.fixture

@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from semgrid_edu.course.isolation.values import MOST_JSON, MOST_KEYS, NotPlainError, decode, encode
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import Factor
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.workshop.course.sandbox.values import MOST_JSON, MOST_KEYS, NotPlainError, decode, encode
 
 scalars = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text()
 plain = st.recursive(

@@ -10,10 +10,18 @@ from pyagrum_oracle import assert_oracle_agrees
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals, total_variation, why_dependent
-from semgrid_edu.graphical.stages.beam import BeamWorld, beam_likelihood, beam_over_cells, range_state, reflection
-from semgrid_edu.graphical.stages.beam_beliefs import beam_beliefs, independent, occupied
-from semgrid_edu.graphical.stages.shared_error import count_rings, scan_with_pose_error
-from semgrid_edu.graphical.stages.thick_walls import PARAMS, draw_ranges, package_row, same_sensor, thick_walls
+from semgrid_edu.stage_models.beam import BeamWorld, beam_likelihood, beam_over_cells, range_state, reflection
+from semgrid_edu.stage_models.ground_truth_label import count_rings, scan_with_pose_error
+from semgrid_edu.stage_models.thick_walls import (
+    PARAMS,
+    beam_beliefs,
+    draw_ranges,
+    independent,
+    occupied,
+    package_row,
+    same_sensor,
+    thick_walls,
+)
 
 COARSE = [4.0, 4.6, 3.6, 4.2]
 """Four returns from a wall in the fifth of eight cells, with a noise of one cell."""

@@ -10,8 +10,9 @@ from pyagrum_oracle import posteriors
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, why_dependent
-from semgrid_edu.graphical.stages import bof_stage
-from semgrid_edu.graphical.stages.bof import (
+from semgrid_edu.occupancy import SensorModel
+from semgrid_edu.stage_models import bof_stage
+from semgrid_edu.stage_models.bof import (
     AT_THE_EDGE,
     HEAD_ON,
     STANDING_OR_DRIVING,
@@ -20,16 +21,15 @@ from semgrid_edu.graphical.stages.bof import (
     bof_errors,
     expected_things,
 )
-from semgrid_edu.graphical.stages.cells_in_a_row import NO_CHANGE, Cell, CellsInARow
-from semgrid_edu.graphical.stages.cmcdot import FORGETTING, LEFT_OR_RIGHT
-from semgrid_edu.graphical.stages.joint_row import (
+from semgrid_edu.stage_models.cells_in_a_row import NO_CHANGE, Cell, CellsInARow
+from semgrid_edu.stage_models.cmcdot import FORGETTING, LEFT_OR_RIGHT
+from semgrid_edu.stage_models.joint_row import (
     exact_beliefs,
     hit_probability,
     joint_belief,
     row_evidence,
     row_model,
 )
-from semgrid_edu.occupancy import SensorModel
 
 WORLDS = [AT_THE_EDGE, STANDING_OR_DRIVING, HEAD_ON, TOWARDS_A_FENCE]
 STEP = {Cell.STATIC: 0, Cell.LEFT: -1, Cell.RIGHT: 1}

@@ -7,13 +7,13 @@ from pyagrum_oracle import assert_oracle_agrees
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, why_dependent
-from semgrid_edu.graphical.stages import cmcdot_stage
-from semgrid_edu.graphical.stages.bof import AT_THE_EDGE, STANDING_OR_DRIVING, TOWARDS_A_FENCE, bof_beliefs, bof_errors
-from semgrid_edu.graphical.stages.cells_in_a_row import DT, HIT, NO_CHANGE, NOT_SEEN, Cell, CellsInARow
-from semgrid_edu.graphical.stages.cmcdot import FORGETTING, LEFT_OR_RIGHT, particle_beliefs, sampling_error
-from semgrid_edu.graphical.stages.cmcdot_graph import FROM_BOTH_SIDES
-from semgrid_edu.graphical.stages.joint_row import exact_beliefs
 from semgrid_edu.occupancy import State, WorldModel
+from semgrid_edu.stage_models import cmcdot_stage
+from semgrid_edu.stage_models.bof import AT_THE_EDGE, STANDING_OR_DRIVING, TOWARDS_A_FENCE, bof_beliefs, bof_errors
+from semgrid_edu.stage_models.cells_in_a_row import DT, HIT, NO_CHANGE, NOT_SEEN, Cell, CellsInARow
+from semgrid_edu.stage_models.cmcdot import FORGETTING, LEFT_OR_RIGHT, particle_beliefs, sampling_error
+from semgrid_edu.stage_models.cmcdot_graph import FROM_BOTH_SIDES
+from semgrid_edu.stage_models.joint_row import exact_beliefs
 
 NUMBERS = [100, 400, 1600, 6400]
 

@@ -6,9 +6,8 @@ import pytest
 
 from semgrid_edu.crf import CrfParams, crf_model, exact_marginals, mean_field_naive
 from semgrid_edu.graphical import d_separated, mean_field_graph
-from semgrid_edu.graphical.stages import crf_stage
-from semgrid_edu.graphical.stages.crf import UNDECIDED, all_free, coupled, two_classes
-from semgrid_edu.graphical.stages.crf_coupling import coupling_sweep, critical_coupling
+from semgrid_edu.stage_models import crf_stage
+from semgrid_edu.stage_models.crf import UNDECIDED, all_free, coupled, coupling_sweep, critical_coupling, two_classes
 
 
 @pytest.fixture(scope="module")

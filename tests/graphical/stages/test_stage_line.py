@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyagrum_oracle import assert_oracle_agrees
 
-from semgrid_edu.course.notebooks import NOTEBOOKS, read_percent
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals, sum_product, why_dependent
-from semgrid_edu.graphical.stages.line import bayes_on_a_line, filtered, future_gain, most_likely_path, smoothed
+from semgrid_edu.stage_models.line import bayes_on_a_line, filtered, future_gain, most_likely_path, smoothed
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 
 MOVED = np.array([0.1, 0.8, 0.1])
 P_POLE = np.where(np.isin(np.arange(10), [2, 3, 7]), 0.8, 0.1)

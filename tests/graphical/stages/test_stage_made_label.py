@@ -5,9 +5,9 @@ from scipy.stats import binom
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate
-from semgrid_edu.graphical.stages import LabelWorld, made_label_stage, wrong_label
-from semgrid_edu.graphical.stages.made_label import MADE
 from semgrid_edu.labels import KITTI_14
+from semgrid_edu.stage_models import LabelWorld, made_label_stage, wrong_label
+from semgrid_edu.stage_models.ground_truth_label import MADE
 
 
 @pytest.mark.parametrize("returns", [1, 3, 5])

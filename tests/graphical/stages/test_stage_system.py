@@ -8,11 +8,10 @@ from pyagrum_oracle import assert_oracle_agrees
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals, why_dependent
-from semgrid_edu.graphical.stages.cell import exact_cell
-from semgrid_edu.graphical.stages.cell_scans import read_scans
-from semgrid_edu.graphical.stages.system import class_and_sensors, same_belief, street, whole_system
-from semgrid_edu.graphical.stages.system_gain import system_gain
-from semgrid_edu.graphical.stages.system_world import CLASS_OF, CONTENTS, PARAMS, STREET, SystemWorld
+from semgrid_edu.stage_models.cell import exact_cell
+from semgrid_edu.stage_models.log_odds_cell import read_scans
+from semgrid_edu.stage_models.system import class_and_sensors, same_belief, street, system_gain, whole_system
+from semgrid_edu.stage_models.system_world import CLASS_OF, CONTENTS, PARAMS, STREET, SystemWorld
 
 ROAD, SIDEWALK, PARKED, MOVING, BUILDING = range(len(CONTENTS))
 WORLDS = [SystemWorld(), SystemWorld(1), SystemWorld(3), SystemWorld(dt=0.1, pixel_right=0.95, range_error=0.2)]

@@ -1,0 +1,107 @@
+"""What `make demo`, `make test` and `make test-browser` do, for machines without make.
+
+`python make.py demo` in a clone needs nothing but Python's own library, since it makes the environment in
+which everything else is installed.
+"""
+
+import os
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+CLONE = Path(__file__).resolve().parent
+"""The clone that this file lies in."""
+ENVIRONMENT = CLONE / ".venv"
+BIN = ENVIRONMENT / ("Scripts" if os.name == "nt" else "bin")
+MADE = ENVIRONMENT / "made"
+"""The file whose time says when the environment was made."""
+NEEDS = ("pyproject.toml", "constraints.txt")
+"""The files that decide what is installed; when one is newer, the environment is brought up to date."""
+OLDEST = (3, 11)
+"""The oldest Python that will do."""
+
+
+def environment() -> None:
+    """Make `.venv` with all that demo and tests need, or bring it up to date; nothing is done when it is."""
+    if sys.version_info < OLDEST:
+        found = f"{sys.executable} is {sys.version.split()[0]}; set PYTHON=... for make"
+        sys.exit(f"Python {OLDEST[0]}.{OLDEST[1]} or later is needed, {found}")
+    if MADE.exists() and all((CLONE / name).stat().st_mtime <= MADE.stat().st_mtime for name in NEEDS):
+        return
+    venv.create(ENVIRONMENT, with_pip=True, symlinks=os.name != "nt")
+    _run("python", "-m", "pip", "install", "--quiet", "-c", "constraints.txt", "-e", ".[test]")
+    MADE.touch()
+
+
+def demo() -> None:
+    """Run the whole pipeline on the shipped drive and write out/demo/index.html."""
+    environment()
+    _run("semgrid-edu", "demo", "--out", str(Path("out") / "demo"))
+
+
+def lint() -> None:
+    """Check style and format of the code."""
+    environment()
+    _run("python", "-m", "ruff", "check", ".")
+    _run("python", "-m", "ruff", "format", "--check", ".")
+
+
+def test() -> None:
+    """Check the code, run every test, and run every notebook and compare what it prints."""
+    lint()
+    _pytest("-n", "2", "--dist", "loadfile", "--doctest-modules", "semgrid_edu", "tests", "--ignore=tests/browser")
+    folder = CLONE / "notebooks"
+    notebooks = [
+        str(path.relative_to(CLONE)) for path in sorted([*folder.glob("*.ipynb"), *folder.glob("deeper/*.ipynb")])
+    ]
+    options = ("--nbval", "--nbval-current-env", "--nbval-cell-timeout=300", "-p", "no:cacheprovider")
+    _run("python", "-m", "pytest", *options, "-n", "2", "--dist", "loadscope", *notebooks)
+
+
+def test_browser() -> None:
+    """Test the demo's page and a lecture's widget in a real browser; skipped where there is none."""
+    environment()
+    _run("python", "-m", "pip", "install", "--quiet", "-c", "constraints.txt", "-e", ".[browser]")
+    _pytest("tests/browser")
+
+
+def _pytest(*arguments: str) -> None:
+    """Run pytest with one thread per process: two of them share two cores."""
+    _run("python", "-m", "pytest", *arguments, OMP_NUM_THREADS="1", NUMBA_NUM_THREADS="1")
+
+
+def _run(program: str, *arguments: str, **variables: str) -> None:
+    """Run a program of the environment in the clone; when it fails, end with its exit status."""
+    # Idle OpenMP threads sleep instead of spinning, so that processes can share the cores.
+    variables = os.environ | {"OMP_WAIT_POLICY": "PASSIVE"} | variables
+    done = subprocess.run([BIN / program, *arguments], cwd=CLONE, env=variables, check=False)
+    if done.returncode:
+        sys.exit(done.returncode)
+
+
+TARGETS = {target.__name__.replace("_", "-"): target for target in (environment, demo, lint, test, test_browser)}
+"""What can be asked for, by name."""
+
+
+def make_targets(asked: list[str]) -> None:
+    """Do what the command line asks for.
+
+    Parameters
+    ----------
+    asked : list of str
+        Keys of `TARGETS`, at least one.
+
+    Raises
+    ------
+    SystemExit
+        When something else is asked for, or a target fails.
+    """
+    if not asked or not set(asked) <= TARGETS.keys():
+        sys.exit(f"usage: python make.py [{' | '.join(TARGETS)}]")
+    for target in asked:
+        TARGETS[target]()
+
+
+if __name__ == "__main__":
+    make_targets(sys.argv[1:])

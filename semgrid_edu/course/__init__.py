@@ -1,1 +1,0 @@
-"""The course: notebooks built from percent sources, exercises, their grading, and the equation register."""

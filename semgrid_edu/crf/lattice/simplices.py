@@ -1,0 +1,206 @@
+"""Points in the permutohedral lattice: the simplex around each, and what comes back to it (Adams, Baek, Davis 2010).
+
+The lattice lies in the hyperplane of d + 1 dimensions in which the coordinates sum to zero. A vertex is d + 1 integers
+that sum to zero and have the same remainder modulo d + 1; a step in direction j adds one to all of them except the
+j-th, from which it takes d.
+"""
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from semgrid_edu.crf.lattice.arithmetic import HALF
+
+FORTH, BACK = 0, 1
+
+
+def elevation(d: int) -> NDArray[np.float64]:
+    """Return the matrix that takes d features to the hyperplane of zero sum.
+
+    It is scaled so that the whole filter has unit variance: splat and slice have variance (d + 1)^2 / 12 along each
+    axis, the blur (d + 1)^2 / 2 (Adams 2010, section 3.1).
+
+    Parameters
+    ----------
+    d : int
+        Number of features of a point.
+
+    Returns
+    -------
+    (d + 1, d) float64
+        The matrix; its columns are orthogonal.
+    """
+    basis = np.zeros((d + 1, d))
+    for j in range(d):
+        basis[: j + 1, j] = 1
+        basis[j + 1, j] = -(j + 1)
+    return (d + 1) * np.sqrt(2 / 3) * basis / np.linalg.norm(basis, axis=0)
+
+
+def peak(d: int) -> float:
+    """Return the factor that gives the filter of d features the integral of the Gaussian, (2 pi)^(d/2).
+
+    Without it the integral is the volume of feature space that belongs to one vertex, (3/2)^(d/2) / sqrt(d + 1).
+
+    Parameters
+    ----------
+    d : int
+        Number of features of a point.
+
+    Returns
+    -------
+    float
+        The factor.
+    """
+    return (4 * np.pi / 3) ** (d / 2) * np.sqrt(d + 1)
+
+
+@njit(cache=True, parallel=True)
+def enclosing_simplices(elevated):
+    """Find the simplex around each point.
+
+    Parameters
+    ----------
+    elevated : (N, d + 1) float
+        The points on the hyperplane of zero sum, see `elevation`.
+
+    Returns
+    -------
+    origins : (N, d + 1) int32
+        The corner of the simplex whose coordinates have remainder 0 modulo d + 1.
+    ranks : (N, d + 1) int32
+        The rank of each coordinate's distance from that corner, 0 for the largest; it names the simplex at the corner.
+    weights : (N, d + 1) float64
+        The barycentric weights of the corners with remainders 0 .. d; they sum to 1.
+    """
+    n_points, size = elevated.shape
+    origins, ranks = np.empty((n_points, size), np.int32), np.empty((n_points, size), np.int32)
+    weights = np.empty((n_points, size), np.float64)
+    for i in prange(n_points):
+        distances, rank, weight = np.empty(size), np.zeros(size, np.int32), np.zeros(size + 1)
+        excess = 0
+        for j in range(size):
+            steps = np.rint(elevated[i, j] * (1 / size))
+            origins[i, j] = steps * size
+            distances[j] = elevated[i, j] - steps * size
+            excess += int(steps)
+        for j in range(size):
+            for k in range(j):
+                later = distances[k] < distances[j]
+                rank[k] += later
+                rank[j] += not later
+        # Rounding left the hyperplane of zero sum: move the coordinates that were rounded the farthest.
+        for j in range(size):
+            rank[j] += excess
+            moved = size if rank[j] < 0 else -size if rank[j] >= size else 0
+            rank[j] += moved
+            origins[i, j] += moved
+            delta = (distances[j] - moved) * (1 / size)
+            weight[size - 1 - rank[j]] += delta
+            weight[size - rank[j]] -= delta
+        ranks[i] = rank
+        weights[i] = weight[:size]
+        weights[i, 0] += 1 + weight[size]
+    return origins, ranks, weights
+
+
+@njit(cache=True, parallel=True)
+def responses(simplices, ranks, neighbours):
+    """Compute how much of a value that is put on one corner of a simplex the blur brings to each of its corners.
+
+    A value travels by one step forward, one step back, or none, along each direction in turn. Corner a + 1 of a simplex
+    lies one step from corner a, in the direction whose rank is d - a; after corner d follows corner 0 again. So a value
+    goes from corner a to corner b along the directions between them, forward or back. It is lost where a vertex on its
+    way doesn't exist.
+
+    Parameters
+    ----------
+    simplices : (S, d + 1) int32
+        The vertices at the corners of each simplex, see `Vertices`.
+    ranks : (S, d + 1) int32
+        Order of the coordinates in each simplex, see `enclosing_simplices`.
+    neighbours : (d + 1, 2, M) int32
+        The vertices one step forward and back along each direction; M where there is none.
+
+    Returns
+    -------
+    (S, d + 1, d + 1) float32
+        From the corner of the row to that of the column.
+    """
+    n_simplices, size = simplices.shape
+    alive = survivors(neighbours, FORTH), survivors(neighbours, BACK)
+    response = np.zeros((n_simplices, size, size), np.float32)
+    for s in prange(n_simplices):
+        direction = np.empty(2 * size, np.int32)  # twice, since corner 0 follows corner d
+        for j in range(size):
+            direction[ranks[s, j]] = direction[ranks[s, j] + size] = j
+        for a in range(size):
+            forth, back, weight = alive[FORTH][simplices[s, a]], alive[BACK][simplices[s, a]], np.float32(0.5) ** size
+            response[s, a, a] += weight  # no step at all
+            above, below, steps_forth, steps_back = a, a, 0, 0
+            for steps in range(1, size + 1):
+                above, below = (above + 1 if above < size - 1 else 0), (below - 1 if below > 0 else size - 1)
+                steps_forth |= 1 << direction[2 * size - a - steps]
+                steps_back |= 1 << direction[size - a + steps - 1]
+                weight *= HALF
+                response[s, a, above] += weight * forth[steps_forth]
+                response[s, a, below] += weight * back[steps_back]
+    return response
+
+
+@njit(cache=True, parallel=True)
+def survivors(neighbours, sign):
+    """Tell for each vertex and each set of directions whether all vertices on the way along them exist.
+
+    Parameters
+    ----------
+    neighbours : (d + 1, 2, M) int32
+        The vertices one step forward and back along each direction; M where there is none.
+    sign : int
+        `FORTH` or `BACK`: steps forward or back.
+
+    Returns
+    -------
+    (M, 2^(d + 1)) bool
+        Bit j of the column says whether direction j is taken; steps are made in the order of the directions.
+    """
+    size, _, n_vertices = neighbours.shape
+    alive = np.zeros((n_vertices, 1 << size), np.bool_)
+    alive[:, 0] = True
+    for j in range(size - 1, -1, -1):
+        for v in prange(n_vertices):
+            following = neighbours[j, sign, v]
+            if following < n_vertices:
+                for later in range(0, 1 << size, 2 << j):  # sets of directions after j
+                    alive[v, later | 1 << j] = alive[following, later]
+    return alive
+
+
+@njit(cache=True, parallel=True)
+def self_responses(members, weights, response):
+    """Compute what share of its own value the filter gives back to each point, without the factor of `peak`.
+
+    Parameters
+    ----------
+    members : (N,) int32
+        The simplex of each point, see `Vertices`.
+    weights : (N, d + 1) float64
+        Barycentric weights of its corners, see `enclosing_simplices`.
+    response : (S, d + 1, d + 1) float32
+        See `responses`.
+
+    Returns
+    -------
+    (N,) float32
+        The diagonal of the filter.
+    """
+    diagonal = np.empty(len(members), np.float32)
+    for i in prange(len(members)):
+        weight, returned = weights[i], 0.0
+        for a in range(len(weight)):
+            reached = 0.0
+            for b in range(len(weight)):
+                reached += response[members[i], a, b] * weight[b]
+            returned += weight[a] * reached
+        diagonal[i] = returned
+    return diagonal

@@ -1,0 +1,76 @@
+"""What is doubtful about a drive and can be seen without reading its scans and images: sizes of files, and poses."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.datasets.readers.oxts import mercator_pose, mercator_scale
+from semgrid_edu.errors import DataError
+
+SHORT_SCAN = 0.6
+"""Share of the size of a drive's median scan below which a scan was probably cut short: sound ones differ less."""
+
+FEWEST_RETURNS = 100
+"""Number of returns that the scan of any street has, even that of a LIDAR with 16 beams."""
+
+RETURN = 16
+"""Bytes of a return on disk: four floats."""
+
+FASTEST = 100.0
+"""Metres a second that no car drives."""
+
+
+def short_scans(paths: Iterable[Path]) -> list[str]:
+    """Name the scans that were probably cut short: much smaller than the drive's median scan, or all but empty.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+        The files of a drive's scans; those that are missing don't count.
+
+    Returns
+    -------
+    list of str
+        One line for each such scan.
+    """
+    sizes = {path: path.stat().st_size for path in paths if path.is_file()}
+    median = np.median(list(sizes.values())) if sizes else 0
+    about, least = f"a scan about as large as the drive's others, {median:g} bytes", FEWEST_RETURNS * RETURN
+    short = [DataError(path, about, size) for path, size in sizes.items() if least <= size < SHORT_SCAN * median]
+    tiny = [
+        DataError(path, f"a scan of at least {FEWEST_RETURNS} points", size // RETURN)
+        for path, size in sizes.items()
+        if 0 < size < least and size % RETURN == 0  # else the reader names it
+    ]
+    return [str(error) for error in (*tiny, *short)]
+
+
+def jumps(packets: Mapping[Path, NDArray], seconds: NDArray) -> list[str]:
+    """Name the packets that no car can have got to since the packet before.
+
+    Parameters
+    ----------
+    packets : mapping of Path to (30,) float
+        The packets of a drive, in order, from `read_packet`.
+    seconds : (N,) float
+        Time of each packet; steps that aren't positive or not known don't count.
+
+    Returns
+    -------
+    list of str
+        One line for each such packet.
+    """
+    if len(packets) < 2:
+        return []
+    scale = mercator_scale(next(iter(packets.values())))
+    places = np.array([mercator_pose(packet, scale)[:3, 3] for packet in packets.values()])
+    metres, steps = np.linalg.norm(np.diff(places, axis=0), axis=1), np.diff(seconds)
+    with np.errstate(invalid="ignore"):
+        too_far = (steps > 0) & (metres > FASTEST * steps)
+    return [
+        str(DataError(path, f"a place within {FASTEST * step:.0f} m of the packet before", f"{far:.0f} m"))
+        for path, far, step, wrong in zip(list(packets)[1:], metres, steps, too_far, strict=True)
+        if wrong
+    ]

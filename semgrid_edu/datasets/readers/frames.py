@@ -1,0 +1,161 @@
+"""What all readers of drives have in common: frames that are read when they are asked for, and labels in part.
+
+One LIDAR scan on disk: KITTI's velodyne files, which KITTI raw, tracking and SemanticKITTI share (section 4).
+"""
+
+import operator
+import re
+from abc import abstractmethod
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import DataError
+from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
+from semgrid_edu.labels import IGNORE, LabelSet
+from semgrid_edu.storage.reading import read_bytes
+
+LIDAR_RANGE = 250.0
+"""Largest coordinate of a return, metres. KITTI's HDL-64E sees 120 m, so what lies twice as far is no measurement."""
+
+
+def read_scan(path: Path) -> NDArray[np.float32]:
+    """Read the returns of one scan.
+
+    Parameters
+    ----------
+    path : Path
+        A file of little-endian floats, four for each return.
+
+    Returns
+    -------
+    (N, 4) float32
+        x forward, y left, z up in the LIDAR frame (metres), and reflectance.
+
+    Raises
+    ------
+    DataError
+        When the file is missing or cut short, or a number is no measurement.
+    """
+    content = read_bytes(path)
+    if len(content) % 16:
+        raise DataError(path, "points of 4 x 4 bytes", f"{len(content)} bytes, {len(content) % 16} too many")
+    points = np.frombuffer(content, dtype="<f4").reshape(-1, 4).astype(np.float32)
+    strange = ~(np.abs(points[:, :3]) <= LIDAR_RANGE).all(axis=1) | ~np.isfinite(points[:, 3])
+    if strange.any():
+        first = strange.argmax()
+        expected = f"finite coordinates within {LIDAR_RANGE:g} m and a finite reflectance"
+        raise DataError(path, expected, f"{points[first].tolist()} at point {first}")
+    return points
+
+
+class FrameSequence(Sequence[Frame]):
+    """The frames of a drive. Each is read, and checked, when it is asked for.
+
+    `drive[k]` is frame k, `drive[-1]` the last one, `drive[2:5]` a list of three. A reader derives from this class and
+    defines `__len__` and `_frame`.
+    """
+
+    @overload
+    def __getitem__(self, index: int) -> Frame: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Frame]: ...
+    def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
+        """Read a frame, or a list of frames."""
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        k = operator.index(index)
+        if not -len(self) <= k < len(self):
+            raise IndexError(f"frame {k} of a drive of {len(self)} frames")
+        return self._frame(k % len(self))
+
+    def problems(self) -> list[str]:
+        """Read every frame and list all that is wrong.
+
+        Returns
+        -------
+        list of str
+            One line for each problem, which names the file; empty when all frames are sound.
+        """
+        found = [error_of(partial(self._frame, k)) for k in range(len(self))]
+        return [error for error in dict.fromkeys(found) if error]
+
+    @abstractmethod
+    def _frame(self, k: int) -> Frame:
+        """Read frame k, 0 <= k < len(self)."""
+
+
+def count_frames(folder: Path, what: str, suffix: str) -> int:
+    """Return how many frames a drive has whose files are numbered with six digits, such as 000000.png.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder with one file per frame.
+    what : str
+        What the files are, such as "images", for the error.
+    suffix : str
+        How their names end, such as ".png".
+
+    Returns
+    -------
+    int
+        One more than the highest number, since files of some frames may be missing.
+
+    Raises
+    ------
+    DataError
+        When there is no such file.
+    """
+    numbers = [int(path.stem) for path in folder.glob(f"*{suffix}") if re.fullmatch(r"\d{6}", path.stem)]
+    if not numbers:
+        raise DataError(folder, f"{what} such as 000000{suffix}", "none" if folder.is_dir() else "no folder")
+    return 1 + max(numbers)
+
+
+def nothing_known(label_set: LabelSet, image_size: tuple[int, int]) -> FrameLabels:
+    """Return the truth of a frame of which nothing is known, in which a reader replaces what its data set does tell.
+
+    Parameters
+    ----------
+    label_set : LabelSet
+        The classes of what is replaced.
+    image_size : (int, int)
+        Height and width of the image, pixels.
+
+    Returns
+    -------
+    FrameLabels
+        Without a label, without a depth, and with nothing visible.
+    """
+    return FrameLabels(
+        label_set=label_set,
+        image=np.full(image_size, IGNORE, dtype=np.uint8),
+        depth=np.full(image_size, np.nan, dtype=np.float32),
+        birdseye=np.full(LABEL_GRID.shape, IGNORE, dtype=np.uint8),
+        visible=np.zeros(LABEL_GRID.shape, dtype=np.bool_),
+    )
+
+
+def error_of(read: Callable[[], object]) -> str:
+    """Return the error that a reader raises as text.
+
+    Parameters
+    ----------
+    read : callable
+        Reads something, and raises `DataError` when it is missing or damaged.
+
+    Returns
+    -------
+    str
+        Empty when it is sound.
+    """
+    try:
+        read()
+    except DataError as error:
+        return str(error)
+    return ""

@@ -1,0 +1,251 @@
+"""KITTI's image labels by Zhang, Candra, Vetter and Zakhor (ICRA 2015), which the paper learns from (section 4).
+
+What their own readme (12 August 2015) says: 252 acquisitions of eight runs of KITTI's *tracking* training set are
+labelled, every tenth or twentieth; 140 in the runs 9, 10, 11 and 19 for training, 112 in the runs 0, 4, 5 and 13 for
+testing (the paper says 142 and 110). Image labels are MATLAB files image_02/(trn or test)/(run)/(acquisition), each a
+matrix of the numbers in `ZHANG_CLASSES`; pictures in the colours of `ZHANG_COLOURS` come with them.
+
+What is assumed here, since the archive itself couldn't be looked at: files end in .mat and .png; their names and the
+runs' folders are numbers, with or without leading zeros; a picture lies beside its matrix; a matrix is the only
+two-dimensional variable of its file.
+
+Drives with Zhang et al.'s labels: KITTI's frames, in raw or tracking layout, and what they show (section 4).
+"""
+
+import io
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.io import loadmat
+
+from semgrid_edu.datasets.readers.class_tables import ClassTable
+from semgrid_edu.datasets.readers.frames import FrameSequence, nothing_known
+from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.frame import Frame, FrameLabels
+from semgrid_edu.labels import KITTI_14
+from semgrid_edu.storage.reading import read_bytes, read_png
+
+ZHANG_CLASSES = ClassTable(
+    KITTI_14,
+    {
+        0: None,  # not ground-truthed
+        1: "building",
+        2: "sky",
+        3: "road",
+        4: "vegetation",
+        5: "sidewalk",
+        6: "car",
+        7: "pedestrian",
+        8: "bicycle",  # cyclist
+        9: "signage",
+        10: "fence",
+    },
+)
+"""KITTI-14's class of each number in their matrices."""
+
+ZHANG_COLOURS = {
+    0: (255, 255, 255),
+    1: (153, 0, 0),
+    2: (0, 51, 102),
+    3: (160, 160, 160),
+    4: (0, 102, 0),
+    5: (255, 228, 196),
+    6: (255, 200, 50),
+    7: (255, 153, 255),
+    8: (204, 153, 255),
+    9: (130, 255, 255),
+    10: (193, 120, 87),
+}
+"""Red, green and blue of each number in their pictures."""
+
+ZHANG_RUNS = {"train": (9, 10, 11, 19), "test": (0, 4, 5, 13)}
+"""The runs of KITTI's tracking training set that each split consists of."""
+
+
+class ZhangLabels:
+    """The labelled images of the data set.
+
+    Parameters
+    ----------
+    folder : path-like
+        Where the archive was unpacked: holds image_02.
+
+    Raises
+    ------
+    DataError
+        When there are no labels in the folder.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+        self._files: dict[tuple[int, int], Path] = {}
+        for path in sorted(self.folder.glob("image_02/*/*/*"), key=lambda path: path.suffix, reverse=True):
+            if path.suffix in (".mat", ".png") and re.fullmatch(r"\d+/\d+", f"{path.parent.name}/{path.stem}"):
+                self._files[int(path.parent.name), int(path.stem)] = path
+        if not self._files:
+            expected = "labels such as image_02/trn/0009/000000.mat"
+            raise DataError(self.folder, expected, "none" if self.folder.is_dir() else "no folder")
+
+    def frames(self, split: str) -> list[tuple[int, int]]:
+        """Return the labelled acquisitions of a split that are there.
+
+        Parameters
+        ----------
+        split : str
+            "train" or "test".
+
+        Returns
+        -------
+        list of (int, int)
+            Run and acquisition, in ascending order.
+
+        Raises
+        ------
+        ArgumentError
+            When there is no such split.
+        """
+        if split not in ZHANG_RUNS:
+            raise ArgumentError("split", f"one of {', '.join(ZHANG_RUNS)}", repr(split))
+        return sorted(key for key in self._files if key[0] in ZHANG_RUNS[split])
+
+    def read(self, run: int, acquisition: int, image_size: tuple[int, int]) -> FrameLabels | None:
+        """Read the labels of one image.
+
+        Parameters
+        ----------
+        run : int
+            Number of the run in KITTI's tracking training set.
+        acquisition : int
+            Number of the frame in it.
+        image_size : (int, int)
+            Height and width of the image, pixels.
+
+        Returns
+        -------
+        FrameLabels or None
+            Image labels only: depth is NaN and nothing of the bird's-eye view is labelled or visible, because the data
+            set says nothing about them. None for a frame without labels.
+
+        Raises
+        ------
+        DataError
+            When the file is damaged or has another size.
+        """
+        path = self._files.get((run, acquisition))
+        if path is None:
+            return None
+        numbers = _matrix(path) if path.suffix == ".mat" else _numbers_of_colours(path, image_size)
+        if numbers.shape != image_size:
+            raise DataError(path, "labels of {} x {} pixels".format(*image_size), "{} x {}".format(*numbers.shape))
+        return replace(nothing_known(KITTI_14, image_size), image=ZHANG_CLASSES.classes(path, numbers))
+
+
+def _matrix(path: Path) -> NDArray:
+    """Read the one matrix of a MATLAB file."""
+    content = read_bytes(path)
+    try:
+        variables = {name: value for name, value in loadmat(io.BytesIO(content)).items() if not name.startswith("__")}
+    except NotImplementedError:
+        raise DataError(path, "a MATLAB file up to version 7.2", "version 7.3; save it again with `-v7`") from None
+    except Exception as error:  # scipy lets through whatever a damaged file makes of it: IndexError, zlib.error, ...
+        raise DataError(path, "a MATLAB file", f"{type(error).__name__}: {error}") from error
+    found = [value for value in variables.values() if isinstance(value, np.ndarray) and min(value.shape) > 1]
+    if len(found) != 1 or found[0].ndim != 2 or found[0].dtype.kind not in "iufb":
+        raise DataError(path, "one matrix of numbers", f"the variables {', '.join(variables) or '(none)'}")
+    return found[0]
+
+
+def _numbers_of_colours(path: Path, image_size: tuple[int, int]) -> NDArray[np.int64]:
+    """Read a picture of labels, refusing a colour that stands for nothing."""
+    picture = read_png(path, "RGB", image_size).astype(np.int64)
+    codes = picture @ (1 << 16, 1 << 8, 1)
+    known = {(r << 16) + (g << 8) + b: number for number, (r, g, b) in ZHANG_COLOURS.items()}
+    values, places = np.unique(codes, return_inverse=True)
+    for value in values:
+        if value not in known:
+            colour = (int(value) >> 16, int(value) >> 8 & 255, int(value) & 255)
+            raise DataError(path, "the colours of Zhang et al.'s readme", f"{colour}")
+    return np.array([known[value] for value in values])[places].reshape(codes.shape)
+
+
+RAW_DRIVES = {
+    0: ("2011_09_26", "0005", 154),
+    4: ("2011_09_26", "0014", 314),
+    5: ("2011_09_26", "0015", 297),
+    10: ("2011_09_26", "0056", 294),
+    11: ("2011_09_26", "0059", 373),
+    13: ("2011_09_26", "0091", 340),
+    19: ("2011_09_29", "0071", 1059),
+}
+"""Date, number and frames of the raw drive that a run of the tracking set was taken from.
+
+Assumed, because drive and run have equally many frames, as far as we know: it couldn't be checked against the data, and
+for run 9 we know of no such drive. Look at some labels over their images before you rely on an entry."""
+
+
+class ZhangDrive(FrameSequence):
+    """The frames of a drive, with the labels of those that Zhang et al. labelled.
+
+    Parameters
+    ----------
+    drive : sequence of Frame
+        The frames of the run: a `KittiTrackingRun`, or a raw drive that begins where the run does.
+    labels : ZhangLabels
+        The labels of all runs.
+    run : int
+        Number of the run in KITTI's tracking training set.
+
+    Examples
+    --------
+    >>> labels = ZhangLabels("zhang")                                               # doctest: +SKIP
+    >>> drive = ZhangDrive(KittiTrackingRun("kitti_tracking", 9), labels, 9)        # doctest: +SKIP
+    >>> [k for run, k in labels.frames("train") if run == 9][:3]                    # doctest: +SKIP
+    """
+
+    def __init__(self, drive: Sequence[Frame], labels: ZhangLabels, run: int) -> None:
+        self.drive, self.labels, self.run = drive, labels, run
+
+    def __len__(self) -> int:
+        """Return the number of frames, labelled or not."""
+        return len(self.drive)
+
+    def _frame(self, k: int) -> Frame:
+        frame = self.drive[k]
+        return replace(frame, labels=self.labels.read(self.run, k, frame.camera.size))
+
+
+def zhang_raw_drive(root: str | Path, labels: ZhangLabels, run: int) -> ZhangDrive:
+    """Open a labelled run whose frames are in KITTI's raw layout.
+
+    Parameters
+    ----------
+    root : path-like
+        The folder of KITTI raw drives, which holds the folders of the dates.
+    labels : ZhangLabels
+        The labels of all runs.
+    run : int
+        A key of `RAW_DRIVES`.
+
+    Returns
+    -------
+    ZhangDrive
+
+    Raises
+    ------
+    ArgumentError
+        When it isn't known which raw drive the run was taken from.
+    DataError
+        When there is no such drive, or it has another number of frames than the run.
+    """
+    if run not in RAW_DRIVES:
+        raise ArgumentError("run", f"one of {', '.join(map(str, RAW_DRIVES))}", run)
+    date, number, n_frames = RAW_DRIVES[run]
+    drive = KittiRawDrive(root, date, number)
+    if len(drive) != n_frames:
+        raise DataError(drive.folder, f"the {n_frames} frames of tracking run {run}", f"{len(drive)}")
+    return ZhangDrive(drive, labels, run)

@@ -1,5 +1,0 @@
-"""The page that `semgrid-edu demo` writes: every stage of Fig. 2 over a drive, frame by frame."""
-
-from semgrid_edu.demo.run import write_demo
-
-__all__ = ["write_demo"]

@@ -1,1 +1,0 @@
-"""The paper's tables, claims and ablations as runs: units of work that are shared, resumed and spread over machines."""

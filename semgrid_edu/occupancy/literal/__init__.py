@@ -1,0 +1,1 @@
+"""The literal twins of the occupancy filters: plain numpy, one term of the formula at a time."""

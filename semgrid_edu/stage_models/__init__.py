@@ -1,0 +1,47 @@
+"""Each stage of the paper as a model of toy size, built from the functions that the pipeline itself calls."""
+
+from semgrid_edu.stage_models.beam import BeamWorld, beam_over_cells
+from semgrid_edu.stage_models.bof import bof_stage
+from semgrid_edu.stage_models.cell import exact_cell, one_cell, package_cell
+from semgrid_edu.stage_models.cmcdot_graph import cmcdot_stage
+from semgrid_edu.stage_models.crf import crf_stage
+from semgrid_edu.stage_models.ground_truth_label import (
+    LabelWorld,
+    count_rings,
+    made_label_stage,
+    scan_with_pose_error,
+    wrong_label,
+)
+from semgrid_edu.stage_models.line import bayes_on_a_line
+from semgrid_edu.stage_models.log_odds_cell import one_log_odds_cell, package_log_odds_cell, read_scans
+from semgrid_edu.stage_models.stage_graph import CutEdge, StageGraph
+from semgrid_edu.stage_models.system import system_gain, whole_system
+from semgrid_edu.stage_models.system_world import SystemWorld
+from semgrid_edu.stage_models.thick_walls import beam_beliefs, thick_walls
+
+__all__ = [
+    "BeamWorld",
+    "CutEdge",
+    "LabelWorld",
+    "StageGraph",
+    "SystemWorld",
+    "bayes_on_a_line",
+    "beam_beliefs",
+    "beam_over_cells",
+    "bof_stage",
+    "cmcdot_stage",
+    "count_rings",
+    "crf_stage",
+    "exact_cell",
+    "made_label_stage",
+    "one_cell",
+    "one_log_odds_cell",
+    "package_cell",
+    "package_log_odds_cell",
+    "read_scans",
+    "scan_with_pose_error",
+    "system_gain",
+    "thick_walls",
+    "whole_system",
+    "wrong_label",
+]

@@ -1,0 +1,203 @@
+"""One cell of CMCDOT by itself: its four states as a chain (paper, section 3.2, steps 1 to 3).
+
+A scan enters as virtual evidence (Pearl 1988, section 2.2.2): z_t has two states, "this scan" and "any other", and
+P(z_t = this scan | state) is the pair of likelihoods that the package computes. Only their ratio matters.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from semgrid_edu.graphical.factor import Factor
+from semgrid_edu.graphical.layout import in_rows
+from semgrid_edu.graphical.messages import sum_product
+from semgrid_edu.graphical.model import GraphicalModel
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import (
+    Evidence,
+    FilterState,
+    Particles,
+    State,
+    WorldModel,
+    predict,
+    transition_matrix,
+    update,
+)
+from semgrid_edu.stage_models.log_odds_cell import check_scans
+from semgrid_edu.stage_models.stage_graph import CutEdge, StageGraph
+
+UNKNOWN = (0.0, 0.0, 0.0, 1.0)
+"""The belief of a cell that no scan has seen: FREE, STATIC, DYNAMIC, UNKNOWN."""
+
+CUT = (
+    CutEdge(
+        "x1 - x1 of the next cell",
+        "Each cell is updated by itself, and only particles carry anything from one cell to another, so a gap that no "
+        "beam hits stays a gap, however sure the filter is of the wall on both sides.",
+    ),
+    CutEdge(
+        "x1 of the cells in front -> v1",
+        "Whether a beam reaches this cell depends on what stands in front of it, but the filter takes v as given, so a "
+        "shadow tells it nothing about what casts it.",
+    ),
+    CutEdge(
+        "z1 - z2",
+        "The filter takes the scans as independent given the state, so an error that lasts for several scans is "
+        "counted again with each of them.",
+    ),
+)
+"""What the filter leaves out when it treats a cell by itself."""
+
+
+def one_cell(
+    scans: ArrayLike, dt: float = 0.1, world: WorldModel | None = None, start: Sequence[float] = UNKNOWN
+) -> StageGraph:
+    """Build the chain of one cell of CMCDOT, which repeats three steps: predict, look, read the scan.
+
+    Between two scans the state changes by `transition_matrix`. v_t says whether scan t sees the cell. If it does,
+    UNKNOWN turns into one of the other states as `first_sight` says, because UNKNOWN means that no scan has seen it.
+    STATIC and DYNAMIC share P(z | occupied), FREE and UNKNOWN share P(z | free).
+
+    Parameters
+    ----------
+    scans : (T, 2) float
+        P(z | occupied) and P(z | free) of each scan, such as `read_scans` gives; equal where a scan says nothing.
+    dt : float
+        Time before each scan, seconds.
+    world : WorldModel, optional
+        The rates of change, and what UNKNOWN turns out to be at first sight; the defaults when left out.
+    start : (4,) float
+        The belief at time 0: FREE, STATIC, DYNAMIC, UNKNOWN.
+
+    Returns
+    -------
+    StageGraph
+        Variables x0; then, for t = 1 ... T, prior t (after prediction), v t, x t (after looking), z t.
+        `cell_given(scans)` holds what is observed.
+
+    Raises
+    ------
+    ArgumentError
+        When a scan isn't a pair of likelihoods, or both are 0, so that nothing would be possible.
+    """
+    world, scans = world or WorldModel(), check_scans(scans)
+    steps = range(1, len(scans) + 1)
+    M, look = transition_matrix(world, dt), looking(world)
+    factors = [Factor("x0", start)]
+    parents: dict[str, tuple[str, ...]] = {}
+    for t, (occupied, free) in zip(steps, scans, strict=True):
+        prior, v, x, z = names = f"prior{t}", f"v{t}", f"x{t}", f"z{t}"
+        this_scan = np.array([free, occupied, occupied, free]) / max(occupied, free)
+        factors += [
+            Factor((f"x{t - 1}", prior), M),
+            Factor(v, [0.5, 0.5]),
+            Factor((v, prior, x), look),
+            Factor((x, z), np.stack([1 - this_scan, this_scan], axis=1)),
+        ]
+        parents |= dict(zip(names, ((f"x{t - 1}",), (), (prior, v), (x,)), strict=True))
+    chain = [name for t in steps for name in (f"prior{t}", f"x{t}")]
+    above = [name for t in steps for name in (None, f"v{t}")]
+    below = [name for t in steps for name in (None, f"z{t}")]
+    return StageGraph(
+        "One cell, four states",
+        GraphicalModel(factors, parents),
+        observed=tuple(name for t in steps for name in (f"v{t}", f"z{t}")),
+        positions=in_rows([None, *above], ["x0", *chain], [None, *below]),
+        labels={f"prior{t}": f"$x_{{{t}}}^-$" for t in steps},
+        equations={f"v{len(scans)}": "seen?", f"x{len(scans)}": "state", f"z{len(scans)}": "scan"},
+        plates={"cells": tuple(dict.fromkeys(name for factor in factors for name in factor.names))},
+        cut=CUT,
+    )
+
+
+def looking(world: WorldModel) -> NDArray[np.float64]:
+    """Return P(x | v, prior): the state stays as it is, but UNKNOWN becomes another state when a scan sees the cell.
+
+    Parameters
+    ----------
+    world : WorldModel
+        Its `first_sight` says what UNKNOWN becomes.
+
+    Returns
+    -------
+    (2, 4, 4) float64
+        Axes: whether the scan sees the cell, the state before, the state after.
+    """
+    seen = np.eye(4)
+    seen[State.UNKNOWN] = [*world.first_sight, 0]
+    return np.stack([np.eye(4), seen / seen.sum(axis=1, keepdims=True)])
+
+
+def cell_given(scans: ArrayLike) -> dict[str, int]:
+    """Return what is observed of one cell: whether each scan sees it, and that it was these scans.
+
+    Parameters
+    ----------
+    scans : (T, 2) float
+        P(z | occupied) and P(z | free) of each scan.
+
+    Returns
+    -------
+    dict of str to int
+        The states of v1, v2, ... and z1, z2, .... A scan whose two likelihoods are equal doesn't see the cell.
+    """
+    seen = {f"v{t}": int(occupied != free) for t, (occupied, free) in enumerate(check_scans(scans), start=1)}
+    return seen | {f"z{t}": 1 for t in range(1, len(seen) + 1)}
+
+
+class CellBeliefs(NamedTuple):
+    """What is believed of one cell at each of T scans.
+
+    Parameters
+    ----------
+    predicted, updated : (T, 4) float
+        The belief before and after each scan: FREE, STATIC, DYNAMIC, UNKNOWN.
+    """
+
+    predicted: NDArray
+    updated: NDArray
+
+
+def exact_cell(
+    scans: ArrayLike, dt: float = 0.1, world: WorldModel | None = None, start: Sequence[float] = UNKNOWN
+) -> CellBeliefs:
+    """Filter one cell by the forward messages of sum-product on its chain.
+
+    Parameters and errors are those of `one_cell`.
+
+    Returns
+    -------
+    CellBeliefs
+        The messages from P(prior t | x t-1) to prior t, and from x t to what follows it.
+    """
+    beliefs = sum_product(one_cell(scans, dt, world, start).model, cell_given(scans))
+    steps = range(1, len(check_scans(scans)) + 1)
+    predicted = [beliefs.messages[f"P(prior{t} | x{t - 1})", f"prior{t}"] for t in steps]
+    passed = [beliefs.messages[f"x{t}", f"P(prior{t + 1} | x{t})"] for t in steps[:-1]]
+    return CellBeliefs(np.array(predicted), np.array([*passed, beliefs.marginals[f"x{steps[-1]}"]]))
+
+
+def package_cell(
+    scans: ArrayLike, dt: float = 0.1, world: WorldModel | None = None, start: Sequence[float] = UNKNOWN
+) -> CellBeliefs:
+    """Filter one cell by the package's `predict` and `update`, without particles.
+
+    All of its dynamic mass is newborn, so none of it flies away, and none stops. Parameters and errors are those of
+    `one_cell`.
+
+    Returns
+    -------
+    CellBeliefs
+        What the package believes, float32.
+    """
+    world, spec, rng = world or WorldModel(), GridSpec(0, 1, 0, 1, 1), np.random.default_rng(0)
+    first = np.reshape(np.asarray(start, np.float32), (4, 1, 1))
+    state = FilterState(first, Particles.none(), first[State.DYNAMIC])
+    history = []
+    for occupied, free in check_scans(scans):
+        predicted = predict(state, spec, world, dt, rng)
+        state = update(predicted, spec, Evidence(np.array([[occupied]]), np.array([[free]])), world)
+        history.append((predicted.probability[:, 0, 0], state.probability[:, 0, 0]))
+    return CellBeliefs(*map(np.array, zip(*history, strict=True)))

@@ -1,0 +1,192 @@
+"""Bayes on a line: a vehicle's place on a ring road as a hidden Markov model (lecture 01; paper, section 3.2).
+
+A filter is half of message passing on a chain: its beliefs are the messages that run forward in time. The messages
+that run backward carry what later readings say about earlier places.
+"""
+
+from collections.abc import Sequence
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.graphical.exact import eliminate, max_product
+from semgrid_edu.graphical.factor import Factor
+from semgrid_edu.graphical.layout import in_rows
+from semgrid_edu.graphical.messages import sum_product
+from semgrid_edu.graphical.model import GraphicalModel
+from semgrid_edu.stage_models.stage_graph import CutEdge, StageGraph
+
+CUT = (
+    CutEdge(
+        "n1 <- n2",
+        "The filter passes messages forward in time and none backward, so a later reading never corrects what was "
+        "believed of an earlier place; for the present place nothing is lost.",
+    ),
+)
+"""The filter's graph keeps every edge, but uses each in one direction."""
+
+
+def bayes_on_a_line(
+    steps: int = 4,
+    n_cells: int = 10,
+    poles: Sequence[int] = (2, 3, 7),
+    moved: Sequence[float] = (0.1, 0.8, 0.1),
+    hit: float = 0.8,
+    false_alarm: float = 0.1,
+) -> StageGraph:
+    """Build lecture 01's ring road: places n0, n1, ... one step apart, and what the sensor reads at each.
+
+    Parameters
+    ----------
+    steps : int
+        Number of readings, at least 1; the vehicle moves between them.
+    n_cells : int
+        Number of cells of the ring; after the last comes cell 0 again.
+    poles : sequence of int
+        The cells beside which a pole stands.
+    moved : sequence of float
+        Probability that the vehicle moves by d cells from one reading to the next, for d = 0, 1, 2, ...; sums to 1.
+    hit, false_alarm : float
+        Probability that the sensor says "pole" beside a pole, and elsewhere.
+
+    Returns
+    -------
+    StageGraph
+        Variables n0, n1, ... with `n_cells` states each, and z0, z1, ...: 0 is "nothing", 1 is "pole".
+
+    Raises
+    ------
+    ArgumentError
+        When `steps` is below 1, or a probability isn't one.
+    """
+    if steps < 1:
+        raise ArgumentError("steps", "at least 1", steps)
+    kernel = np.zeros(n_cells)
+    np.add.at(kernel, np.arange(len(moved)) % n_cells, moved)
+    move = np.array([np.roll(kernel, n) for n in range(n_cells)])
+    says_pole = np.where(np.isin(np.arange(n_cells), poles), hit, false_alarm)
+    read = np.stack([1 - says_pole, says_pole], axis=1)
+    factors = [Factor("n0", np.full(n_cells, 1 / n_cells))]
+    factors += [Factor((f"n{t - 1}", f"n{t}"), move) for t in range(1, steps)]
+    factors += [Factor((f"n{t}", f"z{t}"), read) for t in range(steps)]
+    parents = {f"n{t}": (f"n{t - 1}",) for t in range(1, steps)} | {f"z{t}": (f"n{t}",) for t in range(steps)}
+    places, readings = ([f"{letter}{t}" for t in range(steps)] for letter in "nz")
+    return StageGraph(
+        "Bayes on a line",
+        GraphicalModel(factors, parents),
+        observed=tuple(readings),
+        positions=in_rows(places, readings),
+        equations={places[-1]: "place", readings[-1]: "reading"},
+        cut=CUT,
+    )
+
+
+def filtered(stage: StageGraph, readings: Sequence[int]) -> NDArray[np.float64]:
+    """Return the filter's beliefs: the messages of sum-product that run forward along the chain.
+
+    The message from n_t to P(n_{t+1} | n_t) is P(n_t | z_0 ... z_t), lecture 01's posterior at step t.
+
+    Parameters
+    ----------
+    stage : StageGraph
+        A graph from `bayes_on_a_line`.
+    readings : (T,) int
+        What the sensor said at each step: 0 for "nothing", 1 for "pole".
+
+    Returns
+    -------
+    (T, N) float64
+        One belief per step.
+    """
+    beliefs = sum_product(stage.model, _given(stage, readings))
+    last = len(readings) - 1
+    passed = [beliefs.messages[f"n{t}", f"P(n{t + 1} | n{t})"] for t in range(last)]
+    return np.array([*passed, beliefs.marginals[f"n{last}"]])
+
+
+def smoothed(stage: StageGraph, readings: Sequence[int]) -> NDArray[np.float64]:
+    """Return P(n_t | all readings), past and future: the product of forward and backward messages.
+
+    Parameters
+    ----------
+    stage : StageGraph
+        A graph from `bayes_on_a_line`.
+    readings : (T,) int
+        What the sensor said at each step: 0 for "nothing", 1 for "pole".
+
+    Returns
+    -------
+    (T, N) float64
+        One belief per step.
+    """
+    marginals = sum_product(stage.model, _given(stage, readings)).marginals
+    return np.array([marginals[f"n{t}"] for t in range(len(readings))])
+
+
+def most_likely_path(stage: StageGraph, readings: Sequence[int]) -> list[int]:
+    """Return the most likely sequence of places given all readings (Viterbi).
+
+    Parameters
+    ----------
+    stage : StageGraph
+        A graph from `bayes_on_a_line`.
+    readings : (T,) int
+        What the sensor said at each step: 0 for "nothing", 1 for "pole".
+
+    Returns
+    -------
+    list of int
+        One cell per step.
+    """
+    best = max_product(stage.model, _given(stage, readings))
+    return [best[f"n{t}"] for t in range(len(readings))]
+
+
+class FutureGain(NamedTuple):
+    """How uncertain the places are, on average over all sequences of readings.
+
+    Parameters
+    ----------
+    filtered, smoothed : (T,) float64
+        Mean entropy of P(n_t | readings up to t), and of P(n_t | all readings), bits.
+    """
+
+    filtered: NDArray[np.float64]
+    smoothed: NDArray[np.float64]
+
+
+def future_gain(stage: StageGraph) -> FutureGain:
+    """Measure what backward messages add: mean entropy of each place with and without later readings.
+
+    With the defaults of `bayes_on_a_line`, the first of four places has an entropy of 2.97 bits when filtered and 2.51
+    bits when smoothed. The last place has no later readings, so it has 2.51 bits either way.
+
+    Parameters
+    ----------
+    stage : StageGraph
+        A graph from `bayes_on_a_line` with T steps: all 2^T sequences of readings are enumerated.
+
+    Returns
+    -------
+    FutureGain
+        The mean entropies, with and without later readings.
+    """
+    total = np.zeros((2, len(stage.observed)))
+    for readings in product((0, 1), repeat=len(stage.observed)):
+        weight = eliminate(stage.model, (), _given(stage, readings)).table
+        total += weight * np.array([_bits(filtered(stage, readings)), _bits(smoothed(stage, readings))])
+    return FutureGain(*total)
+
+
+def _given(stage: StageGraph, readings: Sequence[int]) -> dict[str, int]:
+    if len(readings) != len(stage.observed):
+        raise ArgumentError("readings", f"one per step, {len(stage.observed)}", len(readings))
+    return {name: int(says) for name, says in zip(stage.observed, readings, strict=True)}
+
+
+def _bits(beliefs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the entropy of each row in bits, with 0 log 0 = 0."""
+    return -(beliefs * np.log2(np.where(beliefs > 0, beliefs, 1))).sum(axis=1)

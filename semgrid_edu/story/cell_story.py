@@ -1,0 +1,201 @@
+"""The story of one cell: what each stage did to it, from returns and pixels to its class (paper, Fig. 2)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import softmax
+
+from semgrid_edu.crf import CrfParams
+from semgrid_edu.datasets.grid_truth import grid_truth
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import LABEL_SETS
+from semgrid_edu.networks import SemanticGridNet
+from semgrid_edu.occupancy import SensorModel
+from semgrid_edu.pipeline import FrameResult
+from semgrid_edu.planes import plane_pixels
+from semgrid_edu.story.cell_evidence import CellScan, cell_scan, place_history
+from semgrid_edu.story.contributions import Contributions, cell_contributions
+from semgrid_edu.story.crf_messages import NeighbourPull, neighbour_pull
+
+FRAMES = 10
+"""How many frames a history goes back, the present one included."""
+
+TOLERANCE = 1e-3
+"""The most by which the network's probabilities may differ from those of the result that it is to explain."""
+
+
+@dataclass(frozen=True, eq=False)
+class CellStory:
+    """What each stage did to one cell.
+
+    Parameters
+    ----------
+    cell : (int, int)
+        Row and column.
+    xy : (float, float)
+        Its centre in the grid frame, metres.
+    scan : CellScan
+        What the frame's scan says of it.
+    steps : dict of str to (4,) float32
+        Its four states after "move", "predict", "update" and "resample", on the filter's map, and "shown", in the grid
+        that the filter hands out. That one is the prediction updated with the returns of exactly this cell, while the
+        map's cell lies up to half a cell beside it. Each sums to 1. Only "shown" when the filter wasn't asked to keep
+        its steps.
+    times, history : (T,) float64, (4, T) float32
+        What was believed of the place in the last frames (`place_history`).
+    heights : (D,) float64
+        The heights of the planes above the cell, metres.
+    pixels, visible : (D, 2) float64, (D,) bool
+        Where eq. (1) finds the points of the planes in the frame's image, and whether the camera sees them.
+    label, rival : int
+        The class of the semantic grid, and the one that it is compared with: the truth where that is another class,
+        otherwise the second most probable one.
+    for_label, for_rival : Contributions
+        The parts of both logits. `for_label.minus(for_rival)` says why the cell got the one and not the other.
+    pull : NeighbourPull
+        What the CRF did.
+    truth : int or None
+        The true class, where it is known.
+    names : tuple of str
+        The names of the classes.
+    """
+
+    cell: tuple[int, int]
+    xy: tuple[float, float]
+    scan: CellScan
+    steps: dict[str, NDArray[np.float32]]
+    times: NDArray[np.float64]
+    history: NDArray[np.float32]
+    heights: NDArray[np.float64]
+    pixels: NDArray[np.float64]
+    visible: NDArray[np.bool_]
+    label: int
+    rival: int
+    for_label: Contributions
+    for_rival: Contributions
+    pull: NeighbourPull
+    truth: int | None
+    names: tuple[str, ...]
+
+    @property
+    def refined(self) -> int:
+        """The class after the CRF."""
+        return int(self.pull.after.argmax())
+
+
+def cell_story(
+    result: FrameResult,
+    cell: tuple[int, int],
+    net: SemanticGridNet,
+    past: Sequence[FrameResult] = (),
+    sensor: SensorModel | None = None,
+    crf: CrfParams | None = None,
+) -> CellStory:
+    """Tell what each stage did to one cell of a frame.
+
+    Parameters
+    ----------
+    result : FrameResult
+        The frame's result from the package's own stages. Made with `Stages.of(net, keep_steps=True)`, it also has the
+        filter's steps.
+    cell : (int, int)
+        Row and column of the cell.
+    net : SemanticGridNet
+        The network that made the result, in evaluation mode.
+    past : sequence of FrameResult
+        The results of earlier frames in the order of time; the last nine of them are told.
+    sensor : SensorModel, optional
+        The filter's sensor model, when it wasn't the default one.
+    crf : CrfParams, optional
+        The parameters of the refinement, when they weren't those of `CrfParams.for_cells`.
+
+    Returns
+    -------
+    CellStory
+        The parts of all stages.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such cell, the network is in training mode, or another network made the result.
+
+    Examples
+    --------
+    >>> results = list(run_pipeline(drive[:10], Stages.of(net, keep_steps=True)))           # doctest: +SKIP
+    >>> story = cell_story(results[-1], (101, 31), net, past=results[:-1])                  # doctest: +SKIP
+    >>> why = story.for_label.minus(story.for_rival)                                        # doctest: +SKIP
+    >>> why.planes.sum() + why.occupancy.sum() + why.rest == why.score                      # doctest: +SKIP
+    """
+    architecture = net.need_architecture()
+    spec = architecture.grid
+    cell = _checked(cell, spec)
+    o = result.belief.probability
+    truth = _truth(result, spec, cell)
+    label, rival = label_and_rival(result.grid[:, *cell], truth)
+    times, history = place_history([*past[max(0, len(past) - FRAMES + 1) :], result], spec, cell)
+    pixels, visible = plane_pixels(spec, architecture.heights, result.frame.camera)
+    parts = [cell_contributions(net, result.scores, o, cell, c) for c in (label, rival)]
+    _check_net(parts, result.grid[[label, rival], *cell])
+    params = crf or CrfParams.for_cells(spec.cell)
+    return CellStory(
+        cell=cell,
+        xy=tuple(spec.centers()[cell].tolist()),
+        scan=cell_scan(result.frame.points_grid, spec, cell, sensor or SensorModel()),
+        steps={name: states[:, *cell] for name, states in {**result.belief.steps, "shown": o}.items()},
+        times=times,
+        history=history,
+        heights=np.array(architecture.heights),
+        pixels=pixels[:, *cell],
+        visible=visible[:, *cell],
+        label=label,
+        rival=rival,
+        for_label=parts[0],
+        for_rival=parts[1],
+        pull=neighbour_pull(result.grid, result.refined, o, cell, params),
+        truth=truth,
+        names=LABEL_SETS[architecture.label_set].names,
+    )
+
+
+def label_and_rival(probability: NDArray, truth: int | None) -> tuple[int, int]:
+    """Return a cell's most probable class, and the one that it is compared with.
+
+    Parameters
+    ----------
+    probability : (C,) float
+        The cell's distribution.
+    truth : int or None
+        The true class, where it is known.
+
+    Returns
+    -------
+    label, rival : int
+        The rival is the truth where that is another class of the distribution, otherwise the second most probable one.
+    """
+    label, second = (int(c) for c in np.argsort(-probability, kind="stable")[:2])
+    wrong = truth is not None and truth != label and truth < len(probability)
+    return label, truth if wrong else second
+
+
+def _checked(cell: tuple[int, int], spec: GridSpec) -> tuple[int, int]:
+    row, col = (int(index) for index in cell)
+    if not (0 <= row < spec.shape[0] and 0 <= col < spec.shape[1]):
+        raise ArgumentError("cell", f"row and column in a grid of {spec.shape} cells", (row, col))
+    return row, col
+
+
+def _truth(result: FrameResult, spec: GridSpec, cell: tuple[int, int]) -> int | None:
+    if result.frame.labels is None:
+        return None
+    return int(grid_truth(result.frame.labels, result.belief.probability, spec)[cell])
+
+
+def _check_net(parts: list[Contributions], probability: NDArray) -> None:
+    """Refuse a network whose two scores don't give the result's ratio of probabilities."""
+    share = softmax([part.score for part in parts])[0]
+    given = probability[0] / probability.sum()
+    if not abs(share - given) <= TOLERANCE:
+        raise ArgumentError("net", "the network that made the result", f"one that gives {share:.3f}, not {given:.3f}")

@@ -1,0 +1,123 @@
+"""The commands `semgrid-edu course ...`: they parse and call, nothing else."""
+
+import os
+import shlex
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from semgrid_edu.workshop.commands.data import report
+
+course = typer.Typer(no_args_is_help=True, help="Build the notebooks and the exercises, and grade them.")
+
+
+@course.callback()
+def needs_tools() -> None:
+    """Build the notebooks and the exercises, and grade them."""
+    missing = [name for name in ("jupytext", "nbgrader") if find_spec(name) is None]
+    if missing:
+        sys.exit(f"semgrid-edu: {' and '.join(missing)} are needed for this: pip install 'semgrid_edu[course]'")
+
+
+@course.command()
+def notebooks(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Such as 00_tour or graphical_models; all by default.")
+    ] = None,
+) -> None:
+    """Execute lectures and companions and write the students' exercises, from their sources."""
+    from semgrid_edu.workshop.course.nbgrader.build import build_exercise, exercise_sources
+    from semgrid_edu.workshop.course.notebooks.build import (
+        build_lecture,
+        companion_sources,
+        lecture_sources,
+        named,
+        notebook_name,
+    )
+
+    for source in named([*exercise_sources(), *lecture_sources(), *companion_sources()], names):
+        build = build_exercise if source in exercise_sources() else build_lecture
+        typer.echo(f"{notebook_name(source)}: {build(source)}")
+
+
+@course.command()
+def minutes(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Such as 00_tour, for its sections; all by default.")
+    ] = None,
+) -> None:
+    """Tell how many minutes each notebook takes a student, and what takes them."""
+    from semgrid_edu.workshop.course.notebooks.build import companion_sources, lecture_sources, named
+    from semgrid_edu.workshop.course.notebooks.minutes import minutes_table
+
+    typer.echo(minutes_table(named([*lecture_sources(), *companion_sources()], names)))
+
+
+@course.command()
+def check() -> None:
+    """Check that every notebook agrees with its source, has run, and is fit to be shown."""
+    from semgrid_edu.workshop.course.checks import course_problems
+
+    report(course_problems(), "every notebook agrees with its source")
+
+
+@course.command()
+def build(
+    folder: Annotated[Path, typer.Argument(help="A missing or empty folder, or a course built before.")],
+    lectures: Annotated[
+        str | None, typer.Option(help="Address or path at which students find 00_tour.ipynb; exercises link there.")
+    ] = None,
+) -> None:
+    """Lay out a complete nbgrader course for an instructor."""
+    from semgrid_edu.workshop.course.nbgrader.build import build_course
+
+    built = build_course(folder, lectures=lectures)
+    names = built.assignments
+    typer.echo(f"{folder}: {len(names)} assignments, {', '.join(names)}; read {folder / 'README.md'}")
+    for name in built.kept:
+        typer.echo(f"you changed {name}, so it stays; this version of semgrid_edu has another one", err=True)
+
+
+@course.command()
+def grade(
+    folder: Annotated[Path, typer.Argument(help="A course that `course build` wrote, with what was handed in.")],
+    assignments: Annotated[list[str] | None, typer.Argument(help="Such as 01_bayes; all by default.")] = None,
+    again: Annotated[bool, typer.Option("--again", help="Grade also what is graded already.")] = False,
+    workers: Annotated[int, typer.Option(min=1, max=64, help="Submissions at the same time.")] = os.cpu_count() or 1,
+    timeout: Annotated[int, typer.Option(min=1, help="Seconds for a cell, or for all calls of a test.")] = 30,
+    memory: Annotated[int, typer.Option(min=100, help="Megabytes of memory for a student's code.")] = 4000,
+    container: Annotated[
+        str, typer.Option(help='Runs students\' code in a container: "docker run --rm -i --network none IMAGE".')
+    ] = "",
+    seed_by_student: Annotated[
+        bool, typer.Option("--seed-by-student", help="Hidden tests draw other inputs for each student.")
+    ] = False,
+) -> None:
+    """Grade a class with nbgrader: students' code runs in processes of its own, apart from tests and gradebook."""
+    from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings
+    from semgrid_edu.workshop.course.nbgrader.failures import UngradedError
+    from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course, missing_limits
+    from semgrid_edu.workshop.course.nbgrader.gradebook import write_graded
+    from semgrid_edu.workshop.course.nbgrader.submissions import misplaced
+
+    settings = GradeSettings(timeout, memory, tuple(shlex.split(container)), seed_by_student)
+    for path in misplaced(folder):
+        typer.echo(f"not graded: expected submitted/STUDENT/EXERCISE/EXERCISE.ipynb, found {path}", err=True)
+    if missing := missing_limits(settings):
+        typer.echo(f"this system can't limit for students' code: {', '.join(missing)}; the guide says more", err=True)
+    ungraded = ""
+    try:
+        for one in grade_course(folder, settings, assignments or (), again, workers):
+            if one.note:
+                typer.echo(f"{one.student}, {one.assignment}: {one.note}", err=True)
+    except KeyboardInterrupt:
+        sys.exit(f"semgrid-edu: interrupted; the same command {'begins again' if again else 'goes on'}")
+    except UngradedError as error:
+        ungraded = str(error)
+    typer.echo(f"all scores so far: {write_graded(folder)}")
+    if ungraded:
+        told = "these stay ungraded, through no fault of the students; mend it, then the same command without --again"
+        sys.exit(f"semgrid-edu: {told}:\n{ungraded}")

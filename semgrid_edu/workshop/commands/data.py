@@ -1,0 +1,89 @@
+"""The commands of `semgrid-edu data`: make, fetch and check data."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from semgrid_edu.errors import ArgumentError
+
+data = typer.Typer(no_args_is_help=True, help="Make, fetch and check data.")
+"""What `semgrid-edu` adds to its commands."""
+
+
+@data.command()
+def make(
+    name: Annotated[
+        str, typer.Argument(help="minikitti, minichroma, minisynthia, validation, sample, or all for the first three.")
+    ],
+    folder: Annotated[Path, typer.Argument(help="Takes the data set's own folder.")],
+    seed: Annotated[int, typer.Option(help="Seed for the drives; the same seed gives the same bytes.")] = 0,
+    workers: Annotated[int, typer.Option(help="Number of processes that share the work.")] = 2,
+    scheduler: Annotated[
+        str | None, typer.Option(help="tcp://HOST:PORT of a dask.distributed cluster that shares the work instead.")
+    ] = None,
+) -> None:
+    """Simulate a data set in KITTI's raw layout; the same command finishes one that was interrupted."""
+    from semgrid_edu.workshop.simulation.datasets import DATA_SETS, make_dataset
+
+    for one in DATA_SETS if name == "all" else [name]:
+        typer.echo(f"{one} is in {make_dataset(one, folder, seed, workers, scheduler)}")
+
+
+@data.command()
+def fetch(
+    name: Annotated[str, typer.Argument(help="kitti: real drives, from their official archives.")],
+    drive: Annotated[str, typer.Option(help="Date and number, such as 2011_09_26_0013.")],
+    folder: Annotated[Path, typer.Option(help="Takes the folder of the day, and the archives.")] = Path("kitti_raw"),
+) -> None:
+    """Download a real drive and its calibration, and unpack them; the same command goes on after an interruption."""
+    from semgrid_edu.datasets.readers.fetch import KITTI_LICENCE, fetch_kitti
+
+    if name != "kitti":
+        raise ArgumentError("name", "kitti", repr(name))
+    typer.echo(KITTI_LICENCE)
+    fetched = fetch_kitti(folder, drive)
+    typer.echo(f"{len(fetched)} frames are in {fetched.folder}; the archives in {folder / 'archives'} may be deleted")
+
+
+@data.command()
+def verify(
+    folder: Annotated[Path | None, typer.Argument(help="A folder of samples; the shipped ones by default.")] = None,
+) -> None:
+    """Check the samples against the checksums in their provenance files."""
+    from semgrid_edu.datasets.samples import samples_problems
+
+    report(samples_problems(folder), "every sample is as it was made")
+
+
+@data.command()
+def excerpt(
+    folder: Annotated[Path, typer.Argument(help="The folder that takes the frames and their provenance.")],
+    data: Annotated[Path, typer.Option(help="A data set with train frames, such as data/minikitti.")],
+    frames: Annotated[int, typer.Option(min=1, help="Number of frames.")] = 6,
+) -> None:
+    """Keep a few labelled frames of a data set, in the form in which a network takes them."""
+    from semgrid_edu.datasets.training_set import write_excerpt
+
+    write_excerpt(data, frames, folder)
+
+
+def report(problems: list[str], sound: str) -> None:
+    """Print every problem on a line of its own and exit with 1, or print something else when there is none.
+
+    Parameters
+    ----------
+    problems : list of str
+        One line for each problem.
+    sound : str
+        What to print when there is no problem.
+
+    Raises
+    ------
+    typer.Exit
+        When there are problems.
+    """
+    if problems:
+        typer.echo("\n".join(problems), err=True)
+        raise typer.Exit(1)
+    typer.echo(sound)

@@ -1,0 +1,154 @@
+"""The commands of `semgrid-edu reproduce`: each runs an experiment, keeps its result and prints its table."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+reproduce = typer.Typer(no_args_is_help=True, help="Run the experiments of the lectures.")
+"""What `semgrid-edu` adds to its commands."""
+
+KEPT = ("dataset.json", "provenance.json")
+"""JSON files that no result may replace."""
+
+
+@reproduce.command()
+def occupancy(
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives and the particles.")] = 0,
+    drives: Annotated[int, typer.Option(min=1, help="Number of drives, of three seconds each.")] = 20,
+    grid: Annotated[str | None, typer.Option(help="paper or compact; both by default.")] = None,
+    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("occupancy.json"),
+) -> None:
+    """Score log-odds grid, BOF and CMCDOT on simulated drives (lecture 04)."""
+    from semgrid_edu.workshop.studies.filter.occupancy import GRIDS, compare_filters, occupancy_tables
+
+    keep_result(out, lambda: compare_filters(seed, drives, (grid,) if grid else tuple(GRIDS)), occupancy_tables)
+
+
+@reproduce.command()
+def streets(
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives and the particles.")] = 0,
+    drives: Annotated[int, typer.Option(min=1, help="Number of drives through each street.")] = 6,
+    grid: Annotated[str | None, typer.Option(help="paper or compact; both by default.")] = None,
+    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("streets.json"),
+) -> None:
+    """Score CMCDOT on streets with wire mesh, hedges, glass, walls that come into view, convoys (lecture 04)."""
+    from semgrid_edu.workshop.studies.filter.streets import GRIDS, measure_streets, streets_tables
+
+    keep_result(out, lambda: measure_streets(seed, drives, (grid,) if grid else tuple(GRIDS)), streets_tables)
+
+
+@reproduce.command()
+def two_stage(
+    data: Annotated[Path, typer.Option(help="A data set with train and test frames, such as data/minikitti.")],
+    runs: Annotated[Path, typer.Option(help="Takes one folder per training run; a run that has ended isn't repeated.")],
+    seeds: Annotated[int, typer.Option(min=1, help="Number of training runs of each kind.")] = 3,
+    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("two_stage.json"),
+) -> None:
+    """Train end to end and in two stages, and score both kinds of networks (lecture 08)."""
+    from semgrid_edu.workshop.studies.training.two_stage import compare_training, two_stage_table
+
+    keep_result(out, lambda: compare_training(data, runs, seeds), lambda result: two_stage_table(result["scores"]))
+
+
+@reproduce.command()
+def overfit(
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the initial weights.")] = 0,
+    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("overfit.json"),
+) -> None:
+    """Overfit four frames with each image network: learn them by heart (lecture 08)."""
+    from semgrid_edu.workshop.studies.training.overfit import overfit, overfit_table
+
+    keep_result(out, lambda: overfit(seed), lambda result: overfit_table(result["networks"]))
+
+
+@reproduce.command()
+def crf_error(
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the filter's particles and for the landmarks.")] = 0,
+    out: Annotated[Path, typer.Option(help="Takes each scene; the same command goes on.")] = Path("crf_error.json"),
+) -> None:
+    """Measure error against time of every way to run the CRF, kernel and convergence apart (lecture 11)."""
+    from semgrid_edu.workshop.studies.crf.crf_error import crf_error, crf_error_tables
+
+    keep_result(out, lambda: crf_error(out, seed), crf_error_tables)
+
+
+@reproduce.command()
+def crf_coupling(
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the random grids.")] = 0,
+    draws: Annotated[int, typer.Option(min=1, help="Number of random grids of each size.")] = 20,
+    out: Annotated[Path, typer.Option(help="Takes each size; the same command goes on.")] = Path("crf_coupling.json"),
+) -> None:
+    """Compare approximate with exact inference in the CRF on tiny grids, as the coupling grows (lecture 10)."""
+    from semgrid_edu.workshop.studies.crf.crf_coupling import crf_coupling, crf_coupling_tables
+
+    keep_result(out, lambda: crf_coupling(out, seed, draws), crf_coupling_tables)
+
+
+@reproduce.command()
+def learned_crf(
+    data: Annotated[Path, typer.Option(help="The data set that the network learned from, such as data/minikitti.")],
+    validation: Annotated[Path, typer.Option(help="A data set with validation frames, such as data/validation.")],
+    weights: Annotated[Path, typer.Option(help="A network trained on the train frames of --data.")],
+    runs: Annotated[Path, typer.Option(help="Takes one folder per training run; a run that has ended isn't repeated.")],
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the order of the frames.")] = 0,
+    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("learned_crf.json"),
+) -> None:
+    """Learn a CRF's weights, widths and label costs in eight ways, and score them on test frames (lecture 11)."""
+    from semgrid_edu.workshop.studies.crf.learned_crf_scores import compare_learned_crfs, learned_crf_table
+
+    keep_result(out, lambda: compare_learned_crfs(data, validation, weights, runs, seed=seed), learned_crf_table)
+
+
+@reproduce.command()
+def truth_policies(
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives, the errors, the particles.")] = 0,
+    drives: Annotated[int, typer.Option(min=1, help="Number of drives, of two seconds each.")] = 20,
+    grid: Annotated[str, typer.Option(help="compact or paper.")] = "compact",
+    lidar: Annotated[str, typer.Option(help="coarse, that of the simulated data sets, or HDL-64E.")] = "coarse",
+    out: Annotated[Path, typer.Option(help="Takes each drive; the same command goes on.")] = Path("truth.json"),
+) -> None:
+    """Measure how wrong each way of making ground truth from LIDAR is, by class and distance (lecture 09)."""
+    from semgrid_edu.workshop.studies.ground_truth.truth_policies import truth_policies
+    from semgrid_edu.workshop.studies.ground_truth.truth_tables import truth_tables
+
+    keep_result(out, lambda: truth_policies(out, seed, drives, grid, lidar), truth_tables)
+
+
+@reproduce.command()
+def real_drive(
+    kitti: Annotated[
+        list[Path], typer.Option(help="A folder of KITTI raw drives; once more for another stretch of the same drive.")
+    ],
+    date: Annotated[str, typer.Option(help="Such as 2011_09_26.")] = "2011_09_26",
+    drive: Annotated[str, typer.Option(help="Such as 0013.")] = "0013",
+    out: Annotated[Path, typer.Option(help="Where to write the numbers.")] = Path("real_drive.json"),
+) -> None:
+    """Put a real drive through every check of new data, beside the shipped drive (lecture 13)."""
+    from semgrid_edu.workshop.studies.new_drive.real_drive import compare_drives, real_drive_table
+
+    keep_result(out, lambda: compare_drives(kitti, date, drive), real_drive_table)
+
+
+def keep_result(out: Path, compute: Callable[[], dict], table: Callable[[dict], str]) -> None:
+    """Compute an experiment's result, once it is known that the file can be written; write it, and print its table.
+
+    Parameters
+    ----------
+    out : Path
+        The file to write, as JSON.
+    compute : callable
+        Returns the result.
+    table : callable
+        Turns the result into text to print.
+    """
+    from semgrid_edu.errors import DataError
+    from semgrid_edu.storage.files import check_writable, write_json
+
+    check_writable(out)
+    if out.exists() and (out.suffix != ".json" or out.name in KEPT):
+        raise DataError(out, "a new file, or the JSON of an earlier result", "something else, which would be lost")
+    result = compute()
+    write_json(out, result)
+    typer.echo(f"{table(result)}\n\nwritten to {out}")

@@ -1,0 +1,235 @@
+"""The command line, `semgrid-edu`: parses and calls, nothing else."""
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from typer.core import TyperCommand
+
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.storage.compiled import CACHE_VARIABLE, keep_compiled_functions
+from semgrid_edu.workshop.commands.arguments import check_arguments, tell
+from semgrid_edu.workshop.commands.course import course
+from semgrid_edu.workshop.commands.data import data
+from semgrid_edu.workshop.commands.experiments import keep_result, reproduce
+from semgrid_edu.workshop.commands.reproduce import add_commands
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+app.add_typer(data, name="data")
+app.add_typer(course, name="course")
+app.add_typer(reproduce, name="reproduce")
+add_commands(reproduce)
+
+
+@app.callback()
+def main(
+    cache: Annotated[
+        Path | None,
+        typer.Option(help="Keeps what is made of data sets; otherwise each keeps it itself, so it can't be read-only."),
+    ] = None,
+) -> None:
+    """Probabilistic bird's-eye semantic perception, taught notebook by notebook."""
+    if cache is not None:
+        os.environ[CACHE_VARIABLE] = str(cache.resolve())
+
+
+@app.command()
+def demo(
+    kitti: Annotated[Path | None, typer.Option(help="A folder of KITTI raw drives, which holds the dates.")] = None,
+    date: Annotated[str | None, typer.Option(help="Such as 2011_09_26.")] = None,
+    drive: Annotated[str | None, typer.Option(help="Such as 0013.")] = None,
+    camera: Annotated[
+        str, typer.Option(help="image_02, the left colour camera, or image_03, the right one.")
+    ] = "image_02",
+    weights: Annotated[Path | None, typer.Option(help="A trained network; the shipped SegNet by default.")] = None,
+    frames: Annotated[
+        str | None,
+        typer.Option(help="FIRST:LAST or FIRST:LAST:STEP (LAST excluded), such as 40:120:2; all by default."),
+    ] = None,
+    stages: Annotated[
+        Path | None,
+        typer.Option(help="A Python file with your own track, segment, sample, fuse or refine, to compare."),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Where to write the page.")] = Path("out/demo"),
+) -> None:
+    """Run every stage over a drive, the shipped one by default, and write a page that shows it."""
+    from semgrid_edu.datasets import KittiRawDrive
+    from semgrid_edu.datasets.readers.kitti_raw import VIEWS
+    from semgrid_edu.datasets.samples import sample_drive, sample_weights
+    from semgrid_edu.networks.weights import weights_doubts
+    from semgrid_edu.workshop.demo import write_demo
+
+    named = {"--kitti": kitti, "--date": date, "--drive": drive}
+    given = [option for option, value in named.items() if value is not None]
+    if given and len(given) < len(named):
+        raise ArgumentError(", ".join(named), "all three or none", f"only {' and '.join(given)}")
+    if camera != VIEWS[0] and not given:
+        raise ArgumentError("--camera", f"{VIEWS[0]}, the only one of the shipped drive", camera)
+    chosen = KittiRawDrive(kitti, date, drive, view=camera) if given else sample_drive()
+    tell([*chosen.doubts(), *(weights_doubts(weights) if weights else ())])
+    page = write_demo(chosen, weights or sample_weights(), out, stages, frames)
+    typer.echo(f"open {page.resolve().as_uri()}\nin one picture: {page.parent / 'overview.png'}")
+
+
+class _TrainCommand(TyperCommand):
+    """A command whose help names every image network: looked up when the help is shown, since that loads PyTorch."""
+
+    def format_help(self, ctx, formatter) -> None:
+        """Write the help."""
+        from semgrid_edu.networks import SEGMENTERS
+
+        (segmenter,) = (option for option in self.params if option.name == "segmenter")
+        segmenter.help = f"The image network: {', '.join(SEGMENTERS)}."
+        super().format_help(ctx, formatter)
+
+
+@app.command(cls=_TrainCommand)
+def train(
+    data: Annotated[Path, typer.Option(help="A data set with train frames, such as data/minikitti.")],
+    out: Annotated[Path, typer.Option(help="A folder for the weights, the log and their provenance.")],
+    segmenter: Annotated[str, typer.Option(help="The image network.")] = "segnet",
+    preset: Annotated[
+        str, typer.Option(help="compact, or paper: published size, whole images, 0.2 m cells.")
+    ] = "compact",
+    imagenet: Annotated[
+        Path | None, typer.Option(help="ImageNet weights (VGG16 or ResNet-101, safetensors) to start --preset paper.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the initial weights and the order of the frames.")] = 0,
+    iterations: Annotated[int, typer.Option(min=1, help="Steps of each of the two stages.")] = 2000,
+    two_stage: Annotated[
+        bool, typer.Option("--two-stage", help="Keep the image network fixed while the fusion learns.")
+    ] = False,
+    truth: Annotated[
+        str,
+        typer.Option(
+            help="true; lidar: made from image labels and LIDAR with real data's errors; or made in another way, "
+            "such as no-cleanup."
+        ),
+    ] = "true",
+    resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was interrupted.")] = False,
+    device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu, cuda or cuda:N.")] = "auto",
+) -> None:
+    """Train a network: first its image network, then all of it on grids. torchrun runs it in several processes."""
+    from semgrid_edu.datasets.doubts import dataset_doubts
+    from semgrid_edu.training.run import chosen_truth, how_to_go_on, train_network, training_params
+
+    params = training_params(preset, iterations, end_to_end=not two_stage, from_imagenet=imagenet is not None)
+    tell(dataset_doubts(data, "train"))
+    choices = {"preset": preset, "imagenet": imagenet, "device": device, "made": chosen_truth(truth)}
+    try:
+        train_network(data, out, segmenter, params, seed, resume, **choices)
+    except KeyboardInterrupt:
+        sys.exit(f"semgrid-edu: interrupted; {how_to_go_on(out)}")
+
+
+@app.command()
+def train_crf(
+    data: Annotated[Path, typer.Option(help="A data set; best one that the network has never seen.")],
+    weights: Annotated[Path, typer.Option(help="A trained network, which stays as it is.")],
+    out: Annotated[Path, typer.Option(help="A folder for the weights, the log and their provenance.")],
+    split: Annotated[str, typer.Option(help="The frames of the data set to learn from.")] = "validation",
+    label_costs: Annotated[bool, typer.Option("--label-costs", help="Learn a cost for every two labels.")] = False,
+    weight_limit: Annotated[float, typer.Option(help="Limit of the class weights; 1: all cells count the same.")] = 4.0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the order of the frames.")] = 0,
+    iterations: Annotated[int, typer.Option(min=1, help="Steps of two frames each.")] = 150,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was interrupted.")] = False,
+) -> None:
+    """Train a CRF on the grids of a trained network: its weights, widths, and costs of labels."""
+    from dataclasses import replace
+
+    from semgrid_edu.datasets.doubts import dataset_doubts
+    from semgrid_edu.networks.weights import weights_doubts
+    from semgrid_edu.training.crf import CRF_TRAINING
+    from semgrid_edu.training.run import how_to_go_on
+    from semgrid_edu.workshop.studies.crf.learned_crf import CrfVariant, train_crf_on
+
+    tell(dataset_doubts(data, split) + weights_doubts(weights))
+    params = replace(CRF_TRAINING, grid_iterations=iterations)
+    try:
+        train_crf_on(data, weights, out, CrfVariant(split, label_costs, weight_limit), params, seed, resume)
+    except KeyboardInterrupt:
+        sys.exit(f"semgrid-edu: interrupted; {how_to_go_on(out)}")
+
+
+@app.command()
+def curves(
+    runs: Annotated[list[Path], typer.Argument(help="Folders that `semgrid-edu train` writes, finished or not.")],
+    out: Annotated[Path, typer.Option(help="Where to write the picture.")] = Path("curves.png"),
+) -> None:
+    """Draw the loss of one or several training runs over their steps."""
+    from semgrid_edu.plotting import training_curves
+    from semgrid_edu.storage.files import atomic_path
+    from semgrid_edu.training.log import LOG, read_log
+
+    names = [run.resolve().name for run in runs]
+    if len(set(names)) < len(names):
+        names = list(map(str, runs))
+    axes = training_curves({name: read_log(run / LOG) for name, run in zip(names, runs, strict=True)})
+    if out.suffix[1:].lower() not in (formats := axes.figure.canvas.get_supported_filetypes()):
+        raise ArgumentError("--out", f"a picture that ends in one of {', '.join(sorted(formats))}", out)
+    with atomic_path(out) as path:
+        axes.figure.savefig(path, dpi=150)
+    typer.echo(f"written to {out}")
+
+
+@app.command()
+def evaluate(
+    data: Annotated[Path, typer.Option(help="A data set with train and test frames, such as data/minikitti.")],
+    weights: Annotated[Path, typer.Option(help="A network trained on its train frames.")],
+    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("evaluation.json"),
+    confusions: Annotated[Path | None, typer.Option(help="Takes each frame's confusion matrices, as .npz.")] = None,
+) -> None:
+    """Score a trained network and the baselines on the test frames."""
+    from semgrid_edu.datasets.doubts import dataset_doubts
+    from semgrid_edu.networks.weights import weights_doubts
+    from semgrid_edu.workshop.scoring.evaluate import evaluate, scores_table
+
+    if confusions and confusions.suffix != ".npz":
+        raise ArgumentError("--confusions", "a file that ends in .npz", confusions)
+
+    def scored() -> dict:
+        tell(dataset_doubts(data, "train", "test") + weights_doubts(weights))
+        return evaluate(data, weights, confusions_file=confusions)
+
+    keep_result(out, scored, lambda result: scores_table(result["scores"]))
+
+
+@app.command()
+def search_crf(
+    data: Annotated[Path, typer.Option(help="A data set with validation frames, such as data/validation.")],
+    test: Annotated[Path, typer.Option(help="The data set that the network was trained on, with test frames.")],
+    weights: Annotated[Path, typer.Option(help="A network trained on its train frames.")],
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the parameters that are tried.")] = 0,
+    trials: Annotated[int, typer.Option(min=1, help="Number of trials in all; a search that ended can go on.")] = 200,
+    out: Annotated[Path, typer.Option(help="Takes each trial, then all scores.")] = Path("crf_search.json"),
+) -> None:
+    """Calibrate a network, search the CRF's parameters on validation frames, and score the best on test frames."""
+    from semgrid_edu.workshop.studies.crf.crf_search import search_crf, search_table
+
+    try:
+        keep_result(out, lambda: search_crf(data, test, weights, out, seed, trials), search_table)
+    except KeyboardInterrupt:
+        sys.exit(f"semgrid-edu: interrupted; the same command goes on from {out}")
+
+
+def run() -> None:
+    """Run the command line; a mistake in the input, or a disk that refuses, ends in one line, not in a traceback."""
+    # Idle OpenMP threads spin, which keeps busy cores from the threads that have work: on two busy cores a frame took
+    # 1.2 s instead of 0.07 s. OpenMP reads this once, when a command loads torch or numba, so it must be set before.
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+    try:
+        check_arguments(sys.argv[1:])
+        if told := keep_compiled_functions():
+            typer.echo(f"semgrid-edu: {told}", err=True)
+        app()
+    except (ArgumentError, DataError) as error:
+        sys.exit(f"semgrid-edu: {error}")
+    except RuntimeError as error:
+        if "Symlink loop" not in str(error):
+            raise
+        sys.exit(f"semgrid-edu: {error}")
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        sys.exit(f"semgrid-edu: {where}{error.strerror or error}")

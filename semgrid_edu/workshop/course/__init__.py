@@ -1,0 +1,1 @@
+"""The course: notebooks, registers, exercises and their grading."""

@@ -1,0 +1,227 @@
+"""Checks of every committed notebook: up to date, executed without warnings, small, and free of paths of a machine."""
+
+import re
+from pathlib import Path
+
+import nbformat
+from nbformat import NotebookNode
+from nbgrader.utils import is_grade
+
+from semgrid_edu.workshop.course.nbgrader.build import exercise_sources, student_version
+from semgrid_edu.workshop.course.notebooks.build import (
+    NOTEBOOKS,
+    built_path,
+    companion_sources,
+    lecture_sources,
+    notebook_name,
+    read_percent,
+)
+from semgrid_edu.workshop.course.notebooks.rules import EXCEPTIONS, RULES, Rule, rule_problems
+
+MAX_LINES = 25
+"""Most lines of a code cell, so that a student can take it in at once."""
+
+MAX_TEST_LINES = 32
+"""Most lines of an exercise's test cell: its function, and a hint for each of many mistakes."""
+
+MAX_BYTES = 2_000_000
+"""Largest size of a lecture or companion, bytes: it has room for figures and one or two animations."""
+
+MAX_BYTES_TOGETHER = 16_000_000
+"""Largest size of all notebooks together, bytes, so that the project is quick to clone."""
+
+COMMON_PARTS = {
+    "a thesis": r"\*\*In one sentence\.\*\*",
+    "what the student will be able to do": r"\*\*You will be able to\*\*",
+    "prerequisites": r"\*\*Prerequisites\.\*\*",
+    "minutes": r"\*\*Time\.\*\* \d+ minutes",
+    "further reading": r"^## Further reading",
+}
+
+LECTURE_PARTS = COMMON_PARTS | {
+    "the paper's sections and equations": r"\*\*Paper\.\*\*",
+    "a prediction": r"\*\*Predict before you run\.\*\*(?s:.*?)<details><summary>Answer</summary>",
+    "a failure": r"^## Where this breaks",
+    "a summary": r"^## In five lines",
+    "the link to its exercise": r"\]\(exercises/\d\d_\w+\.ipynb\)",
+    "something to play with": r"\binteract\(",
+}
+"""The parts of a lecture, and how each is recognised in its source."""
+
+COMPANION_PARTS = COMMON_PARTS | {
+    "a limit": r"^## (Where this breaks|What this does not show)",
+    "the link back to its lecture or exercise": r"\]\(\.\./(exercises/)?\w+\.ipynb\)",
+}
+"""The parts of a companion, and how each is recognised in its source."""
+
+COMPANION_RULES = {name: rule for name, rule in RULES.items() if name != "length"}
+"""The rules for a companion. It may be long, because students choose whether to read it."""
+
+MACHINE = re.compile(r"(?<![\w.:/<])(?:/(?:home|root|tmp|work|usr|opt|mnt|srv|private|Users)/|[A-Z]:\\\\)\S*")
+ADDRESS = re.compile(r"\bat 0x[0-9a-f]{6,}\b")
+LINK = re.compile(r"\]\((?!https?:|#|mailto:)([^)#\s]+)[^)]*\)")
+
+
+def lecture_problems(source: Path) -> list[str]:
+    """List everything that is wrong with a lecture.
+
+    Parameters
+    ----------
+    source : Path
+        The source, `notebooks/src/NN_name.py`. The executed notebook is looked for where `built_path` puts it.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem, with the name of the notebook; empty when nothing is wrong.
+    """
+    return [f"{built_path(source).name}: {problem}" for problem in _problems(source, LECTURE_PARTS, RULES)]
+
+
+def companion_problems(source: Path) -> list[str]:
+    """List everything that is wrong with a companion.
+
+    Parameters
+    ----------
+    source : Path
+        The source, `notebooks/src/deeper/NAME.py`. The executed notebook is looked for where `built_path` puts it.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem, with the name of the notebook; empty when nothing is wrong.
+    """
+    name = f"{notebook_name(source)}.ipynb"
+    problems = _problems(source, COMPANION_PARTS, COMPANION_RULES)
+    if not any(f"]({name})" in lecture.read_text(encoding="utf-8") for lecture in source.parents[1].glob("*.py")):
+        problems.append(f"no lecture links to it; write ]({name}) where it helps")
+    return [f"{name}: {problem}" for problem in problems]
+
+
+def exercise_problems(source: Path) -> list[str]:
+    """List everything that is wrong with the student version of an exercise.
+
+    Parameters
+    ----------
+    source : Path
+        The source, `notebooks/src/exercises/NAME.py`.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem, with the name of the notebook; empty when nothing is wrong.
+    """
+    path = built_path(source)
+    if not path.is_file():
+        return [f"exercises/{path.name}: not built; run `semgrid-edu course notebooks`"]
+    notebook = nbformat.read(path, as_version=4)
+    problems = text_problems(notebook, path.parent)
+    if notebook != student_version(source):
+        problems.append(f"differs from src/exercises/{source.name}; run `semgrid-edu course notebooks {source.stem}`")
+    return [f"exercises/{path.name}: {problem}" for problem in problems]
+
+
+def course_problems(folder: Path = NOTEBOOKS) -> list[str]:
+    """List everything that is wrong with the lectures, companions and students' exercises in a folder of notebooks.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder of notebooks, with their sources in `src`.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem, with the name of the notebook; empty when nothing is wrong.
+
+    Raises
+    ------
+    DataError
+        When the folder holds no lectures.
+    """
+    problems = [problem for source in lecture_sources(folder) for problem in lecture_problems(source)]
+    problems += [problem for source in companion_sources(folder) for problem in companion_problems(source)]
+    problems += [problem for source in exercise_sources(folder) for problem in exercise_problems(source)]
+    together = sum(path.stat().st_size for path in folder.rglob("*.ipynb"))
+    if together > MAX_BYTES_TOGETHER:
+        problems.append(f"all notebooks together: {together / 1e6:.1f} MB, more than {MAX_BYTES_TOGETHER / 1e6:.0f} MB")
+    return problems
+
+
+def text_problems(notebook: NotebookNode, folder: Path) -> list[str]:
+    """List long cells, paths of a machine and links that lead nowhere.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        The notebook, executed or not.
+    folder : Path
+        The folder of the notebook, to which its links are relative.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem, with the exercise's name for the cell, or else the cell's first line.
+    """
+    problems = []
+    for cell in notebook.cells:
+        name = cell.metadata.get("nbgrader", {}).get("grade_id") or cell.source.strip().split("\n")[0][:60]
+        lines = len(cell.source.splitlines())
+        most = MAX_TEST_LINES if is_grade(cell) else MAX_LINES
+        if cell.cell_type == "code" and lines > most:
+            problems.append(f"cell '{name}' has {lines} lines, more than {most}")
+        for found in MACHINE.findall(cell.source + _printed(cell)):
+            problems.append(f"cell '{name}' names a path of one machine: {found}")
+        for target in LINK.findall(_shown(cell)):
+            if not (folder / target).exists():
+                problems.append(f"cell '{name}' links to {target}, which does not exist")
+    return problems
+
+
+def _problems(source: Path, parts: dict[str, str], rules: dict[str, Rule]) -> list[str]:
+    """List what is wrong with a lecture or a companion; they differ in the parts they need and the rules they keep."""
+    wanted, path, name = read_percent(source), built_path(source), notebook_name(source)
+    text = "\n\n".join(cell.source for cell in wanted.cells)
+    problems = [f"lacks {part}" for part, pattern in parts.items() if not re.search(pattern, text, re.MULTILINE)]
+    if not path.is_file():
+        return [*problems, "not built; run `semgrid-edu course notebooks`"]
+    notebook = nbformat.read(path, as_version=4)
+    if _inputs(notebook) != _inputs(wanted):
+        problems.append(f"differs from src/{name}.py; run `semgrid-edu course notebooks {source.stem}`")
+    if path.stat().st_size > MAX_BYTES:
+        problems.append(f"{path.stat().st_size / 1e6:.1f} MB, more than {MAX_BYTES / 1e6} MB")
+    for number, cell in enumerate((c for c in notebook.cells if c.cell_type == "code"), start=1):
+        problems += [f"code cell {number} {problem}" for problem in _run_problems(cell, number)]
+    return problems + text_problems(notebook, path.parent) + rule_problems(notebook, rules, EXCEPTIONS.get(name, ()))
+
+
+def _run_problems(cell: NotebookNode, number: int) -> list[str]:
+    """List the signs that a code cell didn't run in its turn, or raised an error, or gave a warning."""
+    problems = []
+    if cell.execution_count != number:
+        problems.append(f"has execution count {cell.execution_count}; execute the whole notebook in order")
+    for output in cell.outputs:
+        if output.output_type == "error":
+            problems.append(f"ends in an error: {output.ename}: {output.evalue}")
+        if output.output_type == "stream" and output.name == "stderr":
+            problems.append(f"writes to stderr: {output.text.strip()[:80]}")
+    if ADDRESS.search(_printed(cell)):
+        problems.append("prints the address of an object; end a plot cell with plt.show()")
+    return problems
+
+
+def _printed(cell: NotebookNode) -> str:
+    """Return all text that a cell shows below itself."""
+    outputs = cell.get("outputs", [])
+    return "".join(output.get("text", "") + output.get("data", {}).get("text/plain", "") for output in outputs)
+
+
+def _shown(cell: NotebookNode) -> str:
+    """Return the Markdown that a cell shows: its own text, or what its code displays."""
+    displayed = [output.get("data", {}).get("text/markdown", "") for output in cell.get("outputs", [])]
+    return cell.source if cell.cell_type == "markdown" else "\n".join(displayed)
+
+
+def _inputs(notebook: NotebookNode) -> list[tuple]:
+    """Return what comes from the source of a notebook: kind, id, text and metadata of every cell."""
+    return [(cell.cell_type, cell.id, cell.source, dict(cell.metadata)) for cell in notebook.cells]

@@ -1,0 +1,1 @@
+"""Exercises laid out as an nbgrader course, collected and graded."""

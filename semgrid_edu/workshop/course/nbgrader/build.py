@@ -1,0 +1,238 @@
+"""Exercises from one source: the students' notebook, and a complete nbgrader course for an instructor."""
+
+import hashlib
+import logging
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+from nbformat import NotebookNode
+from nbgrader.apps import NbGraderAPI
+from nbgrader.preprocessors import (
+    CheckCellMetadata,
+    ClearHiddenTests,
+    ClearOutput,
+    ClearSolutions,
+    ComputeChecksums,
+    LockCells,
+)
+from traitlets.config import PyFileConfigLoader
+
+from semgrid_edu.errors import DataError
+from semgrid_edu.storage.files import write_json, write_text
+from semgrid_edu.storage.reading import read_json
+from semgrid_edu.workshop.course.nbgrader.failures import causes, why
+from semgrid_edu.workshop.course.notebooks.build import (
+    NOTEBOOKS,
+    built_path,
+    notebook_text,
+    read_percent,
+    write_notebook,
+)
+from semgrid_edu.workshop.course.registers.equations import point_links
+
+RELEASE_STEPS = (LockCells, ClearSolutions, ClearOutput, ClearHiddenTests, ComputeChecksums, CheckCellMetadata)
+"""What nbgrader's generate_assignment does to a notebook, without its gradebook."""
+
+MARKER = "semgrid_course.json"
+"""The file by which a folder is recognised as a course that `build_course` wrote."""
+
+
+def exercise_sources(folder: Path = NOTEBOOKS) -> list[Path]:
+    """Return the percent sources of all exercises.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder of notebooks.
+
+    Returns
+    -------
+    list of Path
+        The lectures' exercises in the order of the course, then those of companions by name.
+    """
+    return sorted((folder / "src" / "exercises").glob("*.py"))
+
+
+def student_version(source: Path) -> NotebookNode:
+    """Take solutions and hidden tests out of an exercise.
+
+    Parameters
+    ----------
+    source : Path
+        The source, `notebooks/src/exercises/NAME.py`, with nbgrader's markers and metadata.
+
+    Returns
+    -------
+    NotebookNode
+        What `nbgrader generate_assignment` would release.
+    """
+    notebook, resources = read_percent(source), {}
+    for step in RELEASE_STEPS:
+        notebook, resources = step().preprocess(notebook, resources)
+    return notebook
+
+
+def build_exercise(source: Path) -> Path:
+    """Write the student version of an exercise.
+
+    Parameters
+    ----------
+    source : Path
+        The source, `notebooks/src/exercises/NAME.py`.
+
+    Returns
+    -------
+    Path
+        The file written, `notebooks/exercises/NAME.ipynb`.
+    """
+    target = built_path(source)
+    write_notebook(student_version(source), target)
+    return target
+
+
+@dataclass(frozen=True)
+class BuiltCourse:
+    """What `build_course` has laid out.
+
+    Parameters
+    ----------
+    assignments : list of str
+        Names of the assignments.
+    kept : list of str
+        Files that the instructor changed, and that therefore stay as they are though this version has others.
+    """
+
+    assignments: list[str]
+    kept: list[str]
+
+
+def build_course(directory: str | Path, folder: Path = NOTEBOOKS, lectures: str | None = None) -> BuiltCourse:
+    """Write a complete nbgrader course: sources, settings, the instructor's module, gradebook and released versions.
+
+    When it is run again, it brings up to date what the instructor hasn't changed, and leaves all else, submissions and
+    grades as they are.
+
+    Parameters
+    ----------
+    directory : path-like
+        The folder of the course: missing, empty, or with a course that was written before.
+    folder : Path
+        The folder of notebooks.
+    lectures : str, optional
+        Where students find the lectures, to which exercises link: see `point_links`. What was said last by default.
+
+    Returns
+    -------
+    BuiltCourse
+        What it holds.
+
+    Raises
+    ------
+    DataError
+        When the folder holds something else, there are no exercises, or nbgrader can't release one.
+    """
+    directory = Path(directory).resolve()
+    _refuse_what_is_not_ours(directory)
+    sources = exercise_sources(folder)
+    if not sources:
+        raise DataError(folder / "src" / "exercises", "the sources of the exercises", "none")
+    names, before = [source.stem for source in sources], _written_before(directory)
+    lectures = before.get("lectures", "") if lectures is None else lectures
+    written, kept = _write_what_is_not_changed(directory, _course_files(folder, sources, lectures), before)
+    about = {"written by": f"semgrid_edu {version('semgrid_edu')}", "assignments": names}
+    write_json(directory / MARKER, about | {"lectures": lectures, "files": written})
+    with course_api(directory) as api:
+        for name in names:
+            _release(api, name, directory / "source" / name)
+    return BuiltCourse(names, kept)
+
+
+def _written_before(directory: Path) -> dict:
+    """Return what the course says of itself; {} for one that is still to be written."""
+    marker = directory / MARKER
+    return read_json(marker) if marker.exists() else {}
+
+
+def _course_files(folder: Path, sources: list[Path], lectures: str) -> dict[str, str]:
+    """Return the text of each file of a course, by its path in it."""
+    instructor = folder / "instructor"
+    files = {name: instructor / name for name in ("nbgrader_config.py", "README.md", "Containerfile")}
+    files |= {f"instructor/{path.relative_to(instructor).as_posix()}": path for path in instructor.glob("*/*.py")}
+    texts = {name: path.read_text(encoding="utf-8") for name, path in files.items()}
+    return texts | {f"source/{s.stem}/{s.stem}.ipynb": _source_text(s, lectures) for s in sources}
+
+
+def _source_text(source: Path, lectures: str) -> str:
+    """Return an exercise as the instructor gets it: with solutions, and links that its students can follow."""
+    notebook = read_percent(source)
+    for cell in notebook.cells:
+        if cell.cell_type == "markdown":
+            cell.source = point_links(cell.source, lectures)
+    return notebook_text(notebook)
+
+
+def _write_what_is_not_changed(directory: Path, texts: dict[str, str], about: dict) -> tuple[dict[str, str], list[str]]:
+    """Write files, but not over one that isn't as it was written before; return all digests, and what was kept."""
+    before = about.get("files", {})
+    digests, kept = {}, []
+    for name, text in texts.items():
+        path = directory / name
+        now = _digest(path.read_bytes()) if path.exists() else before.get(name)
+        digests[name] = _digest(text.encode())
+        if now in (before.get(name), digests[name]):
+            write_text(path, text)
+        else:
+            kept.append(name)
+            digests[name] = before.get(name, "")
+    return digests, kept
+
+
+def _digest(content: bytes) -> str:
+    """Return a digest of a file."""
+    return hashlib.sha256(content).hexdigest()
+
+
+@contextmanager
+def course_api(directory: Path) -> Iterator[NbGraderAPI]:
+    """Open a course with the settings in its own folder.
+
+    Parameters
+    ----------
+    directory : Path
+        A course that `build_course` wrote.
+
+    Yields
+    ------
+    NbGraderAPI
+        nbgrader's commands on that course. The settings put the instructor's module on the kernels' path; that is
+        undone when the block ends.
+    """
+    before = dict(os.environ)
+    try:
+        config = PyFileConfigLoader("nbgrader_config.py", path=str(directory)).load_config()
+        api = NbGraderAPI(config=config)
+        api.log.setLevel(logging.ERROR)
+        yield api
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
+
+
+def _refuse_what_is_not_ours(directory: Path) -> None:
+    """Raise when a folder holds anything but a course that `build_course` wrote."""
+    if directory.is_file():
+        raise DataError(directory, "a folder", "a file")
+    if directory.exists() and any(directory.iterdir()) and not (directory / MARKER).is_file():
+        raise DataError(directory, f"an empty folder, or a course with its {MARKER}", "a folder with other files")
+
+
+def _release(api: NbGraderAPI, name: str, source: Path) -> None:
+    """Let nbgrader release an exercise; raise when it doesn't."""
+    with causes(api.log) as found:
+        result = api.generate_assignment(name)
+    if not result["success"]:
+        raise DataError(source, "an exercise that nbgrader can release", why(result, found))

@@ -1,0 +1,191 @@
+"""A whole class: every submission that was collected, graded by nbgrader on all cores."""
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from glob import has_magic
+from multiprocessing import get_context
+from pathlib import Path
+
+import nbformat
+from nbformat.v4 import new_markdown_cell
+from tqdm import tqdm
+
+from semgrid_edu.errors import DataError
+from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, autograde_one, place
+from semgrid_edu.workshop.course.nbgrader.failures import UngradedError, in_one_line
+from semgrid_edu.workshop.course.nbgrader.gradebook import (
+    Graded,
+    forget,
+    is_graded,
+    open_gradebook,
+    result_of,
+    unfinished,
+)
+from semgrid_edu.workshop.course.nbgrader.preprocessors import CRASHED
+from semgrid_edu.workshop.course.nbgrader.submissions import check_file, check_time, submissions
+from semgrid_edu.workshop.course.notebooks.build import write_notebook
+from semgrid_edu.workshop.course.sandbox.prepared import prepare, starter
+
+UNREADABLE = "unreadable"
+"""The folder with notebooks that stand in for files that can't be read."""
+
+
+def grade_course(
+    course: Path,
+    settings: GradeSettings,
+    assignments: Sequence[str] = (),
+    again: bool = False,
+    workers: int = 1,
+) -> Iterator[Graded]:
+    """Grade what was handed in and isn't graded yet; interrupted, it goes on when it is called again.
+
+    Parameters
+    ----------
+    course : Path
+        A course that `build_course` wrote.
+    settings : GradeSettings
+        How.
+    assignments : sequence of str
+        Only these; all when empty.
+    again : bool
+        Whether to grade also what is graded already.
+    workers : int
+        How many submissions are graded at the same time.
+
+    Yields
+    ------
+    Graded
+        One submission after the other, as they end.
+
+    Raises
+    ------
+    DataError
+        When the folder is no course.
+    ArgumentError
+        When there is no such assignment.
+    UngradedError
+        In the end, when submissions stay ungraded for a reason that isn't theirs; it names them, one a line.
+    """
+    course = course.resolve()
+    wanted = [one for one in submissions(course, assignments) if again or not is_graded(course, *one)]
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+        try:
+            failed = _failing_references(pool, course, settings, [assignment for assignment, _ in wanted])
+            ready = [one for one in wanted if one[0] not in failed]
+            waiting = {pool.submit(grade_one, course, *one, settings): one for one in ready}
+            yield from _as_they_end(course, waiting, failed)
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    if failed:
+        raise UngradedError("\n".join(f"{which}: {says}" for which, says in failed.items()))
+
+
+def _as_they_end(course: Path, waiting: dict[Future, tuple[str, str]], failed: dict[str, str]) -> Iterator[Graded]:
+    """Yield results; tell of submissions that have none, since their grading failed or its process was ended."""
+    for done in tqdm(as_completed(waiting), "submissions", len(waiting)):
+        try:
+            yield done.result()
+        except Exception as error:
+            forget(course, *waiting[done])
+            failed[", ".join(reversed(waiting[done]))] = in_one_line(error)
+
+
+def _failing_references(
+    pool: ProcessPoolExecutor, course: Path, settings: GradeSettings, assignments: Sequence[str]
+) -> dict[str, str]:
+    """Grade the reference answers of exercises; return what is wrong, by exercise, where they fail."""
+    trials = {
+        name: pool.submit(prepare, course, name, settings.memory, settings.container)
+        for name in dict.fromkeys(assignments)
+    }
+    errors = {name: trial.exception() for name, trial in trials.items()}
+    return {name: in_one_line(error) for name, error in errors.items() if error is not None}
+
+
+def missing_limits(settings: GradeSettings) -> list[str]:
+    """Start a process as students' code gets it, and return what can't be limited.
+
+    Parameters
+    ----------
+    settings : GradeSettings
+        How a class is graded.
+
+    Returns
+    -------
+    list of str
+        Of `limits.PARTS`; empty with a container, whose own command says what is limited.
+
+    Raises
+    ------
+    OSError
+        When the process or the container doesn't start.
+    """
+    with tempfile.TemporaryDirectory() as nothing:
+        process = starter(settings.memory, settings.container)(Path(nothing))
+        process.stop()
+    return process.unlimited
+
+
+def grade_one(course: Path, assignment: str, student: str, settings: GradeSettings) -> Graded:
+    """Grade one submission; a file that can't be read is graded as an empty one, and the note says so.
+
+    Parameters
+    ----------
+    course : Path
+        The course.
+    assignment, student : str
+        Whose submission.
+    settings : GradeSettings
+        How.
+
+    Returns
+    -------
+    Graded
+        The result.
+
+    Raises
+    ------
+    UngradedError
+        When grading fails for a reason that isn't the submission's; it then has no grade.
+    """
+    if has_magic(student):
+        note = f"{CRASHED}nbgrader takes * ? [ in a student's name for a pattern: rename the folder"
+        return Graded(student, assignment, 0, 0, 0, note)
+    try:
+        with unfinished(course, assignment, student):
+            if fault := _graded_or_fault(course, assignment, student, settings):
+                _grade_stand_in(course, assignment, student, settings, f"{CRASHED}the file can't be graded: {fault}")
+            return result_of(course, assignment, student)
+    except Exception as error:
+        raise UngradedError(in_one_line(error)) from error
+
+
+def _graded_or_fault(course: Path, assignment: str, student: str, settings: GradeSettings) -> str:
+    """Grade a submission; return what is wrong with its file, "" when it has been graded."""
+    path = place(course, "submitted", student, assignment)
+    check_time(path)
+    try:
+        check_file(path)
+        autograde_one(course, assignment, student, settings)
+    except DataError as error:
+        return error.args[2] if error.path == path else in_one_line(error)
+    return ""
+
+
+def _grade_stand_in(course: Path, assignment: str, student: str, settings: GradeSettings, note: str) -> None:
+    """Grade the exercise as students get it in place of a file that can't be graded; say so in the gradebook."""
+    _stand_in(course, assignment, student, note)
+    autograde_one(course, assignment, student, settings, UNREADABLE)
+    with open_gradebook(course) as gradebook:
+        for comment in gradebook.find_submission_notebook(assignment, assignment, student).comments:
+            comment.auto_comment = note
+        gradebook.db.commit()
+
+
+def _stand_in(course: Path, assignment: str, student: str, note: str) -> None:
+    """Write the exercise as students get it, with a note, in place of a file that can't be graded."""
+    notebook = nbformat.read(course / "release" / assignment / f"{assignment}.ipynb", as_version=4)
+    notebook.cells.insert(0, new_markdown_cell(f"**{note}**"))
+    write_notebook(notebook, place(course, UNREADABLE, student, assignment))

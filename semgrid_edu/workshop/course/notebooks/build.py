@@ -1,0 +1,241 @@
+"""Notebooks from percent sources: stable cell ids, executed lectures, and no traces of a machine in the file."""
+
+import hashlib
+from pathlib import Path
+
+import jupytext
+import nbformat
+from nbclient import NotebookClient
+from nbformat import NotebookNode
+
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.storage.files import write_text
+from semgrid_edu.storage.provenance import shipped_folder
+from semgrid_edu.workshop.course.notebooks.figures import finish_figures
+
+NOTEBOOKS = shipped_folder("notebooks")
+"""The lectures and exercises. A wheel holds the sources of the exercises and the instructor's part alone."""
+
+METADATA = {
+    "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
+    "language_info": {"name": "python"},
+}
+"""What a notebook says about where it ran: on any Python 3."""
+
+LIVE = "application/vnd.jupyter.widget-view+json"
+"""The output of a widget. It works only with a kernel, and its name is random."""
+
+
+def lecture_sources(folder: Path = NOTEBOOKS) -> list[Path]:
+    """Return the percent sources of all lectures, in the order of the course.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder of notebooks.
+
+    Returns
+    -------
+    list of Path
+        The files `src/NN_name.py`.
+
+    Raises
+    ------
+    DataError
+        When there are no lectures, as in an installed wheel.
+    """
+    sources = sorted((folder / "src").glob("[0-9][0-9]_*.py"))
+    if not sources:
+        raise DataError(folder / "src", "lectures named NN_name.py (run this in a checkout of the project)", "none")
+    return sources
+
+
+def companion_sources(folder: Path = NOTEBOOKS) -> list[Path]:
+    """Return the percent sources of all companion notebooks.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder of notebooks.
+
+    Returns
+    -------
+    list of Path
+        The files `src/deeper/NAME.py`, sorted by name; there may be none.
+    """
+    return sorted((folder / "src" / "deeper").glob("*.py"))
+
+
+def notebook_name(source: Path) -> str:
+    """Return the name of a source's notebook, such as "03_bof", "exercises/03_bof" or "deeper/graphical_models".
+
+    Parameters
+    ----------
+    source : Path
+        A percent source in the folder `src` or below it.
+
+    Returns
+    -------
+    str
+        The path of the source within `src`, without its suffix.
+    """
+    sources = next(folder for folder in source.parents if folder.name == "src")
+    return source.relative_to(sources).with_suffix("").as_posix()
+
+
+def built_path(source: Path) -> Path:
+    """Return the path of a source's notebook: that of the source without `src`.
+
+    Parameters
+    ----------
+    source : Path
+        A percent source in the folder `src` or below it.
+
+    Returns
+    -------
+    Path
+        The notebook; it needn't exist yet.
+
+    Examples
+    --------
+    >>> built_path(Path("notebooks/src/deeper/graphical_models.py")).as_posix()
+    'notebooks/deeper/graphical_models.ipynb'
+    """
+    sources = next(folder for folder in source.parents if folder.name == "src")
+    return sources.parent / f"{notebook_name(source)}.ipynb"
+
+
+def named(sources: list[Path], names: list[str] | None) -> list[Path]:
+    """Return the sources with the given names; all of them when no name is given.
+
+    Parameters
+    ----------
+    sources : list of Path
+        The sources to choose from. A lecture and its exercise have the same name, and are chosen together.
+    names : list of str, optional
+        The names to keep, such as "03_bof" or "graphical_models".
+
+    Returns
+    -------
+    list of Path
+        The chosen sources, in their order.
+
+    Raises
+    ------
+    ArgumentError
+        When no source has one of the names.
+    """
+    known = sorted({source.stem for source in sources})
+    for name in names or []:
+        if name not in known:
+            raise ArgumentError("names", f"some of {', '.join(known)}", name)
+    return [source for source in sources if not names or source.stem in names]
+
+
+def read_percent(path: Path) -> NotebookNode:
+    """Read a percent source as a notebook that has not run.
+
+    Parameters
+    ----------
+    path : Path
+        A jupytext source in percent format.
+
+    Returns
+    -------
+    NotebookNode
+        The notebook. The ids of its cells depend on the cells' text alone, so two conversions are equal byte for byte.
+
+    Raises
+    ------
+    DataError
+        When there is no such file.
+    """
+    if not path.is_file():
+        raise DataError(path, "a percent source", "no file")
+    notebook = jupytext.reads(path.read_text(encoding="utf-8"), fmt="py:percent")
+    notebook.metadata = nbformat.from_dict(METADATA)
+    notebook.nbformat, notebook.nbformat_minor = 4, 5
+    taken: dict[str, int] = {}
+    for cell in notebook.cells:
+        digest = hashlib.sha256(f"{cell.cell_type}\n{cell.source}".encode()).hexdigest()[:8]
+        taken[digest] = taken.get(digest, 0) + 1
+        cell.id = digest if taken[digest] == 1 else f"{digest}-{taken[digest]}"
+    return notebook
+
+
+def write_notebook(notebook: NotebookNode, path: Path) -> None:
+    """Validate a notebook and write it atomically.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        The notebook.
+    path : Path
+        The file to write; its folder is made when missing.
+    """
+    write_text(path, notebook_text(notebook))
+
+
+def notebook_text(notebook: NotebookNode) -> str:
+    """Validate a notebook, and return the text of its file.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        The notebook.
+    """
+    nbformat.validate(notebook)
+    return nbformat.writes(notebook)
+
+
+def execute(notebook: NotebookNode, folder: Path, timeout: int = 300) -> NotebookNode:
+    """Run all cells, and keep the outputs that can be seen without a kernel.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        The notebook to run, changed in place.
+    folder : Path
+        The kernel's working directory: the folder in which a student would run the notebook.
+    timeout : int
+        The longest that one cell may take, seconds.
+
+    Returns
+    -------
+    NotebookNode
+        The same notebook, with outputs. The views of widgets are left out, because they show nothing without a kernel.
+        Figures are made smaller where the eye can't tell the difference, and carry the alternative text of their cell.
+
+    Raises
+    ------
+    nbclient.exceptions.CellExecutionError
+        When a cell raises an error; the message names the cell.
+    """
+    place = {"metadata": {"path": folder}}
+    client = NotebookClient(notebook, timeout=timeout, record_timing=False, resources=place)
+    client.execute()
+    for cell in notebook.cells:
+        if cell.cell_type == "code":
+            cell.outputs = [output for output in cell.outputs if LIVE not in output.get("data", {})]
+            finish_figures(cell)
+    notebook.metadata = nbformat.from_dict(METADATA)
+    return notebook
+
+
+def build_lecture(source: Path) -> Path:
+    """Execute a lecture or a companion and write it.
+
+    Parameters
+    ----------
+    source : Path
+        Its percent source.
+
+    Returns
+    -------
+    Path
+        The notebook written, at `built_path`.
+    """
+    target = built_path(source)
+    target.parent.mkdir(exist_ok=True)
+    write_notebook(execute(read_percent(source), target.parent), target)
+    return target

@@ -1,0 +1,271 @@
+"""Rules that protect the reader of a notebook: honest minutes, no answer in sight, figures that everybody can read.
+
+Which lectures may break which rules until their second edition: a list that only gets shorter.
+"""
+
+import ast
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping
+
+from nbformat import NotebookNode
+
+from semgrid_edu.plotting import FIGURE_DPI, MAX_ANIMATION_BYTES
+from semgrid_edu.workshop.course.notebooks.figures import PNG, alternative_text, figures, moves, png_bytes, resolution
+from semgrid_edu.workshop.course.notebooks.minutes import PREDICTION, reading_time, stated_minutes
+
+MAX_MINUTES = 75
+"""The longest that a lecture's main path may take."""
+
+MIN_ALT_WORDS = 4
+"""An alternative text with fewer words than this doesn't describe a figure."""
+
+HEADING = re.compile(r"^#{1,6} ", re.MULTILINE)
+
+
+def dishonest_minutes(notebook: NotebookNode) -> list[str]:
+    """Report a header that states fewer minutes than `reading_time` computes.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        An executed notebook.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem; empty when there is none.
+    """
+    needed, stated = round(reading_time(notebook).minutes), stated_minutes(notebook)
+    if stated is None or stated >= needed:
+        return []
+    return [f"states {stated} minutes and takes {needed}; `semgrid-edu course minutes NAME` tells where they go"]
+
+
+def too_long(notebook: NotebookNode) -> list[str]:
+    """Report a lecture of more than `MAX_MINUTES` minutes.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        An executed notebook.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem; empty when there is none.
+    """
+    needed = round(reading_time(notebook).minutes)
+    if needed <= MAX_MINUTES:
+        return []
+    return [f"takes {needed} minutes, more than {MAX_MINUTES}; move what is beside the path to a companion"]
+
+
+def answers_in_sight(notebook: NotebookNode) -> list[str]:
+    """Report a cell that shows the answer to a prediction before the reader has asked for it.
+
+    The answer is taken to be the first code cell with output below the prediction. If a heading comes before that
+    cell, the prediction has only its folded answer.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        An executed notebook.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem; empty when there is none.
+    """
+    problems, open_question = [], False
+    for cell in notebook.cells:
+        if cell.cell_type == "markdown":
+            _, asked, after = cell.source.rpartition(PREDICTION)
+            open_question = (open_question or bool(asked)) and not HEADING.search(after)
+        elif open_question and cell.outputs:
+            open_question = False
+            if not _collapsed(cell, "outputs_hidden"):
+                remedy = 'give it jupyter={"outputs_hidden": true}'
+                problems.append(f"cell {_first_line(cell)} shows the answer to a prediction; {remedy}")
+    return problems
+
+
+def plot_code_in_sight(notebook: NotebookNode) -> list[str]:
+    """Report plot code that isn't collapsed: a cell with a figure that defines, asserts and prints nothing.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        An executed notebook.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem; empty when there is none.
+    """
+    return [
+        f'cell {_first_line(cell)} only plots; give it jupyter={{"source_hidden": true}}'
+        for cell in _cells_with_figures(notebook)
+        if _only_plots(cell.source) and not _collapsed(cell, "source_hidden")
+    ]
+
+
+def missing_alternative_texts(notebook: NotebookNode) -> list[str]:
+    """Report a figure whose alternative text is missing or too short to describe it.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        An executed notebook.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem; empty when there is none.
+    """
+    problems = []
+    for cell in _cells_with_figures(notebook):
+        for figure in figures(cell):
+            words = len(alternative_text(cell, figure).split())
+            if words < MIN_ALT_WORDS:
+                found = f"one of {words} words" if words else "none"
+                problems.append(
+                    f'the figure of cell {_first_line(cell)} needs an alternative text, alt="...", has {found}'
+                )
+    return problems
+
+
+def coarse_figures(notebook: NotebookNode) -> list[str]:
+    """Report figures of fewer dots per inch than `FIGURE_DPI`.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        An executed notebook.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem; empty when there is none.
+    """
+    problems = []
+    for cell in _cells_with_figures(notebook):
+        for figure in figures(cell):
+            dpi = resolution(png_bytes(figure)) if PNG in figure.data else None
+            if dpi is not None and dpi < FIGURE_DPI:
+                problems.append(f"the figure of cell {_first_line(cell)} has {dpi} dots per inch, not {FIGURE_DPI}")
+    return problems
+
+
+def unfit_animations(notebook: NotebookNode) -> list[str]:
+    """Report animations of more than `MAX_ANIMATION_BYTES`, and kinds of images that only JupyterLab shows.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        An executed notebook.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem; empty when there is none.
+    """
+    problems = []
+    for cell in _cells_with_figures(notebook):
+        for figure in figures(cell):
+            for kind in {"image/gif", "image/webp"} & set(figure.data):
+                problems.append(
+                    f"cell {_first_line(cell)} shows {kind}, which nbconvert leaves out; use plotting.animate"
+                )
+            if PNG in figure.data and moves(png := png_bytes(figure)) and len(png) > MAX_ANIMATION_BYTES:
+                limit = f"{MAX_ANIMATION_BYTES // 1000} kB"
+                problems.append(
+                    f"the animation of cell {_first_line(cell)} has {len(png) // 1000} kB, more than {limit}"
+                )
+    return problems
+
+
+Rule = Callable[[NotebookNode], list[str]]
+"""A function that takes an executed notebook and returns what is wrong, one sentence per problem."""
+
+RULES: dict[str, Rule] = {
+    "minutes": dishonest_minutes,
+    "length": too_long,
+    "predictions": answers_in_sight,
+    "plot code": plot_code_in_sight,
+    "alternative texts": missing_alternative_texts,
+    "resolution": coarse_figures,
+    "animations": unfit_animations,
+}
+"""All rules, by the names that `exceptions.py` uses."""
+
+
+def _cells_with_figures(notebook: NotebookNode) -> Iterator[NotebookNode]:
+    """Yield the cells that show a figure."""
+    yield from (cell for cell in notebook.cells if next(figures(cell), None))
+
+
+def _collapsed(cell: NotebookNode, what: str) -> bool:
+    """Return whether JupyterLab hides a cell's source or its outputs."""
+    return cell.metadata.get("jupyter", {}).get(what, False)
+
+
+def _only_plots(source: str) -> bool:
+    """Return whether code neither defines nor asserts nor prints anything; False for magics, which aren't Python."""
+    try:
+        nodes = list(ast.walk(ast.parse(source)))
+    except SyntaxError:
+        return False
+    calls = [ast.unparse(node.func) for node in nodes if isinstance(node, ast.Call)]
+    speaks = any(call == "print" or "assert" in call for call in calls)
+    return not speaks and not any(isinstance(n, ast.FunctionDef | ast.ClassDef | ast.Assert) for n in nodes)
+
+
+def _first_line(cell: NotebookNode) -> str:
+    """Name a cell by its first line."""
+    return f"'{cell.source.strip().splitlines()[0][:60]}'"
+
+
+NOT_YET = frozenset({"predictions", "plot code", "alternative texts", "resolution"})
+
+EXCEPTIONS: Mapping[str, frozenset[str]] = {
+    "00_tour": NOT_YET,
+    "01_bayes": frozenset({"alternative texts"}),
+    "02_grids": NOT_YET - {"resolution"} | {"length"},
+    "03_bof": NOT_YET - {"resolution"} | {"length"},
+    "04_cmcdot": NOT_YET | {"length"},
+    "05_pixels": NOT_YET | {"length"},
+    "06_planes": NOT_YET | {"length"},
+    "07_segmentation": NOT_YET | {"length"},
+    "08_fusion": NOT_YET | {"length"},
+}
+"""The rules that each lecture may break, by their names in `RULES`. An exception that isn't needed is a problem too."""
+
+
+def rule_problems(
+    notebook: NotebookNode, rules: Mapping[str, Rule] = RULES, allowed: Collection[str] = ()
+) -> list[str]:
+    """List where a notebook breaks a rule without having an exception, and the exceptions that it no longer needs.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        An executed notebook.
+    rules : mapping of str to Rule
+        The rules to check, by name.
+    allowed : collection of str
+        Names of the rules that this notebook may break.
+
+    Returns
+    -------
+    list of str
+        One sentence per problem; empty when there is none.
+    """
+    problems = []
+    for name, rule in rules.items():
+        found = rule(notebook)
+        if name in allowed and not found:
+            problems.append(
+                f"keeps the rule on {name}; take its exception out of semgrid_edu/workshop/course/notebooks/rules.py"
+            )
+        problems += [] if name in allowed else found
+    return problems

@@ -1,0 +1,237 @@
+"""The grader's side of one student's process: starts it, asks it, and ends it when it takes too long."""
+
+import os
+import queue
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.storage.files import atomic_path
+from semgrid_edu.workshop.course.sandbox.limits import (
+    MEGABYTE,
+    PARTS,
+    Limits,
+    delete,
+    takes_too_much,
+    threads_of_this_user,
+)
+from semgrid_edu.workshop.course.sandbox.values import Wire, decode, encode
+
+WORKER = (sys.executable, "-m", "semgrid_edu.workshop.course.sandbox.worker")
+
+ALONE = ("unshare", "--user", "--map-current-user", "--net", "--ipc", "--pid", "--mount-proc", "--fork", "--kill-child")
+"""Starts a program that sees no network and no processes but its own (util-linux; needs no privileges)."""
+
+KEPT = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT")
+"""What a student's process inherits of the environment."""
+
+WATCHED = 0.5
+"""Seconds from one look at the files of a process to the next."""
+
+STARTED = 60.0
+"""Seconds that a process may take to start."""
+
+
+class ProcessEndedError(Exception):
+    """A student's process is no more: it ended itself, or was ended because it took too long."""
+
+
+class StudentProcess:
+    """A process of its own for one student's code, in a fresh folder.
+
+    Parameters
+    ----------
+    limits : Limits
+        How much it may take; its number of processes is added to those that the user has now.
+    prepared : Path
+        A folder that is copied into the fresh one: functions that are compiled already, and fonts.
+    keeps : bool
+        Whether what is compiled in the fresh folder goes back to that folder in the end: for trusted code alone.
+    container : tuple of str
+        A command before the worker's that starts it in a container, such as ("docker", "run", ...); otherwise it is
+        started in namespaces of its own where the system can.
+
+    Raises
+    ------
+    ChildProcessError
+        When the process ends, or stays silent, before any code of a student has run in it.
+
+    Attributes
+    ----------
+    unlimited : list of str
+        Of `PARTS` what could not be limited. A container is taken to limit everything.
+    """
+
+    def __init__(self, limits: Limits, prepared: Path, keeps: bool = False, container: tuple[str, ...] = ()) -> None:
+        self.prepared, self.keeps = prepared, keeps
+        self.folder = Path(tempfile.mkdtemp(prefix="semgrid-answers-"))
+        shutil.copytree(prepared, self.folder / "prepared", dirs_exist_ok=True)
+        alone = () if container or not _can_be_alone() else ALONE
+        self.process = subprocess.Popen(
+            [*container, *alone, *(_in_container() if container else WORKER)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            cwd=self.folder,
+            env=self._environment(),
+            start_new_session=True,
+        )
+        self.wire = Wire(self.process.stdout, self.process.stdin)
+        self.sent: queue.Queue[bytes | None] = queue.Queue()
+        self.received: queue.Queue[bytes | None] = queue.Queue()
+        self.speaker = threading.Thread(target=self._speak, daemon=True)
+        self.speaker.start()
+        threading.Thread(target=self._watch, args=(3 * limits.written * MEGABYTE,), daemon=True).start()
+        self.unlimited = self._greeted(limits, alone, container)
+
+    def _greeted(self, limits: Limits, alone: tuple[str, ...], container: tuple[str, ...]) -> list[str]:
+        """Wait for the first reply; return what could not be limited."""
+        try:
+            if not container:
+                return self._limit(limits, alone)
+            self.ask({"do": "names", "wanted": []}, time.monotonic() + STARTED)
+            return []
+        except (ProcessEndedError, TimeoutError):
+            told = f"no Python that answers was started by: {shlex.join(container or WORKER)}"
+            raise ChildProcessError(told) from None
+        except KeyboardInterrupt:
+            self.stop()
+            raise
+
+    def _limit(self, limits: Limits, alone: tuple[str, ...]) -> list[str]:
+        """Let the process limit itself; return what it couldn't."""
+        limits = replace(limits, processes=limits.processes + threads_of_this_user())
+        message = {"do": "limit", "limits": asdict(limits), "folder": str(self.folder)}
+        done = self.ask(message, time.monotonic() + STARTED)["done"] + (["network", "signals"] if alone else [])
+        return [part for part in PARTS if part not in done]
+
+    def _environment(self) -> dict[str, str]:
+        """Return the environment of the process: one thread for each library, and all caches in its own folder."""
+        here = {name: str(self.folder / "prepared") for name in ("NUMBA_CACHE_DIR", "MPLCONFIGDIR")}
+        here |= {name: str(self.folder) for name in ("HOME", "TMPDIR", "IPYTHONDIR")}
+        threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+        inline = {"MPLBACKEND": "module://matplotlib_inline.backend_inline", "PYTHONDONTWRITEBYTECODE": "1"}
+        return {name: os.environ[name] for name in KEPT if name in os.environ} | here | threads | inline
+
+    def _speak(self) -> None:
+        """Send what is to be sent, and receive a reply to each; None stands for a process that is no more.
+
+        A thread does it, because neither a full pipe nor a silent process may hold up the grader for ever.
+        """
+        while (data := self.sent.get()) is not None:
+            try:
+                self.wire.send(data)
+                self.received.put(self.wire.receive())
+            except (OSError, ValueError, MemoryError):
+                self.received.put(None)
+
+    def _watch(self, most: int) -> None:
+        """End the process when all its files together become too large, or too many."""
+        while self.process.poll() is None:
+            if takes_too_much(self.folder, most):
+                self._kill()
+            time.sleep(WATCHED)
+
+    def _kill(self) -> None:
+        """End the process and those in its session."""
+        with suppress(OSError):
+            os.killpg(self.process.pid, signal.SIGKILL) if hasattr(os, "killpg") else self.process.kill()
+
+    def ask(self, message: dict, deadline: float, callbacks: list[Callable] | None = None) -> dict[str, Any]:
+        """Send a message and return the reply.
+
+        Parameters
+        ----------
+        message : dict
+            What `Worker` takes.
+        deadline : float
+            When the reply must be here, `time.monotonic()` seconds.
+        callbacks : list of callable, optional
+            Takes the functions in the message; the process may call them before it replies.
+
+        Returns
+        -------
+        dict
+            The reply.
+
+        Raises
+        ------
+        TimeoutError
+            When there was none in time. The process has been ended.
+        ProcessEndedError
+            When the process is no more, or sends what is no message.
+        """
+        callbacks = [] if callbacks is None else callbacks
+        data = encode(message, callbacks)
+        while True:
+            reply = self._exchange(data, deadline, callbacks)
+            if "callback" not in reply:
+                return reply
+            data = encode(_called(callbacks, reply))
+
+    def _exchange(self, data: bytes, deadline: float, callbacks: list[Callable]) -> dict[str, Any]:
+        """Send bytes, and return what comes back."""
+        self.sent.put(data)
+        try:
+            received = self.received.get(timeout=max(deadline - time.monotonic(), 0))
+        except queue.Empty:
+            self.stop()
+            raise TimeoutError from None
+        try:
+            return dict(decode(received or b"", callbacks.__getitem__))
+        except (ArgumentError, TypeError, ValueError):
+            self.stop()
+            raise ProcessEndedError from None
+
+    def stop(self) -> None:
+        """End the process with all that it has started, and delete its folder."""
+        self.sent.put(None)
+        self._kill()
+        self.process.wait()
+        self.speaker.join(timeout=1)
+        if not self.speaker.is_alive():
+            for pipe in (self.process.stdin, self.process.stdout):
+                with suppress(OSError):
+                    pipe.close()
+        if self.keeps:
+            shutil.copytree(self.folder / "prepared", self.prepared, copy_function=_replace, dirs_exist_ok=True)
+        delete(self.folder)
+
+
+def _replace(source: str, target: str) -> None:
+    """Copy a file, so that nobody who reads the old one meanwhile gets half of the new."""
+    with atomic_path(target) as path:
+        shutil.copyfile(source, path)
+
+
+def _called(callbacks: list[Callable], reply: dict) -> dict[str, Any]:
+    """Work out a function for the student's process."""
+    try:
+        return {"result": callbacks[reply["callback"]](*reply["arguments"], **reply["named"])}
+    except Exception as error:
+        return {"error": f"{type(error).__name__}: {error}"}
+
+
+def _in_container() -> tuple[str, ...]:
+    """Return how a container's own Python starts the worker."""
+    return ("python", *WORKER[1:])
+
+
+@cache
+def _can_be_alone() -> bool:
+    """Return whether this system lets a program have namespaces of its own."""
+    if shutil.which(ALONE[0]) is None:
+        return False
+    return subprocess.run([*ALONE, "true"], capture_output=True, check=False).returncode == 0

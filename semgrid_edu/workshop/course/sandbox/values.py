@@ -1,0 +1,276 @@
+"""Plain values as bytes: what may pass between a student's process and the grader's. Never a pickle.
+
+A message is one line of JSON and, behind it, the bytes of its arrays. Reading one makes numbers, texts, containers,
+arrays and a few of the package's own records, and runs nothing that the sender wrote.
+
+What a function changed in its arguments, carried over to those of the caller.
+
+Messages between two processes: each is its length in eight bytes, then its bytes.
+"""
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from importlib import import_module
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import ArgumentError
+
+LONGEST = 200_000_000
+"""Bytes of a message that are still read."""
+
+
+class Wire:
+    """Both directions of a connection.
+
+    Parameters
+    ----------
+    incoming, outgoing : binary file
+        The two pipes.
+    """
+
+    def __init__(self, incoming: BinaryIO, outgoing: BinaryIO) -> None:
+        self.incoming, self.outgoing = incoming, outgoing
+
+    def send(self, message: bytes) -> None:
+        """Send a message.
+
+        Parameters
+        ----------
+        message : bytes
+            The message.
+        """
+        self.outgoing.write(len(message).to_bytes(8, "big") + message)
+        self.outgoing.flush()
+
+    def receive(self) -> bytes | None:
+        """Return the next message; None when the other side has hung up, or sends what is no message."""
+        head = self.incoming.read(8)
+        length = int.from_bytes(head, "big")
+        if len(head) < 8 or length > LONGEST:
+            return None
+        message = self.incoming.read(length)
+        return message if len(message) == length else None
+
+
+def put_back(original: Any, changed: Any) -> Any:
+    """Change a value, as far as it can be changed in place, into what a copy of it became.
+
+    Parameters
+    ----------
+    original : object
+        What the caller holds: its arrays, lists and dicts are changed.
+    changed : object
+        The copy.
+
+    Returns
+    -------
+    object
+        `original` where it could be changed, otherwise `changed`.
+
+    Examples
+    --------
+    >>> inner = np.zeros(2)
+    >>> put_back([inner, 1], [np.ones(2), 2, 3])
+    [array([1., 1.]), 2, 3]
+    >>> inner
+    array([1., 1.])
+    """
+    if type(original) is not type(changed):
+        return changed
+    if isinstance(original, np.ndarray) and original.shape == changed.shape and original.flags.writeable:
+        original[...] = changed
+    elif isinstance(original, list):
+        original[:] = [*map(put_back, original, changed), *changed[len(original) :]]
+    elif isinstance(original, dict):
+        now = {key: put_back(original[key], value) if key in original else value for key, value in changed.items()}
+        original.clear()
+        original.update(now)
+    elif isinstance(original, tuple):
+        return tuple(map(put_back, original, changed))
+    else:
+        return changed
+    return original
+
+
+RECORDS = (
+    "semgrid_edu.grid.GridSpec",
+    "semgrid_edu.graphical.factor.Factor",
+    "semgrid_edu.camera.Camera",
+    "semgrid_edu.frame.Frame",
+    "semgrid_edu.frame.FrameLabels",
+    "semgrid_edu.labels.LabelSet",
+)
+"""The package's records that pass; the last part is the class."""
+
+KINDS = "?biufcUS"
+"""The kinds of array that pass, numpy's letters: booleans, numbers and texts."""
+
+
+MOST_BYTES = 150_000_000
+"""Bytes of all arrays of a message."""
+
+MOST_JSON = 20_000_000
+"""Bytes of a message outside its arrays: lists of a million numbers, and what the grader can hold a hundred times."""
+
+MOST_KEYS = 20_000
+"""Entries of a set or dict: keys chosen so that all collide take the square of their number to put in."""
+
+
+class NotPlainError(TypeError):
+    """A value that can't pass."""
+
+
+def encode(value: Any, callbacks: list[Callable] | None = None) -> bytes:
+    """Turn a value into bytes.
+
+    Parameters
+    ----------
+    value : object
+        None, a boolean, number or text; a list, tuple, set or dict of such; an array of these, or what numpy makes an
+        array of (a tensor, a table); one of `RECORDS`.
+    callbacks : list of callable, optional
+        Takes the functions within `value`; the other side gets their numbers. Without it a function can't pass.
+
+    Returns
+    -------
+    bytes
+        For `decode`.
+
+    Raises
+    ------
+    NotPlainError
+        When a part of the value is something else.
+    """
+    arrays: list[NDArray] = []
+    tree = _tree(value, arrays, callbacks)
+    head = json.dumps({"value": tree, "arrays": [[array.dtype.str, array.shape] for array in arrays]})
+    if len(head) > MOST_JSON or sum(array.nbytes for array in arrays) > MOST_BYTES:
+        raise NotPlainError("more than can be sent: is it as long as it should be, and an array rather than a list?")
+    return b"".join([head.encode(), b"\n", *(array.tobytes() for array in arrays)])
+
+
+def decode(data: bytes, callback: Callable[[int], Callable] | None = None) -> Any:
+    """Turn bytes into the value from which `encode` made them.
+
+    Parameters
+    ----------
+    data : bytes
+        The message.
+    callback : callable, optional
+        Turns the number of a function into a function to call in its place.
+
+    Returns
+    -------
+    object
+        The value. An array is a plain one, with memory of its own.
+
+    Raises
+    ------
+    ArgumentError
+        When the bytes are no such message.
+    """
+    head, _, rest = data.partition(b"\n")
+    try:
+        if len(head) > MOST_JSON:
+            raise ValueError(f"{len(head)} bytes of JSON")
+        message = json.loads(head)
+        arrays = _arrays(message["arrays"], rest)
+        return _value(message["value"], arrays, callback)
+    except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError, MemoryError) as error:
+        raise ArgumentError("data", "a message of plain values", f"{type(error).__name__}: {error}") from error
+
+
+def _tree(value: Any, arrays: list[NDArray], callbacks: list[Callable] | None) -> Any:
+    """Return a value as JSON holds it; its arrays are added to the list."""
+
+    def trees(values: Any) -> list:
+        return [_tree(one, arrays, callbacks) for one in values]
+
+    if value is None or type(value) in (bool, int, float, str):
+        return value
+    if type(value) is list:
+        return trees(value)
+    for kind in (int, float, str):
+        if isinstance(value, kind) and not isinstance(value, np.generic):
+            return kind(value)
+    if isinstance(value, set | frozenset | dict) and len(value) > MOST_KEYS:
+        raise NotPlainError(f"a {type(value).__name__} of {len(value)} entries, more than {MOST_KEYS}")
+    for kind in (tuple, set, frozenset):
+        if isinstance(value, kind):
+            return {kind.__name__: trees(value)}
+    if isinstance(value, dict):
+        return {"dict": [trees(pair) for pair in value.items()]}
+    if _path(value) in RECORDS:
+        return {"record": _path(value), "fields": trees(getattr(value, field.name) for field in fields(value))}
+    if isinstance(value, np.generic | complex):
+        return {"scalar": _tree(np.array(value), arrays, callbacks)}
+    if callable(value) and callbacks is not None:
+        callbacks.append(value)
+        return {"function": len(callbacks) - 1}
+    return _array_tree(value, arrays, callbacks)
+
+
+def _array_tree(value: Any, arrays: list[NDArray], callbacks: list[Callable] | None) -> Any:
+    """Return what numpy takes for an array, as JSON holds it."""
+    if not isinstance(value, np.ndarray) and not hasattr(value, "__array__") and not isinstance(value, range | list):
+        raise NotPlainError(f"a {type(value).__name__} where numbers, texts, arrays, lists or dicts are expected")
+    array = np.asarray(value)
+    if array.dtype.kind == "O":
+        return {"objects": _tree(array.tolist(), arrays, callbacks)}
+    if array.dtype.kind not in KINDS:
+        raise NotPlainError(f"an array of {array.dtype}, where numbers, booleans or texts are expected")
+    arrays.append(array)
+    return {"array": len(arrays) - 1}
+
+
+def _path(value: Any) -> str | None:
+    """Return where the class of a record stands."""
+    return f"{type(value).__module__}.{type(value).__qualname__}" if is_dataclass(value) else None
+
+
+def _arrays(described: list, data: bytes) -> dict[int, NDArray]:
+    """Cut the bytes of a message into arrays, each of which may stand in one place of the value."""
+    found, start = [], 0
+    for text, shape in described:
+        dtype = np.dtype(text)
+        if dtype.kind not in KINDS or not all(type(n) is int and n >= 0 for n in shape):
+            raise ValueError(f"an array of {text} and shape {shape}")
+        end = start + dtype.itemsize * math.prod(shape)
+        if end > len(data):
+            raise ValueError(f"{len(data)} bytes where {end} are needed")
+        found.append(np.frombuffer(data[start:end], dtype).reshape(shape).copy())
+        start = end
+    return dict(enumerate(found))
+
+
+def _value(tree: Any, arrays: dict[int, NDArray], callback: Callable[[int], Callable] | None) -> Any:
+    """Return the value that a tree of JSON stands for."""
+    if isinstance(tree, list):
+        return [_value(one, arrays, callback) for one in tree]
+    if not isinstance(tree, dict):
+        return tree
+    kind, content = next(iter(tree.items()))
+    if kind == "array":
+        return arrays.pop(content)
+    if kind == "function":
+        return callback(content)
+    if kind == "record":
+        return _record(content, _value(tree["fields"], arrays, callback))
+    inner = _value(content, arrays, callback)
+    if kind in ("set", "frozenset", "dict") and len(inner) > MOST_KEYS:
+        raise ValueError(f"a {kind} of {len(inner)} entries")
+    makers = {"tuple": tuple, "set": set, "frozenset": frozenset, "dict": dict, "scalar": lambda array: array[()]}
+    return np.array(inner, dtype=object) if kind == "objects" else makers[kind](inner)
+
+
+def _record(path: str, values: list) -> Any:
+    """Return a record of the package."""
+    if path not in RECORDS:
+        raise ValueError(f"a record {path!r}")
+    module, _, name = path.rpartition(".")
+    return getattr(import_module(module), name)(*values)

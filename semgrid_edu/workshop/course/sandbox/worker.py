@@ -1,0 +1,231 @@
+"""A student's process: it runs cells as a notebook's kernel does, and calls the functions that they define.
+
+It is started as `python -m semgrid_edu.workshop.course.sandbox.worker` and speaks with the grader over its standard
+input and output. Whatever the student's code does in here, only plain values leave it (`values`).
+"""
+
+import linecache
+import os
+import sys
+import traceback
+import tracemalloc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from IPython.core.interactiveshell import InteractiveShell
+from IPython.utils.capture import RichOutput, capture_output
+from traitlets.config import Config
+
+from semgrid_edu.workshop.course.sandbox.limits import Limits, limit_this_process
+from semgrid_edu.workshop.course.sandbox.values import NotPlainError, Wire, decode, encode
+
+MOST_TEXT = 20_000
+"""Characters of a text that are kept."""
+
+MOST_SHOWN = 5_000_000
+"""Characters of all that a cell displays, pictures among it, that are kept."""
+
+
+class Shell(InteractiveShell):
+    """Runs cells as a notebook's kernel does, without a screen."""
+
+    def enable_gui(self, gui: str | None = None) -> None:
+        """Take no notice of a magic that asks for a screen.
+
+        Parameters
+        ----------
+        gui : str, optional
+            The screen.
+        """
+
+    def ask_exit(self) -> None:
+        """End the cell or call that says `exit()`."""
+        raise SystemExit
+
+    def system(self, cmd: str) -> None:
+        """Run a line that begins with "!", without the terminal that IPython gives it elsewhere.
+
+        Parameters
+        ----------
+        cmd : str
+            The line.
+        """
+        self.system_raw(cmd)
+
+
+class Worker:
+    """One student's notebook, cell by cell and call by call.
+
+    Parameters
+    ----------
+    wire : Wire
+        To the grader.
+    """
+
+    def __init__(self, wire: Wire) -> None:
+        quiet = Config(HistoryManager={"enabled": False}, InteractiveShell={"colors": "NoColor"})
+        self.wire = wire
+        self.shell = Shell.instance(config=quiet)
+        self.traceback: list[str] = []
+        self.shell._showtraceback = lambda kind, value, lines: self.traceback.extend(lines)
+
+    def serve(self) -> None:
+        """Answer the grader until it hangs up."""
+        while (data := self.wire.receive()) is not None:
+            message = decode(data, self._callback)
+            if message["do"] == "call":
+                message["sent"] = data
+            try:
+                # Functions that were given go back by their numbers, among arguments that were changed.
+                reply = encode(getattr(self, message.pop("do"))(**message), [])
+            except NotPlainError as error:
+                reply = encode({"error": _told(error)})
+            self.wire.send(reply)
+
+    def limit(self, limits: dict, folder: str) -> dict:
+        """Set limits; tell which are set.
+
+        Parameters
+        ----------
+        limits : dict
+            The fields of `Limits`.
+        folder : str
+            The only folder to which the student's code may write.
+        """
+        return {"done": limit_this_process(Limits(**limits), Path(folder))}
+
+    def run(self, code: str) -> dict:
+        """Run a cell; tell what it put out and the error that ended it.
+
+        Parameters
+        ----------
+        code : str
+            The cell.
+        """
+        self.traceback.clear()
+        with capture_output() as captured:
+            result = self.shell.run_cell(code)
+        error = result.error_before_exec or result.error_in_exec
+        found = {"streams": _streams(captured), "shown": _shown(captured.outputs)}
+        if error is not None:
+            found["error"] = _told(error) | {"traceback": [_text(line) for line in self.traceback]}
+        return found
+
+    def names(self, wanted: list[str]) -> dict:
+        """Tell which of these names are functions, and what the others are.
+
+        Parameters
+        ----------
+        wanted : list of str
+            The names.
+        """
+        known = {name: self.shell.user_ns[name] for name in wanted if name in self.shell.user_ns}
+        functions = [name for name, value in known.items() if callable(value)]
+        return {"functions": functions, "values": {n: v for n, v in known.items() if n not in functions and _passes(v)}}
+
+    def call(self, name: str, arguments: tuple, named: dict, measured: bool, sent: bytes) -> dict:
+        """Call a function; tell its result or error, what it printed, and what it changed in its arguments.
+
+        Parameters
+        ----------
+        name : str
+            The function.
+        arguments, named : tuple, dict
+            What it is called with.
+        measured : bool
+            Whether its memory is measured.
+        sent : bytes
+            The message in which the arguments came.
+        """
+        reply: dict[str, Any] = {}
+        with capture_output(display=False) as captured:
+            try:
+                with _traced(measured) as megabytes:
+                    reply["result"] = self.shell.user_ns[name](*arguments, **named)
+                    reply |= {"megabytes": megabytes()} if measured else {}
+                encode(reply["result"])
+            except BaseException as error:
+                reply = {"error": _told(error)}
+        before = decode(sent, self._callback)
+        if encode((before["arguments"], before["named"]), []) != encode((arguments, named), []):
+            reply["changed"] = arguments, named
+        return reply | {"streams": _streams(captured)}
+
+    def _callback(self, number: int) -> Callable:
+        """Return a function that is worked out by the grader."""
+
+        def call(*arguments: Any, **named: Any) -> Any:
+            self.wire.send(encode({"callback": number, "arguments": arguments, "named": named}))
+            reply = decode(self.wire.receive() or b"")
+            if "error" in reply:
+                raise ValueError(reply["error"])
+            return reply["result"]
+
+        return call
+
+
+def _passes(value: Any) -> bool:
+    """Return whether a value can be sent."""
+    try:
+        encode(value)
+    except NotPlainError:
+        return False
+    return True
+
+
+@contextmanager
+def _traced(measured: bool) -> Iterator[Callable[[], float]]:
+    """Measure memory, if asked to, and give a function that tells the most that was held, in megabytes."""
+    if measured:
+        tracemalloc.start()
+    try:
+        yield lambda: tracemalloc.get_traced_memory()[1] / 1e6
+    finally:
+        tracemalloc.stop()
+
+
+def _streams(captured: Any) -> dict[str, str]:
+    """Return what was printed."""
+    return {"stdout": _text(captured.stdout), "stderr": _text(captured.stderr)}
+
+
+def _text(text: str) -> str:
+    """Return the beginning of a text, with a question mark for what can't be written to a file."""
+    return text[:MOST_TEXT].encode("utf-8", "replace").decode()
+
+
+def _shown(outputs: list[RichOutput]) -> list[dict[str, str]]:
+    """Return what was displayed, as far as it is text or a picture in text, and not too much."""
+    kept, size = [], 0
+    for output in outputs:
+        data = {kind: data for kind, data in output.data.items() if isinstance(data, str)}
+        size += sum(map(len, data.values()))
+        if size > MOST_SHOWN:
+            break
+        kept.append(data)
+    return kept
+
+
+def _told(error: BaseException) -> dict[str, Any]:
+    """Return an error in plain values: its kind, the standard kind it is of, what it says, and where it was raised."""
+    kinds = [kind.__name__ for kind in type(error).__mro__ if kind.__module__ == "builtins"]
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename.startswith("<ipython")]
+    line = linecache.getline(frames[-1].filename, frames[-1].lineno).strip() if frames else ""
+    kind = type(error).__name__
+    return {"kind": kind, "standard": kinds[0], "says": _text(str(error)), "line": _text(line)[:200]}
+
+
+def _main() -> None:
+    """Speak over standard input and output, which the student's code doesn't get."""
+    wire = Wire(os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb"))
+    nothing = os.open(os.devnull, os.O_RDWR)
+    for stream in (0, 1, 2):
+        os.dup2(nothing, stream)
+    sys.path.insert(0, "")
+    Worker(wire).serve()
+
+
+if __name__ == "__main__":
+    _main()

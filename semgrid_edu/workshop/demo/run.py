@@ -1,0 +1,190 @@
+"""The demo: run every stage over every frame of a drive, then write the page and its picture.
+
+Which frames of a drive the demo runs over, and which of them its page shows.
+"""
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+from tqdm.auto import tqdm
+
+from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import LABEL_SETS
+from semgrid_edu.networks import load_net
+from semgrid_edu.pipeline import FrameResult, Stages, load_stages, run_side_by_side
+from semgrid_edu.storage.files import write_text
+from semgrid_edu.workshop.demo.comparison import Comparison
+from semgrid_edu.workshop.demo.details import StoryData
+from semgrid_edu.workshop.demo.overview import save_overview
+from semgrid_edu.workshop.demo.page import Summary, page_html
+from semgrid_edu.workshop.demo.record import Record
+
+SHOWN = 40
+"""Most frames that the page shows if nobody asks for more, evenly spaced, so that its size stays near 10 MB."""
+
+
+class ChosenFrames(NamedTuple):
+    """Frames of a drive.
+
+    Parameters
+    ----------
+    run : range
+        The numbers of those that every stage runs over; the filter needs each, also those that aren't shown.
+    shown : range
+        The numbers of those that the page shows, the first of `run` and then one in so many.
+    """
+
+    run: range
+    shown: range
+
+    @classmethod
+    def of(cls, n_frames: int, wanted: str | None = None) -> "ChosenFrames":
+        """Choose frames.
+
+        Parameters
+        ----------
+        n_frames : int
+            Number of frames of the drive, at least one.
+        wanted : str, optional
+            FIRST:LAST or FIRST:LAST:STEP. Frames from FIRST up to the one before LAST are run, as Python slices a list,
+            and one in STEP is shown. Each number may be left out. All frames by default, of which at most `SHOWN` are
+            shown if there is no STEP.
+
+        Returns
+        -------
+        ChosenFrames
+
+        Raises
+        ------
+        ArgumentError
+            When it isn't such a choice, or chooses no frame.
+
+        Examples
+        --------
+        >>> ChosenFrames.of(144, "40:120:2")
+        ChosenFrames(run=range(40, 120), shown=range(40, 120, 2))
+        >>> ChosenFrames.of(144).shown
+        range(0, 144, 4)
+        """
+        match = re.fullmatch(r"(\d*):(\d*)(?::(\d*))?", wanted or ":")
+        first, last, step = ((int(part) if part else None) for part in match.groups()) if match else (None, 0, None)
+        run = range(n_frames)[first:last]
+        if not run or step == 0:
+            expected = f"FIRST:LAST or FIRST:LAST:STEP with frames of 0 to {n_frames - 1}, such as 0:{n_frames}:2"
+            raise ArgumentError("--frames", expected, repr(wanted))
+        return cls(run, run[:: step or -(-len(run) // SHOWN)])
+
+    def told(self, n_frames: int) -> str:
+        """Say which frames are shown, as part of a sentence.
+
+        Parameters
+        ----------
+        n_frames : int
+            Number of frames of the drive.
+
+        Returns
+        -------
+        str
+            Empty when all are.
+        """
+        if len(self.shown) == n_frames:
+            return ""
+        rate = "" if self.shown.step == 1 else f"one in {self.shown.step} of "
+        return f" ({rate}frames {self.run[0]} to {self.run[-1]}; it has {n_frames})"
+
+
+STORIES = 200_000
+"""Most cells that have a story, in all frames together: one takes some 45 bytes of the page."""
+
+
+def write_demo(
+    drive: KittiRawDrive,
+    weights: str | Path,
+    out: str | Path,
+    stages: str | Path | None = None,
+    frames: str | None = None,
+) -> Path:
+    """Run every stage over a drive and write a page that shows it.
+
+    Parameters
+    ----------
+    drive : KittiRawDrive
+        The drive; it has to have camera images.
+    weights : path-like
+        The network's weights, as `save_net` wrote them.
+    out : path-like
+        The folder to write index.html and overview.png to; made when missing.
+    stages : path-like, optional
+        A Python file with a student's stages, as `load_stages` reads it. The page then shows a second run with these
+        stages beside the package's.
+    frames : str, optional
+        Which frames to run over and to show, such as "40:120:2", see `ChosenFrames.of`.
+
+    Returns
+    -------
+    Path
+        The page, index.html.
+
+    Raises
+    ------
+    ArgumentError
+        When the drive has no images, or not the frames that are asked for.
+    DataError
+        When a file of the drive, the weights or the stages can't be read. If it is a file of a later frame, the page
+        of the frames before it is written first.
+    StageError
+        When a stage of the file raises an error, or returns what the next one can't use.
+    """
+    chosen, net = ChosenFrames.of(len(drive), frames), load_net(weights, drive.camera)
+    own, yours, comparison = Stages.of(net, keep_steps=True), (), None
+    if stages is not None:
+        mine = load_stages(stages)
+        yours, comparison = (mine.over(own),), Comparison(Path(stages).name, mine.given)
+    Path(out).mkdir(parents=True, exist_ok=True)  # before the work, to refuse a bad folder at once
+    label_set = LABEL_SETS[net.architecture.label_set]
+    stories = _stories_every(len(chosen.shown), net.architecture.grid)
+    record = Record(net.architecture.grid, label_set, chosen.shown, comparison, net, stories)
+    results = run_side_by_side((drive[k] for k in chosen.run), own, *yours)
+    broken = _record_all(tqdm(results, total=len(chosen.run), desc=drive.folder.name, unit="frame"), record)
+    summary = Summary(
+        title=drive.folder.name,
+        choice=chosen.told(len(drive)),
+        broken=str(broken or ""),
+        spec=record.spec,
+        camera=drive.camera,
+        network_size=net.architecture.image_size,
+        classes=record.classes(),
+        metrics=record.metrics(),
+        labelled=record.labelled,
+        milliseconds=record.milliseconds(),
+        comparison=comparison,
+        your_milliseconds=record.your_milliseconds(),
+        story=StoryData.of(net, drive.camera, record.layout),
+    )
+    save_overview(*record.liveliest, record.spec, label_set, Path(out) / "overview.png", comparison)
+    page = Path(out) / "index.html"
+    write_text(page, page_html(summary, record.views))
+    if broken:
+        raise DataError(broken.path, broken.args[1], f"{broken.args[2]}; {page} shows the frames before it") from broken
+    return page
+
+
+def _record_all(results: Iterable[tuple[FrameResult, ...]], record: Record) -> DataError | None:
+    """Record every frame up to one that can't be read, whose error is returned; raised when it is the first."""
+    try:
+        for of_frame in results:
+            record.add(*of_frame)
+    except DataError as error:
+        if not record.views:
+            raise
+        return error
+    return None
+
+
+def _stories_every(n_shown: int, spec: GridSpec) -> int:
+    """Return of which one in how many shown frames the page tells the stories of the cells."""
+    return max(1, -(-n_shown * spec.shape[0] * spec.shape[1] // STORIES))

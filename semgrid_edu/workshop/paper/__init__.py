@@ -1,0 +1,1 @@
+"""The paper's experiments: the runs, and the reports made from them."""

@@ -1,0 +1,1 @@
+"""The paper's tables, figures, claims and ablations, written from the runs."""

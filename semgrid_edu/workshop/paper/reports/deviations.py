@@ -1,0 +1,89 @@
+"""What differs from the paper at each scale: it stands below every table (section 4)."""
+
+from semgrid_edu.training.run import PAPER_IMAGE, architecture
+from semgrid_edu.workshop.paper.runs.data_runs import RECIPE_OF
+from semgrid_edu.workshop.paper.runs.scales import Scale
+
+REPLACED = {"kitti": "KITTI", "chroma": "INRIA-Chroma", "synthia": "SYNTHIA"}
+"""The paper's data set in whose place each simulated one stands."""
+
+PAPER_FRAMES = {"kitti": (142, 110), "chroma": (146, 130), "synthia": None}
+"""Labelled frames of the paper's data sets to learn from and to test; the paper doesn't say how many SYNTHIA has."""
+
+
+def frame_counts(data: str) -> dict[str, tuple[int, int]]:
+    """Return the numbers of labelled frames and of drives of each split of a data set.
+
+    Parameters
+    ----------
+    data : str
+        A key of `RECIPE_OF`.
+
+    Returns
+    -------
+    dict of str to (int, int)
+        By split.
+    """
+    counts: dict[str, tuple[int, int]] = {}
+    for route in RECIPE_OF[data].routes:
+        frames, drives = counts.get(route.split, (0, 0))
+        counts[route.split] = frames + len(route.labelled), drives + 1
+    return counts
+
+
+def deviations(scale: Scale, field: str) -> list[str]:
+    """Return in what an experiment differs from the paper's, one sentence each.
+
+    Parameters
+    ----------
+    scale : Scale
+        How large it is.
+    field : str
+        On which data: "kitti", "chroma" or "synthia".
+
+    Returns
+    -------
+    list of str
+    """
+    return [*_data(scale, field), *_labels(field), *_networks(scale), *_training(scale)]
+
+
+def _data(scale: Scale, field: str) -> list[str]:
+    data = getattr(scale, field)
+    counts = frame_counts(data)
+    ours = " and ".join(f"{frames} to {split} in {drives} drives" for split, (frames, drives) in counts.items())
+    paper = PAPER_FRAMES[field]
+    theirs = f" ({paper[0]} to train and {paper[1]} to test in the paper)" if paper else ""
+    return [f"Simulated streets, {data}, in place of {REPLACED[field]}: labelled frames {ours}{theirs}."]
+
+
+def _labels(field: str) -> list[str]:
+    if field == "synthia":
+        return ["Cells without a label are void; the paper doesn't say what they are."]
+    return [
+        "Labels are made with the LIDAR as in the paper, from image labels and a calibration with errors like those of "
+        "real data; no human corrected them.",
+        "The fourteen classes are our reading: ten semantic ones and four kinds of unknown by occupancy state.",
+    ]
+
+
+def _networks(scale: Scale) -> list[str]:
+    usual, paper = architecture("segnet", scale.preset), architecture("segnet", "paper")
+    if scale.preset == "paper":
+        return []
+    sizes = " x ".join(map(str, usual.image_size)), " x ".join(map(str, PAPER_IMAGE))
+    return [
+        f"Compact networks of less than a million parameters, images of {sizes[0]} pixels ({sizes[1]} in the paper), "
+        f"cells of {usual.grid.cell:g} m ({paper.grid.cell:g} m)."
+    ]
+
+
+def _training(scale: Scale) -> list[str]:
+    return [
+        f"No ImageNet weights: the image network first learns from image labels, {scale.image_iterations} steps; "
+        f"then the whole network from grids, {scale.grid_iterations} steps (at most 2000 in the paper), with a "
+        "learning rate of 0.05 that falls along a cosine (0.001), class weights between 1/4 and 4 (no limits), and "
+        "jittered and mirrored images."
+        if scale.preset == "compact"
+        else f"No ImageNet weights: the image network first learns from image labels, {scale.image_iterations} steps."
+    ]

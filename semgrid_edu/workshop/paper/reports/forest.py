@@ -1,0 +1,90 @@
+"""Forest plots: one row per method, with its mean, its confidence interval, and every seed (section 4.2)."""
+
+from collections.abc import Mapping
+
+import matplotlib.pyplot as plt
+from matplotlib.axes import Axes
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.workshop.scoring.score_with_interval import Measured, shown
+
+SCORE_COLOUR, SEED_COLOUR = "#1f4e79", "#d95f02"
+"""The colours of interval and mean, and of single seeds."""
+_SEED_DROP = 0.24
+"""How far the seeds lie below the interval, rows."""
+
+
+def forest_plot(
+    rows: Mapping[str, Measured],
+    ax: Axes | None = None,
+    label: str = "score [%]",
+    reference: float | None = None,
+) -> Axes:
+    """Draw means with their confidence intervals, and below each the value of every seed.
+
+    Parameters
+    ----------
+    rows : mapping of str to dict
+        Scores from `measured` or differences from `compared` by name, from top to bottom.
+    ax : Axes, optional
+        Axes to draw into.
+    label : str
+        Label of the x axis, with the unit.
+    reference : float, optional
+        Where to draw a vertical line, a share as the scores are: 0 for differences.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ArgumentError
+        When there is no row.
+
+    Examples
+    --------
+    >>> rows = {name: measured(matrices, pixel_accuracy) for name, matrices in methods.items()}  # doctest: +SKIP
+    >>> forest_plot(rows, label="pixel accuracy [%]")                                            # doctest: +SKIP
+    """
+    if not rows:
+        raise ArgumentError("rows", "one or more", "none")
+    if ax is None:
+        _, ax = plt.subplots(figsize=(8, 1.2 + 0.5 * len(rows)), layout="constrained")
+    if reference is not None:
+        ax.axvline(100 * reference, color="0.5", linewidth=1, linestyle="--", zorder=0)
+    for number, value in enumerate(rows.values()):
+        draw_score(ax, number, value)
+        ax.annotate(shown(value), (1.02, number), xycoords=("axes fraction", "data"), va="center", fontsize="small")
+    ax.set_yticks(range(len(rows)), list(rows))
+    ax.set(xlabel=label, ylim=(len(rows) - 0.4, -0.6))
+    ax.tick_params(axis="y", length=0)
+    ax.grid(axis="x", alpha=0.3)
+    ax.spines[["left", "right", "top"]].set_visible(False)
+    once = {text: drawn for drawn, text in zip(*ax.get_legend_handles_labels(), strict=True)}
+    ax.legend(once.values(), once, loc="lower right", bbox_to_anchor=(1, 1), ncols=3, frameon=False, fontsize="small")
+    return ax
+
+
+def draw_score(ax: Axes, place: float, value: Measured) -> None:
+    """Draw one score as a line of a chart, per cent: interval, mean, and below them a circle for every seed.
+
+    Parameters
+    ----------
+    ax : Axes
+        The chart.
+    place : float
+        Where the line is on the vertical axis.
+    value : dict
+        From `measured` or `compared`.
+    """
+    if value["mean"] is None:
+        return
+    if value["low"] is not None:
+        ends = [100 * value["low"], 100 * value["high"]]
+        ax.plot(ends, [place, place], color=SCORE_COLOUR, linewidth=2.5, alpha=0.6, label="95 % interval")
+    ax.plot(100 * value["mean"], place, "D", color=SCORE_COLOUR, markersize=6, label="mean")
+    seeds = [100 * seed for seed in value["seeds"] if seed is not None]
+    if len(seeds) > 1:
+        places = [place + _SEED_DROP] * len(seeds)
+        ax.plot(seeds, places, "o", color=SEED_COLOUR, markerfacecolor="none", markersize=5, label="one seed")

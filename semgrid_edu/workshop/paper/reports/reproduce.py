@@ -1,0 +1,132 @@
+"""From a request to results: the plan and its estimate, the runs, the tables (section 4)."""
+
+import os
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.storage.locking import sole_writer
+from semgrid_edu.storage.workplace import check_workers, usable_cores, workplace
+from semgrid_edu.training.devices import choose_device
+from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS, Experiment
+from semgrid_edu.workshop.paper.reports.results import write_result
+from semgrid_edu.workshop.paper.runs.scales import Scale, scale_named
+from semgrid_edu.workshop.scheduler.execute import execute_plan
+from semgrid_edu.workshop.scheduler.one_run import check_runs_folder
+from semgrid_edu.workshop.scheduler.plan import estimate, plan_table, with_needs
+from semgrid_edu.workshop.scheduler.runs import OUTPUT, Run
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a command of `semgrid-edu reproduce` was asked for.
+
+    Parameters
+    ----------
+    experiment : str
+        A key of `EXPERIMENTS`, or "all".
+    scale : str
+        A key of `SCALES`.
+    seeds : int or None
+        Number of seeds; None for the scale's own.
+    runs : Path
+        The folder of all runs.
+    out : Path
+        The folder of the results.
+    workers : int or None
+        Runs at a time; None for one per core.
+    scheduler : str or None
+        Address of a cluster that does the runs; None for processes of this machine.
+    device : str
+        The device of the training runs, see `choose_device`.
+    processes : int
+        In how many processes each training run is done, see `work_together`.
+    """
+
+    experiment: str
+    scale: str
+    seeds: int | None
+    runs: Path
+    out: Path
+    workers: int | None = None
+    scheduler: str | None = None
+    device: str = "cpu"
+    processes: int = 1
+
+    @property
+    def chosen(self) -> dict[str, Experiment]:
+        """The experiments that were asked for, by name."""
+        return EXPERIMENTS if self.experiment == "all" else {self.experiment: EXPERIMENTS[self.experiment]}
+
+    def seeds_of(self, experiment: Experiment) -> int:
+        """Return the number of seeds of an experiment.
+
+        Parameters
+        ----------
+        experiment : Experiment
+            One of `chosen`.
+        """
+        return self.seeds or experiment.seeds(scale_named(self.scale))
+
+    def plan(self) -> list[Run]:
+        """Return the runs of all experiments, each after those that it needs."""
+        scale = scale_named(self.scale)
+        return with_needs(run for one in self.chosen.values() for run in one.runs(scale, self.seeds_of(one)))
+
+
+def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = False) -> str:
+    """Tell the plan, do the runs, and write the results.
+
+    Parameters
+    ----------
+    request : Request
+        What was asked for.
+    echo : callable
+        Shows text to the user.
+    plan_only : bool
+        Whether to stop after the plan.
+
+    Returns
+    -------
+    str
+        What went wrong, one line per run; empty when all went well.
+
+    Raises
+    ------
+    ArgumentError
+        When something that was asked for doesn't exist, such as a GPU for each process, or when torchrun started this
+        process: two of them would do the same runs in the same folders.
+    """
+    started = int(os.environ.get("WORLD_SIZE", 1))
+    if started > 1:
+        expected = f"{started}, by which each training run starts torchrun itself"
+        raise ArgumentError("--processes", expected, f"a command that torchrun started {started} times")
+    check_workers(request.workers or 1)
+    if request.scheduler is None:
+        choose_device(request.device, request.processes - 1)
+    root = check_runs_folder(request.runs)
+    with nullcontext() if plan_only else sole_writer(root):
+        return _reproduced(request, root, echo, plan_only)
+
+
+def _reproduced(request: Request, root: Path, echo: Callable[[str], None], plan_only: bool) -> str:
+    """Do what `reproduce` says, in a folder of runs that no other process writes to."""
+    plan = request.plan()
+    estimated = estimate(plan, root)
+    hours = estimated.hours(request.workers or usable_cores())
+    told = f"{len(estimated.seconds)} of {len(plan)} runs are left, about {60 * hours:.0f} minutes"
+    echo(f"{plan_table(plan, estimated)}\n\n{told}" + (" on this machine" if request.scheduler else ""))
+    if plan_only:
+        return ""
+    with workplace(request.workers, request.scheduler) as place:
+        failed = execute_plan(plan, root, place, request.device, request.processes)
+    scale: Scale = scale_named(request.scale)
+    for name, experiment in request.chosen.items():
+        seeds = request.seeds_of(experiment)
+        if not failed.keys() & set(with_needs(experiment.runs(scale, seeds))):
+            echo(write_result(name, experiment, scale, seeds, root, request.out))
+    return "\n".join(
+        f"{run.name}: {error.strip().splitlines()[-1]} ({run.folder(root) / OUTPUT})" for run, error in failed.items()
+    )

@@ -1,0 +1,205 @@
+"""The trained network compared with simple baselines, on frames kept for testing (sections 4.2 and 4.3)."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+from numpy.typing import NDArray
+from torch import nn
+
+from semgrid_edu.datasets.training_cache import SEED
+from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.labels import LabelSet
+from semgrid_edu.metrics import METRICS, semantic_cells
+from semgrid_edu.networks import IMAGE_STAGE, SemanticGridNet, load_net
+from semgrid_edu.pipeline import Stages
+from semgrid_edu.storage.files import sha256
+from semgrid_edu.storage.provenance import versions
+from semgrid_edu.workshop.scoring.baseline_grids import baseline_grids, carried_grids
+from semgrid_edu.workshop.scoring.confusions import FrameConfusions, frame_confusions, save_confusions
+from semgrid_edu.workshop.scoring.learned_grids import Grids, Refine, best_labels, network_grids
+from semgrid_edu.workshop.scoring.score_with_interval import on_cells
+from semgrid_edu.workshop.scoring.statistics import drive_interval
+
+Scores = dict[str, dict[str, dict[str, float]]]
+"""Values of the metrics, 0..1: by method, by cells ("all" or "semantic"), by metric."""
+
+Intervals = dict[str, dict[str, dict[str, list[float]]]]
+"""The same with [low, value, high] of a 95 % interval in place of the value."""
+
+
+def evaluate(
+    dataset_dir: str | Path,
+    weights: str | Path,
+    refine: Refine | None = None,
+    confusions_file: str | Path | None = None,
+) -> dict[str, object]:
+    """Score the network and the baselines on the test split of a data set.
+
+    Parameters
+    ----------
+    dataset_dir : path-like
+        A data set with the splits "train" and "test", such as data/minikitti.
+    weights : path-like
+        A network that learned from the training split. If `image_stage.safetensors`, the network after the first stage
+        of training, lies in the same folder, its image labels are carried to the grid as well: that network has
+        learned from images alone, not yet from grids.
+    refine : callable, optional
+        Refines the network's grids, as in `Stages`, and is named in the row "network + ..."; the CRF when left out.
+    confusions_file : path-like, optional
+        Takes the confusion matrix of each frame, see `save_confusions`.
+
+    Returns
+    -------
+    dict
+        "scores" (see `Scores`), "intervals" (see `Intervals`; None when there is one test drive), "confusion" (a matrix
+        for each method, one row per true class), and what they were computed from; it can be written as JSON.
+
+    Raises
+    ------
+    ArgumentError
+        When the data set lacks a split, or the network is for other grids or images.
+    DataError
+        When a file is missing or damaged.
+    StageError
+        When `refine` raises an error, or returns anything but probabilities.
+    """
+    training, test = TrainingSet(dataset_dir, "train"), TrainingSet(dataset_dir, "test")
+    net = load_net(weights, test.camera)
+    segmenters = {"end-to-end": net.segmenter}
+    image_stage = Path(weights).with_name(IMAGE_STAGE)
+    if image_stage.exists():
+        segmenters["image-stage"] = load_net(image_stage, test.camera).segmenter
+    compared = frame_confusions(compared_grids(net, segmenters, training, refine), test)
+    if confusions_file:
+        save_confusions(confusions_file, compared)
+    confusions = {method: compared.total(method) for method in compared.counts}
+    return {
+        "scores": scores(confusions, test.label_set),
+        "intervals": intervals(compared, test.label_set) if len(set(test.drives)) > 1 else None,
+        "confusion": {method: confusion.tolist() for method, confusion in confusions.items()},
+        "classes": list(test.label_set.names),
+        "frames": {"train": len(training), "test": len(test)},
+        "weights": {"file": Path(weights).name, "sha256": sha256(weights)},
+        "command": _command(Path(dataset_dir).name, Path(weights).name, refine),
+        "seed": SEED,
+        "date": f"{datetime.now(UTC):%Y-%m-%d}",
+        "versions": versions("numpy", "torch", "numba"),
+    }
+
+
+def _command(data: str, weights: str, refine: Refine | None) -> str:
+    if refine is None:
+        return f"semgrid-edu evaluate --data {data} --weights {weights}"
+    return f'evaluate("{data}", "{weights}", refine={_name(refine)})'
+
+
+def _name(refine: Refine | None) -> str:
+    return "CRF" if refine is None else getattr(refine, "__name__", type(refine).__name__)
+
+
+def compared_grids(
+    net: SemanticGridNet, segmenters: dict[str, nn.Module], training: TrainingSet, refine: Refine | None = None
+) -> Grids:
+    """Return the function that makes the grids of every method for a frame, as `frame_confusions` takes it.
+
+    Parameters
+    ----------
+    net : SemanticGridNet
+        The network, for the grid and the images of the frames.
+    segmenters : dict of str to Module
+        Image networks by name, i -> s. Geometry carries their labels from the image to the grid, see `carried_grids`.
+    training : TrainingSet
+        The frames that the baselines learn from.
+    refine : callable, optional
+        Refines the network's grids, as in `evaluate`.
+
+    Returns
+    -------
+    callable
+        (frames, k) -> grids of frame k by method.
+    """
+    learned = network_grids(net, {_name(refine): refine or Stages.of(net).refine})
+    baselines = baseline_grids(training)
+
+    def grids(frames: TrainingSet, k: int) -> dict[str, NDArray]:
+        found = {**learned(frames, k), **baselines(frames, k)}
+        for name, segmenter in segmenters.items():
+            found |= carried_grids(name, best_labels(segmenter, frames[k]), frames, k)
+        return found
+
+    return grids
+
+
+def intervals(compared: FrameConfusions, label_set: LabelSet) -> Intervals:
+    """Return the confidence intervals of all scores, over drives.
+
+    Parameters
+    ----------
+    compared : FrameConfusions
+        Confusion matrices of the frames of two drives or more.
+    label_set : LabelSet
+        The classes, of which it says which are semantic.
+
+    Returns
+    -------
+    Intervals
+        From `drive_interval`: each is for this one network, or baseline, on new drives.
+    """
+    result: Intervals = {}
+    for method in compared.counts:
+        by_drive = compared.by_drive(method)[None]
+        result[method] = {
+            cells: {
+                name: list(drive_interval(on_cells(by_drive, cells, label_set), metric))
+                for name, metric in METRICS.items()
+            }
+            for cells in ("all", "semantic")
+        }
+    return result
+
+
+def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:
+    """Return the three metrics of each method, over all labelled cells and over those with a semantic class.
+
+    Parameters
+    ----------
+    confusions : dict of str to (C, C) int
+        Confusion matrix of each method.
+    label_set : LabelSet
+        The classes, of which it says which are semantic.
+
+    Returns
+    -------
+    Scores
+        Values from 0 to 1.
+    """
+    return {
+        method: {
+            cells: {name: metric(matrix) for name, metric in METRICS.items()}
+            for cells, matrix in (("all", confusion), ("semantic", semantic_cells(confusion, label_set)))
+        }
+        for method, confusion in confusions.items()
+    }
+
+
+def scores_table(result: Scores) -> str:
+    """Return the scores as a table to print, in per cent.
+
+    Parameters
+    ----------
+    result : Scores
+        What `scores` returns.
+
+    Returns
+    -------
+    str
+        One line per method under two lines of headings.
+    """
+    width = max(map(len, result))
+    group = " ".join(f"{name:>14}" for name in METRICS)
+    lines = [f"{'':{width}}  {'all labelled cells':^{len(group)}}   {'cells with a semantic class':^{len(group)}}"]
+    lines.append(f"{'':{width}}  {group}   {group}")
+    for method, cells in result.items():
+        groups = (" ".join(f"{100 * value:14.1f}" for value in cells[name].values()) for name in ("all", "semantic"))
+        lines.append(f"{method:{width}}  {'   '.join(groups)}")
+    return "\n".join(lines)

@@ -1,0 +1,266 @@
+"""Simulated data sets in place of those of section 4, and the sample drive: made in parallel, resumed after a stop."""
+
+from collections.abc import Iterator
+from concurrent.futures import as_completed
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from tqdm.auto import tqdm
+
+from semgrid_edu.datasets.index import INDEX_FILE
+from semgrid_edu.datasets.readers.kitti_raw import drive_folder
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.labels import LABEL_SETS
+from semgrid_edu.storage.files import write_json
+from semgrid_edu.storage.locking import LOCK, sole_writer
+from semgrid_edu.storage.provenance import versions, write_provenance
+from semgrid_edu.storage.reading import read_json
+from semgrid_edu.storage.workplace import check_workers, workplace
+from semgrid_edu.workshop.simulation.drive import SimulatedDrive
+from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.simulation.street.plan import ANY, Wishes
+from semgrid_edu.workshop.simulation.street.sample_street import SAMPLE_WISHES
+from semgrid_edu.workshop.simulation.writer import (
+    DATE,
+    check_complete,
+    depth_as_points,
+    lidar_points,
+    remove_unfinished,
+    write_calibration,
+    write_drive,
+)
+
+FORMAT = 1
+"""Raised whenever the simulator changes what a seed gives, so that old and new drives don't mix in one folder."""
+
+
+@dataclass(frozen=True)
+class Route:
+    """One drive of a data set.
+
+    Parameters
+    ----------
+    split : str
+        The split that it belongs to, such as "train".
+    n_frames : int
+        Number of frames, ten a second.
+    all_labelled : bool
+        Whether all frames have labels; else the last one alone.
+    wishes : Wishes
+        What isn't left to chance.
+    """
+
+    split: str
+    n_frames: int
+    all_labelled: bool
+    wishes: Wishes = ANY
+
+    @property
+    def labelled(self) -> range:
+        """The numbers of the frames that have labels."""
+        return range(0 if self.all_labelled else self.n_frames - 1, self.n_frames)
+
+
+@dataclass(frozen=True)
+class DatasetRecipe:
+    """What a data set consists of; drives are numbered from 0001 in this order.
+
+    Parameters
+    ----------
+    name : str
+        What the data set is called.
+    label_set : str
+        Name of its label set, a key of `LABEL_SETS`.
+    routes : tuple of Route
+        Its drives.
+    dense : bool
+        Whether points come from the depth image, thinned, instead of the LIDAR.
+    """
+
+    name: str
+    label_set: str
+    routes: tuple[Route, ...]
+    dense: bool = False
+
+
+def _long(split: str, n_frames: int, speed: float, layout: str) -> Route:
+    """Return a route with labels on every frame, fast enough to see much."""
+    return Route(split, n_frames, True, Wishes(layout=layout, speed=speed))
+
+
+RECIPES = {
+    recipe.name: recipe
+    for recipe in (
+        DatasetRecipe("minikitti", "KITTI-14", (Route("train", 10, False),) * 142 + (Route("test", 10, False),) * 110),
+        DatasetRecipe(
+            "minichroma",
+            "KITTI-14",
+            (
+                _long("train", 49, 11.0, "junction"),
+                _long("train", 49, 9.0, "bend"),
+                _long("train", 48, 12.0, "straight"),
+                _long("test", 65, 10.0, "junction"),
+                _long("test", 65, 9.0, "bend"),
+            ),
+        ),
+        DatasetRecipe(
+            "minisynthia",
+            "SYNTHIA-10",
+            (_long("train", 60, 10.0, "junction"), _long("test", 60, 10.0, "junction")),
+            dense=True,
+        ),
+        DatasetRecipe("validation", "KITTI-14", (Route("validation", 10, False),) * 72),
+        DatasetRecipe("sample", "KITTI-14", (Route("drive", 20, True, SAMPLE_WISHES),)),
+    )
+}
+"""Numbers of frames as in the paper: KITTI 142 + 110 labelled frames, INRIA-Chroma 146 + 130 in 3 + 2 routes.
+"validation" has drives like minikitti's, half as many as its training split, for parameters that are chosen when the
+network is trained already. The name of a data set is part of its seed, so no seed gives a drive of minikitti."""
+
+DATA_SETS = ("minikitti", "minichroma", "minisynthia")
+"""What `semgrid-edu data make all` makes."""
+
+PACKAGES = ("numpy", "numba", "embreex", "trimesh", "pillow")
+"""The packages whose versions can change what a seed gives."""
+
+
+def make_dataset(name: str, folder: Path, seed: int = 0, workers: int = 2, scheduler: str | None = None) -> Path:
+    """Make a data set, or finish one that was interrupted.
+
+    The same name and seed give the same bytes, whatever the number of workers and of interruptions.
+
+    Parameters
+    ----------
+    name : str
+        One of `RECIPES`.
+    folder : path-like
+        Takes the data set's own folder, `folder`/`name`.
+    seed : int
+        Seed for all drives; not negative.
+    workers : int
+        Number of processes that share the work, at least one.
+    scheduler : str, optional
+        Address of a dask.distributed scheduler whose workers share the work instead, see `workplace`.
+
+    Returns
+    -------
+    Path
+        The data set's folder.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such data set, the seed is negative, or there are no workers or too many.
+    DataError
+        When the folder holds something else, the same with another seed or an older version, or a drive that lacks
+        files; or when another process writes to it.
+    """
+    if name not in RECIPES:
+        raise ArgumentError("name", f"one of {', '.join(RECIPES)}", repr(name))
+    return make_from_recipe(RECIPES[name], folder, seed, workers, scheduler)
+
+
+def make_from_recipe(
+    recipe: DatasetRecipe, folder: Path, seed: int, workers: int, scheduler: str | None = None
+) -> Path:
+    """Make a data set of your own, or finish one that was interrupted.
+
+    Parameters
+    ----------
+    recipe : DatasetRecipe
+        What it consists of.
+    folder : path-like
+        Takes the data set's own folder, which is named like the recipe.
+    seed : int
+        Seed for all drives; not negative.
+    workers : int
+        Number of processes that share the work, at least one.
+    scheduler : str, optional
+        Address of a dask.distributed scheduler whose workers share the work instead, see `workplace`.
+
+    Returns
+    -------
+    Path
+        The data set's folder.
+
+    Raises
+    ------
+    ArgumentError
+        When the seed is negative, or there are no workers or too many.
+    DataError
+        When the folder holds something else, the same with another seed or an older version, or a drive that lacks
+        files; or when another process writes to it.
+    """
+    if seed < 0:
+        raise ArgumentError("seed", "a whole number from 0 up", seed)
+    check_workers(workers)
+    root = Path(folder).resolve() / recipe.name  # absolute: the machines of a cluster work in other folders
+    with sole_writer(root):
+        _claim(root, {"name": recipe.name, "seed": seed, "format": FORMAT})
+        write_calibration(root, Rig())
+        remove_unfinished(root / DATE)
+        drives = [f"{k + 1:04d}" for k in range(len(recipe.routes))]
+        missing = [k for k, drive in enumerate(drives) if not drive_folder(root, DATE, drive).exists()]
+        missing.sort(key=lambda k: -recipe.routes[k].n_frames)
+        with tqdm(total=len(drives), initial=len(drives) - len(missing), desc=recipe.name, unit="drive") as bar:
+            for _ in _run(partial(_make_drive, recipe, root, seed), missing, workers, scheduler):
+                bar.update()
+        for drive, route in zip(drives, recipe.routes, strict=True):
+            check_complete(drive_folder(root, DATE, drive), route.n_frames, route.labelled)
+        index = _index(recipe, drives, seed)
+        write_json(root / INDEX_FILE, index)
+        write_provenance(root, index["command"], seed, PACKAGES)
+    return root
+
+
+def _claim(root: Path, marker: dict) -> None:
+    """Mark the folder as that of this data set, or refuse it when it holds something else."""
+    path = root / "simulation.json"
+    if path.exists():
+        found = read_json(path)
+        if found != marker:
+            raise DataError(path, f"data made with {marker}", f"{found}: choose another folder or remove this one")
+    elif {path.name for path in root.iterdir()} - {LOCK}:
+        raise DataError(root, "an empty folder, or one that an earlier run began", "other files")
+    else:
+        write_json(path, marker)
+
+
+def _run(work: partial, items: list[int], workers: int, scheduler: str | None) -> Iterator[int]:
+    """Do the work in processes (in this one when one is enough), and yield each item when it is done."""
+    if not scheduler and (workers == 1 or len(items) < 2):
+        for item in items:
+            work(item)
+            yield item
+        return
+    with workplace(None if scheduler else workers, scheduler) as place:
+        for future in as_completed(jobs := {place.executor.submit(work, item): item for item in items}):
+            future.result()
+            yield jobs[future]
+
+
+def _make_drive(recipe: DatasetRecipe, root: Path, seed: int, index: int) -> None:
+    """Simulate and write one drive; its random numbers depend on data set, seed and index alone."""
+    route = recipe.routes[index]
+    own_seed = np.random.SeedSequence([seed, FORMAT, *recipe.name.encode()], spawn_key=(index,))
+    simulated = SimulatedDrive(own_seed, route.n_frames, route.wishes)
+    points = depth_as_points if recipe.dense else lidar_points
+    write_drive(root, f"{index + 1:04d}", simulated, route.labelled, LABEL_SETS[recipe.label_set], points)
+
+
+def _index(recipe: DatasetRecipe, drives: list[str], seed: int) -> dict:
+    """Return what dataset.json holds."""
+    splits: dict[str, list] = {}
+    for drive, route in zip(drives, recipe.routes, strict=True):
+        frames = [{"date": DATE, "drive": drive, "frame": k} for k in route.labelled]
+        splits.setdefault(route.split, []).extend(frames)
+    return {
+        "name": recipe.name,
+        "label_set": recipe.label_set,
+        "seed": seed,
+        "command": f"semgrid-edu data make {recipe.name} DIR --seed {seed}",
+        "versions": versions(*PACKAGES),
+        "splits": splits,
+    }

@@ -1,0 +1,293 @@
+"""One simulated drive: a world, the car that drives through it, and every frame that its sensors take."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.camera import transform_points
+from semgrid_edu.frame import LABEL_GRID, Frame
+from semgrid_edu.workshop.simulation.frame import SimulatedFrame
+from semgrid_edu.workshop.simulation.sensors.camera import Picture, take_picture
+from semgrid_edu.workshop.simulation.sensors.gps import Geodesy
+from semgrid_edu.workshop.simulation.sensors.instant import Instant
+from semgrid_edu.workshop.simulation.sensors.lidar import scan
+from semgrid_edu.workshop.simulation.sensors.porous import PorousMesh
+from semgrid_edu.workshop.simulation.sensors.raycast import RayMesh
+from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.simulation.sensors.truth import BirdseyeTruth, birdseye_kinds, visible_cells, world_cells
+from semgrid_edu.workshop.simulation.street.actors import Actor
+from semgrid_edu.workshop.simulation.street.ego import Ego
+from semgrid_edu.workshop.simulation.street.footprints import footprint_table
+from semgrid_edu.workshop.simulation.street.plan import ANY, Wishes, draw_plan
+from semgrid_edu.workshop.simulation.street.road_users import fill_street
+from semgrid_edu.workshop.simulation.street.scenery import build_scenery
+from semgrid_edu.workshop.simulation.street.traffic import Traffic
+from semgrid_edu.workshop.simulation.street.trajectories import Pace
+
+PERIOD = 0.1
+"""Seconds between frames: KITTI's LIDAR turns ten times a second."""
+_VIEW = 110.0
+"""Distance from the recording car, metres, beyond which nothing that moves is seen."""
+
+
+class SimulatedDrive:
+    """A drive through a world of its own, the same for the same seed.
+
+    Parameters
+    ----------
+    seed : int or numpy.random.SeedSequence
+        Seed for everything that is drawn: the world, who is in it, and the noise of the sensors.
+    n_frames : int
+        Number of frames, `PERIOD` apart.
+    wishes : Wishes
+        What isn't left to chance.
+    rig : Rig, optional
+        The sensors on the recording car; those of the simulated data sets when left out.
+
+    Attributes
+    ----------
+    plan : Plan
+        What the street is like.
+    ego : Ego
+        How the recording car moves.
+    moving, parked : list of Actor
+        The road users; a pedestrian who stands still is among those that move.
+    """
+
+    def __init__(
+        self, seed: int | np.random.SeedSequence, n_frames: int, wishes: Wishes = ANY, rig: Rig | None = None
+    ) -> None:
+        rng = np.random.default_rng(seed)
+        self.n_frames, self.rig = n_frames, rig or Rig()
+        duration = (n_frames - 1) * PERIOD
+        pace = Pace.random(rng, wishes.speed)
+        self.plan = draw_plan(rng, pace.distance(duration), wishes)
+        self.ego = Ego.random(rng, self.plan.road, pace, wishes.ego_lane)
+        self.geodesy = Geodesy.random(rng)
+        builder = build_scenery(self.plan, rng)
+        traffic = Traffic(builder, self.plan, self.ego.trajectory, duration)
+        (wishes.cast or fill_street)(traffic)
+        self.moving: list[Actor] = traffic.moving
+        self.parked: list[Actor] = traffic.parked
+        self.static = RayMesh.of(builder.shapes, builder.instances)
+        self.porous = PorousMesh.of(builder.porous, builder.opacities) if builder.porous else None
+        self.static_footprints = footprint_table(builder.footprints)
+        self.sensor_seed = rng.bit_generator.seed_seq.spawn(1)[0]
+
+    def pose(self, t: float) -> NDArray[np.float64]:
+        """Return the LIDAR's pose at one instant.
+
+        Parameters
+        ----------
+        t : float
+            Seconds since the drive began.
+
+        Returns
+        -------
+        (4, 4) float64
+            T_world_from_lidar, metres.
+        """
+        return self.ego.T_world_from_lidar(t)
+
+    def T_world_from_imu(self, t: float) -> NDArray[np.float64]:
+        """Return the IMU's pose at one instant.
+
+        Parameters
+        ----------
+        t : float
+            Seconds since the drive began.
+
+        Returns
+        -------
+        (4, 4) float64
+            Metres.
+        """
+        return self.pose(t) @ self.rig.T_lidar_from_imu
+
+    def instant(self, t: float) -> Instant:
+        """Return the world at one instant, ready for rays.
+
+        Parameters
+        ----------
+        t : float
+            Seconds since the drive began.
+
+        Returns
+        -------
+        Instant
+        """
+        road, eye = self.plan.road, self.pose(t)[:2, 3]
+        near = [a for a in self.moving if np.hypot(*(a.trajectory.pose(road, t)[0][:2] - eye)) < _VIEW]
+        if not near:
+            return Instant(self.static, None, np.empty((0, 4)), self.porous)
+        shapes = [a.shape(road, t) for a in near]
+        boxes = np.array([[shape.vertices.min(axis=0), shape.vertices.max(axis=0)] for shape in shapes], np.float64)
+        radii = np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) / 2
+        spheres = np.column_stack([boxes.mean(axis=1), radii])
+        return Instant(self.static, RayMesh.of(shapes, [a.instance for a in near]), spheres, self.porous)
+
+    def T_grid_from_world(self, t: float) -> NDArray[np.float64]:
+        """Return the transform from the world to the grid frame of one instant.
+
+        Parameters
+        ----------
+        t : float
+            Seconds since the drive began.
+
+        Returns
+        -------
+        (4, 4) float64
+            Metres.
+        """
+        return self.rig.T_grid_from_lidar @ np.linalg.inv(self.pose(t))
+
+    def velocities(self, t: float) -> dict[int, NDArray[np.float64]]:
+        """Return the velocity over ground of each road user that isn't parked, by its number.
+
+        Parameters
+        ----------
+        t : float
+            Seconds since the drive began.
+
+        Returns
+        -------
+        dict of int to (2,) float64
+            Along x and y of the grid frame at that instant, m/s.
+        """
+        rotation, road = self.T_grid_from_world(t)[:2, :2], self.plan.road
+        return {actor.instance: rotation @ actor.trajectory.velocity(road, t) for actor in self.moving}
+
+    def objects(self, t: float) -> list[dict]:
+        """Return the cars, pedestrians and bicycles whose centres lie in `LABEL_GRID` at one instant.
+
+        Parameters
+        ----------
+        t : float
+            Seconds since the drive began.
+
+        Returns
+        -------
+        list of dict
+            From `Actor.described`.
+        """
+        road, T, actors = self.plan.road, self.T_grid_from_world(t), self.parked + self.moving
+        centres = [transform_points(T, actor.middle(road, t)) for actor in actors]
+        inside = LABEL_GRID.cells(np.reshape(centres, (-1, 3)))[2]
+        return [actor.described(road, t, T) for actor, held in zip(actors, inside, strict=True) if held]
+
+    def footprints(self, t: float) -> NDArray[np.float64]:
+        """Return the footprints of all that stands or moves at one instant.
+
+        Parameters
+        ----------
+        t : float
+            Seconds since the drive began.
+
+        Returns
+        -------
+        (K, 9) float64
+            One row per thing, as from `footprint_table`.
+        """
+        return np.concatenate(
+            [self.static_footprints, footprint_table([a.footprint(self.plan.road, t) for a in self.moving])]
+        )
+
+    def birdseye(self, t: float) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
+        """Return what the cells of `LABEL_GRID` hold, whether a sensor sees it or not.
+
+        Parameters
+        ----------
+        t : float
+            Seconds since the drive began.
+
+        Returns
+        -------
+        kinds : (710, 310) uint8
+            Members of `Kind`.
+        instances : (710, 310) int32
+            Number of the car, pedestrian or bicycle there; 0 for all else.
+        """
+        footprints = self.footprints(t)
+        kinds, which = birdseye_kinds(world_cells(self.pose(t), self.rig), footprints, self.plan.road)
+        return kinds, np.where(which >= 0, footprints[which, 7], 0).astype(np.int32)
+
+    def truth(self, t: float, picture: Picture) -> BirdseyeTruth:
+        """Return what every cell holds and whether the camera sees it.
+
+        Parameters
+        ----------
+        t : float
+            Seconds since the drive began.
+        picture : Picture
+            What the camera took at that instant.
+
+        Returns
+        -------
+        BirdseyeTruth
+        """
+        road, pose = self.plan.road, self.pose(t)
+        cells, footprints = world_cells(pose, self.rig), self.footprints(t)
+        kinds, which = birdseye_kinds(cells, footprints, road)
+        return BirdseyeTruth(
+            kinds, visible_cells(cells, kinds, which, footprints, road, picture, pose, self.rig.camera)
+        )
+
+    def frame(self, index: int, labelled: bool) -> SimulatedFrame:
+        """Take one frame. Its noise depends on its number alone, not on which frames were taken before.
+
+        Parameters
+        ----------
+        index : int
+            Number of the frame.
+        labelled : bool
+            Whether to find the bird's-eye truth too.
+
+        Returns
+        -------
+        SimulatedFrame
+        """
+        rng = self._noise(index)
+        t, road = index * PERIOD, self.plan.road
+        instant, pose = self.instant(t), self.pose(t)
+        picture = take_picture(instant, pose, self.rig, road, self.plan.light, rng)
+        points = scan(instant, pose, self.rig.lidar, road, rng)
+        truth = self.truth(t, picture) if labelled else None
+        return SimulatedFrame(t, pose, picture, points, truth, self.objects(t))
+
+    def scan(self, index: int) -> Frame:
+        """Take the LIDAR scan of one frame alone, which is fast. Its noise differs from that of `frame`.
+
+        Parameters
+        ----------
+        index : int
+            Number of the frame.
+
+        Returns
+        -------
+        Frame
+            Without image and labels; its pose is that of the nearest packet (`Rig.packet_interval`).
+        """
+        t, half = index * PERIOD, self.rig.packet_interval / 2
+        points = scan(self.instant(t), self.pose(t), self.rig.lidar, self.plan.road, self._noise(index, 1))
+        nearest = t + float(self._noise(index, 2).uniform(-half, half)) if half else t
+        return Frame(None, points, self.rig.camera, self.pose(nearest), t)
+
+    def _noise(self, *key: int) -> np.random.Generator:
+        """Return the drive's own generator for a key, such as the number of a frame."""
+        seed = np.random.SeedSequence(self.sensor_seed.entropy, spawn_key=(*self.sensor_seed.spawn_key, *key))
+        return np.random.default_rng(seed)
+
+    def frames(self, labelled: set[int]) -> Iterator[SimulatedFrame]:
+        """Take all frames, one after the other.
+
+        Parameters
+        ----------
+        labelled : set of int
+            Numbers of the frames whose bird's-eye truth is wanted.
+
+        Yields
+        ------
+        SimulatedFrame
+        """
+        yield from (self.frame(k, k in labelled) for k in range(self.n_frames))

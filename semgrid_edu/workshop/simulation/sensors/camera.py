@@ -1,0 +1,229 @@
+"""The camera: a picture of the world at one instant, and what each of its pixels shows."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from semgrid_edu.camera import transform_points
+from semgrid_edu.workshop.simulation.sensors.instant import Instant
+from semgrid_edu.workshop.simulation.sensors.raycast import Hits, turned
+from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.simulation.sensors.shading import shade
+from semgrid_edu.workshop.simulation.street.layout import Road
+from semgrid_edu.workshop.simulation.street.light import Light
+
+_SKY_STEP = 3
+"""Every third pixel of every third row sends a ray to the sky: how much of it is open changes slowly."""
+_SUBPIXELS = ((-0.33, 0.33), (0.33, -0.33))
+"""Where pixels at an edge send two more rays, so that outlines aren't jagged: shift to the right and down, pixels."""
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """What the camera takes, and what the simulator knows about every pixel of it.
+
+    Parameters
+    ----------
+    image : (h, w, 3) uint8
+        What the camera takes, RGB.
+    kind : (h, w) uint8
+        What each pixel shows, a `Kind`.
+    depth : (h, w) float32
+        Depth along the optical axis, metres; NaN for sky.
+    instance : (h, w) int32
+        Number of the car, pedestrian or bicycle that each pixel shows; 0 for all else.
+    """
+
+    image: NDArray[np.uint8]
+    kind: NDArray[np.uint8]
+    depth: NDArray[np.float32]
+    instance: NDArray[np.int32]
+
+
+@cache
+def _rays(rig: Rig, du: float = 0.0, dv: float = 0.0) -> NDArray[np.float32]:
+    """Return a ray for every pixel, through its middle or beside it."""
+    return rig.pixel_directions(du, dv)
+
+
+@cache
+def _cosines(rig: Rig) -> NDArray[np.float32]:
+    """Return the cosine between every pixel's ray and the optical axis."""
+    return (rig.pixel_directions() @ rig.camera.T_camera_from_lidar[2, :3]).astype(np.float32)
+
+
+@njit(cache=True)
+def _discontinuities(triangle, distance, kind, material):
+    """Mark pixels whose right or lower neighbours show something else, and those neighbours: edges to refine."""
+    height, width = triangle.shape
+    edge = np.zeros((height, width), np.bool_)
+    for r in range(height):
+        for c in range(width):
+            for dr, dc in ((0, 1), (1, 0)):
+                if r + dr >= height or c + dc >= width:
+                    continue
+                a, b = triangle[r, c], triangle[r + dr, c + dc]
+                if a == b:
+                    continue
+                jump = a < 0 or b < 0
+                if not jump:
+                    near = min(distance[r, c], distance[r + dr, c + dc])
+                    jump = kind[a] != kind[b] or material[a] != material[b]
+                    jump = jump or abs(distance[r, c] - distance[r + dr, c + dc]) > 0.05 * near
+                if jump:
+                    edge[r, c] = edge[r + dr, c + dc] = True
+    return edge
+
+
+@njit(cache=True)
+def _smooth(values, distance, step, radius, out):
+    """Average sparse `values` (one every `step` pixels, -1 for none) over pixels at a similar distance."""
+    height, width = distance.shape
+    for r in range(height):
+        for c in range(width):
+            total, weight = 0.0, 0.0
+            t = distance[r, c]
+            for i in range(max((r - radius) // step, 0), min((r + radius) // step + 1, values.shape[0])):
+                for j in range(max((c - radius) // step, 0), min((c + radius) // step + 1, values.shape[1])):
+                    if values[i, j] >= 0 and abs(distance[i * step, j * step] - t) < 0.06 * t:
+                        total += values[i, j]
+                        weight += 1.0
+            out[r, c] = total / weight if weight > 0 else 1.0
+
+
+@njit(cache=True)
+def _rays_to(axis, along_normal, spread, luck, chosen, positions, directions, distance, triangle, normals):
+    """Return rays from chosen hits, a little off their surface, to `axis` plus the normal, scattered by `luck`."""
+    starts, rays = np.empty((len(chosen), 3), np.float32), np.empty((len(chosen), 3), np.float32)
+    for i in range(len(chosen)):
+        k = chosen[i]
+        n, d = normals[triangle[k]], directions[k]
+        flip = -1.0 if n[0] * d[0] + n[1] * d[1] + n[2] * d[2] > 0 else 1.0
+        offset, length = 0.004 + 0.0006 * distance[k], 0.0
+        for c in range(3):
+            starts[i, c] = positions[k, c] + offset * (flip * n[c] - d[c])
+            rays[i, c] = axis[c] + along_normal * flip * n[c] + spread * (luck[i, c] - 0.5)
+            length += rays[i, c] ** 2
+        rays[i] /= np.sqrt(length)
+    return starts, rays
+
+
+def _open(
+    hits: Hits,
+    instant: Instant,
+    chosen: NDArray,
+    axis: tuple,
+    along_normal: float,
+    spread: float,
+    rng: np.random.Generator,
+) -> NDArray[np.float32]:
+    """Return for every pixel 1 where its hit sees the light, 0 where something is in between, -1 if not chosen."""
+    luck = rng.random((len(chosen), 3), dtype=np.float32)
+    starts, rays = _rays_to(
+        np.float32(axis), along_normal, spread, luck, chosen,
+        hits.position, hits.directions, hits.distance, hits.triangle, instant.normals,
+    )  # fmt: skip
+    result = np.full(len(hits.distance), -1, np.float32)
+    result[chosen] = ~instant.blocked(starts, rays)
+    return result
+
+
+def _sun_and_sky(
+    hits: Hits, instant: Instant, light: Light, shape: tuple[int, int], rng: np.random.Generator
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return how much of sun and sky each pixel's hit sees, 0..1, from one ray to each, smoothed."""
+    distance, met = hits.distance.reshape(shape), hits.triangle >= 0
+    sunlit, open_sky = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    sun = _open(hits, instant, np.flatnonzero(met), light.sun, 0.0, 3.5 * light.softness, rng)
+    _smooth(sun.reshape(shape), distance, 1, 1 if light.softness < 0.1 else 3, sunlit)
+    grid = np.zeros(shape, bool)
+    grid[::_SKY_STEP, ::_SKY_STEP] = True
+    sky = _open(hits, instant, np.flatnonzero(grid.ravel() & met), (0.0, 0.0, 0.6), 1.0, 1.6, rng).reshape(shape)
+    _smooth(np.ascontiguousarray(sky[::_SKY_STEP, ::_SKY_STEP]), distance, _SKY_STEP, 6, open_sky)
+    return sunlit.ravel(), open_sky.ravel()
+
+
+@njit(cache=True)
+def _lens(radiance, centre):
+    """Blur the picture as a lens does: along each axis the share `centre` stays, the rest goes to the next pixels."""
+    height, width, _ = radiance.shape
+    side = np.float32((1.0 - centre) / 2)
+    middle = np.float32(centre)
+    across, out = np.empty_like(radiance), np.empty_like(radiance)
+    for r in range(height):
+        for c in range(width):
+            a, b = max(c - 1, 0), min(c + 1, width - 1)
+            for i in range(3):
+                across[r, c, i] = middle * radiance[r, c, i] + side * (radiance[r, a, i] + radiance[r, b, i])
+    for r in range(height):
+        a, b = max(r - 1, 0), min(r + 1, height - 1)
+        for c in range(width):
+            for i in range(3):
+                out[r, c, i] = middle * across[r, c, i] + side * (across[a, c, i] + across[b, c, i])
+    return out
+
+
+def _expose(radiance: NDArray, light: Light, rig: Rig, rng: np.random.Generator) -> NDArray[np.uint8]:
+    """Turn radiance into what the sensor counts: lens blur, exposure, vignette, tone curve, noise, bits."""
+    height, width = rig.image_size
+    v, u = np.mgrid[-1 : 1 : height * 1j, -1 : 1 : width * 1j]
+    gain = light.exposure * (1 - 0.18 * (u**2 + 0.3 * v**2))[..., None] * np.asarray(light.balance)
+    exposed = (_lens(radiance, 0.72) * gain.astype(np.float32)).clip(0)
+    grey = 255 * (1 - np.exp(-1.25 * exposed)) ** np.float32(1 / 2.0)
+    sigma = rig.camera_noise * (0.6 + 0.6 * np.sqrt(grey / 128))
+    noisy = grey + sigma * rng.standard_normal(grey.shape, dtype=np.float32)
+    step = 2 ** (8 - rig.bits)
+    levels = np.floor(noisy.clip(0, 255) / step)
+    return (levels * (255 / (2**rig.bits - 1))).clip(0, 255).astype(np.uint8)
+
+
+def take_picture(
+    instant: Instant, T_world_from_lidar: NDArray, rig: Rig, road: Road, light: Light, rng: np.random.Generator
+) -> Picture:
+    """Take a picture with camera 2.
+
+    Parameters
+    ----------
+    instant : Instant
+        The world.
+    T_world_from_lidar : (4, 4) float
+        Pose of the LIDAR, metres.
+    rig : Rig
+        Where the camera stands, and its noise.
+    road : Road
+        The street, for what the ground is.
+    light : Light
+        Sun, sky and exposure.
+    rng : numpy.random.Generator
+        Source of the sensor's noise and of the scattered rays that make shadows soft.
+
+    Returns
+    -------
+    Picture
+    """
+    shape = rig.image_size
+    rotation = T_world_from_lidar[:3, :3].astype(np.float32)
+    eye = transform_points(T_world_from_lidar @ rig.T_lidar_from_camera, np.zeros(3))
+    rays = _rays(rig)
+    hits = instant.cast(eye, turned(rays, rotation), rng)
+    sunlit, open_sky = _sun_and_sky(hits, instant, light, shape, rng)
+    pixel = 1.0 / rig.camera.K[0, 0]
+    radiance, kind = shade(hits, instant, road, light, sunlit, open_sky, pixel)
+
+    triangles, distance = hits.triangle.reshape(shape), hits.distance.reshape(shape)
+    edges = np.flatnonzero(_discontinuities(triangles, distance, instant.kind, instant.material))
+    for du, dv in _SUBPIXELS:
+        beside = instant.cast(eye, turned(_rays(rig, du, dv)[edges], rotation), rng)
+        radiance[edges] += shade(beside, instant, road, light, sunlit[edges], open_sky[edges], pixel)[0]
+    radiance[edges] /= 1 + len(_SUBPIXELS)
+
+    ahead = _cosines(rig) * hits.distance
+    return Picture(
+        image=_expose(radiance.reshape(*shape, 3), light, rig, rng),
+        kind=kind.reshape(shape),
+        depth=np.where(hits.triangle < 0, np.float32(np.nan), ahead).reshape(shape),
+        instance=np.where(hits.triangle < 0, 0, instant.instance[hits.triangle]).reshape(shape),
+    )

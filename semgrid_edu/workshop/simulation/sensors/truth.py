@@ -1,0 +1,189 @@
+"""What is true from above: the class of every 0.1 m cell, and whether the camera sees what stands in it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from semgrid_edu.camera import Camera, transform_points
+from semgrid_edu.frame import LABEL_GRID
+from semgrid_edu.workshop.simulation.sensors.camera import Picture
+from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.simulation.street.footprints import stamp
+from semgrid_edu.workshop.simulation.street.ground import ground_height, ground_kinds
+from semgrid_edu.workshop.simulation.street.layout import Road, to_road
+from semgrid_edu.workshop.simulation.things.materials import Kind
+
+_SEEN_PIXELS = 12
+"""Pixels of an object that must show for the camera to see all of its footprint."""
+_SOLID_DEPTH = 0.35
+"""Metres of facade or foliage behind its visible surface that count as seen."""
+
+_LOOKS_LIKE = np.arange(256, dtype=np.uint8)
+"""The kind that each kind is compared as: lane marks as road, signs as the poles that they hang on."""
+_LOOKS_LIKE[Kind.LANE] = Kind.ROAD
+_LOOKS_LIKE[Kind.SIGN] = Kind.POLE
+
+
+@dataclass(frozen=True, eq=False)
+class BirdseyeTruth:
+    """What is true of a frame, seen from above, over `LABEL_GRID`.
+
+    Parameters
+    ----------
+    kinds : (710, 310) uint8
+        What each cell holds, a `Kind`.
+    visible : (710, 310) bool
+        Whether the camera sees it.
+    """
+
+    kinds: NDArray[np.uint8]
+    visible: NDArray[np.bool_]
+
+
+def world_cells(T_world_from_lidar: NDArray, rig: Rig) -> NDArray[np.float64]:
+    """Return where in the world the cells of `LABEL_GRID` are.
+
+    Parameters
+    ----------
+    T_world_from_lidar : (4, 4) float
+        Pose of the LIDAR, metres.
+    rig : Rig
+        Where the grid lies below the LIDAR.
+
+    Returns
+    -------
+    (710, 310, 2) float64
+        x and y of the centre of each cell, metres.
+    """
+    T = T_world_from_lidar @ np.linalg.inv(rig.T_grid_from_lidar)
+    centers = LABEL_GRID.centers()
+    return transform_points(T, np.concatenate([centers, np.zeros((*LABEL_GRID.shape, 1))], axis=-1))[..., :2]
+
+
+def birdseye_kinds(cells: NDArray, footprints: NDArray, road: Road) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
+    """Return what every cell holds between the ground and 2.5 m above it, or else the ground's kind.
+
+    Parameters
+    ----------
+    cells : (H, W, 2) float
+        Cell centres in the world, metres, from `world_cells`.
+    footprints : (K, 9) float
+        From `footprint_table`; where several overlap, the last one wins.
+    road : Road
+        The street, for the ground.
+
+    Returns
+    -------
+    kinds : (H, W) uint8
+        Members of `Kind`.
+    which : (H, W) int32
+        Row of the footprint that covers the cell; -1 for bare ground.
+    """
+    which = np.full(cells.shape[:2], -1, np.int32)
+    stamp(footprints, cells, LABEL_GRID.cell, which)
+    kinds = ground_kinds(road, cells.reshape(-1, 2)).reshape(which.shape)
+    standing = which >= 0
+    kinds[standing] = footprints[which[standing], 6].astype(np.uint8)
+    return kinds, which
+
+
+@njit(cache=True)
+def _pixel(T, K, x, y, z):
+    """Return u, v and depth of a point of the world, and its X and Y in the camera frame; depth 0 behind the camera."""
+    X = T[0, 0] * x + T[0, 1] * y + T[0, 2] * z + T[0, 3]
+    Y = T[1, 0] * x + T[1, 1] * y + T[1, 2] * z + T[1, 3]
+    Z = T[2, 0] * x + T[2, 1] * y + T[2, 2] * z + T[2, 3]
+    if Z < 0.3:
+        return 0.0, 0.0, 0.0, X, Y
+    return K[0, 0] * X / Z + K[0, 2], K[1, 1] * Y / Z + K[1, 2], Z, X, Y
+
+
+@njit(cache=True)
+def _agrees(u, v, z, tolerance, reach, kind, kinds, depth):
+    """Return whether a pixel within `reach` of (u, v) shows this kind at this depth."""
+    height, width = depth.shape
+    row, col = round(v), round(u)
+    if row < 0 or col < 0 or row >= height or col >= width:
+        return False
+    for r in range(max(row - reach, 0), min(row + reach + 1, height)):
+        for c in range(max(col - reach, 0), min(col + reach + 1, width)):
+            if kinds[r, c] == kind and abs(depth[r, c] - z) < tolerance:
+                return True
+    return False
+
+
+@njit(cache=True)
+def _visible(cells, kinds, which, footprints, road, T, K, pixel_kinds, depth, seen, solid, out):
+    """Write whether the camera sees each cell.
+
+    A pixel has one depth for the whole patch of surface that it shows. So the tolerance grows with the patch.
+    """
+    f = K[0, 0]
+    for r in range(cells.shape[0]):
+        for c in range(cells.shape[1]):
+            x, y = cells[r, c]
+            s, d = to_road(road, x, y)
+            ground = ground_height(road, s, d)
+            k = which[r, c]
+            if k < 0:
+                u, v, z, _, below = _pixel(T, K, x, y, ground)
+                patch = min(z * z / (f * max(below, 0.4)), 3.0)
+                out[r, c] = z > 0 and _agrees(u, v, z, 0.15 + patch, 0, kinds[r, c], pixel_kinds, depth)
+                continue
+            instance = int(footprints[k, 7])
+            if instance > 0:
+                out[r, c] = seen[instance]
+                continue
+            for i in range(8):
+                u, v, z, aside, _ = _pixel(T, K, x, y, ground + footprints[k, 8] * (0.06 + 0.13 * i))
+                patch = min(0.7 * z * z / (f * max(abs(aside), 1.0)), 1.0)
+                if z > 0 and _agrees(u, v, z, solid + patch, 1, kinds[r, c], pixel_kinds, depth):
+                    out[r, c] = True
+                    break
+
+
+def visible_cells(
+    cells: NDArray, kinds: NDArray, which: NDArray, footprints: NDArray, road: Road,
+    picture: Picture, T_world_from_lidar: NDArray, camera: Camera,
+) -> NDArray[np.bool_]:  # fmt: skip
+    """Return whether the camera sees what every cell holds.
+
+    A point of the cell (on the ground, or at eight heights of what stands there) must project into the image where the
+    picture shows the same kind at the same depth. An object with a number (car, pedestrian, bicycle) is seen whole when
+    12 pixels of it are; of a house or a hedge the camera sees the 0.35 m behind its surface.
+
+    Parameters
+    ----------
+    cells : (H, W, 2) float
+        Cell centres in the world, metres.
+    kinds : (H, W) uint8
+        What each cell holds, from `birdseye_kinds`.
+    which : (H, W) int32
+        Row of the footprint in each cell, -1 for none, from `birdseye_kinds`.
+    footprints : (K, 9) float
+        From `footprint_table`.
+    road : Road
+        The street, for the height of the ground.
+    picture : Picture
+        What the camera took.
+    T_world_from_lidar : (4, 4) float
+        Pose of the LIDAR at that instant, metres.
+    camera : Camera
+        Calibration of the picture.
+
+    Returns
+    -------
+    (H, W) bool
+    """
+    T = camera.T_camera_from_lidar @ np.linalg.inv(T_world_from_lidar)
+    highest = int(max(footprints[:, 7].max(initial=0), picture.instance.max()))
+    seen = np.bincount(picture.instance.ravel(), minlength=highest + 1) >= _SEEN_PIXELS
+    out = np.zeros(kinds.shape, np.bool_)
+    depth = np.nan_to_num(picture.depth, nan=1e9)
+    _visible(
+        cells, _LOOKS_LIKE[kinds], which, footprints, road, T, camera.K,
+        _LOOKS_LIKE[picture.kind], depth, seen, _SOLID_DEPTH, out,
+    )  # fmt: skip
+    return out

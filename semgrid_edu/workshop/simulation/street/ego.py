@@ -1,0 +1,109 @@
+"""The recording car: how it drives along the road, and how its body moves on its springs."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, rigid_transform
+from semgrid_edu.workshop.simulation.street.layout import Road, to_world
+from semgrid_edu.workshop.simulation.street.trajectories import Pace, Trajectory
+
+
+@dataclass(frozen=True)
+class Ego:
+    """The motion of the recording car: it keeps its lane, sways in it, and rolls and pitches on its springs.
+
+    Parameters
+    ----------
+    road : Road
+        The street.
+    trajectory : Trajectory
+        The middle of its lane, and its pace.
+    sway : float
+        Amplitude of its sideways drift, metres.
+    roll, pitch : float
+        Amplitudes of these angles, rad: about 0.2 degrees on an even road.
+    phase : float
+        Phase of all of these oscillations, rad.
+    """
+
+    road: Road
+    trajectory: Trajectory
+    sway: float
+    roll: float
+    pitch: float
+    phase: float
+
+    @classmethod
+    def random(cls, rng: np.random.Generator, road: Road, pace: Pace, lane: int | None = None) -> "Ego":
+        """Draw the recording car's lane and how it sways.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Source of all that is drawn.
+        road : Road
+            The street.
+        pace : Pace
+            How fast it drives.
+        lane : int, optional
+            Number of its lane, 0 beside the centre line; when left out, the outer one in two drives of three.
+
+        Returns
+        -------
+        Ego
+        """
+        drawn = road.lanes_right - 1 if rng.random() < 0.65 else 0
+        lane = drawn if lane is None else lane
+        d = -(lane + 0.5) * road.lane + float(rng.normal(0, 0.1))
+        sway, phase = float(rng.uniform(0.02, 0.1)), float(rng.uniform(0, 6.28))
+        roll, pitch = (float(x) for x in np.radians(rng.uniform(0.05, 0.2, 2)))
+        return cls(road, Trajectory(0.0, d, 1.0, 0.0, pace), sway, roll, pitch, phase)
+
+    def T_world_from_lidar(self, t: float) -> NDArray[np.float64]:
+        """Return the LIDAR's pose at one instant; it tilts about the point on the ground below it.
+
+        Parameters
+        ----------
+        t : float
+            Time, seconds.
+
+        Returns
+        -------
+        (4, 4) float64
+            Metres.
+        """
+        s, d = self.trajectory.at(t)
+        speed = self.trajectory.pace.speed(t)
+        swing = 0.45 * s / 10.0 + self.phase
+        d += self.sway * np.sin(swing)
+        x, y, heading = to_world(self.road, s, d)
+        drift = self.sway * np.cos(swing) * 0.045 if speed > 0 else 0.0
+        yaw = heading + np.arctan(drift)
+        roll = self.roll * np.sin(5.1 * t + 2 * self.phase)
+        pitch = self.pitch * np.sin(6.7 * t + 3 * self.phase)
+        R = rotation_matrix(roll, pitch, yaw)
+        return rigid_transform(R, np.array([x, y, 0.0]) + KITTI_LIDAR_HEIGHT * R[:, 2])
+
+
+def rotation_matrix(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:
+    """Return Rz(yaw) Ry(pitch) Rx(roll), the order of the angles in KITTI's oxts packets.
+
+    Parameters
+    ----------
+    roll, pitch, yaw : float
+        Angles about the x, y and z axes, rad.
+
+    Returns
+    -------
+    (3, 3) float64
+    """
+    cr, sr, cp, sp, cy, sy = (f(a) for a in (roll, pitch, yaw) for f in (np.cos, np.sin))
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )

@@ -1,0 +1,160 @@
+"""The ground beside and on a road: what it is, how high it lies, and where lane marks are painted.
+
+All of it follows from the distance outside the asphalt's edge.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from semgrid_edu.workshop.simulation.street.layout import Road, outside_asphalt, to_road
+from semgrid_edu.workshop.simulation.things.materials import Kind
+
+KERB_HEIGHT = 0.12
+"""The usual step from carriageway to sidewalk in a town, metres."""
+KERB_WIDTH = 0.18
+"""Width of the kerb stone, metres."""
+
+_ROAD, _LANE, _SIDEWALK, _GRASS = int(Kind.ROAD), int(Kind.LANE), int(Kind.SIDEWALK), int(Kind.GRASS)
+
+
+@njit(cache=True)
+def ground_kind(road: Road, s: float, d: float) -> int:
+    """Return what the ground is at a place, lane marks left aside.
+
+    Parameters
+    ----------
+    road : Road
+        The street.
+    s, d : float
+        Distance along the centre line and to the left of it, metres.
+
+    Returns
+    -------
+    int
+        `Kind.ROAD`, `Kind.SIDEWALK` or `Kind.GRASS`.
+    """
+    e = outside_asphalt(road, s, d)
+    if e < 0.0:
+        return _ROAD
+    side = road.left if d > 0 else road.right
+    if e < KERB_WIDTH or side.strip <= e < side.strip + side.walk:
+        return _SIDEWALK
+    return _GRASS
+
+
+@njit(cache=True)
+def ground_height(road: Road, s: float, d: float) -> float:
+    """Return how high the ground lies at a place.
+
+    Parameters
+    ----------
+    road : Road
+        The street.
+    s, d : float
+        Distance along the centre line and to the left of it, metres.
+
+    Returns
+    -------
+    float
+        Metres above the asphalt.
+    """
+    e = outside_asphalt(road, s, d)
+    if e <= 0.0:
+        return 0.0
+    side = road.left if d > 0 else road.right
+    height = KERB_HEIGHT * min(e / 0.03, 1.0)
+    t = min(max((e - side.strip - side.walk - 0.2) / side.bank_width, 0.0), 1.0)
+    height += side.bank_rise * t * t * (3.0 - 2.0 * t)
+    far = max(e - 25.0, 0.0)
+    return height + 0.06 * far * (0.5 + 0.5 * np.sin(0.03 * s + 0.02 * d)) * min(far / 40.0, 1.0)
+
+
+@njit(cache=True)
+def _stripe(distance: float, half: float, blur: float) -> float:
+    """Return the share of a patch, `blur` wide and `distance` from the middle of a stripe, that the stripe covers."""
+    return min(max((half - abs(distance)) / blur + 0.5, 0.0), 1.0)
+
+
+@njit(cache=True)
+def _junction_mark(road: Road, s: float, d: float, blur: float) -> float:
+    """Return the paint of zebra crossings and stop lines around the junction."""
+    away = abs(s - road.junction) - road.side_half - road.corner
+    if road.zebra and 0.5 <= away <= 3.7:
+        return _stripe((d % 1.0) - 0.5, 0.25, blur)
+    approach = road.junction - s
+    ours = approach > 0 and -road.lanes_right * road.lane < d < -0.15
+    theirs = approach < 0 and 0.15 < d < road.lanes_left * road.lane
+    if ours or theirs:
+        return _stripe(away - 4.7, 0.2, blur)
+    return 0.0
+
+
+@njit(cache=True)
+def lane_mark(road: Road, s: float, d: float, blur: float) -> float:
+    """Return how much of the asphalt around a place is painted.
+
+    The marks are the centre line, lane boundaries, edge lines along parking bays, zebra crossings and stop lines.
+
+    Parameters
+    ----------
+    road : Road
+        The street.
+    s, d : float
+        Distance along the centre line and to the left of it, metres.
+    blur : float
+        Width of the patch of ground around the place, metres; at least 1 cm is taken.
+
+    Returns
+    -------
+    float
+        Share of the patch that is painted, 0..1.
+    """
+    blur = max(blur, 0.01)
+    if road.side_half > 0.0:
+        away = abs(s - road.junction) - road.side_half - road.corner
+        beyond = d > road.left.edge or d < -road.right.edge
+        if away < 0.0 or beyond:
+            middle = beyond and away < 0.0 and (abs(d) % 6.0) < 3.0 and abs(d) > 12.0
+            return _stripe(s - road.junction, 0.06, blur) if middle else 0.0
+        if away < 6.0:
+            return _junction_mark(road, s, d, blur)
+    if d > road.left.edge or d < -road.right.edge:
+        return 0.0
+    dash = (s % 9.0) < 3.0
+    if abs(d) < 0.5:
+        return _stripe(d, 0.07, blur) if dash or not road.dashed else 0.0
+    lanes = road.lanes_left if d > 0 else road.lanes_right
+    edge = road.left.edge if d > 0 else road.right.edge
+    index = round(abs(d) / road.lane)
+    offset = abs(d) - index * road.lane
+    if index < lanes:
+        return _stripe(offset, 0.06, blur) if dash else 0.0
+    if index == lanes and edge - lanes * road.lane > 1.0:
+        return _stripe(offset, 0.05, blur) if (s % 2.0) < 1.0 else 0.0
+    return _stripe(edge - 0.22 - abs(d), 0.06, blur) if not road.dashed else 0.0
+
+
+@njit(cache=True)
+def ground_kinds(road: Road, xy: NDArray) -> NDArray[np.uint8]:
+    """Return what the ground is at every point, lane marks included.
+
+    Parameters
+    ----------
+    road : Road
+        The street.
+    xy : (N, 2) float
+        Points in the world, metres.
+
+    Returns
+    -------
+    (N,) uint8
+        Members of `Kind`.
+    """
+    kinds = np.empty(len(xy), np.uint8)
+    for i in range(len(xy)):
+        s, d = to_road(road, xy[i, 0], xy[i, 1])
+        kinds[i] = ground_kind(road, s, d)
+        if kinds[i] == _ROAD and lane_mark(road, s, d, 0.0) > 0.5:
+            kinds[i] = _LANE
+    return kinds

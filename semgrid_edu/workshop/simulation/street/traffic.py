@@ -1,0 +1,188 @@
+"""Traffic: lets cars, cyclists and pedestrians take part in a drive where they don't run into anything."""
+
+import numpy as np
+
+from semgrid_edu.workshop.simulation.street.actors import Actor, Look, Size
+from semgrid_edu.workshop.simulation.street.builder import Builder
+from semgrid_edu.workshop.simulation.street.footprints import collides, footprint_table
+from semgrid_edu.workshop.simulation.street.plan import Plan
+from semgrid_edu.workshop.simulation.street.trajectories import Pace, Trajectory
+from semgrid_edu.workshop.simulation.things.cars import BODIES, PAINTS, car_size
+from semgrid_edu.workshop.simulation.things.materials import Kind
+from semgrid_edu.workshop.simulation.things.people import Person
+
+EGO_SIZE = (4.5, 1.85, 1.5)
+"""Length, width and height of the recording car, metres; its own sensors don't see it."""
+
+
+class Traffic:
+    """The actors of a drive.
+
+    None collides with another, with the scenery or with the recording car. This is checked at 25 instants of the drive,
+    or at 6 when it is shorter than 2 s.
+
+    Parameters
+    ----------
+    builder : Builder
+        The world with its scenery; parked cars and bicycles are added to it.
+    plan : Plan
+        What the street is like.
+    ego : Trajectory
+        Where the recording car is at every instant.
+    duration : float
+        How long the drive lasts, seconds.
+
+    Attributes
+    ----------
+    moving, parked : list of Actor
+        The actors so far; a pedestrian who stands still is among those that move.
+    """
+
+    def __init__(self, builder: Builder, plan: Plan, ego: Trajectory, duration: float) -> None:
+        self.builder, self.plan, self.ego, self.duration = builder, plan, ego, duration
+        self.rng, self.road = builder.rng, plan.road
+        self.moving: list[Actor] = []
+        self.parked: list[Actor] = []
+        self._times = np.linspace(0, duration, 6 if duration < 2 else 25)
+        ego_actor = Actor(0, Kind.CAR, EGO_SIZE, ego, ("sedan", PAINTS[0]))
+        self._taken = [[ego_actor.footprint(self.road, t)] for t in self._times]
+        self._static = footprint_table(builder.footprints)
+
+    def add(self, kind: Kind, size: Size, trajectory: Trajectory, look: Look, margin: float = 0.25) -> bool:
+        """Let a road user take part in the drive, unless it would run into something.
+
+        Parameters
+        ----------
+        kind : Kind
+            What it is.
+        size : (float, float, float)
+            Length, width and height, metres.
+        trajectory : Trajectory
+            Where it is at every instant.
+        look : (str, (float, float, float)) or Person
+            As for `Actor`.
+        margin : float
+            Distance that it keeps from other road users, metres.
+
+        Returns
+        -------
+        bool
+            False when the place is taken at any time of the drive; then nothing is added.
+        """
+        actor = Actor(self.builder.next_instance, kind, size, trajectory, look, float(self.rng.uniform(0, 3)))
+        feet = [actor.footprint(self.road, t) for t in self._times]
+        for foot, taken in zip(feet, self._taken, strict=True):
+            if collides(foot, footprint_table(taken), margin) or collides(foot, self._static, 0.05):
+                return False
+        self.builder.number()
+        self.moving.append(actor)
+        for foot, taken in zip(feet, self._taken, strict=True):
+            taken.append(foot)
+        return True
+
+    def park(self, kind: Kind, size: Size, trajectory: Trajectory, look: Look, overturned: bool = False) -> bool:
+        """Park a car or a bicycle for the whole drive, unless the place is taken.
+
+        Parameters
+        ----------
+        kind : Kind
+            What it is.
+        size : (float, float, float)
+            Length, width and height, metres.
+        trajectory : Trajectory
+            Where it stands; its pace is `STAND`.
+        look : (str, (float, float, float))
+            Body and paint, as for `Actor`.
+        overturned : bool
+            Whether it lies on its top.
+
+        Returns
+        -------
+        bool
+            Whether it was parked.
+        """
+        actor = Actor(self.builder.next_instance, kind, size, trajectory, look, overturned=overturned)
+        foot = actor.footprint(self.road, 0.0)
+        if collides(foot, self._static, 0.1):
+            return False
+        if any(collides(foot, footprint_table(taken), 0.2) for taken in self._taken):
+            return False
+        self.builder.number()
+        self.parked.append(actor)
+        self.builder.shapes.append(actor.shape(self.road, 0.0))
+        self.builder.instances.append(actor.instance)
+        self.builder.footprints.append(foot)
+        self._static = footprint_table(self.builder.footprints)
+        return True
+
+    def paint(self) -> tuple[float, float, float]:
+        """Draw the paint of a car, (3,) linear albedo; the usual colours come more often."""
+        weights = 1 / (3.0 + np.arange(len(PAINTS)))
+        return PAINTS[self.rng.choice(len(PAINTS), p=weights / weights.sum())]
+
+    def body(self) -> str:
+        """Draw the body of a car, one of `BODIES`."""
+        return str(self.rng.choice(BODIES, p=[0.32, 0.22, 0.2, 0.16, 0.1]))
+
+    def drive_car(self, s: float, d: float, along: float, across: float, pace: Pace, look: Look | None = None) -> bool:
+        """Let a car drive, unless it would run into something.
+
+        Parameters
+        ----------
+        s, d : float
+            Where it is at t = 0: distance along the road and to the left of its centre line, metres.
+        along, across : float
+            Direction in (s, d), as in `Trajectory`.
+        pace : Pace
+            How fast it drives.
+        look : (str, (float, float, float)), optional
+            Its body and paint; drawn when left out.
+
+        Returns
+        -------
+        bool
+            False when the place is taken at any time of the drive; then nothing is added.
+        """
+        look = look or (self.body(), self.paint())
+        return self.add(Kind.CAR, car_size(look[0]), Trajectory(s, d, along, across, pace), look, 0.3)
+
+    def walk(self, s: float, d: float, along: float, across: float, pace: Pace, turn: float = 0.0) -> bool:
+        """Let a person walk, or stand, unless they would run into something.
+
+        Parameters
+        ----------
+        s, d : float
+            Where it is at t = 0: distance along the road and to the left of its centre line, metres.
+        along, across : float
+            Direction in (s, d), as in `Trajectory`.
+        pace : Pace
+            How fast the person walks; `STAND` for one who stands.
+        turn : float
+            Angle between this direction and the one in which the person looks, rad.
+
+        Returns
+        -------
+        bool
+            False when the place is taken at any time of the drive; then nothing is added.
+        """
+        person = Person.random(self.rng)
+        return self.add(Kind.PEDESTRIAN, (0.7, 0.6, person.height), Trajectory(s, d, along, across, pace, turn), person)
+
+    def ride(self, s: float, d: float, along: float, pace: Pace) -> bool:
+        """Let a person ride a bicycle along the road, unless they would run into something.
+
+        Parameters
+        ----------
+        s, d : float
+            Where it is at t = 0: distance along the road and to the left of its centre line, metres.
+        along : float
+            1 with our traffic, -1 against it.
+        pace : Pace
+            How fast the person rides.
+
+        Returns
+        -------
+        bool
+            False when the place is taken at any time of the drive; then nothing is added.
+        """
+        return self.add(Kind.BICYCLE, (1.78, 0.6, 1.8), Trajectory(s, d, along, 0.0, pace), Person.random(self.rng))

@@ -1,0 +1,193 @@
+"""Trajectories: how things move along the road, at a speed that swings a little."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.workshop.simulation.street.ground import ground_height
+from semgrid_edu.workshop.simulation.street.layout import Road, to_world
+
+
+@dataclass(frozen=True)
+class Pace:
+    """A speed over time, mean + swing sin(rate t + phase), and the distance covered, its integral in closed form.
+
+    Parameters
+    ----------
+    mean : float
+        Mean speed, m/s.
+    swing : float
+        Amplitude of the speed's swing, m/s.
+    rate : float
+        Angular frequency of the swing, rad/s.
+    phase : float
+        Phase of the swing at t = 0, rad.
+    """
+
+    mean: float
+    swing: float = 0.0
+    rate: float = 0.8
+    phase: float = 0.0
+
+    @classmethod
+    def random(cls, rng: np.random.Generator, mean: float | None = None) -> "Pace":
+        """Draw how fast the recording car drives.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Source of all that is drawn.
+        mean : float, optional
+            Mean speed, m/s; when left out, 5 to 14 m/s and in one drive of ten 0.
+
+        Returns
+        -------
+        Pace
+        """
+        drawn = 0.0 if rng.random() < 0.1 else float(rng.uniform(5, 14))
+        mean = drawn if mean is None else mean
+        swing, phase = float(rng.uniform(0.0, 0.12)) * mean, float(rng.uniform(0, 6.28))
+        return cls(mean, swing, 0.8, phase)
+
+    def distance(self, t: float) -> float:
+        """Return the distance covered since t = 0.
+
+        Parameters
+        ----------
+        t : float
+            Time, seconds.
+
+        Returns
+        -------
+        float
+            Metres.
+        """
+        return self.mean * t + self.swing / self.rate * (np.cos(self.phase) - np.cos(self.rate * t + self.phase))
+
+    def speed(self, t: float) -> float:
+        """Return the speed at one instant.
+
+        Parameters
+        ----------
+        t : float
+            Time, seconds.
+
+        Returns
+        -------
+        float
+            m/s.
+        """
+        return self.mean + self.swing * np.sin(self.rate * t + self.phase)
+
+
+STAND = Pace(0.0)
+"""The pace of what stands still."""
+
+
+@dataclass(frozen=True)
+class Departure:
+    """A pace that stands, sets off at a steady acceleration, and then keeps its speed.
+
+    Parameters
+    ----------
+    mean : float
+        The speed that it reaches, m/s.
+    start : float
+        When it sets off, seconds.
+    acceleration : float
+        How fast it speeds up, m/s^2.
+    """
+
+    mean: float
+    start: float
+    acceleration: float
+
+    def distance(self, t: float) -> float:
+        """Return the distance covered since t = 0, metres. Parameters are those of `Pace.distance`."""
+        since = max(t - self.start, 0.0)
+        rising = min(since, self.mean / self.acceleration)
+        return 0.5 * self.acceleration * rising**2 + self.mean * (since - rising)
+
+    def speed(self, t: float) -> float:
+        """Return the speed at one instant, m/s. Parameters are those of `Pace.speed`."""
+        return min(self.acceleration * max(t - self.start, 0.0), self.mean)
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A straight line in the coordinates of the road, followed at a pace.
+
+    Parameters
+    ----------
+    s, d : float
+        Where it begins at t = 0: distance along the road and to the left of its centre line, metres.
+    along, across : float
+        Direction in (s, d): (1, 0) with our traffic, (-1, 0) against it, (0, 1) across the road to the left.
+    pace : Pace or Departure
+        How fast the line is followed.
+    turn : float
+        Angle between this direction and the one that the thing points in, rad, for things that stand.
+    """
+
+    s: float
+    d: float
+    along: float
+    across: float
+    pace: Pace | Departure
+    turn: float = 0.0
+
+    def at(self, t: float) -> tuple[float, float]:
+        """Return the place beside the road at one instant.
+
+        Parameters
+        ----------
+        t : float
+            Time, seconds.
+
+        Returns
+        -------
+        s, d : float
+            Distance along the road and to the left of its centre line, metres.
+        """
+        travelled = self.pace.distance(t)
+        return self.s + self.along * travelled, self.d + self.across * travelled
+
+    def pose(self, road: Road, t: float) -> tuple[NDArray[np.float64], float]:
+        """Return the place and the direction in the world at one instant.
+
+        Parameters
+        ----------
+        road : Road
+            The street.
+        t : float
+            Time, seconds.
+
+        Returns
+        -------
+        position : (3,) float64
+            The point on the ground, metres.
+        yaw : float
+            Direction of the thing, rad from the x axis, counter-clockwise.
+        """
+        s, d = self.at(t)
+        x, y, heading = to_world(road, s, d)
+        return np.array([x, y, ground_height(road, s, d)]), heading + np.arctan2(self.across, self.along) + self.turn
+
+    def velocity(self, road: Road, t: float) -> NDArray[np.float64]:
+        """Return the velocity over ground at one instant, as a central difference.
+
+        Parameters
+        ----------
+        road : Road
+            The street.
+        t : float
+            Time, seconds.
+
+        Returns
+        -------
+        (2,) float64
+            Along the world's x and y, m/s.
+        """
+        step = 1e-4
+        return (self.pose(road, t + step)[0][:2] - self.pose(road, t - step)[0][:2]) / (2 * step)

@@ -1,0 +1,269 @@
+"""Simulated drives on disk: KITTI's raw layout, each drive written whole or not at all.
+
+Whether a drive on disk is whole, and what is left of one that isn't.
+"""
+
+import io
+import json
+import shutil
+import tempfile
+from collections.abc import Callable, Collection
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from semgrid_edu.datasets.readers.depth_points import depth_scan
+from semgrid_edu.datasets.readers.kitti_labels import DEPTH_UNIT, KINDS
+from semgrid_edu.datasets.readers.kitti_raw import drive_folder
+from semgrid_edu.errors import DataError
+from semgrid_edu.labels import KITTI_14, LabelSet
+from semgrid_edu.storage.files import write_text
+from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
+from semgrid_edu.workshop.simulation.frame import SimulatedFrame
+from semgrid_edu.workshop.simulation.sensors.gps import DATAFORMAT, oxts_packet
+from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.simulation.things.materials import class_of_kind
+
+UNFINISHED = ".partial"
+"""How the name of a drive's hidden folder ends as long as the drive isn't whole."""
+
+
+def remove_unfinished(day: Path) -> None:
+    """Remove what killed processes have left of drives. No other process may be writing drives there.
+
+    Parameters
+    ----------
+    day : Path
+        The folder of the drives of a day.
+    """
+    for partial in day.glob(f".*{UNFINISHED}"):
+        shutil.rmtree(partial, ignore_errors=True)
+
+
+def check_complete(folder: Path, n_frames: int, labelled: Collection[int]) -> None:
+    """Check that a drive has all its files.
+
+    Parameters
+    ----------
+    folder : Path
+        The drive's folder.
+    n_frames : int
+        Number of frames.
+    labelled : collection of int
+        Numbers of the frames that have labels.
+
+    Raises
+    ------
+    DataError
+        When a file is missing.
+    """
+    per_frame = {"image_02/data": "png", "velodyne_points/data": "bin", "oxts/data": "txt"}
+    expected = [f"{place}/{k:010d}.{suffix}" for place, suffix in per_frame.items() for k in range(n_frames)]
+    expected += [f"labels/{kind}/{k:010d}.png" for kind in KINDS for k in labelled]
+    expected += [f"{sensor}/timestamps.txt" for sensor in ("image_02", "velodyne_points", "oxts")]
+    expected += ["labels/label_set.txt", "labels/objects.json"]
+    missing = [name for name in expected if not (folder / name).is_file()]
+    if missing:
+        found = f"{len(missing)} missing, such as {missing[0]}"
+        raise DataError(folder, f"all {len(expected)} files of a drive (delete the folder to make it anew)", found)
+
+
+DATE = "2026_01_01"
+"""The day on which all simulated drives take place."""
+
+
+def _row(name: str, numbers: NDArray | tuple) -> str:
+    return f"{name}: " + " ".join(f"{x:.12e}" for x in np.ravel(numbers)) + "\n"
+
+
+def write_calibration(root: Path, rig: Rig) -> None:
+    """Write KITTI's three calibration files. The cameras are ideal: they have no distortion and look in one direction.
+
+    Parameters
+    ----------
+    root : path-like
+        The folder that takes the day's folder.
+    rig : Rig
+        Where camera, LIDAR and IMU stand.
+    """
+    day, time = Path(root) / DATE, "calib_time: 01-Jan-2026 09:00:00\n"
+    height, width = rig.image_size
+    text = time + _row("corner_dist", (0.0995,))
+    for index in range(4):
+        P = rig.P_rect(index)
+        baseline = rig.R_rect.T @ np.array([P[0, 3] / P[0, 0], 0.0, 0.0])
+        rows = {"S": (width, height), "K": P[:, :3], "D": np.zeros(5), "R": np.eye(3), "T": baseline}
+        rows |= {"S_rect": (width, height), "R_rect": rig.R_rect, "P_rect": P}
+        text += "".join(_row(f"{name}_{index:02d}", numbers) for name, numbers in rows.items())
+    write_text(day / "calib_cam_to_cam.txt", text)
+    for name, T, extra in (
+        ("calib_velo_to_cam.txt", rig.T_camera0_from_lidar, _row("delta_f", (0, 0)) + _row("delta_c", (0, 0))),
+        ("calib_imu_to_velo.txt", rig.T_lidar_from_imu, ""),
+    ):
+        write_text(day / name, time + _row("R", T[:3, :3]) + _row("T", T[:3, 3]) + extra)
+
+
+def _stamp(start: datetime, seconds: float) -> str:
+    """Return a time of day with nanoseconds, as KITTI writes it."""
+    return f"{start + timedelta(seconds=seconds):%Y-%m-%d %H:%M:%S.%f}000\n"
+
+
+def _write_times(folder: Path, n_frames: int, start: datetime) -> None:
+    """Write timestamps: camera, LIDAR and IMU all take a frame at the middle of the LIDAR's turn."""
+    offsets = {"image_02/timestamps": 0.0, "oxts/timestamps": 0.0, "velodyne_points/timestamps": 0.0}
+    offsets |= {"velodyne_points/timestamps_start": -PERIOD / 2, "velodyne_points/timestamps_end": PERIOD / 2}
+    for name, offset in offsets.items():
+        lines = [_stamp(start, k * PERIOD + offset) for k in range(n_frames)]
+        (folder / f"{name}.txt").write_text("".join(lines))
+
+
+def _save_png(path: Path, pixels: NDArray) -> None:
+    """Write a PNG, at a level of compression above which files hardly get smaller but take longer."""
+    buffer = io.BytesIO()
+    Image.fromarray(pixels).save(buffer, format="png", compress_level=4)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(buffer.getvalue())
+
+
+def depth_to_png(depth: NDArray) -> NDArray[np.uint16]:
+    """Return depths as KITTI's depth maps hold them: times 256, 0 for none and for what lies 256 m away or farther.
+
+    Parameters
+    ----------
+    depth : (h, w) float
+        Metres along the optical axis; NaN for none.
+
+    Returns
+    -------
+    (h, w) uint16
+        In steps of `DEPTH_UNIT`.
+    """
+    scaled = np.round(np.nan_to_num(depth, nan=0.0) / DEPTH_UNIT)
+    return np.where(scaled < 65536, scaled, 0).astype(np.uint16)
+
+
+def _write_labels(folder: Path, name: str, frame: SimulatedFrame, label_set: LabelSet) -> None:
+    """Write what is true of one frame."""
+    classes = class_of_kind(label_set)
+    _save_png(folder / "image" / f"{name}.png", classes[frame.picture.kind])
+    _save_png(folder / "depth" / f"{name}.png", depth_to_png(frame.picture.depth))
+    _save_png(folder / "birdseye" / f"{name}.png", classes[frame.truth.kinds])
+    _save_png(folder / "visible" / f"{name}.png", frame.truth.visible.astype(np.uint8) * 255)
+
+
+def depth_as_points(frame: SimulatedFrame, rig: Rig) -> NDArray[np.float32]:
+    """Return the depth image as a scan, thinned to a LIDAR's sparsity (section 4: SYNTHIA).
+
+    Parameters
+    ----------
+    frame : SimulatedFrame
+        The frame, with its picture.
+    rig : Rig
+        Where the camera stands.
+
+    Returns
+    -------
+    (N, 4) float32
+        As `depth_scan` says.
+    """
+    return depth_scan(frame.picture.depth, rig.camera)
+
+
+def lidar_points(frame: SimulatedFrame, rig: Rig) -> NDArray[np.float32]:
+    """Return the points of the LIDAR.
+
+    Parameters
+    ----------
+    frame : SimulatedFrame
+        The frame, with its points.
+    rig : Rig
+        Not used: `write_drive` calls this as it calls `depth_as_points`.
+
+    Returns
+    -------
+    (N, 4) float32
+        x, y, z in the LIDAR frame, metres, and reflectance 0..1.
+    """
+    return frame.points
+
+
+def write_drive(
+    root: Path,
+    drive: str,
+    simulated: SimulatedDrive,
+    labelled: Collection[int],
+    label_set: LabelSet = KITTI_14,
+    points: Callable[[SimulatedFrame, Rig], NDArray[np.float32]] = lidar_points,
+) -> Path:
+    """Write a drive: images, points, oxts, timestamps, and labels of some frames.
+
+    It grows in a hidden folder of its own, which gets the drive's name when the drive is whole. So a killed process
+    leaves no half drive, and of two processes that make the same drive the first one's stays.
+
+    Parameters
+    ----------
+    root : path-like
+        The folder that holds the day's folder, into which `write_calibration` writes too.
+    drive : str
+        Number of the drive, four digits.
+    simulated : SimulatedDrive
+        The drive.
+    labelled : collection of int
+        Numbers of the frames that get labels.
+    label_set : LabelSet
+        The classes of the labels.
+    points : callable
+        What is written as LIDAR points: `lidar_points` or `depth_as_points`.
+
+    Returns
+    -------
+    Path
+        The drive's folder.
+
+    Raises
+    ------
+    DataError
+        When another process has removed what was written.
+    """
+    folder = drive_folder(root, DATE, drive)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    partial = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}-", suffix=UNFINISHED))
+    _write_files(partial, simulated, labelled, label_set, points)
+    check_complete(partial, simulated.n_frames, labelled)
+    partial.chmod(0o755)
+    try:
+        partial.rename(folder)
+    except OSError:
+        shutil.rmtree(partial, ignore_errors=True)
+        if not folder.exists():  # else another process was quicker
+            raise
+    return folder
+
+
+def _write_files(
+    partial: Path,
+    simulated: SimulatedDrive,
+    labelled: Collection[int],
+    label_set: LabelSet,
+    points: Callable[[SimulatedFrame, Rig], NDArray[np.float32]],
+) -> None:
+    """Write all files of a drive to its folder."""
+    for name in ("image_02/data", "velodyne_points/data", "oxts/data", "labels"):
+        (partial / name).mkdir(parents=True)
+    objects = {}
+    for k, frame in enumerate(simulated.frames(set(labelled))):
+        name = f"{k:010d}"
+        _save_png(partial / "image_02" / "data" / f"{name}.png", frame.picture.image)
+        (partial / "velodyne_points" / "data" / f"{name}.bin").write_bytes(points(frame, simulated.rig).tobytes())
+        oxts = oxts_packet(simulated.T_world_from_imu, frame.time, simulated.geodesy)
+        (partial / "oxts" / "data" / f"{name}.txt").write_text(oxts)
+        objects[name] = frame.objects
+        if k in labelled:
+            _write_labels(partial / "labels", name, frame, label_set)
+    _write_times(partial, simulated.n_frames, datetime(2026, 1, 1, 10, 0, 0, 125000))
+    (partial / "oxts" / "dataformat.txt").write_text(DATAFORMAT)
+    (partial / "labels" / "label_set.txt").write_text(f"{label_set.name}\n")
+    (partial / "labels" / "objects.json").write_text(json.dumps(objects, separators=(",", ":")) + "\n")

@@ -1,0 +1,1 @@
+"""Measurements that lectures and README quote: filter, CRF, ground truth, training, and a new drive."""

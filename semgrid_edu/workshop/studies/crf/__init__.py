@@ -1,0 +1,1 @@
+"""The CRF measured: error against time, coupling, parameters searched and learnt."""

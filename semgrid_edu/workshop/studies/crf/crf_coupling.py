@@ -1,0 +1,244 @@
+"""Approximate against exact inference in the dense CRF on tiny grids, as the coupling grows (eq. (3), (4)).
+
+The coupling is the weight w1 of the bilateral kernel; the weight w2 of the spatial kernel is three quarters of it, as
+by default. So 4 stands for the default parameters, and 0 for no pairs at all.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from datetime import UTC, datetime
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import softmax
+from tqdm.auto import tqdm
+
+from semgrid_edu.crf import CrfParams, mean_field, mean_field_naive, unary_from_probability
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.stage_models.crf import all_free, coupled, two_classes
+from semgrid_edu.storage.files import write_json
+from semgrid_edu.storage.provenance import versions
+from semgrid_edu.storage.reading import read_parts
+from semgrid_edu.workshop.attic.all_labellings import visit_labellings
+from semgrid_edu.workshop.attic.potts_messages import potts_max_product, potts_sum_product
+from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
+
+COUPLINGS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
+"""From no pairs to the default weights."""
+FINE = tuple(k / 8 for k in range(33))
+"""The same range for the symmetric case."""
+GRIDS = ((3, 3), (4, 4))
+"""Rows and columns."""
+CLASSES = (2, 3)
+"""Numbers of classes."""
+N_DRAWS = 20
+"""Number of random CRFs of each size."""
+TILT = 0.501
+"""Probability of class 0 in every cell of the symmetric case: as good as undecided."""
+Inference = Callable[[NDArray, NDArray, CrfParams], NDArray]
+"""Takes unary, values and params, and returns a distribution over the classes in each cell, (C, H, W)."""
+
+
+def _settled(unary: NDArray, values: NDArray, params: CrfParams) -> NDArray:
+    return mean_field_naive(unary, values, params, iterations=10_000, tolerance=1e-9)
+
+
+WAYS: Mapping[str, Inference] = {
+    "mean field, 10 updates": mean_field_naive,
+    "mean field, converged": _settled,
+    "fast mean field, 10 updates": mean_field,
+    "loopy sum-product": potts_sum_product,
+    "loopy max-product": potts_max_product,
+}
+"""What is compared with exact inference."""
+ONLY_LABELS = ("loopy max-product",)
+"""Ways that don't say how probable a class is, so that only their labels are compared."""
+
+
+def crf_coupling(
+    log: str | Path,
+    seed: int = 0,
+    draws: int = N_DRAWS,
+    grids: Sequence[tuple[int, int]] = GRIDS,
+    classes: Sequence[int] = CLASSES,
+    couplings: Sequence[float] = COUPLINGS,
+    fine: Sequence[float] = FINE,
+) -> dict:
+    """Compare every way with exact inference on random tiny grids, coupling by coupling, and in a symmetric case.
+
+    Parameters
+    ----------
+    log : path-like
+        Takes each size as soon as it is done. If the file exists, sizes that it holds aren't measured again.
+    seed : int
+        Seed for the random CRFs.
+    draws : int
+        Number of random CRFs of each size, at least one.
+    grids : sequence of (int, int)
+        Rows and columns.
+    classes : sequence of int
+        Numbers of classes.
+    couplings, fine : sequence of float
+        Weights w1, for the random grids and for the symmetric case.
+
+    Returns
+    -------
+    dict
+        "cases": by name from `measure_coupling`; "symmetric": from `symmetric_case`; and all that made them. JSON can
+        hold it.
+
+    Raises
+    ------
+    ArgumentError
+        When the seed is negative, or nothing is to be drawn.
+    DataError
+        When the log is something else, or was begun with another seed or other numbers.
+    """
+    if seed < 0 or draws < 1:
+        name, value = ("seed", seed) if seed < 0 else ("draws", draws)
+        raise ArgumentError(name, "a whole number from 0 up, and at least one draw", value)
+    identity = {"seed": seed, "draws": draws, "couplings": list(couplings)}
+    done = read_parts(log, identity, "cases")
+    for height, width, n in ((*grid, n) for grid in grids for n in classes):
+        name = f"{height} x {width} cells, {n} classes"
+        if name not in done:
+            done[name] = measure_coupling((n, height, width), couplings, draws, seed, name)
+            write_json(log, identity | {"cases": done})
+    return identity | {
+        "cases": done,
+        "symmetric": symmetric_case(fine),
+        "command": f"semgrid-edu reproduce crf-coupling --seed {seed} --draws {draws}",
+        "date": f"{datetime.now(UTC):%Y-%m-%d}",
+        "versions": versions("numpy", "scipy", "numba"),
+    }
+
+
+def random_crf(shape: tuple[int, int, int], seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Draw a unary term and occupancy values.
+
+    Parameters
+    ----------
+    shape : (int, int, int)
+        C, H, W.
+    seed : int
+        Seed for both.
+
+    Returns
+    -------
+    unary : (C, H, W) float64
+        Of soft-maxes of normally distributed scores.
+    values : (4, H, W) float64
+        Drawn from a Dirichlet distribution whose parameters are all 1/2: most cells lean towards one state.
+    """
+    rng = np.random.default_rng((seed, *shape))
+    unary = unary_from_probability(softmax(rng.normal(size=shape), axis=0))
+    return unary, np.moveaxis(rng.dirichlet(np.full(4, 0.5), shape[1:]), -1, 0)
+
+
+def measure_coupling(
+    shape: tuple[int, int, int],
+    couplings: Sequence[float],
+    draws: int,
+    seed: int = 0,
+    name: str = "",
+) -> dict:
+    """Compare every way with exact inference on random CRFs of one size.
+
+    Parameters
+    ----------
+    shape : (int, int, int)
+        C, H, W.
+    couplings : sequence of float
+        Weights w1.
+    draws : int
+        Number of random CRFs, with seeds from `seed` up.
+    seed : int
+        Seed for the first.
+    name : str
+        What the progress bar says.
+
+    Returns
+    -------
+    dict
+        "variation": for each way of `WAYS` but `ONLY_LABELS` (couplings, draws), the mean total variation of a cell's
+        distribution from the exact one, 0..1. "labels": for each way, and for "exact marginals", (couplings, draws),
+        the share of the cells whose most probable class is another than in the most likely labelling.
+    """
+    variation: dict[str, list] = {way: [] for way in WAYS if way not in ONLY_LABELS}
+    labels: dict[str, list] = {way: [] for way in ("exact marginals", *WAYS)}
+    for coupling, draw in tqdm(list(product(couplings, range(draws))), desc=name, unit="CRF"):
+        crf = *random_crf(shape, seed + draw), coupled(coupling)
+        exact = visit_labellings(*crf)
+        found = {way: infer(*crf) for way, infer in WAYS.items()}
+        for way, Q in (("exact marginals", exact.marginals), *found.items()):
+            labels[way].append(float((Q.argmax(axis=0) != exact.labels).mean()))
+        for way, errors in variation.items():
+            errors.append(float(np.abs(found[way] - exact.marginals).sum(axis=0).mean() / 2))
+    return {
+        part: {way: np.reshape(errors, (-1, draws)).tolist() for way, errors in by_way.items()}
+        for part, by_way in (("variation", variation), ("labels", labels))
+    }
+
+
+def symmetric_case(couplings: Sequence[float] = FINE, shape: tuple[int, int] = (3, 3), tilt: float = TILT) -> dict:
+    """Let all cells be free and (almost) undecided between two classes, and watch which of them each way takes.
+
+    With a tilt of exactly 1/2, the exact marginals are 1/2 by symmetry, at every coupling.
+
+    Parameters
+    ----------
+    couplings : sequence of float
+        Weights w1.
+    shape : (int, int)
+        H, W.
+    tilt : float
+        The network's probability of class 0 in every cell.
+
+    Returns
+    -------
+    dict
+        "shape" (H, W); "tilt"; "couplings" (n,); "probability": for each way the probability of class 0 in the middle
+        cell, (n,), with "exact" first, and as "mean field, other side" and so on with the tilt towards class 1.
+    """
+    middle, values = (shape[0] // 2, shape[1] // 2), all_free(shape)
+    ways: dict[str, Inference] = {
+        "exact": lambda *crf: visit_labellings(*crf).marginals,
+        "mean field, 10 updates": mean_field_naive,
+        "mean field, converged": _settled,
+        "loopy sum-product": potts_sum_product,
+    }
+    probability = {
+        way + side: [
+            float(infer(two_classes(np.full(shape, p)), values, coupled(coupling))[(0, *middle)])
+            for coupling in couplings
+        ]
+        for side, p in (("", tilt), (", other side", 1 - tilt))
+        for way, infer in ways.items()
+    }
+    return {"shape": list(shape), "tilt": tilt, "couplings": list(couplings), "probability": probability}
+
+
+def crf_coupling_tables(result: dict) -> str:
+    """Return the means over the draws, one table per size.
+
+    Parameters
+    ----------
+    result : dict
+        From `crf_coupling`, or from the JSON file that it was written to.
+
+    Returns
+    -------
+    str
+        Mean total variation and share of wrong labels, per cent.
+    """
+    tables = []
+    for name, case in result["cases"].items():
+        for part, title in (
+            ("variation", "mean total variation"),
+            ("labels", "labels unlike the most likely labelling"),
+        ):
+            rows = [["coupling", *(f"{coupling:g}" for coupling in result["couplings"])]]
+            rows += [[way, *(f"{100 * np.mean(e):.1f}" for e in errors)] for way, errors in case[part].items()]
+            tables.append(f"{name}, {title}, per cent\n\n{markdown_table(rows)}")
+    return "\n\n".join(tables)

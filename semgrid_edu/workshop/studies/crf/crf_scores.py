@@ -1,0 +1,281 @@
+"""What the chosen CRFs are worth on the test split, and how well calibrated the grids are (sections 3.5 and 4.2).
+
+What the CRF makes of a network's grids: the grids kept in memory, refined with any parameters, and counted (3.5).
+"""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm.auto import tqdm
+
+from semgrid_edu.crf import (
+    CrfParams,
+    at_temperature,
+    expected_calibration_error,
+    mean_field,
+    negative_log_likelihood,
+    reliability,
+    unary_from_log_probability,
+)
+from semgrid_edu.datasets.index import DatasetIndex, load_index
+from semgrid_edu.datasets.readers.kitti_raw import drive_folder
+from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.errors import DataError
+from semgrid_edu.metrics import METRICS, confusion_matrix
+from semgrid_edu.networks import SemanticGridNet, load_net
+from semgrid_edu.storage.files import sha256
+from semgrid_edu.workshop.scoring.confusions import drive_confusions
+from semgrid_edu.workshop.scoring.evaluate import scores
+from semgrid_edu.workshop.scoring.learned_grids import learned_log_g
+from semgrid_edu.workshop.scoring.statistics import paired_interval
+
+
+class GridOutputs(NamedTuple):
+    """A network's semantic grids of N frames, and what the CRF and the metrics need beside them.
+
+    Parameters
+    ----------
+    log_g : (N, C, H, W) float32
+        Logarithms of the network's distribution over the classes.
+    occupancy : (N, 4, H, W) float32
+        o, the probability of FREE, STATIC, DYNAMIC and UNKNOWN.
+    truth : (N, H, W) uint8
+        The class of each cell; 255 where unlabelled.
+    """
+
+    log_g: NDArray[np.float32]
+    occupancy: NDArray[np.float32]
+    truth: NDArray[np.uint8]
+
+    @property
+    def columns(self) -> NDArray[np.float32]:
+        """The same logarithms with the classes first, (C, N, H, W), as the functions of `semgrid_edu.crf` take them."""
+        return self.log_g.swapaxes(0, 1)
+
+
+def grid_outputs(net: SemanticGridNet, frames: TrainingSet) -> GridOutputs:
+    """Run the network once over every frame of a split.
+
+    Parameters
+    ----------
+    net : SemanticGridNet
+        The network, for the sizes of the frames.
+    frames : TrainingSet
+        The frames.
+
+    Returns
+    -------
+    GridOutputs
+        In the order of the frames.
+    """
+    shown = tqdm(range(len(frames)), desc="network", unit="frame")
+    log_g = np.stack([learned_log_g(net, frames[k]) for k in shown])
+    return GridOutputs(log_g, frames.arrays["occupancy"], frames.arrays["truth"])
+
+
+def outputs_at(outputs: GridOutputs, temperature: float) -> GridOutputs:
+    """Return the same grids with log g at another temperature, see `at_temperature`.
+
+    Parameters
+    ----------
+    outputs : GridOutputs
+        The network's grids.
+    temperature : float
+        T, positive.
+
+    Returns
+    -------
+    GridOutputs
+    """
+    return outputs._replace(log_g=at_temperature(outputs.columns, temperature).swapaxes(0, 1))
+
+
+def refined_grids(outputs: GridOutputs, params: CrfParams | None) -> NDArray[np.float32]:
+    """Refine every grid by the CRF, ten iterations of mean field.
+
+    Parameters
+    ----------
+    outputs : GridOutputs
+        The network's grids.
+    params : CrfParams or None
+        Parameters of the CRF; None for the network's own distributions.
+
+    Returns
+    -------
+    (N, C, H, W) float32
+        Q, the distribution over the classes in each cell.
+    """
+    if params is None:
+        return np.exp(outputs.log_g)
+    frames = zip(outputs.log_g, outputs.occupancy, strict=True)
+    return np.stack([mean_field(unary_from_log_probability(log_g), o, params) for log_g, o in frames])
+
+
+def refined_confusions(outputs: GridOutputs, refined: NDArray) -> NDArray[np.int64]:
+    """Compare the most probable classes with the truth, frame by frame.
+
+    Parameters
+    ----------
+    outputs : GridOutputs
+        For the truth.
+    refined : (N, C, H, W) float
+        Distributions over the classes, of `refined_grids`.
+
+    Returns
+    -------
+    (N, C, C) int64
+        Number of labelled cells of each frame: one row per true class, one column per class that was called.
+    """
+    n_classes = refined.shape[1]
+    pairs = zip(outputs.truth, refined.argmax(axis=1), strict=True)
+    return np.stack([confusion_matrix(truth, called, n_classes) for truth, called in pairs])
+
+
+def refuse_known_drives(validation_dir: str | Path, dataset_dir: str | Path) -> None:
+    """Refuse validation drives that a network was trained on or will be tested on.
+
+    Two drives are the same when their first scans are, byte for byte, whatever their numbers are.
+
+    Parameters
+    ----------
+    validation_dir : path-like
+        A data set with the split "validation".
+    dataset_dir : path-like
+        The data set with the splits "train" and "test".
+
+    Raises
+    ------
+    ArgumentError
+        When a split is missing.
+    DataError
+        When a drive of "validation" is one of "train" or "test"; the message names both.
+    """
+    known = load_index(dataset_dir)
+    of_scan = {scan: (split, name) for split in ("train", "test") for name, scan in _first_scans(known, split).items()}
+    validation = load_index(validation_dir)
+    for (date, drive), scan in _first_scans(validation, "validation").items():
+        if scan in of_scan:
+            split, (known_date, known_drive) = of_scan[scan]
+            folder, found = drive_folder(validation.root, date, drive), f"{known_date} {known_drive} of {split}"
+            raise DataError(folder, f"a drive that {known.name} doesn't use for training or testing", found)
+
+
+def _first_scans(index: DatasetIndex, split: str) -> dict[tuple[str, str], str]:
+    """Return the SHA-256 of the first scan of each drive of a split, by date and drive."""
+    folders = {
+        name: drive_folder(index.root, *name) / "velodyne_points" / "data" for name in index.frames_by_drive(split)
+    }
+    first = {name: min(folder.glob("[!.]*.bin"), default=folder) for name, folder in folders.items()}
+    for folder in (path for path in first.values() if not path.is_file()):
+        raise DataError(folder, "scans", "none")
+    return {name: sha256(path) for name, path in first.items()}
+
+
+def calibration(outputs: GridOutputs) -> dict[str, object]:
+    """Return how far a network's probabilities can be believed.
+
+    Parameters
+    ----------
+    outputs : GridOutputs
+        The network's grids.
+
+    Returns
+    -------
+    dict
+        "NLL", nats per cell; "ECE", 0..1; and the columns of the reliability diagram.
+    """
+    diagram = reliability(np.exp(outputs.columns), outputs.truth)
+    columns = {name: column.tolist() for name, column in diagram._asdict().items()}
+    nll = negative_log_likelihood(outputs.columns, outputs.truth)
+    return {"NLL": nll, "ECE": expected_calibration_error(diagram), "reliability": columns}
+
+
+def compare_on_test(
+    dataset_dir: str | Path, weights: str | Path, temperature: float, chosen: dict[str, CrfParams]
+) -> dict[str, object]:
+    """Score the network, the default CRF, and the chosen CRFs on the test split.
+
+    Parameters
+    ----------
+    dataset_dir : path-like
+        A data set with the split "test".
+    weights : path-like
+        The network.
+    temperature : float
+        T of the calibrated network.
+    chosen : dict of str to CrfParams
+        What was chosen, by objective.
+
+    Returns
+    -------
+    dict
+        "frames"; "calibration" "before" and "after"; by method "scores" (see `Scores`), "ECE" of the refined
+        probabilities, "gains" over the network by metric (low, gain, high), and "confusion". JSON can hold it.
+    """
+    test = TrainingSet(dataset_dir, "test")
+    network, default = grid_outputs(load_net(weights, test.camera), test), CrfParams.for_cells(test.spec.cell)
+    calibrated = outputs_at(network, temperature)
+    methods = {"network": (network, None), "CRF": (network, default), "calibrated, CRF": (calibrated, default)}
+    methods |= {f"calibrated, CRF for {objective}": (calibrated, params) for objective, params in chosen.items()}
+    per_drive, ece = {}, {}
+    for method, (outputs, params) in methods.items():
+        refined = refined_grids(outputs, params)
+        ece[method] = expected_calibration_error(reliability(refined.swapaxes(0, 1), outputs.truth))
+        per_drive[method] = drive_confusions(refined_confusions(outputs, refined), test.drives)
+    confusions = {method: confusion.sum(axis=0) for method, confusion in per_drive.items()}
+    return {
+        "frames": len(test),
+        "calibration": {"before": calibration(network), "after": calibration(calibrated)},
+        "scores": scores(confusions, test.label_set),
+        "ECE": ece,
+        "gains": {
+            method: gains_by_metric(confusion, per_drive["network"])
+            for method, confusion in per_drive.items()
+            if method != "network"
+        },
+        "confusion": {method: confusion.tolist() for method, confusion in confusions.items()},
+    }
+
+
+def gains_by_metric(a: NDArray, b: NDArray) -> dict[str, list[float | None]]:
+    """Return by how much one network's refined grids beat another one's on the same drives, by every metric.
+
+    Parameters
+    ----------
+    a, b : (V, C, C) int
+        Confusion matrices of the two, drive by drive.
+
+    Returns
+    -------
+    dict of str to [low, gain, high]
+        By metric, with the 95 % interval of `paired_interval`. There is one network, so the interval is for that one,
+        on new drives. One drive alone gives no interval: then low and high are None.
+    """
+    if len(a) == 1:
+        return {name: [None, metric(a[0]) - metric(b[0]), None] for name, metric in METRICS.items()}
+    return {name: list(paired_interval(a[None], b[None], metric)) for name, metric in METRICS.items()}
+
+
+def gains_text(gains: dict[str, dict[str, list[float | None]]]) -> str:
+    """Return gains as text to print, in points.
+
+    Parameters
+    ----------
+    gains : dict of str to dict
+        What `gains_by_metric` returns, by method.
+
+    Returns
+    -------
+    str
+        One line per method, with intervals in brackets where there are any.
+    """
+    lines = ["gain over the network without CRF, points, and its 95 % interval over test drives:"]
+    for method, by_metric in gains.items():
+        shown = []
+        for name, (low, gain, high) in by_metric.items():
+            interval = "" if low is None else f" ({100 * low:+.2f} to {100 * high:+.2f})"
+            shown.append(f"{name} {100 * gain:+.2f}{interval}")
+        lines.append(f"{method}: {', '.join(shown)}")
+    return "\n".join(lines)

@@ -1,0 +1,298 @@
+"""A search for the CRF's parameters on drives that neither training nor test has seen (section 3.5, claim of 4.3).
+
+Trials of the search for the CRF's parameters: made, valued by each objective, and kept on disk (section 3.5).
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm.auto import tqdm
+
+from semgrid_edu.crf import CrfParams, fit_temperature
+from semgrid_edu.datasets.index import INDEX_FILE, load_index
+from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.labels import LabelSet
+from semgrid_edu.networks import load_net
+from semgrid_edu.storage.files import sha256, write_json
+from semgrid_edu.storage.provenance import FILE_NAME, short_path, versions
+from semgrid_edu.storage.reading import read_json
+from semgrid_edu.workshop.scoring.evaluate import scores, scores_table
+from semgrid_edu.workshop.studies.crf.crf_scores import (
+    GridOutputs,
+    calibration,
+    compare_on_test,
+    gains_text,
+    grid_outputs,
+    outputs_at,
+    refined_confusions,
+    refined_grids,
+    refuse_known_drives,
+)
+from semgrid_edu.workshop.studies.crf.search_point import FACTORS, next_point, params_at, pareto_front, point_of
+
+OBJECTIVES = ("pixel accuracy", "class accuracy", "pixel accuracy, class accuracy kept")
+"""What a CRF is chosen for, over all labelled cells. The last asks for the best pixel accuracy among the CRFs whose
+class accuracy is at least that of the network without one."""
+
+Trial = dict[str, object]
+"""One trial: "params" by name, "scores" by cells and metric as in `Scores`, and the "seconds" that it took."""
+
+
+def next_params(trials: Sequence[Trial], unrefined: dict, cell: float, seed: int) -> CrfParams:
+    """Return the parameters to try next: the defaults first, then those of `next_point`.
+
+    Parameters
+    ----------
+    trials : sequence of dict
+        The trials so far.
+    unrefined : dict
+        Scores of the network without CRF.
+    cell : float
+        Side of a cell, metres.
+    seed : int
+        Seed of the search.
+
+    Returns
+    -------
+    CrfParams
+    """
+    if not trials:
+        return CrfParams.for_cells(cell)
+    points = [point_of(CrfParams(**trial["params"]), cell) for trial in trials]
+    return params_at(next_point(points, objective_values(trials, unrefined), seed), cell)
+
+
+def run_trial(calibrated: GridOutputs, params: CrfParams, label_set: LabelSet) -> Trial:
+    """Refine every grid with these parameters, and score the result.
+
+    Parameters
+    ----------
+    calibrated : GridOutputs
+        The network's grids.
+    params : CrfParams
+        Parameters of the CRF.
+    label_set : LabelSet
+        The classes.
+
+    Returns
+    -------
+    dict
+        A trial.
+    """
+    began = perf_counter()
+    found = validation_scores(calibrated, params, label_set)
+    chosen = {name: value for name, value in asdict(params).items() if name in FACTORS}
+    return {"params": chosen, "scores": found, "seconds": round(perf_counter() - began, 2)}
+
+
+def validation_scores(outputs: GridOutputs, params: CrfParams | None, label_set: LabelSet) -> dict[str, dict]:
+    """Return the metrics of the refined grids.
+
+    Parameters
+    ----------
+    outputs : GridOutputs
+        The network's grids.
+    params : CrfParams or None
+        Parameters of the CRF; None for no CRF.
+    label_set : LabelSet
+        The classes.
+
+    Returns
+    -------
+    dict of str to dict
+        Values from 0 to 1, by cells ("all" or "semantic") and metric.
+    """
+    confusion = refined_confusions(outputs, refined_grids(outputs, params)).sum(axis=0)
+    return scores({"refined": confusion}, label_set)["refined"]
+
+
+def objective_values(trials: Sequence[Trial], unrefined: dict) -> NDArray[np.float64]:
+    """Return what each trial is worth by each objective: the higher, the better.
+
+    Parameters
+    ----------
+    trials : sequence of dict
+        The trials.
+    unrefined : dict
+        Scores of the network without CRF.
+
+    Returns
+    -------
+    (n, 3) float64
+        In the order of `OBJECTIVES`. A trial that loses class accuracy is worth less than 0 by the last one: what it
+        loses.
+    """
+    pixel, by_class = (np.array([trial["scores"]["all"][name] for trial in trials]) for name in OBJECTIVES[:2])
+    lost = by_class - unrefined["all"]["class accuracy"]
+    return np.stack([pixel, by_class, np.where(lost >= 0, pixel, lost)], axis=1)
+
+
+def read_trials(log: str | Path, identity: dict) -> list[Trial]:
+    """Return the trials of a search that was begun, or an empty list.
+
+    Parameters
+    ----------
+    log : path-like
+        The file that `search_crf` writes, which may be missing.
+    identity : dict
+        What makes the search: its data, weights and seed.
+
+    Returns
+    -------
+    list of dict
+
+    Raises
+    ------
+    DataError
+        When the file is something else, or the log of another search.
+    """
+    path = Path(log)
+    if not path.exists():
+        return []
+    content = read_json(path)
+    try:
+        found, trials = {name: content[name] for name in identity}, content["trials"]
+        for trial in trials:
+            CrfParams(**trial["params"])
+            _ = [float(trial["scores"]["all"][name]) for name in OBJECTIVES[:2]], float(trial["seconds"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise DataError(path, "the trials of a search, or no file", f"something else: {error!r}") from error
+    if found != identity:
+        raise DataError(path, f"trials of the search {identity}", f"{found}: choose another file")
+    return trials
+
+
+def search_crf(
+    validation_dir: str | Path,
+    dataset_dir: str | Path,
+    weights: str | Path,
+    log: str | Path,
+    seed: int = 0,
+    n_trials: int = 200,
+) -> dict[str, object]:
+    """Calibrate a network, search the CRF's parameters, and score what was chosen on the test split.
+
+    Temperature and parameters are chosen on drives of their own. On the drives that it was trained on a network is
+    surer, and more often right, than anywhere else: a temperature fitted there would be too low, and a CRF chosen there
+    would have little to repair. Holding drives back from training would mean to train each network anew on fewer. New
+    drives of the same simulator cost minutes (`semgrid-edu data make validation`) and leave the networks, and all
+    scores in docs/results, as they are. A data set that has a split "validation" of its own serves as well.
+
+    The temperature comes first, by likelihood alone (`fit_temperature`), and stays. Then the two weights and three
+    widths are searched (`next_point`). Test frames are looked at once, at the end.
+
+    Parameters
+    ----------
+    validation_dir : path-like
+        A data set with the split "validation".
+    dataset_dir : path-like
+        The data set that the network was trained on, such as data/minikitti, with the splits "train" and "test".
+    weights : path-like
+        A network trained on the split "train".
+    log : path-like
+        Takes every trial as soon as it has ended, as JSON. If the file holds trials of the same search, they aren't
+        repeated.
+    seed : int
+        Seed for the parameters that are tried; not negative.
+    n_trials : int
+        Number of trials in all, at least one.
+
+    Returns
+    -------
+    dict
+        "temperature", "calibration", "unrefined" (validation scores without CRF), "chosen" (a trial for each of
+        `OBJECTIVES`), "pareto" (numbers of the trials that no other one beats in both accuracies), "test" (from
+        `compare_on_test`), "trials", and all that made them. JSON can hold it.
+
+    Raises
+    ------
+    ArgumentError
+        When a split is missing, there is no trial, or the seed is negative.
+    DataError
+        When a file is missing or damaged, a drive of "validation" is one of "train" or "test", or the log is that of
+        another search.
+    """
+    if n_trials < 1 or seed < 0:
+        name, value = ("n_trials", n_trials) if n_trials < 1 else ("seed", seed)
+        raise ArgumentError(name, "a whole number from 0 up, and one trial at least", value)
+    refuse_known_drives(validation_dir, dataset_dir)
+    validation = TrainingSet(validation_dir, "validation")
+    identity = _identity(validation_dir, dataset_dir, weights, seed)
+    trials, network = read_trials(log, identity), grid_outputs(load_net(weights, validation.camera), validation)
+    temperature = fit_temperature(network.columns, network.truth)
+    calibrated, cell = outputs_at(network, temperature), validation.spec.cell
+    unrefined = validation_scores(calibrated, None, validation.label_set)
+    with tqdm(total=n_trials, initial=len(trials), desc="search", unit="trial") as bar:
+        while len(trials) < n_trials:
+            params = next_params(trials, unrefined, cell, seed)
+            trials.append(run_trial(calibrated, params, validation.label_set))
+            write_json(log, identity | {"trials": trials})
+            bar.update()
+    values = objective_values(trials, unrefined)
+    chosen = {name: int(k) for name, k in zip(OBJECTIVES, values.argmax(axis=0), strict=True)}
+    params = {name: CrfParams(**trials[k]["params"]) for name, k in chosen.items()}
+    return identity | {
+        "temperature": temperature,
+        "cell": cell,
+        "frames": len(validation),
+        "calibration": {"before": calibration(network), "after": calibration(calibrated)},
+        "unrefined": unrefined,
+        "chosen": {name: {"trial": k, **trials[k]} for name, k in chosen.items()},
+        "pareto": pareto_front(values[:, :2]).tolist(),
+        "test": compare_on_test(dataset_dir, weights, temperature, params),
+        "command": _command(validation_dir, dataset_dir, weights, seed, n_trials),
+        "date": f"{datetime.now(UTC):%Y-%m-%d}",
+        "minutes": round(sum(trial["seconds"] for trial in trials) / 60, 1),
+        "versions": versions("numpy", "torch", "numba", "scipy"),
+        "trials": trials,
+    }
+
+
+def search_table(result: dict) -> str:
+    """Return the temperature, what was chosen, and the scores on the test split as text to print.
+
+    Parameters
+    ----------
+    result : dict
+        From `search_crf`.
+
+    Returns
+    -------
+    str
+        Scores in per cent; gains over the network without CRF in points, with their 95 % intervals over test drives.
+    """
+    before, after = (result["calibration"][when]["ECE"] for when in ("before", "after"))
+    lines = [f"temperature {result['temperature']:.3f}: calibration error {before:.1%} before, {after:.1%} after", ""]
+    for objective, trial in result["chosen"].items():
+        params = ", ".join(f"{name} {value:g}" for name, value in trial["params"].items())
+        pairs = {name: (trial["scores"]["all"][name], result["unrefined"]["all"][name]) for name in OBJECTIVES[:2]}
+        accuracies = (f"{name} {100 * crf:.2f} ({100 * net:.2f} without CRF)" for name, (crf, net) in pairs.items())
+        crf, net = pairs["class accuracy"]
+        warning = "; none of the trials kept class accuracy" if objective == OBJECTIVES[2] and crf < net else ""
+        lines.append(f"best {objective}: trial {trial['trial']}, {params}{warning}")
+        lines.append(f"    on the validation drives {', '.join(accuracies)}")
+    lines += ["", scores_table(result["test"]["scores"]), "", gains_text(result["test"]["gains"])]
+    return "\n".join(lines)
+
+
+def _identity(validation_dir: str | Path, dataset_dir: str | Path, weights: str | Path, seed: int) -> dict:
+    """Return what makes the search: data by the SHA-256 of their index, weights, seed."""
+    data = {name: Path(folder) for name, folder in (("validation", validation_dir), ("dataset", dataset_dir))}
+    named = {
+        name: {"name": load_index(folder).name, "sha256": sha256(folder / INDEX_FILE)} for name, folder in data.items()
+    }
+    record = Path(weights).with_name(FILE_NAME)
+    trained_on = read_json(record).get("dataset") if record.exists() else None
+    used = {"file": short_path(weights), "sha256": sha256(weights), "trained on": trained_on}
+    return named | {"weights": used, "seed": seed}
+
+
+def _command(validation_dir: str | Path, dataset_dir: str | Path, weights: str | Path, seed: int, n_trials: int) -> str:
+    data = f"--data {Path(validation_dir).resolve().name} --test {Path(dataset_dir).resolve().name}"
+    return f"semgrid-edu search-crf {data} --weights {short_path(weights)} --seed {seed} --trials {n_trials}"

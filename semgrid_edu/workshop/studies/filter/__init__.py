@@ -1,0 +1,1 @@
+"""The occupancy filters measured on simulated drives, and on streets that are hard for them."""

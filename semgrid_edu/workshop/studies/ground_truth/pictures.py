@@ -1,0 +1,174 @@
+"""Figures of ground truth made from LIDAR: where it differs from the truth, and its errors by distance (section 4)."""
+
+from collections.abc import Mapping, Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import LabelSet
+from semgrid_edu.plotting.colours import class_legend, colour_legend
+from semgrid_edu.plotting.grids import draw_map, grid_labels
+from semgrid_edu.workshop.studies.ground_truth.truth_counts import TruthCounts
+
+DIFFERENCES = {
+    "no label in either": (240, 240, 240),
+    "the same label": (186, 205, 186),
+    "another label": (196, 0, 40),
+    "seen, but not labelled": (60, 110, 200),
+    "labelled, but not seen": (250, 196, 60),
+}
+"""What a cell can be in `truth_difference`, and its colour: what agrees is pale, and the three errors differ in
+lightness too."""
+CHARTED = {
+    "mistaken": "seen, another label",
+    "missed": "seen, no label",
+    "wrong": "labelled, but something\nelse stands there",
+}
+"""The shares of `TruthCounts.shares` that `truth_errors` draws, and their titles."""
+_MARKERS = "osD^vP*Xhp"
+
+
+def difference_kinds(truth: NDArray, made: NDArray, n_semantic: int) -> NDArray[np.int64]:
+    """Tell in which way a made ground truth differs from the truth in each cell.
+
+    Parameters
+    ----------
+    truth : (H, W) int
+        From `grid_truth`: what stands in the cells that the camera sees, an unknown class elsewhere.
+    made : (H, W) int
+        From `lidar_truth`.
+    n_semantic : int
+        Number of semantic classes, which come first.
+
+    Returns
+    -------
+    (H, W) int64
+        Numbers of `DIFFERENCES`, in their order. Two different unknown classes are no difference.
+    """
+    seen, labelled = np.asarray(truth) < n_semantic, np.asarray(made) < n_semantic
+    return np.select([seen & labelled & (truth == made), seen & labelled, seen, labelled], [1, 2, 3, 4], default=0)
+
+
+def truth_difference(spec: GridSpec, truth: NDArray, made: NDArray, label_set: LabelSet) -> Figure:
+    """Draw the truth, a made ground truth, and where they differ, side by side.
+
+    Parameters
+    ----------
+    spec : GridSpec
+        The grid.
+    truth : (H, W) int
+        From `grid_truth`: what stands in the cells that the camera sees, an unknown class elsewhere.
+    made : (H, W) int
+        From `lidar_truth`.
+    label_set : LabelSet
+        The classes, for colours and names.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    ArgumentError
+        When a map doesn't fit `spec`.
+    """
+    figure, axes = plt.subplots(1, 3, figsize=(12.5, 5.8), layout="compressed")
+    for ax, title, labels in ((axes[0], "truth", truth), (axes[1], "made from LIDAR and image labels", made)):
+        grid_labels(spec, labels, label_set, ax=ax, legend=False).set_title(title)
+    class_legend(axes[1], label_set, np.stack([truth, made]))
+    kinds = difference_kinds(truth, made, label_set.n_semantic)
+    colours = np.array(list(DIFFERENCES.values()), np.uint8)
+    draw_map(spec, colours[kinds], axes[2]).set_title("difference")
+    shares = np.bincount(kinds.ravel(), minlength=len(DIFFERENCES)) / kinds.size
+    names = [f"{name} ({share:.1%})" for name, share in zip(DIFFERENCES, shares, strict=True)]
+    colour_legend(axes[2], names, DIFFERENCES.values())
+    return figure
+
+
+def truth_errors(counts: TruthCounts, edges: Sequence[float], label_set: LabelSet, least: int = 50) -> Figure:
+    """Draw the errors of a made ground truth against distance, one line per class, one panel per kind of error.
+
+    Parameters
+    ----------
+    counts : TruthCounts
+        From `score_frame`, or from `counts_of`.
+    edges : sequence of float
+        Where the bands of distance begin and end, metres: `BAND_EDGES`.
+    label_set : LabelSet
+        The classes, for colours and names.
+    least : int
+        Number of cells below which a share isn't drawn: it would be chance.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    ArgumentError
+        When there are other bands than counts.
+    """
+    planes = dict(zip(("seen", "labelled"), counts.cells[[0, 3]], strict=True))
+    if len(edges) != len(planes["seen"]) + 1:
+        raise ArgumentError("edges", f"{len(planes['seen']) + 1} distances", f"{len(edges)}")
+    figure, axes = plt.subplots(1, len(CHARTED), figsize=(11, 4.2), sharex=True, sharey=True, layout="constrained")
+    for ax, (share, title) in zip(axes, CHARTED.items(), strict=True):
+        enough = planes["labelled" if share == "wrong" else "seen"] >= least
+        _class_lines(ax, np.where(enough, counts.shares()[share], np.nan), edges, label_set)
+        ax.set(title=title, xlabel="distance from the LIDAR [m]", ylim=(0, 100))
+        ax.grid(alpha=0.3)
+    axes[0].set_ylabel("share of cells [%]")
+    handles = {text: line for ax in axes for line, text in zip(*ax.get_legend_handles_labels(), strict=True)}
+    figure.legend(handles.values(), handles.keys(), loc="outside right upper", fontsize="small")
+    return figure
+
+
+def _class_lines(ax: Axes, shares: NDArray, edges: Sequence[float], label_set: LabelSet) -> None:
+    """Draw one line per class that has any share, (B, n_semantic), at the middle of each band."""
+    middles = (np.array(edges[:-1]) + np.array(edges[1:])) / 2
+    for c in np.flatnonzero(np.isfinite(shares).any(axis=0)):
+        colour = np.array(label_set.rgb[c]) / 255
+        style = {"color": colour, "marker": _MARKERS[c % len(_MARKERS)], "markeredgecolor": "0.2", "linewidth": 1.5}
+        ax.plot(middles, 100 * shares[:, c], label=label_set.names[c], **style)
+
+
+def policy_errors(result: Mapping, shares: Sequence[str] = ("mistaken", "missed", "wrong")) -> Figure:
+    """Draw the errors of every policy of the laboratory as bars, over all classes and distances.
+
+    Parameters
+    ----------
+    result : mapping
+        From `truth_policies`, or from its JSON file.
+    shares : sequence of str
+        Which shares of `TruthCounts.shares` to draw, one panel each.
+
+    Returns
+    -------
+    Figure
+    """
+    names = list(result["sums"])
+    figure, axes = plt.subplots(
+        1, len(shares), figsize=(4 + 2.6 * len(shares), 1.2 + 0.27 * len(names)), sharey=True, layout="constrained"
+    )
+    for ax, share in zip(np.atleast_1d(axes), shares, strict=True):
+        of_drives = np.array([[_share(drive[name], share) for name in names] for drive in result["drives"].values()])
+        whole = [_share(np.sum([drive[name] for drive in result["drives"].values()], axis=0), share) for name in names]
+        low, high = np.nanquantile(of_drives, [0.25, 0.75], axis=0)
+        ax.barh(names, 100 * np.array(whole), color="#8fa8c8", edgecolor="0.3", linewidth=0.5)
+        ax.hlines(names, 100 * low, 100 * high, color="0.15", linewidth=1)
+        ax.set(title=CHARTED.get(share, share), xlabel="share of cells [%]", xlim=(0, None))
+        ax.grid(axis="x", alpha=0.3)
+    np.atleast_1d(axes)[0].invert_yaxis()
+    text = f"bars: {len(result['drives'])} drives together; lines: first to third quartile of single drives"
+    figure.suptitle(text, fontsize="medium")
+    return figure
+
+
+def _share(counted: Sequence[int], share: str) -> float:
+    """Return one share of numbers that are added up already, in the order of `COUNTED`."""
+    return float(TruthCounts(np.reshape(counted, (-1, 1, 1))).shares(axis=(0, 1))[share])

@@ -1,0 +1,250 @@
+"""The policy laboratory: how wrong each way of making ground truth from LIDAR is, where the truth is known (section 4).
+
+Simulated drives are filtered by CMCDOT, their calibration, labels and scans get errors like those of real data
+(`TruthFlaws`), each policy makes the truth of the frame in the middle, and its cells are counted (`TruthCounts`).
+"""
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+from tqdm.auto import tqdm
+
+from semgrid_edu.datasets.grid_truth import grid_truth
+from semgrid_edu.datasets.ground_truth import Moment, drive_truth, flawed_drive
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import IGNORE, KITTI_14
+from semgrid_edu.occupancy import track_drive
+from semgrid_edu.storage.files import write_json
+from semgrid_edu.storage.provenance import versions
+from semgrid_edu.storage.reading import read_parts
+from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
+from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.simulation.things.materials import class_of_kind
+from semgrid_edu.workshop.studies.filter.occupancy import LIDARS
+from semgrid_edu.workshop.studies.filter.scenes import GRIDS, check_request
+from semgrid_edu.workshop.studies.ground_truth.truth_counts import (
+    BAND_EDGES,
+    COUNTED,
+    REACH,
+    TRIALS,
+    Trial,
+    TruthCounts,
+)
+
+HELD_OUT = 700
+"""Seed of the first drive for seed 0; each further seed adds 1000."""
+
+
+def truth_policies(
+    log: str | Path,
+    seed: int = 0,
+    drives: int = 20,
+    grid: str = "compact",
+    lidar: str = "coarse",
+    trials: dict[str, Trial] | None = None,
+) -> dict[str, object]:
+    """Make the ground truth of simulated drives by every policy, and count how wrong it is.
+
+    Parameters
+    ----------
+    log : path-like
+        Takes every drive as soon as it is done. If the file exists, drives that it holds aren't made again.
+    seed : int
+        Seed for drives, errors and particles.
+    drives : int
+        Number of drives, at least one.
+    grid : str
+        "compact" or "paper".
+    lidar : str
+        "coarse" for the LIDAR of the simulated data sets, or "HDL-64E".
+    trials : dict of str to Trial, optional
+        What to compare, by name; `TRIALS` when left out.
+
+    Returns
+    -------
+    dict
+        "drives": by number of the drive and name of the trial, each of `COUNTED` added up over classes and distances;
+        "sums": by name of the trial the cells of `TruthCounts`, of all drives; "policies": the trials; and all that
+        made them. JSON can hold it.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such grid or LIDAR, or nothing to do.
+    DataError
+        When the log is something else, or was begun with other choices.
+    """
+    check_request(seed, drives, 1, (grid,))
+    if lidar not in LIDARS:
+        raise ArgumentError("lidar", f"one of {', '.join(LIDARS)}", repr(lidar))
+    trials, began = TRIALS if trials is None else trials, datetime.now(UTC)
+    identity = _identity(seed, grid, lidar, trials)
+    done, sums = read_parts(log, identity, "drives"), read_parts(log, identity, "sums", list)
+    minutes = read_parts(log, identity, "minutes", float).get("of all drives", 0.0)
+    with tqdm(total=drives, initial=len(done), desc="truth policies", unit="drive") as bar:
+        for number in range(HELD_OUT + 1000 * seed + len(done), HELD_OUT + 1000 * seed + drives):
+            counts = score_trials(trials, GRIDS[grid], number, lidar)
+            done[str(number)] = {name: one.cells.sum(axis=(1, 2)).tolist() for name, one in counts.items()}
+            for name, one in counts.items():
+                sums[name] = (one + TruthCounts(np.array(sums.get(name, 0)))).cells.tolist()
+            spent = minutes + (datetime.now(UTC) - began).total_seconds() / 60
+            write_json(log, identity | {"drives": done, "sums": sums, "minutes": {"of all drives": round(spent, 2)}})
+            bar.update()
+    choices = f"--grid {grid} --lidar {lidar}"
+    return {
+        **identity,
+        **_legend(trials),
+        "drives": done,
+        "sums": sums,
+        "minutes": read_parts(log, identity, "minutes", float),
+        "command": f"semgrid-edu reproduce truth-policies --seed {seed} --drives {drives} {choices}",
+        "date": f"{began:%Y-%m-%d}",
+        "versions": versions("numpy", "scipy", "numba", "embreex", "trimesh"),
+    }
+
+
+def _identity(seed: int, grid: str, lidar: str, trials: dict[str, Trial]) -> dict[str, object]:
+    """Return what makes the experiment, for the log to be compared with; all trials as one short number."""
+    digest = hashlib.sha256(repr(trials).encode()).hexdigest()[:16]
+    return {"seed": seed, "grid": grid, "lidar": lidar, "trials": digest}
+
+
+def _legend(trials: dict[str, Trial]) -> dict[str, object]:
+    """Return what the numbers of a result stand for."""
+    return {
+        "policies": {name: asdict(trial.policy) | {"errors": asdict(trial.flaws)} for name, trial in trials.items()},
+        "counted": list(COUNTED),
+        "bands": list(BAND_EDGES),
+        "classes": list(KITTI_14.names[: KITTI_14.n_semantic]),
+    }
+
+
+def simulated_drive(number: int, lidar: str = "coarse", n_frames: int = 2 * REACH + 1) -> list[Frame]:
+    """Take the frames of a simulated drive with labels of their pixels, but without images.
+
+    The frame in the middle has bird's-eye labels too. Those of the others are 255.
+
+    Parameters
+    ----------
+    number : int
+        Seed for the drive.
+    lidar : str
+        A key of `LIDARS`.
+    n_frames : int
+        Number of frames, ten a second.
+
+    Returns
+    -------
+    list of Frame
+    """
+    drive = SimulatedDrive(number, n_frames, rig=Rig(lidar=LIDARS[lidar]))
+    return [_labelled_frame(drive, k, birdseye=k == n_frames // 2) for k in range(n_frames)]
+
+
+def _labelled_frame(drive: SimulatedDrive, k: int, birdseye: bool) -> Frame:
+    """Take a frame with labels in KITTI-14, as a data set on disk would hold it, but without the image."""
+    taken, classes = drive.frame(k, labelled=birdseye), class_of_kind(KITTI_14)
+    kinds = taken.truth.kinds if birdseye else np.full(LABEL_GRID.shape, IGNORE, np.uint8)
+    visible = taken.truth.visible if birdseye else np.zeros(LABEL_GRID.shape, bool)
+    labels = FrameLabels(KITTI_14, classes[taken.picture.kind], taken.picture.depth, classes[kinds], visible)
+    return Frame(None, taken.points, drive.rig.camera, taken.T_world_from_lidar, k * PERIOD, labels)
+
+
+def score_trials(
+    trials: dict[str, Trial], spec: GridSpec, number: int, lidar: str = "coarse"
+) -> dict[str, TruthCounts]:
+    """Score every trial on one simulated drive.
+
+    Parameters
+    ----------
+    trials : dict of str to Trial
+        What to score, by name.
+    spec : GridSpec
+        The grid.
+    number : int
+        Seed for the drive and for the errors in its data, which all trials share, and for the particles.
+    lidar : str
+        A key of `LIDARS`.
+
+    Returns
+    -------
+    dict of str to TruthCounts
+        By name.
+    """
+    frames = simulated_drive(number, lidar)
+    return score_frame(trials, frames, len(frames) // 2, spec, number)
+
+
+def score_frame(
+    trials: dict[str, Trial], frames: Iterable[Frame], k: int, spec: GridSpec, seed: int = 0
+) -> dict[str, TruthCounts]:
+    """Score every trial on one labelled frame of any drive whose bird's-eye labels are true.
+
+    Parameters
+    ----------
+    trials : dict of str to Trial
+        What to score, by name.
+    frames : iterable of Frame
+        The frames of the drive, in the order of time.
+    k : int
+        Number of the labelled frame.
+    spec : GridSpec
+        The grid: the extent of `LABEL_GRID`, a multiple of its cell.
+    seed : int
+        Seed for the errors in the data and for the particles.
+
+    Returns
+    -------
+    dict of str to TruthCounts
+        By name.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such frame, or it has no labels.
+    """
+    frames = list(frames)
+    if not 0 <= k < len(frames) or frames[k].labels is None:
+        raise ArgumentError("k", "the number of a labelled frame", k)
+    beliefs, labels = list(track_drive(frames, spec, seed=seed)), frames[k].labels
+    truth, standing = grid_truth(labels, beliefs[k].probability, spec), labels.birdseye_on(spec)
+    moments = {
+        flaws: [Moment(*pair) for pair in zip(flawed_drive(frames, flaws, seed), beliefs, strict=True)]
+        for flaws in {trial.flaws for trial in trials.values()}
+    }
+    return {
+        name: TruthCounts.of_frame(
+            drive_truth(moments[flaws], k, spec, policy), truth, standing, spec, labels.label_set
+        )
+        for name, (policy, flaws) in trials.items()
+    }
+
+
+def counts_of(result: dict, name: str) -> TruthCounts:
+    """Return the counts of one trial of a result.
+
+    Parameters
+    ----------
+    result : dict
+        From `truth_policies`, or from the JSON file that it was written to.
+    name : str
+        The name of the trial.
+
+    Returns
+    -------
+    TruthCounts
+
+    Raises
+    ------
+    ArgumentError
+        When the result has no such trial.
+    """
+    if name not in result["sums"]:
+        raise ArgumentError("name", f"one of {', '.join(result['sums'])}", repr(name))
+    return TruthCounts(np.array(result["sums"][name]))

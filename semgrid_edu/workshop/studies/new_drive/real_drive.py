@@ -1,0 +1,207 @@
+"""Real drives through every check, beside the shipped drive: numbers only, never a picture (section 4)."""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.datasets.samples import sample_drive, sample_image_stage, sample_weights
+from semgrid_edu.datasets.training_cache import resize_image
+from semgrid_edu.frame import Frame
+from semgrid_edu.metrics import total_variation
+from semgrid_edu.networks import load_net
+from semgrid_edu.occupancy import State
+from semgrid_edu.pipeline import run_pipeline
+from semgrid_edu.storage.provenance import versions
+from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
+from semgrid_edu.workshop.studies.new_drive.domain import image_statistics, mean_histograms, normalised_entropy
+from semgrid_edu.workshop.studies.new_drive.drive_checks import ground_plane, sensor_delays, share_on_image, with_scan
+from semgrid_edu.workshop.studies.new_drive.ego_motion import axes_errors
+from semgrid_edu.workshop.studies.new_drive.faults import FAULTS, colour_distance, drive_readings
+from semgrid_edu.workshop.studies.new_drive.moving_cars import Boxes, moving_hits, read_boxes, sample_boxes
+from semgrid_edu.workshop.studies.new_drive.network_view import network_numbers, training_images
+
+EVERY = 4
+"""Images, ground and networks are measured in each frame of this number."""
+SETTLED = 10
+"""Number of frames after which grids count: by then the filter has seen a second."""
+
+
+def compare_drives(roots: Sequence[Path], date: str, drive: str) -> dict[str, object]:
+    """Put the shipped drive and real ones through every check.
+
+    Parameters
+    ----------
+    roots : sequence of Path
+        Folders that hold the dates; each may have another stretch of the drive, and `moving_cars_DRIVE.json` with the
+        boxes of cars that move, for `read_boxes`.
+    date, drive : str
+        Such as "2011_09_26" and "0013".
+
+    Returns
+    -------
+    dict
+        What `measure_drive` and `drive_readings` return for each drive, by name, and how it was made; JSON can hold it.
+    """
+    began, known = datetime.now(UTC), mean_histograms(training_images())
+    drives = {"sample": (sample_drive(), sample_boxes(sample_drive()))}
+    for number, root in enumerate(roots, 1):
+        boxes = read_boxes(root / f"moving_cars_{drive}.json")
+        drives[f"stretch {number}"] = KittiRawDrive(root, date, drive), boxes
+    return {
+        "drives": {name: measure_drive(*one) for name, one in drives.items()},
+        "faults": {
+            name: {fault: drive_readings(make(one[:]), known) for fault, make in FAULTS.items()}
+            for name, (one, _) in drives.items()
+        },
+        "training images": among_training_images(),
+        "drive": f"{date}_drive_{drive}",
+        "command": f"semgrid-edu reproduce real-drive --date {date} --drive {drive}" + " --kitti FOLDER" * len(roots),
+        "seed": 0,
+        "date": f"{began:%Y-%m-%d}",
+        "minutes": round((datetime.now(UTC) - began).total_seconds() / 60, 1),
+        "versions": versions("numpy", "scipy", "torch", "numba"),
+    }
+
+
+def measure_drive(drive: KittiRawDrive, boxes: Boxes) -> dict[str, object]:
+    """Put one drive through every check.
+
+    Parameters
+    ----------
+    drive : KittiRawDrive
+        More than ten frames with images.
+    boxes : dict of int to list
+        Boxes of moving cars by frame; may be empty.
+
+    Returns
+    -------
+    dict
+        Numbers of the drive, of its ground, motion, images, networks and grids; JSON can hold it.
+    """
+    frames, net = drive[:], load_net(sample_image_stage(), drive.camera)
+    scanned = with_scan(frames)
+    positions = np.array([frame.T_world_from_lidar[:3, 3] for frame in frames])
+    ground = np.mean([ground_plane(frame.points, frame.camera.lidar_height) for frame in scanned[::EVERY]], axis=0)
+    images = [resize_image(frame.need_image(), net.architecture.image_size) for frame in frames[::EVERY]]
+    return {
+        "frames": len(frames),
+        "problems": len(drive.problems()),
+        "seconds": frames[-1].time - frames[0].time,
+        "step ms": 1000 * float(np.median(np.diff([frame.time for frame in frames]))),
+        "delay ms": {name: 1000 * float(np.median(late)) for name, late in sensor_delays(drive).items()},
+        "metres": float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum()),
+        "returns": float(np.mean([len(frame.points) for frame in scanned])),
+        "on image": float(np.mean([share_on_image(frame.points, frame.camera) for frame in scanned])),
+        "ground": dict(zip(("height", "pitch", "roll"), map(float, ground), strict=True)),
+        "axes": axes_errors(scanned),
+        "images": distances(images, training_images()) | statistics_of(images),
+        "image network": network_numbers(net, scanned[::EVERY]),
+        "image network, colours matched": network_numbers(net, scanned[::EVERY], matched=True),
+        "grids": grid_numbers(frames, boxes),
+    }
+
+
+def grid_numbers(frames: Sequence[Frame], boxes: Boxes) -> dict[str, object]:
+    """Run the pipeline with the shipped network, and measure its grids without any truth but the boxes.
+
+    Parameters
+    ----------
+    frames : sequence of Frame
+        More than ten successive frames with images.
+    boxes : dict of int to list
+        Boxes of moving cars by frame; may be empty.
+
+    Returns
+    -------
+    dict
+        "states": share of the cells by their most likely state; "confidence" and "entropy" of the semantic grid;
+        "moving cells", how many cells of moving cars were hit, and "found", the share of them that is called DYNAMIC.
+    """
+    net = load_net(sample_weights(), frames[0].camera)
+    states, semantic, found = [], [], []
+    for k, result in enumerate(run_pipeline(frames, net)):
+        if k >= SETTLED:
+            likely = result.belief.probability.argmax(axis=0)
+            states.append(np.bincount(likely.ravel(), minlength=len(State)) / likely.size)
+            semantic.append([result.grid.max(axis=0).mean(), normalised_entropy(result.grid).mean()])
+            found.append(moving_hits(result.frame, result.belief, boxes.get(k, []), net.architecture.grid))
+    found = np.concatenate(found)
+    return {
+        "states": dict(zip((state.name for state in State), map(float, np.mean(states, axis=0)), strict=True)),
+        **dict(zip(("confidence", "entropy"), map(float, np.mean(semantic, axis=0)), strict=True)),
+        "moving cells": len(found),
+        "found": float(found.mean()) if len(found) else None,
+    }
+
+
+def distances(images: Sequence[NDArray], known: Sequence[NDArray]) -> dict[str, float]:
+    """Return how far images are from those that a network learned from.
+
+    Parameters
+    ----------
+    images, known : sequence of (h, w, 3) uint8
+        RGB, at the size that the network sees.
+
+    Returns
+    -------
+    dict of str to float
+        "colour distance" and "edge distance": total variation of the mean histograms, 0..1.
+    """
+    seen, learned = mean_histograms(images), mean_histograms(known)
+    edges = float(total_variation(seen["edges"], learned["edges"]))
+    return {"colour distance": colour_distance(seen, learned), "edge distance": edges}
+
+
+def statistics_of(images: Sequence[NDArray]) -> dict[str, float]:
+    """Return the means over several images of their `image_statistics`.
+
+    Parameters
+    ----------
+    images : sequence of (h, w, 3) uint8
+        RGB, at the size that the network sees.
+
+    Returns
+    -------
+    dict of str to float
+    """
+    every = [image_statistics(image) for image in images]
+    return {name: float(np.mean([one[name] for one in every])) for name in every[0]}
+
+
+def among_training_images() -> dict[str, object]:
+    """Return how far each shipped training image is from the others, largest distance last, and their statistics."""
+    images = training_images()
+    each = [distances([images[k]], images[:k] + images[k + 1 :]) for k in range(len(images))]
+    return {name: sorted(one[name] for one in each) for name in each[0]} | statistics_of(images)
+
+
+def real_drive_table(result: dict) -> str:
+    """Return the numbers of all drives as a Markdown table.
+
+    Parameters
+    ----------
+    result : dict
+        From `compare_drives`, or from the JSON file that it was written to.
+
+    Returns
+    -------
+    str
+    """
+    columns = {name: dict(_flat(one)) for name, one in result["drives"].items()}
+    rows = [["", *columns]]
+    for key in next(iter(columns.values())):
+        rows.append([key, *("-" if one[key] is None else f"{one[key]:.4g}" for one in columns.values())])
+    return markdown_table(rows)
+
+
+def _flat(numbers: dict, before: str = ""):
+    """Yield every number with its whole name, such as "ground: height"."""
+    for key, value in numbers.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{before}{key}: ")
+        else:
+            yield before + key, value
