@@ -8,9 +8,9 @@ from semgrid_edu.answers import answer_array, answer_arrays
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams, Evidence, FilterState, Particles, transition_matrix
 from semgrid_edu.occupancy import update as package_update
+from semgrid_edu.occupancy.local_belief import velocity_moments
 from semgrid_edu.occupancy.particles import cells_of, weight_in_cells
 from semgrid_edu.occupancy.resampling import systematic_resample
-from semgrid_edu.occupancy.local_belief import velocity_moments
 from semgrid_instructor import generator, hidden
 
 

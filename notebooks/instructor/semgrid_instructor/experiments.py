@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from semgrid_edu.answers import answer_array, answer_number
 from semgrid_edu.crf import expected_calibration_error, reliability
+from semgrid_edu.metrics import METRICS, class_accuracy
+from semgrid_edu.workshop.paper.reports.verdicts import Statement, verdict
 from semgrid_edu.workshop.scoring.confusions import drive_confusions
 from semgrid_edu.workshop.scoring.score_with_interval import Measured
-from semgrid_edu.workshop.paper.reports.verdicts import Statement, verdict
 from semgrid_edu.workshop.scoring.statistics import drive_interval, paired_interval
-from semgrid_edu.metrics import METRICS, class_accuracy
 from semgrid_instructor import generator, hidden
 
 

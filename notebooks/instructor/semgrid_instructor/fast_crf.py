@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from semgrid_edu.answers import answer_array
-from semgrid_edu.answers import peak_megabytes
+from semgrid_edu.answers import answer_array, peak_megabytes
 from semgrid_edu.crf.lattice.literal import blur_literal, enclosing_simplex_literal
 from semgrid_instructor import generator, hidden
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from semgrid_edu.camera import Camera, invert_rigid, project, rigid_transform, transform_points
 from semgrid_edu.answers import answer_array, answer_number
+from semgrid_edu.camera import Camera, invert_rigid, project, rigid_transform, transform_points
 from semgrid_instructor import generator, hidden
 
 AXES = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
-from semgrid_edu.camera import Camera, project, rigid_transform, transform_points
 from semgrid_edu.answers import answer_array
+from semgrid_edu.camera import Camera, project, rigid_transform, transform_points
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.workshop.studies.new_drive.drive_checks import time_gaps
 from semgrid_edu.workshop.studies.new_drive.faults import FAULTS

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from semgrid_edu.camera import Camera, project, rigid_transform, transform_points
 from semgrid_edu.answers import answer_array
+from semgrid_edu.camera import Camera, project, rigid_transform, transform_points
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import class_accuracy, pixel_accuracy
 from semgrid_instructor import generator, hidden

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_closing
 from scipy.spatial.transform import Rotation
 
-from semgrid_edu.camera import Camera, project, rigid_transform, transform_points
 from semgrid_edu.answers import answer_array
+from semgrid_edu.camera import Camera, project, rigid_transform, transform_points
 from semgrid_edu.labels import KITTI_14
 from semgrid_instructor import generator, hidden
 
