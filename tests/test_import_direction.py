@@ -1,38 +1,40 @@
-"""Imports run one way: down the README's map of the house, which names every module."""
+"""Imports run one way: down the README's map of the house, and never from the book to the workshop."""
 
 import ast
 import re
+from collections import defaultdict
 from graphlib import TopologicalSorter
 from pathlib import Path
-
-import pytest
 
 import semgrid_edu
 
 PACKAGE = Path(semgrid_edu.__file__).parent
 README = PACKAGE.parent / "README.md"
-MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path.name != "__init__.py")
+FILES = sorted(PACKAGE.rglob("*.py"))
+MODULES = [path for path in FILES if path.name != "__init__.py"]
+WORKSHOP = "workshop"
 
 
 def dotted(path: Path) -> str:
-    """A module's name inside the package, such as crf.params."""
-    return ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
+    """A module's or folder's name inside the package, such as crf.params or crf."""
+    parts = path.relative_to(PACKAGE).parts
+    return ".".join(parts).removesuffix(".py").removesuffix("__init__").removesuffix(".")
 
 
 def house() -> list[str]:
-    """The rooms in the order of the map's first column; a room may be part of one that stands higher up."""
+    """The rooms of the map, in its order: modules of the top, and folders."""
     rows = re.findall(r"^\| (`.*?) \|", README.read_text(encoding="utf-8"), flags=re.MULTILINE)
     names = [name for row in rows for name in re.findall(r"`([\w/]+?)(?:\.py|/)`", row)]
     return [name.replace("/", ".") for name in names]
 
 
-def room_of(module: str) -> str:
-    """The innermost room of the map that a module lies in."""
-    return max((room for room in house() if f"{module}.".startswith(f"{room}.")), key=len, default="")
+def room_of(name: str) -> str:
+    """The room of the map that a module lies in."""
+    return next((room for room in house() if f"{name}.".startswith(f"{room}.")), "")
 
 
 def imported(path: Path) -> set[str]:
-    """What a module imports of the package: modules and packages, by their names inside it."""
+    """What a module imports of the package: modules and folders, by their names inside it."""
     nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
     names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
     for node in nodes:
@@ -47,25 +49,56 @@ def is_module(name: str) -> bool:
     return place.with_suffix(".py").is_file() or (place / "__init__.py").is_file()
 
 
-def test_the_map_names_every_module_once():
-    there = {path.stem for path in PACKAGE.glob("*.py")} | {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
-    rooms = house()
-    assert sorted(room for room in rooms if "." not in room) == sorted(there - {"__init__"})
-    assert all(is_module(f"semgrid_edu.{room}") for room in rooms)
-    assert len(set(rooms)) == len(rooms)
+def folder_of(name: str) -> str:
+    """The folder that a module lies in; a folder is its own."""
+    return name if (PACKAGE.joinpath(*name.split(".")) / "__init__.py").is_file() else name.rpartition(".")[0]
 
 
-@pytest.mark.parametrize("room", house())
-def test_a_room_imports_only_from_what_stands_above_it(room):
-    order = house()
-    above = {*order[: order.index(room)], room}
-    files = [path for path in PACKAGE.rglob("*.py") if room_of(dotted(path).removesuffix(".__init__")) == room]
-    below = {dotted(path): {name for name in imported(path) if room_of(name) not in above} for path in files}
-    assert files
-    assert {module: names for module, names in below.items() if names} == {}
+def in_workshop(name: str) -> bool:
+    return name.split(".")[0] == WORKSHOP
+
+
+def imports_between_folders() -> dict[str, set[str]]:
+    """Which folders the modules of each folder import from; what `__init__` collects from its own folder doesn't count."""
+    graph = defaultdict(set)
+    for path in MODULES:
+        here = dotted(path.parent)
+        graph[here] |= {folder_of(name) for name in imported(path)} - {here}
+    return graph
+
+
+def test_the_map_names_every_room_once():
+    def rooms_in(folder: Path) -> set[str]:
+        inside = [*folder.glob("*.py"), *(init.parent for init in folder.glob("*/__init__.py"))]
+        return {dotted(path) for path in inside} - {dotted(folder), WORKSHOP}
+
+    there = rooms_in(PACKAGE) | rooms_in(PACKAGE / WORKSHOP)
+    assert sorted(house()) == sorted(there - {""})
+
+
+def test_the_book_never_imports_the_workshop():
+    book = [path for path in FILES if not in_workshop(dotted(path))]
+    back = {dotted(path): found for path in book if (found := set(filter(in_workshop, imported(path))))}
+    assert len(book) > 100
+    assert back == {}
+
+
+def test_a_room_imports_only_from_what_stands_above_it():
+    order = {room: place for place, room in enumerate(house())}
+    back = [
+        f"{dotted(path)} imports {name}"
+        for path in FILES
+        for name in sorted(imported(path))
+        if order.get(room_of(name), len(order)) > order.get(room_of(dotted(path)), len(order))
+    ]
+    assert back == []
+
+
+def test_no_folder_imports_in_a_circle():
+    TopologicalSorter(imports_between_folders()).prepare()  # raises CycleError, which names the circle
 
 
 def test_no_module_imports_in_a_circle():
     modules = {dotted(path): path for path in MODULES}
     graph = {module: imported(path) & modules.keys() for module, path in modules.items()}
-    TopologicalSorter(graph).prepare()  # raises CycleError, which names the circle
+    TopologicalSorter(graph).prepare()
