@@ -2,7 +2,8 @@
 
 Twenty planes of 355 x 155 cells take the scores of 14 classes from an image of 375 x 1242 pixels, and a 1x1
 convolution leaves 16 of these 280. `PlaneSampler` and other ways to sample do so in turn, each followed by the same
-convolution; the best of the rounds counts. Peak memory is that of a process of its own, above what it held before.
+convolution, ours in the form that the package's network uses; the best of the rounds counts. Peak memory is that of a
+process of its own, above what it held before.
 """
 
 import os
@@ -17,15 +18,19 @@ import torch.nn.functional as F
 from numpy.typing import NDArray
 from timing import best_times
 from torch import Tensor
+from torch.func import functional_call
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.networks.fusion import PlaneConvolution
 from semgrid_edu.planes import PlaneSampler, plane_heights, plane_pixels
 from semgrid_edu.training.devices import keep_freed_memory
 
 N_CLASSES, N_REDUCED, ROUNDS = 14, 16, 15
 KITTI_SIZE = (375, 1242)
 OURS = "PlaneSampler"
+CONVOLUTION = PlaneConvolution(N_CLASSES, N_REDUCED, (len(plane_heights()), 1, 1), bias=False)
+"""What `FusionNet` reduces the planes with; the benchmark hands it its own weight."""
 Sampling = Callable[[Tensor], Tensor]
 """(1, C, h, w) -> (1, C, D, H, W)."""
 
@@ -67,7 +72,7 @@ SAMPLINGS: dict[str, Callable[[NDArray, NDArray], Sampling]] = {
 def reduction(name: str, sampling: Sampling) -> Callable[[Tensor, Tensor], Tensor]:
     """Return sampling, then the 1x1 convolution in the form that suits how the planes lie in memory."""
     if name == OURS:
-        return lambda scores, weight: F.conv3d(sampling(scores), weight)[:, :, 0]
+        return lambda scores, weight: functional_call(CONVOLUTION, {"weight": weight}, sampling(scores))[:, :, 0]
     return lambda scores, weight: F.conv2d(sampling(scores).flatten(1, 2), weight.flatten(1, 2))
 
 

@@ -113,11 +113,11 @@ def _reduction(n_scores: int, n_planes: int, n_reduced: int | None) -> nn.Module
     """Return what takes (B, C, D, H, W) to (B, n_reduced, 1, H, W); without a number to (B, C x D, 1, H, W)."""
     if n_reduced is None:
         return nn.Sequential(nn.Flatten(1, 2), nn.Unflatten(1, (n_scores * n_planes, 1)))
-    convolution = _PlaneConvolution(n_scores, n_reduced, (n_planes, 1, 1))
+    convolution = PlaneConvolution(n_scores, n_reduced, (n_planes, 1, 1))
     return nn.Sequential(convolution, nn.BatchNorm3d(n_reduced), nn.ReLU(inplace=True))
 
 
-class _PlaneConvolution(nn.Conv3d):
+class PlaneConvolution(nn.Conv3d):
     """The 1x1 convolution of all D x C planes: on (B, C, D, H, W), a D x 1 x 1 kernel.
 
     It is computed as the product of matrices that it is, one row per cell. The planes lie in memory like this already,
