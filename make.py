@@ -50,13 +50,14 @@ def lint() -> None:
 def test() -> None:
     """Check the code, run every test, and run every notebook and compare what it prints."""
     lint()
-    _pytest("-n", "2", "--dist", "loadfile", "--doctest-modules", "semgrid_edu", "tests", "--ignore=tests/browser")
     folder = CLONE / "notebooks"
     notebooks = [
         str(path.relative_to(CLONE)) for path in sorted([*folder.glob("*.ipynb"), *folder.glob("deeper/*.ipynb")])
     ]
-    options = ("--nbval", "--nbval-current-env", "--nbval-cell-timeout=300", "-p", "no:cacheprovider")
-    _run("python", "-m", "pytest", *options, "-n", "2", "--dist", "loadscope", *notebooks)
+    # Three processes for two cores: one waits for a kernel, a subprocess or the disk most of the time.
+    pool = ("-n", "3", "--dist", "loadfile", "-p", "no:cacheprovider")
+    nbval = ("--nbval", "--nbval-current-env", "--nbval-cell-timeout=300")
+    _pytest(*pool, *nbval, "--doctest-modules", "semgrid_edu", "tests", "--ignore=tests/browser", *notebooks)
 
 
 def test_browser() -> None:
