@@ -59,7 +59,7 @@ def in_workshop(name: str) -> bool:
 
 
 def imports_between_folders() -> dict[str, set[str]]:
-    """Which folders the modules of each folder import from; what `__init__` collects from its own folder doesn't count."""
+    """Which folders the modules of each folder import from, without what `__init__` collects from its own."""
     graph = defaultdict(set)
     for path in MODULES:
         here = dotted(path.parent)
