@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.distance import cdist
 
 from semgrid_edu.crf.doctor.finding import Finding
 from semgrid_edu.crf.doctor.unary import spread_of
+from semgrid_edu.crf.kernel import gaussian, kernels
 from semgrid_edu.crf.params import PAPER_CELL, CrfParams
 
 REACH = {"sigma_alpha": "w_bilateral", "sigma_gamma": "w_spatial"}
@@ -48,7 +48,7 @@ def kernel_faults(params: CrfParams, shape: tuple[int, int], cell: float | None)
         yield _of_other_cells(params, cell)
     used = {name: getattr(params, name) for name, weight in REACH.items() if getattr(params, weight) > 0}
     for name, sigma in used.items():
-        if np.exp(-0.5 / sigma**2) < 0.05 and not metric:
+        if gaussian(1 / sigma**2) < 0.05 and not metric:
             yield _narrow(name, sigma)
         if sigma > max(shape) >= 16:
             yield _wide(name, sigma, shape)
@@ -94,7 +94,7 @@ def _narrow(name: str, sigma: float) -> Finding:
     return Finding(
         "narrow kernel",
         "The CRF smooths less than elsewhere, or does nothing: the refined map is the map before it.",
-        f"{name} = {sigma:g} cells: the kernel is 1 for a cell itself and {np.exp(-0.5 / sigma**2):.1g} for the next.",
+        f"{name} = {sigma:g} cells: the kernel is 1 for a cell itself and {gaussian(1 / sigma**2):.1g} for the next.",
         "The width may be in another unit, such as metres or parts of the grid. It is in cells.",
         "CrfParams.for_cells(cell) gives widths for cells of that many metres.",
     )
@@ -175,9 +175,6 @@ def pair_sum(values: NDArray, params: CrfParams) -> float:
     """
     if params.normalization == "symmetric":
         return params.w_bilateral + params.w_spatial
-    place = np.indices(values.shape[1:]).reshape(2, -1).T
-    state = values.reshape(len(values), -1).T
-    near = np.hstack([place / params.sigma_alpha, state / params.sigma_beta]), place / params.sigma_gamma
-    few = slice(None, None, max(1, len(place) // 50))
-    sums = [np.exp(-0.5 * cdist(f[few], f, "sqeuclidean")).sum(axis=1).mean() - 1 for f in near]
-    return float(params.w_bilateral * sums[0] + params.w_spatial * sums[1])
+    few = slice(None, None, max(1, values[0].size // 50))
+    bilateral, spatial = (kernel.sum(axis=1).mean() - 1 for kernel in kernels(values, params, few))
+    return float(params.w_bilateral * bilateral + params.w_spatial * spatial)
