@@ -1,16 +1,14 @@
 """The CRF on tiny grids without approximation, against enumeration and pyagrum; and how far a Q is from it."""
 
-from itertools import product
-
 import numpy as np
 import pytest
+from enumeration import enumerated
 from pyagrum_oracle import as_directed, posteriors
 from scipy.special import logsumexp
 
 from semgrid_edu.crf import (
     CrfParams,
     crf_model,
-    energy,
     exact_marginals,
     free_energy,
     log_partition,
@@ -30,13 +28,6 @@ def random_cells(seed, classes, height, width):
     rng = np.random.default_rng(seed)
     unary = unary_from_probability(np.moveaxis(rng.dirichlet(np.ones(classes), (height, width)), -1, 0))
     return unary, np.moveaxis(rng.dirichlet(np.ones(4) / 2, (height, width)), -1, 0)
-
-
-def enumerated(unary, values, params):
-    """Return all labellings, (n, H, W), and their energies."""
-    classes, height, width = unary.shape
-    labellings = np.array(list(product(range(classes), repeat=height * width))).reshape(-1, height, width)
-    return labellings, np.array([energy(x, unary, values, params) for x in labellings])
 
 
 @TINY
