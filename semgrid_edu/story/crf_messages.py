@@ -8,8 +8,7 @@ from scipy.special import softmax
 
 from semgrid_edu.crf import CrfParams, mean_field, unary_from_probability
 from semgrid_edu.crf.accurate import WindowedGaussian
-from semgrid_edu.crf.kernel import kernels
-from semgrid_edu.crf.naive import damping, update
+from semgrid_edu.crf.naive import damping
 from semgrid_edu.crf.spatial import SeparableGaussian
 from semgrid_edu.errors import ArgumentError
 
@@ -100,8 +99,9 @@ def neighbour_pull(
     Q = mean_field(unary, o, params, iterations - 1)
     weights, own = weights_of_cell(o, params, cell)
     log_Q = np.log(np.maximum(Q[:, *cell].astype(np.float64), np.finfo(np.float32).tiny))
-    agreement = np.einsum("hw,chw->c", weights, Q)
-    settled = softmax(update(log_Q, unary[:, *cell], -agreement, damping(own)))
+    target = np.einsum("hw,chw->c", weights, Q) - unary[:, *cell]
+    part = damping(own)
+    settled = softmax((1 - part) * log_Q + part * target)
     before, after = (np.asarray(grid[:, *cell], np.float64) for grid in (g, refined))
     return NeighbourPull(before, after, weights, Q, settled)
 
@@ -126,11 +126,14 @@ def weights_of_cell(o: NDArray, params: CrfParams, cell: tuple[int, int]) -> tup
     own : float
         k_ii, which decides how far an update goes (`damping`).
     """
-    here = np.ravel_multi_index([[row_or_column] for row_or_column in cell], o.shape[1:])
-    of_state = WindowedGaussian.build(o, params).scale.astype(np.float64)
+    apart = sum((index - at) ** 2.0 for index, at in zip(np.indices(o.shape[1:]), cell, strict=True))
+    unlike = ((o - o[:, *cell][:, None, None]).astype(np.float64) ** 2).sum(axis=0)
+    bilateral = WindowedGaussian.build(o, params).scale.astype(np.float64)
     spatial = SeparableGaussian.build(o.shape[1:], params.sigma_gamma, params.w_spatial, params.normalization)
     of_place = np.outer(spatial.row_scale, spatial.column_scale).astype(np.float64)
-    k1, k2 = (row.reshape(o.shape[1:]) for row in kernels(o, params, here))
-    weights = of_state[cell] * of_state * k1 + of_place[cell] * of_place * k2
+    weights = (
+        bilateral[cell] * bilateral * np.exp(-0.5 * (apart / params.sigma_alpha**2 + unlike / params.sigma_beta**2))
+    )
+    weights += of_place[cell] * of_place * np.exp(-0.5 * apart / params.sigma_gamma**2)
     own, weights[cell] = float(weights[cell]), 0
     return weights, own
