@@ -10,9 +10,10 @@ from typing import Protocol
 import numpy as np
 from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import log_softmax
 
-from semgrid_edu.crf.naive import NEVER, damping
+from semgrid_edu.crf.kernel import gaussian
+from semgrid_edu.crf.lattice.arithmetic import HALF, exponential
+from semgrid_edu.crf.naive import above_best, all_updates, damping, settled
 from semgrid_edu.crf.params import CrfParams, check_inputs, check_stop
 from semgrid_edu.crf.spatial import SeparableGaussian
 
@@ -68,7 +69,7 @@ class WindowedGaussian:
         _, height, width = values.shape
         reach = int(min(np.ceil(radius * params.sigma_alpha), max(height, width) - 1))
         with np.errstate(over="ignore"):  # exp(-inf) is 0, the right limit of a width near 0
-            taps = np.exp(-0.5 * (np.arange(reach + 1) / params.sigma_alpha) ** 2)
+            taps = gaussian((np.arange(reach + 1) / params.sigma_alpha) ** 2)
         sharpness = min(np.float32(1 / max(params.sigma_beta, 1e-30)), _SHARPEST)
         state = np.ascontiguousarray(values.transpose(1, 0, 2), np.float32) * sharpness
         kernel = cls(state, taps.astype(np.float32), np.ones((height, width), np.float32))
@@ -134,19 +135,7 @@ def _weigh(own, other, tap, weights):
     for c in range(len(weights)):
         square = (free[c] - own_free[c]) ** 2 + (static[c] - own_static[c]) ** 2
         square += (dynamic[c] - own_dynamic[c]) ** 2 + (unknown[c] - own_unknown[c]) ** 2
-        weights[c] = tap * _gaussian(square)
-
-
-@njit(cache=True, fastmath=True, inline="always")
-def _gaussian(square):
-    """Return exp(-square / 2) to 5 digits: the 64th power of the series of exp(-square / 128), which vectorises."""
-    y = max(np.float32(-1 / 128) * square, np.float32(-1))
-    power = np.float32(1 / 120) * y + np.float32(1 / 24)
-    power = (power * y + np.float32(1 / 6)) * y + np.float32(1 / 2)
-    power = (power * y + np.float32(1)) * y + np.float32(1)
-    for _ in range(6):
-        power *= power
-    return power
+        weights[c] = tap * exponential(-HALF * square)
 
 
 @njit(cache=True, fastmath=True)
@@ -228,31 +217,6 @@ def mean_field_accurate(
     return settled(updates, iterations, tolerance)
 
 
-def settled(updates: Iterator[NDArray], iterations: int, tolerance: float) -> NDArray:
-    """Take updates until their number is reached or nothing changes any more.
-
-    Parameters
-    ----------
-    updates : iterator of (C, H, W) float
-        Q at first and after each update, such as `mean_field_updates`.
-    iterations : int
-        The largest number of updates.
-    tolerance : float
-        Stop as soon as an update changes no probability by more than this.
-
-    Returns
-    -------
-    (C, H, W) float
-        The last Q.
-    """
-    Q = next(updates)
-    for _ in range(iterations):
-        before, Q = Q, next(updates)
-        if np.abs(Q - before).max() <= tolerance:
-            break
-    return Q
-
-
 def filtered_updates(unary: NDArray, kernels: Sequence[Kernel]) -> Iterator[NDArray[np.float32]]:
     """Yield Q at first and after each update, without end, as `mean_field_updates` does, with filters for the sums.
 
@@ -271,11 +235,11 @@ def filtered_updates(unary: NDArray, kernels: Sequence[Kernel]) -> Iterator[NDAr
     (C, H, W) float32
         Q, the distribution over classes in each cell.
     """
-    phi = np.minimum(unary - unary.min(axis=0), NEVER).reshape(len(unary), -1).T.astype(np.float32)
-    own = np.sum([kernel.diagonal for kernel in kernels], axis=0, dtype=np.float32)[:, None]
-    part, logits = damping(own), log_softmax(-phi, axis=1)
-    while True:
-        Q = np.exp(logits)
-        yield np.ascontiguousarray(Q.T).reshape(unary.shape)
-        agreement = sum(kernel(Q) for kernel in kernels) - own * Q
-        logits = log_softmax(logits + part * (agreement - phi - logits), axis=1)
+    phi, own = above_best(unary).astype(np.float32), sum(kernel.diagonal for kernel in kernels)
+
+    def disagreement(Q: NDArray[np.float32]) -> NDArray[np.float32]:
+        cells = np.ascontiguousarray(Q.T)
+        return own * Q - sum(kernel(cells) for kernel in kernels).T
+
+    for Q in all_updates(phi, disagreement, damping(own)):
+        yield Q.reshape(unary.shape)

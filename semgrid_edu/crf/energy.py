@@ -1,90 +1,12 @@
-"""The CRF written out: every pair of cells, and what a labelling or a distribution costs (eq. (3), (4))."""
+"""What a labelling or a distribution costs, every pair of cells written out (eq. (3), (4))."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.distance import cdist
+from numpy.typing import ArrayLike
 from scipy.special import xlogy
 
+from semgrid_edu.crf.kernel import pair_weights
 from semgrid_edu.crf.params import CrfParams, check_inputs
 from semgrid_edu.errors import ArgumentError
-
-MAX_CELLS = 10_000
-"""The largest grid whose pairs are written out: two matrices of 10,000 x 10,000 numbers are 1.6 GB."""
-
-
-def pair_weights(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
-    """Compute the bracket of eq. (4) for every pair of cells.
-
-    Parameters
-    ----------
-    values : (4, H, W) float
-        o_i, the occupancy probabilities of each cell.
-    params : CrfParams
-        Weights, widths and normalisation.
-
-    Returns
-    -------
-    (H W, H W) float64
-        The cost of two cells having different labels; cells are counted row by row. Zero on the diagonal, since a cell
-        is no pair with itself.
-
-    Raises
-    ------
-    ArgumentError
-        When `values` has another shape or isn't finite, or the grid has more than `MAX_CELLS` cells.
-    """
-    weights = gram_matrix(values, params)
-    np.fill_diagonal(weights, 0)
-    return weights
-
-
-def gram_matrix(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
-    """Compute both kernels of eq. (4) for every two cells, a cell and itself included.
-
-    Gaussians of distances are inner products in some space, so this matrix has no negative eigenvalue, whatever the
-    weights, widths and normalisation. It is this property that keeps mean field from oscillating (`damping`).
-
-    Parameters
-    ----------
-    values : (4, H, W) float
-        o_i, the occupancy probabilities of each cell.
-    params : CrfParams
-        Weights, widths and normalisation.
-
-    Returns
-    -------
-    (H W, H W) float64
-        Symmetric and positive semidefinite; `pair_weights` everywhere but on the diagonal.
-
-    Raises
-    ------
-    ArgumentError
-        When `values` has another shape or isn't finite, or the grid has more than `MAX_CELLS` cells.
-    """
-    values = np.asarray(values, dtype=np.float64)
-    if values.ndim != 3:
-        raise ArgumentError("values", "shape (4, H, W)", f"shape {values.shape}")
-    if not np.isfinite(values).all():
-        raise ArgumentError("values", "probabilities", "NaN or infinity")
-    _, height, width = values.shape
-    if height * width > MAX_CELLS:
-        raise ArgumentError("values", f"at most {MAX_CELLS} cells; mean_field takes more", height * width)
-    place = np.indices((height, width)).reshape(2, -1).T.astype(np.float64)
-    state = values.reshape(len(values), -1).T
-    bilateral = np.hstack([place / params.sigma_alpha, state / params.sigma_beta])
-    weights = params.w_bilateral * _gaussian(bilateral, params.normalization)
-    weights += params.w_spatial * _gaussian(place / params.sigma_gamma, params.normalization)
-    return weights
-
-
-def _gaussian(features: NDArray, normalization: str) -> NDArray[np.float64]:
-    """Return exp(-|f_i - f_j|^2 / 2) for all pairs of the (N, d) features, normalised; (N, N)."""
-    kernel = np.exp(-0.5 * cdist(features, features, "sqeuclidean"))
-    if normalization == "symmetric":
-        root = np.sqrt(kernel.sum(axis=1))
-        kernel /= root[:, None]
-        kernel /= root
-    return kernel
 
 
 def energy(labels: ArrayLike, unary: ArrayLike, values: ArrayLike, params: CrfParams) -> float:

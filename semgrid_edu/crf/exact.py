@@ -5,7 +5,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.crf.energy import energy, pair_weights
+from semgrid_edu.crf.energy import energy
+from semgrid_edu.crf.kernel import pair_weights
 from semgrid_edu.crf.params import CrfParams, check_inputs
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import Factor, GraphicalModel, eliminate, log_total, max_product

@@ -1,12 +1,16 @@
-"""Mean field with every pair of cells written out, all cells at once or one by one (eq. (3), (4)); for small grids."""
+"""Mean field with every pair of cells written out, all cells at once or one by one (eq. (3), (4)); for small grids.
 
-from collections.abc import Iterator
+`update` is the one rule of mean field: the accurate version, the trainable layer and the story of a cell use it too.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import log_softmax, softmax
+from scipy.special import log_softmax
 
-from semgrid_edu.crf.energy import gram_matrix, pair_weights
+from semgrid_edu.crf.kernel import gram_matrix, pair_weights
 from semgrid_edu.crf.params import CrfParams, check_inputs, check_stop
 
 NEVER = 1e30
@@ -53,13 +57,7 @@ def mean_field_naive(
         When shapes don't fit, numbers aren't what they should be, or the grid has more than `MAX_CELLS` cells.
     """
     check_stop(iterations, tolerance)
-    updates = mean_field_updates(unary, values, params)
-    Q = next(updates)
-    for _ in range(iterations):
-        before, Q = Q, next(updates)
-        if np.abs(Q - before).max() <= tolerance:
-            break
-    return Q
+    return settled(mean_field_updates(unary, values, params), iterations, tolerance)
 
 
 def mean_field_updates(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> Iterator[NDArray[np.float64]]:
@@ -90,15 +88,100 @@ def mean_field_updates(unary: ArrayLike, values: ArrayLike, params: CrfParams) -
     [1.89, 1.44, 1.31, 1.19]
     """
     unary, values = check_inputs(unary, values)
-    gram = gram_matrix(values, params)
-    weights, part = gram - np.diag(np.diag(gram)), damping(np.diag(gram))
-    phi = np.minimum(unary - unary.min(axis=0), NEVER).reshape(len(unary), -1)
+    weights = gram_matrix(values, params)
+    own = np.diag(weights).copy()
+    np.fill_diagonal(weights, 0)
+    for Q in all_updates(above_best(unary), lambda Q: (1 - Q) @ weights, damping(own)):
+        yield Q.reshape(unary.shape)
+
+
+def update(log_Q: Any, phi: Any, disagreement: Any, part: Any = 1.0) -> Any:
+    """Return log Q_i(l) after an update, but for a number in each cell that the soft-max takes off again.
+
+        log Q_i(l) <- (1 - p_i) log Q_i(l) + p_i (-phi_i(l) - sum_{j != i} k_ij (1 - Q_j(l)))
+
+    Parameters
+    ----------
+    log_Q, phi : (C, ...) float array or Tensor
+        log Q and the unary term of one or many cells.
+    disagreement : (C, ...) float array or Tensor
+        The sum over all other cells, of which a number that is the same for all classes may be missing.
+    part : (...) float array or Tensor
+        p_i, see `damping`; 1 when no other cell moves at the same time.
+
+    Returns
+    -------
+    (C, ...) float array or Tensor
+        Logarithms that aren't normalised.
+    """
+    return (1 - part) * log_Q + part * (-phi - disagreement)
+
+
+def all_updates(
+    phi: NDArray[np.floating], disagreement: Callable[[NDArray], NDArray], part: NDArray[np.floating]
+) -> Iterator[NDArray[np.floating]]:
+    """Yield Q at first and after each `update` of all cells at once, without end.
+
+    Parameters
+    ----------
+    phi : (C, N) float
+        The unary term, finite, see `above_best`.
+    disagreement : callable
+        Q (C, N) -> sum_{j != i} k_ij (1 - Q_j(l)), (C, N).
+    part : (N,) float
+        p_i, see `damping`.
+
+    Yields
+    ------
+    (C, N) float
+        Q, in the type of phi.
+    """
     log_Q = log_softmax(-phi, axis=0)
     while True:
         Q = np.exp(log_Q)
-        yield Q.reshape(unary.shape)
-        disagreement = (1 - Q) @ weights
-        log_Q = log_softmax((1 - part) * log_Q + part * (-phi - disagreement), axis=0)
+        yield Q
+        log_Q = log_softmax(update(log_Q, phi, disagreement(Q), part), axis=0)
+
+
+def above_best(unary: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Return how far each cost lies above that of the cell's best class.
+
+    Parameters
+    ----------
+    unary : (C, H, W) float
+        phi_u; inf where a class is impossible.
+
+    Returns
+    -------
+    (C, H W) float
+        The same unary term but for a number in each cell: finite, at most `NEVER`.
+    """
+    return np.minimum(unary - unary.min(axis=0), NEVER).reshape(len(unary), -1)
+
+
+def settled(updates: Iterator[NDArray], iterations: int, tolerance: float) -> NDArray:
+    """Take updates until their number is reached or nothing changes any more.
+
+    Parameters
+    ----------
+    updates : iterator of (C, H, W) float
+        Q at first and after each update, such as `mean_field_updates`.
+    iterations : int
+        The largest number of updates.
+    tolerance : float
+        Stop as soon as an update changes no probability by more than this.
+
+    Returns
+    -------
+    (C, H, W) float
+        The last Q.
+    """
+    Q = next(updates)
+    for _ in range(iterations):
+        before, Q = Q, next(updates)
+        if np.abs(Q - before).max() <= tolerance:
+            break
+    return Q
 
 
 def damping(own: NDArray) -> NDArray:
@@ -162,10 +245,10 @@ def mean_field_sequential(
     """
     unary, values = check_inputs(unary, values)
     check_stop(iterations)
-    phi, weights = unary.reshape(len(unary), -1).astype(np.float64), pair_weights(values, params)
-    Q = softmax(-phi, axis=0)
+    phi, weights = above_best(unary.astype(np.float64)), pair_weights(values, params)
+    log_Q = log_softmax(-phi, axis=0)
     for _ in range(iterations):
-        for i in range(Q.shape[1]):
-            disagreement = (1 - Q) @ weights[i]
-            Q[:, i] = softmax(-phi[:, i] - disagreement)
-    return Q.reshape(unary.shape)
+        for i in range(phi.shape[1]):
+            disagreement = (1 - np.exp(log_Q)) @ weights[i]
+            log_Q[:, i] = log_softmax(update(log_Q[:, i], phi[:, i], disagreement))
+    return np.exp(log_Q).reshape(unary.shape)

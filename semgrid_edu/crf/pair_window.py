@@ -11,6 +11,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from semgrid_edu.crf.kernel import gaussian
+
 
 @dataclass(frozen=True)
 class PairWindow:
@@ -234,7 +236,7 @@ def bilateral_pairs(occupancy: Tensor, radius: int, sigma_alpha: Tensor, sigma_b
     window = PairWindow(*occupancy.shape[2:], radius)
     places = torch.tensor(window.offsets).reshape(-1, 2).to(occupancy).square().sum(dim=1, keepdim=True)
     states = window.squared_distances(occupancy)
-    weights = torch.exp(-0.5 * (places / sigma_alpha**2 + states / sigma_beta**2))
+    weights = gaussian(places / sigma_alpha**2 + states / sigma_beta**2, torch.exp)
     return Pairs(lambda x: PairSum.apply(weights, x, window), torch.ones_like(occupancy[:, :1]))
 
 
@@ -254,5 +256,5 @@ def spatial_pairs(occupancy: Tensor, sigma_gamma: Tensor) -> Pairs:
         Without weight and normalisation, for all pairs of cells of the grid.
     """
     axes = (torch.arange(size).to(occupancy) for size in occupancy.shape[2:])
-    rows, columns = (torch.exp(-0.5 * ((axis[:, None] - axis) / sigma_gamma) ** 2) for axis in axes)
+    rows, columns = (gaussian(((axis[:, None] - axis) / sigma_gamma) ** 2, torch.exp) for axis in axes)
     return Pairs(lambda x: rows @ x @ columns - x, torch.ones_like(occupancy[:, :1]))

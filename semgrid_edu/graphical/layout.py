@@ -4,12 +4,15 @@ Nodes, edges and plates as daft draws them (https://docs.daft-pgm.org).
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
-import daft
 import numpy as np
-from matplotlib.axes import Axes
 
 from semgrid_edu.graphical.model import GraphicalModel, topological_order
+
+if TYPE_CHECKING:  # daft brings matplotlib along, which takes half a second: it is imported where it draws
+    import daft
+    from matplotlib.axes import Axes
 
 Place = tuple[float, float]
 """x to the right, y upwards."""
@@ -135,7 +138,7 @@ def variable_nodes(
     size: float,
     observed: Collection[str],
     highlight: Collection[str],
-) -> dict[str, daft.Node]:
+) -> "dict[str, daft.Node]":
     """Make the nodes of variables.
 
     Parameters
@@ -156,6 +159,8 @@ def variable_nodes(
     dict of str to daft.Node
         By variable.
     """
+    import daft
+
     outline = {True: {"ec": HIGHLIGHT, "lw": 3.0}, False: {}}
     return {
         name: daft.Node(
@@ -171,7 +176,7 @@ def variable_nodes(
     }
 
 
-def model_edges(model: GraphicalModel, places: Mapping[str, Place], nodes: Mapping[str, daft.Node]) -> list:
+def model_edges(model: GraphicalModel, places: Mapping[str, Place], nodes: "Mapping[str, daft.Node]") -> list:
     """Make the arrows of a directed model, or the squares of an undirected one and the lines to them.
 
     Parameters
@@ -188,6 +193,8 @@ def model_edges(model: GraphicalModel, places: Mapping[str, Place], nodes: Mappi
     list
         daft's edges and nodes.
     """
+    import daft
+
     if model.parents is not None:
         arrow = {"head_length": 0.14, "head_width": 0.1}
         return [
@@ -207,7 +214,7 @@ def model_edges(model: GraphicalModel, places: Mapping[str, Place], nodes: Mappi
     return things
 
 
-def plate_boxes(boxes: Mapping[str, tuple[np.ndarray, np.ndarray]], size: float) -> list[daft.Plate]:
+def plate_boxes(boxes: Mapping[str, tuple[np.ndarray, np.ndarray]], size: float) -> "list[daft.Plate]":
     """Make plates.
 
     Parameters
@@ -222,13 +229,15 @@ def plate_boxes(boxes: Mapping[str, tuple[np.ndarray, np.ndarray]], size: float)
     list of daft.Plate
         One for each box.
     """
+    import daft
+
     return [
         daft.Plate([*low, *(high - low)], label=text, fontsize=size, rect_params={"fc": "none"})
         for text, (low, high) in boxes.items()
     ]
 
 
-def render(things: Iterable, ax: Axes) -> None:
+def render(things: Iterable, ax: "Axes") -> None:
     """Draw daft's objects into our axes: `daft.PGM.render` would open a figure of its own.
 
     Parameters
@@ -238,6 +247,8 @@ def render(things: Iterable, ax: Axes) -> None:
     ax : matplotlib Axes
         Where.
     """
+    import daft
+
     context = daft.PGM(grid_unit=1.0, node_unit=NODE)._ctx
     context._ax = ax
     for thing in things:

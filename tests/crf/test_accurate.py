@@ -81,13 +81,13 @@ def test_the_window_leaves_out_what_the_docstring_says():
     assert everywhere - inside < params.w_bilateral * 2 * np.pi * 9 * 0.00013
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_at_60_by_40_cells_it_is_nearly_the_naive_one(seed):
-    unary, values = street(seed)
-    exact, found = mean_field_naive(unary, values, CrfParams()), mean_field_accurate(unary, values, CrfParams())
-    assert np.abs(found - exact).mean() <= 1e-5
-    assert (found.argmax(axis=0) == exact.argmax(axis=0)).mean() >= 0.999
-    assert found.dtype == np.float32
+def test_at_60_by_40_cells_it_is_nearly_the_naive_one():
+    for seed in range(2):
+        unary, values = street(seed)
+        exact, found = mean_field_naive(unary, values, CrfParams()), mean_field_accurate(unary, values, CrfParams())
+        assert np.abs(found - exact).mean() <= 1e-5, seed
+        assert (found.argmax(axis=0) == exact.argmax(axis=0)).mean() >= 0.999, seed
+        assert found.dtype == np.float32
 
 
 def test_it_stops_when_nothing_changes_any_more():

@@ -10,9 +10,8 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import log_softmax, softmax
 
 from semgrid_edu.crf import CrfParams, Finding, check, mean_field, unary_from_probability
-from semgrid_edu.crf.doctor.shapes import SHAPE_ERROR
-from semgrid_edu.crf.doctor.states import REFUSED
-from semgrid_edu.crf.doctor.unary import WORSE, scale_of
+from semgrid_edu.crf.doctor.distributions import scale_of
+from semgrid_edu.crf.doctor.finding import PHRASES
 from semgrid_edu.datasets.samples import sample_drive, sample_weights, trained_segmenters
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
@@ -395,14 +394,14 @@ def test_a_symptom_is_what_one_sees():
     for name, unary in unary_faults(case):
         finding = check(unary, case.values, case.params)[0]
         if name in ("scores", "log probabilities", "probabilities") and np.isfinite(unary).all():
-            assert WORSE in finding.symptom
+            assert PHRASES["worse"] in finding.symptom
             labels = mean_field(unary, case.values, case.params).argmax(axis=0)
             assert (labels == right).mean() < 0.2 < (before == right).mean()
-        if finding.symptom == SHAPE_ERROR and np.ndim(unary) != 3:
+        if finding.symptom == PHRASES["shape_error"] and np.ndim(unary) != 3:
             with pytest.raises(ArgumentError, match="shape"):
                 mean_field(unary, case.values, case.params)
     for _, values in values_faults(case):
-        if check(case.unary, values, case.params)[0].symptom == REFUSED:
+        if check(case.unary, values, case.params)[0].symptom == PHRASES["refused"]:
             with pytest.raises(ArgumentError, match=r"^values"):
                 mean_field(case.unary, values, case.params)
 

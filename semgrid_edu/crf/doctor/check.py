@@ -1,15 +1,15 @@
 """A doctor for the CRF: what is probably wrong with its input and parameters, each with its symptom (eq. (3), (4))."""
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.crf.doctor.finding import Finding, Findings
+from semgrid_edu.crf.doctor.distributions import states_fault, unary_fault
+from semgrid_edu.crf.doctor.finding import Finding, Findings, finding
 from semgrid_edu.crf.doctor.kernels import kernel_faults, overwhelming
+from semgrid_edu.crf.doctor.refined import refined_fault
 from semgrid_edu.crf.doctor.shapes import arguments_swapped, as_numbers, oriented_unary, oriented_values
-from semgrid_edu.crf.doctor.states import refined_fault, states_fault
-from semgrid_edu.crf.doctor.unary import unary_fault
 from semgrid_edu.crf.params import CrfParams
 
 
@@ -62,48 +62,30 @@ def check(
 def _all(unary: object, values: object, params: object, refined: object, cell: float | None) -> Iterator[Finding]:
     """Yield shapes first, then what the numbers mean, then kernels, then the result."""
     phi, o = yield from _grids(unary, values)
-    faults = [unary_fault(phi) if phi is not None else None, states_fault(o) if o is not None else None]
-    faults = [fault for fault in faults if fault]
-    yield from faults
+    faults = [phi is not None and unary_fault(phi), o is not None and states_fault(o)]
+    yield from filter(None, faults)
     if not isinstance(params, CrfParams):
-        yield _no_params(params)
+        yield finding("no parameters", what=type(params).__name__)
     elif phi is not None or o is not None:
         kernels = list(kernel_faults(params, (o if phi is None else phi).shape[1:], cell))
-        if not (faults or kernels or phi is None or o is None):
-            kernels = filter(None, [overwhelming(phi.astype(np.float64), o.astype(np.float64), params)])
         yield from kernels
+        if faults == [None, None] and not kernels:
+            yield from overwhelming(phi.astype(np.float64), o.astype(np.float64), params)
     if refined is not None:
-        yield from _result(refined, phi)
+        shown = yield from as_numbers("refined", refined)
+        if shown is not None and phi is not None and not np.ma.is_masked(refined):
+            yield from filter(None, [refined_fault(shown, phi.astype(np.float64))])
 
 
-def _grids(unary: object, values: object) -> Iterator[Finding]:
+def _grids(unary: object, values: object) -> Generator[Finding, None, tuple[NDArray | None, NDArray | None]]:
     """Yield what is wrong with the shapes; return both arrays with their axes in place, or None."""
-    (phi, *first), (o, *second) = as_numbers("unary", unary), as_numbers("values", values)
-    yield from filter(None, first + second)
-    if phi is not None and o is not None and (swapped := arguments_swapped(phi, o)):
+    phi = yield from as_numbers("unary", unary)
+    o = yield from as_numbers("values", values)
+    if phi is not None and o is not None and arguments_swapped(phi, o):
+        yield finding("arguments swapped", other=len(o))
         phi, o = o, phi
-        yield swapped
     if o is not None:
-        o, finding = oriented_values(o)
-        yield from filter(None, [finding])
+        o = yield from oriented_values(o)
     if phi is not None:
-        phi, finding = oriented_unary(phi, None if o is None else o.shape[1:])
-        yield from filter(None, [finding])
+        phi = yield from oriented_unary(phi, None if o is None else o.shape[1:])
     return phi, o
-
-
-def _result(refined: object, phi: NDArray | None) -> Iterator[Finding]:
-    array, finding = as_numbers("refined", refined)
-    if not finding and phi is not None:
-        finding = refined_fault(array, phi.astype(np.float64))
-    yield from filter(None, [finding])
-
-
-def _no_params(params: object) -> Finding:
-    return Finding(
-        "no parameters",
-        "The CRF stops with an AttributeError, or takes the default parameters whatever you set.",
-        f"`params` is {type(params).__name__}.",
-        "Something else was handed over, or the class itself.",
-        "CrfParams(), with its brackets, or CrfParams.for_cells(cell).",
-    )

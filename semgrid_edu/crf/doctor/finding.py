@@ -1,11 +1,20 @@
-"""What a check of the CRF's input found, in the words in which one would search for it."""
+"""What a check of the CRF's input found, in the words in which one would search for it: those of findings.toml."""
 
 import textwrap
-from collections.abc import Iterable
-from dataclasses import dataclass
+import tomllib
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from numpy.typing import NDArray
 
 WIDTH = 110
 """Characters in a line of a printed finding."""
+
+TEXTS = tomllib.loads(Path(__file__).with_name("findings.toml").read_text(encoding="utf-8"))
+"""The sentences of each fault, by its name."""
+
+PHRASES: dict[str, str] = TEXTS.pop("phrases")
+"""Sentences that several faults share."""
 
 
 @dataclass(frozen=True)
@@ -43,46 +52,43 @@ class Finding:
 
     def __str__(self) -> str:
         """Return the name and, below it, one paragraph for each of the others."""
-        parts = {"symptom": self.symptom, "found": self.found, "cause": self.cause, "remedy": self.remedy}
-        indent = " " * 11
-        lines = [
-            textwrap.fill(f"  {title:7}  {text}", WIDTH, subsequent_indent=indent) for title, text in parts.items()
-        ]
-        return "\n".join([self.name, *lines])
+        name, *parts = asdict(self).items()
+        paragraphs = (f"  {title:7}  {text}" for title, text in parts)
+        return "\n".join([name[1], *(textwrap.fill(p, WIDTH, subsequent_indent=" " * 11) for p in paragraphs)])
 
 
 class Findings(list[Finding]):
-    """All that was found, the most likely root first; empty when nothing was.
-
-    Parameters
-    ----------
-    findings : iterable of Finding
-        In the order in which they should be read.
-    """
-
-    def __init__(self, findings: Iterable[Finding] = ()) -> None:
-        super().__init__(findings)
+    """All that was found, the most likely root first; empty when nothing was."""
 
     def __str__(self) -> str:
         """Return the findings with an empty line between them, or a sentence that there is none."""
-        if not self:
-            return "Nothing wrong was found in shapes, numbers and parameters."
-        return "\n\n".join(map(str, self))
+        return "\n\n".join(map(str, self)) or "Nothing wrong was found in shapes, numbers and parameters."
 
     __repr__ = __str__
 
 
-def in_cells(mask: object) -> str:
-    """Say how many cells a mask marks.
+def finding(key: str, name: str | None = None, **numbers: object) -> Finding:
+    """Return what findings.toml says of a fault.
 
     Parameters
     ----------
-    mask : (H, W) bool
-        The cells.
+    key : str
+        Its entry: the name of the fault, or name and variant with a slash between them.
+    name : str, optional
+        Another name for it.
+    **numbers : object
+        What the braces in its sentences ask for.
 
     Returns
     -------
-    str
-        Such as "3 of 120 cells".
+    Finding
+        With the numbers filled in.
     """
+    general = key.split("/")[0]
+    texts = TEXTS.get(general, {}) | TEXTS[key]
+    return Finding(name or general, **{part: text.format(**PHRASES, **numbers) for part, text in texts.items()})
+
+
+def in_cells(mask: NDArray) -> str:
+    """Say how many cells a mask (H, W) marks, such as "3 of 120 cells"."""
     return f"{mask.sum():,} of {mask.size:,} cells"

@@ -4,10 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.distance import cdist
 
 from semgrid_edu.crf import CrfParams, SeparableGaussian
-from semgrid_edu.crf.accurate import filtered_updates, settled
+from semgrid_edu.crf.accurate import filtered_updates
+from semgrid_edu.crf.kernel import kernels
+from semgrid_edu.crf.naive import settled
 from semgrid_edu.crf.params import check_inputs, check_stop
 
 _NEGLIGIBLE = 1e-10
@@ -47,9 +48,7 @@ class LowRankGaussian:
         LowRankGaussian
             A kernel of rank m or less.
         """
-        place = np.indices(values.shape[1:]) / params.sigma_alpha
-        features = np.concatenate([place, values / params.sigma_beta]).reshape(2 + len(values), -1).T
-        to_landmarks = np.exp(-0.5 * cdist(features, features[landmarks], "sqeuclidean"))
+        to_landmarks = kernels(values, params, landmarks)[0].T
         eigenvalues, vectors = np.linalg.eigh(to_landmarks[landmarks])
         kept = eigenvalues > _NEGLIGIBLE * eigenvalues[-1]
         factor = to_landmarks @ (vectors[:, kept] / np.sqrt(eigenvalues[kept]))

@@ -1,0 +1,137 @@
+"""The kernels of eq. (4): how strongly two cells are coupled by their distance in place and in occupancy."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.distance import cdist
+
+from semgrid_edu.crf.params import CrfParams
+from semgrid_edu.errors import ArgumentError
+
+MAX_CELLS = 10_000
+"""The largest grid whose pairs are written out: two matrices of 10,000 x 10,000 numbers are 1.6 GB."""
+
+
+def gaussian(squared_distance: Any, exp: Callable = np.exp) -> Any:
+    """Return exp(-d^2 / 2), the Gaussian of eq. (4), for squared distances d^2 in units of its width.
+
+    Parameters
+    ----------
+    squared_distance : array or Tensor
+        d^2 of each pair of cells.
+    exp : callable
+        The exponential for arrays of this kind: numpy's, or torch's, which has a gradient.
+
+    Returns
+    -------
+    array or Tensor
+        1 for two cells at the same place.
+    """
+    return exp(-0.5 * squared_distance)
+
+
+def kernels(
+    values: ArrayLike, params: CrfParams, cells: slice | NDArray = slice(None)
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Compute both kernels of eq. (4), without their weights, between some cells i and all cells j.
+
+    With c the row and column of a cell and o its occupancy, they are
+
+        k1_ij = exp(-|c_i - c_j|^2 / (2 sigma_alpha^2) - |o_i - o_j|^2 / (2 sigma_beta^2))
+        k2_ij = exp(-|c_i - c_j|^2 / (2 sigma_gamma^2))
+
+    Parameters
+    ----------
+    values : (4, H, W) float
+        o_i, the occupancy probabilities of each cell.
+    params : CrfParams
+        The widths.
+    cells : slice or (n,) int
+        The cells i, counted row by row; all of them when left out.
+
+    Returns
+    -------
+    bilateral, spatial : (n, H W) float64
+        k1 and k2.
+    """
+    values = np.asarray(values, dtype=np.float64)
+    place = np.indices(values.shape[1:]).reshape(2, -1).T.astype(np.float64)
+    occupancy = values.reshape(len(values), -1).T
+    both = np.hstack([place / params.sigma_alpha, occupancy / params.sigma_beta]), place / params.sigma_gamma
+    bilateral, spatial = (gaussian(cdist(features[cells], features, "sqeuclidean")) for features in both)
+    return bilateral, spatial
+
+
+def gram_matrix(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
+    """Compute the bracket of eq. (4) for every two cells, a cell and itself included.
+
+    Gaussians of distances are inner products in some space, so this matrix has no negative eigenvalue, whatever the
+    weights, widths and normalisation. It is this property that keeps mean field from oscillating (`damping`).
+
+    Parameters
+    ----------
+    values : (4, H, W) float
+        o_i, the occupancy probabilities of each cell.
+    params : CrfParams
+        Weights, widths and normalisation.
+
+    Returns
+    -------
+    (H W, H W) float64
+        Symmetric and positive semidefinite; `pair_weights` everywhere but on the diagonal.
+
+    Raises
+    ------
+    ArgumentError
+        When `values` has another shape or isn't finite, or the grid has more than `MAX_CELLS` cells.
+    """
+    values = np.asarray(values, dtype=np.float64)
+    if values.ndim != 3:
+        raise ArgumentError("values", "shape (4, H, W)", f"shape {values.shape}")
+    if not np.isfinite(values).all():
+        raise ArgumentError("values", "probabilities", "NaN or infinity")
+    if values[0].size > MAX_CELLS:
+        raise ArgumentError("values", f"at most {MAX_CELLS} cells; mean_field takes more", values[0].size)
+    bilateral, spatial = kernels(values, params)
+    if params.normalization == "symmetric":
+        _normalise(bilateral)
+        _normalise(spatial)
+    bilateral *= params.w_bilateral  # in place, as these matrices may be large
+    spatial *= params.w_spatial
+    bilateral += spatial
+    return bilateral
+
+
+def _normalise(kernel: NDArray[np.float64]) -> None:
+    """Make D^-1/2 K D^-1/2 of K, in place, with D its row sums."""
+    root = np.sqrt(kernel.sum(axis=1))
+    kernel /= root[:, None]
+    kernel /= root
+
+
+def pair_weights(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
+    """Compute the bracket of eq. (4) for every pair of cells.
+
+    Parameters
+    ----------
+    values : (4, H, W) float
+        o_i, the occupancy probabilities of each cell.
+    params : CrfParams
+        Weights, widths and normalisation.
+
+    Returns
+    -------
+    (H W, H W) float64
+        The cost of two cells having different labels; cells are counted row by row. Zero on the diagonal, since a cell
+        is no pair with itself.
+
+    Raises
+    ------
+    ArgumentError
+        As `gram_matrix` raises it.
+    """
+    weights = gram_matrix(values, params)
+    np.fill_diagonal(weights, 0)
+    return weights
