@@ -60,17 +60,18 @@ def arrivals_barred() -> AbstractContextManager:
     """Return a context in which the filter takes each arrival for one that comes out of something that stands.
 
     So nothing that arrives may claim a cell that hasn't been seen to be free. It replaces the compiled rule of
-    `cellwise.meet`, because no parameter of the filter goes as far.
+    `cellwise.collide`, because no parameter of the filter goes as far.
 
     Returns
     -------
     context manager
     """
 
-    def meet(mixed, newborn, going, stays, arrives, doubtful):
-        return cellwise.meet(mixed, newborn, going, stays, arrives, np.minimum(arrives, np.float32(cellwise.CERTAIN)))
+    def collide(mixed, newborn, going, stays, arrives, doubtful):
+        everything = np.minimum(arrives, np.float32(cellwise.CERTAIN))
+        return cellwise.collide(mixed, newborn, going, stays, arrives, everything)
 
-    return patch("semgrid_edu.occupancy.steps.meet", meet)
+    return patch("semgrid_edu.occupancy.steps.collide", collide)
 
 
 @dataclass(frozen=True)
