@@ -29,7 +29,7 @@ from IPython.display import Markdown
 # %% jupyter={"source_hidden": true}
 from semgrid_edu import plotting
 from semgrid_edu.workshop.studies.filter.occupancy import markdown_table, per_cent
-from semgrid_edu.workshop.studies.filter.street_scores import LEAST_DYNAMIC, StreetScores
+from semgrid_edu.workshop.studies.filter.streets import LEAST_DYNAMIC, StreetScores
 from semgrid_edu.workshop.attic.suspects import (
     BARRED, BEFORE, MENDED, SUSPECTS, Suspect, counts, run_filter, scenes_of,
 )  # fmt: skip
