@@ -39,7 +39,7 @@ from semgrid_edu.stage_models.cells_in_a_row import Cell, CellsInARow
 from semgrid_edu.stage_models.joint_row import row_evidence, row_model
 from semgrid_edu.workshop.illustrations.boxes import Box, cells_in, scan_boxes
 from semgrid_edu.occupancy.literal.bof import clear_wakes_literal, mass_that_left, strike_out
-from semgrid_edu.occupancy.bof_steps import origins
+from semgrid_edu.occupancy.bof import origins
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 FREE, STATIC, DYNAMIC, UNKNOWN = State

@@ -56,7 +56,7 @@ from semgrid_edu.occupancy.state import OUTSIDE
 from semgrid_edu.occupancy.planar_motion import scroll
 from semgrid_edu.occupancy.particles import cells_at, cells_of
 from semgrid_edu.occupancy.resampling import systematic_resample
-from semgrid_edu.occupancy.steps import reveal
+from semgrid_edu.occupancy.steps import initialise_unknown
 
 plt.rcParams["figure.dpi"] = 72
 FREE, STATIC, DYNAMIC, UNKNOWN = State
@@ -546,8 +546,8 @@ plt.show()
 # 0.8 if the cell is occupied, 0.2 if it is free.
 #
 # UNKNOWN isn't a kind of thing. It says that nobody has looked, and now somebody does. So first share it out among
-# the other three as things are found at first sight, say 0.6, 0.3, 0.1: this is `reveal`. Then Bayes' rule, as
-# always. By hand:
+# the other three as things are found at first sight, say 0.6, 0.3, 0.1: this is `initialise_unknown`. Then Bayes'
+# rule, as always. By hand:
 #
 # | | FREE | STATIC | DYNAMIC | UNKNOWN |
 # |---|---|---|---|---|
@@ -619,7 +619,7 @@ plt.show()
 
 # %%
 sees = evidence.occupied != evidence.free
-revealed = reveal(predicted, sees, params).probability
+revealed = initialise_unknown(predicted, sees, params).probability
 occupied = sees & (updated.probability[STATIC] + updated.probability[DYNAMIC] > 0.1)
 ratios = [p[DYNAMIC, occupied] / (p[STATIC, occupied] + p[DYNAMIC, occupied]) for p in (revealed, updated.probability)]
 np.testing.assert_allclose(*ratios, atol=1e-4)

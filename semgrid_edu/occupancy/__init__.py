@@ -6,9 +6,8 @@ filter, each a pure function on a `FilterState`, and `cmcdot_literal` the same s
 before it: the binary grid, and the exact filter on a lattice of velocities.
 """
 
-from semgrid_edu.occupancy.bof import Bof
+from semgrid_edu.occupancy.bof import Bof, bof_move, bof_predict, bof_update, bof_velocity
 from semgrid_edu.occupancy.bof_state import BofParams, BofState, VelocityLattice
-from semgrid_edu.occupancy.bof_steps import bof_move, bof_predict, bof_update, bof_velocity
 from semgrid_edu.occupancy.cmcdot import Cmcdot, track_drive
 from semgrid_edu.occupancy.evidence import Evidence, Measurement, Sensor, scan_evidence
 from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
@@ -24,6 +23,7 @@ from semgrid_edu.occupancy.log_odds import (
     update_log_odds,
 )
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
+from semgrid_edu.occupancy.resampling import Resampling, SystematicResampling
 from semgrid_edu.occupancy.sensor import Scan, SensorModel
 from semgrid_edu.occupancy.state import N_STATES, Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import move, predict, resample, update
@@ -45,10 +45,12 @@ __all__ = [
     "Measurement",
     "Particles",
     "PlanarMotion",
+    "Resampling",
     "Scan",
     "Sensor",
     "SensorModel",
     "State",
+    "SystematicResampling",
     "VelocityLattice",
     "WorldModel",
     "bof_move",

@@ -16,7 +16,7 @@ CERTAIN = 1 - 1e-3
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def make_room(probability, claimed):
+def renormalise(probability, claimed):
     """Let its particles decide how much of a cell is DYNAMIC; the other states share the rest in their old proportions.
 
     Parameters
@@ -87,7 +87,7 @@ def mix(probability, newborn, going, M):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def meet(mixed, newborn, going, stays, arrives, doubtful):
+def collide(mixed, newborn, going, stays, arrives, doubtful):
     """Let the dynamic mass that arrives in a cell meet what the cell holds, and strike out what can't both be true.
 
     Parameters
@@ -203,7 +203,7 @@ def bayes(prior, occupied, free):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def represent(probability, carried):
+def rescale_weights(probability, carried):
     """Make the particles of each cell carry its dynamic probability; without particles it turns UNKNOWN.
 
     Parameters

@@ -1,10 +1,6 @@
-"""CMCDOT, the Conditional Monte Carlo Dense Occupancy Tracker (paper, section 3.2; Rummelhard et al., ITSC 2015).
-
-The filter over a whole drive: ego-motion from the poses of its frames (paper, section 3.2).
-"""
+"""CMCDOT, the Conditional Monte Carlo Dense Occupancy Tracker (paper, section 3.2; Rummelhard et al., ITSC 2015)."""
 
 from collections.abc import Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +8,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy._runtime import keep_memory, on_another_core, undo_after_errors
 from semgrid_edu.occupancy.local_belief import local_belief, observe, velocity_moments
 from semgrid_edu.occupancy.particles import cells_of, transform
 from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll
@@ -24,7 +21,7 @@ class Cmcdot:
     """The filter: give it scan after scan, and it tells free, static, dynamic and unknown cells apart.
 
     Inside, it keeps a map that is somewhat larger than the grid, stays aligned with the world, and scrolls under the
-    vehicle by whole cells (`moving_map`). For the belief that it hands out, it looks up in the vehicle's own cells what
+    vehicle by whole cells (`scroll`). For the belief that it hands out, it looks up in the vehicle's own cells what
     the map predicts, and updates those cells with the scan (`local_belief`). Nothing of that goes back to the map.
 
     Parameters
@@ -36,7 +33,7 @@ class Cmcdot:
     seed : int or numpy.random.Generator
         Seed or source of all random numbers that the filter draws: the same seed gives the same bits.
     keep_steps : bool
-        Whether each belief also tells what the map held after each step (`Belief.steps`). Nothing else changes by it.
+        Whether each belief also holds what the map held after each step (`Belief.steps`). Nothing else changes by it.
 
     Examples
     --------
@@ -61,7 +58,7 @@ class Cmcdot:
         self._rng = np.random.default_rng(seed)
         self._pose = PlanarMotion()
         self._state = FilterState.unknown(self.map_spec)
-        _keep_memory_of_a_step()
+        keep_memory()
 
     @property
     def particles(self) -> Particles:
@@ -91,47 +88,28 @@ class Cmcdot:
         Raises
         ------
         ArgumentError
-            When the points aren't a table of finite coordinates, the time is negative or not finite, or the sensor
-            doesn't turn the scan into evidence. The tracker then stays as it was.
+            When the points aren't a table of finite coordinates, the time is negative or not finite, the sensor doesn't
+            turn the scan into evidence, or the resampling doesn't return indices. The tracker then stays as it was.
         """
         shift, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
-        random, steps = self._rng.bit_generator.state, {}
-        with ThreadPoolExecutor(1) as another_core:
-            scan = another_core.submit(observe, self.params.sensor, points_grid, pose, self.map_spec, self.spec)
-            # One name for what is between two steps: its memory, as large as what the filter keeps, is then used again
-            state = move(self._state, self.map_spec, shift)
-            self._keep(steps, "move", state, pose)
-            state = predict(state, self.map_spec, self.params, dt, self._rng)
-            self._keep(steps, "predict", state, pose)
-        if scan.exception():
-            self._rng.bit_generator.state = random
-        seen, predicted = scan.result(), state.probability
-        state = update(state, self.map_spec, seen.on_map, self.params)
-        self._keep(steps, "update", state, pose)
-        self._state, self._pose = resample(state, self.map_spec, self.params, self._rng), seen.pose
-        self._keep(steps, "resample", self._state, pose)
-        belief = local_belief(predicted, self._velocities(), seen, self.map_spec, self.spec, self.params)
-        return replace(belief, steps=steps)
+        scan = observe, self.params.sensor, points_grid, pose, self.map_spec, self.spec
+        with undo_after_errors(self._rng), on_another_core(*scan) as seen:
+            moved = move(self._state, self.map_spec, shift)
+            predicted = predict(moved, self.map_spec, self.params, dt, self._rng)
+            updated = update(predicted, self.map_spec, seen.result().on_map, self.params)
+            resampled = resample(updated, self.map_spec, self.params, self._rng)
+        self._state, self._pose = resampled, pose
+        cells = cells_of(resampled.particles.position, self.map_spec)
+        velocity = velocity_moments(resampled.particles, cells, self.map_spec.shape)
+        belief = local_belief(predicted.probability, velocity, seen.result(), self.map_spec, self.spec, self.params)
+        if not self.keep_steps:
+            return belief
+        states = {"move": moved, "predict": predicted, "update": updated, "resample": resampled}
+        return replace(belief, steps={name: self._in_grid(state, pose) for name, state in states.items()})
 
-    def _keep(self, steps: dict[str, NDArray], name: str, state: FilterState, pose: PlanarMotion) -> None:
-        """Note what the map holds after a step, at the centres of the vehicle's own cells."""
-        if self.keep_steps:
-            steps[name] = look_up(state.probability, NOTHING_KNOWN, self.map_spec, self.spec, pose)
-
-    def _velocities(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return mean and covariance of the particles' velocities in each cell of the map."""
-        particles = self._state.particles
-        return velocity_moments(particles, cells_of(particles.position, self.map_spec), self.map_spec.shape)
-
-
-def _keep_memory_of_a_step() -> None:
-    """Let the memory of one step serve the next.
-
-    On Linux, glibc hands idle memory back to the system as soon as it is more than twice the largest buffer that was
-    ever freed, and what a step frees often is. The system clears each page before it lends it again: up to 5 ms a step.
-    In a process that once freed a buffer of 25 MB, such as an image network's, up to 50 MB stay. So this frees one.
-    """
-    np.empty(3 * 2**23, np.uint8)
+    def _in_grid(self, state: FilterState, pose: PlanarMotion) -> NDArray[np.float32]:
+        """Look up what the map holds at the centres of the vehicle's own cells."""
+        return look_up(state.probability, NOTHING_KNOWN, self.map_spec, self.spec, pose)
 
 
 LIDAR_PERIOD = 0.1
@@ -158,7 +136,7 @@ def track_drive(
     seed : int or numpy.random.Generator
         Seed or source of all random numbers that the filter draws.
     keep_steps : bool
-        Whether each belief also tells what the filter's map held after each step (`Belief.steps`).
+        Whether each belief also holds what the filter's map held after each step (`Belief.steps`).
 
     Yields
     ------
@@ -172,9 +150,8 @@ def track_drive(
     """
     tracker, before = Cmcdot(spec, params, seed, keep_steps), None
     for frame in frames:
-        if before is None:
-            motion, dt = PlanarMotion(), LIDAR_PERIOD
-        else:
+        motion, dt = PlanarMotion(), LIDAR_PERIOD
+        if before is not None:
             motion = PlanarMotion.from_poses(before.T_world_from_lidar, frame.T_world_from_lidar)
             dt = frame.time - before.time
         yield tracker.step(frame.points_grid, motion, dt)

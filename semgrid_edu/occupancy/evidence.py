@@ -2,8 +2,6 @@
 
 A filter needs two things: a sensor that takes in a scan (`Sensor.scan`), and a result that can say what the scan tells
 about the cells of any grid (`Measurement.evidence`). Any two classes with these methods will do.
-
-What a scan has to be before anything is made of it: a table of finite coordinates (paper, section 3.2).
 """
 
 from dataclasses import dataclass
@@ -16,7 +14,7 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.state import check_shape
+from semgrid_edu.occupancy.state import check_part, check_shape
 
 
 def check_points(points: NDArray) -> NDArray:
@@ -59,6 +57,7 @@ def _all_finite(points):
     return finite
 
 
+@njit(cache=True, nogil=True)
 def without_own_returns(points: NDArray, vehicle: tuple[float, float, float, float], low: float) -> NDArray:
     """Leave out the returns that come from the vehicle itself.
 
@@ -78,12 +77,7 @@ def without_own_returns(points: NDArray, vehicle: tuple[float, float, float, flo
     (M, 3) float
         x, y and z of the other returns, in their order.
     """
-    return _outside(points, *vehicle, low)
-
-
-@njit(cache=True, nogil=True)
-def _outside(points, x_min, x_max, y_min, y_max, low):
-    """Copy the points that don't lie in a box without a lid."""
+    x_min, x_max, y_min, y_max = vehicle
     others, n = np.empty((len(points), 3), points.dtype), 0
     for i in range(len(points)):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
@@ -224,11 +218,7 @@ def check_sensor(sensor: Sensor) -> None:
     ArgumentError
         When it has no such method, or is a class, of which an object has to be made first.
     """
-    expected = "an object with a method .scan(points), such as SensorModel()"
-    if isinstance(sensor, type):
-        raise ArgumentError("sensor", expected, f"the class {sensor.__name__} itself: write {sensor.__name__}()")
-    if not isinstance(sensor, Sensor):
-        raise ArgumentError("sensor", expected, type(sensor).__name__)
+    check_part("sensor", sensor, Sensor, ".scan(points), such as SensorModel()")
 
 
 def take_scan(sensor: Sensor, points: NDArray) -> Measurement:
@@ -254,7 +244,7 @@ def take_scan(sensor: Sensor, points: NDArray) -> Measurement:
     measurement = sensor.scan(check_points(points))
     if not isinstance(measurement, Measurement):
         expected = ".scan(points) to return an object with a method .evidence(spec, pose)"
-        raise ArgumentError(_name(sensor), expected, type(measurement).__name__)
+        raise ArgumentError(type(sensor).__name__, expected, type(measurement).__name__)
     return measurement
 
 
@@ -283,14 +273,9 @@ def evidence_of(measurement: Measurement, spec: GridSpec, pose: PlanarMotion) ->
     evidence = measurement.evidence(spec, pose)
     if not isinstance(evidence, Evidence):
         expected = ".evidence(spec, pose) to return Evidence(occupied, free)"
-        raise ArgumentError(_name(measurement), expected, type(evidence).__name__)
+        raise ArgumentError(type(measurement).__name__, expected, type(evidence).__name__)
     if np.shape(evidence.free) != spec.shape:
         expected = f".evidence(spec, pose) to cover the spec that it is given, shape {spec.shape}"
         reason = "a filter asks for its own map, which is larger, and for the grid of its beliefs"
-        raise ArgumentError(_name(measurement), expected, f"shape {np.shape(evidence.free)} ({reason})")
+        raise ArgumentError(type(measurement).__name__, expected, f"shape {np.shape(evidence.free)} ({reason})")
     return evidence
-
-
-def _name(thing: object) -> str:
-    """Name the class of a sensor or measurement, for an error that says which one is at fault."""
-    return type(thing).__name__

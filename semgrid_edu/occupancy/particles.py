@@ -44,6 +44,7 @@ def _cells_of(xy, shape, x_max, y_max, cell):
     return cells
 
 
+@njit(cache=True, nogil=True)
 def weight_in_cells(weight: NDArray, cells: NDArray, shape: tuple[int, ...]) -> NDArray:
     """Add the weights up in each cell.
 
@@ -61,18 +62,15 @@ def weight_in_cells(weight: NDArray, cells: NDArray, shape: tuple[int, ...]) -> 
     (H, W) or (2, H, W) float32
         The sums, added up in the order of the particles in double precision.
     """
-    return _sum_in_cells(weight, cells, math.prod(shape)).reshape(shape).astype(np.float32)
+    total = np.zeros(shape)
+    flat = total.ravel()
+    for i in range(len(cells)):
+        if cells[i] != OUTSIDE:
+            flat[cells[i]] += weight[i]
+    return total.astype(np.float32)
 
 
 @njit(cache=True, nogil=True)
-def _sum_in_cells(values, cells, n_cells):
-    total = np.zeros(n_cells)
-    for i in range(len(cells)):
-        if cells[i] != OUTSIDE:
-            total[cells[i]] += values[i]
-    return total
-
-
 def scale_in_cells(weight: NDArray, cells: NDArray, factor: NDArray) -> NDArray[np.float32]:
     """Multiply each weight by the factor of its cell.
 
@@ -90,18 +88,14 @@ def scale_in_cells(weight: NDArray, cells: NDArray, factor: NDArray) -> NDArray[
     (N,) float32
         The new weights; zero for particles outside.
     """
-    return _scale_in_cells(weight, cells, factor.ravel())
-
-
-@njit(cache=True, nogil=True)
-def _scale_in_cells(weight, cells, factor):
-    scaled = np.zeros(len(weight), np.float32)
+    scaled, flat = np.zeros(len(weight), np.float32), factor.ravel()
     for i in range(len(weight)):
         if cells[i] != OUTSIDE:
-            scaled[i] = weight[i] * factor[cells[i]]
+            scaled[i] = weight[i] * flat[cells[i]]
     return scaled
 
 
+@njit(cache=True, nogil=True)
 def by_origin(before: NDArray, after: NDArray, n_cells: int) -> NDArray[np.int32]:
     """Tell particles that have stayed in their cell from those that have come in: to the latter's cell add `n_cells`.
 
@@ -118,11 +112,6 @@ def by_origin(before: NDArray, after: NDArray, n_cells: int) -> NDArray[np.int32
         Indices into a flattened array (2, H, W), whose first plane is for particles that have stayed and whose second
         is for those that have arrived; `OUTSIDE` for particles that have left the map.
     """
-    return _by_origin(before, after, np.int32(n_cells))
-
-
-@njit(cache=True, nogil=True)
-def _by_origin(before, after, n_cells):
     origin = after.copy()
     for i in range(len(after)):
         if after[i] != before[i] and after[i] != OUTSIDE:
@@ -151,10 +140,8 @@ def cells_at(particles: Particles, cells: NDArray, spec: GridSpec, time: float, 
     (N,) int32
         row * W + column; `OUTSIDE` for a particle that is outside the grid then, or in the same cell as now.
     """
-    now, grid = (
-        (particles.position.ravel(), particles.velocity.ravel()),
-        (spec.shape, spec.x_max, spec.y_max, spec.cell),
-    )
+    now = particles.position.ravel(), particles.velocity.ravel()
+    grid = spec.shape, spec.x_max, spec.y_max, spec.cell
     return _cells_at(*now, cells, np.float32(time), np.float32(fewest * spec.cell), *grid)
 
 

@@ -1,11 +1,97 @@
 """Particles drawn anew: where dynamic mass is, and where it has just come into being (section 3.2, step 4)."""
 
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.state import Particles
+
+
+@runtime_checkable
+class Resampling(Protocol):
+    """How indices are drawn in proportion to weights. The package's own is `SystematicResampling`.
+
+    `resample` asks twice in each step: for the particles that go on, by their weights, and for the cells in which new
+    ones appear, by their newborn mass. All that are drawn get the same weight afterwards. So index i should be drawn
+    count w_i / sum(w) times on average; otherwise the filter's probabilities are biased.
+
+    Examples
+    --------
+    Independent draws, which scatter more than systematic ones:
+
+    >>> class Multinomial:
+    ...     def draw(self, weight, count, rng):
+    ...         return rng.choice(len(weight), count, p=weight / weight.sum())
+    >>> isinstance(Multinomial(), Resampling)
+    True
+    """
+
+    def draw(self, weight: NDArray, count: int, rng: np.random.Generator) -> NDArray:
+        """Draw indices in proportion to weights.
+
+        Parameters
+        ----------
+        weight : (N,) float64
+            The weights: a copy, finite, not negative, with a sum that is above 0 but needn't be 1.
+        count : int
+            How many to draw, M, at least 1; M may be above or below N.
+        rng : numpy.random.Generator
+            The only source of random numbers, so that the filter's seed decides everything.
+
+        Returns
+        -------
+        (M,) int
+            Indices from 0 to N - 1, in any order.
+        """
+        ...
+
+
+def draw_indices(resampling: Resampling, weight: NDArray, count: int, rng: np.random.Generator) -> NDArray:
+    """Ask a resampling for indices, and check its answer.
+
+    Parameters
+    ----------
+    resampling : Resampling
+        How to draw.
+    weight : (N,) float
+        The weights, not negative and not all zero.
+    count : int
+        How many to draw, M.
+    rng : numpy.random.Generator
+        Source of random numbers.
+
+    Returns
+    -------
+    (M,) int64
+        What `resampling.draw` returned.
+
+    Raises
+    ------
+    ArgumentError
+        When these aren't M indices from 0 to N - 1; it names the class of the resampling.
+    """
+    drawn = np.asarray(resampling.draw(weight.astype(np.float64), count, rng))
+    found = f"shape {drawn.shape}, type {drawn.dtype}"
+    if drawn.shape == (count,) and drawn.dtype.kind in "iu":
+        if drawn.min() >= 0 and drawn.max() < len(weight):
+            return drawn.astype(np.int64, copy=False)
+        found = f"indices from {drawn.min()} to {drawn.max()}"
+    expected = f".draw(weight, count, rng) to return {count} whole numbers from 0 to {len(weight) - 1}"
+    raise ArgumentError(type(resampling).__name__, expected, found)
+
+
+@dataclass(frozen=True)
+class SystematicResampling:
+    """Equally spaced points on the weights laid end to end: one random number, and the least scatter (the default)."""
+
+    def draw(self, weight: NDArray, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
+        """Draw indices by `systematic_resample`. Parameters and result are those of `Resampling.draw`."""
+        return systematic_resample(weight, count, rng.random())
 
 
 @njit(cache=True, nogil=True)
@@ -50,7 +136,7 @@ def systematic_resample(weight, count, offset):
     return chosen
 
 
-def draw_again(particles: Particles, count: int, rng: np.random.Generator) -> Particles:
+def draw_again(particles: Particles, count: int, resampling: Resampling, rng: np.random.Generator) -> Particles:
     """Draw particles in proportion to their weights; all that are drawn get the same weight.
 
     Parameters
@@ -59,8 +145,10 @@ def draw_again(particles: Particles, count: int, rng: np.random.Generator) -> Pa
         The N particles to draw from.
     count : int
         How many to draw, M.
+    resampling : Resampling
+        How to draw.
     rng : numpy.random.Generator
-        Source of the one random offset.
+        Source of random numbers.
 
     Returns
     -------
@@ -70,20 +158,19 @@ def draw_again(particles: Particles, count: int, rng: np.random.Generator) -> Pa
     total = particles.weight.sum(dtype=np.float64)
     if total == 0 or count == 0:
         return Particles.none()
-    chosen = systematic_resample(particles.weight, count, rng.random())
-    return Particles(*_take(particles.position, particles.velocity, chosen), np.full(count, total / count, np.float32))
+    chosen = draw_indices(resampling, particles.weight, count, rng)
+    position, velocity = (np.take(values, chosen, axis=0) for values in (particles.position, particles.velocity))
+    return Particles(position, velocity, np.full(count, total / count, np.float32))
 
 
-@njit(cache=True, nogil=True)
-def _take(position, velocity, chosen):
-    there, then = np.empty((len(chosen), 2), np.float32), np.empty((len(chosen), 2), np.float32)
-    for m in range(len(chosen)):
-        there[m, 0], there[m, 1] = position[chosen[m], 0], position[chosen[m], 1]
-        then[m, 0], then[m, 1] = velocity[chosen[m], 0], velocity[chosen[m], 1]
-    return there, then
-
-
-def draw_newborn(newborn: NDArray, spec: GridSpec, count: int, max_speed: float, rng: np.random.Generator) -> Particles:
+def draw_newborn(
+    newborn: NDArray,
+    spec: GridSpec,
+    count: int,
+    max_speed: float,
+    resampling: Resampling,
+    rng: np.random.Generator,
+) -> Particles:
     """Draw new particles in proportion to each cell's newborn mass; all of them get the same weight.
 
     Parameters
@@ -96,6 +183,8 @@ def draw_newborn(newborn: NDArray, spec: GridSpec, count: int, max_speed: float,
         How many to draw, M.
     max_speed : float
         Largest speed of the velocity prior, m/s.
+    resampling : Resampling
+        How to draw cells.
     rng : numpy.random.Generator
         Source of all random numbers.
 
@@ -107,7 +196,7 @@ def draw_newborn(newborn: NDArray, spec: GridSpec, count: int, max_speed: float,
     total = newborn.sum(dtype=np.float64)
     if total == 0 or count == 0:
         return Particles.none()
-    chosen = systematic_resample(newborn.ravel(), count, rng.random())
+    chosen = draw_indices(resampling, newborn.ravel(), count, rng)
     position = _anywhere(chosen, rng.random((count, 2), np.float32), spec.shape[1], spec.x_max, spec.y_max, spec.cell)
     return Particles(position, draw_velocities(count, max_speed, rng), np.full(count, total / count, np.float32))
 

@@ -1,7 +1,4 @@
-"""What the filter believes of each cell: four states and a velocity (paper, section 3.2).
-
-Which cell a place lies in, for compiled loops: the rule of `GridSpec.cells` (section 4.1).
-"""
+"""What the filter believes of each cell: four states and a velocity (paper, section 3.2)."""
 
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -12,32 +9,6 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-
-OUTSIDE = -1
-"""The index of what lies in no cell of a grid."""
-
-
-@njit(cache=True, inline="always", error_model="numpy")
-def cell_of(x, y, shape, x_max, y_max, cell):
-    """Return the cell that a place lies in, as an index into the flattened grid.
-
-    Parameters
-    ----------
-    x, y : float
-        The place, in the frame of the grid, metres.
-    shape : (int, int)
-        H, W of the grid.
-    x_max, y_max, cell : float
-        The grid's far and left border, and the side of a cell, metres.
-
-    Returns
-    -------
-    int32
-        row * W + column; `OUTSIDE` for a place outside the grid.
-    """
-    row, col = np.floor((x_max - x) / cell), np.floor((y_max - y) / cell)
-    inside = (row >= 0) & (row < shape[0]) & (col >= 0) & (col < shape[1])  # `and` would branch, and be slower
-    return np.int32(row * shape[1] + col if inside else OUTSIDE)
 
 
 class State(IntEnum):
@@ -72,6 +43,32 @@ def check_shape(name: str, values: NDArray, shape: tuple[int, ...]) -> None:
     """
     if np.shape(values) != shape:
         raise ArgumentError(name, f"shape {shape}", f"shape {np.shape(values)}")
+
+
+def check_part(name: str, part: object, protocol: type, example: str) -> None:
+    """Refuse what can't take the place of an exchangeable part of a filter.
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument, for the error.
+    part : object
+        What was handed over.
+    protocol : type
+        The protocol that it has to fulfil.
+    example : str
+        The method that it needs, and a class that has it.
+
+    Raises
+    ------
+    ArgumentError
+        When it has no such method, or is a class, of which an object has to be made first.
+    """
+    expected = f"an object with a method {example}"
+    if isinstance(part, type):
+        raise ArgumentError(name, expected, f"the class {part.__name__} itself: write {part.__name__}()")
+    if not isinstance(part, protocol):
+        raise ArgumentError(name, expected, type(part).__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,3 +182,30 @@ class FilterState:
         probability = np.zeros((4, *spec.shape), np.float32)
         probability[State.UNKNOWN] = 1
         return cls(probability, Particles.none(), np.zeros(spec.shape, np.float32))
+
+
+OUTSIDE = -1
+"""The index of what lies in no cell of a grid."""
+
+
+@njit(cache=True, inline="always", error_model="numpy")
+def cell_of(x, y, shape, x_max, y_max, cell):
+    """Return the cell that a place lies in, as an index into the flattened grid.
+
+    Parameters
+    ----------
+    x, y : float
+        The place, in the frame of the grid, metres.
+    shape : (int, int)
+        H, W of the grid.
+    x_max, y_max, cell : float
+        The grid's far and left border, and the side of a cell, metres.
+
+    Returns
+    -------
+    int32
+        row * W + column; `OUTSIDE` for a place outside the grid.
+    """
+    row, col = np.floor((x_max - x) / cell), np.floor((y_max - y) / cell)
+    inside = (row >= 0) & (row < shape[0]) & (col >= 0) & (col < shape[1])  # `and` would branch, and be slower
+    return np.int32(row * shape[1] + col if inside else OUTSIDE)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.cellwise import bayes, clear_wakes, make_room, meet, mix, represent
+from semgrid_edu.occupancy.cellwise import bayes, clear_wakes, collide, mix, renormalise, rescale_weights
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.particles import (
     by_origin,
@@ -56,7 +56,7 @@ def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterStat
     probability = look_up(state.probability, NOTHING_KNOWN, spec, spec, motion)
     particles = transform(state.particles, motion)
     cells = cells_of(particles.position, spec)
-    probability, factor = make_room(probability, weight_in_cells(particles.weight, cells, spec.shape))
+    probability, factor = renormalise(probability, weight_in_cells(particles.weight, cells, spec.shape))
     weight = scale_in_cells(particles.weight, cells, factor)
     return FilterState(probability, replace(particles, weight=weight), state.newborn)
 
@@ -126,7 +126,7 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
     doubt -= scale_in_cells(doubt, ahead, mixed[FREE] + mixed[DYNAMIC])
     stays, arrives = weight_in_cells(particles.weight, came, (2, *spec.shape))
     doubtful = weight_in_cells(doubt, came, (2, *spec.shape))[1]
-    probability, newborn, factor, less = meet(mixed, newborn, going, stays, arrives, doubtful)
+    probability, newborn, factor, less = collide(mixed, newborn, going, stays, arrives, doubtful)
     weight = scale_in_cells(particles.weight, came, factor) - scale_in_cells(doubt, came, less)
     return FilterState(probability, replace(particles, weight=np.maximum(weight, 0)), newborn)
 
@@ -135,7 +135,7 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
     """Step 3: update each cell by Bayes' rule, P(state | z) = P(z | state) P(state) / P(z).
 
     STATIC and DYNAMIC share P(z | occupied), because one scan can't tell them apart. UNKNOWN means that no scan has
-    said anything of the cell; as soon as one does, `reveal` first shares its UNKNOWN mass among the other states.
+    said anything of the cell; as soon as one does, `initialise_unknown` shares its UNKNOWN mass among the others.
 
     Of a cell that is hidden a scan says nothing, but what moves does: one thing can't be in two places. Where a thing
     was `clearing_time` ago (a slow one, `clearing_cells` ago) it isn't any more, so "it has come from there" and "it
@@ -167,7 +167,7 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
     check_shape("state", state.newborn, spec.shape)
     check_shape("evidence", evidence.free, spec.shape)
     seen = evidence.occupied != evidence.free
-    prior = reveal(state, seen, world)
+    prior = initialise_unknown(state, seen, world)
     posterior, factor = bayes(prior.probability, evidence.occupied, evidence.free)
     cells = cells_of(prior.particles.position, spec)
     weight = scale_in_cells(prior.particles.weight, cells, factor)
@@ -177,7 +177,7 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
     return FilterState(cleared, replace(prior.particles, weight=weight), newborn)
 
 
-def reveal(state: FilterState, seen: NDArray, world: WorldModel) -> FilterState:
+def initialise_unknown(state: FilterState, seen: NDArray, world: WorldModel) -> FilterState:
     """Share the UNKNOWN mass of cells that are seen among the other states, by the probabilities of first sight.
 
     Parameters
@@ -203,10 +203,10 @@ def reveal(state: FilterState, seen: NDArray, world: WorldModel) -> FilterState:
 def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.random.Generator) -> FilterState:
     """Step 4: resample, which spends the particles where dynamic mass is, and on newborn mass.
 
-    There are two systematic draws of fixed size. The first draws particles in proportion to their weights. The second
-    draws cells in proportion to their newborn mass, and puts a particle anywhere in each cell that it draws, with a
-    velocity from the wide prior. Then the weights in each cell are scaled to its dynamic probability again. Dynamic
-    mass so small that no particle was drawn for it becomes UNKNOWN.
+    There are two draws of fixed size, by `params.resampling`. The first draws particles in proportion to their weights.
+    The second draws cells in proportion to their newborn mass, and puts a particle anywhere in each cell that it draws,
+    with a velocity from the wide prior. Then the weights in each cell are scaled to its dynamic probability again.
+    Dynamic mass so small that no particle was drawn for it becomes UNKNOWN.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
     spec : GridSpec
         The cells, (H, W).
     params : CmcdotParams
-        Number of particles, share of births, and their velocity prior.
+        Number of particles, share of births and their velocity prior, and how particles are drawn.
     rng : numpy.random.Generator
         Source of the draws, and of the newborn particles' places and velocities.
 
@@ -227,18 +227,18 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
     Raises
     ------
     ArgumentError
-        When the state is over other cells than those of `spec`.
+        When the state is over other cells than those of `spec`, or the resampling doesn't return indices.
     """
     check_shape("state", state.newborn, spec.shape)
     births = round(params.birth_share * params.n_particles)
     drawn = (
-        draw_again(state.particles, params.n_particles - births, rng),
-        draw_newborn(state.newborn, spec, births, params.max_speed, rng),
+        draw_again(state.particles, params.n_particles - births, params.resampling, rng),
+        draw_newborn(state.newborn, spec, births, params.max_speed, params.resampling, rng),
     )
     position, velocity, weight = (
         np.concatenate([getattr(p, name) for p in drawn]) for name in ("position", "velocity", "weight")
     )
     cells = cells_of(position, spec)
-    probability, factor = represent(state.probability, weight_in_cells(weight, cells, spec.shape))
+    probability, factor = rescale_weights(state.probability, weight_in_cells(weight, cells, spec.shape))
     particles = Particles(position, velocity, scale_in_cells(weight, cells, factor))
     return FilterState(probability, particles, np.zeros_like(state.newborn))

@@ -13,23 +13,13 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.layout import in_rows
-from semgrid_edu.graphical.model import GraphicalModel
-from semgrid_edu.stage_models.stage_graph import CutEdge, StageGraph
+from semgrid_edu.stage_models.stage_graph import StageGraph, binary, cut_edges, directed
 
 BINS_PER_CELL = 10
 """Number of ranges that can be read per cell: a range is read to a tenth of a cell, 2 cm for cells of 0.2 m."""
 
 MARGIN = 6
 """Number of standard deviations by which a range may lie before the first or behind the last cell."""
-
-CUT = (
-    CutEdge(
-        "m4 - m5, once z is known",
-        "The grid keeps one number per cell, so it forgets that one of the two cells already explains the return, and "
-        "noisy returns raise the cell behind a wall again and again: after four to 0.57 instead of 0.34.",
-    ),
-)
-"""The edge that an occupancy grid cuts: explaining away."""
 
 
 @dataclass(frozen=True)
@@ -115,19 +105,18 @@ def beam_over_cells(world: BeamWorld | None = None, beams: int = 1) -> StageGrap
         raise ArgumentError("beams", "at least 1", beams)
     world = world or BeamWorld()
     names = [(f"r{b}", f"z{b}") for b in range(1, beams + 1)]
-    factors = [Factor(cell, [1 - world.prior, world.prior]) for cell in world.cells]
+    factors = [binary(cell, world.prior) for cell in world.cells]
     for r, z in names:
         factors += [reflection(world, r), Factor((r, z), measurement(world))]
-    parents = dict.fromkeys((r for r, _ in names), world.cells) | {z: (r,) for r, z in names}
     reflected, measured = zip(*names, strict=True)
     return StageGraph(
         f"{'A beam' if beams == 1 else f'{beams} beams'} over {world.n_cells} cells",
-        GraphicalModel(factors, parents),
+        directed(factors),
         observed=measured,
         positions=in_rows(world.cells, (), reflected, measured),
         equations={reflected[-1]: "which cell reflects", measured[-1]: "range"},
         plates={"beams": (*reflected, *measured)} if beams == 1 else {},
-        cut=CUT,
+        cut=cut_edges("beam"),
     )
 
 

@@ -12,7 +12,7 @@ from semgrid_edu.metrics import total_variation
 from semgrid_edu.occupancy import BofState, bof_predict_literal, bof_update
 from semgrid_edu.stage_models.cells_in_a_row import DT, SPEED, Cell, CellsInARow
 from semgrid_edu.stage_models.joint_row import exact_beliefs, row_evidence, row_model
-from semgrid_edu.stage_models.stage_graph import CutEdge, StageGraph
+from semgrid_edu.stage_models.stage_graph import StageGraph, cut_edges
 
 AT_THE_EDGE = CellsInARow(({"left": 0.3, "right": 0.5}, {}, {}, {"static": 0.4}), (".x..", "..x.", "...x"))
 """Something in cell 1 either leaves the row at once or crosses it, towards something that may stand in cell 4.
@@ -38,26 +38,6 @@ TOWARDS_A_FENCE = CellsInARow(({}, {"static": 0.3, "right": 0.6}, {"static": 0.5
 The thing and the fence can't share cell 3. So it is less probable that the thing drives, and the probability that it
 stands in cell 2 rises from 0.3 to 3/7. BOF strikes the impossible combination out of cell 3, which is right, but
 doesn't pass on to cell 2 what follows, so that cell 2 keeps 0.3."""
-
-
-CUT = (
-    CutEdge(
-        "c1,t - c2,t",
-        "BOF keeps each cell's marginal, so cells that share an antecedent count as independent, and a thing that "
-        "either stands or drives is believed to be in both places: 1.24 things instead of 1.",
-    ),
-    CutEdge(
-        "one2,t -> c1,t-1",
-        "That two things can't share cell 2 also says something of what was in cell 1, but BOF strikes combinations "
-        "out of cell 2 alone, so the probability that a thing stands before a fence stays at 0.30 instead of 0.43.",
-    ),
-    CutEdge(
-        "c1,t-1 - c3,t-1",
-        "BOF adds what two antecedents send, as if only one of them could send something, so two independent ones "
-        "with probability 1/2 each make it certain that cell 2 is occupied, where 2/3 is right.",
-    ),
-)
-"""What BOF leaves out of the joint model, and what that costs in the last three worlds above."""
 
 
 def bof_beliefs(world: CellsInARow) -> NDArray[np.float64]:
@@ -152,7 +132,7 @@ def bof_stage(world: CellsInARow = STANDING_OR_DRIVING) -> StageGraph:
             f"c{columns[-1]},0": "what the cell holds",
             f"z{columns[-1]},1": "pass or hit",
         },
-        cut=CUT,
+        cut=cut_edges("bof"),
     )
 
 

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.layout import in_rows
 from semgrid_edu.graphical.messages import sum_product
-from semgrid_edu.graphical.model import GraphicalModel
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
     Evidence,
@@ -26,29 +25,10 @@ from semgrid_edu.occupancy import (
     update,
 )
 from semgrid_edu.stage_models.log_odds_cell import check_scans
-from semgrid_edu.stage_models.stage_graph import CutEdge, StageGraph
+from semgrid_edu.stage_models.stage_graph import StageGraph, binary, cut_edges, directed
 
 UNKNOWN = (0.0, 0.0, 0.0, 1.0)
 """The belief of a cell that no scan has seen: FREE, STATIC, DYNAMIC, UNKNOWN."""
-
-CUT = (
-    CutEdge(
-        "x1 - x1 of the next cell",
-        "Each cell is updated by itself, and only particles carry anything from one cell to another, so a gap that no "
-        "beam hits stays a gap, however sure the filter is of the wall on both sides.",
-    ),
-    CutEdge(
-        "x1 of the cells in front -> v1",
-        "Whether a beam reaches this cell depends on what stands in front of it, but the filter takes v as given, so a "
-        "shadow tells it nothing about what casts it.",
-    ),
-    CutEdge(
-        "z1 - z2",
-        "The filter takes the scans as independent given the state, so an error that lasts for several scans is "
-        "counted again with each of them.",
-    ),
-)
-"""What the filter leaves out when it treats a cell by itself."""
 
 
 def one_cell(
@@ -86,29 +66,27 @@ def one_cell(
     steps = range(1, len(scans) + 1)
     M, look = transition_matrix(world, dt), looking(world)
     factors = [Factor("x0", start)]
-    parents: dict[str, tuple[str, ...]] = {}
     for t, (occupied, free) in zip(steps, scans, strict=True):
-        prior, v, x, z = names = f"prior{t}", f"v{t}", f"x{t}", f"z{t}"
+        prior, v, x, z = f"prior{t}", f"v{t}", f"x{t}", f"z{t}"
         this_scan = np.array([free, occupied, occupied, free]) / max(occupied, free)
         factors += [
             Factor((f"x{t - 1}", prior), M),
-            Factor(v, [0.5, 0.5]),
+            binary(v, 0.5),
             Factor((v, prior, x), look),
             Factor((x, z), np.stack([1 - this_scan, this_scan], axis=1)),
         ]
-        parents |= dict(zip(names, ((f"x{t - 1}",), (), (prior, v), (x,)), strict=True))
     chain = [name for t in steps for name in (f"prior{t}", f"x{t}")]
     above = [name for t in steps for name in (None, f"v{t}")]
     below = [name for t in steps for name in (None, f"z{t}")]
     return StageGraph(
         "One cell, four states",
-        GraphicalModel(factors, parents),
+        directed(factors),
         observed=tuple(name for t in steps for name in (f"v{t}", f"z{t}")),
         positions=in_rows([None, *above], ["x0", *chain], [None, *below]),
         labels={f"prior{t}": f"$x_{{{t}}}^-$" for t in steps},
         equations={f"v{len(scans)}": "seen?", f"x{len(scans)}": "state", f"z{len(scans)}": "scan"},
         plates={"cells": tuple(dict.fromkeys(name for factor in factors for name in factor.names))},
-        cut=CUT,
+        cut=cut_edges("cell"),
     )
 
 

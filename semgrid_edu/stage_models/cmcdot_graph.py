@@ -10,7 +10,7 @@ from semgrid_edu.occupancy import N_STATES, State, transition_matrix
 from semgrid_edu.stage_models.cells_in_a_row import DT, NOT_SEEN, STATE_OF, Cell, CellsInARow
 from semgrid_edu.stage_models.cmcdot import FORGETTING
 from semgrid_edu.stage_models.joint_row import hit_probability
-from semgrid_edu.stage_models.stage_graph import CutEdge, StageGraph
+from semgrid_edu.stage_models.stage_graph import StageGraph, cut_edges, directed
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
@@ -33,26 +33,6 @@ PLACES = [(place, velocity) for place in (-1, 0, 1) for velocity in (-1, 1)]
 
 HERE = np.array([False, *(place == 0 for place, _ in PLACES)])
 """For each of its states, whether it is then in the cell."""
-
-CUT = (
-    CutEdge(
-        "c1,t - c2,t",
-        "As in BOF, each cell is updated by itself, which leaves a root mean square error of 0.051 in a world where a "
-        "thing goes left or right, however many particles there are.",
-    ),
-    CutEdge(
-        "x,t-1 -> x,t",
-        "N particles stand for the distribution over places and velocities; in the same world their sampling error is "
-        "0.010 with 100 particles and 0.001 with 6400.",
-    ),
-    CutEdge(
-        "x,t-1 -> o,t",
-        "What stands at the origin counts as independent of the thing that has flown away from there, so where cell 1 "
-        "holds a thing that stands (0.3) or drives (0.5) towards cells 2 and 3, which are UNKNOWN, the filter expects "
-        "it in cell 2 with 0.41 instead of 0.50.",
-    ),
-)
-"""What CMCDOT leaves out of the joint model."""
 
 
 def cmcdot_stage(world: CellsInARow = FROM_BOTH_SIDES, cell: int = 2) -> StageGraph:
@@ -104,7 +84,7 @@ def cmcdot_stage(world: CellsInARow = FROM_BOTH_SIDES, cell: int = 2) -> StageGr
         labels={"x0": "$x_{t-1}^{(i)}$", "x1": "$x_t^{(i)}$", "o1": "$o_t^{(i)}$", "one1": r"$\leq 1$"}
         | {"c0": "$c_{k,t-1}$", "c1": "$c_{k,t}$", "z1": "$z_{k,t}$"},
         plates={"particles $i$": ("x0", "x1", "o1"), "cells $k$": ("c0", "c1", "one1", "z1")},
-        cut=CUT,
+        cut=cut_edges("cmcdot"),
     )
 
 
@@ -122,7 +102,7 @@ def _two_slices(world: CellsInARow, cell: int) -> GraphicalModel:
         Factor(("c0", "x1", "c1"), _next_cell(M) @ np.vstack([np.eye(N_STATES)[:UNKNOWN], first_sight])),
         Factor(("c1", "z1"), read),
     ]
-    return GraphicalModel(factors, {factor.names[-1]: factor.names[:-1] for factor in factors})
+    return directed(factors)
 
 
 def _first_place(belief: NDArray, cell: int) -> NDArray[np.float64]:

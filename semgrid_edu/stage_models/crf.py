@@ -1,6 +1,4 @@
-"""The dense CRF on a few cells as an undirected model, built from the package's pair weights (eq. (3), (4)).
-
-Exact inference in the dense CRF against mean field and loopy sum-product, as the coupling grows (eq. (3), (4)).
+"""The dense CRF on a few cells: exact inference, mean field and loopy sum-product as the coupling grows (eq. (3), (4)).
 
 As the pair weights grow, all cells take the same label, but which of the two classes that is stays open: the exact
 probability of class 0 in the centre of `UNDECIDED` is 0.52 at each of the `COUPLINGS`. Mean field and loopy sum-product
@@ -29,19 +27,10 @@ from semgrid_edu.graphical.mean_field import mean_field_graph
 from semgrid_edu.graphical.messages import sum_product
 from semgrid_edu.graphical.model import GraphicalModel
 from semgrid_edu.occupancy import N_STATES, State
-from semgrid_edu.stage_models.stage_graph import CutEdge, StageGraph
+from semgrid_edu.stage_models.stage_graph import StageGraph, cut_edges
 
 UNDECIDED = np.array([[0.6, 0.4, 0.6], [0.4, 0.52, 0.4], [0.6, 0.4, 0.6]])
 """The network's probability of class 0: four cells are for it, four against it, and the centre is slightly for it."""
-
-CUT = (
-    CutEdge(
-        "x1 - x2",
-        "Mean field shows each cell only the average of the others, not how they would react to it, so beyond a "
-        "coupling of about 1.3 it picks a side: 0.998 for class 0 at the default weights, where 0.52 is right.",
-    ),
-)
-"""What the package's inference leaves out of the model; every pair has such an edge."""
 
 
 def coupled(coupling: float) -> CrfParams:
@@ -121,7 +110,7 @@ def crf_stage(coupling: float = 4.0, unary: NDArray | None = None, values: NDArr
         model,
         positions=_circle(model),
         equations={"f(x1)": r"$e^{-\phi_u(x_1)}$", "f(x1, x2)": r"$e^{-k_{12} [x_1 \neq x_2]}$"},
-        cut=CUT,
+        cut=cut_edges("crf"),
     )
 
 

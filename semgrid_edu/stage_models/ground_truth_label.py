@@ -1,6 +1,4 @@
-"""The label of one cell, made from image labels and LIDAR: what stands there, errors, votes (section 4, lecture 09).
-
-One pose error in all returns of a scan: an error that evidence cell by cell takes for two independent ones.
+"""Errors that several returns share: the pose of a scan, the calibration behind a label (section 4, lecture 09).
 
 Several rings of a LIDAR hit a wall in the same scan, so a wrong pose shifts all their returns together. Evidence cell
 by cell takes these returns as independent, up to `SensorModel.max_returns` of them.
@@ -17,21 +15,10 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical.exact import eliminate
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.layout import in_rows
-from semgrid_edu.graphical.model import GraphicalModel
 from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
 from semgrid_edu.stage_models.beam import BINS_PER_CELL, MARGIN, BeamWorld, range_bins, range_state, reflection
-from semgrid_edu.stage_models.stage_graph import CutEdge, StageGraph
+from semgrid_edu.stage_models.stage_graph import StageGraph, binary, cut_edges, directed
 from semgrid_edu.stage_models.thick_walls import beam_beliefs, occupied, package_row, same_sensor
-
-CUT = (
-    CutEdge(
-        "e -> z1, z2",
-        "Evidence cell by cell has no pose error, so returns that are wrong together count as if each were wrong by "
-        "itself: a second ring raises the cell of the return from 0.80 to 0.97, while the exact probability rises from "
-        "0.40 to 0.46.",
-    ),
-)
-"""The variable that the grid leaves out."""
 
 
 def scan_with_pose_error(world: BeamWorld | None = None, rings: int = 2) -> StageGraph:
@@ -61,20 +48,18 @@ def scan_with_pose_error(world: BeamWorld | None = None, rings: int = 2) -> Stag
     if world.noise == 0:
         raise ArgumentError("world", "a noise above 0: the pose error", world)
     names = [(f"r{b}", f"z{b}") for b in range(1, rings + 1)]
-    factors = [Factor(cell, [1 - world.prior, world.prior]) for cell in world.cells]
-    factors.append(Factor("e", _pose_error(world)))
+    factors = [*(binary(cell, world.prior) for cell in world.cells), Factor("e", _pose_error(world))]
     for r, z in names:
         factors += [reflection(world, r), Factor((r, "e", z), _shifted(world))]
-    parents = dict.fromkeys((r for r, _ in names), world.cells) | {z: (r, "e") for r, z in names}
     reflected, measured = zip(*names, strict=True)
     return StageGraph(
         "One scan, one pose error",
-        GraphicalModel(factors, parents),
+        directed(factors),
         observed=measured,
         positions=in_rows(world.cells, (), reflected, measured, ["e"]),
         equations={reflected[-1]: "which cell reflects", measured[-1]: "range", "e": "pose error"},
         plates={"scans": (*reflected, *measured, "e")},
-        cut=CUT,
+        cut=cut_edges("pose"),
     )
 
 
@@ -158,29 +143,6 @@ MADE = (*CONTENTS, *UNKNOWN_OF_STATE)
 STATE_GIVEN_CONTENT = ((0.80, 0.05, 0.05, 0.10), (0.10, 0.60, 0.20, 0.10))
 """Probability of FREE, STATIC, DYNAMIC and UNKNOWN on road and in a car: an assumption."""
 
-MADE_LABEL_CUT = (
-    CutEdge(
-        "calibration - votes",
-        "Votes are counted as if returns erred independently, but all returns share the calibration, so no number of "
-        "votes outvotes its error.",
-    ),
-    CutEdge(
-        "o -> y, where there is a vote",
-        "The occupancy state is asked only where no labelled return lies, so a cell that surely holds something keeps "
-        "the label road.",
-    ),
-    CutEdge(
-        "a1 - d1",
-        "A return is taken to lie on what its pixel shows, unless a closer return shares the pixel, so grass behind a "
-        "fence is labelled fence.",
-    ),
-    CutEdge(
-        "y - its neighbours",
-        "Each cell votes by itself; the clean-up joins neighbours again, without asking what else is known of them.",
-    ),
-)
-"""What the recipe leaves out when it makes the label of a cell."""
-
 
 @dataclass(frozen=True)
 class LabelWorld:
@@ -242,20 +204,19 @@ def made_label_stage(world: LabelWorld | None = None) -> StageGraph:
     right = 1 - world.outline
     shown = [[[right, 1 - right], [1 - right, right]], [[1 - right, right], [right, 1 - right]]]  # by m, then by c
     brought = np.stack([np.eye(3)[:2], np.eye(3)[[2, 2]]], axis=1)  # by class of the pixel, then by depth
-    factors, parents = [Factor("m", [0.5, 0.5]), Factor("c", [1 - world.calibration, world.calibration])], {}
+    factors = [binary("m", 0.5), binary("c", world.calibration)]
     for k in range(1, world.returns + 1):
         a, d, x = f"a{k}", f"d{k}", f"x{k}"
-        factors += [Factor(("m", "c", a), shown), Factor(d, [1 - world.lost, world.lost]), Factor((a, d, x), brought)]
-        parents |= {a: ("m", "c"), x: (a, d)}
+        factors += [Factor(("m", "c", a), shown), binary(d, world.lost), Factor((a, d, x), brought)]
     votes = tuple(f"x{k}" for k in range(1, world.returns + 1))
     factors += [Factor(("m", "o"), STATE_GIVEN_CONTENT), Factor((*votes, "o", "y"), _voted(world))]
     return StageGraph(
         "How one cell gets its label",
-        GraphicalModel(factors, parents | {"o": ("m",), "y": (*votes, "o")}),
+        directed(factors),
         observed=("o", *(f"{name}{k}" for k in range(1, world.returns + 1) for name in "ad")),
         positions=_positions(world.returns),
         equations={"m": "what stands there", "c": "calibration", "o": "occupancy", "y": "label"},
-        cut=MADE_LABEL_CUT,
+        cut=cut_edges("label"),
     )
 
 

@@ -10,6 +10,7 @@ from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.model import GraphicalModel
 from semgrid_edu.occupancy import SensorModel
 from semgrid_edu.stage_models.cells_in_a_row import HIT, NOT_SEEN, Cell, CellsInARow
+from semgrid_edu.stage_models.stage_graph import directed
 
 
 def row_model(world: CellsInARow, steps: int | None = None) -> GraphicalModel:
@@ -39,8 +40,7 @@ def row_model(world: CellsInARow, steps: int | None = None) -> GraphicalModel:
     for step in range(1, steps + 1):
         for k in range(1, len(world.cells) + 1):
             factors += _slice(world, k, step)
-    # Each factor's last axis is its child.
-    return GraphicalModel(factors, {factor.names[-1]: factor.names[:-1] for factor in factors})
+    return directed(factors)
 
 
 def row_evidence(world: CellsInARow, steps: int) -> dict[str, int]:

@@ -16,17 +16,7 @@ from semgrid_edu.graphical.exact import eliminate, max_product
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.layout import in_rows
 from semgrid_edu.graphical.messages import sum_product
-from semgrid_edu.graphical.model import GraphicalModel
-from semgrid_edu.stage_models.stage_graph import CutEdge, StageGraph
-
-CUT = (
-    CutEdge(
-        "n1 <- n2",
-        "The filter passes messages forward in time and none backward, so a later reading never corrects what was "
-        "believed of an earlier place; for the present place nothing is lost.",
-    ),
-)
-"""The filter's graph keeps every edge, but uses each in one direction."""
+from semgrid_edu.stage_models.stage_graph import StageGraph, cut_edges, directed
 
 
 def bayes_on_a_line(
@@ -72,15 +62,14 @@ def bayes_on_a_line(
     factors = [Factor("n0", np.full(n_cells, 1 / n_cells))]
     factors += [Factor((f"n{t - 1}", f"n{t}"), move) for t in range(1, steps)]
     factors += [Factor((f"n{t}", f"z{t}"), read) for t in range(steps)]
-    parents = {f"n{t}": (f"n{t - 1}",) for t in range(1, steps)} | {f"z{t}": (f"n{t}",) for t in range(steps)}
     places, readings = ([f"{letter}{t}" for t in range(steps)] for letter in "nz")
     return StageGraph(
         "Bayes on a line",
-        GraphicalModel(factors, parents),
+        directed(factors),
         observed=tuple(readings),
         positions=in_rows(places, readings),
         equations={places[-1]: "place", readings[-1]: "reading"},
-        cut=CUT,
+        cut=cut_edges("line"),
     )
 
 

@@ -1,7 +1,4 @@
-"""One cell of the log-odds grid as a graphical model: two states, and no change (lecture 02).
-
-What a sequence of scans says of one cell, as the package's likelihoods.
-"""
+"""One cell of the log-odds grid as a graphical model: two states, and no change (lecture 02)."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,10 +6,9 @@ from numpy.typing import ArrayLike, NDArray
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.layout import in_rows
-from semgrid_edu.graphical.model import GraphicalModel
 from semgrid_edu.occupancy import Evidence, LogOddsParams, SensorModel, log_odds, probability, update_log_odds
 from semgrid_edu.occupancy.sensor import likelihoods
-from semgrid_edu.stage_models.stage_graph import CutEdge, StageGraph
+from semgrid_edu.stage_models.stage_graph import StageGraph, binary, cut_edges, directed
 
 
 def read_scans(says: str, sensor: SensorModel | None = None) -> NDArray[np.float64]:
@@ -73,26 +69,6 @@ def check_scans(scans: ArrayLike) -> NDArray[np.float64]:
     return table
 
 
-LOG_ODDS_CUT = (
-    CutEdge(
-        "m at one scan -> m at the next",
-        "The log-odds grid gives a cell one state for ever, so what moves leaves a smear until enough scans have "
-        "contradicted it.",
-    ),
-    CutEdge(
-        "m of the cells in front -> z1",
-        "Whether a beam reaches this cell depends on what stands in front of it, but the grid takes that as given, so "
-        "a shadow tells it nothing about what casts it.",
-    ),
-    CutEdge(
-        "z1 - z2",
-        "Given the state, the grid takes scans as independent, so an error that lasts from scan to scan is counted "
-        "again with each.",
-    ),
-)
-"""What the log-odds grid leaves out when it treats a cell by itself."""
-
-
 def one_log_odds_cell(scans: ArrayLike, prior: float = 0.5) -> StageGraph:
     """Build one cell of the log-odds grid: free or occupied for ever, and scans that are independent given its state.
 
@@ -111,15 +87,16 @@ def one_log_odds_cell(scans: ArrayLike, prior: float = 0.5) -> StageGraph:
     scans = check_scans(scans)
     names = tuple(f"z{t}" for t in range(1, len(scans) + 1))
     ratios = (scans / scans.max(axis=1, keepdims=True))[:, ::-1]
-    factors = [Factor((name, "m"), [1 - ratio, ratio]) for name, ratio in zip(names, ratios, strict=True)]
+    tables = np.stack([1 - ratios, ratios], axis=-1)
+    factors = [Factor(("m", name), table) for name, table in zip(names, tables, strict=True)]
     return StageGraph(
         "One cell of the log-odds grid",
-        GraphicalModel([Factor("m", [1 - prior, prior]), *factors], dict.fromkeys(names, ("m",))),
+        directed([binary("m", prior), *factors]),
         observed=names,
         positions=in_rows(["m"], names),
         equations={"m": "free or occupied", names[-1]: "scan"},
         plates={"cells": ("m", *names)},
-        cut=LOG_ODDS_CUT,
+        cut=cut_edges("log-odds"),
     )
 
 

@@ -1,12 +1,15 @@
 """The graph of a stage: its model, how it is drawn, and the edges that the real system cuts."""
 
+import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import NamedTuple
 
 from matplotlib.axes import Axes
 
 from semgrid_edu.graphical.drawing import draw
+from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.model import GraphicalModel
 
 
@@ -23,6 +26,58 @@ class CutEdge(NamedTuple):
 
     edge: str
     price: str
+
+
+CATALOGUE = Path(__file__).with_name("cut_edges.toml")
+"""The cut edges of all stages, in the order of the pipeline."""
+
+
+def cut_edges(stage: str) -> tuple[CutEdge, ...]:
+    """Return what the real system cuts in one stage.
+
+    Parameters
+    ----------
+    stage : str
+        A key of `CATALOGUE`, such as "bof".
+
+    Returns
+    -------
+    tuple of CutEdge
+    """
+    return tuple(CutEdge(**edge) for edge in tomllib.loads(CATALOGUE.read_text(encoding="utf-8"))[stage])
+
+
+def directed(factors: Iterable[Factor]) -> GraphicalModel:
+    """Return a directed model of factors that have their child as the last variable: P(last | all others).
+
+    Parameters
+    ----------
+    factors : iterable of Factor
+        One per variable.
+
+    Returns
+    -------
+    GraphicalModel
+    """
+    factors = tuple(factors)
+    return GraphicalModel(factors, {factor.names[-1]: factor.names[:-1] for factor in factors})
+
+
+def binary(name: str, p: float) -> Factor:
+    """Return P(name): a variable without parents that is 1 with probability p, and 0 otherwise.
+
+    Parameters
+    ----------
+    name : str
+        The variable.
+    p : float
+        Its probability of being 1.
+
+    Returns
+    -------
+    Factor
+    """
+    return Factor(name, [1 - p, p])
 
 
 @dataclass(frozen=True, eq=False)

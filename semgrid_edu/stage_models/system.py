@@ -1,9 +1,7 @@
-"""The whole system as a graph: from the world to LIDAR and image, and from those to the semantic grid (paper, Fig. 2).
+"""The whole system as a graph, and what joint inference would gain over passing marginals forward (paper, Fig. 2).
 
 In the drawing, the world stands above the sensors, and what the paper computes below them: l -> o, i -> s -> p,
 (p, o) -> g. Information flows down, never up, and from one instant to the next only inside o.
-
-What joint inference would gain over passing marginals forward, on the toy street (paper, Fig. 2).
 """
 
 from typing import NamedTuple
@@ -14,41 +12,8 @@ from numpy.typing import NDArray
 from semgrid_edu.graphical.exact import eliminate
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.model import GraphicalModel
-from semgrid_edu.stage_models.stage_graph import CutEdge, StageGraph
+from semgrid_edu.stage_models.stage_graph import StageGraph, cut_edges, directed
 from semgrid_edu.stage_models.system_world import CLASS_OF, STATE_OF, STREET, SystemWorld
-
-CUT = (
-    CutEdge(
-        "i1 -> o1",
-        "The occupancy filter never sees the image, so what the camera recognises can't help it to tell what stands "
-        "from what moves, or a grazing return from an obstacle.",
-    ),
-    CutEdge(
-        "l1 -> s1",
-        "The segmentation network gets the image alone, so measured depth can't help it where an image is ambiguous.",
-    ),
-    CutEdge(
-        "s1 -> p1, the distance",
-        "A pixel's scores are sampled into every cell in which its ray crosses a plane, although the camera saw only "
-        "one of them, and the fusion has to find out from o which one.",
-    ),
-    CutEdge(
-        "near1 - far1 in o1",
-        "o holds one distribution per cell, so it can't say that one of two cells explains a return. On the toy street "
-        "a fusion that sees o in both cells loses nothing by that, because o tells all sequences of scans apart.",
-    ),
-    CutEdge(
-        "g0 -> g1",
-        "Only o remembers, because classes aren't carried from frame to frame, so a class that an earlier image showed "
-        "is forgotten. On the toy street that costs 0.05 nats in the near cell and 0.10 in the far one.",
-    ),
-    CutEdge(
-        "g0 -> o1",
-        "Nothing goes back from the semantic grid to the filter, whose rates are the same for a building and for a "
-        "parked car.",
-    ),
-)
-"""What the paper's chain leaves out of the exact model."""
 
 
 def whole_system(world: SystemWorld | None = None) -> StageGraph:
@@ -67,7 +32,7 @@ def whole_system(world: SystemWorld | None = None) -> StageGraph:
         classes, as i), and g t (16 states: 4 times the label of near, plus the label of far).
     """
     world = world or SystemWorld()
-    factors, parents = list(street(world).factors), dict(street(world).parents or {})
+    factors = list(street(world).factors)
     for t in range(world.steps):
         o, s, p, g = f"o{t}", f"s{t}", f"p{t}", f"g{t}"
         history, n = (f"o{t - 1}",) * (t > 0), 3 ** (t + 1)
@@ -78,15 +43,14 @@ def whole_system(world: SystemWorld | None = None) -> StageGraph:
             Factor((s, p), np.eye(4)),
             Factor((o, p, g), _labels(world, t)),
         ]
-        parents |= {o: (*history, f"l{t}"), s: (f"i{t}",), p: (s,), g: (o, p)}
     return StageGraph(
         "The whole system",
-        GraphicalModel(factors, parents),
+        directed(factors),
         observed=tuple(f"{sensor}{t}" for t in range(world.steps) for sensor in "li"),
         positions=_positions(world.steps),
         labels=_node_labels(world.steps),
         equations=_words(world.steps),
-        cut=CUT,
+        cut=cut_edges("system"),
     )
 
 
@@ -103,15 +67,13 @@ def street(world: SystemWorld) -> GraphicalModel:
     GraphicalModel
         A directed model with the variables near t, far t, l t and i t.
     """
-    factors, parents = [], {}
+    factors = []
     for t in range(world.steps):
         cells = f"near{t}", f"far{t}"
         for cell, before in zip(cells, (f"near{t - 1}", f"far{t - 1}"), strict=True):
             factors.append(Factor((before, cell), world.change()) if t else Factor(cell, STREET))
-            parents[cell] = (before,) if t else ()
         factors += [Factor((*cells, f"l{t}"), world.scan()), Factor((*cells, f"i{t}"), world.image())]
-        parents |= {f"l{t}": cells, f"i{t}": cells}
-    return GraphicalModel(factors, parents)
+    return directed(factors)
 
 
 def class_and_sensors(world: SystemWorld, t: int) -> NDArray[np.float64]:

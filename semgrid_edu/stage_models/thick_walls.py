@@ -3,8 +3,6 @@
 Evidence cell by cell takes the cell of a return as occupied and the cells before it as free. When range or pose are off
 by half a cell, some returns of a wall fall into the cell behind it. Exact inference knows that one wall explains all of
 these returns.
-
-What an occupancy grid loses of the posterior of beams: it keeps one number per cell, exact inference all maps.
 """
 
 from collections.abc import Sequence

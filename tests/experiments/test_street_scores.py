@@ -18,8 +18,7 @@ from semgrid_edu.workshop.simulation.things.materials import Kind
 from semgrid_edu.workshop.studies.filter.cell_truth import CellTruth
 from semgrid_edu.workshop.studies.filter.detection_latency import convoy_pairs
 from semgrid_edu.workshop.studies.filter.scenes import KnownScene
-from semgrid_edu.workshop.studies.filter.street_scores import StreetScores
-from semgrid_edu.workshop.studies.filter.streets import measure_streets, streets_tables
+from semgrid_edu.workshop.studies.filter.streets import StreetScores, measure_streets, streets_tables
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 ROW = GridSpec(2, 3, -11, -3, 1)

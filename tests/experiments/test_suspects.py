@@ -20,7 +20,7 @@ from semgrid_edu.workshop.attic.suspects import (
 )
 from semgrid_edu.workshop.simulation.named_streets import named_street
 from semgrid_edu.workshop.simulation.things.materials import Kind
-from semgrid_edu.workshop.studies.filter.street_scores import StreetScores
+from semgrid_edu.workshop.studies.filter.streets import StreetScores
 
 
 def points_of(change, street="mesh"):

@@ -8,8 +8,15 @@ import torch
 from torch import nn
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.workshop.illustrations.pole_nets import PoleNet, draw_poles, score_poles, train_pole_net
-from semgrid_edu.workshop.illustrations.thin_pole import MECHANISMS, apply_mechanism, place_and_width
+from semgrid_edu.workshop.illustrations.thin_pole import (
+    MECHANISMS,
+    PoleNet,
+    apply_mechanism,
+    draw_poles,
+    place_and_width,
+    score_poles,
+    train_pole_net,
+)
 
 
 @pytest.fixture(autouse=True)

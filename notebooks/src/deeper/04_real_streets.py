@@ -29,7 +29,7 @@ from IPython.display import Markdown
 # %% jupyter={"source_hidden": true}
 from semgrid_edu import plotting
 from semgrid_edu.workshop.studies.filter.occupancy import markdown_table, per_cent
-from semgrid_edu.workshop.studies.filter.street_scores import LEAST_DYNAMIC, StreetScores
+from semgrid_edu.workshop.studies.filter.streets import LEAST_DYNAMIC, StreetScores
 from semgrid_edu.workshop.attic.suspects import (
     BARRED, BEFORE, MENDED, SUSPECTS, Suspect, counts, run_filter, scenes_of,
 )  # fmt: skip
@@ -38,7 +38,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
     Cmcdot, CmcdotParams, Evidence, FilterState, Particles, State, predict, update,
 )  # fmt: skip
-from semgrid_edu.occupancy.cellwise import clear_wakes, meet
+from semgrid_edu.occupancy.cellwise import clear_wakes, collide
 from semgrid_edu.occupancy.planar_motion import look_up
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
@@ -477,7 +477,7 @@ plt.show()
 
 
 # %% tags=["doubtful"]
-def meet_literal(cell, a, b):
+def collide_literal(cell, a, b):
     """Strike out "arrives where something stands" and "goes along a wall, where nobody has looked"."""
     free, s, d, u = cell
     left = 1 - a * s - b * u
@@ -489,11 +489,11 @@ def meet_of_package(cell, a, b):
     """Ask the package's compiled rule, which works on whole maps."""
     mixed = np.array(cell, np.float32).reshape(4, 1, 1)
     zero, arrives, doubtful = (np.full((1, 1), x, np.float32) for x in (0, a, b))
-    return meet(mixed, mixed[DYNAMIC], zero, zero, arrives, doubtful)[0][:, 0, 0]
+    return collide(mixed, mixed[DYNAMIC], zero, zero, arrives, doubtful)[0][:, 0, 0]
 
 
 for cell in ((0.2, 0, 0, 0.8), (1.0, 0, 0, 0), (0.1, 0.3, 0.2, 0.4)):
-    by_hand = meet_literal(cell, a=0.6, b=0.54)
+    by_hand = collide_literal(cell, a=0.6, b=0.54)
     np.testing.assert_allclose(meet_of_package(cell, 0.6, 0.54), by_hand, atol=1e-6)
     np.testing.assert_allclose(by_hand.sum(), 1)
 
@@ -503,7 +503,7 @@ for cell in ((0.2, 0, 0, 0.8), (1.0, 0, 0, 0)):
         "cell",
         cell,
         "->",
-        *(f"{state.name} {p:.2f}" for state, p in zip(State, meet_literal(cell, 0.6, 0.54), strict=True)),
+        *(f"{state.name} {p:.2f}" for state, p in zip(State, collide_literal(cell, 0.6, 0.54), strict=True)),
     )
 now = uncover(6, AFTER.clearing_time)
 print("wall on the line, P(DYNAMIC):", *(f"{p:.3f}" for p in now))

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.bof import origins, whole_cells
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
-from semgrid_edu.occupancy.bof_steps import origins, whole_cells
 from semgrid_edu.occupancy.cellwise import CERTAIN, ratio
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.literal.particles import slow_down_literal
@@ -49,7 +49,7 @@ def bof_predict_literal(state: BofState, spec: GridSpec, params: BofParams, dt: 
     doubt, occupied = out_of_a_wall * (1 - along_no_wall), np.zeros(state.occupied.shape)
     for row, col in np.ndindex(spec.shape):
         here = own[:, row, col], vacated[row, col], stays[:, row, col], arrives[:, row, col], doubt[:, row, col]
-        own[:, row, col], occupied[:, row, col] = meet_in_cell(*here)
+        own[:, row, col], occupied[:, row, col] = collide_in_cell(*here)
     return BofState(own[FREE], own[UNKNOWN], occupied, state.velocity, remainder)
 
 
@@ -85,8 +85,8 @@ def elsewhere_literal(plane: NDArray, cells: NDArray[np.int64]) -> NDArray[np.fl
 
     Parameters
     ----------
-    plane : (H, W) float
-        One number per cell.
+    plane : (H, W) or (V, H, W) float
+        One number per cell, the same for all velocities or one for each.
     cells : (V, 2) int
         How far mass of each velocity moves until then, in cells along x and y: up and to the left.
 
@@ -95,16 +95,16 @@ def elsewhere_literal(plane: NDArray, cells: NDArray[np.int64]) -> NDArray[np.fl
     (V, H, W) float64
         Zero where that is the same cell or lies outside.
     """
-    found = np.zeros((len(cells), *plane.shape))
-    for k, (up, left) in enumerate(cells):
-        for row, col in np.ndindex(plane.shape):
-            there = row - up, col - left
-            if there != (row, col) and 0 <= there[0] < plane.shape[0] and 0 <= there[1] < plane.shape[1]:
-                found[k, row, col] = plane[there]
+    height, width = plane.shape[-2:]
+    planes, found = np.broadcast_to(plane, (len(cells), height, width)), np.zeros((len(cells), height, width))
+    for k, row, col in np.ndindex(found.shape):
+        there = row - cells[k, 0], col - cells[k, 1]
+        if there != (row, col) and 0 <= there[0] < height and 0 <= there[1] < width:
+            found[k, row, col] = planes[k, *there]
     return found
 
 
-def meet_in_cell(
+def collide_in_cell(
     own: NDArray, vacated: float, stays: NDArray, arrives: NDArray, doubt: NDArray
 ) -> tuple[NDArray, NDArray]:
     """Let the mass that arrives in one cell meet what the cell holds, by the rule of `predict`.
@@ -177,13 +177,7 @@ def mass_that_left(occupied: NDArray, cells: NDArray[np.int64]) -> NDArray[np.fl
     (H, W) float64
         The sums.
     """
-    left = np.zeros(occupied.shape[1:])
-    for mass, (up, to_left) in zip(occupied, cells, strict=True):
-        for row, col in np.ndindex(left.shape):
-            was = row - up, col - to_left
-            if was != (row, col) and 0 <= was[0] < left.shape[0] and 0 <= was[1] < left.shape[1]:
-                left[was] += mass[row, col]
-    return left
+    return elsewhere_literal(occupied, -cells).sum(axis=0)
 
 
 def relative_likelihoods(evidence: Evidence) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

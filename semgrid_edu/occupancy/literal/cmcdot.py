@@ -14,9 +14,9 @@ from semgrid_edu.occupancy.cellwise import ratio
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.literal.bof import clear_wakes_literal, relative_likelihoods, strike_out
 from semgrid_edu.occupancy.literal.particles import (
+    SystematicResamplingLiteral,
     cells_at_literal,
     cells_of_literal,
-    draw_again_literal,
     draw_newborn_literal,
     fly_literal,
     scale_in_cells_literal,
@@ -25,7 +25,8 @@ from semgrid_edu.occupancy.literal.particles import (
     weight_in_cells_literal,
 )
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.state import FilterState, Particles, State, check_shape
+from semgrid_edu.occupancy.resampling import SystematicResampling, draw_again
+from semgrid_edu.occupancy.state import OUTSIDE, FilterState, Particles, State, check_shape
 from semgrid_edu.occupancy.world import CmcdotParams, WorldModel, transition_matrix
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
@@ -76,7 +77,7 @@ def look_up_literal(probability: NDArray, spec: GridSpec, motion: PlanarMotion) 
 def predict_literal(
     state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rng: np.random.Generator
 ) -> FilterState:
-    """Step 2, predict: cells mix, particles fly, and what arrives meets what is there. The literal twin of `predict`.
+    """Step 2, predict: cells mix, particles fly, and collide with what is there. The literal twin of `predict`.
 
     Parameters, result and errors are those of `predict`, and so are the random numbers that are drawn.
     """
@@ -90,18 +91,15 @@ def predict_literal(
 
     particles = fly_literal(particles, world.max_acceleration, dt, rng)
     end = cells_of_literal(particles.position, spec)
-    came = end != start
     origin = cells_at_literal(particles, end, spec, -world.clearing_time, world.clearing_cells)
     ahead = cells_at_literal(particles, end, spec, world.clearing_time, world.clearing_cells)
-    out_of_a_wall = scale_in_cells_literal(particles.weight * came, origin, mixed[STATIC])
-    doubt = out_of_a_wall - scale_in_cells_literal(out_of_a_wall, ahead, mixed[FREE] + mixed[DYNAMIC])
-    stays = weight_in_cells_literal(particles.weight * ~came, end, spec.shape)
-    arrives = weight_in_cells_literal(particles.weight * came, end, spec.shape)
-    doubtful = weight_in_cells_literal(doubt, end, spec.shape)
-    probability, newborn, own, sure, less = meet_literal(mixed, newborn, going, stays, arrives, doubtful)
-    weight = scale_in_cells_literal(particles.weight, end, own)
-    arrived = scale_in_cells_literal(particles.weight, end, sure) - scale_in_cells_literal(doubt, end, less)
-    weight[came] = arrived[came]
+    doubt = scale_in_cells_literal(particles.weight, origin, mixed[STATIC])
+    doubt = doubt - scale_in_cells_literal(doubt, ahead, mixed[FREE] + mixed[DYNAMIC])
+    came = np.where((end != start) & (end != OUTSIDE), end + going.size, end)  # the second of two planes of cells
+    stays, arrives = weight_in_cells_literal(particles.weight, came, (2, *spec.shape))
+    doubtful = weight_in_cells_literal(doubt, came, (2, *spec.shape))[1]
+    probability, newborn, factor, less = collide_literal(mixed, newborn, going, stays, arrives, doubtful)
+    weight = scale_in_cells_literal(particles.weight, came, factor) - scale_in_cells_literal(doubt, came, less)
     return FilterState(probability, replace(particles, weight=weight), newborn)
 
 
@@ -121,30 +119,21 @@ def mix_literal(
     return mixed, born
 
 
-def meet_literal(
+def collide_literal(
     mixed: NDArray, newborn: NDArray, going: NDArray, stays: NDArray, arrives: NDArray, doubtful: NDArray
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Let the mass that arrives in a cell meet what the cell holds: the literal twin of `cellwise.meet`.
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Let the mass that arrives in a cell collide with what the cell holds: the literal twin of `cellwise.collide`.
 
-    Parameters are those of `meet`.
-
-    Returns
-    -------
-    probability : (4, H, W) float64
-        The belief of each cell, with two combinations struck out: "something arrives in a cell that is STATIC", and
-        "something comes out of a wall and goes on along it, in a cell that hasn't been seen to be free".
-    newborn : (H, W) float64
-        Scaled like everything that was in the cell.
-    own, sure, less : (H, W) float64
-        Factors of the weights of the particles that have stayed in the cell, and of those that have arrived in it; and
-        by how much the latter is smaller for what is doubtful.
+    Two combinations are struck out (`strike_out`): "something arrives in a cell that is STATIC", and "something comes
+    out of a wall and goes on along it, in a cell that hasn't been seen to be free". Parameters and result are those of
+    `collide`.
     """
     vacated = going - stays
     own, sure, less = strike_out(mixed[STATIC], arrives, mixed[UNKNOWN] + vacated, doubtful)
     probability = own * mixed
     probability[FREE] += own * vacated  # what flew away leaves free space behind
     probability[DYNAMIC] = own * (newborn + stays) + sure * arrives - less * doubtful
-    return probability, own * newborn, own, sure, less
+    return probability, own * newborn, np.stack([own, sure]), np.stack([0 * less, less])
 
 
 def update_literal(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldModel) -> FilterState:
@@ -154,9 +143,9 @@ def update_literal(state: FilterState, spec: GridSpec, evidence: Evidence, world
     """
     check_shape("state", state.newborn, spec.shape)
     check_shape("evidence", evidence.free, spec.shape)
-    prior, newborn = reveal_literal(state, evidence.occupied != evidence.free, world)
+    prior = initialise_unknown_literal(state, evidence.occupied != evidence.free, world)
     of_occupied, of_free = relative_likelihoods(evidence)
-    joint = np.stack([of_free, of_occupied, of_occupied, of_free]) * prior
+    joint = np.stack([of_free, of_occupied, of_occupied, of_free]) * prior.probability
     p_z = joint.sum(axis=0)
     posterior = ratio(joint, p_z)
     posterior[UNKNOWN] += p_z == 0  # nothing that was held possible explains the scan
@@ -167,29 +156,20 @@ def update_literal(state: FilterState, spec: GridSpec, evidence: Evidence, world
     left = weight_in_cells_literal(weight, origin, spec.shape)
     static = clear_wakes_literal(posterior[STATIC], left, evidence.occupied == evidence.free)
     posterior[FREE], posterior[STATIC] = posterior[FREE] + posterior[STATIC] - static, static
-    return FilterState(posterior, replace(state.particles, weight=weight), newborn * factor)
+    return FilterState(posterior, replace(state.particles, weight=weight), prior.newborn * factor)
 
 
-def reveal_literal(
-    state: FilterState, seen: NDArray, world: WorldModel
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Share out the UNKNOWN mass of cells that are seen, by the probabilities of first sight: the twin of `reveal`.
+def initialise_unknown_literal(state: FilterState, seen: NDArray, world: WorldModel) -> FilterState:
+    """Share the UNKNOWN mass of cells that are seen among the other states: the twin of `initialise_unknown`.
 
-    Parameters are those of `reveal`.
-
-    Returns
-    -------
-    probability : (4, H, W) float64
-        The belief with UNKNOWN mass only where the scan says nothing.
-    newborn : (H, W) float64
-        The dynamic mass that no particle carries, with what has been revealed.
+    Parameters and result are those of `initialise_unknown`.
     """
     probability = state.probability.astype(np.float64)
     unknown = np.where(seen, probability[UNKNOWN], 0)
     for i in (FREE, STATIC, DYNAMIC):
         probability[i] += world.first_sight[i] * unknown
     probability[UNKNOWN] -= unknown
-    return probability, state.newborn + world.first_sight[DYNAMIC] * unknown
+    return FilterState(probability, state.particles, state.newborn + world.first_sight[DYNAMIC] * unknown)
 
 
 def resample_literal(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.random.Generator) -> FilterState:
@@ -199,9 +179,10 @@ def resample_literal(state: FilterState, spec: GridSpec, params: CmcdotParams, r
     Parameters, result and errors are those of `resample`, and so are the random numbers that are drawn.
     """
     check_shape("state", state.newborn, spec.shape)
-    births = round(params.birth_share * params.n_particles)
-    old = draw_again_literal(state.particles, params.n_particles - births, rng)
-    new = draw_newborn_literal(state.newborn, spec, births, params.max_speed, rng)
+    births, how = round(params.birth_share * params.n_particles), params.resampling
+    how = SystematicResamplingLiteral() if isinstance(how, SystematicResampling) else how
+    old = draw_again(state.particles, params.n_particles - births, how, rng)
+    new = draw_newborn_literal(state.newborn, spec, births, params.max_speed, how, rng)
     position, velocity = np.vstack([old.position, new.position]), np.vstack([old.velocity, new.velocity])
     weight, cells = np.append(old.weight, new.weight), cells_of_literal(position, spec)
     carried = weight_in_cells_literal(weight, cells, spec.shape)

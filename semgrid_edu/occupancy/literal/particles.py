@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.cellwise import ratio
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.resampling import draw_velocities
+from semgrid_edu.occupancy.resampling import Resampling, draw_indices, draw_velocities
 from semgrid_edu.occupancy.state import OUTSIDE, Particles
 
 
@@ -45,10 +45,10 @@ def cells_at_literal(
 
     Parameters and result are those of `cells_at`.
     """
-    way = time * particles.velocity.astype(np.float64)
-    length = np.linalg.norm(way, axis=1, keepdims=True)
-    way *= np.maximum(1, ratio(np.full_like(length, fewest * spec.cell), length))
-    then = cells_of_literal(particles.position + way, spec)
+    path = time * particles.velocity.astype(np.float64)
+    length = np.linalg.norm(path, axis=1, keepdims=True)
+    path *= np.maximum(1, ratio(np.full_like(length, fewest * spec.cell), length))
+    then = cells_of_literal(particles.position + path, spec)
     return np.where(then == cells, OUTSIDE, then)
 
 
@@ -93,30 +93,30 @@ def systematic_resample_literal(weight: NDArray, count: int, offset: float) -> N
     return np.minimum(np.searchsorted(ends, points, side="right"), len(weight) - 1)
 
 
-def draw_again_literal(particles: Particles, count: int, rng: np.random.Generator) -> Particles:
-    """Draw particles in proportion to their weights: the literal twin of `draw_again`.
+class SystematicResamplingLiteral:
+    """Draws as `SystematicResampling` does, by `systematic_resample_literal`."""
 
-    Parameters and result are those of `draw_again`, and so are the random numbers that are drawn.
-    """
-    total = particles.weight.sum(dtype=np.float64)
-    if total == 0 or count == 0:
-        return Particles.none()
-    drawn = systematic_resample_literal(particles.weight, count, rng.random())
-    return Particles(particles.position[drawn], particles.velocity[drawn], np.full(count, total / count))
+    def draw(self, weight: NDArray, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
+        """Draw indices. Parameters and result are those of `Resampling.draw`."""
+        return systematic_resample_literal(weight, count, rng.random())
 
 
 def draw_newborn_literal(
-    newborn: NDArray, spec: GridSpec, count: int, max_speed: float, rng: np.random.Generator
+    newborn: NDArray,
+    spec: GridSpec,
+    count: int,
+    max_speed: float,
+    resampling: Resampling,
+    rng: np.random.Generator,
 ) -> Particles:
-    """Draw new particles in proportion to each cell's newborn mass: the literal twin of `draw_newborn`.
+    """Draw new particles anywhere in their cells: the literal twin of `draw_newborn`.
 
-    Each lies anywhere in its cell, with a velocity from the prior. Parameters and result are those of `draw_newborn`,
-    and so are the random numbers that are drawn.
+    Parameters and result are those of `draw_newborn`, and so are the random numbers that are drawn.
     """
     total = newborn.sum(dtype=np.float64)
     if total == 0 or count == 0:
         return Particles.none()
-    drawn = systematic_resample_literal(newborn.ravel(), count, rng.random())
+    drawn = draw_indices(resampling, newborn.ravel(), count, rng)
     corner = np.stack(np.unravel_index(drawn, spec.shape), axis=1) + rng.random((count, 2), np.float32)
     position = (spec.x_max, spec.y_max) - corner * spec.cell
     return Particles(position, draw_velocities(count, max_speed, rng), np.full(count, total / count))

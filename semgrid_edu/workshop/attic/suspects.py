@@ -17,7 +17,7 @@ from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.things.materials import Kind
 from semgrid_edu.workshop.studies.filter.cell_truth import true_cells
 from semgrid_edu.workshop.studies.filter.scenes import KnownScene, SceneHistory
-from semgrid_edu.workshop.studies.filter.street_scores import StreetScores
+from semgrid_edu.workshop.studies.filter.streets import StreetScores
 
 BEFORE = CmcdotParams(clearing_time=0.0, first_sight=(0.93, 0.067, 0.003))
 """The filter without the two rules against phantoms, with the probabilities of first sight that it had then."""
@@ -60,17 +60,18 @@ def arrivals_barred() -> AbstractContextManager:
     """Return a context in which the filter takes each arrival for one that comes out of something that stands.
 
     So nothing that arrives may claim a cell that hasn't been seen to be free. It replaces the compiled rule of
-    `cellwise.meet`, because no parameter of the filter goes as far.
+    `cellwise.collide`, because no parameter of the filter goes as far.
 
     Returns
     -------
     context manager
     """
 
-    def meet(mixed, newborn, going, stays, arrives, doubtful):
-        return cellwise.meet(mixed, newborn, going, stays, arrives, np.minimum(arrives, np.float32(cellwise.CERTAIN)))
+    def collide(mixed, newborn, going, stays, arrives, doubtful):
+        everything = np.minimum(arrives, np.float32(cellwise.CERTAIN))
+        return cellwise.collide(mixed, newborn, going, stays, arrives, everything)
 
-    return patch("semgrid_edu.occupancy.steps.meet", meet)
+    return patch("semgrid_edu.occupancy.steps.collide", collide)
 
 
 @dataclass(frozen=True)

@@ -37,10 +37,6 @@ class Box(NamedTuple):
             Its centre in the world, metres.
         length, width, height : float
             Its sides along x, y and z, metres.
-
-        Returns
-        -------
-        Box
         """
         return cls(x - length / 2, x + length / 2, y - width / 2, y + width / 2, height)
 
@@ -117,7 +113,7 @@ def scan_boxes(
 
 
 def cells_in(box: Box, spec: GridSpec, x: float = 0.0, y: float = 0.0, margin: float = 0.0) -> NDArray[np.bool_]:
-    """Return which cells have their centres in a box of the world.
+    """Return which cells have their centres in a box of the world, (H, W).
 
     Parameters
     ----------
@@ -129,10 +125,6 @@ def cells_in(box: Box, spec: GridSpec, x: float = 0.0, y: float = 0.0, margin: f
         Where the vehicle is in the world, metres.
     margin : float
         By how much the box is widened on every side, metres.
-
-    Returns
-    -------
-    (H, W) bool
     """
     centre_x, centre_y = np.moveaxis(spec.centers() + np.array([x, y]), -1, 0)
     return (

@@ -27,6 +27,8 @@ from semgrid_edu.occupancy import (
 )
 from semgrid_edu.occupancy.local_belief import velocity_moments
 from semgrid_edu.occupancy.particles import cells_of
+from semgrid_edu.occupancy.sensor import likelihoods
+from semgrid_edu.stage_models.cmcdot import NO_BIRTHS
 from semgrid_edu.workshop.illustrations.boxes import Box, cells_in
 
 SPEC = GridSpec(0, 16, -4, 4, 0.5)
@@ -44,8 +46,6 @@ PARAMS = BofParams(
     ),
 )
 """The default world, except that nothing accelerates or is born: such velocities wouldn't lie on the lattice."""
-NO_BIRTHS = 1e-9
-"""Share of the particles that is kept for births: in this world there are none."""
 WORTH_COMPARING = 0.1
 """Cells are compared where the BOF's dynamic probability is above this; elsewhere a mean velocity says little."""
 
@@ -136,11 +136,8 @@ def evidence_of_boxes(boxes: list[Box]) -> Evidence:
     Evidence
         P(z | occupied) and P(z | free) over `SPEC`.
     """
-    sensor = SensorModel()
     hit = np.any([cells_in(box, SPEC) for box in boxes], axis=0)
-    occupied = np.where(hit, sensor.p_hit_occupied, sensor.p_pass_occupied)
-    free = np.where(hit, sensor.p_hit_free, sensor.p_pass_free)
-    return Evidence(occupied.astype(np.float32), free.astype(np.float32))
+    return likelihoods(hit.astype(int), ~hit, SensorModel())
 
 
 def first_belief() -> NDArray[np.float64]:
@@ -196,9 +193,8 @@ def run_cmcdot(number: int, seed: int) -> Iterator[tuple[NDArray, NDArray]]:
     state = _first_particles(number, rng)
     for step in range(1, STEPS + 1):
         predicted = predict(state, SPEC, PARAMS.world, DT, rng)
-        state = resample(
-            update(predicted, SPEC, evidence_of_boxes(passing_cars(step)), PARAMS.world), SPEC, spending, rng
-        )
+        updated = update(predicted, SPEC, evidence_of_boxes(passing_cars(step)), PARAMS.world)
+        state = resample(updated, SPEC, spending, rng)
         cells = cells_of(state.particles.position, SPEC)
         yield state.probability[State.DYNAMIC], velocity_moments(state.particles, cells, SPEC.shape)[0]
 

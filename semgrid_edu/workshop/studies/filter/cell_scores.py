@@ -58,10 +58,6 @@ class Estimate:
         ----------
         belief : Belief
             Probabilities and velocities after a step.
-
-        Returns
-        -------
-        Estimate
         """
         p = belief.probability
         moves = p[State.DYNAMIC] > p[State.STATIC]
@@ -75,10 +71,6 @@ class Estimate:
         ----------
         p_occupied : (H, W) float
             P(occupied) after a step.
-
-        Returns
-        -------
-        Estimate
         """
         state = np.where(p_occupied > 0.5, State.STATIC, State.FREE)
         state[np.abs(p_occupied - 0.5) <= UNDECIDED] = State.UNKNOWN

@@ -49,10 +49,6 @@ def true_cells(drive: SimulatedDrive, time: float, spec: GridSpec) -> CellTruth:
         Seconds since it began.
     spec : GridSpec
         The grid: the extent of `LABEL_GRID`, a multiple of its cell.
-
-    Returns
-    -------
-    CellTruth
     """
     return pool_truth(*drive.birdseye(time), drive.velocities(time), spec)
 

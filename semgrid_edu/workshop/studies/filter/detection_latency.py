@@ -19,8 +19,8 @@ _LEAST_TIME = 1.0
 
 
 @dataclass(eq=False)
-class MoverTimes:
-    """Times at which cars and pedestrians are found, over several drives.
+class DetectionLatency:
+    """When cars and pedestrians are found, over several drives.
 
     Something is found in the first frame in which at least half of its hit cells are more DYNAMIC than STATIC.
 
@@ -94,13 +94,13 @@ class MoverTimes:
         """End a drive: work out its times."""
         for kind, name in ((Kind.CAR, "cars"), (Kind.PEDESTRIAN, "pedestrians")):
             numbers = [number for number in self._hit if self._kinds[number] == kind]
-            self.waits[name] += self._times({number: self._hit[number] for number in numbers})
+            self.waits[name] += self._delays({number: self._hit[number] for number in numbers})
         found = self._found
-        self.delays += self._times(
+        self.delays += self._delays(
             {b: max(found[a], self._hit[b]) for a, b in self._pairs if a in found and b in self._hit}
         )
 
-    def _times(self, since: dict[int, float]) -> list[float]:
+    def _delays(self, since: dict[int, float]) -> list[float]:
         """Return how much later than `since` each thing is found; what leaves the view too early is left out."""
         seen = {k: t for k, t in since.items() if k in self._found or self._last[k] - t >= _LEAST_TIME}
         return [round(max(self._found.get(number, np.inf) - time, 0.0), 3) for number, time in seen.items()]
@@ -137,9 +137,9 @@ def convoy_pairs(moving: list[Actor]) -> list[tuple[int, int]]:
     """
     lines: dict[object, list[tuple[float, int]]] = {}
     for actor in moving:
-        way = actor.trajectory
+        path = actor.trajectory
         if actor.kind == Kind.CAR:
-            line = (way.along, way.across, way.d if way.along else way.s, way.pace)
-            lines.setdefault(line, []).append((way.s * way.along + way.d * way.across, actor.instance))
+            line = (path.along, path.across, path.d if path.along else path.s, path.pace)
+            lines.setdefault(line, []).append((path.s * path.along + path.d * path.across, actor.instance))
     ordered = [[number for _, number in sorted(line, reverse=True)] for line in lines.values()]
     return [pair for line in ordered for pair in pairwise(line)]

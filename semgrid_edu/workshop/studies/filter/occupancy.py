@@ -108,10 +108,6 @@ def occupancy_tables(result: dict) -> str:
     ----------
     result : dict
         From `compare_filters`, or from the JSON file that it was written to.
-
-    Returns
-    -------
-    str
     """
     return "\n\n".join(
         f"{lidar} LIDAR, {grid} grid\n\n{occupancy_table(result, lidar, grid)}"
@@ -134,10 +130,6 @@ def occupancy_table(result: dict, lidar: str = "HDL-64E", grid: str = "paper") -
         From `compare_filters`, or from the JSON file that it was written to.
     lidar, grid : str
         Keys of `LIDARS` and `GRIDS` that the result holds.
-
-    Returns
-    -------
-    str
     """
     scores = [result["scores"][lidar][grid][method] for method in METHODS]
     rows = [["per cent", *METHODS]]

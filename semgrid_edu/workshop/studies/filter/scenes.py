@@ -122,7 +122,7 @@ class KnownScene:
 def hit_cells(
     points: NDArray, spec: GridSpec, least: int = 2, low: float = 0.3, high: float = 1.6
 ) -> NDArray[np.bool_]:
-    """Return which cells hold enough returns from above the ground to be scored.
+    """Return which cells hold enough returns from above the ground to be scored, (H, W).
 
     Parameters
     ----------
@@ -134,10 +134,6 @@ def hit_cells(
         Number of returns that a cell needs.
     low, high : float
         Heights above flat ground between which returns count, metres.
-
-    Returns
-    -------
-    (H, W) bool
     """
     rows, cols, inside = spec.cells(points[(points[:, 2] >= low) & (points[:, 2] <= high)])
     count = np.zeros(spec.shape, int)
@@ -199,10 +195,6 @@ class SceneHistory:
             The frame, with its scan.
         truth : CellTruth
             What is true at that instant.
-
-        Returns
-        -------
-        KnownScene
         """
         evidence = scan_evidence(frame.points_grid, self._around, self.sensor)
         pose = frame.T_world_from_lidar
