@@ -209,13 +209,13 @@ def autograde_one(
 def _scores(course: Path, assignment: str, student: str) -> dict[str, CellScore]:
     """Read a student's scores from the gradebook and the messages from the graded notebook."""
     graded = nbformat.read(place(course, "autograded", student, assignment), as_version=4)
-    messages = {c.metadata.nbgrader.grade_id: _message(c) for c in graded.cells if is_grade(c)}
+    messages = {c.metadata.nbgrader.grade_id: error_message(c) for c in graded.cells if is_grade(c)}
     with Gradebook(f"sqlite:///{course / 'gradebook.db'}") as gradebook:
         grades = gradebook.find_submission_notebook(assignment, assignment, student).grades
         return {g.name: CellScore(g.max_score, g.auto_score, messages[g.name]) for g in grades}
 
 
-def _message(cell: NotebookNode) -> str:
+def error_message(cell: NotebookNode) -> str:
     """Return the errors below a cell, as the student reads them."""
     errors = [output for output in cell.get("outputs", []) if output.output_type == "error"]
     return "\n".join(f"{error.ename}: {error.evalue or strip_ansi(error.traceback[-1])}" for error in errors)

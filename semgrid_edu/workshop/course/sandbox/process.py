@@ -10,7 +10,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
 from functools import cache
@@ -55,7 +55,7 @@ class StudentProcess:
     ----------
     limits : Limits
         How much it may take; its number of processes is added to those that the user has now.
-    prepared : Path
+    prepared : Path, optional
         A folder that is copied into the fresh one: functions that are compiled already, and fonts.
     keeps : bool
         Whether what is compiled in the fresh folder goes back to that folder in the end: for trusted code alone.
@@ -74,20 +74,15 @@ class StudentProcess:
         Of `PARTS` what could not be limited. A container is taken to limit everything.
     """
 
-    def __init__(self, limits: Limits, prepared: Path, keeps: bool = False, container: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self, limits: Limits, prepared: Path | None = None, keeps: bool = False, container: tuple[str, ...] = ()
+    ) -> None:
         self.prepared, self.keeps = prepared, keeps
         self.folder = Path(tempfile.mkdtemp(prefix="semgrid-answers-"))
-        shutil.copytree(prepared, self.folder / "prepared", dirs_exist_ok=True)
+        if prepared is not None:
+            shutil.copytree(prepared, self.folder / "prepared")
         alone = () if container or not _can_be_alone() else ALONE
-        self.process = subprocess.Popen(
-            [*container, *alone, *(_in_container() if container else WORKER)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            cwd=self.folder,
-            env=self._environment(),
-            start_new_session=True,
-        )
+        self.process = self._started([*container, *alone, *(_in_container() if container else WORKER)])
         self.wire = Wire(self.process.stdout, self.process.stdin)
         self.sent: queue.Queue[bytes | None] = queue.Queue()
         self.received: queue.Queue[bytes | None] = queue.Queue()
@@ -95,6 +90,18 @@ class StudentProcess:
         self.speaker.start()
         threading.Thread(target=self._watch, args=(3 * limits.written * MEGABYTE,), daemon=True).start()
         self.unlimited = self._greeted(limits, alone, container)
+
+    def _started(self, command: Sequence[str]) -> subprocess.Popen:
+        """Start the worker in a session of its own, with a pipe in both directions."""
+        return subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            cwd=self.folder,
+            env=worker_environment(self.folder),
+            start_new_session=True,
+        )
 
     def _greeted(self, limits: Limits, alone: tuple[str, ...], container: tuple[str, ...]) -> list[str]:
         """Wait for the first reply; return what could not be limited."""
@@ -116,14 +123,6 @@ class StudentProcess:
         message = {"do": "limit", "limits": asdict(limits), "folder": str(self.folder)}
         done = self.ask(message, time.monotonic() + STARTED)["done"] + (["network", "signals"] if alone else [])
         return [part for part in PARTS if part not in done]
-
-    def _environment(self) -> dict[str, str]:
-        """Return the environment of the process: one thread for each library, and all caches in its own folder."""
-        here = {name: str(self.folder / "prepared") for name in ("NUMBA_CACHE_DIR", "MPLCONFIGDIR")}
-        here |= {name: str(self.folder) for name in ("HOME", "TMPDIR", "IPYTHONDIR")}
-        threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
-        inline = {"MPLBACKEND": "module://matplotlib_inline.backend_inline", "PYTHONDONTWRITEBYTECODE": "1"}
-        return {name: os.environ[name] for name in KEPT if name in os.environ} | here | threads | inline
 
     def _speak(self) -> None:
         """Send what is to be sent, and receive a reply to each; None stands for a process that is no more.
@@ -208,6 +207,21 @@ class StudentProcess:
         if self.keeps:
             shutil.copytree(self.folder / "prepared", self.prepared, copy_function=_replace, dirs_exist_ok=True)
         delete(self.folder)
+
+
+def worker_environment(folder: Path) -> dict[str, str]:
+    """Return the environment of a worker: one thread for each library, and all caches in its own folder.
+
+    Parameters
+    ----------
+    folder : Path
+        The fresh folder of the process.
+    """
+    here = {name: str(folder / "prepared") for name in ("NUMBA_CACHE_DIR", "MPLCONFIGDIR")}
+    here |= {name: str(folder) for name in ("HOME", "TMPDIR", "IPYTHONDIR")}
+    threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+    inline = {"MPLBACKEND": "module://matplotlib_inline.backend_inline", "PYTHONDONTWRITEBYTECODE": "1"}
+    return {name: os.environ[name] for name in KEPT if name in os.environ} | here | threads | inline
 
 
 def _replace(source: str, target: str) -> None:
