@@ -20,11 +20,16 @@ from semgrid_edu.workshop.course.nbgrader.autograde import (
     reference_answers,
     submission,
 )
-from semgrid_edu.workshop.course.nbgrader.build import build_course, build_exercise, exercise_sources, student_version
+from semgrid_edu.workshop.course.nbgrader.build import (
+    build_course,
+    build_exercise,
+    exercise_sources,
+    point_links,
+    student_version,
+)
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_one
 from semgrid_edu.workshop.course.nbgrader.gradebook import is_graded, write_graded
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, write_notebook
-from semgrid_edu.workshop.course.registers.equations import point_links
 
 
 @pytest.fixture(scope="module")

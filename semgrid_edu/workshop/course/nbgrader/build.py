@@ -3,6 +3,7 @@
 import hashlib
 import logging
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ from nbgrader.preprocessors import (
 )
 from traitlets.config import PyFileConfigLoader
 
-from semgrid_edu.errors import DataError
+from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.files import write_json, write_text
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.workshop.course.nbgrader.failures import causes, why
@@ -32,7 +33,6 @@ from semgrid_edu.workshop.course.notebooks.build import (
     read_percent,
     write_notebook,
 )
-from semgrid_edu.workshop.course.registers.equations import point_links
 
 RELEASE_STEPS = (LockCells, ClearSolutions, ClearOutput, ClearHiddenTests, ComputeChecksums, CheckCellMetadata)
 """What nbgrader's generate_assignment does to a notebook, without its gradebook."""
@@ -173,6 +173,35 @@ def _source_text(source: Path, lectures: str) -> str:
         if cell.cell_type == "markdown":
             cell.source = point_links(cell.source, lectures)
     return notebook_text(notebook)
+
+
+def point_links(text: str, lectures: str) -> str:
+    """Let an exercise link to the lectures where its students find them.
+
+    Parameters
+    ----------
+    text : str
+        A text cell of an exercise. Its links to notebooks begin with `../`, the folder of notebooks.
+    lectures : str
+        The address of the folder that holds `00_tour.ipynb`, or its path from a student's copy of the exercise; "" when
+        students can't open it. Then the link's text stays alone.
+
+    Raises
+    ------
+    ArgumentError
+        When the folder can't stand in a link.
+
+    Examples
+    --------
+    >>> point_links("The lecture is [00: the tour](../00_tour.ipynb).", "https://course.example/lectures")
+    'The lecture is [00: the tour](https://course.example/lectures/00_tour.ipynb).'
+    >>> point_links("The lecture is [00: the tour](../00_tour.ipynb).", "")
+    'The lecture is 00: the tour.'
+    """
+    if re.search(r"[\s()<>]", lectures):
+        raise ArgumentError("lectures", "an address or a path without blanks, parentheses and < or >", lectures)
+    new = rf"[\1]({lectures.rstrip('/')}/\2)" if lectures else r"\1"
+    return re.sub(r"\[([^\]]*)\]\(\.\./([^)]*)\)", lambda link: link.expand(new), text)
 
 
 def _write_what_is_not_changed(directory: Path, texts: dict[str, str], about: dict) -> tuple[dict[str, str], list[str]]:
