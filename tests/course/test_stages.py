@@ -2,8 +2,8 @@
 
 import pytest
 
-from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 from semgrid_edu.workshop.course import registers
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 from semgrid_edu.workshop.course.registers import STAGES, StageModel, find_code, stage_table
 
 EXAMPLE = StageModel(

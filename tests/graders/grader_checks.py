@@ -1,19 +1,18 @@
 """What grading must do with every exercise; one subclass an exercise, with its catalogue of answers.
 
-nbgrader grades three students of each exercise; the whole catalogue is graded in a warm session (`warm`), whose points and
-messages must be those of nbgrader.
+nbgrader grades three students of each exercise. The whole catalogue is graded in a warm session (`warm`), which must give
+these three the same points and messages.
 """
 
 import re
 from dataclasses import dataclass
 
 import pytest
-
 from warm import grade_warm, warm_processes
 
 from semgrid_edu.workshop.course.nbgrader.autograde import autograde, reference_answers, submission, tasks
+from semgrid_edu.workshop.course.nbgrader.preprocessors import prepare
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
-from semgrid_edu.workshop.course.sandbox.prepared import prepare
 
 TIMEOUT = {"answer": 12, "endless loop": 2}
 """Seconds for a cell: enough for any answer on a busy machine; what each call of an endless loop costs."""
