@@ -5,9 +5,9 @@ import re
 import sys
 
 import pytest
+from nbgrader_scores import tasks
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.workshop.course.nbgrader.autograde import tasks
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 from semgrid_edu.workshop.course.registers import EQUATIONS, equation_table, find_code
 

@@ -8,13 +8,13 @@ import sys
 import nbformat
 import pytest
 from nbgrader.api import Gradebook
+from nbgrader_scores import autograde
 from tiny_course import tiny_notebooks
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.files import write_text
 from semgrid_edu.workshop.course.nbgrader.autograde import (
     GradeSettings,
-    autograde,
     autograde_one,
     place,
     reference_answers,

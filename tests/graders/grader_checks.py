@@ -1,16 +1,17 @@
 """What grading must do with every exercise; one subclass an exercise, with its catalogue of answers.
 
-nbgrader grades three students of each exercise. The whole catalogue is graded in a warm session (`warm`), which must give
-these three the same points and messages.
+nbgrader grades three students of each exercise. The whole catalogue is graded in a warm session (`warm`), which must
+give these three the same points and messages.
 """
 
 import re
 from dataclasses import dataclass
 
 import pytest
+from nbgrader_scores import autograde, tasks
 from warm import grade_warm, warm_processes
 
-from semgrid_edu.workshop.course.nbgrader.autograde import autograde, reference_answers, submission, tasks
+from semgrid_edu.workshop.course.nbgrader.autograde import reference_answers, submission
 from semgrid_edu.workshop.course.nbgrader.preprocessors import prepare
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 

@@ -1,7 +1,7 @@
 """Grading without nbgrader: the same sandbox and test cells, with students' processes forked from one that is ready.
 
-A server runs an exercise's source once, so that everything is imported and compiled. From then on it forks a new process
-for each student, with a fresh namespace, and with a folder and limits of its own as in real grading.
+A server runs an exercise's source once, so that everything is imported and compiled. From then on it forks a new
+process for each student, with a fresh namespace, and with a folder and limits of its own as in real grading.
 """
 
 import os
@@ -16,8 +16,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from nbgrader.utils import determine_grade, is_grade, is_solution
+from nbgrader_scores import CellScore, error_message
 
-from semgrid_edu.workshop.course.nbgrader.autograde import CellScore, error_message, submission
+from semgrid_edu.workshop.course.nbgrader.autograde import submission
 from semgrid_edu.workshop.course.nbgrader.preprocessors import instructors_cells, use_instructor
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 from semgrid_edu.workshop.course.sandbox.limits import Limits

@@ -1,4 +1,4 @@
-"""The two registers of the course, read from `registers.toml`: the paper's equations, and each stage's graphical model."""
+"""The two registers of the course, in `registers.toml`: the paper's equations, and each stage's graphical model."""
 
 import tomllib
 from dataclasses import dataclass

@@ -194,7 +194,7 @@ def point_links(text: str, lectures: str) -> str:
 def _write_unless_changed(
     directory: Path, texts: dict[str, str], before: dict[str, str]
 ) -> tuple[dict[str, str], list[str]]:
-    """Write files, but not over one that differs from what was written before; return all digests, and what was kept."""
+    """Write files, but not over one that was changed since the last time; return all digests, and what was kept."""
     digests, kept = {}, []
     for name, text in texts.items():
         path = directory / name

@@ -1,4 +1,4 @@
-"""What was handed in, and what has been graded of it: which files can be graded, and what the gradebook says of them."""
+"""What was handed in, whether it can be graded and has been, and what the gradebook says of it."""
 
 import csv
 import io
