@@ -5,11 +5,11 @@ import re
 import sys
 
 import pytest
+from nbgrader_scores import tasks
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.workshop.course.nbgrader.autograde import tasks
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
-from semgrid_edu.workshop.course.registers.equations import EQUATIONS, equation_table, find_code
+from semgrid_edu.workshop.course.registers import EQUATIONS, equation_table, find_code
 
 FUNCTIONS = [pytest.param(entry, name, id=f"{entry.id}-{name}") for entry in EQUATIONS for name in entry.functions]
 

@@ -8,23 +8,28 @@ import sys
 import nbformat
 import pytest
 from nbgrader.api import Gradebook
+from nbgrader_scores import autograde
 from tiny_course import tiny_notebooks
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.files import write_text
 from semgrid_edu.workshop.course.nbgrader.autograde import (
     GradeSettings,
-    autograde,
     autograde_one,
     place,
     reference_answers,
     submission,
 )
-from semgrid_edu.workshop.course.nbgrader.build import build_course, build_exercise, exercise_sources, student_version
+from semgrid_edu.workshop.course.nbgrader.build import (
+    build_course,
+    build_exercise,
+    exercise_sources,
+    point_links,
+    student_version,
+)
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_one
 from semgrid_edu.workshop.course.nbgrader.gradebook import is_graded, write_graded
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, write_notebook
-from semgrid_edu.workshop.course.registers.equations import point_links
 
 
 @pytest.fixture(scope="module")

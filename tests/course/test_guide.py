@@ -9,11 +9,11 @@ import pytest
 from nbgrader.apps.dbapp import DbApp
 from nbgrader.apps.nbgraderapp import NbGraderApp
 from nbgrader.utils import is_grade, is_solution, parse_utc
+from nbgrader_scores import tasks
 from packaging.requirements import Requirement
 from typer.main import get_command
 
 from semgrid_edu.workshop.commands import main as cli
-from semgrid_edu.workshop.course.nbgrader.autograde import tasks
 from semgrid_edu.workshop.course.nbgrader.build import exercise_sources
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, built_path, lecture_sources, read_percent
 from semgrid_edu.workshop.course.notebooks.minutes import reading_time

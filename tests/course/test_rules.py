@@ -1,4 +1,4 @@
-"""Each rule on a notebook that keeps it and on one that breaks it; exceptions only while they are needed."""
+"""Each rule on a notebook that keeps it and on one that breaks it; waivers only while they are needed."""
 
 import base64
 import io
@@ -9,7 +9,7 @@ from PIL import Image
 
 from semgrid_edu.plotting import Animation
 from semgrid_edu.workshop.course.notebooks.build import lecture_sources, read_percent
-from semgrid_edu.workshop.course.notebooks.rules import EXCEPTIONS, RULES, rule_problems
+from semgrid_edu.workshop.course.notebooks.rules import RULES, WAIVERS, rule_problems
 
 QUESTION = "**Predict before you run.** How many?\n\n<details><summary>Answer</summary>Two.</details>"
 FIGURE = "fig, ax = plt.subplots()\nax.plot([1, 2])\nplt.show()"
@@ -120,17 +120,17 @@ def test_a_problem_names_its_cell_and_the_remedy():
     assert problem == "cell 'fig, ax = plt.subplots()' only plots; give it jupyter={\"source_hidden\": true}"
 
 
-def test_an_exception_counts_while_it_is_needed_and_no_longer():
+def test_a_waiver_counts_while_it_is_needed_and_no_longer():
     broken, kept = (new_notebook(cells=notebooks["minutes"][0]) for notebooks in (BROKEN, KEPT))
     assert len(rule_problems(broken)) == 1
-    assert rule_problems(broken, allowed={"minutes"}) == []
+    assert rule_problems(broken, waived={"minutes"}) == []
     assert rule_problems(kept) == []
-    assert "take its exception out" in rule_problems(kept, allowed={"minutes"})[0]
+    assert "take its waiver out" in rule_problems(kept, waived={"minutes"})[0]
 
 
-def test_exceptions_are_for_lectures_and_rules_that_exist():
-    assert set(EXCEPTIONS) <= {source.stem for source in lecture_sources()}
-    assert set().union(*EXCEPTIONS.values()) <= set(RULES)
+def test_waivers_are_for_lectures_and_rules_that_exist():
+    assert set(WAIVERS) <= {source.stem for source in lecture_sources()}
+    assert set().union(*WAIVERS.values()) <= set(RULES)
 
 
 def test_a_percent_header_carries_all_that_the_rules_read(tmp_path):

@@ -2,10 +2,9 @@
 
 import pytest
 
+from semgrid_edu.workshop.course import registers
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
-from semgrid_edu.workshop.course.registers import stage_models as stages
-from semgrid_edu.workshop.course.registers.equations import find_code
-from semgrid_edu.workshop.course.registers.stage_models import STAGES, StageModel, stage_table
+from semgrid_edu.workshop.course.registers import STAGES, StageModel, find_code, stage_table
 
 EXAMPLE = StageModel(
     "bof",
@@ -39,7 +38,7 @@ def test_each_stage_is_there_once():
 
 def test_a_row_links_model_check_and_lecture(monkeypatch):
     in_a_cell = StageModel("tour", "All", model="semgrid_edu.grid.GridSpec", check="deeper/graphical_models#all")
-    monkeypatch.setattr(stages, "STAGES", (EXAMPLE, in_a_cell))
+    monkeypatch.setattr(registers, "STAGES", (EXAMPLE, in_a_cell))
     _, _, bof, tour = stage_table().splitlines()
     assert bof == (
         "| BOF: four cells | [`bof_predict_literal`](../semgrid_edu/occupancy/literal/bof.py) "

@@ -17,16 +17,20 @@ from semgrid_edu.storage.files import write_text
 from semgrid_edu.workshop.commands import main as cli
 from semgrid_edu.workshop.course.nbgrader import autograde as grading
 from semgrid_edu.workshop.course.nbgrader import preprocessors as nbgrader_steps
-from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, place, reference_answers, submission
+from semgrid_edu.workshop.course.nbgrader.autograde import (
+    GradeSettings,
+    UngradedError,
+    place,
+    reference_answers,
+    submission,
+)
 from semgrid_edu.workshop.course.nbgrader.build import build_course
-from semgrid_edu.workshop.course.nbgrader.failures import UngradedError
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course, grade_one, missing_limits
-from semgrid_edu.workshop.course.nbgrader.gradebook import is_graded, write_graded
-from semgrid_edu.workshop.course.nbgrader.submissions import misplaced
+from semgrid_edu.workshop.course.nbgrader.gradebook import is_graded, misplaced, write_graded
+from semgrid_edu.workshop.course.nbgrader.preprocessors import instructors_cells
 from semgrid_edu.workshop.course.notebooks.build import write_notebook
 from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.notebook import run_submission
-from semgrid_edu.workshop.course.sandbox.prepared import instructors_cells
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 
 TINY = "00_tiny"

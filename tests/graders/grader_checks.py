@@ -1,14 +1,21 @@
-"""What every exercise must do when nbgrader grades it; one subclass an exercise, with its catalogue of answers."""
+"""What grading must do with every exercise; one subclass an exercise, with its catalogue of answers.
+
+nbgrader grades three students of each exercise. The whole catalogue is graded in a warm session (`warm`), which must
+give these three the same points and messages.
+"""
 
 import re
 from dataclasses import dataclass
 
 import pytest
+from nbgrader_scores import autograde, tasks
+from warm import grade_warm, warm_processes
 
-from semgrid_edu.workshop.course.nbgrader.autograde import autograde, reference_answers, submission, tasks
+from semgrid_edu.workshop.course.nbgrader.autograde import reference_answers, submission
+from semgrid_edu.workshop.course.nbgrader.preprocessors import prepare
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 
-TIMEOUT = {"answer": 12, "endless loop": 4}
+TIMEOUT = {"answer": 12, "endless loop": 2}
 """Seconds for a cell: enough for any answer on a busy machine; what each call of an endless loop costs."""
 
 
@@ -69,17 +76,35 @@ class GraderChecks:
 
     @pytest.fixture(scope="class")
     @classmethod
-    def graded(cls, source, new_course):
-        """Every student's score of every task: (score, points, message), by student and task."""
-        reference = reference_answers(source)
-        course, students = new_course(), {"answer": {"reference": reference, "stub": {}}, "endless loop": {}}
-        for number, answers in enumerate(pack(cls.entries)):
-            codes = {task: entry.code for task, entry in answers.items()}
-            students[kind(answers)][f"student-{number}"] = reference | codes
-        scores = {}
-        for which, seconds in TIMEOUT.items():
-            notebooks = {name: submission(source, answers) for name, answers in students[which].items()}
-            scores |= autograde(course, cls.exercise, notebooks, timeout=seconds)
+    def students(cls, source):
+        """Answers to each task, by student: the reference, the stub, and all entries packed."""
+        reference, packed = reference_answers(source), pack(cls.entries)
+        codes = [{task: entry.code for task, entry in answers.items()} for answers in packed]
+        return {"reference": reference, "stub": {}} | {f"student-{n}": reference | own for n, own in enumerate(codes)}
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def course(cls, new_course):
+        return new_course()
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def graded(cls, source, students, course):
+        """Every student's (score, points, message) by student and task, from one warm session."""
+        loops = {f"student-{n}" for n, answers in enumerate(pack(cls.entries)) if kind(answers) == "endless loop"}
+        with warm_processes(source, prepare(course, cls.exercise, memory=4000)) as start:
+            scores = {
+                name: grade_warm(source, answers, start, TIMEOUT["endless loop" if name in loops else "answer"])
+                for name, answers in students.items()
+            }
+        return {student: cls.by_task(source, cells) for student, cells in scores.items()}
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def graded_by_nbgrader(cls, source, students, course):
+        """The same of the reference, the stub and the first packed student, graded as a class is."""
+        notebooks = {name: submission(source, students[name]) for name in ("reference", "stub", "student-0")}
+        scores = autograde(course, cls.exercise, notebooks, timeout=TIMEOUT["answer"])
         return {student: cls.by_task(source, cells) for student, cells in scores.items()}
 
     @staticmethod
@@ -95,12 +120,16 @@ class GraderChecks:
             if all(cells[name].score is not None for name in names)
         }
 
-    def test_reference_earns_full_marks(self, graded):
-        for task, (score, points, message) in graded["reference"].items():
+    def test_reference_earns_full_marks(self, graded_by_nbgrader):
+        for task, (score, points, message) in graded_by_nbgrader["reference"].items():
             assert score == points, f"{task}: {message}"
 
-    def test_untouched_stub_earns_nothing(self, graded, source):
-        assert {task: score for task, (score, _, _) in graded["stub"].items()} == dict.fromkeys(tasks(source), 0)
+    def test_untouched_stub_earns_nothing(self, graded_by_nbgrader, source):
+        scores = {task: score for task, (score, _, _) in graded_by_nbgrader["stub"].items()}
+        assert scores == dict.fromkeys(tasks(source), 0)
+
+    def test_nbgrader_and_the_warm_session_agree(self, graded, graded_by_nbgrader):
+        assert {student: graded[student] for student in graded_by_nbgrader} == graded_by_nbgrader
 
     def test_entry(self, graded, entry):
         student = next(n for n, answers in enumerate(pack(self.entries)) if answers.get(entry.task) is entry)

@@ -97,11 +97,9 @@ def grade(
     ] = False,
 ) -> None:
     """Grade a class with nbgrader: students' code runs in processes of its own, apart from tests and gradebook."""
-    from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings
-    from semgrid_edu.workshop.course.nbgrader.failures import UngradedError
+    from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, UngradedError
     from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course, missing_limits
-    from semgrid_edu.workshop.course.nbgrader.gradebook import write_graded
-    from semgrid_edu.workshop.course.nbgrader.submissions import misplaced
+    from semgrid_edu.workshop.course.nbgrader.gradebook import misplaced, write_graded
 
     settings = GradeSettings(timeout, memory, tuple(shlex.split(container)), seed_by_student)
     for path in misplaced(folder):

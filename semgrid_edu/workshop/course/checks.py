@@ -1,4 +1,7 @@
-"""Checks of every committed notebook: up to date, executed without warnings, small, and free of paths of a machine."""
+"""Checks of every committed notebook: up to date, executed without warnings, small, and free of paths of a machine.
+
+Each function returns one sentence per problem, with the name of the notebook or cell; nothing when all is well.
+"""
 
 import re
 from pathlib import Path
@@ -16,7 +19,7 @@ from semgrid_edu.workshop.course.notebooks.build import (
     notebook_name,
     read_percent,
 )
-from semgrid_edu.workshop.course.notebooks.rules import EXCEPTIONS, RULES, Rule, rule_problems
+from semgrid_edu.workshop.course.notebooks.rules import RULES, WAIVERS, Rule, rule_problems
 
 MAX_LINES = 25
 """Most lines of a code cell, so that a student can take it in at once."""
@@ -69,11 +72,6 @@ def lecture_problems(source: Path) -> list[str]:
     ----------
     source : Path
         The source, `notebooks/src/NN_name.py`. The executed notebook is looked for where `built_path` puts it.
-
-    Returns
-    -------
-    list of str
-        One sentence per problem, with the name of the notebook; empty when nothing is wrong.
     """
     return [f"{built_path(source).name}: {problem}" for problem in _problems(source, LECTURE_PARTS, RULES)]
 
@@ -85,11 +83,6 @@ def companion_problems(source: Path) -> list[str]:
     ----------
     source : Path
         The source, `notebooks/src/deeper/NAME.py`. The executed notebook is looked for where `built_path` puts it.
-
-    Returns
-    -------
-    list of str
-        One sentence per problem, with the name of the notebook; empty when nothing is wrong.
     """
     name = f"{notebook_name(source)}.ipynb"
     problems = _problems(source, COMPANION_PARTS, COMPANION_RULES)
@@ -105,11 +98,6 @@ def exercise_problems(source: Path) -> list[str]:
     ----------
     source : Path
         The source, `notebooks/src/exercises/NAME.py`.
-
-    Returns
-    -------
-    list of str
-        One sentence per problem, with the name of the notebook; empty when nothing is wrong.
     """
     path = built_path(source)
     if not path.is_file():
@@ -128,11 +116,6 @@ def course_problems(folder: Path = NOTEBOOKS) -> list[str]:
     ----------
     folder : Path
         The folder of notebooks, with their sources in `src`.
-
-    Returns
-    -------
-    list of str
-        One sentence per problem, with the name of the notebook; empty when nothing is wrong.
 
     Raises
     ------
@@ -157,11 +140,6 @@ def text_problems(notebook: NotebookNode, folder: Path) -> list[str]:
         The notebook, executed or not.
     folder : Path
         The folder of the notebook, to which its links are relative.
-
-    Returns
-    -------
-    list of str
-        One sentence per problem, with the exercise's name for the cell, or else the cell's first line.
     """
     problems = []
     for cell in notebook.cells:
@@ -192,7 +170,7 @@ def _problems(source: Path, parts: dict[str, str], rules: dict[str, Rule]) -> li
         problems.append(f"{path.stat().st_size / 1e6:.1f} MB, more than {MAX_BYTES / 1e6} MB")
     for number, cell in enumerate((c for c in notebook.cells if c.cell_type == "code"), start=1):
         problems += [f"code cell {number} {problem}" for problem in _run_problems(cell, number)]
-    return problems + text_problems(notebook, path.parent) + rule_problems(notebook, rules, EXCEPTIONS.get(name, ()))
+    return problems + text_problems(notebook, path.parent) + rule_problems(notebook, rules, WAIVERS.get(name, ()))
 
 
 def _run_problems(cell: NotebookNode, number: int) -> list[str]:

@@ -13,12 +13,11 @@ import pytest
 
 import semgrid_edu
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
-from semgrid_edu.workshop.course.sandbox import linux as landlock
-from semgrid_edu.workshop.course.sandbox import linux as seccomp
+from semgrid_edu.workshop.course.sandbox import linux
 from semgrid_edu.workshop.course.sandbox.limits import PARTS, Limits, _all_but
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 
-needs_landlock = pytest.mark.skipif(not landlock.version(), reason="this system has no Landlock")
+needs_landlock = pytest.mark.skipif(not linux.landlock_version(), reason="this system has no Landlock")
 
 
 @pytest.fixture
@@ -87,9 +86,9 @@ def test_no_socket_of_any_kind(limited, kind):
     assert limited(f"__import__('socket').socket({family}, {way}).fileno()", "network") == ("error", "PermissionError")
 
 
-@pytest.mark.parametrize("name", seccomp.NUMBERS.get(platform.machine(), {}))
+@pytest.mark.parametrize("name", linux.REFUSED_CALLS.get(platform.machine(), {}))
 def test_calls_that_were_given_up_are_refused(session, name):
-    number = seccomp.NUMBERS[platform.machine()][name]
+    number = linux.REFUSED_CALLS[platform.machine()][name]
     session.run(f"import ctypes\nlibc = ctypes.CDLL(None, use_errno=True)\ngot = libc.syscall({number}, 0, 0, 0, 0, 0)")
     session.run("error = ctypes.get_errno()")
     assert session.names(["got", "error"], session) == {"got": -1, "error": errno.EPERM}
@@ -176,4 +175,4 @@ def test_all_of_a_folder_but_one_in_it(tmp_path):
 
 @needs_landlock
 def test_landlock_knows_at_least_files():
-    assert landlock.version() >= 1
+    assert linux.landlock_version() >= 1

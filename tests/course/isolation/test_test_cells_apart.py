@@ -2,15 +2,15 @@
 
 import pytest
 
+from semgrid_edu.workshop.course.nbgrader.preprocessors import use_instructor
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
-from semgrid_edu.workshop.course.sandbox.notebook import CellTests
-from semgrid_edu.workshop.course.sandbox.prepared import use_instructor
+from semgrid_edu.workshop.course.sandbox.notebook import TestCells
 
 
 @pytest.fixture
 def tests(session):
     use_instructor(NOTEBOOKS / "instructor")
-    return CellTests(session, session, ())
+    return TestCells(session, session, ())
 
 
 def test_answers_are_found_by_tests_and_by_what_they_are_prepared_with(session, tests):

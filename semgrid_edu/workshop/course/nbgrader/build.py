@@ -3,6 +3,8 @@
 import hashlib
 import logging
 import os
+import re
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,10 +23,9 @@ from nbgrader.preprocessors import (
 )
 from traitlets.config import PyFileConfigLoader
 
-from semgrid_edu.errors import DataError
+from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.files import write_json, write_text
 from semgrid_edu.storage.reading import read_json
-from semgrid_edu.workshop.course.nbgrader.failures import causes, why
 from semgrid_edu.workshop.course.notebooks.build import (
     NOTEBOOKS,
     built_path,
@@ -32,7 +33,6 @@ from semgrid_edu.workshop.course.notebooks.build import (
     read_percent,
     write_notebook,
 )
-from semgrid_edu.workshop.course.registers.equations import point_links
 
 RELEASE_STEPS = (LockCells, ClearSolutions, ClearOutput, ClearHiddenTests, ComputeChecksums, CheckCellMetadata)
 """What nbgrader's generate_assignment does to a notebook, without its gradebook."""
@@ -40,35 +40,28 @@ RELEASE_STEPS = (LockCells, ClearSolutions, ClearOutput, ClearHiddenTests, Compu
 MARKER = "semgrid_course.json"
 """The file by which a folder is recognised as a course that `build_course` wrote."""
 
+GRADEBOOK_LOG = logging.getLogger("tornado.application")
+"""Where nbgrader's gradebook writes a page of traceback whenever it is locked."""
+
 
 def exercise_sources(folder: Path = NOTEBOOKS) -> list[Path]:
-    """Return the percent sources of all exercises.
+    """Return the percent sources of all exercises: the lectures' in the order of the course, then the companions'.
 
     Parameters
     ----------
     folder : Path
         The folder of notebooks.
-
-    Returns
-    -------
-    list of Path
-        The lectures' exercises in the order of the course, then those of companions by name.
     """
     return sorted((folder / "src" / "exercises").glob("*.py"))
 
 
 def student_version(source: Path) -> NotebookNode:
-    """Take solutions and hidden tests out of an exercise.
+    """Take solutions and hidden tests out of an exercise, as `nbgrader generate_assignment` does.
 
     Parameters
     ----------
     source : Path
         The source, `notebooks/src/exercises/NAME.py`, with nbgrader's markers and metadata.
-
-    Returns
-    -------
-    NotebookNode
-        What `nbgrader generate_assignment` would release.
     """
     notebook, resources = read_percent(source), {}
     for step in RELEASE_STEPS:
@@ -77,17 +70,12 @@ def student_version(source: Path) -> NotebookNode:
 
 
 def build_exercise(source: Path) -> Path:
-    """Write the student version of an exercise.
+    """Write the student version of an exercise, and return its path, `notebooks/exercises/NAME.ipynb`.
 
     Parameters
     ----------
     source : Path
         The source, `notebooks/src/exercises/NAME.py`.
-
-    Returns
-    -------
-    Path
-        The file written, `notebooks/exercises/NAME.ipynb`.
     """
     target = built_path(source)
     write_notebook(student_version(source), target)
@@ -103,7 +91,7 @@ class BuiltCourse:
     assignments : list of str
         Names of the assignments.
     kept : list of str
-        Files that the instructor changed, and that therefore stay as they are though this version has others.
+        Files that the instructor has changed, and that stay as they are although this version has others.
     """
 
     assignments: list[str]
@@ -113,8 +101,8 @@ class BuiltCourse:
 def build_course(directory: str | Path, folder: Path = NOTEBOOKS, lectures: str | None = None) -> BuiltCourse:
     """Write a complete nbgrader course: sources, settings, the instructor's module, gradebook and released versions.
 
-    When it is run again, it brings up to date what the instructor hasn't changed, and leaves all else, submissions and
-    grades as they are.
+    Run again, it brings up to date what the instructor hasn't changed, and leaves everything else, with submissions and
+    grades, as it is.
 
     Parameters
     ----------
@@ -123,12 +111,7 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS, lectures: str 
     folder : Path
         The folder of notebooks.
     lectures : str, optional
-        Where students find the lectures, to which exercises link: see `point_links`. What was said last by default.
-
-    Returns
-    -------
-    BuiltCourse
-        What it holds.
+        Where students find the lectures, to which exercises link: see `point_links`. By default as the last time.
 
     Raises
     ------
@@ -136,25 +119,29 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS, lectures: str 
         When the folder holds something else, there are no exercises, or nbgrader can't release one.
     """
     directory = Path(directory).resolve()
-    _refuse_what_is_not_ours(directory)
+    _refuse_other_folders(directory)
     sources = exercise_sources(folder)
     if not sources:
         raise DataError(folder / "src" / "exercises", "the sources of the exercises", "none")
-    names, before = [source.stem for source in sources], _written_before(directory)
+    marker = directory / MARKER
+    before = read_json(marker) if marker.exists() else {}
     lectures = before.get("lectures", "") if lectures is None else lectures
-    written, kept = _write_what_is_not_changed(directory, _course_files(folder, sources, lectures), before)
+    digests, kept = _write_unless_changed(directory, _course_files(folder, sources, lectures), before.get("files", {}))
+    names = [source.stem for source in sources]
     about = {"written by": f"semgrid_edu {version('semgrid_edu')}", "assignments": names}
-    write_json(directory / MARKER, about | {"lectures": lectures, "files": written})
+    write_json(marker, about | {"lectures": lectures, "files": digests})
     with course_api(directory) as api:
         for name in names:
             _release(api, name, directory / "source" / name)
     return BuiltCourse(names, kept)
 
 
-def _written_before(directory: Path) -> dict:
-    """Return what the course says of itself; {} for one that is still to be written."""
-    marker = directory / MARKER
-    return read_json(marker) if marker.exists() else {}
+def _refuse_other_folders(directory: Path) -> None:
+    """Raise when a folder holds anything but a course that `build_course` wrote."""
+    if directory.is_file():
+        raise DataError(directory, "a folder", "a file")
+    if directory.exists() and any(directory.iterdir()) and not (directory / MARKER).is_file():
+        raise DataError(directory, f"an empty folder, or a course with its {MARKER}", "a folder with other files")
 
 
 def _course_files(folder: Path, sources: list[Path], lectures: str) -> dict[str, str]:
@@ -175,9 +162,39 @@ def _source_text(source: Path, lectures: str) -> str:
     return notebook_text(notebook)
 
 
-def _write_what_is_not_changed(directory: Path, texts: dict[str, str], about: dict) -> tuple[dict[str, str], list[str]]:
-    """Write files, but not over one that isn't as it was written before; return all digests, and what was kept."""
-    before = about.get("files", {})
+def point_links(text: str, lectures: str) -> str:
+    """Let an exercise link to the lectures where its students find them.
+
+    Parameters
+    ----------
+    text : str
+        A text cell of an exercise. Its links to notebooks begin with `../`, the folder of notebooks.
+    lectures : str
+        The address of the folder that holds `00_tour.ipynb`, or its path from a student's copy of the exercise; "" when
+        students can't open it. Then only the link's text stays.
+
+    Raises
+    ------
+    ArgumentError
+        When the folder can't stand in a link.
+
+    Examples
+    --------
+    >>> point_links("The lecture is [00: the tour](../00_tour.ipynb).", "https://course.example/lectures")
+    'The lecture is [00: the tour](https://course.example/lectures/00_tour.ipynb).'
+    >>> point_links("The lecture is [00: the tour](../00_tour.ipynb).", "")
+    'The lecture is 00: the tour.'
+    """
+    if re.search(r"[\s()<>]", lectures):
+        raise ArgumentError("lectures", "an address or a path without blanks, parentheses and < or >", lectures)
+    new = rf"[\1]({lectures.rstrip('/')}/\2)" if lectures else r"\1"
+    return re.sub(r"\[([^\]]*)\]\(\.\./([^)]*)\)", lambda link: link.expand(new), text)
+
+
+def _write_unless_changed(
+    directory: Path, texts: dict[str, str], before: dict[str, str]
+) -> tuple[dict[str, str], list[str]]:
+    """Write files, but not over one that was changed since the last time; return all digests, and what was kept."""
     digests, kept = {}, []
     for name, text in texts.items():
         path = directory / name
@@ -198,18 +215,12 @@ def _digest(content: bytes) -> str:
 
 @contextmanager
 def course_api(directory: Path) -> Iterator[NbGraderAPI]:
-    """Open a course with the settings in its own folder.
+    """Open a course with the settings in its own folder, and yield nbgrader's commands on it.
 
     Parameters
     ----------
     directory : Path
-        A course that `build_course` wrote.
-
-    Yields
-    ------
-    NbGraderAPI
-        nbgrader's commands on that course. The settings put the instructor's module on the kernels' path; that is
-        undone when the block ends.
+        A course that `build_course` wrote. Its settings change the environment, which is undone when the block ends.
     """
     before = dict(os.environ)
     try:
@@ -222,17 +233,57 @@ def course_api(directory: Path) -> Iterator[NbGraderAPI]:
         os.environ.update(before)
 
 
-def _refuse_what_is_not_ours(directory: Path) -> None:
-    """Raise when a folder holds anything but a course that `build_course` wrote."""
-    if directory.is_file():
-        raise DataError(directory, "a folder", "a file")
-    if directory.exists() and any(directory.iterdir()) and not (directory / MARKER).is_file():
-        raise DataError(directory, f"an empty folder, or a course with its {MARKER}", "a folder with other files")
-
-
 def _release(api: NbGraderAPI, name: str, source: Path) -> None:
     """Let nbgrader release an exercise; raise when it doesn't."""
-    with causes(api.log) as found:
+    with caught_errors(api.log) as errors:
         result = api.generate_assignment(name)
     if not result["success"]:
-        raise DataError(source, "an exercise that nbgrader can release", why(result, found))
+        raise DataError(source, "an exercise that nbgrader can release", failure_reason(result, errors))
+
+
+@contextmanager
+def caught_errors(log: logging.Logger) -> Iterator[list[BaseException]]:
+    """Collect the errors that nbgrader catches while a block runs: it logs each, and raises another without the reason.
+
+    Parameters
+    ----------
+    log : Logger
+        nbgrader's log. Its gradebook writes nothing meanwhile.
+    """
+    errors: list[BaseException] = []
+    handler = logging.Handler(logging.ERROR)
+    handler.emit = lambda record: errors.extend(filter(None, [sys.exc_info()[1]]))
+    log.addHandler(handler)
+    was_silent, GRADEBOOK_LOG.disabled = GRADEBOOK_LOG.disabled, True
+    try:
+        yield errors
+    finally:
+        GRADEBOOK_LOG.disabled = was_silent
+        log.removeHandler(handler)
+
+
+def failure_reason(result: dict, errors: list[BaseException]) -> str:
+    """Say in one line why nbgrader failed.
+
+    Parameters
+    ----------
+    result : dict
+        What nbgrader's API returned.
+    errors : list of BaseException
+        What `caught_errors` collected. The last one counts; without any, the last line of nbgrader's own words.
+    """
+    said = result.get("error") or result.get("log") or "no reason"
+    return one_line(errors[-1]) if errors else said.strip().splitlines()[-1]
+
+
+def one_line(error: BaseException) -> str:
+    """Return an error's kind, unless it is one of this package's own errors, and its first line.
+
+    Parameters
+    ----------
+    error : BaseException
+        The error.
+    """
+    says = [*str(error).splitlines(), ""][0][:300]
+    ours = type(error).__module__.startswith("semgrid_edu.")
+    return says if ours else f"{type(error).__name__}: {says}".removesuffix(": ")

@@ -1,6 +1,5 @@
 """A whole class: every submission that was collected, graded by nbgrader on all cores."""
 
-import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from glob import has_magic
@@ -12,20 +11,21 @@ from nbformat.v4 import new_markdown_cell
 from tqdm import tqdm
 
 from semgrid_edu.errors import DataError
-from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, autograde_one, place
-from semgrid_edu.workshop.course.nbgrader.failures import UngradedError, in_one_line
+from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, UngradedError, autograde_one, place
+from semgrid_edu.workshop.course.nbgrader.build import one_line
 from semgrid_edu.workshop.course.nbgrader.gradebook import (
     Graded,
+    check_file,
+    check_time,
     forget,
     is_graded,
     open_gradebook,
     result_of,
+    submissions,
     unfinished,
 )
-from semgrid_edu.workshop.course.nbgrader.preprocessors import CRASHED
-from semgrid_edu.workshop.course.nbgrader.submissions import check_file, check_time, submissions
+from semgrid_edu.workshop.course.nbgrader.preprocessors import CRASHED, prepare, starter
 from semgrid_edu.workshop.course.notebooks.build import write_notebook
-from semgrid_edu.workshop.course.sandbox.prepared import prepare, starter
 
 UNREADABLE = "unreadable"
 """The folder with notebooks that stand in for files that can't be read."""
@@ -65,7 +65,7 @@ def grade_course(
     ArgumentError
         When there is no such assignment.
     UngradedError
-        In the end, when submissions stay ungraded for a reason that isn't theirs; it names them, one a line.
+        In the end, when submissions stay ungraded for a reason that isn't theirs; it names them, one per line.
     """
     course = course.resolve()
     wanted = [one for one in submissions(course, assignments) if again or not is_graded(course, *one)]
@@ -83,13 +83,13 @@ def grade_course(
 
 
 def _as_they_end(course: Path, waiting: dict[Future, tuple[str, str]], failed: dict[str, str]) -> Iterator[Graded]:
-    """Yield results; tell of submissions that have none, since their grading failed or its process was ended."""
+    """Yield results; note submissions that have none because their grading failed or its process was ended."""
     for done in tqdm(as_completed(waiting), "submissions", len(waiting)):
         try:
             yield done.result()
         except Exception as error:
             forget(course, *waiting[done])
-            failed[", ".join(reversed(waiting[done]))] = in_one_line(error)
+            failed[", ".join(reversed(waiting[done]))] = one_line(error)
 
 
 def _failing_references(
@@ -101,30 +101,24 @@ def _failing_references(
         for name in dict.fromkeys(assignments)
     }
     errors = {name: trial.exception() for name, trial in trials.items()}
-    return {name: in_one_line(error) for name, error in errors.items() if error is not None}
+    return {name: one_line(error) for name, error in errors.items() if error is not None}
 
 
 def missing_limits(settings: GradeSettings) -> list[str]:
-    """Start a process as students' code gets it, and return what can't be limited.
+    """Start a process as students' code gets it, and return which of `limits.PARTS` can't be limited.
 
     Parameters
     ----------
     settings : GradeSettings
-        How a class is graded.
-
-    Returns
-    -------
-    list of str
-        Of `limits.PARTS`; empty with a container, whose own command says what is limited.
+        How a class is graded. With a container nothing is missing: its own command says what is limited.
 
     Raises
     ------
     OSError
         When the process or the container doesn't start.
     """
-    with tempfile.TemporaryDirectory() as nothing:
-        process = starter(settings.memory, settings.container)(Path(nothing))
-        process.stop()
+    process = starter(settings.memory, settings.container)(None)
+    process.stop()
     return process.unlimited
 
 
@@ -140,11 +134,6 @@ def grade_one(course: Path, assignment: str, student: str, settings: GradeSettin
     settings : GradeSettings
         How.
 
-    Returns
-    -------
-    Graded
-        The result.
-
     Raises
     ------
     UngradedError
@@ -159,7 +148,7 @@ def grade_one(course: Path, assignment: str, student: str, settings: GradeSettin
                 _grade_stand_in(course, assignment, student, settings, f"{CRASHED}the file can't be graded: {fault}")
             return result_of(course, assignment, student)
     except Exception as error:
-        raise UngradedError(in_one_line(error)) from error
+        raise UngradedError(one_line(error)) from error
 
 
 def _graded_or_fault(course: Path, assignment: str, student: str, settings: GradeSettings) -> str:
@@ -170,7 +159,7 @@ def _graded_or_fault(course: Path, assignment: str, student: str, settings: Grad
         check_file(path)
         autograde_one(course, assignment, student, settings)
     except DataError as error:
-        return error.args[2] if error.path == path else in_one_line(error)
+        return error.args[2] if error.path == path else one_line(error)
     return ""
 
 

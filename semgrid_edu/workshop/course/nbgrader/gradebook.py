@@ -1,19 +1,25 @@
-"""What has been graded: whether all of a submission has, and what the gradebook says of it."""
+"""What was handed in, whether it can be graded and has been, and what the gradebook says of it."""
 
 import csv
 import io
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass, field, fields
 from pathlib import Path
 
+import nbformat
 from nbgrader.api import Gradebook, MissingEntry
+from nbgrader.utils import parse_utc
 
+from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.files import write_text
 from semgrid_edu.workshop.course.nbgrader.autograde import place
+from semgrid_edu.workshop.course.nbgrader.build import MARKER, one_line
 from semgrid_edu.workshop.course.nbgrader.preprocessors import CRASHED
-from semgrid_edu.workshop.course.nbgrader.submissions import submissions
+
+LARGEST = 100_000_000
+"""Bytes of a submission with all its files."""
 
 GRADED = "graded.csv"
 """The file with one line for each submission."""
@@ -46,9 +52,96 @@ class Graded:
     note: str = field(default="")
 
 
+def submissions(course: Path, assignments: Sequence[str] = ()) -> list[tuple[str, str]]:
+    """Return assignment and student of each file `submitted/STUDENT/ASSIGNMENT/ASSIGNMENT.ipynb`.
+
+    Parameters
+    ----------
+    course : Path
+        A course that `build_course` wrote.
+    assignments : sequence of str
+        Only these; all when empty.
+
+    Raises
+    ------
+    DataError
+        When the folder is no course.
+    ArgumentError
+        When there is no such assignment.
+    """
+    if not (course / MARKER).is_file():
+        raise DataError(course, f"a course with its {MARKER}; `semgrid-edu course build` writes one", "none")
+    known = sorted(folder.name for folder in (course / "source").iterdir())
+    if unknown := set(assignments) - set(known):
+        raise ArgumentError("assignments", f"some of {', '.join(known)}", ", ".join(sorted(unknown)))
+    found = (path.parent for path in (course / "submitted").glob("*/*/*.ipynb") if path.stem == path.parent.name)
+    return sorted((at.name, at.parent.name) for at in found if at.name in (assignments or known))
+
+
+def misplaced(course: Path) -> list[Path]:
+    """Return notebooks that nobody grades, because of their names or places, as paths within the course.
+
+    Parameters
+    ----------
+    course : Path
+        A course that `build_course` wrote. A notebook beside one that is graded isn't misplaced.
+    """
+    graded = {course / "submitted" / student / assignment for assignment, student in submissions(course)}
+    found = sorted((course / "submitted").rglob("*.ipynb"))
+    return [path.relative_to(course) for path in found if not graded.intersection(path.parents)]
+
+
+def check_file(path: Path) -> None:
+    """Raise when a submission can't be graded whatever is in its answers.
+
+    Parameters
+    ----------
+    path : Path
+        The notebook.
+
+    Raises
+    ------
+    DataError
+        When it is no notebook, is huge with the files beside it, or comes with links, which nbgrader would follow to
+        other people's files.
+    """
+    folder = path.parent
+    if links := [one for one in (folder.parent, folder, *folder.rglob("*")) if one.is_symlink()]:
+        raise DataError(links[0].name, "a file or folder", "a link")
+    if (size := sum(one.lstat().st_size for one in folder.rglob("*"))) > LARGEST:
+        raise DataError(path.name, f"at most {LARGEST} bytes with all files beside it", size)
+    try:
+        nbformat.validate(nbformat.read(path, as_version=4))
+    except OSError:
+        raise
+    except Exception as error:
+        raise DataError(path.name, "a notebook", one_line(error)) from error
+
+
+def check_time(path: Path) -> None:
+    """Raise when the instructor's note on when a submission came can't be read.
+
+    Parameters
+    ----------
+    path : Path
+        The notebook; `timestamp.txt` may lie beside it.
+
+    Raises
+    ------
+    DataError
+        When that file holds no time.
+    """
+    note = path.with_name("timestamp.txt")
+    text = note.read_text(encoding="utf-8", errors="replace").strip() if note.exists() else ""
+    try:
+        parse_utc(text or None)
+    except (ValueError, OverflowError):
+        raise DataError(note, "a time such as 2027-03-01 17:12:00 UTC", text[:100]) from None
+
+
 @contextmanager
 def unfinished(course: Path, assignment: str, student: str) -> Iterator[None]:
-    """Mark a submission as unfinished while a block grades it: when the block is killed, the mark stays.
+    """Mark a submission as unfinished while a block grades it: when the process is killed, the mark stays.
 
     Parameters
     ----------
@@ -68,7 +161,7 @@ def unfinished(course: Path, assignment: str, student: str) -> Iterator[None]:
 
 
 def forget(course: Path, assignment: str, student: str) -> None:
-    """Delete what an unfinished grading has left: for nbgrader, too, the submission then isn't graded.
+    """Delete what an unfinished grading has left, so that nbgrader, too, doesn't take the submission for graded.
 
     Parameters
     ----------
@@ -105,7 +198,7 @@ def is_graded(course: Path, assignment: str, student: str) -> bool:
 
 
 def _is_up_to_date(course: Path, assignment: str, student: str) -> bool:
-    """Return whether nbgrader has made its whole notebook of a submission after that was handed in."""
+    """Return whether nbgrader wrote all of a submission's graded notebook, and did so after it was handed in."""
     submitted, graded = (place(course, step, student, assignment) for step in ("submitted", "autograded"))
     if _mark(course, assignment, student).exists():
         return False
@@ -122,7 +215,7 @@ def _has_scores(gradebook: Gradebook, assignment: str, student: str) -> bool:
 
 
 def result_of(course: Path, assignment: str, student: str) -> Graded:
-    """Read what a graded submission has from the gradebook.
+    """Read the result of a graded submission from the gradebook.
 
     Parameters
     ----------
@@ -130,18 +223,13 @@ def result_of(course: Path, assignment: str, student: str) -> Graded:
         The course.
     assignment, student : str
         Whose submission.
-
-    Returns
-    -------
-    Graded
-        Its result.
     """
     with open_gradebook(course) as gradebook:
         return _row(gradebook, assignment, student)
 
 
 def _row(gradebook: Gradebook, assignment: str, student: str) -> Graded:
-    """Read what a submission has from the gradebook."""
+    """Read the result of a submission."""
     found = gradebook.find_submission_notebook(assignment, assignment, student)
     crashes = [comment.auto_comment for comment in found.comments if (comment.auto_comment or "").startswith(CRASHED)]
     to_read = sum(grade.needs_manual_grade for grade in found.grades)
@@ -149,33 +237,23 @@ def _row(gradebook: Gradebook, assignment: str, student: str) -> Graded:
 
 
 def open_gradebook(course: Path) -> Gradebook:
-    """Open the gradebook of a course.
+    """Open the gradebook of a course, for a `with` block.
 
     Parameters
     ----------
     course : Path
         The course.
-
-    Returns
-    -------
-    Gradebook
-        nbgrader's, which closes with its `with` block.
     """
     return Gradebook(f"sqlite:///{course / 'gradebook.db'}")
 
 
 def write_graded(course: Path) -> Path:
-    """Write what all submissions have so far, one line each, as a spreadsheet reads it.
+    """Write all scores so far, one line for each submission, to `graded.csv` in the course; return its path.
 
     Parameters
     ----------
     course : Path
         The course.
-
-    Returns
-    -------
-    Path
-        The file, `graded.csv` in the course.
     """
     text = io.StringIO()
     table = csv.writer(text)

@@ -1,9 +1,14 @@
 """What this course adds to nbgrader's autograde: submissions are made whole, and run apart from their tests."""
 
+import sys
 import zlib
+from collections.abc import Callable
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import bleach
+import nbformat
+from filelock import FileLock
 from nbconvert.exporters.exporter import ResourcesDict
 from nbconvert.filters import strip_files_prefix
 from nbformat import NotebookNode
@@ -14,8 +19,11 @@ from nbgrader.utils import is_grade, is_solution
 from traitlets import Bool, Integer, Unicode
 from traitlets import List as ListTrait
 
-from semgrid_edu.workshop.course.sandbox.notebook import cell_name, run_submission
-from semgrid_edu.workshop.course.sandbox.prepared import prepare, starter
+from semgrid_edu.errors import DataError
+from semgrid_edu.storage.compiled import takes_files, user_cache
+from semgrid_edu.workshop.course.sandbox.limits import Limits
+from semgrid_edu.workshop.course.sandbox.notebook import INSTRUCTOR, cell_name, run_submission
+from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 
 CRASHED = "Crashed: "
 """How a comment begins that says what ended Python."""
@@ -25,13 +33,19 @@ SHOWN_TAGS = (
     *("br", "dd", "del", "div", "dl", "dt", "h1", "h2", "h3", "h4", "h5", "h6", "hr", "img", "p", "pre", "s", "span"),
     *("sub", "sup", "table", "tbody", "td", "th", "thead", "tr"),
 )
-"""What Markdown makes, and nothing that runs."""
+"""The HTML that Markdown becomes, and nothing that runs."""
 
 KEPT = ("kernelspec", "language_info")
 """What is kept of a notebook's metadata."""
 
 CRASHES = "crashes"
-"""Under this name `ExecuteApart` hands over to `NoteCrashes` what ended a student's process."""
+"""The name under which `ExecuteApart` leaves for `NoteCrashes` what ended a student's process."""
+
+PATIENCE = 600.0
+"""Seconds that a cell of the reference may take; it compiles functions that submissions then find compiled."""
+
+FONTS = "import matplotlib.pyplot"
+"""Lets matplotlib look for the system's fonts, which takes seconds."""
 
 
 class MakeWhole(NbGraderPreprocessor):
@@ -82,7 +96,7 @@ def _blank(source: SourceCell, exercise) -> NotebookNode:
 
 
 def _mark(cells: list[NotebookNode], blanks: dict[str, NotebookNode]) -> None:
-    """Let the last cell of each name have the exercise's metadata for it, and the others none."""
+    """Give the last cell of each name the exercise's metadata for it, and all other cells none."""
     left = dict(blanks)
     for cell in reversed(cells):
         blank = left.pop(cell_name(cell), None)
@@ -144,14 +158,103 @@ class ExecuteApart(NbGraderPreprocessor):
         return nb, resources
 
 
+def use_instructor(folder: Path) -> None:
+    """Let test cells import the hidden tests of this course, and of no other.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder `instructor` of a course.
+    """
+    place = folder / INSTRUCTOR / "__init__.py"
+    if getattr(sys.modules.get(INSTRUCTOR), "__file__", None) == str(place):
+        return
+    for name in [name for name in sys.modules if name.partition(".")[0] == INSTRUCTOR]:
+        del sys.modules[name]
+    spec = spec_from_file_location(INSTRUCTOR, place)
+    sys.modules[INSTRUCTOR] = module_from_spec(spec)
+    spec.loader.exec_module(sys.modules[INSTRUCTOR])
+
+
+def starter(memory: int, container: tuple[str, ...], keeps: bool = False) -> Callable[[Path | None], StudentProcess]:
+    """Return a function that starts a process for a student's code, given the folder of what is prepared.
+
+    Parameters
+    ----------
+    memory : int
+        Megabytes of memory for the process.
+    container : tuple of str
+        A command that starts a program in a container; () for none.
+    keeps : bool
+        Whether the process adds what it compiles to that folder.
+    """
+    return lambda prepared: StudentProcess(Limits(memory=memory), prepared, keeps, container)
+
+
+def prepare(course: Path, assignment: str, memory: int, container: tuple[str, ...] = ()) -> Path:
+    """Grade the reference answers once in each course; return the folder of what they had compiled.
+
+    Parameters
+    ----------
+    course : Path
+        A course that `build_course` wrote.
+    assignment : str
+        The exercise.
+    memory : int
+        Megabytes of memory for the process.
+    container : tuple of str
+        A command that starts a program in a container: what passes outside needn't pass in there. () for none.
+
+    Raises
+    ------
+    DataError
+        When the reference answers don't pass their own tests.
+    """
+    use_instructor(course / "instructor")
+    # What is compiled serves all of the user's courses, unless the user's cache can't be written to.
+    shared = user_cache() / "semgrid_edu" / "prepared" / assignment
+    folder = shared if takes_files(shared) else course / "prepared" / assignment
+    folder.mkdir(parents=True, exist_ok=True)
+    passed = course / "prepared" / f"{assignment} passed{' in a container' if container else ''}"
+    passed.parent.mkdir(exist_ok=True)
+    with FileLock(folder.with_suffix(".lock")):
+        if not passed.exists():
+            _grade_reference(course, assignment, folder, starter(memory, container, keeps=True))
+            passed.touch()
+    return folder
+
+
+def _grade_reference(course: Path, assignment: str, folder: Path, start: Callable[[Path], StudentProcess]) -> None:
+    """Run an exercise with the instructor's answers in it."""
+    path = course / "source" / assignment / f"{assignment}.ipynb"
+    notebook = nbformat.read(path, as_version=4)
+    notebook.cells.insert(0, new_code_cell(FONTS))
+    run_submission(notebook, instructors_cells(notebook), lambda: start(folder), PATIENCE)
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    if errors := [f"{output.ename}: {output.evalue}" for output in outputs if output.output_type == "error"]:
+        raise DataError(path, "reference answers that pass their tests", "; ".join(errors))
+
+
+def instructors_cells(notebook: NotebookNode) -> dict[str, str]:
+    """Return the text of the cells that aren't answers, by grade_id, for `run_submission`.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        An exercise's source.
+    """
+    cells = [cell for cell in notebook.cells if cell.metadata.get("nbgrader") and not is_solution(cell)]
+    return {cell.metadata.nbgrader.grade_id: cell.source for cell in cells}
+
+
 def without_scripts(html: str) -> str:
-    """Return the HTML of a text cell without all that could run in a browser: that of the instructor is logged in.
+    """Take out of a text cell's HTML whatever could run in a browser: the instructor's is logged in.
 
     Parameters
     ----------
     html : str
-        What nbconvert made of Markdown. This takes the place of its filter `strip_files_prefix`, the last that nbgrader
-        applies.
+        What nbconvert made of Markdown. This function stands in for its filter `strip_files_prefix`, the last that
+        nbgrader applies.
     """
     attributes = {**bleach.ALLOWED_ATTRIBUTES, "*": ["class", "id"], "img": ["src", "alt"]}
     return bleach.clean(strip_files_prefix(html), tags=SHOWN_TAGS, attributes=attributes)

@@ -27,17 +27,12 @@ LIVE = "application/vnd.jupyter.widget-view+json"
 
 
 def lecture_sources(folder: Path = NOTEBOOKS) -> list[Path]:
-    """Return the percent sources of all lectures, in the order of the course.
+    """Return the percent sources of all lectures, `src/NN_name.py`, in the order of the course.
 
     Parameters
     ----------
     folder : Path
         The folder of notebooks.
-
-    Returns
-    -------
-    list of Path
-        The files `src/NN_name.py`.
 
     Raises
     ------
@@ -51,17 +46,12 @@ def lecture_sources(folder: Path = NOTEBOOKS) -> list[Path]:
 
 
 def companion_sources(folder: Path = NOTEBOOKS) -> list[Path]:
-    """Return the percent sources of all companion notebooks.
+    """Return the percent sources of all companion notebooks, `src/deeper/NAME.py`, sorted by name; there may be none.
 
     Parameters
     ----------
     folder : Path
         The folder of notebooks.
-
-    Returns
-    -------
-    list of Path
-        The files `src/deeper/NAME.py`, sorted by name; there may be none.
     """
     return sorted((folder / "src" / "deeper").glob("*.py"))
 
@@ -73,28 +63,18 @@ def notebook_name(source: Path) -> str:
     ----------
     source : Path
         A percent source in the folder `src` or below it.
-
-    Returns
-    -------
-    str
-        The path of the source within `src`, without its suffix.
     """
     sources = next(folder for folder in source.parents if folder.name == "src")
     return source.relative_to(sources).with_suffix("").as_posix()
 
 
 def built_path(source: Path) -> Path:
-    """Return the path of a source's notebook: that of the source without `src`.
+    """Return the path of a source's notebook, which needn't exist yet: the source's path without `src`.
 
     Parameters
     ----------
     source : Path
         A percent source in the folder `src` or below it.
-
-    Returns
-    -------
-    Path
-        The notebook; it needn't exist yet.
 
     Examples
     --------
@@ -106,7 +86,7 @@ def built_path(source: Path) -> Path:
 
 
 def named(sources: list[Path], names: list[str] | None) -> list[Path]:
-    """Return the sources with the given names; all of them when no name is given.
+    """Return the sources with the given names, in their order; all of them when no name is given.
 
     Parameters
     ----------
@@ -114,11 +94,6 @@ def named(sources: list[Path], names: list[str] | None) -> list[Path]:
         The sources to choose from. A lecture and its exercise have the same name, and are chosen together.
     names : list of str, optional
         The names to keep, such as "03_bof" or "graphical_models".
-
-    Returns
-    -------
-    list of Path
-        The chosen sources, in their order.
 
     Raises
     ------
@@ -135,15 +110,12 @@ def named(sources: list[Path], names: list[str] | None) -> list[Path]:
 def read_percent(path: Path) -> NotebookNode:
     """Read a percent source as a notebook that has not run.
 
+    The ids of its cells depend on the cells' text alone, so two conversions are equal byte for byte.
+
     Parameters
     ----------
     path : Path
         A jupytext source in percent format.
-
-    Returns
-    -------
-    NotebookNode
-        The notebook. The ids of its cells depend on the cells' text alone, so two conversions are equal byte for byte.
 
     Raises
     ------
@@ -189,7 +161,10 @@ def notebook_text(notebook: NotebookNode) -> str:
 
 
 def execute(notebook: NotebookNode, folder: Path, timeout: int = 300) -> NotebookNode:
-    """Run all cells, and keep the outputs that can be seen without a kernel.
+    """Run all cells of a notebook, and keep the outputs that can be seen without a kernel.
+
+    Views of widgets are left out. Figures are made smaller where the eye can't tell the difference, and carry the
+    alternative text of their cell.
 
     Parameters
     ----------
@@ -199,12 +174,6 @@ def execute(notebook: NotebookNode, folder: Path, timeout: int = 300) -> Noteboo
         The kernel's working directory: the folder in which a student would run the notebook.
     timeout : int
         The longest that one cell may take, seconds.
-
-    Returns
-    -------
-    NotebookNode
-        The same notebook, with outputs. The views of widgets are left out, because they show nothing without a kernel.
-        Figures are made smaller where the eye can't tell the difference, and carry the alternative text of their cell.
 
     Raises
     ------
@@ -223,17 +192,12 @@ def execute(notebook: NotebookNode, folder: Path, timeout: int = 300) -> Noteboo
 
 
 def build_lecture(source: Path) -> Path:
-    """Execute a lecture or a companion and write it.
+    """Execute a lecture or a companion and write it to its `built_path`, which is returned.
 
     Parameters
     ----------
     source : Path
         Its percent source.
-
-    Returns
-    -------
-    Path
-        The notebook written, at `built_path`.
     """
     target = built_path(source)
     target.parent.mkdir(exist_ok=True)

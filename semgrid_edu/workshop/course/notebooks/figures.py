@@ -21,17 +21,12 @@ LARGEST_SHIFT = 10.0
 
 
 def figures(cell: NotebookNode) -> Iterator[NotebookNode]:
-    """Yield the outputs of a cell that are images.
+    """Yield the outputs of a cell that have an image among their data.
 
     Parameters
     ----------
     cell : NotebookNode
         A cell of an executed notebook.
-
-    Yields
-    ------
-    NotebookNode
-        An output with an image among its data.
     """
     for output in cell.get("outputs", []):
         if any(kind.startswith("image/") for kind in output.get("data", {})):
@@ -53,7 +48,7 @@ def alternative_text(cell: NotebookNode, figure: NotebookNode) -> str:
 
 
 def resolution(png: bytes) -> int | None:
-    """Return the dots per inch that a PNG says it has; None when it doesn't say or is animated.
+    """Return the dots per inch that a PNG says it has, along its x axis; None when it doesn't say or is animated.
 
     Matplotlib writes them into every figure. Other pictures have no size in inches, and the size of an animation is
     limited in bytes instead.
@@ -62,11 +57,6 @@ def resolution(png: bytes) -> int | None:
     ----------
     png : bytes
         A PNG file.
-
-    Returns
-    -------
-    int or None
-        Dots per inch along the x axis, rounded.
     """
     with Image.open(io.BytesIO(png)) as image:
         dots = image.info.get("dpi")
@@ -74,17 +64,12 @@ def resolution(png: bytes) -> int | None:
 
 
 def moves(png: bytes) -> bool:
-    """Return whether a PNG is animated.
+    """Return whether a PNG has more than one frame.
 
     Parameters
     ----------
     png : bytes
         A PNG file.
-
-    Returns
-    -------
-    bool
-        True when it has more than one frame.
     """
     with Image.open(io.BytesIO(png)) as image:
         return getattr(image, "n_frames", 1) > 1
@@ -109,17 +94,12 @@ def finish_figures(cell: NotebookNode) -> None:
 
 
 def png_bytes(figure: NotebookNode) -> bytes:
-    """Return the PNG of an output.
+    """Return the PNG file in an output.
 
     Parameters
     ----------
     figure : NotebookNode
         An output with a PNG among its data.
-
-    Returns
-    -------
-    bytes
-        The PNG file.
     """
     return base64.b64decode(figure.data[PNG])
 

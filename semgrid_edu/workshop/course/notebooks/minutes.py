@@ -80,34 +80,25 @@ class ReadingTime:
 
 
 def reading_time(notebook: NotebookNode) -> ReadingTime:
-    """Return the reading time of a notebook.
+    """Return the reading time of a notebook, the sum over its sections.
 
     Parameters
     ----------
     notebook : NotebookNode
         The notebook; as long as it hasn't run, the figures below its cells aren't counted.
-
-    Returns
-    -------
-    ReadingTime
-        The sum over its sections.
     """
     return sum(section_times(notebook).values(), ReadingTime())
 
 
 def section_times(notebook: NotebookNode) -> dict[str, ReadingTime]:
-    """Return the reading time of each section.
+    """Return the reading time of each section, by the text of its heading (`## ...`), in order.
+
+    The part before the first heading is "(header)".
 
     Parameters
     ----------
     notebook : NotebookNode
         The notebook; as long as it hasn't run, the figures below its cells aren't counted.
-
-    Returns
-    -------
-    dict of str to ReadingTime
-        Reading times by the text of each section's heading (`## ...`), in order. The part before the first heading is
-        "(header)".
     """
     section = "(header)"
     times = {section: ReadingTime()}
@@ -123,17 +114,12 @@ def section_times(notebook: NotebookNode) -> dict[str, ReadingTime]:
 
 
 def time_of_text(text: str) -> ReadingTime:
-    """Return the reading time of a text in Markdown.
+    """Return the words, displayed equations, pictures and predictions of a text in Markdown.
 
     Parameters
     ----------
     text : str
         The text of a cell, or a part of it.
-
-    Returns
-    -------
-    ReadingTime
-        Its words, displayed equations, pictures and predictions.
 
     Examples
     --------
@@ -152,34 +138,26 @@ def time_of_text(text: str) -> ReadingTime:
 
 
 def stated_minutes(notebook: NotebookNode) -> int | None:
-    """Return the minutes that the header of a notebook states.
+    """Return the minutes that the header of a notebook states; None when it states none.
 
     Parameters
     ----------
     notebook : NotebookNode
         The notebook, executed or not.
-
-    Returns
-    -------
-    int or None
-        The minutes; None when the notebook states none.
     """
     found = STATED.search("\n".join(cell.source for cell in notebook.cells))
     return int(found[1]) if found else None
 
 
 def minutes_table(sources: list[Path]) -> str:
-    """Return a table of where the time goes: a line for each notebook, or for each section of a single notebook.
+    """Return a table of minutes: a line for each notebook, or for each section of a single notebook.
+
+    "stated" is what the header says.
 
     Parameters
     ----------
     sources : list of Path
         Percent sources of lectures and companions. Figures are counted in the executed notebooks, if there are any.
-
-    Returns
-    -------
-    str
-        A table of minutes; "stated" is what the header says.
     """
     notebooks = {notebook_name(source): _built(source) for source in sources}
     rows = {name: reading_time(notebook) for name, notebook in notebooks.items()}

@@ -1,7 +1,4 @@
-"""Rules that protect the reader of a notebook: honest minutes, no answer in sight, figures that everybody can read.
-
-Which lectures may break which rules until their second edition: a list that only gets shorter.
-"""
+"""Rules that protect the reader of a notebook: honest minutes, no answer in sight, figures that everybody can read."""
 
 import ast
 import re
@@ -29,16 +26,11 @@ def dishonest_minutes(notebook: NotebookNode) -> list[str]:
     ----------
     notebook : NotebookNode
         An executed notebook.
-
-    Returns
-    -------
-    list of str
-        One sentence per problem; empty when there is none.
     """
     needed, stated = round(reading_time(notebook).minutes), stated_minutes(notebook)
     if stated is None or stated >= needed:
         return []
-    return [f"states {stated} minutes and takes {needed}; `semgrid-edu course minutes NAME` tells where they go"]
+    return [f"states {stated} minutes and takes {needed}; `semgrid-edu course minutes NAME` shows where they go"]
 
 
 def too_long(notebook: NotebookNode) -> list[str]:
@@ -48,11 +40,6 @@ def too_long(notebook: NotebookNode) -> list[str]:
     ----------
     notebook : NotebookNode
         An executed notebook.
-
-    Returns
-    -------
-    list of str
-        One sentence per problem; empty when there is none.
     """
     needed = round(reading_time(notebook).minutes)
     if needed <= MAX_MINUTES:
@@ -70,11 +57,6 @@ def answers_in_sight(notebook: NotebookNode) -> list[str]:
     ----------
     notebook : NotebookNode
         An executed notebook.
-
-    Returns
-    -------
-    list of str
-        One sentence per problem; empty when there is none.
     """
     problems, open_question = [], False
     for cell in notebook.cells:
@@ -96,16 +78,11 @@ def plot_code_in_sight(notebook: NotebookNode) -> list[str]:
     ----------
     notebook : NotebookNode
         An executed notebook.
-
-    Returns
-    -------
-    list of str
-        One sentence per problem; empty when there is none.
     """
     return [
         f'cell {_first_line(cell)} only plots; give it jupyter={{"source_hidden": true}}'
-        for cell in _cells_with_figures(notebook)
-        if _only_plots(cell.source) and not _collapsed(cell, "source_hidden")
+        for cell in notebook.cells
+        if any(figures(cell)) and _only_plots(cell.source) and not _collapsed(cell, "source_hidden")
     ]
 
 
@@ -116,21 +93,13 @@ def missing_alternative_texts(notebook: NotebookNode) -> list[str]:
     ----------
     notebook : NotebookNode
         An executed notebook.
-
-    Returns
-    -------
-    list of str
-        One sentence per problem; empty when there is none.
     """
     problems = []
-    for cell in _cells_with_figures(notebook):
-        for figure in figures(cell):
-            words = len(alternative_text(cell, figure).split())
-            if words < MIN_ALT_WORDS:
-                found = f"one of {words} words" if words else "none"
-                problems.append(
-                    f'the figure of cell {_first_line(cell)} needs an alternative text, alt="...", has {found}'
-                )
+    for cell, figure in _figures(notebook):
+        words = len(alternative_text(cell, figure).split())
+        if words < MIN_ALT_WORDS:
+            found = f"one of {words} words" if words else "none"
+            problems.append(f'the figure of cell {_first_line(cell)} needs an alternative text, alt="...", has {found}')
     return problems
 
 
@@ -141,18 +110,12 @@ def coarse_figures(notebook: NotebookNode) -> list[str]:
     ----------
     notebook : NotebookNode
         An executed notebook.
-
-    Returns
-    -------
-    list of str
-        One sentence per problem; empty when there is none.
     """
     problems = []
-    for cell in _cells_with_figures(notebook):
-        for figure in figures(cell):
-            dpi = resolution(png_bytes(figure)) if PNG in figure.data else None
-            if dpi is not None and dpi < FIGURE_DPI:
-                problems.append(f"the figure of cell {_first_line(cell)} has {dpi} dots per inch, not {FIGURE_DPI}")
+    for cell, figure in _figures(notebook):
+        dpi = resolution(png_bytes(figure)) if PNG in figure.data else None
+        if dpi is not None and dpi < FIGURE_DPI:
+            problems.append(f"the figure of cell {_first_line(cell)} has {dpi} dots per inch, not {FIGURE_DPI}")
     return problems
 
 
@@ -163,24 +126,15 @@ def unfit_animations(notebook: NotebookNode) -> list[str]:
     ----------
     notebook : NotebookNode
         An executed notebook.
-
-    Returns
-    -------
-    list of str
-        One sentence per problem; empty when there is none.
     """
     problems = []
-    for cell in _cells_with_figures(notebook):
-        for figure in figures(cell):
-            for kind in {"image/gif", "image/webp"} & set(figure.data):
-                problems.append(
-                    f"cell {_first_line(cell)} shows {kind}, which nbconvert leaves out; use plotting.animate"
-                )
-            if PNG in figure.data and moves(png := png_bytes(figure)) and len(png) > MAX_ANIMATION_BYTES:
-                limit = f"{MAX_ANIMATION_BYTES // 1000} kB"
-                problems.append(
-                    f"the animation of cell {_first_line(cell)} has {len(png) // 1000} kB, more than {limit}"
-                )
+    for cell, figure in _figures(notebook):
+        name = _first_line(cell)
+        for kind in {"image/gif", "image/webp"} & set(figure.data):
+            problems.append(f"cell {name} shows {kind}, which nbconvert leaves out; use plotting.animate")
+        if PNG in figure.data and moves(png := png_bytes(figure)) and len(png) > MAX_ANIMATION_BYTES:
+            limit = f"{MAX_ANIMATION_BYTES // 1000} kB"
+            problems.append(f"the animation of cell {name} has {len(png) // 1000} kB, more than {limit}")
     return problems
 
 
@@ -196,12 +150,27 @@ RULES: dict[str, Rule] = {
     "resolution": coarse_figures,
     "animations": unfit_animations,
 }
-"""All rules, by the names that `exceptions.py` uses."""
+"""All rules, by the names that waivers use."""
+
+NOT_YET = frozenset({"predictions", "plot code", "alternative texts", "resolution"})
+
+WAIVERS: Mapping[str, frozenset[str]] = {
+    "00_tour": NOT_YET,
+    "01_bayes": frozenset({"alternative texts"}),
+    "02_grids": NOT_YET - {"resolution"} | {"length"},
+    "03_bof": NOT_YET - {"resolution"} | {"length"},
+    "04_cmcdot": NOT_YET | {"length"},
+    "05_pixels": NOT_YET | {"length"},
+    "06_planes": NOT_YET | {"length"},
+    "07_segmentation": NOT_YET | {"length"},
+    "08_fusion": NOT_YET | {"length"},
+}
+"""The rules that each lecture may break until its second edition. A waiver that isn't needed is a problem too."""
 
 
-def _cells_with_figures(notebook: NotebookNode) -> Iterator[NotebookNode]:
-    """Yield the cells that show a figure."""
-    yield from (cell for cell in notebook.cells if next(figures(cell), None))
+def _figures(notebook: NotebookNode) -> Iterator[tuple[NotebookNode, NotebookNode]]:
+    """Yield every figure with the cell that shows it."""
+    yield from ((cell, figure) for cell in notebook.cells for figure in figures(cell))
 
 
 def _collapsed(cell: NotebookNode, what: str) -> bool:
@@ -225,26 +194,8 @@ def _first_line(cell: NotebookNode) -> str:
     return f"'{cell.source.strip().splitlines()[0][:60]}'"
 
 
-NOT_YET = frozenset({"predictions", "plot code", "alternative texts", "resolution"})
-
-EXCEPTIONS: Mapping[str, frozenset[str]] = {
-    "00_tour": NOT_YET,
-    "01_bayes": frozenset({"alternative texts"}),
-    "02_grids": NOT_YET - {"resolution"} | {"length"},
-    "03_bof": NOT_YET - {"resolution"} | {"length"},
-    "04_cmcdot": NOT_YET | {"length"},
-    "05_pixels": NOT_YET | {"length"},
-    "06_planes": NOT_YET | {"length"},
-    "07_segmentation": NOT_YET | {"length"},
-    "08_fusion": NOT_YET | {"length"},
-}
-"""The rules that each lecture may break, by their names in `RULES`. An exception that isn't needed is a problem too."""
-
-
-def rule_problems(
-    notebook: NotebookNode, rules: Mapping[str, Rule] = RULES, allowed: Collection[str] = ()
-) -> list[str]:
-    """List where a notebook breaks a rule without having an exception, and the exceptions that it no longer needs.
+def rule_problems(notebook: NotebookNode, rules: Mapping[str, Rule] = RULES, waived: Collection[str] = ()) -> list[str]:
+    """List where a notebook breaks a rule without a waiver, and the waivers that it no longer needs.
 
     Parameters
     ----------
@@ -252,20 +203,13 @@ def rule_problems(
         An executed notebook.
     rules : mapping of str to Rule
         The rules to check, by name.
-    allowed : collection of str
+    waived : collection of str
         Names of the rules that this notebook may break.
-
-    Returns
-    -------
-    list of str
-        One sentence per problem; empty when there is none.
     """
     problems = []
     for name, rule in rules.items():
         found = rule(notebook)
-        if name in allowed and not found:
-            problems.append(
-                f"keeps the rule on {name}; take its exception out of semgrid_edu/workshop/course/notebooks/rules.py"
-            )
-        problems += [] if name in allowed else found
+        if name in waived and not found:
+            problems.append(f"keeps the rule on {name}; take its waiver out of workshop/course/notebooks/rules.py")
+        problems += [] if name in waived else found
     return problems

@@ -1,6 +1,6 @@
-"""Landlock: a Linux process gives up, for good, all files but those that it names (kernel 5.13; landlock(7)).
+"""What a Linux process gives up for good: all files but those it names (Landlock), and some system calls (seccomp).
 
-Seccomp: a Linux process gives up, for good, system calls by their numbers (seccomp(2), bpf(2)).
+Landlock came with kernel 5.13: landlock(7). Seccomp's filter is a small program for the kernel: seccomp(2), bpf(2).
 """
 
 import ctypes
@@ -12,7 +12,23 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-NUMBERS = {
+NO_NEW_PRIVILEGES = 38
+"""The argument of prctl without which the kernel refuses both."""
+
+CREATE, ADD, RESTRICT = 444, 445, 446
+"""Numbers of Landlock's three system calls, the same on every processor."""
+
+EXECUTE, READ_FILE, READ_DIR, TRUNCATE, DEVICE_CONTROL = 1 << 0, 1 << 2, 1 << 3, 1 << 14, 1 << 15
+READ = EXECUTE | READ_FILE | READ_DIR
+"""The rights to what may only be read."""
+
+OF_FILES = EXECUTE | 1 << 1 | READ_FILE | TRUNCATE | DEVICE_CONTROL
+"""The rights that a single file can have; the others belong to folders."""
+
+FILE_RIGHTS = {1: (1 << 13) - 1, 2: (1 << 14) - 1, 3: (1 << 15) - 1, 4: (1 << 15) - 1, 5: (1 << 16) - 1}
+"""All rights to files that a version of Landlock knows; later versions know those of version 5."""
+
+REFUSED_CALLS = {
     "x86_64": {
         **{"socket": 41, "shmget": 29, "semget": 64, "msgget": 68, "ptrace": 101, "mount": 165, "mq_open": 240},
         **{"add_key": 248, "request_key": 249, "keyctl": 250, "unshare": 272, "perf_event_open": 298, "setns": 308},
@@ -24,66 +40,25 @@ NUMBERS = {
         **{"memfd_create": 279, "bpf": 280, "userfaultfd": 282},
     },
 }
-"""The calls that are given up, by processor: they reach other processes, outlive this one, or hide what it takes."""
+"""The calls that seccomp refuses, by processor: they reach other processes, outlive this one, or hide what it takes."""
 
-EVERYWHERE = (425, 426, 427)
-"""io_uring_setup, io_uring_enter and io_uring_register: the same on every processor."""
+IO_URING = (425, 426, 427)
+"""io_uring_setup, io_uring_enter and io_uring_register, the same on every processor, are refused too."""
 
 AUDIT = {"x86_64": 0xC000003E, "aarch64": 0xC00000B7}
-"""The numbers of the processors' own calls; those of another kind, such as 32-bit ones, are all refused."""
+"""The numbers of the processors' own calls; calls of another kind, such as 32-bit ones, are all refused."""
 
 LOAD, EQUAL, AT_LEAST, RETURN = 0x20, 0x15, 0x35, 0x06
-"""The four instructions of the filter: load a word, two that compare it, and end."""
+"""The four instructions of the filter: load a word, compare it in two ways, and end."""
 
 ALLOW, REFUSE = 0x7FFF0000, 0x00050000 | errno.EPERM
-"""What the filter can say."""
+"""The filter's two verdicts."""
 
 SET_SECCOMP, FILTER = 22, 2
 """Arguments of prctl."""
 
 
-def refuse_calls() -> bool:
-    """Give up the system calls of `NUMBERS`; False where that isn't possible."""
-    machine = platform.machine()
-    if sys.platform != "linux" or machine not in NUMBERS:
-        return False
-    code = _filter(AUDIT[machine], [*NUMBERS[machine].values(), *EVERYWHERE])
-    program = ctypes.create_string_buffer(code)
-    # struct sock_fprog: the number of instructions, and where they are.
-    described = struct.pack("HP", len(code) // 8, ctypes.addressof(program))
-    library = ctypes.CDLL(None)
-    library.prctl(NO_NEW_PRIVILEGES, 1, 0, 0, 0)
-    return library.prctl(SET_SECCOMP, FILTER, described, 0, 0) == 0
-
-
-def _filter(audit: int, refused: list[int]) -> bytes:
-    """Return the filter's instructions: what they do, how many to skip if it is so and if not, and their number."""
-    lines = [(LOAD, 0, 0, 4), (EQUAL, 1, 0, audit), (RETURN, 0, 0, REFUSE), (LOAD, 0, 0, 0)]
-    # From 2^30 on, x86_64 has its calls once more, under other numbers.
-    lines += [(AT_LEAST, 0, 1, 1 << 30), (RETURN, 0, 0, REFUSE)]
-    for number in refused:
-        lines += [(EQUAL, 0, 1, number), (RETURN, 0, 0, REFUSE)]
-    return b"".join(struct.pack("HBBI", *line) for line in [*lines, (RETURN, 0, 0, ALLOW)])
-
-
-CREATE, ADD, RESTRICT = 444, 445, 446
-"""Numbers of the three system calls, the same on every processor."""
-
-NO_NEW_PRIVILEGES = 38
-"""The argument of prctl without which the kernel refuses."""
-
-EXECUTE, READ_FILE, READ_DIR, TRUNCATE, DEVICE_CONTROL = 1 << 0, 1 << 2, 1 << 3, 1 << 14, 1 << 15
-READ = EXECUTE | READ_FILE | READ_DIR
-"""What one may do with what is read only."""
-
-OF_FILES = EXECUTE | 1 << 1 | READ_FILE | TRUNCATE | DEVICE_CONTROL
-"""The rights that a single file can have; the others are those of folders."""
-
-FILE_RIGHTS = {1: (1 << 13) - 1, 2: (1 << 14) - 1, 3: (1 << 15) - 1, 4: (1 << 15) - 1, 5: (1 << 16) - 1}
-"""All rights to files that a version of Landlock knows; later versions know those of version 5."""
-
-
-def version() -> int:
+def landlock_version() -> int:
     """Return the version of Landlock that the kernel has; 0 without one, and on other systems."""
     # The number of the call means something else there.
     if sys.platform != "linux":
@@ -94,8 +69,8 @@ def version() -> int:
         return 0
 
 
-def restrict(look: Iterable[Path], read: Iterable[Path], write: Iterable[Path]) -> list[str]:
-    """Give up everything but some files, and TCP and signals to other processes where the kernel can.
+def give_up_files(look: Iterable[Path], read: Iterable[Path], write: Iterable[Path]) -> list[str]:
+    """Give up all other files, and TCP and signals to other processes where Landlock can.
 
     Parameters
     ----------
@@ -116,7 +91,7 @@ def restrict(look: Iterable[Path], read: Iterable[Path], write: Iterable[Path]) 
     OSError
         When the kernel refuses.
     """
-    known = version()
+    known = landlock_version()
     files = FILE_RIGHTS[min(known, 5)]
     attributes = struct.pack("QQQ", files, 3 if known >= 4 else 0, 3 if known >= 6 else 0)
     rules = _call(CREATE, attributes, 8 if known < 4 else 16 if known < 6 else 24, 0)
@@ -146,3 +121,27 @@ def _call(number: int, *arguments: bytes | int | None) -> int:
     if result < 0:
         raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
     return result
+
+
+def give_up_calls() -> bool:
+    """Give up the system calls of `REFUSED_CALLS` and `IO_URING`; False where that isn't possible."""
+    machine = platform.machine()
+    if sys.platform != "linux" or machine not in REFUSED_CALLS:
+        return False
+    code = _filter(AUDIT[machine], [*REFUSED_CALLS[machine].values(), *IO_URING])
+    program = ctypes.create_string_buffer(code)
+    # struct sock_fprog: the number of instructions, and where they are.
+    described = struct.pack("HP", len(code) // 8, ctypes.addressof(program))
+    library = ctypes.CDLL(None)
+    library.prctl(NO_NEW_PRIVILEGES, 1, 0, 0, 0)
+    return library.prctl(SET_SECCOMP, FILTER, described, 0, 0) == 0
+
+
+def _filter(audit: int, refused: list[int]) -> bytes:
+    """Return the filter's instructions: each has a code, how many to skip if it holds and if not, and a number."""
+    lines = [(LOAD, 0, 0, 4), (EQUAL, 1, 0, audit), (RETURN, 0, 0, REFUSE), (LOAD, 0, 0, 0)]
+    # From 2^30 on, x86_64 has its calls once more, under other numbers.
+    lines += [(AT_LEAST, 0, 1, 1 << 30), (RETURN, 0, 0, REFUSE)]
+    for number in refused:
+        lines += [(EQUAL, 0, 1, number), (RETURN, 0, 0, REFUSE)]
+    return b"".join(struct.pack("HBBI", *line) for line in [*lines, (RETURN, 0, 0, ALLOW)])

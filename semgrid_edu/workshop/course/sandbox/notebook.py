@@ -1,7 +1,4 @@
-"""A submission, cell by cell: answers run in the student's process, tests in the grader's.
-
-Test cells, run in the grader's process: the answers that they call work elsewhere.
-"""
+"""A submission, cell by cell: answers run in the student's process, tests in the grader's."""
 
 import builtins
 import dis
@@ -28,114 +25,13 @@ from semgrid_edu.workshop.course.sandbox.session import AnswerEndedError, Answer
 INSTRUCTOR = "semgrid_instructor"
 """The instructor's module, with the hidden tests; their lines aren't shown."""
 
-SHOWN = 2000
-"""Characters of what an answer printed while a test ran."""
-
-
-class CellTests:
-    """The test cells of one submission.
-
-    Parameters
-    ----------
-    seen, unseen : Session
-        The student's notebook, twice: for the tests that she can read, and for the hidden ones.
-    variant : tuple of int
-        Which inputs the hidden tests draw.
-    """
-
-    def __init__(self, seen: Session, unseen: Session, variant: tuple[int, ...]) -> None:
-        self.seen, self.unseen, self.variant = seen, unseen, variant
-        self.names: dict[str, Any] = {"__name__": "__main__"}
-        self.used: set[str] = set()
-
-    def prepare(self, source: str) -> None:
-        """Run one of the instructor's cells that isn't a test, for what it imports and defines.
-
-        Parameters
-        ----------
-        source : str
-            The cell.
-        """
-        code = compile(source, "<prepared>", "exec")
-        self.used |= _global_names(code)
-        _run(code, self.names)
-
-    def test(self, source: str, name: str) -> list[NotebookNode]:
-        """Run a test cell.
-
-        Parameters
-        ----------
-        source : str
-            The cell, as the instructor wrote it.
-        name : str
-            Its grade_id.
-
-        Returns
-        -------
-        list of NotebookNode
-            What belongs below it: what the answer printed, and the error that makes it fail.
-        """
-        file = f"<{name}>"
-        linecache.cache[file] = len(source), None, source.splitlines(keepends=True), file
-        code = compile(source, file, "exec")
-        try:
-            answers = self._answers(self.used | _global_names(code))
-        except (AnswerEndedError, AnswerTimeoutError) as error:
-            return [_as_output(error, file)]
-        import_module(INSTRUCTOR).choose_variant(*self.variant)
-        self.seen.printed = ""
-        for session in (self.seen, self.unseen):
-            session.begin()
-        error = self._run_among(code, answers)
-        printed = [new_output("stream", name="stdout", text=self.seen.printed[:SHOWN])] if self.seen.printed else []
-        return printed + ([] if error is None else [_as_output(error, file)])
-
-    def _run_among(self, code: CodeType, answers: dict[str, Any]) -> Exception | None:
-        """Run a test among the instructor's names and the answers; both are afterwards as they were."""
-        before = dict(self.names)
-        self.names.update(answers)
-        error = _run(code, self.names)
-        self.names.clear()
-        self.names.update(before)
-        return error
-
-    def _answers(self, names: set[str]) -> dict[str, Any]:
-        """Return what names that the grader doesn't know stand for in the student's notebook."""
-        self.seen.begin()
-        wanted = sorted(names - self.names.keys() - vars(builtins).keys())
-        return self.seen.names(wanted, self.unseen)
-
-
-def _run(code: CodeType, names: dict[str, Any]) -> Exception | None:
-    """Run code quietly; return the error that ended it."""
-    with warnings.catch_warnings(), np.errstate(), redirect_stderr(io.StringIO()), redirect_stdout(io.StringIO()):
-        try:
-            exec(code, names)
-        except Exception as error:
-            return error
-    return None
-
-
-def _global_names(code: CodeType) -> set[str]:
-    """Return the global names that code, with the functions in it, looks up."""
-    here = {one.argval for one in dis.get_instructions(code) if one.opname in ("LOAD_GLOBAL", "LOAD_NAME")}
-    return here.union(*(_global_names(inner) for inner in code.co_consts if isinstance(inner, CodeType)))
-
-
-def _as_output(error: Exception, file: str) -> NotebookNode:
-    """Return an error as a notebook holds it: the line of the test, unless it is a hidden one, and what it says."""
-    kind = type(error).__name__
-    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
-    line = frames[-1].line if frames else ""
-    shown = [] if not line or "complaint" in line else [f"in the test: {line}"]
-    lines = [*shown, *getattr(error, "__notes__", []), f"{kind}: {error}"]
-    return new_output("error", ename=kind, evalue=str(error), traceback=lines)
-
+MOST_PRINTED = 2000
+"""Characters that are kept of what an answer printed while a test ran."""
 
 MOST_OUTPUT = 30_000_000
-"""Characters of all outputs of a notebook that are kept."""
+"""Characters that are kept of all outputs of a notebook."""
 
-ENDS = tuple(kind.__name__ for kind in (AnswerEndedError, AnswerTimeoutError))
+ENDS = (AnswerEndedError, AnswerTimeoutError)
 """The errors of an answer that ended its process, or had to be ended."""
 
 
@@ -172,14 +68,14 @@ def run_submission(
         When no process could be started for her code: that says nothing about her answers.
     """
     seen, unseen = Session(start, timeout), Session(start, timeout, secret=True)
-    tests = CellTests(seen, unseen, variant)
-    room = MOST_OUTPUT
+    tests = TestCells(seen, unseen, variant)
+    room, ends = MOST_OUTPUT, [kind.__name__ for kind in ENDS]
     try:
         _prepare(notebook, trusted, tests)
         for number, cell in enumerate((c for c in notebook.cells if c.cell_type == "code"), start=1):
             cell.execution_count = number
-            cell.outputs, room = _kept(_outputs(cell, trusted, tests), room)
-        return {cell_name(c): o.evalue for c in notebook.cells for o in c.get("outputs", []) if o.get("ename") in ENDS}
+            cell.outputs, room = _shortened(_outputs(cell, trusted, tests), room)
+        return {cell_name(c): o.evalue for c in notebook.cells for o in c.get("outputs", []) if o.get("ename") in ends}
     except NoProcessError as error:
         raise ChildProcessError(str(error)) from error
     finally:
@@ -188,24 +84,116 @@ def run_submission(
 
 
 def cell_name(cell: NotebookNode) -> str:
-    """Return the grade_id of a cell.
+    """Return the grade_id of a cell; "" for a cell without one, or with metadata that nbgrader didn't write.
 
     Parameters
     ----------
     cell : NotebookNode
         Any cell of a submission.
-
-    Returns
-    -------
-    str
-        "" for a cell without one, or with metadata that nbgrader didn't write.
     """
     marked = cell.metadata.get("nbgrader")
     name = marked.get("grade_id") if isinstance(marked, dict) else None
     return name if isinstance(name, str) else ""
 
 
-def _prepare(notebook: NotebookNode, trusted: Mapping[str, str], tests: CellTests) -> None:
+class TestCells:
+    """The test cells of one submission, run in this process: the answers that they call work elsewhere.
+
+    Parameters
+    ----------
+    seen, unseen : Session
+        The student's notebook, twice: for the tests that she can read, and for the hidden ones.
+    variant : tuple of int
+        Which inputs the hidden tests draw.
+    """
+
+    __test__ = False  # for pytest
+
+    def __init__(self, seen: Session, unseen: Session, variant: tuple[int, ...]) -> None:
+        self.seen, self.unseen, self.variant = seen, unseen, variant
+        self.names: dict[str, Any] = {"__name__": "__main__"}
+        self.used: set[str] = set()
+
+    def prepare(self, source: str) -> None:
+        """Run one of the instructor's cells that isn't a test, for what it imports and defines.
+
+        Parameters
+        ----------
+        source : str
+            The cell.
+        """
+        code = compile(source, "<prepared>", "exec")
+        self.used |= _global_names(code)
+        _run(code, self.names)
+
+    def test(self, source: str, name: str) -> list[NotebookNode]:
+        """Run a test cell; return what belongs below it: what the answer printed, and the error that makes it fail.
+
+        Parameters
+        ----------
+        source : str
+            The cell, as the instructor wrote it.
+        name : str
+            Its grade_id.
+        """
+        file = f"<{name}>"
+        linecache.cache[file] = len(source), None, source.splitlines(keepends=True), file
+        code = compile(source, file, "exec")
+        try:
+            answers = self._answers(self.used | _global_names(code))
+        except ENDS as error:
+            return [_as_output(error, file)]
+        import_module(INSTRUCTOR).choose_variant(*self.variant)
+        self.seen.printed = ""
+        for session in (self.seen, self.unseen):
+            session.begin()
+        error = self._run_among(code, answers)
+        printed = self.seen.printed[:MOST_PRINTED]
+        outputs = [new_output("stream", name="stdout", text=printed)] if printed else []
+        return outputs + ([] if error is None else [_as_output(error, file)])
+
+    def _run_among(self, code: CodeType, answers: dict[str, Any]) -> Exception | None:
+        """Run a test in the namespace of the instructor's functions, which call answers too; then restore it."""
+        before = dict(self.names)
+        self.names.update(answers)
+        error = _run(code, self.names)
+        self.names.clear()
+        self.names.update(before)
+        return error
+
+    def _answers(self, names: set[str]) -> dict[str, Any]:
+        """Return what names that the grader doesn't know stand for in the student's notebook."""
+        self.seen.begin()
+        wanted = sorted(names - self.names.keys() - vars(builtins).keys())
+        return self.seen.names(wanted, self.unseen)
+
+
+def _run(code: CodeType, names: dict[str, Any]) -> Exception | None:
+    """Run code quietly; return the error that ended it."""
+    with warnings.catch_warnings(), np.errstate(), redirect_stderr(io.StringIO()), redirect_stdout(io.StringIO()):
+        try:
+            exec(code, names)
+        except Exception as error:
+            return error
+    return None
+
+
+def _global_names(code: CodeType) -> set[str]:
+    """Return the global names that code, with the functions in it, looks up."""
+    here = {one.argval for one in dis.get_instructions(code) if one.opname in ("LOAD_GLOBAL", "LOAD_NAME")}
+    return here.union(*(_global_names(inner) for inner in code.co_consts if isinstance(inner, CodeType)))
+
+
+def _as_output(error: Exception, file: str) -> NotebookNode:
+    """Return an error as a notebook holds it: the line of the test, unless it is a hidden one, and what it says."""
+    kind = type(error).__name__
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
+    line = frames[-1].line if frames else ""
+    shown = [] if not line or "complaint" in line else [f"in the test: {line}"]
+    return _error(kind, str(error), [*shown, *getattr(error, "__notes__", []), f"{kind}: {error}"])
+
+
+def _prepare(notebook: NotebookNode, trusted: Mapping[str, str], tests: TestCells) -> None:
     """Run the instructor's cells that aren't tests, in the course's order, whatever order the student gave them."""
     cells = {cell_name(cell): cell for cell in notebook.cells if cell.cell_type == "code"}
     for name, source in trusted.items():
@@ -213,23 +201,13 @@ def _prepare(notebook: NotebookNode, trusted: Mapping[str, str], tests: CellTest
             tests.prepare(source)
 
 
-def _kept(outputs: list[NotebookNode], room: int) -> tuple[list[NotebookNode], int]:
-    """Return outputs, shortened when the notebook has no room left for them, and the room that is left then."""
-    size = len(json.dumps(outputs))
-    if size <= room:
-        return outputs, room - size
-    says = "all outputs together are too long to be shown"
-    return [_error(one.ename[:99], says) for one in outputs if one.output_type == "error"], room
-
-
-def _outputs(cell: NotebookNode, trusted: Mapping[str, str], tests: CellTests) -> list[NotebookNode]:
+def _outputs(cell: NotebookNode, trusted: Mapping[str, str], tests: TestCells) -> list[NotebookNode]:
     """Run a cell where it belongs."""
     if is_grade(cell) and not is_solution(cell):
-        is_trusted = trusted.get(cell_name(cell)) == cell.source
+        if trusted.get(cell_name(cell)) == cell.source:
+            return tests.test(cell.source, cell_name(cell))
         # Without an error nbgrader would give all points.
-        return (
-            tests.test(cell.source, cell_name(cell)) if is_trusted else [_error("ValueError", "not the course's test")]
-        )
+        return [_error("ValueError", "not the course's test")]
     tests.unseen.run_later(cell.source)
     return _as_outputs(tests.seen.run(cell.source))
 
@@ -252,6 +230,15 @@ def _harmless(shown: dict[str, str]) -> dict[str, str]:
         for kind, data in shown.items()
         if kind == "text/plain" or (kind in pictures and re.fullmatch(r"[A-Za-z0-9+/=\s]*", data))
     }
+
+
+def _shortened(outputs: list[NotebookNode], room: int) -> tuple[list[NotebookNode], int]:
+    """Return outputs, without most of them when the notebook has no room left, and the room that is left then."""
+    size = len(json.dumps(outputs))
+    if size <= room:
+        return outputs, room - size
+    says = "all outputs together are too long to be shown"
+    return [_error(one.ename[:99], says) for one in outputs if one.output_type == "error"], room
 
 
 def _error(kind: str, says: str, lines: Sequence[str] = ()) -> NotebookNode:

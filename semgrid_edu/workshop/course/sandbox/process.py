@@ -1,4 +1,4 @@
-"""The grader's side of one student's process: starts it, asks it, and ends it when it takes too long."""
+"""The grader's side of one student's process: starts it, asks it, and ends it when it takes too long or too much."""
 
 import os
 import queue
@@ -10,7 +10,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
 from functools import cache
@@ -19,26 +19,23 @@ from typing import Any
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.storage.files import atomic_path
-from semgrid_edu.workshop.course.sandbox.limits import (
-    MEGABYTE,
-    PARTS,
-    Limits,
-    delete,
-    takes_too_much,
-    threads_of_this_user,
-)
+from semgrid_edu.workshop.course.sandbox.limits import MEGABYTE, PARTS, Limits
 from semgrid_edu.workshop.course.sandbox.values import Wire, decode, encode
 
-WORKER = (sys.executable, "-m", "semgrid_edu.workshop.course.sandbox.worker")
+WORKER = ("-m", "semgrid_edu.workshop.course.sandbox.worker")
+"""What Python is started with."""
 
 ALONE = ("unshare", "--user", "--map-current-user", "--net", "--ipc", "--pid", "--mount-proc", "--fork", "--kill-child")
 """Starts a program that sees no network and no processes but its own (util-linux; needs no privileges)."""
 
-KEPT = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT")
+INHERITED = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT")
 """What a student's process inherits of the environment."""
 
 WATCHED = 0.5
 """Seconds from one look at the files of a process to the next."""
+
+MOST_FILES = 20_000
+"""How many files and folders a process may have."""
 
 STARTED = 60.0
 """Seconds that a process may take to start."""
@@ -55,7 +52,7 @@ class StudentProcess:
     ----------
     limits : Limits
         How much it may take; its number of processes is added to those that the user has now.
-    prepared : Path
+    prepared : Path, optional
         A folder that is copied into the fresh one: functions that are compiled already, and fonts.
     keeps : bool
         Whether what is compiled in the fresh folder goes back to that folder in the end: for trusted code alone.
@@ -74,20 +71,16 @@ class StudentProcess:
         Of `PARTS` what could not be limited. A container is taken to limit everything.
     """
 
-    def __init__(self, limits: Limits, prepared: Path, keeps: bool = False, container: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self, limits: Limits, prepared: Path | None = None, keeps: bool = False, container: tuple[str, ...] = ()
+    ) -> None:
         self.prepared, self.keeps = prepared, keeps
         self.folder = Path(tempfile.mkdtemp(prefix="semgrid-answers-"))
-        shutil.copytree(prepared, self.folder / "prepared", dirs_exist_ok=True)
+        if prepared is not None:
+            shutil.copytree(prepared, self.folder / "prepared")
         alone = () if container or not _can_be_alone() else ALONE
-        self.process = subprocess.Popen(
-            [*container, *alone, *(_in_container() if container else WORKER)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            cwd=self.folder,
-            env=self._environment(),
-            start_new_session=True,
-        )
+        # A container has a Python of its own.
+        self.process = self._started([*container, *alone, "python" if container else sys.executable, *WORKER])
         self.wire = Wire(self.process.stdout, self.process.stdin)
         self.sent: queue.Queue[bytes | None] = queue.Queue()
         self.received: queue.Queue[bytes | None] = queue.Queue()
@@ -95,6 +88,18 @@ class StudentProcess:
         self.speaker.start()
         threading.Thread(target=self._watch, args=(3 * limits.written * MEGABYTE,), daemon=True).start()
         self.unlimited = self._greeted(limits, alone, container)
+
+    def _started(self, command: Sequence[str]) -> subprocess.Popen:
+        """Start the worker in a session of its own, with a pipe in each direction."""
+        return subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            cwd=self.folder,
+            env=worker_environment(self.folder),
+            start_new_session=True,
+        )
 
     def _greeted(self, limits: Limits, alone: tuple[str, ...], container: tuple[str, ...]) -> list[str]:
         """Wait for the first reply; return what could not be limited."""
@@ -104,26 +109,18 @@ class StudentProcess:
             self.ask({"do": "names", "wanted": []}, time.monotonic() + STARTED)
             return []
         except (ProcessEndedError, TimeoutError):
-            told = f"no Python that answers was started by: {shlex.join(container or WORKER)}"
-            raise ChildProcessError(told) from None
+            command = shlex.join(container or (sys.executable, *WORKER))
+            raise ChildProcessError(f"no Python that answers was started by: {command}") from None
         except KeyboardInterrupt:
             self.stop()
             raise
 
     def _limit(self, limits: Limits, alone: tuple[str, ...]) -> list[str]:
         """Let the process limit itself; return what it couldn't."""
-        limits = replace(limits, processes=limits.processes + threads_of_this_user())
+        limits = replace(limits, processes=limits.processes + _threads_of_this_user())
         message = {"do": "limit", "limits": asdict(limits), "folder": str(self.folder)}
         done = self.ask(message, time.monotonic() + STARTED)["done"] + (["network", "signals"] if alone else [])
         return [part for part in PARTS if part not in done]
-
-    def _environment(self) -> dict[str, str]:
-        """Return the environment of the process: one thread for each library, and all caches in its own folder."""
-        here = {name: str(self.folder / "prepared") for name in ("NUMBA_CACHE_DIR", "MPLCONFIGDIR")}
-        here |= {name: str(self.folder) for name in ("HOME", "TMPDIR", "IPYTHONDIR")}
-        threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
-        inline = {"MPLBACKEND": "module://matplotlib_inline.backend_inline", "PYTHONDONTWRITEBYTECODE": "1"}
-        return {name: os.environ[name] for name in KEPT if name in os.environ} | here | threads | inline
 
     def _speak(self) -> None:
         """Send what is to be sent, and receive a reply to each; None stands for a process that is no more.
@@ -140,7 +137,7 @@ class StudentProcess:
     def _watch(self, most: int) -> None:
         """End the process when all its files together become too large, or too many."""
         while self.process.poll() is None:
-            if takes_too_much(self.folder, most):
+            if _takes_too_much(self.folder, most):
                 self._kill()
             time.sleep(WATCHED)
 
@@ -160,11 +157,6 @@ class StudentProcess:
             When the reply must be here, `time.monotonic()` seconds.
         callbacks : list of callable, optional
             Takes the functions in the message; the process may call them before it replies.
-
-        Returns
-        -------
-        dict
-            The reply.
 
         Raises
         ------
@@ -207,7 +199,22 @@ class StudentProcess:
                     pipe.close()
         if self.keeps:
             shutil.copytree(self.folder / "prepared", self.prepared, copy_function=_replace, dirs_exist_ok=True)
-        delete(self.folder)
+        _delete(self.folder)
+
+
+def worker_environment(folder: Path) -> dict[str, str]:
+    """Return the environment of a worker: one thread for each library, and all caches in its own folder.
+
+    Parameters
+    ----------
+    folder : Path
+        The fresh folder of the process.
+    """
+    here = {name: str(folder / "prepared") for name in ("NUMBA_CACHE_DIR", "MPLCONFIGDIR")}
+    here |= {name: str(folder) for name in ("HOME", "TMPDIR", "IPYTHONDIR")}
+    threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+    inline = {"MPLBACKEND": "module://matplotlib_inline.backend_inline", "PYTHONDONTWRITEBYTECODE": "1"}
+    return {name: os.environ[name] for name in INHERITED if name in os.environ} | here | threads | inline
 
 
 def _replace(source: str, target: str) -> None:
@@ -224,14 +231,63 @@ def _called(callbacks: list[Callable], reply: dict) -> dict[str, Any]:
         return {"error": f"{type(error).__name__}: {error}"}
 
 
-def _in_container() -> tuple[str, ...]:
-    """Return how a container's own Python starts the worker."""
-    return ("python", *WORKER[1:])
-
-
 @cache
 def _can_be_alone() -> bool:
     """Return whether this system lets a program have namespaces of its own."""
     if shutil.which(ALONE[0]) is None:
         return False
     return subprocess.run([*ALONE, "true"], capture_output=True, check=False).returncode == 0
+
+
+def _threads_of_this_user() -> int:
+    """Return how many threads the user of this process has; 0 where there is no `/proc` to count them."""
+    user, count = os.getuid() if hasattr(os, "getuid") else None, 0
+    for tasks in Path("/proc").glob("[0-9]*/task"):
+        with suppress(OSError):
+            count += sum(1 for _ in tasks.iterdir()) if tasks.stat().st_uid == user else 0
+    return count
+
+
+def _takes_too_much(folder: Path, most: int) -> bool:
+    """Return whether the files in a folder take more bytes, are too many, or hide where nobody can look."""
+    closed: list[str] = []
+    size = count = 0
+    for entry in _inside(folder, closed):
+        with suppress(FileNotFoundError):
+            found = entry.stat(follow_symlinks=False)
+            size, count = size + (getattr(found, "st_blocks", 0) * 512 or found.st_size), count + 1
+        if size > most or count > MOST_FILES:
+            return True
+    return bool(closed)
+
+
+def _delete(folder: Path) -> None:
+    """Delete a folder, even if it was made unreadable, or too deep for Python's own way."""
+    folder.chmod(0o700)
+    for entry in _inside(folder, []):
+        if entry.is_dir(follow_symlinks=False):
+            Path(entry.path).chmod(0o700)
+    if shutil.which("rm"):
+        subprocess.run(["rm", "-rf", "--", folder], capture_output=True, check=False)
+    else:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _inside(folder: Path, closed: list[str]) -> Iterator[os.DirEntry]:
+    """Yield all that is in a folder, each folder before what is in it; `closed` takes those that can't be opened.
+
+    Python's own walk fails in folders that are too deep.
+    """
+    waiting = [str(folder)]
+    while waiting:
+        place = waiting.pop()
+        try:
+            with os.scandir(place) as found:
+                for entry in found:
+                    yield entry
+                    if entry.is_dir(follow_symlinks=False):
+                        waiting.append(entry.path)
+        except (FileNotFoundError, NotADirectoryError):
+            continue
+        except OSError:
+            closed.append(place)

@@ -73,7 +73,7 @@ class Session:
         Returns
         -------
         dict
-            "streams", "shown" and, if the cell failed, "error", as `Worker.run` tells them.
+            "streams", "shown" and, if the cell failed, "error", as in `Worker.run`.
         """
         self.begin()
         try:
@@ -95,7 +95,7 @@ class Session:
         self.waiting.append(code)
 
     def names(self, wanted: list[str], unseen: "Session") -> dict[str, Any]:
-        """Return what stands for these names in the student's notebook.
+        """Return functions to call and plain values for the names that the student's notebook defines.
 
         Parameters
         ----------
@@ -103,12 +103,6 @@ class Session:
             Names.
         unseen : Session
             Where the functions are called with the inputs of hidden tests.
-
-        Returns
-        -------
-        dict of str to object
-            A function to call for a function; the value, if it is a plain one, for anything else. Names that the
-            notebook doesn't define are left out.
         """
         reply = self._ask({"do": "names", "wanted": wanted})
         # The reply may hold any names; those that weren't asked for would replace what the tests rely on.
@@ -140,25 +134,25 @@ class Session:
             What it raises, if that is one of Python's own errors; otherwise AnswerError, AnswerTimeoutError or
             AnswerEndedError.
         """
-        if self.waiting:
-            self._catch_up()
+        self._catch_up()
         message = {"do": "call", "name": name, "arguments": arguments, "named": named, "measured": measured}
         reply = self._ask(message, [])
         self.printed += reply.get("streams", {}).get("stdout", "")
         if "changed" in reply:
             put_back((arguments, named), reply["changed"])
         if "error" in reply:
-            told = reply["error"]
-            # A line that is in no cell was put there to tell something else.
-            known = any(told["line"] in cell for cell in self.cells)
-            raise _as_error(told | {"line": told["line"] if known else ""}, self.secret)
+            error = reply["error"]
+            # A line that is in no cell was put there to say something else.
+            known = any(error["line"] in cell for cell in self.cells)
+            raise _as_error(error | {"line": error["line"] if known else ""}, self.secret)
         return reply["result"], reply.get("megabytes", float("nan"))
 
     def _catch_up(self) -> None:
         """Run the cells that are waiting."""
-        while self.waiting:
-            self.run(self.waiting.pop(0))
-        self.begin()
+        if self.waiting:
+            while self.waiting:
+                self.run(self.waiting.pop(0))
+            self.begin()
 
     def _ask(self, message: dict, callbacks: list[Callable] | None = None) -> dict[str, Any]:
         """Ask the process, one that is alive; only the time that passes meanwhile counts as the student's."""
@@ -236,17 +230,17 @@ class RemoteFunction:
         return self.session.call(self.__name__, arguments, {}, measured=True)
 
 
-def _as_error(told: dict[str, Any], secret: bool) -> Exception:
+def _as_error(reported: dict[str, Any], secret: bool) -> Exception:
     """Return the error that an answer raised, of the same standard kind."""
-    kind = getattr(builtins, told["standard"], Exception)
+    kind = getattr(builtins, reported["standard"], Exception)
     # A StopIteration would silently end a loop of the test.
     if not issubclass(kind, Exception) or kind is Exception or issubclass(kind, StopIteration | StopAsyncIteration):
-        kind, told = AnswerError, told | {"says": f"{told['kind']}: {told['says']}"}
-    says = f"in the line `{told['line']}`" if secret else told["says"]
+        kind, reported = AnswerError, reported | {"says": f"{reported['kind']}: {reported['says']}"}
+    says = f"in the line `{reported['line']}`" if secret else reported["says"]
     try:
         error = kind(says)
     except TypeError:
         error = AnswerError(f"{kind.__name__}: {says}")
-    if told["line"]:
-        error.add_note(f"in your line: {told['line']}")
+    if reported["line"]:
+        error.add_note(f"in your line: {reported['line']}")
     return error

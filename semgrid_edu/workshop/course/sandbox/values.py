@@ -2,10 +2,6 @@
 
 A message is one line of JSON and, behind it, the bytes of its arrays. Reading one makes numbers, texts, containers,
 arrays and a few of the package's own records, and runs nothing that the sender wrote.
-
-What a function changed in its arguments, carried over to those of the caller.
-
-Messages between two processes: each is its length in eight bytes, then its bytes.
 """
 
 import json
@@ -20,83 +16,6 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
 
-LONGEST = 200_000_000
-"""Bytes of a message that are still read."""
-
-
-class Wire:
-    """Both directions of a connection.
-
-    Parameters
-    ----------
-    incoming, outgoing : binary file
-        The two pipes.
-    """
-
-    def __init__(self, incoming: BinaryIO, outgoing: BinaryIO) -> None:
-        self.incoming, self.outgoing = incoming, outgoing
-
-    def send(self, message: bytes) -> None:
-        """Send a message.
-
-        Parameters
-        ----------
-        message : bytes
-            The message.
-        """
-        self.outgoing.write(len(message).to_bytes(8, "big") + message)
-        self.outgoing.flush()
-
-    def receive(self) -> bytes | None:
-        """Return the next message; None when the other side has hung up, or sends what is no message."""
-        head = self.incoming.read(8)
-        length = int.from_bytes(head, "big")
-        if len(head) < 8 or length > LONGEST:
-            return None
-        message = self.incoming.read(length)
-        return message if len(message) == length else None
-
-
-def put_back(original: Any, changed: Any) -> Any:
-    """Change a value, as far as it can be changed in place, into what a copy of it became.
-
-    Parameters
-    ----------
-    original : object
-        What the caller holds: its arrays, lists and dicts are changed.
-    changed : object
-        The copy.
-
-    Returns
-    -------
-    object
-        `original` where it could be changed, otherwise `changed`.
-
-    Examples
-    --------
-    >>> inner = np.zeros(2)
-    >>> put_back([inner, 1], [np.ones(2), 2, 3])
-    [array([1., 1.]), 2, 3]
-    >>> inner
-    array([1., 1.])
-    """
-    if type(original) is not type(changed):
-        return changed
-    if isinstance(original, np.ndarray) and original.shape == changed.shape and original.flags.writeable:
-        original[...] = changed
-    elif isinstance(original, list):
-        original[:] = [*map(put_back, original, changed), *changed[len(original) :]]
-    elif isinstance(original, dict):
-        now = {key: put_back(original[key], value) if key in original else value for key, value in changed.items()}
-        original.clear()
-        original.update(now)
-    elif isinstance(original, tuple):
-        return tuple(map(put_back, original, changed))
-    else:
-        return changed
-    return original
-
-
 RECORDS = (
     "semgrid_edu.grid.GridSpec",
     "semgrid_edu.graphical.factor.Factor",
@@ -110,15 +29,17 @@ RECORDS = (
 KINDS = "?biufcUS"
 """The kinds of array that pass, numpy's letters: booleans, numbers and texts."""
 
-
 MOST_BYTES = 150_000_000
 """Bytes of all arrays of a message."""
 
 MOST_JSON = 20_000_000
-"""Bytes of a message outside its arrays: lists of a million numbers, and what the grader can hold a hundred times."""
+"""Bytes of a message outside its arrays: room for lists of a million numbers; the grader can hold a hundred of them."""
 
 MOST_KEYS = 20_000
-"""Entries of a set or dict: keys chosen so that all collide take the square of their number to put in."""
+"""Entries of a set or dict: keys that were chosen to collide take the square of their number to put in."""
+
+LONGEST = 200_000_000
+"""Bytes of a message that are still read."""
 
 
 class NotPlainError(TypeError):
@@ -131,15 +52,10 @@ def encode(value: Any, callbacks: list[Callable] | None = None) -> bytes:
     Parameters
     ----------
     value : object
-        None, a boolean, number or text; a list, tuple, set or dict of such; an array of these, or what numpy makes an
-        array of (a tensor, a table); one of `RECORDS`.
+        None, a boolean, number or text; a list, tuple, set or dict of such; an array of these, or what numpy turns
+        into an array (a tensor, a table); one of `RECORDS`.
     callbacks : list of callable, optional
-        Takes the functions within `value`; the other side gets their numbers. Without it a function can't pass.
-
-    Returns
-    -------
-    bytes
-        For `decode`.
+        Takes the functions within `value`; the other side gets their numbers. Without this list no function can pass.
 
     Raises
     ------
@@ -155,7 +71,7 @@ def encode(value: Any, callbacks: list[Callable] | None = None) -> bytes:
 
 
 def decode(data: bytes, callback: Callable[[int], Callable] | None = None) -> Any:
-    """Turn bytes into the value from which `encode` made them.
+    """Turn bytes back into the value that `encode` was given; an array is a plain one, with memory of its own.
 
     Parameters
     ----------
@@ -163,11 +79,6 @@ def decode(data: bytes, callback: Callable[[int], Callable] | None = None) -> An
         The message.
     callback : callable, optional
         Turns the number of a function into a function to call in its place.
-
-    Returns
-    -------
-    object
-        The value. An array is a plain one, with memory of its own.
 
     Raises
     ------
@@ -274,3 +185,72 @@ def _record(path: str, values: list) -> Any:
         raise ValueError(f"a record {path!r}")
     module, _, name = path.rpartition(".")
     return getattr(import_module(module), name)(*values)
+
+
+def put_back(original: Any, changed: Any) -> Any:
+    """Carry over to an argument what a function in another process did to its copy; return the result.
+
+    Parameters
+    ----------
+    original : object
+        What the caller holds. Its arrays, lists and dicts are changed in place; where that can't be, `changed` is
+        returned.
+    changed : object
+        What the copy became.
+
+    Examples
+    --------
+    >>> inner = np.zeros(2)
+    >>> put_back([inner, 1], [np.ones(2), 2, 3])
+    [array([1., 1.]), 2, 3]
+    >>> inner
+    array([1., 1.])
+    """
+    if type(original) is not type(changed):
+        return changed
+    if isinstance(original, np.ndarray) and original.shape == changed.shape and original.flags.writeable:
+        original[...] = changed
+    elif isinstance(original, list):
+        original[:] = [*map(put_back, original, changed), *changed[len(original) :]]
+    elif isinstance(original, dict):
+        now = {key: put_back(original[key], value) if key in original else value for key, value in changed.items()}
+        original.clear()
+        original.update(now)
+    elif isinstance(original, tuple):
+        return tuple(map(put_back, original, changed))
+    else:
+        return changed
+    return original
+
+
+class Wire:
+    """Both directions of a connection; each message is its length in eight bytes, then its bytes.
+
+    Parameters
+    ----------
+    incoming, outgoing : binary file
+        The two pipes.
+    """
+
+    def __init__(self, incoming: BinaryIO, outgoing: BinaryIO) -> None:
+        self.incoming, self.outgoing = incoming, outgoing
+
+    def send(self, message: bytes) -> None:
+        """Send a message.
+
+        Parameters
+        ----------
+        message : bytes
+            The message.
+        """
+        self.outgoing.write(len(message).to_bytes(8, "big") + message)
+        self.outgoing.flush()
+
+    def receive(self) -> bytes | None:
+        """Return the next message; None when the other side has hung up, or sends what is no message."""
+        head = self.incoming.read(8)
+        length = int.from_bytes(head, "big")
+        if len(head) < 8 or length > LONGEST:
+            return None
+        message = self.incoming.read(length)
+        return message if len(message) == length else None

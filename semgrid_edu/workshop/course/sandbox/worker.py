@@ -32,7 +32,7 @@ class Shell(InteractiveShell):
     """Runs cells as a notebook's kernel does, without a screen."""
 
     def enable_gui(self, gui: str | None = None) -> None:
-        """Take no notice of a magic that asks for a screen.
+        """Ignore a magic that asks for a screen.
 
         Parameters
         ----------
@@ -44,15 +44,8 @@ class Shell(InteractiveShell):
         """End the cell or call that says `exit()`."""
         raise SystemExit
 
-    def system(self, cmd: str) -> None:
-        """Run a line that begins with "!", without the terminal that IPython gives it elsewhere.
-
-        Parameters
-        ----------
-        cmd : str
-            The line.
-        """
-        self.system_raw(cmd)
+    # A line that begins with "!" gets no terminal, as IPython would give it.
+    system = InteractiveShell.system_raw
 
 
 class Worker:
@@ -81,11 +74,11 @@ class Worker:
                 # Functions that were given go back by their numbers, among arguments that were changed.
                 reply = encode(getattr(self, message.pop("do"))(**message), [])
             except NotPlainError as error:
-                reply = encode({"error": _told(error)})
+                reply = encode({"error": _report(error)})
             self.wire.send(reply)
 
     def limit(self, limits: dict, folder: str) -> dict:
-        """Set limits; tell which are set.
+        """Set limits; report which are set.
 
         Parameters
         ----------
@@ -97,7 +90,7 @@ class Worker:
         return {"done": limit_this_process(Limits(**limits), Path(folder))}
 
     def run(self, code: str) -> dict:
-        """Run a cell; tell what it put out and the error that ended it.
+        """Run a cell; report what it put out and the error that ended it.
 
         Parameters
         ----------
@@ -110,11 +103,11 @@ class Worker:
         error = result.error_before_exec or result.error_in_exec
         found = {"streams": _streams(captured), "shown": _shown(captured.outputs)}
         if error is not None:
-            found["error"] = _told(error) | {"traceback": [_text(line) for line in self.traceback]}
+            found["error"] = _report(error) | {"traceback": [_text(line) for line in self.traceback]}
         return found
 
     def names(self, wanted: list[str]) -> dict:
-        """Tell which of these names are functions, and what the others are.
+        """Report which of these names are functions, and the values of the others.
 
         Parameters
         ----------
@@ -126,7 +119,7 @@ class Worker:
         return {"functions": functions, "values": {n: v for n, v in known.items() if n not in functions and _passes(v)}}
 
     def call(self, name: str, arguments: tuple, named: dict, measured: bool, sent: bytes) -> dict:
-        """Call a function; tell its result or error, what it printed, and what it changed in its arguments.
+        """Call a function; report its result or error, what it printed, and what it changed in its arguments.
 
         Parameters
         ----------
@@ -147,14 +140,14 @@ class Worker:
                     reply |= {"megabytes": megabytes()} if measured else {}
                 encode(reply["result"])
             except BaseException as error:
-                reply = {"error": _told(error)}
+                reply = {"error": _report(error)}
         before = decode(sent, self._callback)
         if encode((before["arguments"], before["named"]), []) != encode((arguments, named), []):
             reply["changed"] = arguments, named
         return reply | {"streams": _streams(captured)}
 
     def _callback(self, number: int) -> Callable:
-        """Return a function that is worked out by the grader."""
+        """Return a function that the grader works out."""
 
         def call(*arguments: Any, **named: Any) -> Any:
             self.wire.send(encode({"callback": number, "arguments": arguments, "named": named}))
@@ -177,7 +170,7 @@ def _passes(value: Any) -> bool:
 
 @contextmanager
 def _traced(measured: bool) -> Iterator[Callable[[], float]]:
-    """Measure memory, if asked to, and give a function that tells the most that was held, in megabytes."""
+    """Measure memory, if asked to; yield a function that returns the most that was held so far, in megabytes."""
     if measured:
         tracemalloc.start()
     try:
@@ -208,8 +201,8 @@ def _shown(outputs: list[RichOutput]) -> list[dict[str, str]]:
     return kept
 
 
-def _told(error: BaseException) -> dict[str, Any]:
-    """Return an error in plain values: its kind, the standard kind it is of, what it says, and where it was raised."""
+def _report(error: BaseException) -> dict[str, Any]:
+    """Describe an error in plain values: its kind, the standard kind that it is of, its message and its line."""
     kinds = [kind.__name__ for kind in type(error).__mro__ if kind.__module__ == "builtins"]
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename.startswith("<ipython")]
     line = linecache.getline(frames[-1].filename, frames[-1].lineno).strip() if frames else ""
@@ -218,7 +211,7 @@ def _told(error: BaseException) -> dict[str, Any]:
 
 
 def _main() -> None:
-    """Speak over standard input and output, which the student's code doesn't get."""
+    """Talk to the grader over standard input and output, which the student's code doesn't get."""
     wire = Wire(os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb"))
     nothing = os.open(os.devnull, os.O_RDWR)
     for stream in (0, 1, 2):

@@ -1,1 +1,0 @@
-"""Registers that the course is checked against: equations, and the graphical model of each stage."""
