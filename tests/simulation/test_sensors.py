@@ -14,7 +14,7 @@ from semgrid_edu.workshop.simulation.sensors.rig import Lidar, Rig
 from semgrid_edu.workshop.simulation.street.layout import Road, Side
 from semgrid_edu.workshop.simulation.street.light import Light
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
-from semgrid_edu.workshop.simulation.things.primitives import box, quads
+from semgrid_edu.workshop.simulation.things.shapes import box, quads
 
 SIDE = Side(5.0, 0.0, 2.0, 0.0, 3.0)
 ROAD = Road(0.0, 0.0, 0.0, 3.5, 1, 1, SIDE, SIDE, 0.0, 0.0, False, False, 4.0, False, True)

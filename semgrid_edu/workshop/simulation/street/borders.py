@@ -13,10 +13,9 @@ from semgrid_edu.workshop.simulation.street.builder import Builder
 from semgrid_edu.workshop.simulation.street.footprints import outline
 from semgrid_edu.workshop.simulation.street.layout import Side, to_road
 from semgrid_edu.workshop.simulation.street.plan import Plan
-from semgrid_edu.workshop.simulation.things import furniture, see_through
+from semgrid_edu.workshop.simulation.things import furniture
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
-from semgrid_edu.workshop.simulation.things.primitives import box, tube
-from semgrid_edu.workshop.simulation.things.shapes import Shape
+from semgrid_edu.workshop.simulation.things.shapes import Shape, box, tube
 
 
 def side_of(builder: Builder, sign: int) -> Side:
@@ -175,8 +174,8 @@ def wire_mesh(builder: Builder, s0: float, s1: float, d: float) -> None:
     rng = builder.rng
     opacity, step = rng.uniform(0.008, 0.02), rng.choice([2.0, 2.5, 3.0])
     for piece in _pieces(s0, s1, d, 2.5, step, rng):
-        frame, sheet = see_through.mesh_frame(piece[3]), see_through.mesh_sheet(piece[3])
-        _stand(builder, piece, Kind.FENCE, _THIN_HALF, see_through.MESH_HEIGHT, frame, sheet, opacity)
+        frame, sheet = furniture.mesh_frame(piece[3]), furniture.mesh_sheet(piece[3])
+        _stand(builder, piece, Kind.FENCE, _THIN_HALF, furniture.MESH_HEIGHT, frame, sheet, opacity)
 
 
 def twig_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
@@ -189,7 +188,7 @@ def twig_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
     for piece in _pieces(s0, s1, d + np.sign(d) * thickness / 2, 0.6, 1.0, rng):
         if rng.random() > 0.04:
             wide, high = thickness * rng.uniform(0.8, 1.1), height * rng.uniform(0.9, 1.1)
-            body = see_through.porous_hedge(piece[3], wide, high)
+            body = furniture.porous_hedge(piece[3], wide, high)
             _stand(builder, piece, Kind.PLANT, wide / 2, high, None, body, opacity * rng.uniform(0.7, 1.4))
 
 
@@ -212,7 +211,7 @@ def _rows(builder: Builder, s0: float, s1: float, d: float) -> None:
     rng = builder.rng
     opacity, height, long = rng.uniform(3.0, 6.0), rng.uniform(1.3, 1.9), rng.uniform(2.5, 4.0)
     for s in np.arange(s0, s1, rng.uniform(2.8, 4.0)):
-        body = see_through.porous_hedge(round(long, 3), 0.7, height * rng.uniform(0.9, 1.1))
+        body = furniture.porous_hedge(round(long, 3), 0.7, height * rng.uniform(0.9, 1.1))
         piece = (s, d + np.sign(d) * 1.6, np.sign(d) * np.pi / 2, long)
         _stand(builder, piece, Kind.PLANT, 0.35, height, None, body, opacity)
 
@@ -223,15 +222,15 @@ def panes(builder: Builder, s0: float, s1: float, d: float) -> None:
     opacity, step = rng.uniform(0.05, 0.15), rng.uniform(1.3, 2.2)
     for piece in _pieces(s0, s1, d, 0.8, step, rng):
         if rng.random() > 0.1:
-            frame, glass = see_through.pane_frame(piece[3]), see_through.pane(piece[3])
-            _stand(builder, piece, Kind.FENCE, _THIN_HALF, see_through.PANE_HEIGHT, frame, glass, opacity)
+            frame, glass = furniture.pane_frame(piece[3]), furniture.pane(piece[3])
+            _stand(builder, piece, Kind.FENCE, _THIN_HALF, furniture.PANE_HEIGHT, frame, glass, opacity)
 
 
 def post_row(builder: Builder, s0: float, s1: float, d: float) -> None:
     """Stand bare posts in a regular row. Parameters are those of `wire_mesh`."""
     rng = builder.rng
     step, height, radius = rng.uniform(1.4, 2.6), rng.uniform(1.0, 1.8), rng.uniform(0.04, 0.09)
-    post = see_through.bollard(height, radius)
+    post = furniture.bollard(height, radius)
     for s in np.arange(s0, s1, step):
         builder.try_post(post, s, d, 0.0, Kind.POLE, max(radius, _THIN_HALF))
 
