@@ -12,8 +12,7 @@ from semgrid_edu.workshop.simulation.sensors.camera import Picture, take_picture
 from semgrid_edu.workshop.simulation.sensors.gps import Geodesy
 from semgrid_edu.workshop.simulation.sensors.instant import Instant
 from semgrid_edu.workshop.simulation.sensors.lidar import scan
-from semgrid_edu.workshop.simulation.sensors.porous import PorousMesh
-from semgrid_edu.workshop.simulation.sensors.raycast import RayMesh
+from semgrid_edu.workshop.simulation.sensors.raycast import PorousMesh, RayMesh
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.sensors.truth import BirdseyeTruth, birdseye_kinds, visible_cells, world_cells
 from semgrid_edu.workshop.simulation.street.actors import Actor

@@ -43,11 +43,7 @@ class Geodesy:
         Parameters
         ----------
         rng : numpy.random.Generator
-            Source of all that is drawn.
-
-        Returns
-        -------
-        Geodesy
+            Decides them.
         """
         north, east = float(rng.uniform(0, 0.05)), float(rng.uniform(0, 0.05))
         return cls(49.0 + north, 8.4 + east, 114.0, float(rng.uniform(-3.1, 3.1)))
@@ -105,12 +101,7 @@ def oxts_packet(pose: Callable[[float], NDArray], t: float, geodesy: Geodesy) ->
     level = Rotation.from_euler("z", yaw).as_matrix()
     felt = np.add(acceleration, (0, 0, GRAVITY))
     numbers = [latitude, longitude, geodesy.altitude + offset[2], roll, pitch, yaw, velocity[1], velocity[0]]
-    numbers += [
-        *(level.T @ velocity),
-        *(R.T @ felt),
-        *(level.T @ felt),
-    ]
-    numbers += [*rates, *(level.T @ R @ rates)]
+    numbers += [*(level.T @ velocity), *(R.T @ felt), *(level.T @ felt), *rates, *(level.T @ R @ rates)]
     return " ".join([f"{x:.16g}" for x in numbers] + [str(x) for x in _FLAGS]) + "\n"
 
 

@@ -7,8 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.workshop.simulation.sensors.porous import PorousMesh
-from semgrid_edu.workshop.simulation.sensors.raycast import MISS, Hits, RayMesh
+from semgrid_edu.workshop.simulation.sensors.raycast import MISS, Hits, PorousMesh, RayMesh
 
 
 @njit(cache=True)
@@ -95,10 +94,6 @@ class Instant:
             Unit vectors, in the world.
         rng : numpy.random.Generator
             Decides which rays pass what is porous; nothing is drawn where nothing is.
-
-        Returns
-        -------
-        Hits
         """
         origins = np.empty_like(directions)
         origins[:] = origin
