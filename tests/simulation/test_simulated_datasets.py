@@ -95,7 +95,7 @@ def test_a_drive_that_another_worker_finished_first_stays_and_nothing_partial_do
     (root / DATE / f".{DATE}_drive_0001_sync-abcd.partial").mkdir()
     partial = root / DATE / f".{DATE}_drive_0001_sync-abcd.partial" / "0000000000.png"
     partial.write_bytes(b"half")
-    datasets._make_drive(TINY, root, 3, 0)
+    datasets._make_drive(TINY, root, 3, "0001")
     assert partial.read_bytes() == b"half"
     assert provenance_problems(root) == []
     partial.unlink()
