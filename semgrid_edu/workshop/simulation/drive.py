@@ -92,7 +92,7 @@ class SimulatedDrive:
         self.ego = Ego.random(rng, self.plan.road, pace, wishes.ego_lane)
         self.geodesy = Geodesy.random(rng)
         builder = build_scenery(self.plan, rng)
-        traffic = Traffic(builder, self.plan, self.ego.trajectory, duration)
+        traffic = Traffic(builder, self.ego.trajectory, duration)
         (wishes.cast or fill_street)(traffic)
         self.moving, self.parked = traffic.moving, traffic.parked
         self.static = RayMesh.of(builder.shapes, builder.instances)

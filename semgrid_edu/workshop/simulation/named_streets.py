@@ -1,4 +1,4 @@
-"""Streets with a name: those on which occupancy filters are tested, each hard in its own way, and the sample drive's."""
+"""Streets with a name: ten that are hard for occupancy filters, each in its own way, and the sample drive's street."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -82,13 +82,14 @@ def named_street(name: str, seed: int, frames: int = FRAMES, rig: Rig = KITTI_RI
 def _sample_cast(traffic: Traffic) -> None:
     """Put an overtaking and an oncoming car, a cyclist and pedestrians where the camera sees them, then others."""
     road, end = traffic.road, traffic.duration
-    here = traffic.ego.at(end)[0]
+    here = traffic.ends_at
     overtaking, oncoming, cycling = Pace(traffic.ego.pace.mean + 6.0), Pace(9.0), Pace(5.0)
     red, blue = ("estate", (0.35, 0.02, 0.02)), ("hatchback", (0.05, 0.12, 0.35))
     traffic.drive_car(here + 9.0 - overtaking.distance(end), -0.5 * road.lane, 1, 0, overtaking, red)
     traffic.drive_car(here + 14.0 + oncoming.distance(end), 0.5 * road.lane, -1, 0, oncoming, blue)
     traffic.ride(here + 9.0 - cycling.distance(end), -(road.lanes_right * road.lane - 0.45), 1, cycling)
-    for sign, side, ahead in ((-1, road.right, 12.0), (1, road.left, 17.0)):
+    for sign, ahead in ((-1, 12.0), (1, 17.0)):
+        side = road.side(sign)
         walk = sign * (side.edge + side.strip + 0.6 * side.walk)
         traffic.walk(here + ahead, walk, sign, 0, Pace(1.4))
         traffic.walk(here + ahead + 9.0, walk, -sign, 0, STAND, 1.0)
