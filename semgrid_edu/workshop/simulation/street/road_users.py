@@ -224,13 +224,9 @@ def overturned_car(traffic: Traffic) -> None:
     rng = traffic.rng
     for _ in range(20):  # until the place is free
         look, angle = (traffic.body(), traffic.paint()), rng.uniform(-0.5, 0.5)
-        place = (
-            traffic.ends_at + rng.uniform(10, 22),
-            0.5 * traffic.road.lane,
-            float(np.cos(angle)),
-            float(np.sin(angle)),
-        )
-        if traffic.park(Kind.CAR, car_size(look[0]), Trajectory(*place, STAND), look, overturned=True):
+        s, direction = traffic.ends_at + rng.uniform(10, 22), (float(np.cos(angle)), float(np.sin(angle)))
+        place = Trajectory(s, 0.5 * traffic.road.lane, *direction, STAND)
+        if traffic.park(Kind.CAR, car_size(look[0]), place, look, overturned=True):
             break
     fill_street(traffic)
 

@@ -34,9 +34,8 @@ class Extent:
 def _across(road: Road) -> NDArray[np.float64]:
     """Return the d of the mesh's lines: fine at kerbs and, at a junction, over its rounded corners."""
     rim = np.arange(0, road.corner + 0.3, 0.3) if road.side_half else []
-    left, right = (
-        np.concatenate([[x / 2], x + _OUTWARD, x + np.asarray(rim)]) for x in (road.left.edge, road.right.edge)
-    )
+    edges = road.left.edge, road.right.edge
+    left, right = (np.concatenate([[edge / 2], edge + _OUTWARD, edge + np.asarray(rim)]) for edge in edges)
     return np.unique(np.round(np.concatenate([-right, [0.0], left]), 3))
 
 
