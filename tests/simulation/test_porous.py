@@ -21,7 +21,7 @@ def instant(*porous: tuple[Shape, float], wall: float = 20.0) -> Instant:
         [quads([wall, -90, -90], [0, 180, 0], [0, 0, 180], (0.5,) * 3, Material.PLASTER, Kind.BUILDING)], [0]
     )
     mesh = PorousMesh.of(*zip(*porous, strict=True)) if porous else None
-    return Instant(solid, None, np.empty((0, 4)), mesh)
+    return Instant(solid, None, mesh)
 
 
 def sheet(x: float, material: Material) -> Shape:

@@ -24,7 +24,7 @@ EXACT = Lidar(range_sigma=0.0, drop=0.0)
 
 def scene(*things) -> Instant:
     ground = quads([-50, -50, 0], [200, 0, 0], [0, 100, 0], (0.2,) * 3, Material.GROUND, Kind.ROAD)
-    return Instant(RayMesh.of([ground, *things], range(1 + len(things))), None, np.empty((0, 4)))
+    return Instant(RayMesh.of([ground, *things], range(1 + len(things))), None)
 
 
 def wall(x: float):

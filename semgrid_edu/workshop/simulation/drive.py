@@ -122,13 +122,8 @@ class SimulatedDrive:
         """Return the world at one instant, ready for rays. Parameters are those of `SimulatedDrive.pose`."""
         road, eye = self.plan.road, self.pose(t)[:2, 3]
         near = [a for a in self.moving if np.hypot(*(a.trajectory.pose(road, t)[0][:2] - eye)) < _VIEW]
-        if not near:
-            return Instant(self.static, None, np.empty((0, 4)), self.porous)
-        shapes = [a.shape(road, t) for a in near]
-        boxes = np.array([[shape.vertices.min(axis=0), shape.vertices.max(axis=0)] for shape in shapes], np.float64)
-        radii = np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) / 2
-        spheres = np.column_stack([boxes.mean(axis=1), radii])
-        return Instant(self.static, RayMesh.of(shapes, [a.instance for a in near]), spheres, self.porous)
+        moving = RayMesh.of([a.shape(road, t) for a in near], [a.instance for a in near]) if near else None
+        return Instant(self.static, moving, self.porous)
 
     def velocities(self, t: float) -> dict[int, NDArray[np.float64]]:
         """Return the velocity over ground of each road user that isn't parked, by its number.

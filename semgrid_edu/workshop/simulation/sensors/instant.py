@@ -4,32 +4,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.workshop.simulation.sensors.raycast import MISS, Hits, PorousMesh, RayMesh
-
-
-@njit(cache=True)
-def _towards(origin, directions, spheres):
-    """Return the rays from one point that pass through any of the spheres (centre, radius)."""
-    chosen = np.empty(len(directions), np.int64)
-    n = 0
-    axis = np.empty((len(spheres), 4), np.float32)
-    for k in range(len(spheres)):
-        away = spheres[k, :3] - origin
-        distance = np.sqrt((away**2).sum())
-        axis[k, :3] = away / distance
-        ratio = spheres[k, 3] / distance
-        axis[k, 3] = np.sqrt(1.0 - ratio * ratio) if ratio < 1.0 else -1.0
-    for i in range(len(directions)):
-        for k in range(len(axis)):
-            cosine = axis[k, 0] * directions[i, 0] + axis[k, 1] * directions[i, 1] + axis[k, 2] * directions[i, 2]
-            if cosine >= axis[k, 3] - np.float32(1e-6):
-                chosen[n] = i
-                n += 1
-                break
-    return chosen[:n]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,16 +19,12 @@ class Instant:
         What stands still; its triangles come first in the tables.
     moving : RayMesh or None
         What moves, where it is at this instant; None when nothing moves.
-    spheres : (M, 4) float64
-        Centre in the world and radius, metres, of a sphere around each thing that moves: only rays through one of the
-        spheres are tried against `moving`.
     porous : PorousMesh or None
         What lets a part of the rays through; its triangles come last in the tables.
     """
 
     static: RayMesh
     moving: RayMesh | None
-    spheres: NDArray[np.float64]
     porous: PorousMesh | None = None
 
     @cached_property
@@ -101,11 +74,10 @@ class Instant:
         distance, triangle = hits["tfar"], hits["primID"]
         distance[triangle < 0] = MISS
         if self.moving:
-            near = _towards(np.asarray(origin, np.float64), directions, self.spheres)
-            closer = self.moving.embree.run(origins[near], directions[near], output=1)
-            nearer = (closer["primID"] >= 0) & (closer["tfar"] < distance[near])
-            distance[near[nearer]] = closer["tfar"][nearer]
-            triangle[near[nearer]] = closer["primID"][nearer] + len(self.static.instance)
+            closer = self.moving.embree.run(origins, directions, output=1)
+            nearer = (closer["primID"] >= 0) & (closer["tfar"] < distance)
+            distance[nearer] = closer["tfar"][nearer]
+            triangle[nearer] = closer["primID"][nearer] + len(self.static.instance)
         if self.porous:
             rays, at, face = self.porous.stop(origins, directions, distance, rng)
             distance[rays], triangle[rays] = at, face + len(self.instance) - len(self.porous.opacity)
