@@ -17,17 +17,11 @@ from semgrid_edu.storage.locking import LOCK, sole_writer
 from semgrid_edu.storage.provenance import versions, write_provenance
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.storage.workplace import check_workers, workplace
+from semgrid_edu.workshop.simulation import writer
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.named_streets import SAMPLE_WISHES
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.street.plan import ANY, Wishes
-from semgrid_edu.workshop.simulation.writer import (
-    DATE,
-    check_complete,
-    remove_unfinished,
-    write_calibration,
-    write_drive,
-)
 
 FORMAT = 1
 """Raised whenever the simulator changes what a seed gives, so that old and new drives don't mix in one folder."""
@@ -175,14 +169,14 @@ def make_from_recipe(
     routes = {f"{k + 1:04d}": route for k, route in enumerate(recipe.routes)}
     with sole_writer(root):
         _claim(root, {"name": recipe.name, "seed": seed, "format": FORMAT})
-        write_calibration(root, Rig())
-        remove_unfinished(root / DATE)
-        missing = [drive for drive in routes if not drive_folder(root, DATE, drive).exists()]
+        writer.write_calibration(root, Rig())
+        writer.remove_unfinished(root / writer.DATE)
+        missing = [drive for drive in routes if not drive_folder(root, writer.DATE, drive).exists()]
         missing.sort(key=lambda drive: -routes[drive].n_frames)
         with tqdm(total=len(routes), initial=len(routes) - len(missing), desc=recipe.name, unit="drive") as bar:
             _run(partial(_make_drive, recipe, root, seed), missing, workers, scheduler, bar)
         for drive, route in routes.items():
-            check_complete(drive_folder(root, DATE, drive), route.n_frames, route.labelled)
+            writer.check_complete(drive_folder(root, writer.DATE, drive), route.n_frames, route.labelled)
         index = _index(recipe, routes, seed)
         write_json(root / INDEX_FILE, index)
         write_provenance(root, index["command"], seed, PACKAGES)
@@ -221,14 +215,14 @@ def _make_drive(recipe: DatasetRecipe, root: Path, seed: int, drive: str) -> Non
     route = recipe.routes[index]
     own_seed = np.random.SeedSequence([seed, FORMAT, *recipe.name.encode()], spawn_key=(index,))
     simulated = SimulatedDrive(own_seed, route.n_frames, route.wishes)
-    write_drive(root, drive, simulated, route.labelled, LABEL_SETS[recipe.label_set], recipe.dense)
+    writer.write_drive(root, drive, simulated, route.labelled, LABEL_SETS[recipe.label_set], recipe.dense)
 
 
 def _index(recipe: DatasetRecipe, routes: dict[str, Route], seed: int) -> dict:
     """Return what dataset.json holds."""
     splits: dict[str, list] = {}
     for drive, route in routes.items():
-        frames = [{"date": DATE, "drive": drive, "frame": k} for k in route.labelled]
+        frames = [{"date": writer.DATE, "drive": drive, "frame": k} for k in route.labelled]
         splits.setdefault(route.split, []).extend(frames)
     return {
         "name": recipe.name,

@@ -9,6 +9,11 @@ from numpy.typing import NDArray
 from semgrid_edu.workshop.simulation.sensors.raycast import MISS, Hits, PorousMesh, RayMesh
 
 
+def _column(name: str) -> cached_property:
+    """Return a table of an `Instant`: an attribute of its shapes, one below the other."""
+    return cached_property(lambda instant: np.concatenate([getattr(mesh.shape, name) for mesh in instant.meshes]))
+
+
 @dataclass(frozen=True, eq=False)
 class Instant:
     """The world at one instant: what stands still, what moves, and tables of the F triangles of both.
@@ -21,39 +26,31 @@ class Instant:
         What moves, where it is at this instant; None when nothing moves.
     porous : PorousMesh or None
         What lets a part of the rays through; its triangles come last in the tables.
+
+    Attributes
+    ----------
+    normals : (F, 3) float32
+        The unit normal of each triangle, for shading.
+    colour : (F, 3) float32
+        The linear albedo of each triangle, 0..1.
+    material, kind : (F,) uint8
+        The `Material` and the `Kind` of each triangle.
     """
 
     static: RayMesh
     moving: RayMesh | None
     porous: PorousMesh | None = None
 
-    @cached_property
-    def normals(self) -> NDArray[np.float32]:
-        """(F, 3) float32: the unit normal of each triangle, for shading."""
-        return np.concatenate([mesh.shape.normals for mesh in self._meshes])
-
-    @cached_property
-    def colour(self) -> NDArray[np.float32]:
-        """(F, 3) float32: the linear albedo of each triangle, 0..1."""
-        return np.concatenate([mesh.shape.colour for mesh in self._meshes])
-
-    @cached_property
-    def material(self) -> NDArray[np.uint8]:
-        """(F,) uint8: the `Material` of each triangle."""
-        return np.concatenate([mesh.shape.material for mesh in self._meshes])
-
-    @cached_property
-    def kind(self) -> NDArray[np.uint8]:
-        """(F,) uint8: the `Kind` of each triangle."""
-        return np.concatenate([mesh.shape.kind for mesh in self._meshes])
+    normals, colour, material, kind = (_column(name) for name in ("normals", "colour", "material", "kind"))
 
     @cached_property
     def instance(self) -> NDArray[np.int32]:
         """(F,) int32: the number of the object that each triangle belongs to; 0 for scenery."""
-        return np.concatenate([mesh.instance for mesh in self._meshes])
+        return np.concatenate([mesh.instance for mesh in self.meshes])
 
     @property
-    def _meshes(self) -> list[RayMesh]:
+    def meshes(self) -> list[RayMesh]:
+        """What there is, in the order of the tables."""
         return [mesh for mesh in (self.static, self.moving, self.porous and self.porous.mesh) if mesh]
 
     def cast(self, origin: NDArray, directions: NDArray, rng: np.random.Generator) -> Hits:

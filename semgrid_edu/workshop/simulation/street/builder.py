@@ -2,16 +2,9 @@
 
 import numpy as np
 
-from semgrid_edu.workshop.simulation.street.footprints import (
-    ROUND,
-    SQUARE,
-    Footprint,
-    collides,
-    footprint_table,
-    outline,
-)
-from semgrid_edu.workshop.simulation.street.ground import ground_height
-from semgrid_edu.workshop.simulation.street.layout import outside_asphalt, to_road, to_world
+from semgrid_edu.workshop.simulation.street.footprints import ROUND, SQUARE, Footprint, collides, outline
+from semgrid_edu.workshop.simulation.street.ground import on_ground
+from semgrid_edu.workshop.simulation.street.layout import outside_asphalt, to_road
 from semgrid_edu.workshop.simulation.street.plan import Plan
 from semgrid_edu.workshop.simulation.things.materials import Kind
 from semgrid_edu.workshop.simulation.things.shapes import Shape
@@ -67,8 +60,8 @@ class Builder:
         yaw : float
             Direction of the thing, rad from that of the road, counter-clockwise.
         """
-        x, y, heading = to_world(self.road, s, d)
-        return np.array([x, y, ground_height(self.road, s, d)]), heading + yaw
+        position, heading = on_ground(self.road, s, d)
+        return position, heading + yaw
 
     def footprint(
         self, s: float, d: float, yaw: float, kind: Kind, half: tuple[float, float],
@@ -106,7 +99,7 @@ class Builder:
         margin : float
             Distance that everything else must keep from it, metres; a negative one allows some overlap.
         """
-        return not collides(footprint, footprint_table(self.footprints), margin)
+        return not collides(footprint, self.footprints, margin)
 
     def off_asphalt(self, footprint: Footprint) -> bool:
         """Return whether all of a place lies more than 0.1 m outside the asphalt.

@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.workshop.simulation.street.layout import Road, outside_asphalt, to_road
+from semgrid_edu.workshop.simulation.street.layout import Road, outside_asphalt, to_road, to_world
 from semgrid_edu.workshop.simulation.things.materials import Kind
 
 KERB_HEIGHT = 0.12
@@ -43,6 +43,15 @@ def ground_height(road: Road, s: float, d: float) -> float:
     height += side.bank_rise * t * t * (3.0 - 2.0 * t)
     far = max(e - 25.0, 0.0)
     return height + 0.06 * far * (0.5 + 0.5 * np.sin(0.03 * s + 0.02 * d)) * min(far / 40.0, 1.0)
+
+
+def on_ground(road: Road, s: float, d: float) -> tuple[NDArray[np.float64], float]:
+    """Return the point of the ground at a place, (3,), metres in the world, and the road's direction there, rad.
+
+    Parameters are those of `to_world`.
+    """
+    x, y, heading = to_world(road, s, d)
+    return np.array([x, y, ground_height(road, s, d)]), heading
 
 
 @njit(cache=True)

@@ -2,13 +2,7 @@
 
 import numpy as np
 
-from semgrid_edu.workshop.simulation.street.borders import (
-    YARD_BORDERS,
-    stand_lamps,
-    stand_pillars,
-    stand_signals,
-    stand_signs,
-)
+from semgrid_edu.workshop.simulation.street import borders
 from semgrid_edu.workshop.simulation.street.builder import Builder
 from semgrid_edu.workshop.simulation.street.plan import YARD, Plan
 from semgrid_edu.workshop.simulation.street.terrain import ground_mesh
@@ -30,12 +24,12 @@ def build_scenery(plan: Plan, rng: np.random.Generator) -> Builder:
     builder = Builder(plan, rng)
     builder.shapes.append(ground_mesh(plan.road, plan.extent))
     builder.instances.append(0)
-    stand_signals(builder)
+    borders.stand_signals(builder)
     for sign, style in zip((1, -1), plan.styles, strict=True):
-        stand_lamps(builder, sign)
+        borders.stand_lamps(builder, sign)
         _street_trees(builder, sign)
         _LINE_SIDE[style](builder, sign)
-        stand_signs(builder, sign)
+        borders.stand_signs(builder, sign)
     if plan.road.side_half:
         _side_street(builder)
     _horizon(builder)
@@ -193,8 +187,8 @@ def _park(builder: Builder, sign: int) -> None:
 def _yard(builder: Builder, sign: int) -> None:
     """Run a border along one side, and scatter bushes and trees behind it."""
     rng, extent, line = builder.rng, builder.plan.extent, builder.road.side(sign).line + 0.35
-    YARD_BORDERS[builder.plan.border(sign)](builder, extent.start, extent.end - 60, sign * line)
-    stand_pillars(builder, extent.start, extent.end - 60, sign * (line - rng.uniform(0.4, 0.8)))
+    borders.YARD_BORDERS[builder.plan.border(sign)](builder, extent.start, extent.end - 60, sign * line)
+    borders.stand_pillars(builder, extent.start, extent.end - 60, sign * (line - rng.uniform(0.4, 0.8)))
     for s in np.arange(extent.start, extent.end, 6.0):
         _bush(builder, s + rng.uniform(0, 6), sign * (line + rng.uniform(3, 15)))
         _tree(builder, s + rng.uniform(0, 6), sign * (line + rng.uniform(6, 30)))

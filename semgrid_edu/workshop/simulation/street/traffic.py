@@ -67,7 +67,7 @@ class Traffic:
         actor = Actor(self.builder.next_instance, kind, size, trajectory, look, float(self.rng.uniform(0, 3)))
         feet = [actor.footprint(self.road, t) for t in self._times]
         for foot, taken in zip(feet, self._taken, strict=True):
-            if collides(foot, footprint_table(taken), margin) or collides(foot, self._static, 0.05):
+            if collides(foot, taken, margin) or collides(foot, self._static, 0.05):
                 return False
         self.builder.number()
         self.moving.append(actor)
@@ -89,7 +89,7 @@ class Traffic:
         """
         actor = Actor(self.builder.next_instance, kind, size, trajectory, look, overturned=overturned)
         foot = actor.footprint(self.road, 0.0)
-        moving = (collides(foot, footprint_table(taken), 0.2) for taken in self._taken)
+        moving = (collides(foot, taken, 0.2) for taken in self._taken)
         if collides(foot, self._static, 0.1) or any(moving):
             return False
         self.parked.append(actor)

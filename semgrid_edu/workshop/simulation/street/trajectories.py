@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.workshop.simulation.street.ground import ground_height
-from semgrid_edu.workshop.simulation.street.layout import Road, to_world
+from semgrid_edu.workshop.simulation.street.ground import on_ground
+from semgrid_edu.workshop.simulation.street.layout import Road
 
 
 @dataclass(frozen=True)
@@ -146,8 +146,8 @@ class Trajectory:
             Direction of the thing, rad from the x axis, counter-clockwise.
         """
         s, d = self.at(t)
-        x, y, heading = to_world(road, s, d)
-        return np.array([x, y, ground_height(road, s, d)]), heading + np.arctan2(self.across, self.along) + self.turn
+        position, heading = on_ground(road, s, d)
+        return position, heading + np.arctan2(self.across, self.along) + self.turn
 
     def velocity(self, road: Road, t: float) -> NDArray[np.float64]:
         """Return the velocity over ground along the world's x and y, (2,), m/s, as a central difference.

@@ -1,7 +1,9 @@
 """Shapes of cars, spanned between cross-sections; they stand on z = 0 and point along x."""
 
 import itertools
+import tomllib
 from functools import cache, partial
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -12,69 +14,22 @@ from semgrid_edu.workshop.simulation.things.shapes import Shape, merge, shape
 
 
 class _Body(NamedTuple):
-    """A body: metres and, beside them, one number for each cross-section from rear to front."""
+    """A table of `cars.toml`, which says what each number is."""
 
     length: float
     width: float
-    windows: tuple[int, ...]  # spans between two cross-sections whose sides are glass, by the number of the first
-    screens: tuple[int, ...]  # spans whose top is glass
-    x: tuple[float, ...]  # over the length
-    sill: tuple[float, ...]  # heights, metres
-    shoulder: tuple[float, ...]
-    top: tuple[float, ...]
-    half: tuple[float, ...]  # half-widths of body and top, over half the car's width
-    half_top: tuple[float, ...]
+    windows: list[int]
+    screens: list[int]
+    x: list[float]
+    sill: list[float]
+    shoulder: list[float]
+    top: list[float]
+    half: list[float]
+    half_top: list[float]
 
 
-# fmt: off
-_BODIES = {
-    "hatchback": _Body(
-        length=4.0, width=1.74, windows=(2, 4, 5), screens=(1, 5),
-        x=(-0.500, -0.480, -0.400, -0.170, -0.150, 0.060, 0.230, 0.430, 0.500),
-        sill=(0.36, 0.22, 0.20, 0.20, 0.20, 0.20, 0.20, 0.20, 0.30),
-        shoulder=(0.72, 0.92, 0.95, 0.94, 0.94, 0.92, 0.90, 0.76, 0.58),
-        top=(0.78, 0.96, 1.38, 1.46, 1.46, 1.42, 0.95, 0.80, 0.64),
-        half=(0.86, 0.96, 1.00, 1.00, 1.00, 1.00, 0.99, 0.95, 0.80),
-        half_top=(0.78, 0.84, 0.70, 0.72, 0.72, 0.71, 0.82, 0.76, 0.66),
-    ),
-    "sedan": _Body(
-        length=4.6, width=1.8, windows=(2, 3, 5, 6), screens=(2, 6),
-        x=(-0.500, -0.480, -0.340, -0.210, -0.070, -0.050, 0.100, 0.240, 0.440, 0.500),
-        sill=(0.36, 0.24, 0.20, 0.20, 0.20, 0.20, 0.20, 0.20, 0.20, 0.30),
-        shoulder=(0.74, 0.92, 0.96, 0.95, 0.94, 0.94, 0.92, 0.90, 0.76, 0.58),
-        top=(0.80, 0.98, 1.02, 1.40, 1.44, 1.44, 1.40, 0.96, 0.80, 0.64),
-        half=(0.84, 0.94, 0.99, 1.00, 1.00, 1.00, 1.00, 0.99, 0.94, 0.80),
-        half_top=(0.76, 0.82, 0.84, 0.68, 0.70, 0.70, 0.69, 0.82, 0.76, 0.66),
-    ),
-    "estate": _Body(
-        length=4.7, width=1.8, windows=(2, 4, 5), screens=(1, 5),
-        x=(-0.500, -0.485, -0.430, -0.210, -0.195, 0.090, 0.240, 0.440, 0.500),
-        sill=(0.36, 0.22, 0.20, 0.20, 0.20, 0.20, 0.20, 0.20, 0.30),
-        shoulder=(0.74, 0.94, 0.96, 0.95, 0.95, 0.92, 0.90, 0.76, 0.58),
-        top=(0.80, 0.98, 1.42, 1.47, 1.47, 1.42, 0.96, 0.80, 0.64),
-        half=(0.88, 0.97, 1.00, 1.00, 1.00, 1.00, 0.99, 0.94, 0.80),
-        half_top=(0.80, 0.86, 0.74, 0.74, 0.74, 0.71, 0.82, 0.76, 0.66),
-    ),
-    "suv": _Body(
-        length=4.5, width=1.88, windows=(2, 4, 5), screens=(1, 5),
-        x=(-0.500, -0.480, -0.430, -0.190, -0.170, 0.080, 0.220, 0.440, 0.500),
-        sill=(0.42, 0.30, 0.28, 0.28, 0.28, 0.28, 0.28, 0.28, 0.38),
-        shoulder=(0.86, 1.08, 1.10, 1.09, 1.09, 1.07, 1.05, 0.94, 0.72),
-        top=(0.92, 1.12, 1.62, 1.70, 1.70, 1.64, 1.10, 0.98, 0.80),
-        half=(0.88, 0.97, 1.00, 1.00, 1.00, 1.00, 1.00, 0.96, 0.84),
-        half_top=(0.80, 0.88, 0.76, 0.78, 0.78, 0.76, 0.86, 0.82, 0.74),
-    ),
-    "van": _Body(
-        length=5.3, width=1.98, windows=(3, 4), screens=(4,),
-        x=(-0.500, -0.490, -0.100, 0.170, 0.300, 0.410, 0.480, 0.500),
-        sill=(0.36, 0.28, 0.28, 0.28, 0.28, 0.28, 0.28, 0.36),
-        shoulder=(1.05, 1.08, 1.10, 1.10, 1.10, 1.08, 0.90, 0.70),
-        top=(1.85, 2.25, 2.34, 2.32, 2.10, 1.14, 0.96, 0.80),
-        half=(0.95, 0.99, 1.00, 1.00, 1.00, 0.98, 0.94, 0.88),
-        half_top=(0.86, 0.90, 0.92, 0.90, 0.84, 0.84, 0.80, 0.76),
-    ),
-}
-# fmt: on
+_TABLE = Path(__file__).with_name("cars.toml")
+_BODIES = {name: _Body(**body) for name, body in tomllib.loads(_TABLE.read_text(encoding="utf-8")).items()}
 BODIES = tuple(_BODIES)
 """The car bodies that `car` knows."""
 PAINTS = (
