@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 
 from semgrid_edu.workshop.simulation.sensors.instant import Instant
-from semgrid_edu.workshop.simulation.sensors.porous import PorousMesh
-from semgrid_edu.workshop.simulation.sensors.raycast import MISS, RayMesh
-from semgrid_edu.workshop.simulation.things import see_through
+from semgrid_edu.workshop.simulation.sensors.raycast import MISS, PorousMesh, RayMesh
+from semgrid_edu.workshop.simulation.things import furniture
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
-from semgrid_edu.workshop.simulation.things.primitives import box, quads
-from semgrid_edu.workshop.simulation.things.shapes import Shape
+from semgrid_edu.workshop.simulation.things.shapes import Shape, box, quads
 
 N = 20_000
 FOUR_SIGMA = 4 / np.sqrt(4 * N)
@@ -23,7 +21,7 @@ def instant(*porous: tuple[Shape, float], wall: float = 20.0) -> Instant:
         [quads([wall, -90, -90], [0, 180, 0], [0, 0, 180], (0.5,) * 3, Material.PLASTER, Kind.BUILDING)], [0]
     )
     mesh = PorousMesh.of(*zip(*porous, strict=True)) if porous else None
-    return Instant(solid, None, np.empty((0, 4)), mesh)
+    return Instant(solid, None, mesh)
 
 
 def sheet(x: float, material: Material) -> Shape:
@@ -111,7 +109,7 @@ def test_where_nothing_is_porous_nothing_is_drawn():
 
 
 def test_a_piece_of_mesh_stands_between_its_posts():
-    frame, wire = see_through.mesh_frame(2.5), see_through.mesh_sheet(2.5)
+    frame, wire = furniture.mesh_frame(2.5), furniture.mesh_sheet(2.5)
     assert set(wire.material) == {Material.WIRE}
     assert wire.vertices[:, 0].min() == 0
     assert wire.vertices[:, 0].max() == pytest.approx(2.5)

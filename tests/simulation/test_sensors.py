@@ -14,7 +14,7 @@ from semgrid_edu.workshop.simulation.sensors.rig import Lidar, Rig
 from semgrid_edu.workshop.simulation.street.layout import Road, Side
 from semgrid_edu.workshop.simulation.street.light import Light
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
-from semgrid_edu.workshop.simulation.things.primitives import box, quads
+from semgrid_edu.workshop.simulation.things.shapes import box, quads
 
 SIDE = Side(5.0, 0.0, 2.0, 0.0, 3.0)
 ROAD = Road(0.0, 0.0, 0.0, 3.5, 1, 1, SIDE, SIDE, 0.0, 0.0, False, False, 4.0, False, True)
@@ -24,7 +24,7 @@ EXACT = Lidar(range_sigma=0.0, drop=0.0)
 
 def scene(*things) -> Instant:
     ground = quads([-50, -50, 0], [200, 0, 0], [0, 100, 0], (0.2,) * 3, Material.GROUND, Kind.ROAD)
-    return Instant(RayMesh.of([ground, *things], range(1 + len(things))), None, np.empty((0, 4)))
+    return Instant(RayMesh.of([ground, *things], range(1 + len(things))), None)
 
 
 def wall(x: float):

@@ -10,8 +10,7 @@ from semgrid_edu.workshop.simulation.things.furniture import FENCES, SIGNS, fenc
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 from semgrid_edu.workshop.simulation.things.people import Person, bicycle, rider, walker
 from semgrid_edu.workshop.simulation.things.plants import TREES, bush, hedge, tree
-from semgrid_edu.workshop.simulation.things.primitives import ball, box, quads, tube
-from semgrid_edu.workshop.simulation.things.shapes import merge
+from semgrid_edu.workshop.simulation.things.shapes import ball, box, merge, quads, tube
 
 STYLE = {"colour": (0.5, 0.5, 0.5), "material": Material.MATTE, "kind": Kind.POLE}
 

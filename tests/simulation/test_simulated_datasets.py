@@ -18,7 +18,7 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.storage.provenance import provenance_problems
-from semgrid_edu.workshop.simulation import datasets
+from semgrid_edu.workshop.simulation import datasets, writer
 from semgrid_edu.workshop.simulation.datasets import RECIPES, DatasetRecipe, Route, make_dataset, make_from_recipe
 from semgrid_edu.workshop.simulation.street.plan import Wishes
 from semgrid_edu.workshop.simulation.writer import DATE
@@ -49,7 +49,7 @@ def test_another_seed_gives_another_world(alone, tmp_path):
 
 def test_killed_in_the_middle_it_resumes_to_the_same_bytes(alone, tmp_path, monkeypatch):
     """A kill leaves a finished drive, a half one in its hidden folder, and no dataset.json."""
-    whole = datasets.write_drive
+    whole = writer.write_drive
 
     def killed_in_the_second(root, drive, simulated, labelled, *rest):
         if drive == "0002":
@@ -60,7 +60,7 @@ def test_killed_in_the_middle_it_resumes_to_the_same_bytes(alone, tmp_path, monk
         return whole(root, drive, simulated, labelled, *rest)
 
     with monkeypatch.context() as patch:
-        patch.setattr(datasets, "write_drive", killed_in_the_second)
+        patch.setattr(writer, "write_drive", killed_in_the_second)
         with pytest.raises(KeyboardInterrupt):
             make_from_recipe(TINY, tmp_path, seed=3, workers=1)
     assert not (tmp_path / "tiny" / "dataset.json").exists()
@@ -95,7 +95,7 @@ def test_a_drive_that_another_worker_finished_first_stays_and_nothing_partial_do
     (root / DATE / f".{DATE}_drive_0001_sync-abcd.partial").mkdir()
     partial = root / DATE / f".{DATE}_drive_0001_sync-abcd.partial" / "0000000000.png"
     partial.write_bytes(b"half")
-    datasets._make_drive(TINY, root, 3, 0)
+    datasets._make_drive(TINY, root, 3, "0001")
     assert partial.read_bytes() == b"half"
     assert provenance_problems(root) == []
     partial.unlink()

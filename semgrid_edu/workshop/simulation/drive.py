@@ -1,22 +1,20 @@
 """One simulated drive: a world, the car that drives through it, and every frame that its sensors take."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import transform_points
 from semgrid_edu.frame import LABEL_GRID, Frame
-from semgrid_edu.workshop.simulation.frame import SimulatedFrame
 from semgrid_edu.workshop.simulation.sensors.camera import Picture, take_picture
 from semgrid_edu.workshop.simulation.sensors.gps import Geodesy
 from semgrid_edu.workshop.simulation.sensors.instant import Instant
 from semgrid_edu.workshop.simulation.sensors.lidar import scan
-from semgrid_edu.workshop.simulation.sensors.porous import PorousMesh
-from semgrid_edu.workshop.simulation.sensors.raycast import RayMesh
+from semgrid_edu.workshop.simulation.sensors.raycast import PorousMesh, RayMesh
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.sensors.truth import BirdseyeTruth, birdseye_kinds, visible_cells, world_cells
-from semgrid_edu.workshop.simulation.street.actors import Actor
 from semgrid_edu.workshop.simulation.street.ego import Ego
 from semgrid_edu.workshop.simulation.street.footprints import footprint_table
 from semgrid_edu.workshop.simulation.street.plan import ANY, Wishes, draw_plan
@@ -31,6 +29,34 @@ _VIEW = 110.0
 """Distance from the recording car, metres, beyond which nothing that moves is seen."""
 
 
+@dataclass(frozen=True, eq=False)
+class SimulatedFrame:
+    """One instant of a simulated drive: what its sensors take, and what is true.
+
+    Parameters
+    ----------
+    time : float
+        Seconds since the drive began.
+    T_world_from_lidar : (4, 4) float64
+        Pose of the LIDAR, metres.
+    picture : Picture
+        What the camera takes, and what each of its pixels shows.
+    points : (N, 4) float32
+        LIDAR returns: x, y, z in the LIDAR frame, metres, and reflectance 0..1.
+    truth : BirdseyeTruth or None
+        What every cell holds; None for a frame that isn't labelled.
+    objects : list of dict
+        Cars, pedestrians and bicycles in the bird's-eye grid, from `SimulatedDrive.objects`.
+    """
+
+    time: float
+    T_world_from_lidar: NDArray[np.float64]
+    picture: Picture
+    points: NDArray[np.float32]
+    truth: BirdseyeTruth | None
+    objects: list[dict]
+
+
 class SimulatedDrive:
     """A drive through a world of its own, the same for the same seed.
 
@@ -43,7 +69,7 @@ class SimulatedDrive:
     wishes : Wishes
         What isn't left to chance.
     rig : Rig, optional
-        The sensors on the recording car; those of the simulated data sets when left out.
+        The sensors on the recording car; when left out, the sensors of the simulated data sets.
 
     Attributes
     ----------
@@ -66,110 +92,52 @@ class SimulatedDrive:
         self.ego = Ego.random(rng, self.plan.road, pace, wishes.ego_lane)
         self.geodesy = Geodesy.random(rng)
         builder = build_scenery(self.plan, rng)
-        traffic = Traffic(builder, self.plan, self.ego.trajectory, duration)
+        traffic = Traffic(builder, self.ego.trajectory, duration)
         (wishes.cast or fill_street)(traffic)
-        self.moving: list[Actor] = traffic.moving
-        self.parked: list[Actor] = traffic.parked
+        self.moving, self.parked = traffic.moving, traffic.parked
         self.static = RayMesh.of(builder.shapes, builder.instances)
         self.porous = PorousMesh.of(builder.porous, builder.opacities) if builder.porous else None
         self.static_footprints = footprint_table(builder.footprints)
         self.sensor_seed = rng.bit_generator.seed_seq.spawn(1)[0]
 
     def pose(self, t: float) -> NDArray[np.float64]:
-        """Return the LIDAR's pose at one instant.
+        """Return the LIDAR's pose T_world_from_lidar at one instant, (4, 4), metres.
 
         Parameters
         ----------
         t : float
             Seconds since the drive began.
-
-        Returns
-        -------
-        (4, 4) float64
-            T_world_from_lidar, metres.
         """
         return self.ego.T_world_from_lidar(t)
 
     def T_world_from_imu(self, t: float) -> NDArray[np.float64]:
-        """Return the IMU's pose at one instant.
-
-        Parameters
-        ----------
-        t : float
-            Seconds since the drive began.
-
-        Returns
-        -------
-        (4, 4) float64
-            Metres.
-        """
+        """Return the IMU's pose at one instant, (4, 4), metres. Parameters are those of `SimulatedDrive.pose`."""
         return self.pose(t) @ self.rig.T_lidar_from_imu
 
+    def T_grid_from_world(self, t: float) -> NDArray[np.float64]:
+        """Return the world's pose in the grid of one instant, metres. Parameters are those of `SimulatedDrive.pose`."""
+        return self.rig.T_grid_from_lidar @ np.linalg.inv(self.pose(t))
+
     def instant(self, t: float) -> Instant:
-        """Return the world at one instant, ready for rays.
-
-        Parameters
-        ----------
-        t : float
-            Seconds since the drive began.
-
-        Returns
-        -------
-        Instant
-        """
+        """Return the world at one instant, ready for rays. Parameters are those of `SimulatedDrive.pose`."""
         road, eye = self.plan.road, self.pose(t)[:2, 3]
         near = [a for a in self.moving if np.hypot(*(a.trajectory.pose(road, t)[0][:2] - eye)) < _VIEW]
-        if not near:
-            return Instant(self.static, None, np.empty((0, 4)), self.porous)
-        shapes = [a.shape(road, t) for a in near]
-        boxes = np.array([[shape.vertices.min(axis=0), shape.vertices.max(axis=0)] for shape in shapes], np.float64)
-        radii = np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) / 2
-        spheres = np.column_stack([boxes.mean(axis=1), radii])
-        return Instant(self.static, RayMesh.of(shapes, [a.instance for a in near]), spheres, self.porous)
-
-    def T_grid_from_world(self, t: float) -> NDArray[np.float64]:
-        """Return the transform from the world to the grid frame of one instant.
-
-        Parameters
-        ----------
-        t : float
-            Seconds since the drive began.
-
-        Returns
-        -------
-        (4, 4) float64
-            Metres.
-        """
-        return self.rig.T_grid_from_lidar @ np.linalg.inv(self.pose(t))
+        moving = RayMesh.of([a.shape(road, t) for a in near], [a.instance for a in near]) if near else None
+        return Instant(self.static, moving, self.porous)
 
     def velocities(self, t: float) -> dict[int, NDArray[np.float64]]:
         """Return the velocity over ground of each road user that isn't parked, by its number.
 
-        Parameters
-        ----------
-        t : float
-            Seconds since the drive began.
-
-        Returns
-        -------
-        dict of int to (2,) float64
-            Along x and y of the grid frame at that instant, m/s.
+        It is given along x and y of the grid frame at that instant, (2,), m/s. Parameters are those of
+        `SimulatedDrive.pose`.
         """
         rotation, road = self.T_grid_from_world(t)[:2, :2], self.plan.road
         return {actor.instance: rotation @ actor.trajectory.velocity(road, t) for actor in self.moving}
 
     def objects(self, t: float) -> list[dict]:
-        """Return the cars, pedestrians and bicycles whose centres lie in `LABEL_GRID` at one instant.
+        """Return the cars, pedestrians and bicycles whose centres lie in `LABEL_GRID`, from `Actor.described`.
 
-        Parameters
-        ----------
-        t : float
-            Seconds since the drive began.
-
-        Returns
-        -------
-        list of dict
-            From `Actor.described`.
+        Parameters are those of `SimulatedDrive.pose`.
         """
         road, T, actors = self.plan.road, self.T_grid_from_world(t), self.parked + self.moving
         centres = [transform_points(T, actor.middle(road, t)) for actor in actors]
@@ -177,29 +145,17 @@ class SimulatedDrive:
         return [actor.described(road, t, T) for actor, held in zip(actors, inside, strict=True) if held]
 
     def footprints(self, t: float) -> NDArray[np.float64]:
-        """Return the footprints of all that stands or moves at one instant.
+        """Return the footprints of all that stands or moves at one instant, (K, 9), as from `footprint_table`.
 
-        Parameters
-        ----------
-        t : float
-            Seconds since the drive began.
-
-        Returns
-        -------
-        (K, 9) float64
-            One row per thing, as from `footprint_table`.
+        Parameters are those of `SimulatedDrive.pose`.
         """
-        return np.concatenate(
-            [self.static_footprints, footprint_table([a.footprint(self.plan.road, t) for a in self.moving])]
-        )
+        moving = footprint_table([actor.footprint(self.plan.road, t) for actor in self.moving])
+        return np.concatenate([self.static_footprints, moving])
 
     def birdseye(self, t: float) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
         """Return what the cells of `LABEL_GRID` hold, whether a sensor sees it or not.
 
-        Parameters
-        ----------
-        t : float
-            Seconds since the drive began.
+        Parameters are those of `SimulatedDrive.pose`.
 
         Returns
         -------
@@ -221,17 +177,12 @@ class SimulatedDrive:
             Seconds since the drive began.
         picture : Picture
             What the camera took at that instant.
-
-        Returns
-        -------
-        BirdseyeTruth
         """
-        road, pose = self.plan.road, self.pose(t)
-        cells, footprints = world_cells(pose, self.rig), self.footprints(t)
+        road, pose, footprints = self.plan.road, self.pose(t), self.footprints(t)
+        cells = world_cells(pose, self.rig)
         kinds, which = birdseye_kinds(cells, footprints, road)
-        return BirdseyeTruth(
-            kinds, visible_cells(cells, kinds, which, footprints, road, picture, pose, self.rig.camera)
-        )
+        seen = visible_cells(cells, kinds, which, footprints, road, picture, pose, self.rig.camera)
+        return BirdseyeTruth(kinds, seen)
 
     def frame(self, index: int, labelled: bool) -> SimulatedFrame:
         """Take one frame. Its noise depends on its number alone, not on which frames were taken before.
@@ -242,10 +193,6 @@ class SimulatedDrive:
             Number of the frame.
         labelled : bool
             Whether to find the bird's-eye truth too.
-
-        Returns
-        -------
-        SimulatedFrame
         """
         rng = self._noise(index)
         t, road = index * PERIOD, self.plan.road
@@ -258,25 +205,17 @@ class SimulatedDrive:
     def scan(self, index: int) -> Frame:
         """Take the LIDAR scan of one frame alone, which is fast. Its noise differs from that of `frame`.
 
+        The frame has no image and no labels; its pose is that of the nearest packet (`Rig.packet_interval`).
+
         Parameters
         ----------
         index : int
             Number of the frame.
-
-        Returns
-        -------
-        Frame
-            Without image and labels; its pose is that of the nearest packet (`Rig.packet_interval`).
         """
         t, half = index * PERIOD, self.rig.packet_interval / 2
         points = scan(self.instant(t), self.pose(t), self.rig.lidar, self.plan.road, self._noise(index, 1))
         nearest = t + float(self._noise(index, 2).uniform(-half, half)) if half else t
         return Frame(None, points, self.rig.camera, self.pose(nearest), t)
-
-    def _noise(self, *key: int) -> np.random.Generator:
-        """Return the drive's own generator for a key, such as the number of a frame."""
-        seed = np.random.SeedSequence(self.sensor_seed.entropy, spawn_key=(*self.sensor_seed.spawn_key, *key))
-        return np.random.default_rng(seed)
 
     def frames(self, labelled: set[int]) -> Iterator[SimulatedFrame]:
         """Take all frames, one after the other.
@@ -285,9 +224,10 @@ class SimulatedDrive:
         ----------
         labelled : set of int
             Numbers of the frames whose bird's-eye truth is wanted.
-
-        Yields
-        ------
-        SimulatedFrame
         """
         yield from (self.frame(k, k in labelled) for k in range(self.n_frames))
+
+    def _noise(self, *key: int) -> np.random.Generator:
+        """Return the drive's own generator for a key, such as the number of a frame."""
+        seed = np.random.SeedSequence(self.sensor_seed.entropy, spawn_key=(*self.sensor_seed.spawn_key, *key))
+        return np.random.default_rng(seed)

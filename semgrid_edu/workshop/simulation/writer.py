@@ -1,13 +1,10 @@
-"""Simulated drives on disk: KITTI's raw layout, each drive written whole or not at all.
-
-Whether a drive on disk is whole, and what is left of one that isn't.
-"""
+"""Simulated drives on disk: KITTI's raw layout, each drive written whole or not at all."""
 
 import io
 import json
 import shutil
 import tempfile
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -21,12 +18,14 @@ from semgrid_edu.datasets.readers.kitti_raw import drive_folder
 from semgrid_edu.errors import DataError
 from semgrid_edu.labels import KITTI_14, LabelSet
 from semgrid_edu.storage.files import write_text
-from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
-from semgrid_edu.workshop.simulation.frame import SimulatedFrame
+from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive, SimulatedFrame
 from semgrid_edu.workshop.simulation.sensors.gps import DATAFORMAT, oxts_packet
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.things.materials import class_of_kind
 
+DATE = "2026_01_01"
+"""The day on which all simulated drives take place."""
+_START = datetime(2026, 1, 1, 10, 0, 0, 125000)
 UNFINISHED = ".partial"
 """How the name of a drive's hidden folder ends as long as the drive isn't whole."""
 
@@ -71,10 +70,6 @@ def check_complete(folder: Path, n_frames: int, labelled: Collection[int]) -> No
         raise DataError(folder, f"all {len(expected)} files of a drive (delete the folder to make it anew)", found)
 
 
-DATE = "2026_01_01"
-"""The day on which all simulated drives take place."""
-
-
 def _row(name: str, numbers: NDArray | tuple) -> str:
     return f"{name}: " + " ".join(f"{x:.12e}" for x in np.ravel(numbers)) + "\n"
 
@@ -106,18 +101,13 @@ def write_calibration(root: Path, rig: Rig) -> None:
         write_text(day / name, time + _row("R", T[:3, :3]) + _row("T", T[:3, 3]) + extra)
 
 
-def _stamp(start: datetime, seconds: float) -> str:
-    """Return a time of day with nanoseconds, as KITTI writes it."""
-    return f"{start + timedelta(seconds=seconds):%Y-%m-%d %H:%M:%S.%f}000\n"
-
-
-def _write_times(folder: Path, n_frames: int, start: datetime) -> None:
+def _write_times(folder: Path, n_frames: int) -> None:
     """Write timestamps: camera, LIDAR and IMU all take a frame at the middle of the LIDAR's turn."""
     offsets = {"image_02/timestamps": 0.0, "oxts/timestamps": 0.0, "velodyne_points/timestamps": 0.0}
     offsets |= {"velodyne_points/timestamps_start": -PERIOD / 2, "velodyne_points/timestamps_end": PERIOD / 2}
     for name, offset in offsets.items():
-        lines = [_stamp(start, k * PERIOD + offset) for k in range(n_frames)]
-        (folder / f"{name}.txt").write_text("".join(lines))
+        times = (_START + timedelta(seconds=k * PERIOD + offset) for k in range(n_frames))
+        (folder / f"{name}.txt").write_text("".join(f"{time:%Y-%m-%d %H:%M:%S.%f}000\n" for time in times))
 
 
 def _save_png(path: Path, pixels: NDArray) -> None:
@@ -147,47 +137,33 @@ def depth_to_png(depth: NDArray) -> NDArray[np.uint16]:
 
 def _write_labels(folder: Path, name: str, frame: SimulatedFrame, label_set: LabelSet) -> None:
     """Write what is true of one frame."""
-    classes = class_of_kind(label_set)
-    _save_png(folder / "image" / f"{name}.png", classes[frame.picture.kind])
-    _save_png(folder / "depth" / f"{name}.png", depth_to_png(frame.picture.depth))
-    _save_png(folder / "birdseye" / f"{name}.png", classes[frame.truth.kinds])
-    _save_png(folder / "visible" / f"{name}.png", frame.truth.visible.astype(np.uint8) * 255)
+    classes, picture, truth = class_of_kind(label_set), frame.picture, frame.truth
+    images = (classes[picture.kind], depth_to_png(picture.depth), classes[truth.kinds], np.uint8(255) * truth.visible)
+    for kind, pixels in zip(("image", "depth", "birdseye", "visible"), images, strict=True):
+        _save_png(folder / kind / f"{name}.png", pixels)
 
 
-def depth_as_points(frame: SimulatedFrame, rig: Rig) -> NDArray[np.float32]:
-    """Return the depth image as a scan, thinned to a LIDAR's sparsity (section 4: SYNTHIA).
-
-    Parameters
-    ----------
-    frame : SimulatedFrame
-        The frame, with its picture.
-    rig : Rig
-        Where the camera stands.
-
-    Returns
-    -------
-    (N, 4) float32
-        As `depth_scan` says.
-    """
-    return depth_scan(frame.picture.depth, rig.camera)
-
-
-def lidar_points(frame: SimulatedFrame, rig: Rig) -> NDArray[np.float32]:
-    """Return the points of the LIDAR.
-
-    Parameters
-    ----------
-    frame : SimulatedFrame
-        The frame, with its points.
-    rig : Rig
-        Not used: `write_drive` calls this as it calls `depth_as_points`.
-
-    Returns
-    -------
-    (N, 4) float32
-        x, y, z in the LIDAR frame, metres, and reflectance 0..1.
-    """
-    return frame.points
+def _write_files(
+    folder: Path, simulated: SimulatedDrive, labelled: Collection[int], label_set: LabelSet, dense: bool
+) -> None:
+    """Write all files of a drive to its folder."""
+    for name in ("image_02/data", "velodyne_points/data", "oxts/data", "labels"):
+        (folder / name).mkdir(parents=True)
+    objects = {}
+    for k, frame in enumerate(simulated.frames(set(labelled))):
+        name = f"{k:010d}"
+        _save_png(folder / "image_02" / "data" / f"{name}.png", frame.picture.image)
+        points = depth_scan(frame.picture.depth, simulated.rig.camera) if dense else frame.points
+        (folder / "velodyne_points" / "data" / f"{name}.bin").write_bytes(points.tobytes())
+        oxts = oxts_packet(simulated.T_world_from_imu, frame.time, simulated.geodesy)
+        (folder / "oxts" / "data" / f"{name}.txt").write_text(oxts)
+        objects[name] = frame.objects
+        if k in labelled:
+            _write_labels(folder / "labels", name, frame, label_set)
+    _write_times(folder, simulated.n_frames)
+    (folder / "oxts" / "dataformat.txt").write_text(DATAFORMAT)
+    (folder / "labels" / "label_set.txt").write_text(f"{label_set.name}\n")
+    (folder / "labels" / "objects.json").write_text(json.dumps(objects, separators=(",", ":")) + "\n")
 
 
 def write_drive(
@@ -196,7 +172,7 @@ def write_drive(
     simulated: SimulatedDrive,
     labelled: Collection[int],
     label_set: LabelSet = KITTI_14,
-    points: Callable[[SimulatedFrame, Rig], NDArray[np.float32]] = lidar_points,
+    dense: bool = False,
 ) -> Path:
     """Write a drive: images, points, oxts, timestamps, and labels of some frames.
 
@@ -215,8 +191,8 @@ def write_drive(
         Numbers of the frames that get labels.
     label_set : LabelSet
         The classes of the labels.
-    points : callable
-        What is written as LIDAR points: `lidar_points` or `depth_as_points`.
+    dense : bool
+        Whether the points come from the depth image, thinned (section 4: SYNTHIA), instead of the LIDAR.
 
     Returns
     -------
@@ -231,7 +207,7 @@ def write_drive(
     folder = drive_folder(root, DATE, drive)
     folder.parent.mkdir(parents=True, exist_ok=True)
     partial = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}-", suffix=UNFINISHED))
-    _write_files(partial, simulated, labelled, label_set, points)
+    _write_files(partial, simulated, labelled, label_set, dense)
     check_complete(partial, simulated.n_frames, labelled)
     partial.chmod(0o755)
     try:
@@ -241,29 +217,3 @@ def write_drive(
         if not folder.exists():  # else another process was quicker
             raise
     return folder
-
-
-def _write_files(
-    partial: Path,
-    simulated: SimulatedDrive,
-    labelled: Collection[int],
-    label_set: LabelSet,
-    points: Callable[[SimulatedFrame, Rig], NDArray[np.float32]],
-) -> None:
-    """Write all files of a drive to its folder."""
-    for name in ("image_02/data", "velodyne_points/data", "oxts/data", "labels"):
-        (partial / name).mkdir(parents=True)
-    objects = {}
-    for k, frame in enumerate(simulated.frames(set(labelled))):
-        name = f"{k:010d}"
-        _save_png(partial / "image_02" / "data" / f"{name}.png", frame.picture.image)
-        (partial / "velodyne_points" / "data" / f"{name}.bin").write_bytes(points(frame, simulated.rig).tobytes())
-        oxts = oxts_packet(simulated.T_world_from_imu, frame.time, simulated.geodesy)
-        (partial / "oxts" / "data" / f"{name}.txt").write_text(oxts)
-        objects[name] = frame.objects
-        if k in labelled:
-            _write_labels(partial / "labels", name, frame, label_set)
-    _write_times(partial, simulated.n_frames, datetime(2026, 1, 1, 10, 0, 0, 125000))
-    (partial / "oxts" / "dataformat.txt").write_text(DATAFORMAT)
-    (partial / "labels" / "label_set.txt").write_text(f"{label_set.name}\n")
-    (partial / "labels" / "objects.json").write_text(json.dumps(objects, separators=(",", ":")) + "\n")

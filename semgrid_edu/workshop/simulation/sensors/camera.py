@@ -43,38 +43,20 @@ class Picture:
     instance: NDArray[np.int32]
 
 
-@cache
-def _rays(rig: Rig, du: float = 0.0, dv: float = 0.0) -> NDArray[np.float32]:
-    """Return a ray for every pixel, through its middle or beside it."""
-    return rig.pixel_directions(du, dv)
+_rays = cache(Rig.pixel_directions)
 
 
-@cache
-def _cosines(rig: Rig) -> NDArray[np.float32]:
-    """Return the cosine between every pixel's ray and the optical axis."""
-    return (rig.pixel_directions() @ rig.camera.T_camera_from_lidar[2, :3]).astype(np.float32)
-
-
-@njit(cache=True)
-def _discontinuities(triangle, distance, kind, material):
+def _discontinuities(triangle: NDArray, distance: NDArray, kind: NDArray, material: NDArray) -> NDArray[np.bool_]:
     """Mark pixels whose right or lower neighbours show something else, and those neighbours: edges to refine."""
-    height, width = triangle.shape
-    edge = np.zeros((height, width), np.bool_)
-    for r in range(height):
-        for c in range(width):
-            for dr, dc in ((0, 1), (1, 0)):
-                if r + dr >= height or c + dc >= width:
-                    continue
-                a, b = triangle[r, c], triangle[r + dr, c + dc]
-                if a == b:
-                    continue
-                jump = a < 0 or b < 0
-                if not jump:
-                    near = min(distance[r, c], distance[r + dr, c + dc])
-                    jump = kind[a] != kind[b] or material[a] != material[b]
-                    jump = jump or abs(distance[r, c] - distance[r + dr, c + dc]) > 0.05 * near
-                if jump:
-                    edge[r, c] = edge[r + dr, c + dc] = True
+    edge = np.zeros(triangle.shape, bool)
+    for here, beside in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+        a, b = triangle[here], triangle[beside]
+        near = np.minimum(distance[here], distance[beside]).astype(np.float64)
+        jump = (a < 0) | (b < 0) | (kind[a] != kind[b]) | (material[a] != material[b])
+        jump |= np.abs(distance[here] - distance[beside]) > 0.05 * near
+        jump &= a != b
+        edge[here] |= jump
+        edge[beside] |= jump
     return edge
 
 
@@ -94,40 +76,24 @@ def _smooth(values, distance, step, radius, out):
             out[r, c] = total / weight if weight > 0 else 1.0
 
 
-@njit(cache=True)
-def _rays_to(axis, along_normal, spread, luck, chosen, positions, directions, distance, triangle, normals):
-    """Return rays from chosen hits, a little off their surface, to `axis` plus the normal, scattered by `luck`."""
-    starts, rays = np.empty((len(chosen), 3), np.float32), np.empty((len(chosen), 3), np.float32)
-    for i in range(len(chosen)):
-        k = chosen[i]
-        n, d = normals[triangle[k]], directions[k]
-        flip = -1.0 if n[0] * d[0] + n[1] * d[1] + n[2] * d[2] > 0 else 1.0
-        offset, length = 0.004 + 0.0006 * distance[k], 0.0
-        for c in range(3):
-            starts[i, c] = positions[k, c] + offset * (flip * n[c] - d[c])
-            rays[i, c] = axis[c] + along_normal * flip * n[c] + spread * (luck[i, c] - 0.5)
-            length += rays[i, c] ** 2
-        rays[i] /= np.sqrt(length)
-    return starts, rays
-
-
 def _open(
-    hits: Hits,
-    instant: Instant,
-    chosen: NDArray,
-    axis: tuple,
-    along_normal: float,
-    spread: float,
+    hits: Hits, instant: Instant, chosen: NDArray, axis: tuple, along_normal: float, spread: float,
     rng: np.random.Generator,
-) -> NDArray[np.float32]:
-    """Return for every pixel 1 where its hit sees the light, 0 where something is in between, -1 if not chosen."""
+) -> NDArray[np.float32]:  # fmt: skip
+    """Return for every pixel 1 where its hit sees the light, 0 where something is in between, -1 if not chosen.
+
+    From each chosen hit, a little off its surface, a ray goes to `axis` plus the normal, scattered by chance.
+    """
     luck = rng.random((len(chosen), 3), dtype=np.float32)
-    starts, rays = _rays_to(
-        np.float32(axis), along_normal, spread, luck, chosen,
-        hits.position, hits.directions, hits.distance, hits.triangle, instant.normals,
-    )  # fmt: skip
+    normal, ray = instant.normals[hits.triangle[chosen]], hits.directions[chosen]
+    away = normal[:, 0] * ray[:, 0] + normal[:, 1] * ray[:, 1] + normal[:, 2] * ray[:, 2] > 0
+    facing = np.where(away, -1.0, 1.0)[:, None] * normal
+    offset = 0.004 + 0.0006 * hits.distance[chosen, None].astype(np.float64)
+    starts = hits.position[chosen] + offset * (facing - ray)
+    rays = (np.float32(axis) + along_normal * facing + spread * (luck - 0.5)).astype(np.float32)
+    length = np.sqrt((rays**2).sum(axis=1, keepdims=True, dtype=np.float64))
     result = np.full(len(hits.distance), -1, np.float32)
-    result[chosen] = ~instant.blocked(starts, rays)
+    result[chosen] = ~instant.blocked(starts, rays / length)
     return result
 
 
@@ -146,24 +112,14 @@ def _sun_and_sky(
     return sunlit.ravel(), open_sky.ravel()
 
 
-@njit(cache=True)
-def _lens(radiance, centre):
+def _lens(radiance: NDArray[np.float32], centre: float) -> NDArray[np.float32]:
     """Blur the picture as a lens does: along each axis the share `centre` stays, the rest goes to the next pixels."""
-    height, width, _ = radiance.shape
-    side = np.float32((1.0 - centre) / 2)
-    middle = np.float32(centre)
-    across, out = np.empty_like(radiance), np.empty_like(radiance)
-    for r in range(height):
-        for c in range(width):
-            a, b = max(c - 1, 0), min(c + 1, width - 1)
-            for i in range(3):
-                across[r, c, i] = middle * radiance[r, c, i] + side * (radiance[r, a, i] + radiance[r, b, i])
-    for r in range(height):
-        a, b = max(r - 1, 0), min(r + 1, height - 1)
-        for c in range(width):
-            for i in range(3):
-                out[r, c, i] = middle * across[r, c, i] + side * (across[a, c, i] + across[b, c, i])
-    return out
+    middle, side = np.float32(centre), np.float32((1.0 - centre) / 2)
+    for axis in (1, 0):
+        at = np.arange(radiance.shape[axis])
+        neighbours = radiance.take(at - 1, axis, mode="clip") + radiance.take(at + 1, axis, mode="clip")
+        radiance = middle * radiance + side * neighbours
+    return radiance
 
 
 def _expose(radiance: NDArray, light: Light, rig: Rig, rng: np.random.Generator) -> NDArray[np.uint8]:
@@ -199,10 +155,6 @@ def take_picture(
         Sun, sky and exposure.
     rng : numpy.random.Generator
         Source of the sensor's noise and of the scattered rays that make shadows soft.
-
-    Returns
-    -------
-    Picture
     """
     shape = rig.image_size
     rotation = T_world_from_lidar[:3, :3].astype(np.float32)
@@ -220,7 +172,7 @@ def take_picture(
         radiance[edges] += shade(beside, instant, road, light, sunlit[edges], open_sky[edges], pixel)[0]
     radiance[edges] /= 1 + len(_SUBPIXELS)
 
-    ahead = _cosines(rig) * hits.distance
+    ahead = (rays @ rig.camera.T_camera_from_lidar[2, :3]).astype(np.float32) * hits.distance
     return Picture(
         image=_expose(radiance.reshape(*shape, 3), light, rig, rng),
         kind=kind.reshape(shape),

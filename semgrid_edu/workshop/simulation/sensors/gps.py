@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,8 @@ GRAVITY = 9.81
 """What an accelerometer at rest reads upwards, m/s^2."""
 _STEP = 1e-3
 """Seconds between the poses of which velocities and accelerations are central differences."""
+DATAFORMAT = Path(__file__).with_name("dataformat.txt").read_text(encoding="utf-8")
+"""The legend that KITTI puts beside the packets."""
 _FLAGS = (0.05, 0.02, 4, 9, 4, 4, 6)
 """Accuracies and modes, the last numbers of each packet: those of a receiver with a good fix."""
 
@@ -43,11 +46,7 @@ class Geodesy:
         Parameters
         ----------
         rng : numpy.random.Generator
-            Source of all that is drawn.
-
-        Returns
-        -------
-        Geodesy
+            Decides them.
         """
         north, east = float(rng.uniform(0, 0.05)), float(rng.uniform(0, 0.05))
         return cls(49.0 + north, 8.4 + east, 114.0, float(rng.uniform(-3.1, 3.1)))
@@ -91,7 +90,7 @@ def oxts_packet(pose: Callable[[float], NDArray], t: float, geodesy: Geodesy) ->
     Returns
     -------
     str
-        One line of numbers with spaces between.
+        One line.
     """
     before, now, after = (pose(t + h) for h in (-_STEP, 0.0, _STEP))
     turn = geodesy.rotation
@@ -105,44 +104,5 @@ def oxts_packet(pose: Callable[[float], NDArray], t: float, geodesy: Geodesy) ->
     level = Rotation.from_euler("z", yaw).as_matrix()
     felt = np.add(acceleration, (0, 0, GRAVITY))
     numbers = [latitude, longitude, geodesy.altitude + offset[2], roll, pitch, yaw, velocity[1], velocity[0]]
-    numbers += [
-        *(level.T @ velocity),
-        *(R.T @ felt),
-        *(level.T @ felt),
-    ]
-    numbers += [*rates, *(level.T @ R @ rates)]
+    numbers += [*(level.T @ velocity), *(R.T @ felt), *(level.T @ felt), *rates, *(level.T @ R @ rates)]
     return " ".join([f"{x:.16g}" for x in numbers] + [str(x) for x in _FLAGS]) + "\n"
-
-
-DATAFORMAT = """lat:   latitude of the oxts-unit (deg)
-lon:   longitude of the oxts-unit (deg)
-alt:   altitude of the oxts-unit (m)
-roll:  roll angle (rad),    0 = level, positive = left side up,      range: -pi   .. +pi
-pitch: pitch angle (rad),   0 = level, positive = front down,        range: -pi/2 .. +pi/2
-yaw:   heading (rad),       0 = east,  positive = counter clockwise, range: -pi   .. +pi
-vn:    velocity towards north (m/s)
-ve:    velocity towards east (m/s)
-vf:    forward velocity, i.e. parallel to earth-surface (m/s)
-vl:    leftward velocity, i.e. parallel to earth-surface (m/s)
-vu:    upward velocity, i.e. perpendicular to earth-surface (m/s)
-ax:    acceleration in x, i.e. in direction of vehicle front (m/s^2)
-ay:    acceleration in y, i.e. in direction of vehicle left (m/s^2)
-az:    acceleration in z, i.e. in direction of vehicle top (m/s^2)
-af:    forward acceleration (m/s^2)
-al:    leftward acceleration (m/s^2)
-au:    upward acceleration (m/s^2)
-wx:    angular rate around x (rad/s)
-wy:    angular rate around y (rad/s)
-wz:    angular rate around z (rad/s)
-wf:    angular rate around forward axis (rad/s)
-wl:    angular rate around leftward axis (rad/s)
-wu:    angular rate around upward axis (rad/s)
-pos_accuracy:  velocity accuracy (north/east in m)
-vel_accuracy:  velocity accuracy (north/east in m/s)
-navstat:       navigation status
-numsats:       number of satellites tracked by primary GPS receiver
-posmode:       position mode of primary GPS receiver
-velmode:       velocity mode of primary GPS receiver
-orimode:       orientation mode of primary GPS receiver
-"""
-"""The legend that KITTI puts beside the packets."""

@@ -4,33 +4,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.workshop.simulation.sensors.porous import PorousMesh
-from semgrid_edu.workshop.simulation.sensors.raycast import MISS, Hits, RayMesh
+from semgrid_edu.workshop.simulation.sensors.raycast import MISS, Hits, PorousMesh, RayMesh
 
 
-@njit(cache=True)
-def _towards(origin, directions, spheres):
-    """Return the rays from one point that pass through any of the spheres (centre, radius)."""
-    chosen = np.empty(len(directions), np.int64)
-    n = 0
-    axis = np.empty((len(spheres), 4), np.float32)
-    for k in range(len(spheres)):
-        away = spheres[k, :3] - origin
-        distance = np.sqrt((away**2).sum())
-        axis[k, :3] = away / distance
-        ratio = spheres[k, 3] / distance
-        axis[k, 3] = np.sqrt(1.0 - ratio * ratio) if ratio < 1.0 else -1.0
-    for i in range(len(directions)):
-        for k in range(len(axis)):
-            cosine = axis[k, 0] * directions[i, 0] + axis[k, 1] * directions[i, 1] + axis[k, 2] * directions[i, 2]
-            if cosine >= axis[k, 3] - np.float32(1e-6):
-                chosen[n] = i
-                n += 1
-                break
-    return chosen[:n]
+def _column(name: str) -> cached_property:
+    """Return a table of an `Instant`: an attribute of its shapes, one below the other."""
+    return cached_property(lambda instant: np.concatenate([getattr(mesh.shape, name) for mesh in instant.meshes]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,45 +24,33 @@ class Instant:
         What stands still; its triangles come first in the tables.
     moving : RayMesh or None
         What moves, where it is at this instant; None when nothing moves.
-    spheres : (M, 4) float64
-        Centre in the world and radius, metres, of a sphere around each thing that moves: only rays through one of the
-        spheres are tried against `moving`.
     porous : PorousMesh or None
         What lets a part of the rays through; its triangles come last in the tables.
+
+    Attributes
+    ----------
+    normals : (F, 3) float32
+        The unit normal of each triangle, for shading.
+    colour : (F, 3) float32
+        The linear albedo of each triangle, 0..1.
+    material, kind : (F,) uint8
+        The `Material` and the `Kind` of each triangle.
     """
 
     static: RayMesh
     moving: RayMesh | None
-    spheres: NDArray[np.float64]
     porous: PorousMesh | None = None
 
-    @cached_property
-    def normals(self) -> NDArray[np.float32]:
-        """(F, 3) float32: the unit normal of each triangle, for shading."""
-        return np.concatenate([mesh.shape.normals for mesh in self._meshes])
-
-    @cached_property
-    def colour(self) -> NDArray[np.float32]:
-        """(F, 3) float32: the linear albedo of each triangle, 0..1."""
-        return np.concatenate([mesh.shape.colour for mesh in self._meshes])
-
-    @cached_property
-    def material(self) -> NDArray[np.uint8]:
-        """(F,) uint8: the `Material` of each triangle."""
-        return np.concatenate([mesh.shape.material for mesh in self._meshes])
-
-    @cached_property
-    def kind(self) -> NDArray[np.uint8]:
-        """(F,) uint8: the `Kind` of each triangle."""
-        return np.concatenate([mesh.shape.kind for mesh in self._meshes])
+    normals, colour, material, kind = (_column(name) for name in ("normals", "colour", "material", "kind"))
 
     @cached_property
     def instance(self) -> NDArray[np.int32]:
         """(F,) int32: the number of the object that each triangle belongs to; 0 for scenery."""
-        return np.concatenate([mesh.instance for mesh in self._meshes])
+        return np.concatenate([mesh.instance for mesh in self.meshes])
 
     @property
-    def _meshes(self) -> list[RayMesh]:
+    def meshes(self) -> list[RayMesh]:
+        """What there is, in the order of the tables."""
         return [mesh for mesh in (self.static, self.moving, self.porous and self.porous.mesh) if mesh]
 
     def cast(self, origin: NDArray, directions: NDArray, rng: np.random.Generator) -> Hits:
@@ -95,10 +64,6 @@ class Instant:
             Unit vectors, in the world.
         rng : numpy.random.Generator
             Decides which rays pass what is porous; nothing is drawn where nothing is.
-
-        Returns
-        -------
-        Hits
         """
         origins = np.empty_like(directions)
         origins[:] = origin
@@ -106,11 +71,10 @@ class Instant:
         distance, triangle = hits["tfar"], hits["primID"]
         distance[triangle < 0] = MISS
         if self.moving:
-            near = _towards(np.asarray(origin, np.float64), directions, self.spheres)
-            closer = self.moving.embree.run(origins[near], directions[near], output=1)
-            nearer = (closer["primID"] >= 0) & (closer["tfar"] < distance[near])
-            distance[near[nearer]] = closer["tfar"][nearer]
-            triangle[near[nearer]] = closer["primID"][nearer] + len(self.static.instance)
+            closer = self.moving.embree.run(origins, directions, output=1)
+            nearer = (closer["primID"] >= 0) & (closer["tfar"] < distance)
+            distance[nearer] = closer["tfar"][nearer]
+            triangle[nearer] = closer["primID"][nearer] + len(self.static.instance)
         if self.porous:
             rays, at, face = self.porous.stop(origins, directions, distance, rng)
             distance[rays], triangle[rays] = at, face + len(self.instance) - len(self.porous.opacity)

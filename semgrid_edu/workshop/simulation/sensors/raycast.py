@@ -1,4 +1,4 @@
-"""Rays against triangles: `embreex` finds what each ray hits, and tables say what that is."""
+"""Rays against triangles, some of which let a part of the rays through (by the law of Beer and Lambert)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,10 +9,15 @@ from embreex.rtcore_scene import EmbreeScene
 from numba import njit
 from numpy.typing import NDArray
 
+from semgrid_edu.workshop.simulation.things.materials import Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, merge
 
 MISS = np.float32(1e30)
 """Distance that a ray which meets nothing is given, metres."""
+_GRAZING = np.float32(1e-3)
+"""Smallest |cos| between a ray and the normal of a sheet that is told from a ray along the sheet."""
+_STEP = np.float32(2e-3)
+"""By how much a ray starts beyond the surface that it has passed, metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,16 +48,134 @@ class RayMesh:
             In the world; at least one.
         instances : sequence of int
             For each shape the number of its object; 0 for scenery.
-
-        Returns
-        -------
-        RayMesh
         """
         whole = merge(shapes)
         sizes = [len(s.faces) for s in shapes]
         embree = EmbreeScene()
         TriangleMesh(embree, np.ascontiguousarray(whole.vertices), np.ascontiguousarray(whole.faces))
         return cls(whole, np.repeat(np.asarray(instances, np.int32), sizes), embree)
+
+
+@dataclass(frozen=True, eq=False)
+class PorousMesh:
+    """Surfaces and volumes that stop a ray by chance.
+
+    A ray passes with probability exp(-depth), where `depth` is the optical depth that it has crossed:
+
+    - `Material.WIRE`, a sheet: opacity * distance / |cos|. The light of a LIDAR or a pixel is a cone, so the number of
+      wires in it grows with the distance from the sensor, and with the angle between ray and normal.
+    - `Material.PANE`, a sheet: opacity / |cos|.
+    - `Material.TWIGS`, a closed volume: opacity * length of the way inside it.
+
+    Parameters
+    ----------
+    mesh : RayMesh
+        All F triangles, in the world.
+    opacity : (F,) float32
+        Of each triangle: 1/m for wire and twigs, without unit for panes.
+    """
+
+    mesh: RayMesh
+    opacity: NDArray[np.float32]
+
+    @classmethod
+    def of(cls, shapes: Sequence[Shape], opacities: Sequence[float]) -> "PorousMesh":
+        """Build the search tree of several shapes.
+
+        Parameters
+        ----------
+        shapes : sequence of Shape
+            In the world; at least one.
+        opacities : sequence of float
+            For each shape its opacity.
+        """
+        faces = [len(shape.faces) for shape in shapes]
+        return cls(RayMesh.of(shapes, [0] * len(shapes)), np.repeat(np.asarray(opacities, np.float32), faces))
+
+    def stop(
+        self, origins: NDArray, directions: NDArray, ends: NDArray, rng: np.random.Generator
+    ) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.int32]]:
+        """Find the rays that end here before they meet something solid.
+
+        Each ray that meets any of the surfaces draws the optical depth at which it ends, from the exponential
+        distribution of mean 1, and spends it on its way.
+
+        Parameters
+        ----------
+        origins, directions : (N, 3) float32
+            Where the rays start in the world, metres, and unit vectors.
+        ends : (N,) float32
+            Distance of what is solid, metres; `MISS` for none.
+        rng : numpy.random.Generator
+            Source of chance.
+
+        Returns
+        -------
+        rays : (M,) int64
+            The rays that end.
+        distance : (M,) float32
+            Where they do, metres.
+        triangle : (M,) int32
+            What stops them: triangles of `mesh`.
+        """
+        rays, start = np.arange(len(ends)), np.zeros(len(ends), np.float32)
+        rays, start, crossing, triangle = self._next(origins, directions, rays, start)
+        budget = np.zeros(len(ends), np.float32)
+        budget[rays] = rng.standard_exponential(len(rays), dtype=np.float32)
+        found = [(rays[:0], start[:0], triangle[:0])]
+        while len(rays):
+            at, cost = self._spent(directions[rays], start, crossing, triangle, budget[rays])
+            over = at < ends[rays]
+            found.append((rays[over], at[over], triangle[over]))
+            budget[rays] -= cost
+            on = ~over & (crossing < ends[rays])
+            rays, start, crossing, triangle = self._next(origins, directions, rays[on], crossing[on] + _STEP)
+        return tuple(np.concatenate(part) for part in zip(*found, strict=True))
+
+    def _next(self, origins: NDArray, directions: NDArray, rays: NDArray, start: NDArray) -> tuple[NDArray, ...]:
+        """Return the rays that meet a surface from `start` on, with their starts, its distance and its triangle."""
+        hits = self.mesh.embree.run(origins[rays] + start[:, None] * directions[rays], directions[rays], output=1)
+        met = hits["primID"] >= 0
+        return rays[met], start[met], start[met] + hits["tfar"][met], hits["primID"][met]
+
+    def _spent(
+        self, directions: NDArray, start: NDArray, crossing: NDArray, triangle: NDArray, budget: NDArray
+    ) -> tuple:
+        """Return where each ray's budget ends on the way to its next surface, `MISS` if beyond it, and the way's cost.
+
+        The way lies inside a volume if the ray leaves one at its end.
+        """
+        shape, opacity = self.mesh.shape, self.opacity[triangle]
+        cosine = (shape.normals[triangle] * directions).sum(axis=1)
+        material = shape.material[triangle]
+        length = np.where(cosine > 0, crossing - start, np.float32(0))
+        across = np.where(material == Material.WIRE, crossing, np.float32(1)) / np.maximum(np.abs(cosine), _GRAZING)
+        volume = material == Material.TWIGS
+        cost = opacity * np.where(volume, length, across)
+        at = np.where(volume, start + budget / opacity, crossing)
+        return np.where(budget < cost, at, MISS), cost
+
+
+@dataclass(frozen=True, eq=False)
+class Hits:
+    """Where N rays ended.
+
+    Parameters
+    ----------
+    directions : (N, 3) float32
+        Unit vectors of the rays, in the world.
+    distance : (N,) float32
+        Length of each ray, metres; `MISS` where it meets nothing.
+    triangle : (N,) int32
+        What it meets: a row in the tables of the `Instant`; -1 for nothing.
+    position : (N, 3) float32
+        Where it ends, in the world, metres; 10 km away where it meets nothing.
+    """
+
+    directions: NDArray[np.float32]
+    distance: NDArray[np.float32]
+    triangle: NDArray[np.int32]
+    position: NDArray[np.float32]
 
 
 @njit(cache=True)
@@ -76,25 +199,3 @@ def turned(rays: NDArray, rotation: NDArray) -> NDArray:
         for c in range(3):
             out[i, c] = rotation[c, 0] * rays[i, 0] + rotation[c, 1] * rays[i, 1] + rotation[c, 2] * rays[i, 2]
     return out
-
-
-@dataclass(frozen=True, eq=False)
-class Hits:
-    """Where N rays ended.
-
-    Parameters
-    ----------
-    directions : (N, 3) float32
-        Unit vectors of the rays, in the world.
-    distance : (N,) float32
-        Length of each ray, metres; `MISS` where it meets nothing.
-    triangle : (N,) int32
-        What it meets: a row in the tables of the `Instant`; -1 for nothing.
-    position : (N, 3) float32
-        Where it ends, in the world, metres; 10 km away where it meets nothing.
-    """
-
-    directions: NDArray[np.float32]
-    distance: NDArray[np.float32]
-    triangle: NDArray[np.int32]
-    position: NDArray[np.float32]

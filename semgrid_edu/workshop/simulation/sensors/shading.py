@@ -11,29 +11,6 @@ from semgrid_edu.workshop.simulation.street.layout import Road, outside_asphalt,
 from semgrid_edu.workshop.simulation.street.light import Light, noise_tile, sky_radiance, texture
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 
-_GROUND, _PLASTER, _BRICK, _TILES, _WOOD = (
-    int(Material.GROUND),
-    int(Material.PLASTER),
-    int(Material.BRICK),
-    int(Material.TILES),
-    int(Material.WOOD),
-)
-_GLASS, _PAINT, _METAL, _BARK, _LEAF = (
-    int(Material.GLASS),
-    int(Material.PAINT),
-    int(Material.METAL),
-    int(Material.BARK),
-    int(Material.LEAF),
-)
-_LAMP = int(Material.LAMP)
-_ROAD, _LANE, _SIDEWALK, _GRASS, _SKY = (
-    int(Kind.ROAD),
-    int(Kind.LANE),
-    int(Kind.SIDEWALK),
-    int(Kind.GRASS),
-    int(Kind.SKY),
-)
-
 
 @njit(cache=True, fastmath=True)
 def _asphalt(tile, road, s, d, blur, out):
@@ -97,13 +74,13 @@ def _ground(tile, road, x, y, blur, out):
         gutter = min(max((e + 0.35) / 0.35, 0.0), 1.0)
         for c in range(3):
             out[c] *= 1.0 - 0.3 * gutter
-        return _LANE if mark else _ROAD
+        return Kind.LANE if mark else Kind.ROAD
     side = road.left if d > 0 else road.right
     if e < KERB_WIDTH or side.strip <= e < side.strip + side.walk:
         _paving(tile, s if abs(d) < 40.0 else d, e, e < KERB_WIDTH, blur, out)
-        return _SIDEWALK
+        return Kind.SIDEWALK
     _grass(tile, x, y, blur, out)
-    return _GRASS
+    return Kind.GRASS
 
 
 @njit(cache=True, fastmath=True)
@@ -115,40 +92,38 @@ def _surface(tile, material, p, n, blur, out):
         u, v = p[0], p[1]
     fade = 1.0 / (1.0 + 5.0 * blur)
     gain = 1.0
-    if material == _PLASTER:
-        gain = (
-            1.0
-            + 0.16 * (texture(tile, 25.0 * u, 25.0 * v) - 0.5) * fade
-            + 0.3 * (texture(tile, 2.5 * u, 1.2 * v) - 0.5)
-        )
+    if material == Material.PLASTER:
+        fine, broad = texture(tile, 25.0 * u, 25.0 * v) - 0.5, texture(tile, 2.5 * u, 1.2 * v) - 0.5
+        gain = 1.0 + 0.16 * fine * fade + 0.3 * broad
         gain *= 0.78 + 0.22 * min(max(v / 1.2, 0.0), 1.0)
-    elif material == _BRICK:
+    elif material == Material.BRICK:
         row = np.floor(v / 0.09)
         shift = 0.14 * (row % 2.0)
         joint = (v / 0.09 - row) < 0.14 or ((u + shift) % 0.28) < 0.02
         one = texture(tile, 13.7 * np.floor((u + shift) / 0.28), 5.9 * row)
         gain = (1.0 + 0.6 * (one - 0.5) * fade) * (1.0 + (0.5 if joint else 0.0) * fade)
-    elif material == _TILES:
+    elif material == Material.TILES:
         slant = v / max(np.sqrt(1.0 - n[2] * n[2]), 0.3)
         gain = 1.0 - 0.35 * fade * (1.0 if (slant % 0.32) < 0.07 else 0.0)
         gain *= 1.0 + 0.5 * (texture(tile, 3.0 * u, 3.0 * slant) - 0.5)
-    elif material in (_WOOD, _BARK):
+    elif material in (Material.WOOD, Material.BARK):
         gain = 1.0 + 0.7 * (texture(tile, 50.0 * u + 20.0 * p[0], 5.0 * v) - 0.5) * fade
-    elif material == _LEAF:
+    elif material == Material.LEAF:
         gain = 1.0 + 1.1 * (texture(tile, 45.0 * (u + p[0]), 45.0 * v + 20.0 * p[1]) - 0.5) * fade
     for c in range(3):
         out[c] *= gain
 
 
 @njit(cache=True, fastmath=True)
-def _mirror(tile, ray, n, sun, sun_colour, zenith, horizon, clouds, phase, gloss, strength, out):
+def _mirror(tile, ray, n, light, gloss, strength, out):
     """Add what a glossy surface reflects: the sky above the horizon, a dark street below it, the sun's highlight."""
+    sun, sun_colour, _, horizon, _, _, _ = light
     cos = -(ray[0] * n[0] + ray[1] * n[1] + ray[2] * n[2])
     rx, ry, rz = ray[0] + 2 * cos * n[0], ray[1] + 2 * cos * n[1], ray[2] + 2 * cos * n[2]
     fresnel = strength + (1.0 - strength) * (1.0 - max(cos, 0.0)) ** 5
     seen = np.empty(3, np.float32)
     if rz > 0.12:
-        sky_radiance(tile, rx, ry, rz, sun, sun_colour, zenith, horizon, clouds, phase, seen)
+        sky_radiance(tile, rx, ry, rz, light, seen)
     else:
         skyline = 0.10 + 0.5 * max(rz + 0.02, 0.0) + 0.12 * (texture(tile, 60.0 * np.arctan2(ry, rx), 20.0 * rz) - 0.3)
         for c in range(3):
@@ -163,43 +138,41 @@ def _shade(
     tile, road, rays, t, tri, pos, normals, colour, material, kind, sunlit, open_sky, pixel, light, radiance, kinds
 ):
     """Write the radiance (N, 3) and the kind (N,) of every hit."""
-    sun, sun_colour, zenith, horizon, clouds, haze, phase = light
+    sun, sun_colour, zenith, horizon, _, haze, _ = light
     n, albedo = np.empty(3, np.float32), np.empty(3, np.float32)
     for i in range(len(t)):
         ray = rays[i]
         out = radiance[i]
         if tri[i] < 0:
-            kinds[i] = _SKY
-            sky_radiance(tile, ray[0], ray[1], ray[2], sun, sun_colour, zenith, horizon, clouds, phase, out)
+            kinds[i] = Kind.SKY
+            sky_radiance(tile, ray[0], ray[1], ray[2], light, out)
             continue
         k, p, m = tri[i], pos[i], material[tri[i]]
         facing = normals[k, 0] * ray[0] + normals[k, 1] * ray[1] + normals[k, 2] * ray[2]
-        flip = -1.0 if facing > 0.0 and m != _LEAF else 1.0
+        flip = -1.0 if facing > 0.0 and m != Material.LEAF else 1.0
         for c in range(3):
             n[c], albedo[c] = flip * normals[k, c], colour[k, c]
         blur = t[i] * pixel / max(abs(facing), 0.05)
         kinds[i] = kind[k]
-        if m == _GROUND:
+        if m == Material.GROUND:
             kinds[i] = _ground(tile, road, p[0], p[1], blur if abs(n[2]) > 0.7 else t[i] * pixel, albedo)
-        elif m >= _PLASTER:
+        elif m >= Material.PLASTER:
             _surface(tile, m, p, n, t[i] * pixel, albedo)
         cos = n[0] * sun[0] + n[1] * sun[1] + n[2] * sun[2]
-        if m == _LEAF:
+        if m == Material.LEAF:
             cos = 0.35 * abs(cos) + 0.65 * max(cos, 0.0) + 0.12
         direct = max(cos, 0.0) * sunlit[i]
         up = 0.5 + 0.5 * n[2]
         for c in range(3):
-            ambient = (up * (0.55 * zenith[c] + 0.45 * horizon[c]) + (1.0 - up) * 0.22 * horizon[c]) * (
-                0.12 + 0.88 * open_sky[i]
-            )
-            out[c] = albedo[c] * (direct * sun_colour[c] + ambient)
-        if m == _GLASS:
-            _mirror(tile, ray, n, sun, sun_colour, zenith, horizon, clouds, phase, 300.0, 0.09, out)
-        elif m == _PAINT:
-            _mirror(tile, ray, n, sun, sun_colour, zenith, horizon, clouds, phase, 60.0, 0.055, out)
-        elif m == _METAL:
-            _mirror(tile, ray, n, sun, sun_colour, zenith, horizon, clouds, phase, 20.0, 0.04, out)
-        elif m == _LAMP:
+            ambient = up * (0.55 * zenith[c] + 0.45 * horizon[c]) + (1.0 - up) * 0.22 * horizon[c]
+            out[c] = albedo[c] * (direct * sun_colour[c] + ambient * (0.12 + 0.88 * open_sky[i]))
+        if m == Material.GLASS:
+            _mirror(tile, ray, n, light, 300.0, 0.09, out)
+        elif m == Material.PAINT:
+            _mirror(tile, ray, n, light, 60.0, 0.055, out)
+        elif m == Material.METAL:
+            _mirror(tile, ray, n, light, 20.0, 0.04, out)
+        elif m == Material.LAMP:
             for c in range(3):
                 out[c] += 0.45 * albedo[c]
         fog = 1.0 - np.exp(-haze * t[i])
@@ -236,11 +209,9 @@ def shade(
     """
     n = len(hits.distance)
     radiance, kinds = np.empty((n, 3), np.float32), np.empty(n, np.uint8)
-    vectors = (light.sun, light.sun_colour, light.sky_colour, light.horizon_colour)
-    packed = (*(np.asarray(v, np.float32) for v in vectors), light.clouds, light.haze, light.phase)
     _shade(
         noise_tile(), road, hits.directions, hits.distance, hits.triangle, hits.position,
         instant.normals, instant.colour, instant.material, instant.kind,
-        sunlit, open_sky, pixel, packed, radiance, kinds,
+        sunlit, open_sky, pixel, light.packed, radiance, kinds,
     )  # fmt: skip
     return radiance, kinds

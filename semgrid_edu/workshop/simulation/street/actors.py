@@ -44,7 +44,7 @@ class Actor:
 
     instance: int
     kind: Kind
-    size: tuple[float, float, float]
+    size: Size
     trajectory: Trajectory
     look: Look
     phase: float = 0.0
@@ -59,77 +59,36 @@ class Actor:
             The street.
         t : float
             Time, seconds.
-
-        Returns
-        -------
-        Shape
         """
-        position, yaw = self.trajectory.pose(road, t)
         travelled = self.phase + self.trajectory.pace.distance(t)
         if isinstance(self.look, Person):
-            body = walker(self.look, travelled) if self.kind == Kind.PEDESTRIAN else rider(self.look, travelled)
+            body = (walker if self.kind == Kind.PEDESTRIAN else rider)(self.look, travelled)
         else:
             model, paint = self.look
             body = (bicycle() if model == "bicycle" else car(model)).recoloured(Material.PAINT, paint)
         if self.overturned:
             body = body.overturned(self.size[2])
-        return body.placed(position, yaw)
+        return body.placed(*self.trajectory.pose(road, t))
 
     def footprint(self, road: Road, t: float) -> Footprint:
-        """Return the ground that it covers at one instant.
-
-        Parameters
-        ----------
-        road : Road
-            The street.
-        t : float
-            Time, seconds.
-
-        Returns
-        -------
-        Footprint
-        """
-        position, yaw = self.trajectory.pose(road, t)
+        """Return the ground that it covers at one instant. Parameters are those of `Actor.shape`."""
+        (x, y, _), yaw = self.trajectory.pose(road, t)
         exponent = {Kind.CAR: ROUNDED, Kind.PEDESTRIAN: ROUND}.get(self.kind, SQUARE)
         length, width, height = self.size
-        return Footprint(
-            position[0],
-            position[1],
-            length / 2,
-            width / 2,
-            yaw,
-            exponent,
-            int(self.kind),
-            self.instance,
-            min(height, 2.5),
-        )
+        half, top = (length / 2, width / 2), min(height, 2.5)
+        return Footprint(x, y, *half, yaw, exponent, int(self.kind), self.instance, top)
 
     def middle(self, road: Road, t: float) -> NDArray[np.float64]:
-        """Return the middle of its box in the world at one instant.
-
-        Parameters
-        ----------
-        road : Road
-            The street.
-        t : float
-            Time, seconds.
-
-        Returns
-        -------
-        (3,) float64
-            Metres.
-        """
+        """Return the middle of its box in the world, (3,), metres. Parameters are those of `Actor.shape`."""
         return np.add(self.trajectory.pose(road, t)[0], (0, 0, self.size[2] / 2))
 
     def described(self, road: Road, t: float, T_grid_from_world: NDArray) -> dict[str, object]:
         """Describe it at one instant, as a file of labels holds it.
 
+        Parameters not named here are those of `Actor.shape`.
+
         Parameters
         ----------
-        road : Road
-            The street.
-        t : float
-            Time, seconds.
         T_grid_from_world : (4, 4) float
             Pose of the world in the grid frame at that instant, metres.
 

@@ -1,8 +1,7 @@
-"""Borders that a LIDAR finds hard: wire mesh, porous hedges, panes of glass, posts, and walls across behind gaps.
+"""What runs along a side of the road and stands at its kerb, drawn once for the whole side.
 
-Each function runs one of them along a side of the road. Its measures are drawn, the same for the whole side.
-
-What stands at the kerb: street lamps, traffic signs, and the lights or priority signs of a junction.
+Borders that a LIDAR finds hard: wire mesh, porous hedges, panes of glass, posts, and walls across behind gaps. And
+street lamps, traffic signs, and the lights or priority signs of a junction.
 """
 
 from collections.abc import Callable, Iterator
@@ -10,79 +9,44 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from semgrid_edu.workshop.simulation.street.builder import Builder
-from semgrid_edu.workshop.simulation.street.footprints import outline
-from semgrid_edu.workshop.simulation.street.layout import Side, to_road
-from semgrid_edu.workshop.simulation.street.plan import Plan
-from semgrid_edu.workshop.simulation.things import furniture, see_through
+from semgrid_edu.workshop.simulation.street.footprints import Footprint
+from semgrid_edu.workshop.simulation.things import furniture
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
-from semgrid_edu.workshop.simulation.things.primitives import box, tube
-from semgrid_edu.workshop.simulation.things.shapes import Shape
+from semgrid_edu.workshop.simulation.things.shapes import Shape, box, tube
+
+_SIGNS = {"limit": 0.3, "no-entry": 0.2, "parking": 0.25, "warning": 0.15, "direction": 0.1}
+"""How often each sign stands along a road."""
+_THIN_HALF = 0.08
+_PLASTER, _PLANK = (0.62, 0.6, 0.56), (0.26, 0.16, 0.09)
 
 
-def side_of(builder: Builder, sign: int) -> Side:
-    """Return one side of the road.
-
-    Parameters
-    ----------
-    builder : Builder
-        The world that the road belongs to.
-    sign : int
-        1 for the left side, -1 for the right one.
-
-    Returns
-    -------
-    Side
-    """
-    return builder.road.left if sign > 0 else builder.road.right
-
-
-def stand_lamps(builder: Builder, plan: Plan, sign: int) -> None:
+def stand_lamps(builder: Builder, sign: int) -> None:
     """Put a row of street lamps at the kerb; one side in four, drawn by chance, has none.
 
     Parameters
     ----------
     builder : Builder
         The world that takes them.
-    plan : Plan
-        How far it reaches.
     sign : int
         1 for the left side, -1 for the right one.
     """
-    if builder.rng.random() < 0.25:
+    rng, extent = builder.rng, builder.plan.extent
+    if rng.random() < 0.25:
         return
-    side, step = side_of(builder, sign), builder.rng.uniform(22, 34)
-    shape = furniture.lamp(float(builder.rng.choice([5.5, 7.5])))
-    for s in np.arange(plan.extent.start + builder.rng.uniform(0, step), plan.extent.end, step):
+    side, step = builder.road.side(sign), rng.uniform(22, 34)
+    shape = furniture.lamp(float(rng.choice([5.5, 7.5])))
+    for s in np.arange(extent.start + rng.uniform(0, step), extent.end, step):
         builder.try_post(shape, s, sign * (side.edge + 0.6), np.pi if sign > 0 else 0.0, Kind.POLE, 0.11)
 
 
-def stand_signs(builder: Builder, plan: Plan, sign: int) -> None:
-    """Put traffic signs at the kerb, facing the traffic on their side.
-
-    Parameters
-    ----------
-    builder : Builder
-        The world that takes them.
-    plan : Plan
-        How far it reaches.
-    sign : int
-        1 for the left side, -1 for the right one.
-    """
-    rng, side = builder.rng, side_of(builder, sign)
-    yaw = 0.0 if sign < 0 else np.pi
-    for s in np.arange(plan.extent.start, plan.extent.end, 16.0):
+def stand_signs(builder: Builder, sign: int) -> None:
+    """Put traffic signs at the kerb, facing the traffic on their side. Parameters are those of `stand_lamps`."""
+    rng, extent = builder.rng, builder.plan.extent
+    d, yaw = sign * (builder.road.side(sign).edge + 0.75), 0.0 if sign < 0 else np.pi
+    for s in np.arange(extent.start, extent.end, 16.0):
         if rng.random() < 0.45:
-            name = str(
-                rng.choice(["limit", "no-entry", "parking", "warning", "direction"], p=[0.3, 0.2, 0.25, 0.15, 0.1])
-            )
-            builder.try_post(
-                furniture.sign(name),
-                s + rng.uniform(0, 12),
-                sign * (side.edge + 0.75),
-                yaw + rng.normal(0, 0.08),
-                Kind.SIGN,
-                0.08,
-            )
+            shape = furniture.sign(str(rng.choice(list(_SIGNS), p=list(_SIGNS.values()))))
+            builder.try_post(shape, s + rng.uniform(0, 12), d, yaw + rng.normal(0, 0.08), Kind.SIGN, 0.08)
 
 
 def stand_signals(builder: Builder) -> None:
@@ -99,30 +63,16 @@ def stand_signals(builder: Builder) -> None:
     lights, green = rng.random() < 0.55, bool(rng.random() < 0.5)
     back = road.side_half + road.corner + 0.4
     for sign, yaw in ((-1, 0.0), (1, np.pi)):
-        side = side_of(builder, sign)
         shape = furniture.traffic_light(green) if lights else furniture.sign("priority")
-        s = road.junction + sign * back
-        builder.try_post(shape, s, sign * (side.edge + 0.5), yaw, Kind.SIGN, 0.09)
-    for sign, leaves in ((1, road.side_left), (-1, road.side_right)):
-        if leaves:
-            shape = furniture.traffic_light(not green) if lights else furniture.sign("stop")
-            d = sign * (side_of(builder, sign).edge + road.corner + 0.5)
-            builder.try_post(
-                shape, road.junction + sign * (road.side_half + 0.5), d, -sign * np.pi / 2, Kind.SIGN, 0.09
-            )
+        builder.try_post(shape, road.junction + sign * back, sign * (road.side(sign).edge + 0.5), yaw, Kind.SIGN, 0.09)
+    for sign in filter(road.leaves, (1, -1)):
+        shape = furniture.traffic_light(not green) if lights else furniture.sign("stop")
+        s, d = road.junction + sign * (road.side_half + 0.5), sign * (road.side(sign).edge + road.corner + 0.5)
+        builder.try_post(shape, s, d, -sign * np.pi / 2, Kind.SIGN, 0.09)
 
 
-_THIN_HALF = 0.08
-_PLASTER, _PLANK = (0.62, 0.6, 0.56), (0.26, 0.16, 0.09)
 Piece = tuple[float, float, float, float]
 """Where a piece of a border begins (s, d), its direction in the frame of the road, rad, and its length, metres."""
-
-
-def _fits(builder: Builder, s: float, d: float, yaw: float, kind: Kind, length: float, half: float, top: float) -> list:
-    """Return the footprint of a piece that begins at (s, d) in a list, which is empty where it can't stand."""
-    foot = builder.footprint(s, d, yaw, kind, (length / 2, half), offset=(length / 2, 0.0), top=top)
-    clear = min(builder.edge_distance(*to_road(builder.road, x, y)) for x, y in outline(foot)) > 0.1
-    return [foot] if clear and builder.free(foot, -0.1) else []
 
 
 def _pieces(s0: float, s1: float, d: float, jog: float, step: float, rng: np.random.Generator) -> Iterator[Piece]:
@@ -138,23 +88,19 @@ def _pieces(s0: float, s1: float, d: float, jog: float, step: float, rng: np.ran
             s, at = s + length, at + aside
 
 
-def _stand(
-    builder: Builder,
-    piece: Piece,
-    kind: Kind,
-    half: float,
-    top: float,
-    solid: Shape | None,
-    porous: Shape,
-    opacity: float,
-) -> None:
-    """Put a piece of a border into the world, unless its place is taken."""
-    s, d, yaw, length = piece
-    if foot := _fits(builder, s, d, yaw, kind, length, half, top):
-        builder.footprints.extend(foot)
-        if solid:
-            builder.add(solid, s, d, yaw)
-        builder.add_porous(porous, opacity, s, d, yaw)
+def _fit(builder: Builder, piece: Piece, kind: Kind, half: float, top: float) -> Footprint | None:
+    """Return the footprint of a piece of a border, or None where it can't stand."""
+    *place, length = piece
+    foot = builder.footprint(*place, kind, (length / 2, half), offset=(length / 2, 0.0), top=top)
+    return foot if builder.off_asphalt(foot) and builder.free(foot, -0.1) else None
+
+
+def _stand(builder: Builder, piece: Piece, kind: Kind, half: float, top: float, porous: Shape, opacity: float) -> bool:
+    """Put a porous piece of a border into the world, unless its place is taken."""
+    if foot := _fit(builder, piece, kind, half, top):
+        builder.footprints.append(foot)
+        builder.add_porous(porous, opacity, *piece[:3])
+    return bool(foot)
 
 
 def wire_mesh(builder: Builder, s0: float, s1: float, d: float) -> None:
@@ -175,8 +121,9 @@ def wire_mesh(builder: Builder, s0: float, s1: float, d: float) -> None:
     rng = builder.rng
     opacity, step = rng.uniform(0.008, 0.02), rng.choice([2.0, 2.5, 3.0])
     for piece in _pieces(s0, s1, d, 2.5, step, rng):
-        frame, sheet = see_through.mesh_frame(piece[3]), see_through.mesh_sheet(piece[3])
-        _stand(builder, piece, Kind.FENCE, _THIN_HALF, see_through.MESH_HEIGHT, frame, sheet, opacity)
+        sheet = furniture.mesh_sheet(piece[3])
+        if _stand(builder, piece, Kind.FENCE, _THIN_HALF, furniture.MESH_HEIGHT, sheet, opacity):
+            builder.add(furniture.mesh_frame(piece[3]), *piece[:3])
 
 
 def twig_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
@@ -189,8 +136,8 @@ def twig_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
     for piece in _pieces(s0, s1, d + np.sign(d) * thickness / 2, 0.6, 1.0, rng):
         if rng.random() > 0.04:
             wide, high = thickness * rng.uniform(0.8, 1.1), height * rng.uniform(0.9, 1.1)
-            body = see_through.porous_hedge(piece[3], wide, high)
-            _stand(builder, piece, Kind.PLANT, wide / 2, high, None, body, opacity * rng.uniform(0.7, 1.4))
+            body = furniture.porous_hedge(piece[3], wide, high)
+            _stand(builder, piece, Kind.PLANT, wide / 2, high, body, opacity * rng.uniform(0.7, 1.4))
 
 
 def mesh_and_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
@@ -200,10 +147,7 @@ def mesh_and_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
     s, behind = s0, d + sign * rng.uniform(0.5, 1.5)
     while s < s1:
         run = rng.uniform(15, 30)
-        if rng.random() < 0.5:
-            twig_hedge(builder, s, s + run, behind)
-        else:
-            _rows(builder, s, s + run, behind)
+        (twig_hedge if rng.random() < 0.5 else _rows)(builder, s, s + run, behind)
         s += run + rng.uniform(0, 15)
 
 
@@ -212,9 +156,9 @@ def _rows(builder: Builder, s0: float, s1: float, d: float) -> None:
     rng = builder.rng
     opacity, height, long = rng.uniform(3.0, 6.0), rng.uniform(1.3, 1.9), rng.uniform(2.5, 4.0)
     for s in np.arange(s0, s1, rng.uniform(2.8, 4.0)):
-        body = see_through.porous_hedge(round(long, 3), 0.7, height * rng.uniform(0.9, 1.1))
+        body = furniture.porous_hedge(round(long, 3), 0.7, height * rng.uniform(0.9, 1.1))
         piece = (s, d + np.sign(d) * 1.6, np.sign(d) * np.pi / 2, long)
-        _stand(builder, piece, Kind.PLANT, 0.35, height, None, body, opacity)
+        _stand(builder, piece, Kind.PLANT, 0.35, height, body, opacity)
 
 
 def panes(builder: Builder, s0: float, s1: float, d: float) -> None:
@@ -223,15 +167,16 @@ def panes(builder: Builder, s0: float, s1: float, d: float) -> None:
     opacity, step = rng.uniform(0.05, 0.15), rng.uniform(1.3, 2.2)
     for piece in _pieces(s0, s1, d, 0.8, step, rng):
         if rng.random() > 0.1:
-            frame, glass = see_through.pane_frame(piece[3]), see_through.pane(piece[3])
-            _stand(builder, piece, Kind.FENCE, _THIN_HALF, see_through.PANE_HEIGHT, frame, glass, opacity)
+            glass = furniture.pane(piece[3])
+            if _stand(builder, piece, Kind.FENCE, _THIN_HALF, furniture.PANE_HEIGHT, glass, opacity):
+                builder.add(furniture.pane_frame(piece[3]), *piece[:3])
 
 
 def post_row(builder: Builder, s0: float, s1: float, d: float) -> None:
     """Stand bare posts in a regular row. Parameters are those of `wire_mesh`."""
     rng = builder.rng
     step, height, radius = rng.uniform(1.4, 2.6), rng.uniform(1.0, 1.8), rng.uniform(0.04, 0.09)
-    post = see_through.bollard(height, radius)
+    post = furniture.bollard(height, radius)
     for s in np.arange(s0, s1, step):
         builder.try_post(post, s, d, 0.0, Kind.POLE, max(radius, _THIN_HALF))
 
@@ -254,10 +199,10 @@ def walls_behind_gaps(builder: Builder, s0: float, s1: float, d: float) -> None:
 
 def _wall(builder: Builder, piece: Piece, height: float, colour: tuple, material: Material, kind: Kind) -> None:
     """Put a wall, 0.25 m thick, into the world."""
-    s, d, yaw, length = piece
-    if foot := _fits(builder, s, d, yaw, kind, length, 0.13, height):
+    *place, length = piece
+    if foot := _fit(builder, piece, kind, 0.13, height):
         body = box((length / 2, 0, height / 2 - 0.3), (length, 0.25, height + 0.6), colour, material, kind)
-        builder.add(body, s, d, yaw, footprints=foot)
+        builder.add(body, *place, foot)
 
 
 def stand_pillars(builder: Builder, s0: float, s1: float, d: float) -> None:
@@ -267,10 +212,8 @@ def stand_pillars(builder: Builder, s0: float, s1: float, d: float) -> None:
     """
     rng, s = builder.rng, s0
     while s < s1:
-        radius = rng.uniform(0.3, 0.7)
-        pillar = tube(
-            (0, 0, -0.5), (0, 0, rng.uniform(1.9, 3.5)), (radius, radius), _PLASTER, Material.MATTE, Kind.POLE, 12
-        )
+        radius, top = rng.uniform(0.3, 0.7), (0, 0, rng.uniform(1.9, 3.5))
+        pillar = tube((0, 0, -0.5), top, radius, _PLASTER, Material.MATTE, Kind.POLE, 12)
         builder.try_post(pillar, s, d, 0.0, Kind.POLE, radius)
         s += rng.uniform(10, 30)
 

@@ -1,12 +1,11 @@
 """The builder of a world: puts things beside the road, one by one, and refuses places that are taken."""
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
-from semgrid_edu.workshop.simulation.street.footprints import ROUND, SQUARE, Footprint, collides, footprint_table
-from semgrid_edu.workshop.simulation.street.ground import ground_height
-from semgrid_edu.workshop.simulation.street.layout import Road, outside_asphalt, to_world
+from semgrid_edu.workshop.simulation.street.footprints import ROUND, SQUARE, Footprint, collides, outline
+from semgrid_edu.workshop.simulation.street.ground import on_ground
+from semgrid_edu.workshop.simulation.street.layout import outside_asphalt, to_road
+from semgrid_edu.workshop.simulation.street.plan import Plan
 from semgrid_edu.workshop.simulation.things.materials import Kind
 from semgrid_edu.workshop.simulation.things.shapes import Shape
 
@@ -16,14 +15,13 @@ THIN = 0.072
 """Smallest half-width of a footprint, metres: enough to cover the centre of a 0.1 m cell, however it is turned."""
 
 
-@dataclass(eq=False)
 class Builder:
     """A world in the making.
 
     Parameters
     ----------
-    road : Road
-        The street beside which things are put.
+    plan : Plan
+        What the street is to be like.
     rng : numpy.random.Generator
         Source of all that is drawn while the world is built.
 
@@ -43,17 +41,17 @@ class Builder:
         The number that the next object gets.
     """
 
-    road: Road
-    rng: np.random.Generator
-    shapes: list[Shape] = field(default_factory=list, init=False)
-    instances: list[int] = field(default_factory=list, init=False)
-    porous: list[Shape] = field(default_factory=list, init=False)
-    opacities: list[float] = field(default_factory=list, init=False)
-    footprints: list[Footprint] = field(default_factory=list, init=False)
-    next_instance: int = field(default=1, init=False)
+    def __init__(self, plan: Plan, rng: np.random.Generator) -> None:
+        self.plan, self.road, self.rng = plan, plan.road, rng
+        self.shapes: list[Shape] = []
+        self.instances: list[int] = []
+        self.porous: list[Shape] = []
+        self.opacities: list[float] = []
+        self.footprints: list[Footprint] = []
+        self.next_instance = 1
 
     def place(self, s: float, d: float, yaw: float = 0.0) -> tuple[np.ndarray, float]:
-        """Return where in the world something stands.
+        """Return where in the world something stands: its point on the ground, (3,), metres, and its direction, rad.
 
         Parameters
         ----------
@@ -61,44 +59,18 @@ class Builder:
             Distance along the road and to the left of its centre line, metres.
         yaw : float
             Direction of the thing, rad from that of the road, counter-clockwise.
-
-        Returns
-        -------
-        position : (3,) float64
-            The point on the ground, metres.
-        yaw : float
-            Direction of the thing, rad from the world's x axis.
         """
-        x, y, heading = to_world(self.road, s, d)
-        return np.array([x, y, ground_height(self.road, s, d)]), heading + yaw
-
-    def edge_distance(self, s: float, d: float) -> float:
-        """Return how far a place lies outside the asphalt.
-
-        Parameters
-        ----------
-        s, d : float
-            Distance along the road and to the left of its centre line, metres.
-
-        Returns
-        -------
-        float
-            Metres; negative on the asphalt.
-        """
-        return outside_asphalt(self.road, s, d)
+        position, heading = on_ground(self.road, s, d)
+        return position, heading + yaw
 
     def footprint(
         self, s: float, d: float, yaw: float, kind: Kind, half: tuple[float, float],
         exponent: float = SQUARE, offset: tuple[float, float] = (0.0, 0.0), top: float = OVERHEAD,
     ) -> Footprint:  # fmt: skip
-        """Return the footprint of a piece of scenery.
+        """Return the footprint of a piece of scenery. Parameters not named here are those of `Builder.place`.
 
         Parameters
         ----------
-        s, d : float
-            Where the thing's origin stands: distance along the road and to the left of its centre line, metres.
-        yaw : float
-            Direction of the thing, rad from that of the road.
         kind : Kind
             What it is.
         half : (float, float)
@@ -109,10 +81,6 @@ class Builder:
             Where its centre lies from its origin: ahead and to the left, metres.
         top : float
             Its height, metres.
-
-        Returns
-        -------
-        Footprint
         """
         position, angle = self.place(s, d, yaw)
         c, n = np.cos(angle), np.sin(angle)
@@ -130,59 +98,79 @@ class Builder:
             The place.
         margin : float
             Distance that everything else must keep from it, metres; a negative one allows some overlap.
-
-        Returns
-        -------
-        bool
         """
-        return not collides(footprint, footprint_table(self.footprints), margin)
+        return not collides(footprint, self.footprints, margin)
 
-    def add(self, shape: Shape, s: float, d: float, yaw: float, scale=1.0, footprints=()) -> None:
-        """Put a piece of scenery into the world.
+    def off_asphalt(self, footprint: Footprint) -> bool:
+        """Return whether all of a place lies more than 0.1 m outside the asphalt.
+
+        Parameters
+        ----------
+        footprint : Footprint
+            The place.
+        """
+        return min(outside_asphalt(self.road, *to_road(self.road, x, y)) for x, y in outline(footprint)) > 0.1
+
+    def spot(
+        self, s: float, d: float, kind: Kind, radius: float, clear: float, yaw: float = 0.0, top: float = OVERHEAD
+    ) -> Footprint | None:
+        """Return a round footprint, or None where its place is taken or too near the asphalt.
+
+        Parameters not named here are those of `Builder.footprint` and `Builder.place`.
+
+        Parameters
+        ----------
+        s, d : float
+            Its middle: distance along the road and to the left of its centre line, metres.
+        yaw : float
+            Direction of the thing, rad from that of the road.
+        radius : float
+            Its radius, metres.
+        clear : float
+            How far its middle must lie from the asphalt, metres.
+        """
+        foot = self.footprint(s, d, yaw, kind, (radius, radius), ROUND, top=top)
+        return foot if outside_asphalt(self.road, s, d) > clear and self.free(foot) else None
+
+    def add(self, shape: Shape, s: float, d: float, yaw: float, foot: Footprint | None = None, scale=1.0) -> None:
+        """Put a piece of scenery into the world. Parameters not named here are those of `Builder.place`.
 
         Parameters
         ----------
         shape : Shape
             What it looks like, in its own frame.
-        s, d : float
-            Where its origin goes: distance along the road and to the left of its centre line, metres.
-        yaw : float
-            Its direction, rad from that of the road.
+        foot : Footprint, optional
+            The ground that it takes.
         scale : float
             Factor for its size.
-        footprints : sequence of Footprint
-            The ground that it takes.
         """
-        position, angle = self.place(s, d, yaw)
-        self.shapes.append(shape.placed(position, angle, scale))
+        self.shapes.append(shape.placed(*self.place(s, d, yaw), scale))
         self.instances.append(0)
-        self.footprints.extend(footprints)
+        if foot:
+            self.footprints.append(foot)
 
     def add_porous(self, shape: Shape, opacity: float, s: float, d: float, yaw: float) -> None:
         """Put something into the world that lets a part of the light through.
 
+        Parameters not named here are those of `Builder.place`.
+
         Parameters
         ----------
         shape : Shape
-            What it looks like, in its own frame, of one of `SEE_THROUGH`.
+            What it looks like, in its own frame, of `Material.WIRE`, `Material.PANE` or `Material.TWIGS`.
         opacity : float
             As `PorousMesh` takes it.
-        s, d : float
-            Where its origin goes: distance along the road and to the left of its centre line, metres.
-        yaw : float
-            Its direction, rad from that of the road.
         """
-        position, angle = self.place(s, d, yaw)
-        self.porous.append(shape.placed(position, angle))
+        self.porous.append(shape.placed(*self.place(s, d, yaw)))
         self.opacities.append(opacity)
 
-    def try_post(self, shape: Shape, s: float, d: float, yaw: float, kind: Kind, radius: float, scale=1.0) -> bool:
+    def try_post(self, shape: Shape, s: float, d: float, yaw: float, kind: Kind, radius: float, scale=1.0) -> None:
         """Put something on a round foot, unless the place is asphalt or taken.
+
+        Parameters not named here are those of `Builder.add` and `Builder.place`.
 
         Parameters
         ----------
-        shape : Shape
-            What it looks like, in its own frame.
         s, d : float
             Where its foot goes: distance along the road and to the left of its centre line, metres.
         yaw : float
@@ -191,19 +179,9 @@ class Builder:
             What it is.
         radius : float
             Radius of its foot, metres.
-        scale : float
-            Factor for its size.
-
-        Returns
-        -------
-        bool
-            Whether it was put there.
         """
-        foot = self.footprint(s, d, yaw, kind, (radius, radius), ROUND)
-        if self.edge_distance(s, d) < radius + 0.15 or not self.free(foot):
-            return False
-        self.add(shape, s, d, yaw, scale, [foot])
-        return True
+        if foot := self.spot(s, d, kind, radius, radius + 0.15, yaw):
+            self.add(shape, s, d, yaw, foot, scale)
 
     def number(self) -> int:
         """Return a number that no other object has."""

@@ -49,10 +49,6 @@ class Ego:
             How fast it drives.
         lane : int, optional
             Number of its lane, 0 beside the centre line; when left out, the outer one in two drives of three.
-
-        Returns
-        -------
-        Ego
         """
         drawn = road.lanes_right - 1 if rng.random() < 0.65 else 0
         lane = drawn if lane is None else lane
@@ -62,17 +58,12 @@ class Ego:
         return cls(road, Trajectory(0.0, d, 1.0, 0.0, pace), sway, roll, pitch, phase)
 
     def T_world_from_lidar(self, t: float) -> NDArray[np.float64]:
-        """Return the LIDAR's pose at one instant; it tilts about the point on the ground below it.
+        """Return the LIDAR's pose at one instant, (4, 4), metres; it tilts about the point on the ground below it.
 
         Parameters
         ----------
         t : float
             Time, seconds.
-
-        Returns
-        -------
-        (4, 4) float64
-            Metres.
         """
         s, d = self.trajectory.at(t)
         speed = self.trajectory.pace.speed(t)
@@ -88,16 +79,12 @@ class Ego:
 
 
 def rotation_matrix(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:
-    """Return Rz(yaw) Ry(pitch) Rx(roll), the order of the angles in KITTI's oxts packets.
+    """Return Rz(yaw) Ry(pitch) Rx(roll), (3, 3), the order of the angles in KITTI's oxts packets.
 
     Parameters
     ----------
     roll, pitch, yaw : float
         Angles about the x, y and z axes, rad.
-
-    Returns
-    -------
-    (3, 3) float64
     """
     cr, sr, cp, sp, cy, sy = (f(a) for a in (roll, pitch, yaw) for f in (np.cos, np.sin))
     return np.array(

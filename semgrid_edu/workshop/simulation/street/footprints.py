@@ -85,20 +85,15 @@ def stamp(footprints: NDArray, xy: NDArray, cell: float, which: NDArray) -> None
                     which[r, c] = k
 
 
-def footprint_table(footprints: list[Footprint]) -> NDArray[np.float64]:
-    """Return footprints as rows of numbers.
+def footprint_table(footprints: NDArray | list[Footprint]) -> NDArray[np.float64]:
+    """Return footprints as rows of numbers, (K, 9), one column per field of `Footprint`.
 
     Parameters
     ----------
-    footprints : list of Footprint
+    footprints : list of Footprint or (K, 9) float
         K of them, or none.
-
-    Returns
-    -------
-    (K, 9) float64
-        One row per footprint, one column per field of `Footprint`.
     """
-    return np.array(footprints, dtype=np.float64).reshape(-1, len(Footprint._fields))
+    return np.asarray(footprints, dtype=np.float64).reshape(-1, len(Footprint._fields))
 
 
 def outline(footprint: Footprint, margin: float = 0.0) -> NDArray[np.float64]:
@@ -125,25 +120,19 @@ def outline(footprint: Footprint, margin: float = 0.0) -> NDArray[np.float64]:
     return np.concatenate([local, [[0, 0]]]) @ turn + [f.x, f.y]
 
 
-def collides(footprint: Footprint, others: NDArray, margin: float = 0.0) -> bool:
+def collides(footprint: Footprint, others: NDArray | list[Footprint], margin: float = 0.0) -> bool:
     """Return whether a footprint overlaps any of several others.
 
     Parameters
     ----------
     footprint : Footprint
         What covers the ground.
-    others : (K, 9) float
-        From `footprint_table`.
+    others : (K, 9) float or list of Footprint
+        K footprints, or none.
     margin : float
         By how much `footprint` is widened on every side, metres.
-
-    Returns
-    -------
-    bool
     """
-    if len(others) == 0:
-        return False
-    f = footprint
+    f, others = footprint, footprint_table(others)
     reach = np.hypot(others[:, 2], others[:, 3]) + np.hypot(f.half_length, f.half_width) + margin
     near = others[np.hypot(others[:, 0] - f.x, others[:, 1] - f.y) < reach]
     mine = footprint_table([f._replace(half_length=f.half_length + margin, half_width=f.half_width + margin)])[0]

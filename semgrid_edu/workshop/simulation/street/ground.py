@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.workshop.simulation.street.layout import Road, outside_asphalt, to_road
+from semgrid_edu.workshop.simulation.street.layout import Road, outside_asphalt, to_road, to_world
 from semgrid_edu.workshop.simulation.things.materials import Kind
 
 KERB_HEIGHT = 0.12
@@ -15,49 +15,24 @@ KERB_HEIGHT = 0.12
 KERB_WIDTH = 0.18
 """Width of the kerb stone, metres."""
 
-_ROAD, _LANE, _SIDEWALK, _GRASS = int(Kind.ROAD), int(Kind.LANE), int(Kind.SIDEWALK), int(Kind.GRASS)
-
 
 @njit(cache=True)
 def ground_kind(road: Road, s: float, d: float) -> int:
-    """Return what the ground is at a place, lane marks left aside.
-
-    Parameters
-    ----------
-    road : Road
-        The street.
-    s, d : float
-        Distance along the centre line and to the left of it, metres.
-
-    Returns
-    -------
-    int
-        `Kind.ROAD`, `Kind.SIDEWALK` or `Kind.GRASS`.
-    """
+    """Return `Kind.ROAD`, `Kind.SIDEWALK` or `Kind.GRASS`, without lane marks. Parameters are those of `to_world`."""
     e = outside_asphalt(road, s, d)
     if e < 0.0:
-        return _ROAD
+        return Kind.ROAD
     side = road.left if d > 0 else road.right
     if e < KERB_WIDTH or side.strip <= e < side.strip + side.walk:
-        return _SIDEWALK
-    return _GRASS
+        return Kind.SIDEWALK
+    return Kind.GRASS
 
 
 @njit(cache=True)
 def ground_height(road: Road, s: float, d: float) -> float:
-    """Return how high the ground lies at a place.
+    """Return how high the ground lies at a place, metres above the asphalt. Parameters are those of `to_world`.
 
-    Parameters
-    ----------
-    road : Road
-        The street.
-    s, d : float
-        Distance along the centre line and to the left of it, metres.
-
-    Returns
-    -------
-    float
-        Metres above the asphalt.
+    All that stands, drives or walks takes its height from here, and so do the mesh and the truth.
     """
     e = outside_asphalt(road, s, d)
     if e <= 0.0:
@@ -68,6 +43,15 @@ def ground_height(road: Road, s: float, d: float) -> float:
     height += side.bank_rise * t * t * (3.0 - 2.0 * t)
     far = max(e - 25.0, 0.0)
     return height + 0.06 * far * (0.5 + 0.5 * np.sin(0.03 * s + 0.02 * d)) * min(far / 40.0, 1.0)
+
+
+def on_ground(road: Road, s: float, d: float) -> tuple[NDArray[np.float64], float]:
+    """Return the point of the ground at a place, (3,), metres in the world, and the road's direction there, rad.
+
+    Parameters are those of `to_world`.
+    """
+    x, y, heading = to_world(road, s, d)
+    return np.array([x, y, ground_height(road, s, d)]), heading
 
 
 @njit(cache=True)
@@ -94,21 +78,13 @@ def _junction_mark(road: Road, s: float, d: float, blur: float) -> float:
 def lane_mark(road: Road, s: float, d: float, blur: float) -> float:
     """Return how much of the asphalt around a place is painted.
 
-    The marks are the centre line, lane boundaries, edge lines along parking bays, zebra crossings and stop lines.
+    The marks are the centre line, lane boundaries, edge lines along parking bays, zebra crossings and stop lines. The
+    result is the share of a patch of ground that is painted. Parameters not named here are those of `to_world`.
 
     Parameters
     ----------
-    road : Road
-        The street.
-    s, d : float
-        Distance along the centre line and to the left of it, metres.
     blur : float
         Width of the patch of ground around the place, metres; at least 1 cm is taken.
-
-    Returns
-    -------
-    float
-        Share of the patch that is painted, 0..1.
     """
     blur = max(blur, 0.01)
     if road.side_half > 0.0:
@@ -155,6 +131,6 @@ def ground_kinds(road: Road, xy: NDArray) -> NDArray[np.uint8]:
     for i in range(len(xy)):
         s, d = to_road(road, xy[i, 0], xy[i, 1])
         kinds[i] = ground_kind(road, s, d)
-        if kinds[i] == _ROAD and lane_mark(road, s, d, 0.0) > 0.5:
-            kinds[i] = _LANE
+        if kinds[i] == Kind.ROAD and lane_mark(road, s, d, 0.0) > 0.5:
+            kinds[i] = Kind.LANE
     return kinds

@@ -34,6 +34,11 @@ class Side(NamedTuple):
     bank_rise: float
     bank_width: float
 
+    @property
+    def line(self) -> float:
+        """Distance from the centre line to the outer edge of the sidewalk, metres."""
+        return self.edge + self.strip + self.walk
+
 
 class Road(NamedTuple):
     """A street's geometry.
@@ -79,6 +84,20 @@ class Road(NamedTuple):
     corner: float
     zebra: bool
     dashed: bool
+
+    def side(self, sign: int) -> Side:
+        """Return one side of the road.
+
+        Parameters
+        ----------
+        sign : int
+            1 for the left side, -1 for the right one.
+        """
+        return self.left if sign > 0 else self.right
+
+    def leaves(self, sign: int) -> bool:
+        """Return whether the side road leaves on one side. Parameters are those of `Road.side`."""
+        return self.side_left if sign > 0 else self.side_right
 
 
 @njit(cache=True)
@@ -144,17 +163,7 @@ def to_road(road: Road, x: float, y: float) -> tuple[float, float]:
 def outside_asphalt(road: Road, s: float, d: float) -> float:
     """Return how far a place lies outside the asphalt, whose corners at a junction are rounded.
 
-    Parameters
-    ----------
-    road : Road
-        The street.
-    s, d : float
-        Distance along the centre line and to the left of it, metres.
-
-    Returns
-    -------
-    float
-        Distance from the asphalt's edge, metres; negative on the asphalt.
+    The distance is negative on the asphalt, metres. Parameters are those of `to_world`.
     """
     e = d - road.left.edge if d > 0 else -d - road.right.edge
     crosses = (d > 0 and road.side_left) or (d <= 0 and road.side_right)

@@ -53,11 +53,7 @@ class Light:
         Parameters
         ----------
         rng : numpy.random.Generator
-            Source of all that is drawn.
-
-        Returns
-        -------
-        Light
+            Decides it.
         """
         overcast = rng.random() < 0.3
         elevation, azimuth = np.radians(rng.uniform(18, 62)), rng.uniform(0, 2 * np.pi)
@@ -69,29 +65,23 @@ class Light:
         else:
             strength, sky = rng.uniform(1.3, 1.8), np.array([0.16, 0.30, 0.62]) * rng.uniform(0.8, 1.2)
             horizon = np.array([0.66, 0.75, 0.86]) * (1 - 0.25 * low) + np.array([0.22, 0.10, 0.0]) * low
-        return cls(
-            sun=tuple(map(float, sun)),
-            sun_colour=tuple(map(float, strength * warm)),
-            sky_colour=tuple(map(float, sky)),
-            horizon_colour=tuple(map(float, horizon)),
-            softness=0.45 if overcast else 0.012,
-            clouds=float(rng.uniform(0.75, 1.0) if overcast else rng.uniform(0.0, 0.6)),
-            haze=float(10 ** rng.uniform(-3.5, -2.5)),
-            exposure=float(rng.uniform(0.85, 1.2) * (1.5 if overcast else 1.15)),
-            balance=tuple(map(float, 1 + rng.normal(0, 0.025, 3))),
-            phase=float(rng.uniform(0, 100)),
-        )
+        clouds, haze = rng.uniform(0.75, 1.0) if overcast else rng.uniform(0.0, 0.6), 10 ** rng.uniform(-3.5, -2.5)
+        exposure = rng.uniform(0.85, 1.2) * (1.5 if overcast else 1.15)
+        balance, phase = 1 + rng.normal(0, 0.025, 3), rng.uniform(0, 100)
+        colours = (tuple(map(float, colour)) for colour in (sun, strength * warm, sky, horizon))
+        softness = 0.45 if overcast else 0.012
+        return cls(*colours, softness, clouds, haze, exposure, tuple(map(float, balance)), phase)
+
+    @property
+    def packed(self) -> tuple:
+        """Sun, its colour, zenith and horizon, each (3,) float32, then clouds, haze and phase, as numba takes them."""
+        vectors = (self.sun, self.sun_colour, self.sky_colour, self.horizon_colour)
+        return *(np.asarray(v, np.float32) for v in vectors), self.clouds, self.haze, self.phase
 
 
 @cache
 def noise_tile() -> NDArray[np.float32]:
-    """Return a texture of fractal noise that can be repeated without a seam.
-
-    Returns
-    -------
-    (TILE, TILE) float32
-        0..1, uniformly distributed.
-    """
+    """Return fractal noise that repeats without a seam, (TILE, TILE) float32, uniformly distributed in 0..1."""
     rng = np.random.default_rng(81)
     frequency = np.fft.fftfreq(TILE)
     radius = np.hypot(frequency[:, None], frequency[None, :])
@@ -104,7 +94,7 @@ def noise_tile() -> NDArray[np.float32]:
 
 @njit(cache=True, fastmath=True, inline="always")
 def texture(tile, u, v):
-    """Return the noise at one place, bilinear between texels.
+    """Return the noise at one place, 0..1, bilinear between texels.
 
     Parameters
     ----------
@@ -112,11 +102,6 @@ def texture(tile, u, v):
         From `noise_tile`; it repeats in both directions.
     u, v : float
         The place, texels.
-
-    Returns
-    -------
-    float
-        0..1.
     """
     i, j = np.floor(u), np.floor(v)
     a, b = np.float32(u - i), np.float32(v - j)
@@ -128,7 +113,7 @@ def texture(tile, u, v):
 
 
 @njit(cache=True, fastmath=True)
-def sky_radiance(tile, x, y, z, sun, sun_colour, zenith, horizon, clouds, phase, out):
+def sky_radiance(tile, x, y, z, light, out):
     """Find the radiance that comes from one direction of the sky: gradient, glow of the sun, clouds.
 
     Parameters
@@ -137,17 +122,12 @@ def sky_radiance(tile, x, y, z, sun, sun_colour, zenith, horizon, clouds, phase,
         From `noise_tile`, for the clouds.
     x, y, z : float
         Unit vector of the direction, in the world.
-    sun : (3,) float32
-        Unit vector towards the sun.
-    sun_colour, zenith, horizon : (3,) float32
-        Linear radiance of the sun's light, of the sky overhead and of the sky at the horizon.
-    clouds : float
-        Share of the sky that clouds cover.
-    phase : float
-        Shift of the clouds.
+    light : tuple
+        From `Light.packed`.
     out : (3,) float32
         Written in place: linear radiance, red, green and blue.
     """
+    sun, sun_colour, zenith, horizon, clouds, _, phase = light
     up = max(z, 0.0)
     mix = (1.0 - up) ** 5
     glow = max(x * sun[0] + y * sun[1] + z * sun[2], 0.0)

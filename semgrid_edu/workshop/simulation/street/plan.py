@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -98,17 +99,35 @@ class Plan:
     density: float
     foliage: tuple[float, float, float]
 
+    def border(self, sign: int) -> str:
+        """Return what runs along one side. Parameters are those of `Road.side`."""
+        return self.borders[0 if sign > 0 else 1]
+
+
+class _Style(NamedTuple):
+    """What a style decides beside the asphalt; ranges are metres."""
+
+    strip: float  # chance of a strip of grass
+    walk: tuple[float, float]
+    bank_rise: tuple[float, float] | None = None
+
+
+_STYLES = {
+    "town": _Style(0.25, (2.6, 4.5)),
+    "suburb": _Style(0.5, (1.8, 2.6), (0.0, 0.25)),
+    "park": _Style(0.7, (1.6, 2.4), (0.35, 1.3)),
+    YARD: _Style(0.3, (1.2, 2.6)),
+}
+
 
 def _side(style: str, lanes: int, lane: float, parking: bool, rng: np.random.Generator) -> Side:
     """Draw one side of the road."""
-    edge = lanes * lane + (2.2 if parking else 0.35)
-    strip = (
-        rng.uniform(1.4, 2.6) if rng.random() < {"town": 0.25, "suburb": 0.5, "park": 0.7, YARD: 0.3}[style] else 0.0
-    )
-    walk = rng.uniform(*{"town": (2.6, 4.5), "suburb": (1.8, 2.6), "park": (1.6, 2.4), YARD: (1.2, 2.6)}[style])
+    edge, measures = lanes * lane + (2.2 if parking else 0.35), _STYLES[style]
+    strip = rng.uniform(1.4, 2.6) if rng.random() < measures.strip else 0.0
+    walk = rng.uniform(*measures.walk)
     if style == "park" and rng.random() < 0.4:
         strip, walk = 0.0, 0.0
-    rise = rng.uniform(0.35, 1.3) if style == "park" else rng.uniform(0.0, 0.25) if style == "suburb" else 0.0
+    rise = rng.uniform(*measures.bank_rise) if measures.bank_rise else 0.0
     return Side(edge, strip, walk, rise, rng.uniform(2.5, 6.0))
 
 
@@ -120,9 +139,8 @@ def _road(rng: np.random.Generator, length: float, layout: str, lanes: tuple, st
         start, curvature = rng.uniform(15, 40) + 0.5 * length, rng.choice([-1, 1]) / rng.uniform(75, 220)
         arc = rng.uniform(0.25, 0.9) / abs(curvature)
     junction = layout in ("junction", CROSSING)
-    leaves = (
-        (True, True) if rng.random() < 0.6 or layout == CROSSING else tuple(rng.permutation([True, False]).tolist())
-    )
+    both = rng.random() < 0.6 or layout == CROSSING
+    leaves = (True, True) if both else tuple(rng.permutation([True, False]).tolist())
     return Road(
         bend_start=float(start), bend_end=float(start + arc), curvature=float(curvature),
         lane=float(lane), lanes_left=lanes[0], lanes_right=lanes[1],
@@ -145,10 +163,6 @@ def draw_plan(rng: np.random.Generator, length: float, wishes: Wishes) -> Plan:
         Distance that the recording car drives, metres.
     wishes : Wishes
         What isn't left to chance.
-
-    Returns
-    -------
-    Plan
     """
     layout = wishes.layout or str(rng.choice(LAYOUTS, p=[0.3, 0.3, 0.4]))
     lanes = wishes.lanes or [(1, 1), (1, 1), (1, 2), (2, 2)][rng.integers(4)]

@@ -1,12 +1,11 @@
-"""The road users of a street: parked cars, traffic in every lane, cyclists and pedestrians, as many as planned.
-
-Who takes part in the test streets: convoys, pedestrians, people and cars that set off, crossing and overturned cars.
+"""Who is on a street: as much traffic as planned, or what a test street is about, such as convoys or crossing cars.
 
 Each function puts its road users on the street of the `Traffic` that it is given.
 """
 
 import numpy as np
 
+from semgrid_edu.workshop.simulation.street.layout import Side
 from semgrid_edu.workshop.simulation.street.traffic import Traffic
 from semgrid_edu.workshop.simulation.street.trajectories import STAND, Departure, Pace, Trajectory
 from semgrid_edu.workshop.simulation.things.cars import car_size
@@ -14,7 +13,7 @@ from semgrid_edu.workshop.simulation.things.materials import Kind
 
 
 def fill_street(traffic: Traffic) -> None:
-    """Put road users on the street, as many as the plan's density asks for.
+    """Put parked cars, traffic in every lane, cyclists and pedestrians on the street, as many as planned.
 
     Parameters
     ----------
@@ -31,48 +30,33 @@ def fill_street(traffic: Traffic) -> None:
 
 
 def park_cars(traffic: Traffic) -> None:
-    """Fill the parking bays.
-
-    Parameters
-    ----------
-    traffic : Traffic
-        Takes the cars; its plan says on which sides there are bays.
-    """
+    """Fill the parking bays. Parameters are those of `fill_street`."""
     road, rng, extent = traffic.road, traffic.rng, traffic.plan.extent
-    for sign, side, bays in ((1, road.left, traffic.plan.parking[0]), (-1, road.right, traffic.plan.parking[1])):
+    for sign, bays in zip((1, -1), traffic.plan.parking, strict=True):
         if not bays:
             continue
-        share, s = rng.uniform(0.35, 0.9), extent.start + 5
+        share, s, middle = rng.uniform(0.35, 0.9), extent.start + 5, road.side(sign).edge - 1.06
         while s < extent.end - 60:
             s += rng.uniform(5.7, 6.6)
             near = road.side_half and abs(s - road.junction) < road.side_half + road.corner + 9
             if rng.random() > share or near:
                 continue
             body, away = traffic.body(), (sign > 0) != (rng.random() < 0.12)
-            trajectory = Trajectory(
-                s, sign * (side.edge - 1.06 + rng.normal(0, 0.05)), 1, 0, STAND, rng.normal(0, 0.02) + np.pi * away
-            )
-            traffic.park(Kind.CAR, car_size(body), trajectory, (body, traffic.paint()))
+            d, yaw = sign * (middle + rng.normal(0, 0.05)), rng.normal(0, 0.02) + np.pi * away
+            traffic.park(Kind.CAR, car_size(body), Trajectory(s, d, 1, 0, STAND, yaw), (body, traffic.paint()))
 
 
 def _park_bicycles(traffic: Traffic) -> None:
     """Park a few bicycles on the sidewalks."""
     road, rng = traffic.road, traffic.rng
-    for sign, side in ((1, road.left), (-1, road.right)):
-        if side.walk < 1.5:
-            continue
-        for _ in range(rng.integers(0, 5)):
+    for sign in (1, -1):
+        side = road.side(sign)
+        for _ in range(rng.integers(0, 5) if side.walk >= 1.5 else 0):
             s, n = rng.uniform(4, 70), rng.integers(1, 4)
             for k in range(n):
-                trajectory = Trajectory(
-                    s + 0.75 * k,
-                    sign * (side.edge + side.strip + rng.choice([0.5, side.walk - 0.35])),
-                    1,
-                    0,
-                    STAND,
-                    rng.normal(0, 0.15) + (1.3 if n > 1 else 0),
-                )
-                traffic.park(Kind.BICYCLE, (1.78, 0.4, 1.05), trajectory, ("bicycle", traffic.paint()))
+                d = sign * (side.edge + side.strip + rng.choice([0.5, side.walk - 0.35]))
+                place = Trajectory(s + 0.75 * k, d, 1, 0, STAND, rng.normal(0, 0.15) + (1.3 if n > 1 else 0))
+                traffic.park(Kind.BICYCLE, (1.78, 0.4, 1.05), place, ("bicycle", traffic.paint()))
 
 
 def _lanes(traffic: Traffic) -> None:
@@ -88,8 +72,7 @@ def _lanes(traffic: Traffic) -> None:
     for index in range(road.lanes_left):
         d = (index + 0.5) * road.lane
         if overtaken and index == 0:
-            at_end = ego.at(traffic.duration)[0] + rng.uniform(4, 22)
-            pace = Pace(ego.pace.mean + rng.uniform(4, 7))
+            at_end, pace = traffic.ends_at + rng.uniform(4, 22), Pace(ego.pace.mean + rng.uniform(4, 7))
             traffic.drive_car(at_end - pace.distance(traffic.duration), d, 1, 0, pace)
         else:
             _fill_lane(traffic, d, -1, STAND if stands else Pace(rng.uniform(7, 14)))
@@ -97,60 +80,54 @@ def _lanes(traffic: Traffic) -> None:
 
 def _fill_lane(traffic: Traffic, d: float, along: int, pace: Pace) -> None:
     """Put cars that drive alike into a lane, so that they are around the recording car when the drive ends."""
-    road, rng = traffic.road, traffic.rng
-    travelled = pace.distance(traffic.duration)
+    road, rng, density = traffic.road, traffic.rng, traffic.plan.density
+    travelled, reach = pace.distance(traffic.duration), road.side_half + road.corner
     gap = 6.5 + (0.8 * pace.mean if pace.mean else 0.0)
-    middle = traffic.ego.at(traffic.duration)[0]
-    s = middle - 30 + rng.uniform(0, 15)
-    while s < middle + 110:
-        start, ahead = s - along * travelled, (s - road.junction) * along
-        blocked = (
-            road.side_half and pace.mean == 0 and -(road.side_half + road.corner + 8) < ahead < road.side_half + 12
-        )
-        if not blocked and rng.random() < 0.25 + 0.6 * traffic.plan.density:
-            traffic.drive_car(start, d + rng.normal(0, 0.12), along, 0, pace)
-        s += gap + rng.exponential(3.0 + 28 * (1 - traffic.plan.density))
+    s = traffic.ends_at - 30 + rng.uniform(0, 15)
+    while s < traffic.ends_at + 110:
+        ahead = (s - road.junction) * along
+        blocked = road.side_half and pace.mean == 0 and -(reach + 8) < ahead < road.side_half + 12
+        if not blocked and rng.random() < 0.25 + 0.6 * density:
+            traffic.drive_car(s - along * travelled, d + rng.normal(0, 0.12), along, 0, pace)
+        s += gap + rng.exponential(3.0 + 28 * (1 - density))
 
 
 def _cross_traffic(traffic: Traffic) -> None:
     """Let cars wait in the side road, leave by it, or cross while our traffic stands."""
     road, rng = traffic.road, traffic.rng
-    for sign, side, leaves in ((1, road.left, road.side_left), (-1, road.right, road.side_right)):
-        if not leaves:
-            continue
-        towards = road.junction - sign * road.side_half / 2
-        back = side.edge + road.corner + 3.5
+    for sign in filter(road.leaves, (1, -1)):
+        towards, away = (road.junction - way * sign * road.side_half / 2 for way in (1, -1))
+        edge = road.side(sign).edge
+        back = edge + road.corner + 3.5
         for _ in range(rng.integers(0, 1 + round(3 * traffic.plan.density))):
             traffic.drive_car(towards, sign * back, 0, -sign, STAND)
             back += rng.uniform(6.0, 9.0)
         if rng.random() < 0.6:
-            away, start = road.junction + sign * road.side_half / 2, side.edge + rng.uniform(6, 40)
+            start = edge + rng.uniform(6, 40)
             traffic.drive_car(away, sign * start, 0, sign, Pace(rng.uniform(4, 9)))
         if traffic.ego.pace.mean == 0 and rng.random() < 0.7:
-            pace = Pace(rng.uniform(5, 9))
-            end = rng.uniform(-8, 8)
+            pace, end = Pace(rng.uniform(5, 9)), rng.uniform(-8, 8)
             traffic.drive_car(towards, sign * (end + pace.distance(traffic.duration)), 0, -sign, pace)
 
 
 def _cyclists(traffic: Traffic) -> None:
     """Let cyclists ride at the edge of the outer lanes."""
     road, rng = traffic.road, traffic.rng
-    middle = traffic.ego.at(traffic.duration)[0]
     for _ in range(rng.poisson(0.5 + 1.6 * traffic.plan.density)):
         pace, along = Pace(rng.uniform(3.5, 6.5)), int(rng.choice([1, 1, -1]))
         lanes = road.lanes_right if along > 0 else road.lanes_left
         d = -along * (lanes * road.lane - rng.uniform(0.35, 0.6))
-        traffic.ride(middle + rng.uniform(4, 40) - along * pace.distance(traffic.duration), d, along, pace)
+        traffic.ride(traffic.ends_at + rng.uniform(4, 40) - along * pace.distance(traffic.duration), d, along, pace)
 
 
 def _pedestrians(traffic: Traffic) -> None:
     """Let people walk along the sidewalks, stand there, and cross the road."""
-    road, rng = traffic.road, traffic.rng
-    middle = traffic.ego.at(traffic.duration)[0]
-    for sign, side in ((1, road.left), (-1, road.right)):
+    road, rng, here = traffic.road, traffic.rng, traffic.ends_at
+    for sign in (1, -1):
+        side = road.side(sign)
         for _ in range(rng.poisson(1.0 + 5.0 * traffic.plan.density) if side.walk > 1 else 0):
             d = sign * (side.edge + side.strip + rng.uniform(0.45, side.walk - 0.35))
-            s, along = middle + rng.uniform(3, 55), int(rng.choice([-1, 1]))
+            s, along = here + rng.uniform(3, 55), int(rng.choice([-1, 1]))
             if rng.random() < 0.15:
                 traffic.walk(s, d, 1, 0, STAND, rng.uniform(-np.pi, np.pi))
                 continue
@@ -160,7 +137,7 @@ def _pedestrians(traffic: Traffic) -> None:
     for _ in range(rng.poisson(0.4 + 0.9 * traffic.plan.density)):
         pace, across = Pace(float(rng.normal(1.4, 0.15))), int(rng.choice([-1, 1]))
         back = road.side_half + road.corner + rng.uniform(1.0, 3.2)
-        s = road.junction - back if road.side_half and road.zebra else middle + rng.uniform(9, 35)
+        s = road.junction - back if road.side_half and road.zebra else here + rng.uniform(9, 35)
         end = rng.uniform(-road.right.edge, road.left.edge)
         traffic.walk(s, end - across * pace.distance(traffic.duration), 0, across, pace)
 
@@ -168,7 +145,7 @@ def _pedestrians(traffic: Traffic) -> None:
 def convoys(traffic: Traffic) -> None:
     """Let two or three cars come one behind the other, and two overtake in the left one of our lanes.
 
-    The gaps are 8 to 20 m, so that the first car hides the next one at first. Parameters are those of `park_cars`.
+    The gaps are 8 to 20 m, so that the first car hides the next one at first. Parameters are those of `fill_street`.
     """
     park_cars(traffic)
     road, rng, ego = traffic.road, traffic.rng, traffic.ego
@@ -177,7 +154,7 @@ def convoys(traffic: Traffic) -> None:
     first = ego.at(meets)[0] + oncoming.distance(meets)
     _convoy(traffic, first, 0.5 * road.lane, -1, oncoming, int(rng.integers(2, 4)))
     overtaking = Pace(ego.pace.mean + rng.uniform(2, 5))
-    ahead = ego.at(traffic.duration)[0] + rng.uniform(20, 35) - overtaking.distance(traffic.duration)
+    ahead = traffic.ends_at + rng.uniform(20, 35) - overtaking.distance(traffic.duration)
     _convoy(traffic, ahead, -0.5 * road.lane, 1, overtaking, 2)
 
 
@@ -189,14 +166,19 @@ def _convoy(traffic: Traffic, s: float, d: float, along: int, pace: Pace, cars: 
         s -= along * (car_size(look[0])[0] + traffic.rng.uniform(8, 20))
 
 
+def _on_sidewalk(side: Side, rng: np.random.Generator) -> float:
+    """Draw a place on the sidewalk: its distance from the centre line, metres."""
+    return side.edge + side.strip + rng.uniform(0.4, max(side.walk - 0.4, 0.5))
+
+
 def pedestrians(traffic: Traffic) -> None:
-    """Let people walk along both sidewalks, and across the road. Parameters are those of `park_cars`."""
+    """Let people walk along both sidewalks, and across the road. Parameters are those of `fill_street`."""
     park_cars(traffic)
     road, rng = traffic.road, traffic.rng
     middle = traffic.ego.at(traffic.duration / 2)[0]
-    for sign, side in ((1, road.left), (-1, road.right)):
+    for sign in (1, -1):
         for s in np.arange(middle + 2, middle + 55, 5.0):
-            d = sign * (side.edge + side.strip + rng.uniform(0.4, max(side.walk - 0.4, 0.5)))
+            d = sign * _on_sidewalk(road.side(sign), rng)
             traffic.walk(s + rng.uniform(0, 4), d, int(rng.choice([-1, 1])), 0, _walking(rng))
     for s in np.arange(middle + 8, middle + 50, 8.0):
         across, pace = int(rng.choice([-1, 1])), _walking(rng)
@@ -205,25 +187,26 @@ def pedestrians(traffic: Traffic) -> None:
 
 
 def slow_starters(traffic: Traffic) -> None:
-    """Let people and cars stand for 1 to 2 s, and then set off. Parameters are those of `park_cars`."""
+    """Let people and cars stand for 1 to 2 s, and then set off. Parameters are those of `fill_street`."""
     park_cars(traffic)
-    road, rng, ego = traffic.road, traffic.rng, traffic.ego
-    middle = ego.at(traffic.duration / 2)[0]
-    for sign, side in ((1, road.left), (-1, road.right)):
+    road, rng = traffic.road, traffic.rng
+    middle = traffic.ego.at(traffic.duration / 2)[0]
+    for sign in (1, -1):
+        side = road.side(sign)
         for s in np.arange(middle + 4, middle + 40, 6.0):
-            d = sign * (side.edge + side.strip + rng.uniform(0.4, max(side.walk - 0.4, 0.5)))
+            d = sign * _on_sidewalk(side, rng)
             pace = Departure(rng.uniform(1.1, 1.7), rng.uniform(1.0, 2.0), 2.0)
             crosses = rng.random() < 0.4
             along, across = (0, -sign) if crosses else (int(rng.choice([-1, 1])), 0)
             traffic.walk(s + rng.uniform(0, 4), sign * side.edge if crosses else d, along, across, pace)
-    for index, along in ((0, -1), (1, 1)):
+    for along in (-1, 1):
         for s in np.arange(middle + 12, middle + 45, rng.uniform(9, 13)):
             pace = Departure(rng.uniform(6, 10), rng.uniform(1.0, 2.0), rng.uniform(1.5, 2.5))
-            traffic.drive_car(s, (0.5 if index == 0 else -0.5) * road.lane, along, 0, pace)
+            traffic.drive_car(s, -along * 0.5 * road.lane, along, 0, pace)
 
 
 def crossing_cars(traffic: Traffic) -> None:
-    """Let cars cross at the junction, two from each side. Parameters are those of `park_cars`."""
+    """Let cars cross at the junction, two from each side. Parameters are those of `fill_street`."""
     park_cars(traffic)
     road, rng = traffic.road, traffic.rng
     for sign in (1, -1):
@@ -236,14 +219,13 @@ def crossing_cars(traffic: Traffic) -> None:
 def overturned_car(traffic: Traffic) -> None:
     """Let a car lie on its top in the oncoming lane, 10 to 22 m ahead at the end, in the usual traffic.
 
-    Parameters are those of `park_cars`.
+    Parameters are those of `fill_street`.
     """
-    road, rng, ego = traffic.road, traffic.rng, traffic.ego
-    end = ego.at(traffic.duration)[0]
+    rng = traffic.rng
     for _ in range(20):  # until the place is free
-        look = (traffic.body(), traffic.paint())
-        along, across = np.cos(angle := rng.uniform(-0.5, 0.5)), np.sin(angle)
-        place = Trajectory(end + rng.uniform(10, 22), 0.5 * road.lane, float(along), float(across), STAND)
+        look, angle = (traffic.body(), traffic.paint()), rng.uniform(-0.5, 0.5)
+        s, direction = traffic.ends_at + rng.uniform(10, 22), (float(np.cos(angle)), float(np.sin(angle)))
+        place = Trajectory(s, 0.5 * traffic.road.lane, *direction, STAND)
         if traffic.park(Kind.CAR, car_size(look[0]), place, look, overturned=True):
             break
     fill_street(traffic)

@@ -2,29 +2,17 @@
 
 import numpy as np
 
-from semgrid_edu.workshop.simulation.street.borders import (
-    YARD_BORDERS,
-    side_of,
-    stand_lamps,
-    stand_pillars,
-    stand_signals,
-    stand_signs,
-)
+from semgrid_edu.workshop.simulation.street import borders
 from semgrid_edu.workshop.simulation.street.builder import Builder
-from semgrid_edu.workshop.simulation.street.footprints import ROUND, outline
-from semgrid_edu.workshop.simulation.street.layout import to_road
 from semgrid_edu.workshop.simulation.street.plan import YARD, Plan
 from semgrid_edu.workshop.simulation.street.terrain import ground_mesh
 from semgrid_edu.workshop.simulation.things import furniture, plants
 from semgrid_edu.workshop.simulation.things.buildings import House, build_house
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 
-_TREE_RADIUS = 0.22
-_HEDGE_HALF, _FENCE_HALF = 0.42, 0.08
-
 
 def build_scenery(plan: Plan, rng: np.random.Generator) -> Builder:
-    """Build all that never moves, but for parked cars and bicycles.
+    """Build all that never moves, but for parked cars and bicycles, and return the world, ready for road users.
 
     Parameters
     ----------
@@ -32,30 +20,19 @@ def build_scenery(plan: Plan, rng: np.random.Generator) -> Builder:
         What the street is to be like.
     rng : numpy.random.Generator
         Source of all that is drawn.
-
-    Returns
-    -------
-    Builder
-        The world, ready to take road users.
     """
-    builder = Builder(plan.road, rng)
-    ground = ground_mesh(plan.road, plan.extent)
-    builder.shapes.append(ground)
+    builder = Builder(plan, rng)
+    builder.shapes.append(ground_mesh(plan.road, plan.extent))
     builder.instances.append(0)
-    stand_signals(builder)
+    borders.stand_signals(builder)
     for sign, style in zip((1, -1), plan.styles, strict=True):
-        stand_lamps(builder, plan, sign)
-        _street_trees(builder, plan, sign)
-        if style == "park":
-            _park(builder, plan, sign)
-        elif style == YARD:
-            _yard(builder, plan, sign)
-        else:
-            _house_row(builder, plan, sign, style)
-        stand_signs(builder, plan, sign)
+        borders.stand_lamps(builder, sign)
+        _street_trees(builder, sign)
+        _LINE_SIDE[style](builder, sign)
+        borders.stand_signs(builder, sign)
     if plan.road.side_half:
-        _side_street(builder, plan)
-    _horizon(builder, plan)
+        _side_street(builder)
+    _horizon(builder)
     return builder
 
 
@@ -64,100 +41,101 @@ def _facing(sign: int) -> float:
     return 0.0 if sign > 0 else np.pi
 
 
-def _junction_gap(builder: Builder, s0: float, s1: float, sign: int, margin: float) -> bool:
+def _meets_side_road(builder: Builder, s0: float, s1: float, sign: int, margin: float) -> bool:
     """Return whether the stretch s0..s1 meets the side road and its sidewalks."""
     road = builder.road
-    crosses = road.side_left if sign > 0 else road.side_right
     reach = road.side_half + margin
-    return bool(road.side_half and crosses and s1 > road.junction - reach and s0 < road.junction + reach)
+    return bool(road.side_half and road.leaves(sign)) and road.junction - reach < s1 and s0 < road.junction + reach
 
 
-def _tree(builder: Builder, plan: Plan, s: float, d: float, species: str | None = None) -> None:
+def _tree(builder: Builder, s: float, d: float, species: str | None = None) -> None:
     """Plant a tree; far ones have fewer leaves."""
-    rng = builder.rng
+    rng, plan = builder.rng, builder.plan
     species = species or str(rng.choice(plants.TREES, p=[0.5, 0.15, 0.2, 0.15]))
     far = abs(d) > 35 or s > plan.extent.end - 120
     shape = plants.tree(species, int(rng.integers(3)), 350 if far else 1500)
-    scale = rng.uniform(0.75, 1.25)
-    tint = (
-        np.asarray(plan.foliage if species != "conifer" else (1, 1, 1))
-        * rng.uniform(0.75, 1.25)
-        * (1 + rng.normal(0, 0.08, 3))
-    )
-    leaf = shape.material == Material.LEAF
-    tinted = shape.tinted(np.where(leaf[:, None], tint, 1.0))
-    if species == "conifer":
-        foot = builder.footprint(s, d, 0, Kind.PLANT, (1.9 * scale, 1.9 * scale), ROUND)
-        if builder.edge_distance(s, d) > 2.5 * scale and builder.free(foot):
-            builder.add(tinted, s, d, rng.uniform(0, 6.28), scale, [foot])
-        return
-    builder.try_post(tinted, s, d, rng.uniform(0, 6.28), Kind.PLANT, _TREE_RADIUS * scale, scale)
+    scale, season = rng.uniform(0.75, 1.25), (1, 1, 1) if species == "conifer" else plan.foliage
+    tint = np.asarray(season) * rng.uniform(0.75, 1.25) * (1 + rng.normal(0, 0.08, 3))
+    tinted = shape.tinted(np.where((shape.material == Material.LEAF)[:, None], tint, 1.0))
+    if species != "conifer":
+        builder.try_post(tinted, s, d, rng.uniform(0, 6.28), Kind.PLANT, 0.22 * scale, scale)
+    elif foot := builder.spot(s, d, Kind.PLANT, 1.9 * scale, 2.5 * scale):
+        builder.add(tinted, s, d, rng.uniform(0, 6.28), foot, scale)
 
 
-def _bush(builder: Builder, plan: Plan, s: float, d: float) -> None:
+def _bush(builder: Builder, s: float, d: float) -> None:
     """Plant a bush."""
-    scale = builder.rng.uniform(0.6, 1.3)
-    foot = builder.footprint(s, d, 0, Kind.PLANT, (0.95 * scale, 0.95 * scale), ROUND, top=1.3 * scale)
-    if builder.edge_distance(s, d) > 1.2 * scale and builder.free(foot):
-        shape = plants.bush(int(builder.rng.integers(3))).tinted(
-            np.asarray(plan.foliage) * builder.rng.uniform(0.7, 1.3)
-        )
-        builder.add(shape, s, d, builder.rng.uniform(0, 6.28), scale, [foot])
+    rng = builder.rng
+    scale = rng.uniform(0.6, 1.3)
+    if foot := builder.spot(s, d, Kind.PLANT, 0.95 * scale, 1.2 * scale, top=1.3 * scale):
+        shape = plants.bush(int(rng.integers(3))).tinted(np.asarray(builder.plan.foliage) * rng.uniform(0.7, 1.3))
+        builder.add(shape, s, d, rng.uniform(0, 6.28), foot, scale)
 
 
 def _house(builder: Builder, house: House, s: float, d: float, yaw: float, across_road: bool = False) -> None:
     """Put a house with the middle of its front at (s, d) if the place is free; on asphalt only if it may."""
     half = (house.width / 2, house.depth / 2)
     foot = builder.footprint(s, d, yaw, Kind.BUILDING, half, offset=(0.0, house.depth / 2))
-    corners = [to_road(builder.road, x, y) for x, y in outline(foot)]
-    if not across_road and min(builder.edge_distance(*corner) for corner in corners) < 0.1:
-        return
-    if builder.free(foot, 0.05):
-        builder.add(build_house(house), s, d, yaw, 1.0, [foot])
+    if (across_road or builder.off_asphalt(foot)) and builder.free(foot, 0.05):
+        builder.add(build_house(house), s, d, yaw, foot)
 
 
-def _random_house(style: str, rng: np.random.Generator) -> House:
-    seed = int(rng.integers(2**31))
-    if style == "town":
-        roof = str(rng.choice(["flat", "hip", "gable"], p=[0.45, 0.3, 0.25]))
-        return House(
-            rng.uniform(9, 17), rng.uniform(9, 12), int(rng.integers(2, 6)), roof, bool(rng.random() < 0.5), seed
-        )
-    roof = str(rng.choice(["gable", "hip", "flat"], p=[0.65, 0.25, 0.1]))
+def _town_house(rng: np.random.Generator) -> House:
+    """Draw a house of 2 to 5 storeys, half of which have a shop."""
+    seed, roof = int(rng.integers(2**31)), str(rng.choice(["flat", "hip", "gable"], p=[0.45, 0.3, 0.25]))
+    width, depth, storeys = rng.uniform(9, 17), rng.uniform(9, 12), int(rng.integers(2, 6))
+    return House(width, depth, storeys, roof, bool(rng.random() < 0.5), seed)
+
+
+def _suburb_house(rng: np.random.Generator) -> House:
+    """Draw a house of 1 or 2 storeys."""
+    seed, roof = int(rng.integers(2**31)), str(rng.choice(["gable", "hip", "flat"], p=[0.65, 0.25, 0.1]))
     return House(rng.uniform(8, 12), rng.uniform(7.5, 10.5), int(rng.integers(1, 3)), roof, False, seed)
 
 
-def _house_row(builder: Builder, plan: Plan, sign: int, style: str) -> None:
-    """Line one side with houses; in a suburb with gardens behind fences and hedges."""
-    rng, side = builder.rng, side_of(builder, sign)
-    line = side.strip + side.walk
-    setback = rng.uniform(3.5, 8.0) if style == "suburb" else rng.uniform(0.0, 0.4)
-    border = plan.borders[0 if sign > 0 else 1]
-    s = plan.extent.start + rng.uniform(0, 8)
-    while s < plan.extent.end - 20:
-        house = _random_house(style, rng)
-        gap = rng.uniform(2.5, 9.0) if style == "suburb" else (0.02 if rng.random() < 0.75 else rng.uniform(2, 6))
-        if not _junction_gap(builder, s, s + house.width, sign, line + 0.8):
-            middle, front = s + house.width / 2, side.edge + line + setback + rng.uniform(0, 1.0) * (style == "suburb")
-            _house(builder, house, middle, sign * front, _facing(sign))
-        if style == "suburb":
-            if rng.random() < 0.15:
-                border = str(rng.choice([*furniture.FENCES, "hedge"]))
-            _border(builder, s, s + house.width + gap, sign, side.edge + line + 0.35, border)
-            _garden(builder, plan, s, s + house.width + gap, sign, side.edge + line + 1.2, setback)
-        elif gap > 2 and rng.random() < 0.6:
-            _tree(builder, plan, s + house.width + gap / 2, sign * (side.edge + line + 3.0))
+def _town(builder: Builder, sign: int) -> None:
+    """Line one side with facades at the sidewalk, few of them with a gap between."""
+    rng, side, extent = builder.rng, builder.road.side(sign), builder.plan.extent
+    line, setback = side.strip + side.walk, rng.uniform(0.0, 0.4)
+    s = extent.start + rng.uniform(0, 8)
+    while s < extent.end - 20:
+        house = _town_house(rng)
+        gap = 0.02 if rng.random() < 0.75 else rng.uniform(2, 6)
+        if not _meets_side_road(builder, s, s + house.width, sign, line + 0.8):
+            rng.uniform(0, 1.0)  # in a suburb, by how much the house stands back from the others
+            _house(builder, house, s + house.width / 2, sign * (side.edge + line + setback), _facing(sign))
+        if gap > 2 and rng.random() < 0.6:
+            _tree(builder, s + house.width + gap / 2, sign * (side.edge + line + 3.0))
         s += house.width + gap
-    if style == "town" or rng.random() < 0.5:
-        _second_row(builder, plan, sign, side.edge + line + setback + 24)
+    _second_row(builder, sign, side.edge + line + setback + 24)
 
 
-def _second_row(builder: Builder, plan: Plan, sign: int, offset: float) -> None:
+def _suburb(builder: Builder, sign: int) -> None:
+    """Line one side with houses in gardens behind fences and hedges."""
+    rng, side, extent = builder.rng, builder.road.side(sign), builder.plan.extent
+    line, setback = side.strip + side.walk, rng.uniform(3.5, 8.0)
+    border = builder.plan.border(sign)
+    s = extent.start + rng.uniform(0, 8)
+    while s < extent.end - 20:
+        house, gap = _suburb_house(rng), rng.uniform(2.5, 9.0)
+        if not _meets_side_road(builder, s, s + house.width, sign, line + 0.8):
+            front = side.edge + line + setback + rng.uniform(0, 1.0)
+            _house(builder, house, s + house.width / 2, sign * front, _facing(sign))
+        if rng.random() < 0.15:
+            border = str(rng.choice([*furniture.FENCES, "hedge"]))
+        _border(builder, s, s + house.width + gap, sign, side.edge + line + 0.35, border)
+        _garden(builder, s, s + house.width + gap, sign, side.edge + line + 1.2, setback)
+        s += house.width + gap
+    if rng.random() < 0.5:
+        _second_row(builder, sign, side.edge + line + setback + 24)
+
+
+def _second_row(builder: Builder, sign: int, offset: float) -> None:
     """Scatter taller houses behind the first row, so that gaps don't end in nothing."""
-    rng = builder.rng
-    for s in np.arange(plan.extent.start, plan.extent.end, 34.0):
+    rng, extent = builder.rng, builder.plan.extent
+    for s in np.arange(extent.start, extent.end, 34.0):
         if rng.random() < 0.7:
-            house = _random_house("town", rng)
+            house = _town_house(rng)
             _house(builder, house, s + rng.uniform(0, 10), sign * (offset + rng.uniform(0, 10)), _facing(sign))
 
 
@@ -165,100 +143,99 @@ def _border(builder: Builder, s0: float, s1: float, sign: int, offset: float, st
     """Run a fence or a hedge along the road from s0 to s1, in pieces that follow bends; gates stay open."""
     if style == "none":
         return
-    step = 1.0 if style == "hedge" else 2.5
-    gate = builder.rng.uniform(s0, s1)
+    rng, margin, hedge = builder.rng, offset - builder.road.side(sign).edge, style == "hedge"
+    step, half, kind = (1.0, 0.42, Kind.PLANT) if hedge else (2.5, 0.08, Kind.FENCE)
+    gate = rng.uniform(s0, s1)
     for s in np.arange(s0, s1 - 0.5 * step, step):
-        gap = abs(s + step / 2 - gate) < 1.3
-        if gap or _junction_gap(builder, s, s + step, sign, offset - side_of(builder, sign).edge):
-            continue
-        half, kind = (_HEDGE_HALF, Kind.PLANT) if style == "hedge" else (_FENCE_HALF, Kind.FENCE)
         foot = builder.footprint(s, sign * offset, 0, kind, (step / 2, half), offset=(step / 2, 0.0), top=1.4)
-        if not builder.free(foot, -0.05):
+        at_gate = abs(s + step / 2 - gate) < 1.3
+        if at_gate or _meets_side_road(builder, s, s + step, sign, margin) or not builder.free(foot, -0.05):
             continue
-        piece = plants.hedge(int(builder.rng.integers(3))) if style == "hedge" else furniture.fence(style, step)
-        if style == "hedge":
-            piece = piece.placed((0.5, 0, 0)).tinted(builder.rng.uniform(0.85, 1.15))
-        builder.add(piece, s, sign * offset, 0.0, 1.0, [foot])
+        if hedge:
+            piece = plants.hedge(int(rng.integers(3))).placed((0.5, 0, 0)).tinted(rng.uniform(0.85, 1.15))
+        else:
+            piece = furniture.fence(style, step)
+        builder.add(piece, s, sign * offset, 0.0, foot)
 
 
-def _garden(builder: Builder, plan: Plan, s0: float, s1: float, sign: int, offset: float, depth: float) -> None:
+def _garden(builder: Builder, s0: float, s1: float, sign: int, offset: float, depth: float) -> None:
     """Plant the ground between border and house, and beside the house."""
     rng = builder.rng
     for _ in range(rng.integers(1, 4)):
         s, d = rng.uniform(s0, s1), sign * (offset + rng.uniform(0.6, max(depth - 1.5, 0.8)))
-        (_bush if rng.random() < 0.6 else _tree)(builder, plan, s, d)
+        (_bush if rng.random() < 0.6 else _tree)(builder, s, d)
     if rng.random() < 0.7:
-        _tree(builder, plan, s1 - 1.0, sign * (offset + depth + rng.uniform(2, 12)))
+        _tree(builder, s1 - 1.0, sign * (offset + depth + rng.uniform(2, 12)))
 
 
-def _park(builder: Builder, plan: Plan, sign: int) -> None:
+def _park(builder: Builder, sign: int) -> None:
     """Cover one side with trees and bushes on its bank, perhaps a fence along it."""
-    rng, side = builder.rng, side_of(builder, sign)
-    line = side.edge + side.strip + side.walk
+    rng, extent, line = builder.rng, builder.plan.extent, builder.road.side(sign).line
     if rng.random() < 0.65:
         style = str(rng.choice(furniture.FENCES, p=[0.2, 0.25, 0.4, 0.15]))
-        _border(builder, plan.extent.start, plan.extent.start + 150, sign, line + rng.uniform(0.8, 2.5), style)
-    for s in np.arange(plan.extent.start, plan.extent.end, 5.5):
+        _border(builder, extent.start, extent.start + 150, sign, line + rng.uniform(0.8, 2.5), style)
+    for s in np.arange(extent.start, extent.end, 5.5):
         for _ in range(2):
             offset = line + rng.uniform(1.8, 26)
-            (_tree if rng.random() < 0.62 else _bush)(builder, plan, s + rng.uniform(0, 5), sign * offset)
-    for s in np.arange(plan.extent.start, plan.extent.end, 60.0):
+            (_tree if rng.random() < 0.62 else _bush)(builder, s + rng.uniform(0, 5), sign * offset)
+    for s in np.arange(extent.start, extent.end, 60.0):
         if rng.random() < 0.5:
-            house = _random_house("town", rng)
+            house = _town_house(rng)
             _house(builder, house, s + rng.uniform(0, 30), sign * (line + rng.uniform(30, 40)), _facing(sign))
 
 
-def _yard(builder: Builder, plan: Plan, sign: int) -> None:
+def _yard(builder: Builder, sign: int) -> None:
     """Run a border along one side, and scatter bushes and trees behind it."""
-    rng, side = builder.rng, side_of(builder, sign)
-    line = side.edge + side.strip + side.walk + 0.35
-    border = YARD_BORDERS[plan.borders[0 if sign > 0 else 1]]
-    border(builder, plan.extent.start, plan.extent.end - 60, sign * line)
-    stand_pillars(builder, plan.extent.start, plan.extent.end - 60, sign * (line - rng.uniform(0.4, 0.8)))
-    for s in np.arange(plan.extent.start, plan.extent.end, 6.0):
-        _bush(builder, plan, s + rng.uniform(0, 6), sign * (line + rng.uniform(3, 15)))
-        _tree(builder, plan, s + rng.uniform(0, 6), sign * (line + rng.uniform(6, 30)))
+    rng, extent, line = builder.rng, builder.plan.extent, builder.road.side(sign).line + 0.35
+    borders.YARD_BORDERS[builder.plan.border(sign)](builder, extent.start, extent.end - 60, sign * line)
+    borders.stand_pillars(builder, extent.start, extent.end - 60, sign * (line - rng.uniform(0.4, 0.8)))
+    for s in np.arange(extent.start, extent.end, 6.0):
+        _bush(builder, s + rng.uniform(0, 6), sign * (line + rng.uniform(3, 15)))
+        _tree(builder, s + rng.uniform(0, 6), sign * (line + rng.uniform(6, 30)))
 
 
-def _street_trees(builder: Builder, plan: Plan, sign: int) -> None:
+_LINE_SIDE = {"town": _town, "suburb": _suburb, "park": _park, YARD: _yard}
+"""What lines a side of each style: functions of the world and of the side, 1 for the left and -1 for the right one."""
+
+
+def _street_trees(builder: Builder, sign: int) -> None:
     """Plant a row of trees of one species in the strip beside the kerb."""
-    rng, side = builder.rng, side_of(builder, sign)
+    rng, side, extent = builder.rng, builder.road.side(sign), builder.plan.extent
     if side.strip < 1.2:
         return
-    species = str(rng.choice(["broad", "tall", "birch"]))
-    step = rng.uniform(8, 15)
-    for s in np.arange(plan.extent.start + rng.uniform(0, step), plan.extent.end, step):
+    species, step = str(rng.choice(["broad", "tall", "birch"])), rng.uniform(8, 15)
+    for s in np.arange(extent.start + rng.uniform(0, step), extent.end, step):
         if rng.random() < 0.9:
-            _tree(builder, plan, s, sign * (side.edge + 0.55 * side.strip), species)
+            _tree(builder, s, sign * (side.edge + 0.55 * side.strip), species)
 
 
-def _side_street(builder: Builder, plan: Plan) -> None:
+def _side_street(builder: Builder) -> None:
     """Line the side road with houses on both of its flanks."""
     road, rng = builder.road, builder.rng
-    for sign, leaves, style in zip((1, -1), (road.side_left, road.side_right), plan.styles, strict=True):
-        if not leaves:
+    for sign, style in zip((1, -1), builder.plan.styles, strict=True):
+        if not road.leaves(sign):
             continue
-        side = side_of(builder, sign)
-        back = road.side_half + side.strip + side.walk + (rng.uniform(2, 5) if style != "town" else 0.3)
+        side, town = road.side(sign), style == "town"
+        back = road.side_half + side.strip + side.walk + (0.3 if town else rng.uniform(2, 5))
         for flank in (-1, 1):
             d = side.edge + 8
             while d < 70:
-                house = _random_house("town" if style == "town" else "suburb", rng)
-                yaw = -np.pi / 2 if flank > 0 else np.pi / 2
-                _house(builder, house, road.junction + flank * back, sign * (d + house.width / 2), yaw)
+                house = (_town_house if town else _suburb_house)(rng)
+                place = (road.junction + flank * back, sign * (d + house.width / 2), -flank * np.pi / 2)
+                _house(builder, house, *place)
                 if rng.random() < 0.5:
-                    _tree(builder, plan, road.junction + flank * (back - 1.2), sign * (d + house.width + 1))
+                    _tree(builder, road.junction + flank * (back - 1.2), sign * (d + house.width + 1))
                 d += house.width + rng.uniform(0.5, 5)
 
 
-def _horizon(builder: Builder, plan: Plan) -> None:
+def _horizon(builder: Builder) -> None:
     """Close the view with trees and houses far away."""
-    rng, extent = builder.rng, plan.extent
+    rng, extent = builder.rng, builder.plan.extent
     for _ in range(70):
         s, d = rng.uniform(extent.start, extent.end + 60), rng.choice([-1, 1]) * rng.uniform(38, 110)
-        _tree(builder, plan, s, d)
+        _tree(builder, s, d)
     for d in np.arange(-70, 70, 3.5):
-        _tree(builder, plan, extent.end - 8 + rng.uniform(-12, 10), d + rng.uniform(-1, 1))
+        _tree(builder, extent.end - 8 + rng.uniform(-12, 10), d + rng.uniform(-1, 1))
     for d in np.arange(-60, 60, 17):
         s = extent.end - 2 + rng.uniform(0, 8)
-        _house(builder, _random_house("town", rng), s, d + rng.uniform(-4, 4), -np.pi / 2, across_road=True)
+        _house(builder, _town_house(rng), s, d + rng.uniform(-4, 4), -np.pi / 2, across_road=True)

@@ -7,31 +7,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.workshop.simulation.street.ground import ground_height
-from semgrid_edu.workshop.simulation.street.layout import Road, Side, to_world
+from semgrid_edu.workshop.simulation.street.layout import Road, to_world
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, shape
 
-_OUTWARD = (
-    0.0,
-    0.03,
-    0.18,
-    0.6,
-    1.2,
-    2.0,
-    3.0,
-    4.0,
-    5.0,
-    6.0,
-    8.0,
-    10.0,
-    13.0,
-    17.0,
-    24.0,
-    35.0,
-    50.0,
-    80.0,
-    130.0,
-    250.0,
+_OUTWARD = np.array(
+    [0.0, 0.03, 0.18, 0.6, 1.2, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 13.0, 17.0, 24.0, 35.0, 50.0, 80.0, 130.0, 250.0]
 )
 """Distances outside the asphalt's edge at which the mesh has vertices, metres."""
 
@@ -50,19 +31,20 @@ class Extent:
     end: float
 
 
-def _across(side: Side, corner: float) -> NDArray[np.float64]:
-    """Return the |d| of the mesh's lines on one side of the road."""
-    rim = np.arange(0, corner + 0.3, 0.3) if corner else []
-    return np.concatenate([[side.edge / 2], side.edge + np.array(_OUTWARD), side.edge + np.asarray(rim)])
+def _across(road: Road) -> NDArray[np.float64]:
+    """Return the d of the mesh's lines: fine at kerbs and, at a junction, over its rounded corners."""
+    rim = np.arange(0, road.corner + 0.3, 0.3) if road.side_half else []
+    edges = road.left.edge, road.right.edge
+    left, right = (np.concatenate([[edge / 2], edge + _OUTWARD, edge + np.asarray(rim)]) for edge in edges)
+    return np.unique(np.round(np.concatenate([-right, [0.0], left]), 3))
 
 
 def _along(road: Road, extent: Extent) -> NDArray[np.float64]:
     """Return the s of the mesh's lines."""
     lines = [np.arange(extent.start, extent.end + 4, 4.0)]
     if road.side_half:
-        out = np.concatenate(
-            [np.arange(0, road.corner + 0.3, 0.3), [0.03, 0.18], road.corner + np.array([1, 2, 3, 4, 6, 8, 11])]
-        )
+        beyond = road.corner + np.array([1, 2, 3, 4, 6, 8, 11])
+        out = np.concatenate([np.arange(0, road.corner + 0.3, 0.3), [0.03, 0.18], beyond])
         lines += [road.junction + side * (road.side_half + out) for side in (-1, 1)]
     return np.unique(np.round(np.concatenate(lines), 3))
 
@@ -90,15 +72,8 @@ def ground_mesh(road: Road, extent: Extent) -> Shape:
         The street.
     extent : Extent
         How far the ground reaches along the street.
-
-    Returns
-    -------
-    Shape
     """
-    corner = road.corner if road.side_half else 0.0
-    d = np.concatenate([-_across(road.right, corner), [0.0], _across(road.left, corner)])
-    d = np.unique(np.round(d, 3))
-    s = _along(road, extent)
+    s, d = _along(road, extent), _across(road)
     if road.curvature:
         inner = 0.8 / abs(road.curvature)
         d = d[np.sign(road.curvature) * d < inner]

@@ -5,7 +5,6 @@ import numpy as np
 from semgrid_edu.workshop.simulation.street.actors import Actor, Look, Size
 from semgrid_edu.workshop.simulation.street.builder import Builder
 from semgrid_edu.workshop.simulation.street.footprints import collides, footprint_table
-from semgrid_edu.workshop.simulation.street.plan import Plan
 from semgrid_edu.workshop.simulation.street.trajectories import Pace, Trajectory
 from semgrid_edu.workshop.simulation.things.cars import BODIES, PAINTS, car_size
 from semgrid_edu.workshop.simulation.things.materials import Kind
@@ -25,8 +24,6 @@ class Traffic:
     ----------
     builder : Builder
         The world with its scenery; parked cars and bicycles are added to it.
-    plan : Plan
-        What the street is like.
     ego : Trajectory
         Where the recording car is at every instant.
     duration : float
@@ -36,11 +33,14 @@ class Traffic:
     ----------
     moving, parked : list of Actor
         The actors so far; a pedestrian who stands still is among those that move.
+    ends_at : float
+        Where along the road the recording car is at the end of the drive: s, metres.
     """
 
-    def __init__(self, builder: Builder, plan: Plan, ego: Trajectory, duration: float) -> None:
-        self.builder, self.plan, self.ego, self.duration = builder, plan, ego, duration
-        self.rng, self.road = builder.rng, plan.road
+    def __init__(self, builder: Builder, ego: Trajectory, duration: float) -> None:
+        self.builder, self.ego, self.duration = builder, ego, duration
+        self.plan, self.rng, self.road = builder.plan, builder.rng, builder.road
+        self.ends_at = ego.at(duration)[0]
         self.moving: list[Actor] = []
         self.parked: list[Actor] = []
         self._times = np.linspace(0, duration, 6 if duration < 2 else 25)
@@ -49,7 +49,7 @@ class Traffic:
         self._static = footprint_table(builder.footprints)
 
     def add(self, kind: Kind, size: Size, trajectory: Trajectory, look: Look, margin: float = 0.25) -> bool:
-        """Let a road user take part in the drive, unless it would run into something.
+        """Let a road user take part in the drive, and return True, unless it would run into something.
 
         Parameters
         ----------
@@ -63,16 +63,11 @@ class Traffic:
             As for `Actor`.
         margin : float
             Distance that it keeps from other road users, metres.
-
-        Returns
-        -------
-        bool
-            False when the place is taken at any time of the drive; then nothing is added.
         """
         actor = Actor(self.builder.next_instance, kind, size, trajectory, look, float(self.rng.uniform(0, 3)))
         feet = [actor.footprint(self.road, t) for t in self._times]
         for foot, taken in zip(feet, self._taken, strict=True):
-            if collides(foot, footprint_table(taken), margin) or collides(foot, self._static, 0.05):
+            if collides(foot, taken, margin) or collides(foot, self._static, 0.05):
                 return False
         self.builder.number()
         self.moving.append(actor)
@@ -81,36 +76,25 @@ class Traffic:
         return True
 
     def park(self, kind: Kind, size: Size, trajectory: Trajectory, look: Look, overturned: bool = False) -> bool:
-        """Park a car or a bicycle for the whole drive, unless the place is taken.
+        """Park a car or a bicycle for the whole drive, and return True, unless the place is taken.
+
+        Parameters not named here are those of `Traffic.add`.
 
         Parameters
         ----------
-        kind : Kind
-            What it is.
-        size : (float, float, float)
-            Length, width and height, metres.
         trajectory : Trajectory
             Where it stands; its pace is `STAND`.
-        look : (str, (float, float, float))
-            Body and paint, as for `Actor`.
         overturned : bool
             Whether it lies on its top.
-
-        Returns
-        -------
-        bool
-            Whether it was parked.
         """
         actor = Actor(self.builder.next_instance, kind, size, trajectory, look, overturned=overturned)
         foot = actor.footprint(self.road, 0.0)
-        if collides(foot, self._static, 0.1):
+        moving = (collides(foot, taken, 0.2) for taken in self._taken)
+        if collides(foot, self._static, 0.1) or any(moving):
             return False
-        if any(collides(foot, footprint_table(taken), 0.2) for taken in self._taken):
-            return False
-        self.builder.number()
         self.parked.append(actor)
         self.builder.shapes.append(actor.shape(self.road, 0.0))
-        self.builder.instances.append(actor.instance)
+        self.builder.instances.append(self.builder.number())
         self.builder.footprints.append(foot)
         self._static = footprint_table(self.builder.footprints)
         return True
@@ -125,7 +109,7 @@ class Traffic:
         return str(self.rng.choice(BODIES, p=[0.32, 0.22, 0.2, 0.16, 0.1]))
 
     def drive_car(self, s: float, d: float, along: float, across: float, pace: Pace, look: Look | None = None) -> bool:
-        """Let a car drive, unless it would run into something.
+        """Let a car drive, and return True, unless it would run into something.
 
         Parameters
         ----------
@@ -134,55 +118,29 @@ class Traffic:
         along, across : float
             Direction in (s, d), as in `Trajectory`.
         pace : Pace
-            How fast it drives.
+            How fast it moves; `STAND` if it stands.
         look : (str, (float, float, float)), optional
             Its body and paint; drawn when left out.
-
-        Returns
-        -------
-        bool
-            False when the place is taken at any time of the drive; then nothing is added.
         """
         look = look or (self.body(), self.paint())
         return self.add(Kind.CAR, car_size(look[0]), Trajectory(s, d, along, across, pace), look, 0.3)
 
     def walk(self, s: float, d: float, along: float, across: float, pace: Pace, turn: float = 0.0) -> bool:
-        """Let a person walk, or stand, unless they would run into something.
+        """Let a person walk or stand, and return True, unless they would run into something.
+
+        Parameters not named here are those of `Traffic.drive_car`.
 
         Parameters
         ----------
-        s, d : float
-            Where it is at t = 0: distance along the road and to the left of its centre line, metres.
-        along, across : float
-            Direction in (s, d), as in `Trajectory`.
-        pace : Pace
-            How fast the person walks; `STAND` for one who stands.
         turn : float
             Angle between this direction and the one in which the person looks, rad.
-
-        Returns
-        -------
-        bool
-            False when the place is taken at any time of the drive; then nothing is added.
         """
         person = Person.random(self.rng)
         return self.add(Kind.PEDESTRIAN, (0.7, 0.6, person.height), Trajectory(s, d, along, across, pace, turn), person)
 
     def ride(self, s: float, d: float, along: float, pace: Pace) -> bool:
-        """Let a person ride a bicycle along the road, unless they would run into something.
+        """Let a person ride a bicycle along the road, and return True, unless they would run into something.
 
-        Parameters
-        ----------
-        s, d : float
-            Where it is at t = 0: distance along the road and to the left of its centre line, metres.
-        along : float
-            1 with our traffic, -1 against it.
-        pace : Pace
-            How fast the person rides.
-
-        Returns
-        -------
-        bool
-            False when the place is taken at any time of the drive; then nothing is added.
+        Parameters are those of `Traffic.drive_car`.
         """
         return self.add(Kind.BICYCLE, (1.78, 0.6, 1.8), Trajectory(s, d, along, 0.0, pace), Person.random(self.rng))

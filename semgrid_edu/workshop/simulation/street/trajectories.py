@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.workshop.simulation.street.ground import ground_height
-from semgrid_edu.workshop.simulation.street.layout import Road, to_world
+from semgrid_edu.workshop.simulation.street.ground import on_ground
+from semgrid_edu.workshop.simulation.street.layout import Road
 
 
 @dataclass(frozen=True)
@@ -40,10 +40,6 @@ class Pace:
             Source of all that is drawn.
         mean : float, optional
             Mean speed, m/s; when left out, 5 to 14 m/s and in one drive of ten 0.
-
-        Returns
-        -------
-        Pace
         """
         drawn = 0.0 if rng.random() < 0.1 else float(rng.uniform(5, 14))
         mean = drawn if mean is None else mean
@@ -51,33 +47,17 @@ class Pace:
         return cls(mean, swing, 0.8, phase)
 
     def distance(self, t: float) -> float:
-        """Return the distance covered since t = 0.
+        """Return the distance covered since t = 0, metres.
 
         Parameters
         ----------
         t : float
             Time, seconds.
-
-        Returns
-        -------
-        float
-            Metres.
         """
         return self.mean * t + self.swing / self.rate * (np.cos(self.phase) - np.cos(self.rate * t + self.phase))
 
     def speed(self, t: float) -> float:
-        """Return the speed at one instant.
-
-        Parameters
-        ----------
-        t : float
-            Time, seconds.
-
-        Returns
-        -------
-        float
-            m/s.
-        """
+        """Return the speed at one instant, m/s. Parameters are those of `Pace.distance`."""
         return self.mean + self.swing * np.sin(self.rate * t + self.phase)
 
 
@@ -138,17 +118,12 @@ class Trajectory:
     turn: float = 0.0
 
     def at(self, t: float) -> tuple[float, float]:
-        """Return the place beside the road at one instant.
+        """Return (s, d) at one instant: distance along the road and to the left of its centre line, metres.
 
         Parameters
         ----------
         t : float
             Time, seconds.
-
-        Returns
-        -------
-        s, d : float
-            Distance along the road and to the left of its centre line, metres.
         """
         travelled = self.pace.distance(t)
         return self.s + self.along * travelled, self.d + self.across * travelled
@@ -171,23 +146,13 @@ class Trajectory:
             Direction of the thing, rad from the x axis, counter-clockwise.
         """
         s, d = self.at(t)
-        x, y, heading = to_world(road, s, d)
-        return np.array([x, y, ground_height(road, s, d)]), heading + np.arctan2(self.across, self.along) + self.turn
+        position, heading = on_ground(road, s, d)
+        return position, heading + np.arctan2(self.across, self.along) + self.turn
 
     def velocity(self, road: Road, t: float) -> NDArray[np.float64]:
-        """Return the velocity over ground at one instant, as a central difference.
+        """Return the velocity over ground along the world's x and y, (2,), m/s, as a central difference.
 
-        Parameters
-        ----------
-        road : Road
-            The street.
-        t : float
-            Time, seconds.
-
-        Returns
-        -------
-        (2,) float64
-            Along the world's x and y, m/s.
+        Parameters are those of `Trajectory.pose`.
         """
         step = 1e-4
         return (self.pose(road, t + step)[0][:2] - self.pose(road, t - step)[0][:2]) / (2 * step)

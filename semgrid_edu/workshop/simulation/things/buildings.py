@@ -1,29 +1,27 @@
 """Shapes of houses: walls with windows and doors under a gable, hip or flat roof."""
 
 from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.workshop.simulation.things import shapes
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
-from semgrid_edu.workshop.simulation.things.primitives import box, quads
-from semgrid_edu.workshop.simulation.things.shapes import Shape, merge, shape
+from semgrid_edu.workshop.simulation.things.shapes import UP, Shape, merge, quads
 
 _PLASTER = (
-    (0.70, 0.64, 0.50),
-    (0.72, 0.70, 0.66),
-    (0.62, 0.45, 0.28),
-    (0.55, 0.30, 0.22),
-    (0.66, 0.58, 0.34),
-    (0.42, 0.46, 0.50),
-    (0.50, 0.56, 0.44),
-    (0.60, 0.52, 0.50),
-)
+    (0.70, 0.64, 0.50), (0.72, 0.70, 0.66), (0.62, 0.45, 0.28), (0.55, 0.30, 0.22),
+    (0.66, 0.58, 0.34), (0.42, 0.46, 0.50), (0.50, 0.56, 0.44), (0.60, 0.52, 0.50),
+)  # fmt: skip
 _BRICK = ((0.30, 0.10, 0.06), (0.36, 0.16, 0.09), (0.24, 0.12, 0.08), (0.42, 0.30, 0.2))
 _TILES = ((0.28, 0.08, 0.05), (0.20, 0.07, 0.05), (0.09, 0.09, 0.10), (0.16, 0.10, 0.08), (0.33, 0.14, 0.08))
 _DOORS = ((0.10, 0.05, 0.03), (0.03, 0.10, 0.06), (0.25, 0.03, 0.03), (0.04, 0.06, 0.14), (0.5, 0.48, 0.44))
 _SHOPS = ((0.30, 0.03, 0.03), (0.03, 0.12, 0.22), (0.04, 0.16, 0.08), (0.45, 0.30, 0.04), (0.05, 0.05, 0.06))
 _DEEP = -2.5
+"""How far walls reach into the ground, metres, so that no gap opens below them on a slope."""
+_box, _shape = partial(shapes.box, kind=Kind.BUILDING), partial(shapes.shape, kind=Kind.BUILDING)
 
 
 @dataclass(frozen=True)
@@ -66,8 +64,7 @@ def _walls(house: House) -> list[tuple[NDArray, NDArray, float]]:
     return [(c, e / n, n) for c, e, n in zip(corners, edges, lengths, strict=True)]
 
 
-@dataclass(frozen=True)
-class _Style:
+class _Style(NamedTuple):
     """What all windows of a house share."""
 
     spacing: float
@@ -92,58 +89,49 @@ def _windows(origin, along, length: float, sills: NDArray, style: _Style, rng: n
     x, z = (a.ravel() for a in np.meshgrid((np.arange(n) + 0.5) * step - w / 2, sills))
     keep = rng.random(len(x)) > 0.06
     x, z = x[keep], z[keep]
-    up = np.array([0, 0, 1.0])
-    corner = origin + x[:, None] * along + z[:, None] * up
+    corner = origin + x[:, None] * along + z[:, None] * UP
     curtain = rng.random((len(x), 1))
     pane = np.where(curtain < 0.3, 0.25, 0.02) * np.array([1.0, 1.02, 1.06]) * (0.6 + 0.8 * curtain)
     edge = 0.08
-    parts = [_panel(corner, w * along, h * up, 0.02, style.frame)]
+    parts = [_panel(corner, w * along, h * UP, 0.02, style.frame)]
     for k in range(2):
-        inner = corner + (edge + k * (w / 2 - edge / 2 + 0.02)) * along + edge * up
-        parts.append(_panel(inner, (w / 2 - 1.25 * edge) * along, (h - 2 * edge) * up, 0.04, pane, Material.GLASS))
+        inner = corner + (edge + k * (w / 2 - edge / 2 + 0.02)) * along + edge * UP
+        parts.append(_panel(inner, (w / 2 - 1.25 * edge) * along, (h - 2 * edge) * UP, 0.04, pane, Material.GLASS))
     if style.sill:
-        parts.append(_panel(corner - 0.1 * along - 0.12 * up, (w + 0.2) * along, 0.12 * up, 0.07, (0.45, 0.44, 0.42)))
+        parts.append(_panel(corner - 0.1 * along - 0.12 * UP, (w + 0.2) * along, 0.12 * UP, 0.07, (0.45, 0.44, 0.42)))
     if style.shutters:
         for shift in (-0.5 * w - 0.02, w + 0.02):
-            parts.append(_panel(corner + shift * along, 0.5 * w * along, h * up, 0.05, style.shutters, Material.WOOD))
+            parts.append(_panel(corner + shift * along, 0.5 * w * along, h * UP, 0.05, style.shutters, Material.WOOD))
     return parts
 
 
 def _front_door(origin, along, length: float, rng: np.random.Generator) -> list[Shape]:
     """Hang a door with its frame, a step and a small canopy near the middle of the front."""
     at = origin + (length * rng.uniform(0.3, 0.6)) * along
-    up = np.array([0, 0, 1.0])
     colour = _DOORS[rng.integers(len(_DOORS))]
-    out = np.cross(along, up)
+    out = np.cross(along, UP)
     return [
-        _panel(at - 0.12 * along, 1.34 * along, 2.5 * up, 0.06, (0.6, 0.58, 0.54)),
-        _panel(at, 1.1 * along, 2.35 * up, 0.08, colour, Material.WOOD),
-        _panel(at + 0.25 * along + 1.4 * up, 0.6 * along, 0.7 * up, 0.1, (0.03, 0.03, 0.035), Material.GLASS),
-        box(
-            at + 0.55 * along + 0.45 * out + 2.62 * up,
-            (1.9, 0.9, 0.1),
-            (0.2, 0.19, 0.18),
-            Material.MATTE,
-            Kind.BUILDING,
-        ),
+        _panel(at - 0.12 * along, 1.34 * along, 2.5 * UP, 0.06, (0.6, 0.58, 0.54)),
+        _panel(at, 1.1 * along, 2.35 * UP, 0.08, colour, Material.WOOD),
+        _panel(at + 0.25 * along + 1.4 * UP, 0.6 * along, 0.7 * UP, 0.1, (0.03, 0.03, 0.035), Material.GLASS),
+        _box(at + 0.55 * along + 0.45 * out + 2.62 * UP, (1.9, 0.9, 0.1), (0.2, 0.19, 0.18), Material.MATTE),
     ]
 
 
 def _shop_front(origin, along, length: float, rng: np.random.Generator) -> list[Shape]:
     """Hang a shop's windows, door and sign board on the ground floor."""
-    up = np.array([0, 0, 1.0])
     colour = np.array(_SHOPS[rng.integers(len(_SHOPS))])
     n = max(int(length / 2.6), 1)
     step = (length - 0.8) / n
-    corner = origin + (0.5 + np.arange(n) * step)[:, None] * along + 0.45 * up
+    corner = origin + (0.5 + np.arange(n) * step)[:, None] * along + 0.45 * UP
     letters = rng.uniform(0.15, 0.6, 9).cumsum()
     letters = letters[letters < length - 2.2]
-    words = origin + (1.0 + letters)[:, None] * along + 3.1 * up
+    words = origin + (1.0 + letters)[:, None] * along + 3.1 * UP
     return [
-        _panel(origin + 0.2 * along, (length - 0.4) * along, 3.0 * up, 0.03, 0.5 * colour + 0.05),
-        _panel(corner, (step - 0.25) * along, 2.3 * up, 0.05, (0.05, 0.055, 0.06), Material.GLASS),
-        _panel(origin + 0.2 * along + 2.9 * up, (length - 0.4) * along, 0.75 * up, 0.12, colour),
-        _panel(words, 0.26 * along, 0.32 * up, 0.14, (0.85, 0.83, 0.75)),
+        _panel(origin + 0.2 * along, (length - 0.4) * along, 3.0 * UP, 0.03, 0.5 * colour + 0.05),
+        _panel(corner, (step - 0.25) * along, 2.3 * UP, 0.05, (0.05, 0.055, 0.06), Material.GLASS),
+        _panel(origin + 0.2 * along + 2.9 * UP, (length - 0.4) * along, 0.75 * UP, 0.12, colour),
+        _panel(words, 0.26 * along, 0.32 * UP, 0.14, (0.85, 0.83, 0.75)),
     ]
 
 
@@ -153,25 +141,21 @@ def _gable(house: House, tiles, wall, wall_material, rng: np.random.Generator) -
     w, d, z = house.width / 2, house.depth, house.eaves
     span, run = (w, d / 2) if not across else (d / 2, w)
     rise, over = run * rng.uniform(0.6, 1.0), 0.45
-    drop = over * rise / run
-    local = np.array(
-        [
-            [-span - over, -run - over, -drop],
-            [span + over, -run - over, -drop],
-            [span + over, 0, rise],
-            [-span - over, 0, rise],
-        ]
-    )
+    eave, ends = (-run - over, -over * rise / run), (-span - over, span + over)
+    slope = np.array([(ends[0], *eave), (ends[1], *eave), (ends[1], 0, rise), (ends[0], 0, rise)])
     gable = np.array([[span, -run, 0], [span, run, 0], [span, 0, rise]])
-    flip = np.array([-1.0, -1.0, 1.0])
+    half_a_turn = np.array([-1.0, -1.0, 1.0])
     turn = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]) if across else np.eye(3)
-    place = lambda p: p @ turn.T + [0, d / 2, z]  # noqa: E731
-    slope = [
-        shape(place(p), [[0, 1, 2], [0, 2, 3]], tiles, Material.TILES, Kind.BUILDING) for p in (local, local * flip)
+    parts = [
+        _shape((corners * flip) @ turn.T + [0, d / 2, z], faces, colour, material)
+        for corners, faces, colour, material in (
+            (slope, [[0, 1, 2], [0, 2, 3]], tiles, Material.TILES),
+            (gable, [[0, 1, 2]], wall, wall_material),
+        )
+        for flip in (np.ones(3), half_a_turn)
     ]
-    ends = [shape(place(p), [[0, 1, 2]], wall, wall_material, Kind.BUILDING) for p in (gable, gable * flip)]
-    chimney = box((0.5 * w, 0.6 * d, z + 0.9 * rise), (0.7, 0.6, 1.6), _BRICK[0], Material.BRICK, Kind.BUILDING)
-    return [*slope, *ends, chimney]
+    chimney = _box((0.5 * w, 0.6 * d, z + 0.9 * rise), (0.7, 0.6, 1.6), _BRICK[0], Material.BRICK)
+    return [*parts, chimney]
 
 
 def _hip(house: House, tiles) -> list[Shape]:
@@ -181,7 +165,7 @@ def _hip(house: House, tiles) -> list[Shape]:
     eave = [(-w, -over, z), (w, -over, z), (w, d - over, z), (-w, d - over, z)]
     top = [(-ridge, house.depth / 2, z + rise), (ridge, house.depth / 2, z + rise)]
     faces = [[0, 1, 5], [0, 5, 4], [1, 2, 5], [2, 3, 4], [2, 4, 5], [3, 0, 4]]
-    return [shape(eave + top, faces, tiles, Material.TILES, Kind.BUILDING)]
+    return [_shape(eave + top, faces, tiles, Material.TILES)]
 
 
 def _flat(house: House, wall) -> list[Shape]:
@@ -189,8 +173,8 @@ def _flat(house: House, wall) -> list[Shape]:
     w, d, z = house.width, house.depth, house.eaves
     cornice = 0.8 * np.asarray(wall) + 0.1
     return [
-        box((0, d / 2, z + 0.1), (w + 0.5, d + 0.5, 0.35), cornice, Material.PLASTER, Kind.BUILDING),
-        box((0.2 * w, 0.5 * d, z + 1.0), (2.5, 2.5, 1.6), (0.4, 0.4, 0.4), Material.PLASTER, Kind.BUILDING),
+        _box((0, d / 2, z + 0.1), (w + 0.5, d + 0.5, 0.35), cornice, Material.PLASTER),
+        _box((0.2 * w, 0.5 * d, z + 1.0), (2.5, 2.5, 1.6), (0.4, 0.4, 0.4), Material.PLASTER),
     ]
 
 
@@ -200,53 +184,48 @@ def _balconies(house: House, rng: np.random.Generator) -> list[Shape]:
     parts = []
     for storey in range(1, house.storeys):
         z = 2.9 * storey + 0.45
-        parts.append(box((x, -0.6, z), (2.8, 1.2, 0.15), (0.5, 0.49, 0.47), Material.PLASTER, Kind.BUILDING))
-        parts.append(box((x, -1.18, z + 0.55), (2.8, 0.05, 0.95), (0.3, 0.34, 0.38), Material.METAL, Kind.BUILDING))
+        parts.append(_box((x, -0.6, z), (2.8, 1.2, 0.15), (0.5, 0.49, 0.47), Material.PLASTER))
+        parts.append(_box((x, -1.18, z + 0.55), (2.8, 0.05, 0.95), (0.3, 0.34, 0.38), Material.METAL))
     return parts
+
+
+def _draw_style(house: House, rng: np.random.Generator) -> _Style:
+    """Draw what the windows of a house look like."""
+    frame = (0.72, 0.71, 0.68) if rng.random() < 0.75 else (0.12, 0.08, 0.06)
+    shutters = _DOORS[rng.integers(4)] if house.roof == "gable" and rng.random() < 0.45 else None
+    size = (rng.uniform(1.0, 1.5), rng.uniform(1.35, 1.7))
+    spacing = rng.uniform(2.2, 3.2) + (0.8 if shutters else 0)
+    return _Style(spacing, size, frame, shutters, bool(rng.random() < 0.7))
+
+
+def _body(house: House, wall, material: Material) -> list[Shape]:
+    """Build the four walls as one box, with a darker plinth around their foot."""
+    w, d, middle = house.width, house.depth, house.depth / 2
+    return [
+        _box((0, middle, (house.eaves + _DEEP) / 2), (w, d, house.eaves - _DEEP), wall, material),
+        _box((0, middle, (_DEEP + 0.5) / 2), (w + 0.06, d + 0.06, 0.5 - _DEEP), 0.5 * wall, Material.PLASTER),
+    ]
 
 
 def build_house(house: House) -> Shape:
     """Build a house.
 
-    Its walls reach 2.5 m into the ground, so that no gap opens below them on a slope.
-
     Parameters
     ----------
     house : House
         Its plan; x along the front, y away from the street.
-
-    Returns
-    -------
-    Shape
-        In the frame of the plan.
     """
     rng = np.random.default_rng([house.seed, 80])
-    brick = rng.random() < 0.3
-    palette = _BRICK if brick else _PLASTER
-    material = Material.BRICK if brick else Material.PLASTER
+    palette, material = (_BRICK, Material.BRICK) if rng.random() < 0.3 else (_PLASTER, Material.PLASTER)
     wall = np.array(palette[rng.integers(len(palette))]) * rng.uniform(0.8, 1.15, 3)
     tiles = np.array(_TILES[rng.integers(len(_TILES))]) * rng.uniform(0.8, 1.2)
-    centre, size = (0, house.depth / 2, (house.eaves + _DEEP) / 2), (house.width, house.depth, house.eaves - _DEEP)
-    parts = [box(centre, size, wall, material, Kind.BUILDING)]
-    parts.append(
-        box(
-            (0, house.depth / 2, (_DEEP + 0.5) / 2),
-            (house.width + 0.06, house.depth + 0.06, 0.5 - _DEEP),
-            0.5 * wall,
-            Material.PLASTER,
-            Kind.BUILDING,
-        )
-    )
-    grey = (0.72, 0.71, 0.68) if rng.random() < 0.75 else (0.12, 0.08, 0.06)
-    shutters = _DOORS[rng.integers(4)] if house.roof == "gable" and rng.random() < 0.45 else None
-    size = (rng.uniform(1.0, 1.5), rng.uniform(1.35, 1.7))
-    style = _Style(rng.uniform(2.2, 3.2) + (0.8 if shutters else 0), size, grey, shutters, bool(rng.random() < 0.7))
+    parts, style = _body(house, wall, material), _draw_style(house, rng)
     sills = 2.9 * np.arange(house.storeys) + 1.3
-    for i, (origin, along, length) in enumerate(_walls(house)):
-        front = i == 0
-        parts += _windows(origin, along, length, sills[1:] if front and house.shop else sills, style, rng)
-        if front:
-            parts += (_shop_front if house.shop else _front_door)(origin, along, length, rng)
+    front, *others = _walls(house)
+    parts += _windows(*front, sills[1:] if house.shop else sills, style, rng)
+    parts += (_shop_front if house.shop else _front_door)(*front, rng)
+    for wall_place in others:
+        parts += _windows(*wall_place, sills, style, rng)
     if house.roof == "gable":
         parts += _gable(house, tiles, wall, material, rng)
     else:

@@ -1,23 +1,27 @@
-"""Shapes of what stands beside a street: fences, garden walls, traffic signs, lamps and traffic lights."""
+"""Shapes of what stands beside a street: fences, walls, signs, lamps and traffic lights; wire mesh, panes and posts."""
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
-from semgrid_edu.workshop.simulation.things.primitives import ball, box, quads, tube
-from semgrid_edu.workshop.simulation.things.shapes import Shape, merge, shape
+from semgrid_edu.workshop.simulation.things.shapes import Shape, ball, box, merge, quads, shape, tube
 
-FENCES = ("planks", "bars", "mesh", "wall")
-"""The fences that `fence` knows."""
 _WOOD, _STEEL, _STONE = (0.26, 0.16, 0.09), (0.05, 0.09, 0.06), (0.36, 0.34, 0.31)
-
-
-def _pickets(length: float, step: float, width: float, low: float, high: float, colour, material) -> Shape:
-    """Stand a row of upright slats along x."""
-    x = np.arange(step / 2, length, step)
-    corner = np.stack([x - width / 2, 0 * x, 0 * x + low], axis=1)
-    return quads(corner, [width, 0, 0], [0, 0, high - low], colour, material, Kind.FENCE)
+_BLACK, _ZINC, _FRAME, _TWIGS = (0.06, 0.06, 0.06), (0.33, 0.35, 0.35), (0.16, 0.17, 0.18), (0.05, 0.11, 0.028)
+_GREY = (0.42, 0.43, 0.44)
+_FENCES = {
+    "planks": (1.35, _WOOD, Material.WOOD, (0.15, 0.11, 0.12, (0.30, 0.19, 0.11))),
+    "bars": (1.4, _BLACK, Material.METAL, (0.13, 0.025, 0.1, _BLACK)),
+    "mesh": (1.8, _STEEL, Material.METAL, (0.1, 0.016, 0.05, _STEEL)),
+}
+"""Of each fence: height, colour of the posts, material; and of its slats: step, width, lower end, colour."""
+FENCES = (*_FENCES, "wall")
+"""The fences that `fence` knows."""
+MESH_HEIGHT, PANE_HEIGHT = 1.95, 2.1
+"""Heights of a fence of wire mesh and of a row of panes, metres."""
+_fence_box, _fence_quads = partial(box, kind=Kind.FENCE), partial(quads, kind=Kind.FENCE)
 
 
 @cache
@@ -30,32 +34,84 @@ def fence(style: str, length: float) -> Shape:
         One of `FENCES`; "wall" is a low garden wall of stone, a fence to both label sets.
     length : float
         Length of the piece, metres.
-
-    Returns
-    -------
-    Shape
     """
+    middle = length / 2
     if style == "wall":
-        cap = box((length / 2, 0, 1.0), (length, 0.34, 0.1), (0.45, 0.43, 0.4), Material.PLASTER, Kind.FENCE)
-        return merge([box((length / 2, 0, 0.1), (length, 0.25, 1.8), _STONE, Material.BRICK, Kind.FENCE), cap])
-    post = {"planks": _WOOD, "bars": (0.06,) * 3, "mesh": _STEEL}[style]
-    material = Material.WOOD if style == "planks" else Material.METAL
-    height = {"planks": 1.35, "bars": 1.4, "mesh": 1.8}[style]
-    posts = [
-        box((x, 0.03, height / 2 - 0.4), (0.09, 0.09, height + 0.9), post, material, Kind.FENCE)
+        cap = _fence_box((middle, 0, 1.0), (length, 0.34, 0.1), (0.45, 0.43, 0.4), Material.PLASTER)
+        return merge([_fence_box((middle, 0, 0.1), (length, 0.25, 1.8), _STONE, Material.BRICK), cap])
+    height, colour, material, (step, width, low, slat_colour) = _FENCES[style]
+    parts = [
+        _fence_box((x, 0.03, height / 2 - 0.4), (0.09, 0.09, height + 0.9), colour, material)
         for x in np.linspace(0.0, length, max(round(length / 2.5), 1) + 1)
     ]
-    rails = [box((length / 2, 0.03, z), (length, 0.04, 0.07), post, material, Kind.FENCE) for z in (0.3, 0.92 * height)]
-    if style == "planks":
-        return merge([*posts, *rails, _pickets(length, 0.15, 0.11, 0.12, height, (0.30, 0.19, 0.11), Material.WOOD)])
-    if style == "bars":
-        return merge([*posts, *rails, _pickets(length, 0.13, 0.025, 0.1, height, (0.06,) * 3, Material.METAL)])
-    z = np.arange(0.1, height, 0.2)
-    wires = quads(np.stack([0 * z, 0 * z, z], 1), [length, 0, 0], [0, 0, 0.02], _STEEL, Material.METAL, Kind.FENCE)
-    return merge([*posts, wires, _pickets(length, 0.1, 0.016, 0.05, height, _STEEL, Material.METAL)])
+    if style == "mesh":
+        z = np.arange(0.1, height, 0.2)
+        parts.append(_fence_quads(np.stack([0 * z, 0 * z, z], 1), [length, 0, 0], [0, 0, 0.02], colour, material))
+    else:
+        parts += [_fence_box((middle, 0.03, z), (length, 0.04, 0.07), colour, material) for z in (0.3, 0.92 * height)]
+    x = np.arange(step / 2, length, step)
+    corner = np.stack([x - width / 2, 0 * x, 0 * x + low], axis=1)
+    return merge([*parts, _fence_quads(corner, [width, 0, 0], [0, 0, height - low], slat_colour, material)])
 
 
-def _plate(corners: np.ndarray, colour, x: float, material=Material.RETRO) -> Shape:
+@cache
+def mesh_frame(length: float) -> Shape:
+    """Make what is solid of a piece of wire mesh fence from the origin along x: a post at its start, a rail on top.
+
+    Parameters
+    ----------
+    length : float
+        Distance to the next post, metres.
+    """
+    post = _fence_box((0, 0, MESH_HEIGHT / 2 - 0.3), (0.06, 0.06, MESH_HEIGHT + 0.7), _ZINC, Material.METAL)
+    return merge([post, _fence_box((length / 2, 0, MESH_HEIGHT - 0.02), (length, 0.03, 0.04), _ZINC, Material.METAL)])
+
+
+@cache
+def mesh_sheet(length: float) -> Shape:
+    """Make the wire of `mesh_frame`, as a sheet of `Material.WIRE`. Parameters are those of `mesh_frame`."""
+    return _fence_quads((0, 0, 0.05), (length, 0, 0), (0, 0, MESH_HEIGHT - 0.05), _ZINC, Material.WIRE)
+
+
+@cache
+def pane_frame(length: float) -> Shape:
+    """Make what is solid of one pane: a post at its start, two rails. Parameters are those of `mesh_frame`."""
+    post = _fence_box((0, 0, PANE_HEIGHT / 2), (0.06, 0.06, PANE_HEIGHT + 0.2), _FRAME, Material.METAL)
+    rails = [_fence_box((length / 2, 0, z), (length, 0.05, 0.06), _FRAME, Material.METAL) for z in (0.2, 2.05)]
+    return merge([post, *rails])
+
+
+@cache
+def pane(length: float) -> Shape:
+    """Make the glass of `pane_frame`, as a sheet of `Material.PANE`. Parameters are those of `mesh_frame`."""
+    return _fence_quads((0, 0, 0.23), (length, 0, 0), (0, 0, PANE_HEIGHT - 0.3), _FRAME, Material.PANE)
+
+
+def porous_hedge(length: float, thickness: float, height: float) -> Shape:
+    """Make a piece of hedge from the origin along x, as a volume of `Material.TWIGS`.
+
+    Parameters
+    ----------
+    length, thickness, height : float
+        Its sides along x, y and z, metres.
+    """
+    size = (length, thickness, height + 0.5)
+    return box((length / 2, 0, height / 2 - 0.25), size, _TWIGS, Material.TWIGS, Kind.PLANT)
+
+
+@cache
+def bollard(height: float, radius: float) -> Shape:
+    """Make a post without a fence on the origin.
+
+    Parameters
+    ----------
+    height, radius : float
+        Its size above the ground, metres.
+    """
+    return tube((0, 0, -0.5), (0, 0, height), radius, np.multiply(_ZINC, 0.8), Material.METAL, Kind.POLE, 9)
+
+
+def _plate(corners: ArrayLike, colour, x: float, material=Material.RETRO) -> Shape:
     """Make a convex plate in the plane x, from its corners (y, z), facing -x."""
     n = len(corners)
     vertices = np.column_stack([np.full(n, x), corners])
@@ -67,24 +123,20 @@ def _polygon(n: int, radius: float, turn: float = 0.0) -> np.ndarray:
     return np.stack([-radius * np.cos(angle), radius * np.sin(angle)], axis=1)
 
 
+def _rectangle(left: float, right: float, half_height: float) -> np.ndarray:
+    h = half_height
+    return np.array([[left, -h], [left, h], [right, h], [right, -h]])
+
+
 _RED, _WHITE, _BLUE, _YELLOW = (0.55, 0.01, 0.015), (0.85, 0.85, 0.83), (0.01, 0.06, 0.4), (0.8, 0.5, 0.01)
 _FACES = {
-    "limit": [(_polygon(16, 0.32), _RED), (_polygon(16, 0.25), _WHITE), (_polygon(4, 0.12), (0.05,) * 3)],
-    "no-entry": [
-        (_polygon(16, 0.32), _RED),
-        (np.array([[-0.22, -0.06], [-0.22, 0.06], [0.22, 0.06], [0.22, -0.06]]), _WHITE),
-    ],
+    "limit": [(_polygon(16, 0.32), _RED), (_polygon(16, 0.25), _WHITE), (_polygon(4, 0.12), (0.05, 0.05, 0.05))],
+    "no-entry": [(_polygon(16, 0.32), _RED), (_rectangle(-0.22, 0.22, 0.06), _WHITE)],
     "priority": [(_polygon(4, 0.4, np.pi / 2), _WHITE), (_polygon(4, 0.3, np.pi / 2), _YELLOW)],
     "warning": [(_polygon(3, 0.46, np.pi / 2), _RED), (_polygon(3, 0.3, np.pi / 2), _WHITE)],
     "stop": [(_polygon(8, 0.34, np.pi / 8), _WHITE), (_polygon(8, 0.31, np.pi / 8), _RED)],
-    "parking": [
-        (_polygon(4, 0.43, np.pi / 4), _BLUE),
-        (np.array([[-0.08, -0.2], [-0.08, 0.2], [0.1, 0.2], [0.1, 0.0]]), _WHITE),
-    ],
-    "direction": [
-        (np.array([[-0.6, -0.22], [-0.6, 0.22], [0.6, 0.22], [0.6, -0.22]]), _YELLOW),
-        (np.array([[-0.5, -0.06], [-0.5, 0.06], [0.3, 0.06], [0.3, -0.06]]), (0.03,) * 3),
-    ],
+    "parking": [(_polygon(4, 0.43, np.pi / 4), _BLUE), ([(-0.08, -0.2), (-0.08, 0.2), (0.1, 0.2), (0.1, 0)], _WHITE)],
+    "direction": [(_rectangle(-0.6, 0.6, 0.22), _YELLOW), (_rectangle(-0.5, 0.3, 0.06), (0.03, 0.03, 0.03))],
 }
 SIGNS = tuple(_FACES)
 """The traffic signs that `sign` knows."""
@@ -92,22 +144,17 @@ SIGNS = tuple(_FACES)
 
 @cache
 def sign(name: str) -> Shape:
-    """Make a traffic sign on its pole; it faces -x, so that a driver who goes along x sees it.
+    """Make a traffic sign on its pole at the origin; it faces -x, so that a driver who goes along x sees it.
 
     Parameters
     ----------
     name : str
         One of `SIGNS`.
-
-    Returns
-    -------
-    Shape
-        The pole stands on the origin.
     """
-    pole = tube((0, 0, -0.5), (0, 0, 2.75), (0.035, 0.035), (0.42, 0.43, 0.44), Material.METAL, Kind.POLE)
-    plates = [_plate(np.add(c, (0, 2.4)), colour, -0.05 - 0.008 * i) for i, (c, colour) in enumerate(_FACES[name])]
-    back = _plate(np.add(_FACES[name][0][0][::-1], (0, 2.4)), (0.3, 0.3, 0.3), -0.04, Material.METAL)
-    return merge([pole, back, *plates])
+    faces = [(np.add(corners, (0, 2.4)), colour) for corners, colour in _FACES[name]]
+    pole = tube((0, 0, -0.5), (0, 0, 2.75), 0.035, _GREY, Material.METAL, Kind.POLE)
+    back = _plate(faces[0][0][::-1], (0.3, 0.3, 0.3), -0.04, Material.METAL)
+    return merge([pole, back, *(_plate(*face, -0.05 - 0.008 * i) for i, face in enumerate(faces))])
 
 
 @cache
@@ -118,19 +165,14 @@ def lamp(height: float) -> Shape:
     ----------
     height : float
         Height of the lamp above the ground, metres.
-
-    Returns
-    -------
-    Shape
     """
-    grey = {"colour": (0.24, 0.25, 0.25), "material": Material.METAL, "kind": Kind.POLE}
-    head = box((0, 1.7, height), (0.22, 0.7, 0.12), (0.3, 0.3, 0.29), Material.METAL, Kind.POLE)
+    metal = partial(tube, colour=(0.24, 0.25, 0.25), material=Material.METAL, kind=Kind.POLE)
     return merge(
         [
-            tube((0, 0, -0.5), (0, 0, 1.2), (0.11, 0.10), **grey),
-            tube((0, 0, 1.2), (0, 0, height - 0.4), (0.075, 0.055), **grey),
-            tube((0, 0, height - 0.4), (0, 1.5, height), (0.05, 0.04), **grey),
-            head,
+            metal((0, 0, -0.5), (0, 0, 1.2), (0.11, 0.10)),
+            metal((0, 0, 1.2), (0, 0, height - 0.4), (0.075, 0.055)),
+            metal((0, 0, height - 0.4), (0, 1.5, height), (0.05, 0.04)),
+            box((0, 1.7, height), (0.22, 0.7, 0.12), (0.3, 0.3, 0.29), Material.METAL, Kind.POLE),
         ]
     )
 
@@ -143,27 +185,13 @@ def traffic_light(green: bool) -> Shape:
     ----------
     green : bool
         Whether it shows green; else red.
-
-    Returns
-    -------
-    Shape
     """
-    dark = (0.025, 0.03, 0.028)
-    colours = [(0.7, 0.02, 0.02), (0.5, 0.3, 0.02), (0.02, 0.6, 0.25)]
-    lit = 2 if green else 0
     parts = [
         tube((0, 0, -0.5), (0, 0, 3.3), (0.06, 0.055), (0.2, 0.21, 0.2), Material.METAL, Kind.POLE),
-        box((-0.12, 0, 2.75), (0.2, 0.32, 0.95), dark, Material.MATTE, Kind.SIGN),
+        box((-0.12, 0, 2.75), (0.2, 0.32, 0.95), (0.025, 0.03, 0.028), Material.MATTE, Kind.SIGN),
     ]
-    for i, colour in enumerate(colours):
-        shade = colour if i == lit else 0.12 * np.asarray(colour)
-        parts.append(
-            ball(
-                (-0.22, 0, 3.04 - 0.29 * i),
-                (0.04, 0.11, 0.11),
-                shade,
-                Material.LAMP if i == lit else Material.MATTE,
-                Kind.SIGN,
-            )
-        )
+    for i, colour in enumerate(((0.7, 0.02, 0.02), (0.5, 0.3, 0.02), (0.02, 0.6, 0.25))):
+        lit = i == (2 if green else 0)
+        colour, material = (colour, Material.LAMP) if lit else (np.multiply(0.12, colour), Material.MATTE)
+        parts.append(ball((-0.22, 0, 3.04 - 0.29 * i), (0.04, 0.11, 0.11), colour, material, Kind.SIGN))
     return merge(parts)

@@ -44,13 +44,10 @@ class Material(IntEnum):
     RUBBER = 12
     LAMP = 13
     RETRO = 14
+    # these three stop only a part of the rays, by chance
     WIRE = 15
     PANE = 16
     TWIGS = 17
-
-
-SEE_THROUGH = (Material.WIRE, Material.PANE, Material.TWIGS)
-"""Materials that stop only a part of the rays, by chance."""
 
 
 REFLECTANCE = np.array(
@@ -58,21 +55,6 @@ REFLECTANCE = np.array(
 )
 """Share of 905 nm light that each `Material` sends back (1: retroreflective plates and signs)."""
 
-_NAMES = {
-    Kind.ROAD: "road",
-    Kind.LANE: "lane",
-    Kind.SIDEWALK: "sidewalk",
-    Kind.GRASS: "vegetation",
-    Kind.PLANT: "vegetation",
-    Kind.CAR: "car",
-    Kind.PEDESTRIAN: "pedestrian",
-    Kind.BICYCLE: "bicycle",
-    Kind.BUILDING: "building",
-    Kind.SIGN: "sign",
-    Kind.POLE: "pole",
-    Kind.FENCE: "fence",
-    Kind.SKY: "sky",
-}
 _KITTI_NAMES = {"lane": "road", "sign": "signage", "pole": "signage"}
 
 
@@ -93,7 +75,8 @@ def class_of_kind(label_set: LabelSet) -> NDArray[np.uint8]:
         A table to index with kinds; 255 (unlabelled) stays 255.
     """
     table = np.full(256, IGNORE, dtype=np.uint8)
-    for kind, name in _NAMES.items():
+    for kind in Kind:
+        name = "vegetation" if kind in (Kind.GRASS, Kind.PLANT) else kind.name.lower()
         candidates = (name, _KITTI_NAMES.get(name), "void")
         table[kind] = label_set.index(next(c for c in candidates if c in label_set.names))
     return table

@@ -1,86 +1,67 @@
-"""Shapes of people: walkers, whose legs and arms swing with the distance that they have walked, and riders.
+"""Shapes of people and bicycles: walkers, whose legs and arms swing as they go, and riders.
 
 A body is built once for each phase of the stride, with the number of a garment in place of each colour. So dressing a
-person is a look-up.
-
-Shapes of bicycles, made of tubes; they stand on z = 0 and point along x.
+person is a look-up. All stand on z = 0 and look along x.
 """
 
 import itertools
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.workshop.simulation.things.cars import PAINTS
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
-from semgrid_edu.workshop.simulation.things.primitives import ball, quads, tube
-from semgrid_edu.workshop.simulation.things.shapes import Shape, merge
+from semgrid_edu.workshop.simulation.things.shapes import Shape, ball, merge, quads, tube
+
+_BLACK, _GREY = (0.02, 0.02, 0.02), (0.25, 0.25, 0.25)
+_CRANK, _SADDLE, _HEAD = (-0.08, 0, 0.32), (-0.22, 0, 0.9), (0.38, 0, 0.85)
+_REAR, _FRONT = (-0.53, 0, 0.35), (0.53, 0, 0.35)
+_FRAME = (
+    (_CRANK, _SADDLE, 0.024),
+    (_CRANK, _HEAD, 0.024),
+    ((-0.2, 0, 0.83), _HEAD, 0.024),
+    (_CRANK, _REAR, 0.015),
+    ((-0.2, 0, 0.83), _REAR, 0.015),
+    ((0.36, 0, 0.98), _FRONT, 0.024),
+)
+"""The tubes of a bicycle: where they begin and end, and their radius, metres."""
 
 
 def _wheel(x: float) -> list[Shape]:
     """Make a bicycle wheel: a ring of tubes, and spokes."""
     angle = np.linspace(0, 2 * np.pi, 17)
     rim = np.stack([x + 0.33 * np.cos(angle), 0 * angle, 0.35 + 0.33 * np.sin(angle)], axis=1)
-    tyre = [
-        tube(a, b, (0.025, 0.025), (0.02,) * 3, Material.RUBBER, Kind.BICYCLE, 4) for a, b in itertools.pairwise(rim)
-    ]
-    spokes = [
-        tube(rim[i], rim[i + 8], (0.006, 0.006), (0.4,) * 3, Material.METAL, Kind.BICYCLE, 3) for i in range(0, 8, 2)
-    ]
-    return [*tyre, *spokes]
+    tyre = [tube(a, b, 0.025, _BLACK, Material.RUBBER, Kind.BICYCLE, 4) for a, b in itertools.pairwise(rim)]
+    pairs = ((rim[i], rim[i + 8]) for i in range(0, 8, 2))
+    return tyre + [tube(a, b, 0.006, (0.4, 0.4, 0.4), Material.METAL, Kind.BICYCLE, 3) for a, b in pairs]
 
 
 @cache
 def bicycle() -> Shape:
-    """Make a bicycle, 1.75 m long; its frame is of `Material.PAINT`, so that it can be recoloured.
-
-    Returns
-    -------
-    Shape
-    """
-    paint = {"colour": PAINTS[5], "material": Material.PAINT, "kind": Kind.BICYCLE, "sides": 5}
-    metal = {"colour": (0.25,) * 3, "material": Material.METAL, "kind": Kind.BICYCLE, "sides": 5}
-    crank, saddle, head, rear, front = (
-        (-0.08, 0, 0.32),
-        (-0.22, 0, 0.9),
-        (0.38, 0, 0.85),
-        (-0.53, 0, 0.35),
-        (0.53, 0, 0.35),
-    )
-    thick, thin = (0.024, 0.024), (0.015, 0.015)
+    """Make a bicycle, 1.75 m long; its frame is of `Material.PAINT`, so that it can be recoloured."""
+    metal = partial(tube, colour=_GREY, material=Material.METAL, kind=Kind.BICYCLE, sides=5)
     return merge(
         [
             *_wheel(-0.53),
             *_wheel(0.53),
-            tube(crank, saddle, thick, **paint),
-            tube(crank, head, thick, **paint),
-            tube((-0.2, 0, 0.83), head, thick, **paint),
-            tube(crank, rear, thin, **paint),
-            tube((-0.2, 0, 0.83), rear, thin, **paint),
-            tube((0.36, 0, 0.98), front, thick, **paint),
-            tube((0.4, -0.28, 1.02), (0.4, 0.28, 1.02), (0.018, 0.018), **metal),
-            ball((-0.24, 0, 0.93), (0.13, 0.08, 0.04), (0.02,) * 3, Material.RUBBER, Kind.BICYCLE),
-            tube((-0.08, -0.12, 0.32), (-0.08, 0.12, 0.32), (0.07, 0.07), **metal),
+            *(tube(*measures, PAINTS[5], Material.PAINT, Kind.BICYCLE, 5) for measures in _FRAME),
+            metal((0.4, -0.28, 1.02), (0.4, 0.28, 1.02), 0.018),
+            ball((-0.24, 0, 0.93), (0.13, 0.08, 0.04), _BLACK, Material.RUBBER, Kind.BICYCLE),
+            metal((-0.08, -0.12, 0.32), (-0.08, 0.12, 0.32), 0.07),
             quads([-0.55, 0.0, 0.7], [0.1, 0, 0], [0, 0.03, 0.04], (0.5, 0.02, 0.02), Material.RETRO, Kind.BICYCLE),
         ]
     )
 
 
 _PHASES = 16
-_TOP, _TROUSERS, _SKIN_SLOT, _HAIR_SLOT, _SHOES = 0, 1, 2, 3, 4
+_TOP, _TROUSERS, _SKIN_SLOT, _HAIR_SLOT, _SHOES = range(5)
 
 _CLOTHES = (
-    (0.05, 0.08, 0.25),
-    (0.45, 0.05, 0.05),
-    (0.6, 0.6, 0.58),
-    (0.03, 0.03, 0.04),
-    (0.55, 0.4, 0.06),
-    (0.07, 0.25, 0.12),
-    (0.3, 0.12, 0.35),
-    (0.25, 0.2, 0.15),
-)
+    (0.05, 0.08, 0.25), (0.45, 0.05, 0.05), (0.6, 0.6, 0.58), (0.03, 0.03, 0.04),
+    (0.55, 0.4, 0.06), (0.07, 0.25, 0.12), (0.3, 0.12, 0.35), (0.25, 0.2, 0.15),
+)  # fmt: skip
 _SKIN = ((0.55, 0.33, 0.22), (0.4, 0.22, 0.13), (0.17, 0.09, 0.05), (0.62, 0.4, 0.29))
 _HAIR = ((0.02, 0.015, 0.01), (0.12, 0.06, 0.02), (0.35, 0.22, 0.08), (0.35, 0.34, 0.33))
 
@@ -108,34 +89,28 @@ class Person:
 
     @classmethod
     def random(cls, rng: np.random.Generator) -> "Person":
-        """Draw a person.
+        """Draw height, clothes, skin, hair and the paint of the bicycle.
 
         Parameters
         ----------
         rng : numpy.random.Generator
-            Decides height, clothes, skin, hair and the paint of the bicycle.
-
-        Returns
-        -------
-        Person
+            Decides them.
         """
         pick = lambda colours: colours[rng.integers(len(colours))]  # noqa: E731
         top, trousers = pick(_CLOTHES), pick(_CLOTHES[:4] + _CLOTHES[7:])
         return cls(rng.uniform(1.55, 1.92), top, trousers, pick(_SKIN), pick(_HAIR), pick(PAINTS))
 
 
-def _limb(joints: list, radii: list, slot: int, kind: Kind) -> list[Shape]:
-    """Make a chain of tubes through joints, rounded where it bends."""
-    parts = [
-        tube(a, b, (ra, rb), (slot,) * 3, Material.CLOTH, kind)
-        for a, b, ra, rb in zip(joints[:-1], joints[1:], radii[:-1], radii[1:], strict=True)
-    ]
-    return [*parts, _blob(joints[1], (radii[1],) * 3, slot, kind, 0)]
-
-
 def _blob(centre: ArrayLike, radii: tuple, slot: int, kind: Kind, detail: int = 1) -> Shape:
     """Make an ellipsoid of one garment."""
     return ball(centre, radii, (slot,) * 3, Material.CLOTH, kind, detail)
+
+
+def _limb(joints: list, radii: tuple, slot: int, kind: Kind) -> list[Shape]:
+    """Make a chain of tubes through three joints, rounded where it bends."""
+    bones = zip(itertools.pairwise(joints), itertools.pairwise(radii), strict=True)
+    parts = [tube(*ends, thick, (slot,) * 3, Material.CLOTH, kind) for ends, thick in bones]
+    return [*parts, _blob(joints[1], (radii[1],) * 3, slot, kind, 0)]
 
 
 def _trunk(hip: NDArray, shoulder: NDArray, kind: Kind) -> list[Shape]:
@@ -145,7 +120,7 @@ def _trunk(hip: NDArray, shoulder: NDArray, kind: Kind) -> list[Shape]:
         tube(hip, shoulder, (0.145, 0.17), (_TOP,) * 3, Material.CLOTH, kind, 9),
         _blob(hip, (0.13, 0.165, 0.13), _TROUSERS, kind),
         _blob(hip + 0.92 * (shoulder - hip), (0.12, 0.21, 0.11), _TOP, kind),
-        tube(shoulder - [0, 0, 0.03], face, (0.055, 0.055), (_SKIN_SLOT,) * 3, Material.CLOTH, kind),
+        tube(shoulder - [0, 0, 0.03], face, 0.055, (_SKIN_SLOT,) * 3, Material.CLOTH, kind),
         _blob(face, (0.095, 0.08, 0.12), _SKIN_SLOT, kind),
         _blob(np.add(face, (-0.025, 0, 0.035)), (0.098, 0.09, 0.11), _HAIR_SLOT, kind),
     ]
@@ -162,11 +137,11 @@ def _walking(phase: int) -> Shape:
         step = side * swing
         knee = np.array([0.22 * step + 0.05, 0.09 * side, 0.5])
         foot = np.array([0.36 * step - 0.04 + 0.05 * (step < 0), 0.09 * side, 0.07 + 0.06 * max(-step, 0)])
-        parts += _limb([np.add(hip, (0, 0.09 * side, 0)), knee, foot], [0.095, 0.07, 0.05], _TROUSERS, kind)
+        parts += _limb([np.add(hip, (0, 0.09 * side, 0)), knee, foot], (0.095, 0.07, 0.05), _TROUSERS, kind)
         parts.append(_blob(np.add(foot, (0.06, 0, -0.02)), (0.13, 0.05, 0.05), _SHOES, kind, 0))
         elbow = np.array([-0.12 * step - 0.02, 0.24 * side, 1.17])
         hand = np.array([-0.26 * step + 0.1, 0.25 * side, 0.95])
-        parts += _limb([np.add(shoulder, (0, 0.19 * side, -0.03)), elbow, hand], [0.06, 0.05, 0.038], _TOP, kind)
+        parts += _limb([np.add(shoulder, (0, 0.19 * side, -0.03)), elbow, hand], (0.06, 0.05, 0.038), _TOP, kind)
         parts.append(_blob(hand, (0.05, 0.04, 0.06), _SKIN_SLOT, kind, 0))
     return merge(parts)
 
@@ -181,10 +156,10 @@ def _riding(phase: int) -> Shape:
         turn = 2 * np.pi * phase / _PHASES + (np.pi if side > 0 else 0)
         foot = np.array([-0.08 + 0.17 * np.cos(turn), 0.11 * side, 0.34 - 0.17 * np.sin(turn)])
         knee = (hip + foot) / 2 + np.array([0.2, 0.02 * side, 0.06])
-        parts += _limb([np.add(hip, (0, 0.09 * side, 0)), knee, foot], [0.09, 0.065, 0.05], _TROUSERS, kind)
+        parts += _limb([np.add(hip, (0, 0.09 * side, 0)), knee, foot], (0.09, 0.065, 0.05), _TROUSERS, kind)
         parts.append(_blob(np.add(foot, (0.05, 0, -0.03)), (0.12, 0.045, 0.04), _SHOES, kind, 0))
         elbow, hand = np.array([0.22, 0.26 * side, 1.2]), np.array([0.4, 0.25 * side, 1.04])
-        parts += _limb([np.add(shoulder, (0, 0.18 * side, -0.03)), elbow, hand], [0.055, 0.045, 0.035], _TOP, kind)
+        parts += _limb([np.add(shoulder, (0, 0.18 * side, -0.03)), elbow, hand], (0.055, 0.045, 0.035), _TOP, kind)
     return merge(parts)
 
 
@@ -195,7 +170,7 @@ def _dressed(body: Shape, person: Person) -> Shape:
 
 
 def walker(person: Person, distance: float) -> Shape:
-    """Make a person in mid-stride, who stands on z = 0 and looks along x.
+    """Make a person in mid-stride.
 
     Parameters
     ----------
@@ -203,17 +178,13 @@ def walker(person: Person, distance: float) -> Shape:
         How tall the person is, and what colours they wear.
     distance : float
         Distance walked so far, metres; the legs repeat their motion every 1.45 m.
-
-    Returns
-    -------
-    Shape
     """
     phase = round(distance / 1.45 * _PHASES) % _PHASES
     return _dressed(_walking(phase), person).placed((0, 0, 0), scale=person.height / 1.78)
 
 
 def rider(person: Person, distance: float) -> Shape:
-    """Make a cyclist on a bicycle, whose wheels stand on z = 0 and who looks along x.
+    """Make a cyclist on a bicycle.
 
     Parameters
     ----------
@@ -221,10 +192,6 @@ def rider(person: Person, distance: float) -> Shape:
         The colours of clothes and bicycle; all riders are of one height.
     distance : float
         Distance ridden so far, metres; the pedals turn once every 5 m.
-
-    Returns
-    -------
-    Shape
     """
     phase = round(distance / 5.0 * _PHASES) % _PHASES
     return merge([bicycle().recoloured(Material.PAINT, person.frame), _dressed(_riding(phase), person)])

@@ -1,29 +1,35 @@
 """Shapes of trees, bushes and hedges: trunks, and leaves that are lit as parts of the crown that they form."""
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.workshop.simulation.things import shapes
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
-from semgrid_edu.workshop.simulation.things.primitives import ball, box, tube
-from semgrid_edu.workshop.simulation.things.shapes import Shape, merge, shape
+from semgrid_edu.workshop.simulation.things.shapes import Shape, merge
 
-TREES = ("broad", "tall", "birch", "conifer")
+_leaves = partial(shapes.shape, material=Material.LEAF, kind=Kind.PLANT)
+_bark = partial(shapes.tube, material=Material.BARK, kind=Kind.PLANT)
+
+
+class _Species(NamedTuple):
+    bark: tuple[float, float, float]
+    leaf: tuple[float, float, float]
+    trunk: float  # radius, metres
+    crown: tuple[float, float, float] | None = None  # half its extent sideways and upwards, and its height, metres
+
+
+_SPECIES = {
+    "broad": _Species((0.11, 0.08, 0.06), (0.09, 0.17, 0.03), 0.19, (1.5, 1.3, 4.9)),
+    "tall": _Species((0.10, 0.08, 0.06), (0.07, 0.15, 0.035), 0.17, (0.85, 3.0, 6.2)),
+    "birch": _Species((0.5, 0.49, 0.45), (0.16, 0.24, 0.05), 0.11, (1.1, 1.3, 5.0)),
+    "conifer": _Species((0.1, 0.06, 0.04), (0.03, 0.085, 0.035), 0.15),
+}
+TREES = tuple(_SPECIES)
 """The species that `tree` knows."""
-_BARK = {
-    "broad": (0.11, 0.08, 0.06),
-    "tall": (0.10, 0.08, 0.06),
-    "birch": (0.5, 0.49, 0.45),
-    "conifer": (0.1, 0.06, 0.04),
-}
-_LEAF = {
-    "broad": (0.09, 0.17, 0.03),
-    "tall": (0.07, 0.15, 0.035),
-    "birch": (0.16, 0.24, 0.05),
-    "conifer": (0.03, 0.085, 0.035),
-}
 
 
 def _foliage(points: NDArray, outward: NDArray, size: float, green: tuple, rng: np.random.Generator) -> Shape:
@@ -33,20 +39,16 @@ def _foliage(points: NDArray, outward: NDArray, size: float, green: tuple, rng: 
     corners *= size * rng.uniform(0.5, 1.1, (n, 1, 1)) / np.linalg.norm(corners, axis=2, keepdims=True)
     light = 0.75 + 0.3 * outward[:, 2:] + rng.normal(0, 0.16, (n, 1))
     hue = 1 + rng.normal(0, 0.12, (n, 3)) * np.array([1.0, 0.4, 0.8])
-    leaves = shape(
-        (points[:, None] + corners).reshape(-1, 3),
-        np.arange(3 * n).reshape(-1, 3),
-        (np.asarray(green) * light * hue).clip(0.01, 0.9),
-        Material.LEAF,
-        Kind.PLANT,
-    )
+    colour = (np.asarray(green) * light * hue).clip(0.01, 0.9)
+    leaves = _leaves((points[:, None] + corners).reshape(-1, 3), np.arange(3 * n).reshape(-1, 3), colour)
     normals = outward + rng.normal(0, 0.35, (n, 3)) + np.array([0, 0, 0.15])
     return replace(leaves, normals=(normals / np.linalg.norm(normals, axis=1, keepdims=True)).astype(np.float32))
 
 
 def _crown(centre: NDArray, radii: NDArray, n: int, size: float, green: tuple, rng: np.random.Generator) -> Shape:
     """Fill a crown, (K, 3) blobs with (K, 3) radii, with n leaf clusters around dark cores."""
-    which = rng.choice(len(centre), n, p=radii.prod(axis=1) ** (2 / 3) / (radii.prod(axis=1) ** (2 / 3)).sum())
+    surface = radii.prod(axis=1) ** (2 / 3)
+    which = rng.choice(len(centre), n, p=surface / surface.sum())
     direction = rng.normal(0, 1, (n, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     depth = rng.uniform(0.72, 1.08, (n, 1))
@@ -55,8 +57,19 @@ def _crown(centre: NDArray, radii: NDArray, n: int, size: float, green: tuple, r
     whole /= np.linalg.norm(whole, axis=1, keepdims=True)
     outward = (0.6 * direction + 0.4 * whole).astype(np.float32)
     core = tuple(0.35 * np.asarray(green))
-    cores = [ball(c, 0.74 * r, core, Material.LEAF, Kind.PLANT, 1) for c, r in zip(centre, radii, strict=True)]
+    cores = [shapes.ball(c, 0.74 * r, core, Material.LEAF, Kind.PLANT) for c, r in zip(centre, radii, strict=True)]
     return merge([_foliage(points, outward, size, green, rng), *cores])
+
+
+def _cone(n: int, size: float, green: tuple, rng: np.random.Generator) -> Shape:
+    """Make the crown of a conifer from n leaf clusters around a dark core."""
+    z = 0.8 + 7.5 * (1 - np.sqrt(rng.uniform(0, 1, n)))
+    radius = (8.6 - z) * 0.27 * (0.75 + 0.25 * np.cos(z * 8)) * rng.uniform(0.8, 1.05, n)
+    angle = rng.uniform(0, 2 * np.pi, n)
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
+    outward = np.stack([np.cos(angle), np.sin(angle), np.full(n, 0.45)], axis=1).astype(np.float32)
+    core = shapes.tube((0, 0, 0.9), (0, 0, 8.2), (1.55, 0.03), (0.012, 0.03, 0.013), Material.LEAF, Kind.PLANT, 9)
+    return merge([_foliage(points, outward, size, green, rng), core])
 
 
 @cache
@@ -71,42 +84,19 @@ def tree(species: str, variant: int, n_leaves: int = 1500) -> Shape:
         Number of the variant: trees of one species and variant are the same.
     n_leaves : int
         Triangles of foliage; trees far away need fewer.
-
-    Returns
-    -------
-    Shape
     """
     rng = np.random.default_rng([TREES.index(species), variant, 77])
+    bark, green, thick, crown = _SPECIES[species]
     leaf = 0.24 * (1500 / n_leaves) ** 0.5
-    if species == "conifer":
-        z = 0.8 + 7.5 * (1 - np.sqrt(rng.uniform(0, 1, n_leaves)))
-        radius = (8.6 - z) * 0.27 * (0.75 + 0.25 * np.cos(z * 8)) * rng.uniform(0.8, 1.05, n_leaves)
-        angle = rng.uniform(0, 2 * np.pi, n_leaves)
-        points = np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
-        outward = np.stack([np.cos(angle), np.sin(angle), np.full(n_leaves, 0.45)], axis=1).astype(np.float32)
-        core = tube((0, 0, 0.9), (0, 0, 8.2), (1.55, 0.03), (0.012, 0.03, 0.013), Material.LEAF, Kind.PLANT, 9)
-        crown = merge([_foliage(points, outward, leaf, _LEAF[species], rng), core])
-    else:
-        spread, height = {"broad": (1.5, 4.9), "tall": (0.85, 6.2), "birch": (1.1, 5.0)}[species]
-        k = 7
-        centre = rng.uniform(-1, 1, (k, 3)) * [spread, spread, 1.3 if species != "tall" else 3.0] + [0, 0, height]
-        radii = rng.uniform(0.95, 1.55, (k, 1)) * [1, 1, 0.85]
-        crown = _crown(centre, radii, n_leaves, leaf, _LEAF[species], rng)
-    thick = {"broad": 0.19, "tall": 0.17, "birch": 0.11, "conifer": 0.15}[species]
-    trunk = tube((0, 0, -0.8), (0, 0, 4.2), (thick * 1.2, thick * 0.6), _BARK[species], Material.BARK, Kind.PLANT, 9)
-    forks = [
-        tube(
-            (0, 0, 2.4),
-            (*rng.uniform(-1.2, 1.2, 2), 4.6),
-            (thick * 0.5, thick * 0.25),
-            _BARK[species],
-            Material.BARK,
-            Kind.PLANT,
-            5,
-        )
-        for _ in range(3 if species != "conifer" else 0)
-    ]
-    return merge([crown, trunk, *forks])
+    trunk = _bark((0, 0, -0.8), (0, 0, 4.2), (thick * 1.2, thick * 0.6), bark, sides=9)
+    if crown is None:
+        return merge([_cone(n_leaves, leaf, green, rng), trunk])
+    sideways, upwards, height = crown
+    centre = rng.uniform(-1, 1, (7, 3)) * [sideways, sideways, upwards] + [0, 0, height]
+    radii = rng.uniform(0.95, 1.55, (7, 1)) * [1, 1, 0.85]
+    foliage, fork = _crown(centre, radii, n_leaves, leaf, green, rng), (thick * 0.5, thick * 0.25)
+    forks = [_bark((0, 0, 2.4), (*rng.uniform(-1.2, 1.2, 2), 4.6), fork, bark, sides=5) for _ in range(3)]
+    return merge([foliage, trunk, *forks])
 
 
 @cache
@@ -117,10 +107,6 @@ def bush(variant: int) -> Shape:
     ----------
     variant : int
         Number of the variant: bushes of one variant are the same.
-
-    Returns
-    -------
-    Shape
     """
     rng = np.random.default_rng([variant, 78])
     centre = rng.uniform(-1, 1, (4, 3)) * [0.5, 0.5, 0.2] + [0, 0, 0.55]
@@ -136,19 +122,14 @@ def hedge(variant: int) -> Shape:
     ----------
     variant : int
         Number of the variant: hedges of one variant are the same.
-
-    Returns
-    -------
-    Shape
     """
     rng = np.random.default_rng([variant, 79])
     n = 260
     points = rng.uniform(-1, 1, (n, 3)) * [0.5, 0.4, 0.65]
     face = rng.integers(0, 3, n)
-    points[face == 0, 1] = 0.4
-    points[face == 1, 1] = -0.4
-    points[face == 2, 2] = 0.65
+    for number, (axis, side) in enumerate(((1, 0.4), (1, -0.4), (2, 0.65))):
+        points[face == number, axis] = side
     outward = np.array([[0, 1, 0.2], [0, -1, 0.2], [0, 0, 1]], dtype=np.float32)[face]
     leaves = _foliage(points + rng.normal(0, 0.03, (n, 3)) + [0, 0, 0.65], outward, 0.1, (0.06, 0.13, 0.03), rng)
-    core = box((0, 0, 0.6), (1, 0.7, 1.2), (0.02, 0.045, 0.012), Material.LEAF, Kind.PLANT)
+    core = shapes.box((0, 0, 0.6), (1, 0.7, 1.2), (0.02, 0.045, 0.012), Material.LEAF, Kind.PLANT)
     return merge([leaves, core])

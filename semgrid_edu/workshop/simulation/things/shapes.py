@@ -1,12 +1,17 @@
-"""Shapes of triangles, each with a colour, a material and a kind: what all things on a street are built from."""
+"""Shapes of triangles, each with a colour, a material and a kind; boxes, ellipsoids, tubes and parallelograms."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
+import trimesh
 from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
+
+UP = np.array([0.0, 0.0, 1.0])
+"""The direction of the z axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +50,6 @@ class Shape:
             Angle about the z axis, counter-clockwise, rad.
         scale : float or (3,) float
             Factor for all sides, or one for each of x, y and z.
-
-        Returns
-        -------
-        Shape
         """
         c, s = np.cos(yaw), np.sin(yaw)
         rotation = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], dtype=np.float32)
@@ -62,10 +63,6 @@ class Shape:
         ----------
         height : float
             Height of the shape, metres, by which it is lifted.
-
-        Returns
-        -------
-        Shape
         """
         half_a_turn = np.array([1, -1, -1], np.float32)
         lifted = self.vertices * half_a_turn + np.array([0, 0, height], np.float32)
@@ -80,10 +77,6 @@ class Shape:
             Which triangles change.
         colour : (3,) float
             Their new linear albedo, 0..1.
-
-        Returns
-        -------
-        Shape
         """
         colours = self.colour.copy()
         colours[self.material == material] = colour
@@ -96,10 +89,6 @@ class Shape:
         ----------
         factor : float, (3,) float or (F, 3) float
             Factor for all, for each of red, green and blue, or for each triangle; products above 1 become 1.
-
-        Returns
-        -------
-        Shape
         """
         return replace(self, colour=(self.colour * np.asarray(factor, np.float32)).clip(0, 1))
 
@@ -119,10 +108,6 @@ def shape(vertices: ArrayLike, faces: ArrayLike, colour: ArrayLike, material: Ma
         What it is made of.
     kind : Kind
         What it belongs to.
-
-    Returns
-    -------
-    Shape
     """
     vertices = np.asarray(vertices, dtype=np.float32)
     faces = np.asarray(faces, dtype=np.int32)
@@ -140,18 +125,94 @@ def merge(shapes: Iterable[Shape]) -> Shape:
     Parameters
     ----------
     shapes : iterable of Shape
-        At least one.
-
-    Returns
-    -------
-    Shape
-        All triangles, those of the first shape first.
+        At least one; the triangles of the first come first.
     """
     shapes = list(shapes)
     offsets = np.cumsum([0] + [len(s.vertices) for s in shapes[:-1]])
     faces = np.concatenate([s.faces + o for s, o in zip(shapes, offsets, strict=True)]).astype(np.int32)
-    rest = {
-        name: np.concatenate([getattr(s, name) for s in shapes])
-        for name in ("vertices", "normals", "colour", "material", "kind")
-    }
-    return Shape(faces=faces, **rest)
+    names = ("vertices", "normals", "colour", "material", "kind")
+    return Shape(faces=faces, **{name: np.concatenate([getattr(s, name) for s in shapes]) for name in names})
+
+
+@cache
+def _primitive(name: str, **measures: float) -> tuple[NDArray, NDArray]:
+    """Return vertices and faces of a primitive of `trimesh` about the origin."""
+    mesh = getattr(trimesh.creation, name)(**measures)
+    return mesh.vertices.astype(np.float32), mesh.faces.astype(np.int32)
+
+
+def box(centre: ArrayLike, size: ArrayLike, colour: ArrayLike, material: Material, kind: Kind) -> Shape:
+    """Make a box whose sides lie along the axes. Parameters not named here are those of `shape`.
+
+    Parameters
+    ----------
+    centre : (3,) float
+        Its middle, metres.
+    size : (3,) float
+        Its sides along x, y and z, metres.
+    """
+    vertices, faces = _primitive("box")
+    return shape(vertices * np.asarray(size, np.float32) + np.asarray(centre), faces, colour, material, kind)
+
+
+def ball(centre: ArrayLike, radii: ArrayLike, colour: ArrayLike, material: Material, kind: Kind, detail=1) -> Shape:
+    """Make an ellipsoid whose axes lie along x, y and z. Parameters not named here are those of `shape`.
+
+    Parameters
+    ----------
+    centre : (3,) float
+        Its middle, metres.
+    radii : (3,) float
+        Half its extent along x, y and z, metres.
+    detail : int
+        How often the 20 faces of an icosahedron are divided by four.
+    """
+    vertices, faces = _primitive("icosphere", subdivisions=detail)
+    return shape(vertices * np.asarray(radii, np.float32) + np.asarray(centre), faces, colour, material, kind)
+
+
+def tube(
+    start: ArrayLike, end: ArrayLike, radii: float | tuple[float, float],
+    colour: ArrayLike, material: Material, kind: Kind, sides: int = 7,
+) -> Shape:  # fmt: skip
+    """Make a cylinder, or a frustum. Parameters not named here are those of `shape`.
+
+    Parameters
+    ----------
+    start, end : (3,) float
+        The two ends of its axis, metres.
+    radii : float or (float, float)
+        Its radius, or the radii at the start and at the end, metres.
+    sides : int
+        Faces around the axis.
+    """
+    start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+    first, last = radii if isinstance(radii, tuple) else (radii, radii)
+    vertices, faces = _primitive("cylinder", radius=1.0, height=1.0, sections=sides)
+    axis = (end - start) / np.linalg.norm(end - start)
+    side = np.cross(axis, [0, 0, 1] if abs(axis[2]) < 0.9 else [1, 0, 0])
+    side /= np.linalg.norm(side)
+    along = vertices[:, 2:] + 0.5
+    radius = first + (last - first) * along
+    ring = (vertices[:, :1] * side + vertices[:, 1:2] * np.cross(axis, side)) * radius
+    return shape(start + along * (end - start) + ring, faces, colour, material, kind)
+
+
+def quads(
+    corner: ArrayLike, right: ArrayLike, up: ArrayLike, colour: ArrayLike, material: Material, kind: Kind
+) -> Shape:
+    """Make N parallelograms, normal to right x up. Parameters not named here are those of `shape`.
+
+    Parameters
+    ----------
+    corner, right, up : (N, 3) or (3,) float
+        A corner of each parallelogram and the two edges that start there, metres; one row stands for all N.
+    colour : (N, 3) or (3,) float
+        Linear albedo, 0..1.
+    """
+    corner, right, up = np.broadcast_arrays(*(np.atleast_2d(np.asarray(a, np.float32)) for a in (corner, right, up)))
+    n = len(corner)
+    vertices = np.stack([corner, corner + right, corner + right + up, corner + up], axis=1).reshape(-1, 3)
+    faces = (np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(n)[:, None, None]).reshape(-1, 3)
+    colours = np.repeat(np.broadcast_to(np.asarray(colour, np.float32), (n, 3)), 2, axis=0)
+    return shape(vertices, faces, colours, material, kind)
