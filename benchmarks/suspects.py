@@ -7,13 +7,18 @@ the simplest cure and for the one that was chosen.
 """
 
 import argparse
+import sys
 from datetime import UTC, datetime
+from pathlib import Path
 
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import versions
-from semgrid_edu.workshop.attic.suspects import BARRED, MENDED, SUSPECTS, measure_suspects
 from semgrid_edu.workshop.simulation.named_streets import TEST_STREETS
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "notebooks" / "deeper"))
+
+from phantom_suspects import BARRED, MENDED, SUSPECTS, measure_suspects
 
 CLOSELY = ("walls", "mesh and hedge")
 CURES = (next(iter(SUSPECTS)), BARRED, MENDED)

@@ -4,6 +4,7 @@ The spread of velocities: a distribution as points, its mean and its covariance 
 """
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -14,7 +15,9 @@ from scipy.ndimage import uniform_filter1d
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.plotting.colours import velocity_colours
-from semgrid_edu.training.log import TrainingLog
+
+if TYPE_CHECKING:  # training loads torch
+    from semgrid_edu.training.log import TrainingLog
 
 
 def velocity_spread(velocity: NDArray, weight: NDArray, ax: Axes | None = None) -> Axes:
@@ -138,7 +141,7 @@ SMOOTHING = 50
 """Number of steps that a running mean is taken over; of all steps in a stage that has fewer."""
 
 
-def training_curves(logs: TrainingLog | Mapping[str, TrainingLog], ax: Axes | None = None) -> Axes:
+def training_curves(logs: "TrainingLog | Mapping[str, TrainingLog]", ax: Axes | None = None) -> Axes:
     """Draw the loss of training runs over their steps: one point per step, and a line for the running mean.
 
     The two stages have losses of different things, pixels and cells, so the line breaks between them. The learning
@@ -160,7 +163,7 @@ def training_curves(logs: TrainingLog | Mapping[str, TrainingLog], ax: Axes | No
     ArgumentError
         When there is no training run, or one has no step with a finite loss.
     """
-    logs = {"": logs} if isinstance(logs, TrainingLog) else logs
+    logs = logs if isinstance(logs, Mapping) else {"": logs}
     if not logs or not all(len(log.loss) for log in logs.values()):
         raise ArgumentError("logs", "at least one training run, each with at least one step", list(logs) or "none")
     for name, log in logs.items():
@@ -183,7 +186,7 @@ def training_curves(logs: TrainingLog | Mapping[str, TrainingLog], ax: Axes | No
     return ax
 
 
-def _curve(ax: Axes, log: TrainingLog, name: str, colour: str) -> None:
+def _curve(ax: Axes, log: "TrainingLog", name: str, colour: str) -> None:
     """Draw one training run, stage by stage, with a dotted line where a stage begins."""
     ax.scatter(log.iteration, log.loss, s=3, color=colour, alpha=0.2, linewidth=0)
     for stage, begin in _stages(log):
@@ -193,6 +196,6 @@ def _curve(ax: Axes, log: TrainingLog, name: str, colour: str) -> None:
         ax.axvline(begin, color="0.5", linewidth=0.8, linestyle=":")
 
 
-def _stages(log: TrainingLog) -> list[tuple[str, int]]:
+def _stages(log: "TrainingLog") -> list[tuple[str, int]]:
     """Return the stages of a training run and the step with which each begins."""
     return [(stage, log.iteration[log.stage == stage][0]) for stage in dict.fromkeys(log.stage.tolist())]

@@ -1,6 +1,7 @@
 """The story of one cell as a figure: its image column, states, parts of the score, and neighbours (paper, Fig. 2)."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -10,13 +11,15 @@ from numpy.typing import NDArray
 
 from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, colour_legend
 from semgrid_edu.plotting.images import draw_image
-from semgrid_edu.story import CellStory
+
+if TYPE_CHECKING:  # the story loads torch
+    from semgrid_edu.story import CellStory
 
 FOR, AGAINST = "#6a1b9a", "#d9902f"
 """Colours of parts that speak for a class and of those that speak against it."""
 
 
-def draw_cell_story(story: CellStory, image: NDArray | None = None) -> Figure:
+def draw_cell_story(story: "CellStory", image: NDArray | None = None) -> Figure:
     """Draw the story of one cell.
 
     At the top the image with the points of the planes above the cell. Below, from left to right: the four states
@@ -54,7 +57,7 @@ def draw_cell_story(story: CellStory, image: NDArray | None = None) -> Figure:
     return figure
 
 
-def _draw_column(story: CellStory, image: NDArray, ax: Axes) -> None:
+def _draw_column(story: "CellStory", image: NDArray, ax: Axes) -> None:
     """Mark the points of eq. (1) on the image; the lowest one is filled."""
     draw_image(image, ax)
     seen = story.pixels[story.visible]
@@ -63,7 +66,7 @@ def _draw_column(story: CellStory, image: NDArray, ax: Axes) -> None:
     ax.set_title("the planes' points above the cell, eq. (1)", loc="left", fontsize="medium")
 
 
-def _draw_states(story: CellStory, steps: Axes, past: Axes) -> None:
+def _draw_states(story: "CellStory", steps: Axes, past: Axes) -> None:
     """Draw the four states as stacked bars: one bar per step, and one per frame."""
     _stack(steps, list(story.steps), np.stack(list(story.steps.values()), axis=1))
     _stack(past, [f"{time:.1f} s" for time in story.times], story.history)
@@ -83,7 +86,7 @@ def _stack(ax: Axes, names: Sequence[str], states: NDArray) -> None:
     ax.set(xlim=(0, 1), ylim=(len(names) - 0.5, -0.5))
 
 
-def _draw_parts(story: CellStory, kinds: Axes, classes: Axes, planes: Axes) -> None:
+def _draw_parts(story: "CellStory", kinds: Axes, classes: Axes, planes: Axes) -> None:
     """Draw why the cell got its class and not the rival."""
     why = story.for_label.minus(story.for_rival)
     sums = [why.planes.sum(), why.occupancy.sum(), why.rest, why.score]
@@ -107,7 +110,7 @@ def _bars(ax: Axes, names: Sequence[str], values: Sequence[float]) -> None:
     ax.set_ylim(len(names) - 0.5, -0.5)
 
 
-def _draw_crf(story: CellStory, ax: Axes) -> None:
+def _draw_crf(story: "CellStory", ax: Axes) -> None:
     """Draw the probabilities of the classes that matter before and after the CRF, and what the neighbours add."""
     pull = story.pull
     classes = np.argsort(-np.maximum(pull.before, pull.after), kind="stable")[:4]

@@ -11,10 +11,9 @@ from semgrid_edu.crf import crf_model, exact_marginals, log_partition, mean_fiel
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.graphical import loopy_max_product, sum_product
 from semgrid_edu.stage_models.crf import all_free, coupled, two_classes
-from semgrid_edu.workshop.attic.all_labellings import visit_labellings
-from semgrid_edu.workshop.attic.potts_messages import potts_max_product, potts_sum_product
 from semgrid_edu.workshop.commands.main import run
 from semgrid_edu.workshop.studies.crf import crf_coupling as study
+from semgrid_edu.workshop.studies.crf.brute_force import potts_messages, visit_labellings
 
 QUICK = {"draws": 2, "grids": [(1, 2), (2, 2)], "classes": [2], "couplings": [0.0, 2.0], "fine": [0.0, 1.0]}
 
@@ -28,18 +27,16 @@ def test_every_labelling_says_what_elimination_says(shape):
     assert found.log_partition == pytest.approx(log_partition(*crf), abs=1e-10)
 
 
-@pytest.mark.parametrize(
-    ("fast", "literal"), [(potts_sum_product, sum_product), (potts_max_product, loopy_max_product)]
-)
+@pytest.mark.parametrize(("best", "literal"), [(False, sum_product), (True, loopy_max_product)])
 @pytest.mark.parametrize(
     ("shape", "coupling"), [((2, 2, 2), 0.0), ((3, 2, 2), 1.0), ((2, 2, 3), 1.0), ((3, 1, 2), 4.0)]
 )
-def test_messages_from_cell_to_cell_are_those_through_factors(fast, literal, shape, coupling):
+def test_messages_from_cell_to_cell_are_those_through_factors(best, literal, shape, coupling):
     crf = *study.random_crf(shape, 1), coupled(coupling)
     model = crf_model(*crf)
     beliefs = literal(model, iterations=200, damping=0.5).marginals
     found = np.stack([beliefs[name] for name in model.names], axis=1).reshape(shape)
-    np.testing.assert_allclose(fast(*crf), found, atol=1e-6)
+    np.testing.assert_allclose(potts_messages(*crf, best), found, atol=1e-6)
 
 
 def test_too_many_labellings_and_impossible_classes_are_refused():

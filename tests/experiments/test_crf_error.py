@@ -11,10 +11,10 @@ from sklearn.kernel_approximation import Nystroem
 from semgrid_edu import plotting
 from semgrid_edu.crf import CrfParams, gram_matrix, mean_field_naive, unary_from_probability
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.workshop.attic.low_rank import LowRankGaussian, mean_field_low_rank
 from semgrid_edu.workshop.commands.main import run
 from semgrid_edu.workshop.studies.crf import crf_error as study
 from semgrid_edu.workshop.studies.crf.crf_scenes import CROP, N_CROPS, CrfProblem, crops
+from semgrid_edu.workshop.studies.crf.nystrom import LowRankGaussian, mean_field_low_rank
 
 
 def problem(seed=0, shape=(6, 7)):

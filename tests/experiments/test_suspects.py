@@ -1,26 +1,21 @@
-"""What is switched off is off, and the rest of the street stays."""
+"""The companion on real streets: what is switched off is off, and the rest of the street stays."""
 
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import FilterState, Particles, State, predict
-from semgrid_edu.workshop.attic.suspects import (
-    BEFORE,
-    GROUPS,
-    SUSPECTS,
-    arrivals_barred,
-    counts,
-    measure_suspects,
-    opaque,
-    without_pillars,
-)
 from semgrid_edu.workshop.simulation.named_streets import named_street
 from semgrid_edu.workshop.simulation.things.materials import Kind
 from semgrid_edu.workshop.studies.filter.streets import StreetScores
+
+sys.path.append(str(Path(__file__).parents[2] / "notebooks" / "deeper"))
+
+from phantom_suspects import BEFORE, GROUPS, SUSPECTS, arrivals_barred, counts, opaque, without_pillars
 
 
 def points_of(change, street="mesh"):
@@ -66,9 +61,7 @@ def test_counts_add_the_groups_of_a_border_and_hold_nothing_of_groups_that_never
     assert counts(scores) == {name: [0, 0] for name in GROUPS} | {"border": [15, 3], "moving cars": [4, 4]}
 
 
-def test_only_known_suspects():
-    with pytest.raises(ArgumentError, match="as it was"):
-        measure_suspects(GridSpec.compact(), ["walls"], [0], ["the weather"])
+def test_three_suspects_are_switched_off_in_the_street_or_the_sensors():
     assert [name for name, suspect in SUSPECTS.items() if not suspect.in_the_filter] == [
         "nothing transparent", "no pillars", "exact poses",
     ]  # fmt: skip

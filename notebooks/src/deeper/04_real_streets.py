@@ -30,7 +30,7 @@ from IPython.display import Markdown
 from semgrid_edu import plotting
 from semgrid_edu.workshop.studies.filter.occupancy import markdown_table, per_cent
 from semgrid_edu.workshop.studies.filter.streets import LEAST_DYNAMIC, StreetScores
-from semgrid_edu.workshop.attic.suspects import (
+from phantom_suspects import (  # beside this notebook
     BARRED, BEFORE, MENDED, SUSPECTS, Suspect, counts, run_filter, scenes_of,
 )  # fmt: skip
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate

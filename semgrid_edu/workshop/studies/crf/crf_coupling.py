@@ -6,6 +6,7 @@ by default. So 4 stands for the default parameters, and 0 for no pairs at all.
 
 from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
+from functools import partial
 from itertools import product
 from pathlib import Path
 
@@ -20,9 +21,8 @@ from semgrid_edu.stage_models.crf import all_free, coupled, two_classes
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import versions
 from semgrid_edu.storage.reading import read_parts
-from semgrid_edu.workshop.attic.all_labellings import visit_labellings
-from semgrid_edu.workshop.attic.potts_messages import potts_max_product, potts_sum_product
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
+from semgrid_edu.workshop.studies.crf.brute_force import potts_messages, visit_labellings
 
 COUPLINGS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
 """From no pairs to the default weights."""
@@ -48,8 +48,8 @@ WAYS: Mapping[str, Inference] = {
     "mean field, 10 updates": mean_field_naive,
     "mean field, converged": _settled,
     "fast mean field, 10 updates": mean_field,
-    "loopy sum-product": potts_sum_product,
-    "loopy max-product": potts_max_product,
+    "loopy sum-product": potts_messages,
+    "loopy max-product": partial(potts_messages, best=True),
 }
 """What is compared with exact inference."""
 ONLY_LABELS = ("loopy max-product",)
@@ -206,7 +206,7 @@ def symmetric_case(couplings: Sequence[float] = FINE, shape: tuple[int, int] = (
         "exact": lambda *crf: visit_labellings(*crf).marginals,
         "mean field, 10 updates": mean_field_naive,
         "mean field, converged": _settled,
-        "loopy sum-product": potts_sum_product,
+        "loopy sum-product": potts_messages,
     }
     probability = {
         way + side: [

@@ -20,9 +20,9 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import versions
 from semgrid_edu.storage.reading import read_parts
-from semgrid_edu.workshop.attic.low_rank import mean_field_low_rank
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
 from semgrid_edu.workshop.studies.crf.crf_scenes import CrfProblem, crf_scenes
+from semgrid_edu.workshop.studies.crf.nystrom import mean_field_low_rank
 
 ITERATIONS = (1, 2, 3, 5, 10, 20, 50, 100)
 """Numbers of updates at which each way is timed and compared."""

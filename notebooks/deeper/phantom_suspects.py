@@ -1,4 +1,4 @@
-"""Why standing things were called DYNAMIC: the suspects on simulated streets, switched off one at a time."""
+"""Why standing things were called DYNAMIC: what `04_real_streets` and `benchmarks/suspects.py` switch off in turn."""
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -7,7 +7,6 @@ from unittest.mock import patch
 
 import numpy as np
 
-from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Cmcdot, CmcdotParams, SensorModel, cellwise
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
@@ -31,24 +30,15 @@ _OPAQUE = 1e6
 
 
 def opaque(drive: SimulatedDrive) -> None:
-    """Let nothing pass through what is porous: each wire mesh, hedge or pane stops a ray where it meets it.
-
-    Parameters
-    ----------
-    drive : SimulatedDrive
-        A drive, which is changed.
-    """
+    """Let nothing pass through what is porous: each wire mesh, hedge or pane stops a ray where it meets it."""
     if drive.porous:
         drive.porous = replace(drive.porous, opacity=np.full_like(drive.porous.opacity, _OPAQUE))
 
 
 def without_pillars(drive: SimulatedDrive) -> None:
-    """Take the pillars in front of a border away, and with them all other poles of the street.
+    """Take away the pillars in front of a border, and with them all other poles of the street.
 
-    Parameters
-    ----------
-    drive : SimulatedDrive
-        A drive, which is changed. Its truth still has the pillars' cells, but no ray meets them.
+    The truth of the drive keeps the pillars' cells, but no ray meets them.
     """
     shape, keep = drive.static.shape, drive.static.shape.kind != Kind.POLE
     of_triangles = ("faces", "normals", "colour", "material", "kind")
@@ -76,19 +66,7 @@ def arrivals_barred() -> AbstractContextManager:
 
 @dataclass(frozen=True)
 class Suspect:
-    """One suspect, and how it is switched off.
-
-    Parameters
-    ----------
-    change : callable, optional
-        Takes a drive and changes what its LIDAR meets.
-    rig : Rig
-        The sensors.
-    params : CmcdotParams
-        The filter's parameters.
-    context : callable
-        Returns the context in which the filter runs.
-    """
+    """How a suspect is switched off: in the street, the sensors, the filter's parameters, or the code that it runs."""
 
     change: Callable[[SimulatedDrive], None] | None = None
     rig: Rig = KITTI_RIG
@@ -114,25 +92,7 @@ SUSPECTS = {
 
 
 def scenes_of(street: str, number: int, spec: GridSpec, suspect: Suspect) -> tuple[SimulatedDrive, list[KnownScene]]:
-    """Drive once through a street, with a suspect switched off.
-
-    Parameters
-    ----------
-    street : str
-        One of `TEST_STREETS`.
-    number : int
-        Seed for the drive.
-    spec : GridSpec
-        The grid of the scenes.
-    suspect : Suspect
-        What is switched off.
-
-    Returns
-    -------
-    drive : SimulatedDrive
-    scenes : list of KnownScene
-        All frames.
-    """
+    """Return a drive through a street of `TEST_STREETS`, `number` being its seed, and its scenes on the grid."""
     drive = named_street(street, number, rig=suspect.rig)
     if suspect.change:
         suspect.change(drive)
@@ -143,21 +103,7 @@ def scenes_of(street: str, number: int, spec: GridSpec, suspect: Suspect) -> tup
 def run_filter(
     drive: SimulatedDrive, scenes: Sequence[KnownScene], suspect: Suspect, scores: StreetScores, seed: int = 0
 ) -> None:
-    """Run CMCDOT over a drive, and score it.
-
-    Parameters
-    ----------
-    drive : SimulatedDrive
-        The drive.
-    scenes : sequence of KnownScene
-        Its frames.
-    suspect : Suspect
-        Parameters of the filter, and the context in which it runs.
-    scores : StreetScores
-        Takes the counts.
-    seed : int
-        Seed for the particles.
-    """
+    """Run CMCDOT over the scenes of a drive; `scores` takes the counts, and `seed` is that of the particles."""
     tracker = Cmcdot(scores.spec, suspect.params, seed=seed)
     scores.begin(drive.moving)
     with suspect.context():
@@ -169,31 +115,7 @@ def run_filter(
 def measure_suspects(
     spec: GridSpec, streets: Sequence[str], drives: Sequence[int], suspects: Sequence[str] = tuple(SUSPECTS)
 ) -> dict[str, dict[str, dict]]:
-    """Score the filter on streets with each suspect switched off in turn.
-
-    Parameters
-    ----------
-    spec : GridSpec
-        The grid.
-    streets : sequence of str
-        Of `TEST_STREETS`.
-    drives : sequence of int
-        Seeds for the drives through each street.
-    suspects : sequence of str
-        Of `SUSPECTS`.
-
-    Returns
-    -------
-    dict
-        By street and suspect, from `counts`.
-
-    Raises
-    ------
-    ArgumentError
-        When there is no such suspect.
-    """
-    if not set(suspects) <= set(SUSPECTS):
-        raise ArgumentError("suspects", " or ".join(SUSPECTS), ", ".join(suspects))
+    """Return the `counts` of drives (seeds) through each street, with each suspect switched off: [street][suspect]."""
     result = {}
     for street in streets:
         scores = {name: StreetScores(spec) for name in suspects}
@@ -208,18 +130,9 @@ def measure_suspects(
 
 
 def counts(scores: StreetScores) -> dict[str, list[int]]:
-    """Return what the tables of suspects and streets need.
+    """Return for each of `GROUPS` how many cells were hit, and how many of them were called DYNAMIC.
 
-    Parameters
-    ----------
-    scores : StreetScores
-        The scores of some drives.
-
-    Returns
-    -------
-    dict of str to [int, int]
-        For each of `GROUPS`: how many cells were hit, and how many of them were called DYNAMIC. In "left" how many
-        cells something moving has left, and how many of them were still called occupied.
+    In "left": how many cells something moving has left, and how many of them were still called occupied.
     """
     of = {name: [scores.cells.get(one, (0, 0)) for one in group] for name, group in GROUPS.items()}
     return {name: [sum(n for n, _ in pairs), sum(part for _, part in pairs)] for name, pairs in of.items()}

@@ -19,8 +19,7 @@ _NEGLIGIBLE = 1e-10
 class LowRankGaussian:
     """Sums over all cells, weighted by K_nm K_mm^-1 K_mn in place of the Gaussian K_nn, with m landmarks.
 
-    The approximation is exact between landmarks. Of a cell that is far from every landmark it knows nothing: its
-    weights vanish.
+    Between landmarks it is exact. The weights of a cell that is far from every landmark vanish.
 
     Parameters
     ----------
@@ -63,18 +62,7 @@ class LowRankGaussian:
         return np.square(self.factor).sum(axis=1)
 
     def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Filter values.
-
-        Parameters
-        ----------
-        values : (N, K) float32
-            One row per cell.
-
-        Returns
-        -------
-        (N, K) float32
-            sum_j k_ij values_j, the cell itself included.
-        """
+        """Return sum_j k_ij values_j for values (N, K), one row per cell, the cell itself included."""
         return self.factor @ (self.factor.T @ values)
 
 
