@@ -36,7 +36,7 @@ from semgrid_edu import plotting
 from semgrid_edu.camera import Camera, project
 from semgrid_edu.workshop.course.registers.equations import equation_table
 from semgrid_edu.workshop.course.registers.stage_models import stage_table
-from semgrid_edu.datasets.training_cache import resize_image, resize_labels
+from semgrid_edu.datasets.training_arrays import resize_image, resize_labels
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.grid import GridSpec
