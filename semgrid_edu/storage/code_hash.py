@@ -24,7 +24,7 @@ def code_hash(modules: Iterable[Path], root: Path = ROOT) -> str:
     str
         SHA-256, hexadecimal. It is another one under a Python whose syntax trees are printed otherwise.
     """
-    code = [ast.dump(_without_docstrings(path)) for path in import_closure(modules, root)]
+    code = sorted(map(ast.dump, _trees(modules, root).values()))
     return hashlib.sha256("\n".join(code).encode()).hexdigest()
 
 
@@ -46,25 +46,29 @@ def import_closure(modules: Iterable[Path], root: Path = ROOT) -> list[Path]:
     list of Path
         The files, those of `modules` included, in alphabetical order.
     """
-    found: set[Path] = set()
+    return sorted(_trees(modules, root))
+
+
+def _trees(modules: Iterable[Path], root: Path) -> dict[Path, ast.Module]:
+    """Return the syntax trees of modules and of all that they import, without docstrings."""
+    trees: dict[Path, ast.Module] = {}
     waiting = list(modules)
     while waiting:
         path = waiting.pop()
-        if path not in found:
-            found.add(path)
-            waiting += _imported(path, root)
-    return sorted(found)
+        if path not in trees:
+            trees[path] = _without_docstrings(ast.parse(path.read_text(encoding="utf-8")))
+            waiting += _imported(trees[path], root)
+    return trees
 
 
-def _imported(path: Path, root: Path) -> Iterator[Path]:
-    """Yield the files of the package that the import statements of a file lead to."""
-    for node in ast.walk(_tree(path)):
+def _imported(tree: ast.Module, root: Path) -> Iterator[Path]:
+    """Yield the files of the package that import statements lead to."""
+    for node in ast.walk(tree):
+        names = []
         if isinstance(node, ast.Import):
             names = [alias.name.rpartition(".")[::2] for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and not node.level:
             names = [(node.module, alias.name) for alias in node.names]
-        else:
-            continue
         yield from filter(None, (_origin(module, name, root) for module, name in names))
 
 
@@ -77,15 +81,14 @@ def _origin(module: str, name: str, root: Path) -> Path | None:
             return path
     if not init.is_file():
         return None
-    for node in ast.walk(_tree(init)):
+    for node in ast.walk(ast.parse(init.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and any((alias.asname or alias.name) == name for alias in node.names):
             return _origin(node.module, name, root)
     return init
 
 
-def _without_docstrings(path: Path) -> ast.Module:
-    """Parse a file and drop every string that stands alone, which is how constants are described as well."""
-    tree = _tree(path)
+def _without_docstrings(tree: ast.Module) -> ast.Module:
+    """Drop every string that stands alone, which is how constants are described as well."""
     for node in ast.walk(tree):
         for field in ("body", "orelse", "finalbody"):
             if isinstance(statements := getattr(node, field, None), list):
@@ -95,7 +98,3 @@ def _without_docstrings(path: Path) -> ast.Module:
 
 def _is_docstring(node: ast.stmt) -> bool:
     return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
-
-
-def _tree(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
