@@ -296,7 +296,7 @@ INDEXES = (
     Row(
         "the label set of other labels",
         TRAIN,
-        "label_set.txt: expected SYNTHIA-10.*KITTI-14",
+        "dataset.json: expected the label set of 2026_01_01 000., KITTI-14, found SYNTHIA-10",
         index(label_set="SYNTHIA-10"),
     ),
     Row("splits that are numbers", TRAIN, "dataset.json: expected splits", index(splits=3)),
@@ -313,7 +313,7 @@ INDEXES = (
     Row("a frame that is a word", TRAIN, "dataset.json: expected a frame like", frames(frame="two")),
     Row("a drive outside of the data set", TRAIN, "dataset.json: expected a frame like", frames(drive="../../x")),
     Row("a drive that isn't there, in an index", TRAIN, "0042_sync: expected a folder", frames(drive="0042")),
-    Row("a frame beyond the drive", TRAIN, "expected the frame 7 that dataset.json lists", frames(frame=7)),
+    Row("a frame beyond the drive", TRAIN, "the frame 7 that dataset.json lists, found", frames(frame=7)),
     Row("a frame without labels", TRAIN, "expected image and labels of the frame 0", frames(frame=0)),
     Row(
         "labels of an unknown set",

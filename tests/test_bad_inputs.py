@@ -30,13 +30,8 @@ from semgrid_edu.workshop.commands.reproduce import HELP
 def in_this_process():
     """Make arrays without worker processes, which take seconds to start."""
 
-    def process(index, split, recipe):
-        by_drive = index.frames_by_drive(split).items()
-        drives = [training_cache._process_drive(index.root, *name, frames, recipe) for name, frames in by_drive]
-        return [frame for drive in drives for frame in drive]
-
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(training_cache, "_process", process)
+        patch.setattr(training_cache, "WORKERS", 1)
         yield
 
 

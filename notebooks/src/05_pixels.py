@@ -33,7 +33,7 @@ from scipy.spatial.transform import Rotation
 
 from semgrid_edu import plotting
 from semgrid_edu.camera import Camera, invert_rigid, lidar_from_grid, project, rigid_transform, transform_points
-from semgrid_edu.datasets.training_cache import resize_image
+from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14

@@ -42,7 +42,7 @@ from ipywidgets import FloatRangeSlider, interact
 from semgrid_edu import plotting
 from semgrid_edu.training.batches import Batch, draw_batch, grid_logits
 from semgrid_edu.camera import rigid_transform
-from semgrid_edu.datasets.training_cache import resize_image
+from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.datasets.samples import sample_drive, sample_frames, sample_image_stage, sample_weights
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.datasets.grid_truth import grid_truth

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.datasets.readers.frames import visible_labels
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import FrameLabels
 from semgrid_edu.grid import GridSpec
@@ -12,10 +13,7 @@ from semgrid_edu.labels import IGNORE, KITTI_14, SYNTHIA_10, UNKNOWN_OF_STATE, L
 def grid_truth(labels: FrameLabels, belief_probability: NDArray, spec: GridSpec) -> NDArray[np.uint8]:
     """Return the class that each cell should take.
 
-    A cell that the camera sees takes the class of what stands there. The others have no label. With KITTI-14 they are,
-    as in the paper, unknown-free, unknown-static, unknown-dynamic or unknown-unobserved: their most probable occupancy
-    state decides. SYNTHIA-10 has no such classes; there they are void, as in the paper's Table 3, where void is the
-    most frequent class by far.
+    A cell that the camera sees takes the class of what stands there; the others take theirs from `fill_unlabelled`.
 
     Parameters
     ----------
@@ -34,22 +32,45 @@ def grid_truth(labels: FrameLabels, belief_probability: NDArray, spec: GridSpec)
     Raises
     ------
     ArgumentError
+        As `fill_unlabelled` raises it.
+    """
+    return fill_unlabelled(visible_labels(labels, spec), belief_probability, labels.label_set)
+
+
+def fill_unlabelled(truth: NDArray[np.uint8], belief_probability: NDArray, label_set: LabelSet) -> NDArray[np.uint8]:
+    """Give the cells without a label a class.
+
+    With KITTI-14 they are, as in the paper, unknown-free, unknown-static, unknown-dynamic or unknown-unobserved: their
+    most probable occupancy state decides. SYNTHIA-10 has no such classes; there they are void, as in the paper's Table
+    3, where void is the most frequent class by far.
+
+    Parameters
+    ----------
+    truth : (H, W) uint8
+        The class of each cell; 255 where unlabelled.
+    belief_probability : (4, H, W) float
+        Probability of FREE, STATIC, DYNAMIC and UNKNOWN in each cell.
+    label_set : LabelSet
+        KITTI-14 or SYNTHIA-10.
+
+    Returns
+    -------
+    (H, W) uint8
+
+    Raises
+    ------
+    ArgumentError
         When it isn't known what cells without a label are in the label set, or shapes disagree.
     """
-    unknown = _without_label(labels.label_set, belief_probability)
-    truth = labels.birdseye_on(spec)
-    if unknown.shape != truth.shape:
+    if np.shape(belief_probability) != (4, *truth.shape):
         raise ArgumentError("belief_probability", f"shape {(4, *truth.shape)}", f"{np.shape(belief_probability)}")
-    return np.where(labels.visible_on(spec) & (truth != IGNORE), truth, unknown)
-
-
-def _without_label(label_set: LabelSet, belief_probability: NDArray) -> NDArray[np.uint8]:
-    """Return the class (H, W) that each cell takes when it has no label."""
     if label_set is KITTI_14:
-        return unknown_classes(belief_probability)
-    if label_set is SYNTHIA_10:
-        return np.full(np.shape(belief_probability)[-2:], SYNTHIA_10.index("void"), dtype=np.uint8)
-    raise ArgumentError("labels", f"the label set {KITTI_14.name} or {SYNTHIA_10.name}", label_set.name)
+        unknown = unknown_classes(belief_probability)
+    elif label_set is SYNTHIA_10:
+        unknown = np.uint8(SYNTHIA_10.index("void"))
+    else:
+        raise ArgumentError("labels", f"the label set {KITTI_14.name} or {SYNTHIA_10.name}", label_set.name)
+    return np.where(truth == IGNORE, unknown, truth)
 
 
 def unknown_classes(belief_probability: NDArray) -> NDArray[np.uint8]:

@@ -1,10 +1,15 @@
 """The index of a data set: its labelled frames, split into those for training and those for testing (section 4)."""
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from semgrid_edu.datasets.readers.frames import LabelledDrive
+from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
+from semgrid_edu.datasets.readers.semantic_kitti import SemanticKittiSequence
+from semgrid_edu.datasets.readers.synthia import SynthiaSequence
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import LABEL_SETS, LabelSet
 from semgrid_edu.storage.reading import read_json
@@ -15,44 +20,69 @@ MOST_FRAMES = 10**10
 """KITTI's files are named by the frame's number in ten digits."""
 
 
+class Reader(NamedTuple):
+    """How the drives of a data set on disk are opened.
+
+    Parameters
+    ----------
+    open : callable
+        (root, *name) -> `LabelledDrive`.
+    keys : tuple of str
+        What a frame in dataset.json says, beside its number, to name its drive.
+    """
+
+    open: Callable[..., LabelledDrive]
+    keys: tuple[str, ...] = ("drive",)
+
+
+READERS = {
+    "kitti-raw": Reader(KittiRawDrive, ("date", "drive")),
+    "semantic-kitti": Reader(SemanticKittiSequence),
+    "synthia": Reader(SynthiaSequence),
+}
+"""The readers that dataset.json can name as its "reader"; without one it means "kitti-raw"."""
+
+
 class LabelledFrame(NamedTuple):
     """Where a labelled frame is.
 
     Parameters
     ----------
-    date, drive : str
-        The drive `KittiRawDrive(root, date, drive)`.
+    drive : tuple of str
+        What the reader takes after the root: date and number for `KittiRawDrive(root, date, drive)`.
     frame : int
         Number of the frame in that drive.
     """
 
-    date: str
-    drive: str
+    drive: tuple[str, ...]
     frame: int
 
 
 @dataclass(frozen=True)
 class DatasetIndex:
-    """What a data set holds.
+    """What a data set holds. `load_index` reads it from disk; any other sequence of drives can be listed in Python.
 
     Parameters
     ----------
     root : Path
-        Its folder, which holds the folders of the dates.
+        Its folder, which holds its drives; what is made of them goes to `cache/` in it.
     name : str
         What it is called, such as "minikitti".
     label_set : LabelSet
         The classes of its labels.
     splits : dict of str to tuple of LabelledFrame
         Labelled frames by split, such as "train" and "test"; no drive is in two of them.
+    reader : callable
+        (root, *drive) -> `LabelledDrive`: opens a drive. Worker processes must be able to import it.
     """
 
     root: Path
     name: str
     label_set: LabelSet
     splits: dict[str, tuple[LabelledFrame, ...]]
+    reader: Callable[..., LabelledDrive] = KittiRawDrive
 
-    def frames_by_drive(self, split: str) -> dict[tuple[str, str], list[int]]:
+    def frames_by_drive(self, split: str) -> dict[tuple[str, ...], list[int]]:
         """Return the labelled frames of a split, drive by drive.
 
         Parameters
@@ -62,8 +92,8 @@ class DatasetIndex:
 
         Returns
         -------
-        dict of (str, str) to list of int
-            The numbers of the labelled frames by (date, drive), in the order of the index.
+        dict of tuple of str to list of int
+            The numbers of the labelled frames by drive, (date, number) for KITTI raw, in the order of the index.
 
         Raises
         ------
@@ -72,10 +102,65 @@ class DatasetIndex:
         """
         if split not in self.splits:
             raise ArgumentError("split", f"one of {', '.join(self.splits)}", repr(split))
-        frames: dict[tuple[str, str], list[int]] = {}
-        for date, drive, frame in self.splits[split]:
-            frames.setdefault((date, drive), []).append(frame)
+        frames: dict[tuple[str, ...], list[int]] = {}
+        for drive, frame in self.splits[split]:
+            frames.setdefault(drive, []).append(frame)
         return frames
+
+    def drives(self, split: str) -> list[tuple[LabelledDrive, list[int]]]:
+        """Open the drives of a split. Parameters are those of `DatasetIndex.frames_by_drive`.
+
+        Returns
+        -------
+        list of (LabelledDrive, list of int)
+            Each drive, and the numbers of its labelled frames.
+
+        Raises
+        ------
+        ArgumentError
+            When there is no such split.
+        DataError
+            When a drive is missing, is shorter than the index says, or has labels of another label set: the same
+            numbers would stand for other classes.
+        """
+        by_drive = self.frames_by_drive(split).items()
+        return [(self._opened(drive, max(numbers)), numbers) for drive, numbers in by_drive]
+
+    def _opened(self, name: tuple[str, ...], last: int) -> LabelledDrive:
+        """Open a drive and check that it is what the index says."""
+        drive = self.reader(self.root, *name)
+        if last >= len(drive):
+            expected = f"in {drive.name} the frame {last} that {INDEX_FILE} lists"
+            raise DataError(self.root, expected, f"{len(drive)} frames")
+        if drive.label_set != self.label_set:
+            expected = f"the label set of {drive.name}, {drive.label_set.name}"
+            raise DataError(self.root / INDEX_FILE, expected, self.label_set.name)
+        return drive
+
+
+def dataset_doubts(dataset_dir: str | Path, *splits: str) -> list[str]:
+    """List what is doubtful about the drives of some splits, before hours of work are based on them.
+
+    Parameters
+    ----------
+    dataset_dir : path-like
+        The folder of the data set, such as data/minikitti.
+    *splits : str
+        Such as "train".
+
+    Returns
+    -------
+    list of str
+        One line for each doubtful thing, from the reader's `doubts`.
+
+    Raises
+    ------
+    ArgumentError, DataError
+        As `DatasetIndex.drives` raises them.
+    """
+    index = load_index(dataset_dir)
+    drives = [drive for split in splits for drive, _ in index.drives(split)]
+    return [line for drive in drives for line in drive.doubts()]
 
 
 def load_index(dataset_dir: str | Path) -> DatasetIndex:
@@ -101,13 +186,16 @@ def load_index(dataset_dir: str | Path) -> DatasetIndex:
     name, label_set, splits = (_entry(path, content, key) for key in ("name", "label_set", "splits"))
     if not isinstance(name, str):
         raise DataError(path, "name: a word or two", repr(name)[:200])
-    if not isinstance(label_set, str) or label_set not in LABEL_SETS:
-        raise DataError(path, f"label_set: one of {', '.join(LABEL_SETS)}", repr(label_set))
+    reader = content.get("reader", "kitti-raw")
+    for key, value, known in (("label_set", label_set, LABEL_SETS), ("reader", reader, READERS)):
+        if not isinstance(value, str) or value not in known:
+            raise DataError(path, f"{key}: one of {', '.join(known)}", repr(value))
     if not isinstance(splits, dict) or not all(isinstance(frames, list) and frames for frames in splits.values()):
         raise DataError(path, "splits: lists of labelled frames by name, none empty", repr(splits)[:200])
-    frames = {split: tuple(_frame(path, entry) for entry in entries) for split, entries in splits.items()}
+    keys = READERS[reader].keys
+    frames = {split: tuple(_frame(path, entry, keys) for entry in entries) for split, entries in splits.items()}
     _refuse_leaks(path, frames)
-    return DatasetIndex(root, name, LABEL_SETS[label_set], frames)
+    return DatasetIndex(root, name, LABEL_SETS[label_set], frames, READERS[reader].open)
 
 
 def _entry(path: Path, content: Any, key: str) -> Any:
@@ -117,21 +205,21 @@ def _entry(path: Path, content: Any, key: str) -> Any:
     return content[key]
 
 
-def _frame(path: Path, entry: Any) -> LabelledFrame:
+def _frame(path: Path, entry: Any, keys: tuple[str, ...]) -> LabelledFrame:
     """Check one entry of a split."""
-    date, drive, frame = (_entry(path, entry, key) for key in LabelledFrame._fields)
-    sound_names = all(isinstance(name, str) and re.fullmatch(r"\w+", name) for name in (date, drive))
+    *drive, frame = (_entry(path, entry, key) for key in (*keys, "frame"))
+    sound_names = all(isinstance(name, str) and re.fullmatch(r"[\w-]+", name) for name in drive)
     if not sound_names or type(frame) is not int or not 0 <= frame < MOST_FRAMES:
         raise DataError(path, 'a frame like {"date": "2026_01_01", "drive": "0001", "frame": 9}', entry)
-    return LabelledFrame(date, drive, frame)
+    return LabelledFrame(tuple(drive), frame)
 
 
 def _refuse_leaks(path: Path, splits: dict[str, tuple[LabelledFrame, ...]]) -> None:
     """Refuse a frame that comes twice and a drive in two splits: a network would be tested on what it learned."""
-    split_of: dict[tuple[str, str], str] = {}
+    split_of: dict[tuple[str, ...], str] = {}
     for split, frames in splits.items():
         if len(set(frames)) != len(frames):
             raise DataError(path, f"each frame of {split} once", "a frame that comes twice")
         for frame in frames:
-            if split_of.setdefault(frame[:2], split) != split:
-                raise DataError(path, "each drive in one split", f"{frame.date} {frame.drive} in two")
+            if split_of.setdefault(frame.drive, split) != split:
+                raise DataError(path, "each drive in one split", f"{' '.join(frame.drive)} in two")

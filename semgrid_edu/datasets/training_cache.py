@@ -1,114 +1,46 @@
-"""The arrays that a network learns from, made once per data set, kept beside it and mapped from disk (section 4.1).
-
-Images and their labels with fewer pixels, as a coarser sensor would have taken them (section 4.1).
-"""
+"""The arrays that a network learns from, made once per data set, kept beside it and mapped from disk (section 4.1)."""
 
 import hashlib
+import inspect
+import os
 import shutil
 import tempfile
-from itertools import islice
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 from tqdm.auto import tqdm
 
-import semgrid_edu
-from semgrid_edu.datasets.doubts import check_label_sets
-from semgrid_edu.datasets.grid_truth import grid_truth
-from semgrid_edu.datasets.index import INDEX_FILE, DatasetIndex
-from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive, drive_folder
-from semgrid_edu.datasets.readers.project_lidar import seen_returns
-from semgrid_edu.errors import DataError
-from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import CmcdotParams, track_drive
+from semgrid_edu.datasets import training_arrays
+from semgrid_edu.datasets.index import DatasetIndex
+from semgrid_edu.datasets.readers.frames import LabelledDrive
+from semgrid_edu.datasets.training_arrays import ArrayRecipe, drive_arrays
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.storage.code_hash import code_hash
 from semgrid_edu.storage.compiled import cache_folder
-from semgrid_edu.storage.files import sha256, write_json
+from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.storage.workplace import worker_pool
 
-
-def resize_image(image: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
-    """Average an image over larger pixels; its calibration becomes `camera.resized(size)`.
-
-    Parameters
-    ----------
-    image : (h, w, 3) uint8
-        RGB.
-    size : (int, int)
-        The new height and width, pixels.
-
-    Returns
-    -------
-    (*size, 3) uint8
-    """
-    return np.asarray(Image.fromarray(image).resize(size[::-1], Image.Resampling.BOX))
-
-
-def resize_labels(labels: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
-    """Give each larger pixel the class that covers most of it; between two equal shares the smaller number wins.
-
-    Parameters
-    ----------
-    labels : (h, w) uint8
-        The class of each pixel; 255 (unlabelled) counts as a class.
-    size : (int, int)
-        The new height and width, pixels.
-
-    Returns
-    -------
-    (*size,) uint8
-    """
-    classes = np.unique(labels)
-    masks = (Image.fromarray((labels == c).astype(np.float32)) for c in classes)
-    shares = [np.asarray(mask.resize(size[::-1], Image.Resampling.BOX)) for mask in masks]
-    return classes[np.argmax(shares, axis=0)]
-
-
-SEED = 0
-"""Seed for the particles of the occupancy filter, in each drive."""
-
-CODE = (
-    *("camera", "frame", "grid", "labels", "storage/reading"),
-    *(f"datasets/{name}" for name in ("calibration", "kitti_labels", "kitti_raw", "oxts", "resizing")),
-    *(f"datasets/{name}" for name in ("returns", "timestamps", "training_cache", "truth")),
-)
-"""The modules that decide the arrays, beside all of occupancy/."""
-
 WORKERS = 2
-"""Number of processes that make the arrays, each one drive at a time."""
+"""Number of processes that work on the drives, each one drive at a time."""
 
 RAGGED = ("return_pixels", "return_cells")
 """Arrays whose length differs from frame to frame: they lie end to end, and `return_ends` says where each ends."""
 
-
-class ArrayRecipe(NamedTuple):
-    """How the arrays are made.
-
-    Parameters
-    ----------
-    spec : GridSpec
-        The grid of occupancy and truth.
-    image_size : (int, int)
-        Height and width of the resized images, pixels.
-    params : CmcdotParams
-        Parameters of the occupancy filter.
-    """
-
-    spec: GridSpec
-    image_size: tuple[int, int]
-    params: CmcdotParams
+LabelledDrives = Sequence[tuple[LabelledDrive, list[int]]]
+"""The drives of a split, each with the numbers of its labelled frames, from `DatasetIndex.drives`."""
 
 
 def cached_arrays(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> dict[str, NDArray]:
     """Return the arrays of a split's labelled frames, which are made on first use.
 
-    They are kept in `cache_folder`, in a folder that is named by a hash of all that decides them: the recipe,
-    the code that makes them, dataset.json, and the drives' files by name, size and time of their last change. (Hashing
-    the contents of these files, about a gigabyte, at every start would take longer than reading the arrays.) When one
-    of these changes, the arrays are made anew.
+    They are kept in `cache_folder`, in a folder that is named by a hash of all that decides them: the recipe, the
+    code that makes them, the labelled frames, and the drives' files by name, size and time of their last change.
+    (Hashing the contents of these files, about a gigabyte, at every start would take longer than reading the arrays.)
+    When one of these changes, the arrays are made anew.
 
     Parameters
     ----------
@@ -129,30 +61,81 @@ def cached_arrays(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> dict[
     Raises
     ------
     ArgumentError
-        When there is no such split.
+        When there is no such split, or the reader isn't defined in a file.
     DataError
         When the data set, or what was kept, is damaged; or when nothing can be kept.
     """
-    check_label_sets(index, split)
-    folder = cache_folder(index.root) / _key(index, split, recipe) / split
+    drives = index.drives(split)
+    folder = cache_folder(index.root) / _key(index, drives, recipe) / split
     if not folder.exists():
         _make_room(folder.parent)
-        _write_arrays(_pack(_process(index, split, recipe)), recipe, folder)
+        frames = in_each_drive(drive_arrays, [(*drive, recipe) for drive in drives], f"{index.name}, {split}")
+        _write_arrays(_pack(frames), recipe, folder)
     return _map_arrays(folder)
 
 
-def _key(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> str:
-    """Hash what decides the arrays: the recipe, the code, and names, sizes and times of all files of the drives."""
-    package = Path(semgrid_edu.__file__).parent
-    code = [package / f"{name}.py" for name in CODE] + sorted((package / "occupancy").glob("*.py"))
-    drives = index.frames_by_drive(split)
-    calibration = [path for date in {date for date, _ in drives} for path in (index.root / date).glob("*.txt")]
-    parts = [repr(recipe), *map(sha256, [index.root / INDEX_FILE, *code, *sorted(calibration)])]
-    for date, drive in drives:
-        files = {
-            file.relative_to(index.root): file.stat() for file in drive_folder(index.root, date, drive).rglob("*.*")
-        }
-        parts += sorted(f"{name} {found.st_size} {found.st_mtime_ns}" for name, found in files.items())
+def in_each_drive(make: Callable[..., list], jobs: Sequence[tuple], what: str) -> list:
+    """Make something of every labelled frame, a drive at a time, in worker processes if there are several drives.
+
+    Parameters
+    ----------
+    make : callable
+        (drive, numbers of its labelled frames, ...) -> a list with an entry for each of these frames.
+    jobs : sequence of tuple
+        The arguments of `make` for each drive.
+    what : str
+        What is made, for the bar that shows the progress.
+
+    Returns
+    -------
+    list
+        What was made of all frames, by drive.
+    """
+    alone = WORKERS == 1 or len(jobs) == 1
+    with nullcontext() if alone else worker_pool(WORKERS) as pool:
+        results = (map if alone else pool.map)(make, *zip(*jobs, strict=True))
+        return [frame for drive in tqdm(results, desc=what, total=len(jobs), unit="drive") for frame in drive]
+
+
+def array_code(drives: LabelledDrives, recipe: ArrayRecipe) -> list[Path]:
+    """Return the modules whose code, and what they import, decides the arrays.
+
+    Parameters
+    ----------
+    drives : sequence of (LabelledDrive, list of int)
+        The drives; their readers may stand outside of the package.
+    recipe : ArrayRecipe
+        How the arrays are made; so may its sensor model.
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    ArgumentError
+        When a reader or a sensor model isn't defined in a file, but, say, in a notebook.
+    """
+    parts = {type(recipe.params.sensor), *(type(drive) for drive, _ in drives)}
+    return [Path(training_arrays.__file__), *map(_file_of, parts)]
+
+
+def _file_of(part: type) -> Path:
+    """Return the file that defines a class."""
+    try:
+        return Path(inspect.getfile(part))
+    except (TypeError, OSError):
+        expected = "a class in a file, whose code can be hashed and which worker processes can import"
+        raise ArgumentError(part.__name__, expected, f"one of {part.__module__}") from None
+
+
+def _key(index: DatasetIndex, drives: LabelledDrives, recipe: ArrayRecipe) -> str:
+    """Hash what decides the arrays."""
+    parts = [repr(recipe), code_hash(array_code(drives, recipe))]
+    for drive, labelled in drives:
+        found = {os.path.relpath(path, index.root): path.stat() for path in drive.files()}
+        parts += [drive.name, repr(labelled)]
+        parts += sorted(f"{path} {stat.st_size} {stat.st_mtime_ns}" for path, stat in found.items())
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 
@@ -164,15 +147,6 @@ def _make_room(folder: Path) -> None:
     except OSError as error:
         expected = "a folder that can be written, for what is made of the data (`semgrid-edu --cache` takes another)"
         raise DataError(folder, expected, error.strerror) from error
-
-
-def _process(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> list[dict[str, NDArray]]:
-    """Make the arrays of every labelled frame of a split."""
-    jobs = [(index.root, *name, labelled, recipe) for name, labelled in index.frames_by_drive(split).items()]
-    with worker_pool(WORKERS) as pool:
-        drives = pool.map(_process_drive, *zip(*jobs, strict=True))
-        progress = tqdm(drives, desc=f"{index.name}, {split}", total=len(jobs), unit="drive")
-        return [frame for drive in progress for frame in drive]
 
 
 def _write_arrays(arrays: dict[str, NDArray], recipe: ArrayRecipe, folder: Path) -> None:
@@ -190,36 +164,6 @@ def _write_arrays(arrays: dict[str, NDArray], recipe: ArrayRecipe, folder: Path)
             raise
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)
-
-
-def _process_drive(
-    root: Path, date: str, drive: str, labelled: list[int], recipe: ArrayRecipe
-) -> list[dict[str, NDArray]]:
-    """Run the filter over a drive and make the arrays of its labelled frames, in the order of `labelled`."""
-    scans = islice(KittiRawDrive(root, date, drive, images=False), max(labelled) + 1)
-    beliefs = enumerate(track_drive(scans, recipe.spec, recipe.params, SEED))
-    occupancy = {k: belief.probability for k, belief in beliefs if k in labelled}
-    frames = KittiRawDrive(root, date, drive)
-    if max(labelled) >= len(frames):
-        raise DataError(frames.folder, f"the frame {max(labelled)} that {INDEX_FILE} lists", f"{len(frames)} frames")
-    return [_process_frame(frames, k, occupancy[k], recipe) for k in labelled]
-
-
-def _process_frame(drive: KittiRawDrive, k: int, occupancy: NDArray, recipe: ArrayRecipe) -> dict[str, NDArray]:
-    """Make the arrays of one frame."""
-    frame = drive[k]
-    if frame.labels is None or frame.image is None:
-        missing = "image" if frame.image is None else "labels"
-        raise DataError(drive.folder, f"image and labels of the frame {k} that {INDEX_FILE} lists", f"no {missing}")
-    pixels, cells = seen_returns(frame, recipe.spec, recipe.image_size)
-    return {
-        "image": resize_image(frame.image, recipe.image_size).transpose(2, 0, 1),
-        "labels": resize_labels(frame.labels.image, recipe.image_size),
-        "occupancy": occupancy.astype(np.float32),
-        "truth": grid_truth(frame.labels, occupancy, recipe.spec),
-        "return_pixels": pixels,
-        "return_cells": cells,
-    }
 
 
 def _pack(frames: list[dict[str, NDArray]]) -> dict[str, NDArray]:

@@ -1,7 +1,4 @@
-"""The training set: image, occupancy grid and truth of each labelled frame of a split (section 4.1).
-
-A few labelled frames of a data set in one file: how the shipped ones were kept (section 4.1).
-"""
+"""The training set: image, occupancy grid and truth of each labelled frame of a split, or of a few (section 4.1)."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -13,10 +10,11 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets.cached_labels import MadeTruth, made_grids
+from semgrid_edu.datasets.cached_labels import cached_labels
 from semgrid_edu.datasets.index import INDEX_FILE, DatasetIndex, load_index
-from semgrid_edu.datasets.readers.calibration import read_camera
-from semgrid_edu.datasets.training_cache import SEED, ArrayRecipe, cached_arrays
+from semgrid_edu.datasets.label_policies import LidarTruth
+from semgrid_edu.datasets.training_arrays import SEED, ArrayRecipe
+from semgrid_edu.datasets.training_cache import LabelledDrives, cached_arrays
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture
@@ -49,13 +47,15 @@ class Sample(NamedTuple):
 class TrainingSet(Dataset[Sample]):
     """The labelled frames of a split.
 
-    The first use runs the occupancy filter over every drive up to its labelled frames and keeps the result in
-    `cache/` of the data set, see `cached_arrays`. Later uses map it from disk, until data, recipe or code change.
+    The first use runs the occupancy filter over every drive up to its labelled frames and keeps the result in `cache/`
+    of the data set, see `cached_arrays`. Later uses map it from disk, until data, recipe or code change. Whatever is a
+    training set can be trained on (`train`) and scored.
 
     Parameters
     ----------
-    dataset_dir : path-like
-        A data set with dataset.json, such as data/minikitti.
+    dataset : path-like or DatasetIndex
+        The folder of a data set with dataset.json, such as data/minikitti; or an index made in Python, whose reader may
+        be any class of a `LabelledDrive`.
     split : str
         One of its splits, such as "train".
     spec : GridSpec, optional
@@ -64,9 +64,9 @@ class TrainingSet(Dataset[Sample]):
         Height and width to which the images are resized, pixels; those of the compact network when left out.
     params : CmcdotParams, optional
         Parameters of the occupancy filter; the package's own when left out.
-    made : MadeTruth, optional
+    truth : LidarTruth, optional
         How to make the truth from image labels and LIDAR, as one must with real data. When left out, the truth is what
-        the data set says of its cells (`grid_truth`).
+        the data set says of its cells (`LabelledDrive.truth`).
 
     Attributes
     ----------
@@ -77,11 +77,11 @@ class TrainingSet(Dataset[Sample]):
     spec : GridSpec
         The grid.
     drives : tuple of str
-        Date and drive of each frame, such as "2026_01_01 0143". Frames of one drive look alike, so they aren't
+        The name of the drive of each frame, such as "2026_01_01 0143". Frames of one drive look alike, so they aren't
         independent.
     arrays : dict of str to arrays mapped from disk
-        All frames at once, as `cached_arrays` returns them, and "true", (N, H, W) uint8: `grid_truth` of every frame.
-        "truth" is the same, or what `made` makes. The labels of pixels are the true ones in both cases.
+        All frames at once, as `cached_arrays` returns them, and "true", (N, H, W) uint8: what the data set says.
+        "truth" is the same, or what `truth` makes. The labels of pixels are the true ones in both cases.
 
     Raises
     ------
@@ -93,30 +93,30 @@ class TrainingSet(Dataset[Sample]):
     Examples
     --------
     >>> training = TrainingSet("data/minikitti", "train")                  # doctest: +SKIP
-    >>> as_in_the_paper = TrainingSet("data/minikitti", "train", made=MadeTruth())  # doctest: +SKIP
+    >>> as_in_the_paper = TrainingSet("data/minikitti", "train", truth=LidarTruth())  # doctest: +SKIP
     >>> torch.utils.data.DataLoader(training, batch_size=6, shuffle=True)  # doctest: +SKIP
     """
 
     def __init__(
         self,
-        dataset_dir: str | Path,
+        dataset: str | Path | DatasetIndex,
         split: str,
         spec: GridSpec | None = None,
         image_size: tuple[int, int] = Architecture.image_size,
         params: CmcdotParams | None = None,
-        made: MadeTruth | None = None,
+        truth: LidarTruth | None = None,
     ) -> None:
-        index = load_index(dataset_dir)
+        index = dataset if isinstance(dataset, DatasetIndex) else load_index(dataset)
         recipe = ArrayRecipe(spec or GridSpec.compact(), tuple(image_size), params or CmcdotParams())
         self.spec, self.label_set = recipe.spec, index.label_set
-        self.camera = _shared_camera(index, split).resized(recipe.image_size)
-        by_drive = index.frames_by_drive(split)
-        self.drives = tuple(f"{date} {drive}" for (date, drive), numbers in by_drive.items() for _ in numbers)
+        drives = index.drives(split)
+        self.camera = _shared_camera(drives).resized(recipe.image_size)
+        self.drives = tuple(drive.name for drive, numbers in drives for _ in numbers)
         arrays = cached_arrays(index, split, recipe)
         self.arrays = arrays | {"true": arrays["truth"]}
-        if made:
+        if truth:
             folder = Path(arrays["truth"].filename).parent
-            self.arrays["truth"] = made_grids(index, split, recipe, made, folder)
+            self.arrays["truth"] = cached_labels(drives, recipe, truth, folder)
 
     def __len__(self) -> int:
         """Return the number of labelled frames."""
@@ -143,15 +143,17 @@ class TrainingSet(Dataset[Sample]):
         return self.arrays["return_pixels"][first:last], self.arrays["return_cells"][first:last]
 
 
-def _shared_camera(index: DatasetIndex, split: str) -> Camera:
+def _shared_camera(drives: LabelledDrives) -> Camera:
     """Return the camera of a split's drives, refusing two that differ, because one sampler serves them all."""
-    first, *others = sorted({date for date, _ in index.frames_by_drive(split)})
-    camera = read_camera(index.root / first)
-    for date in others:
-        other = read_camera(index.root / date)
-        same = np.array_equal(camera.K, other.K) and camera.size == other.size
-        if not (same and np.array_equal(camera.T_camera_from_lidar, other.T_camera_from_lidar)):
-            raise DataError(index.root / date, f"the calibration of {first}, as one network serves both", "another")
+    (first, _), *others = drives
+    camera = first.camera
+    for drive, _ in others:
+        other = drive.camera
+        same = (camera.size, camera.lidar_height) == (other.size, other.lidar_height)
+        matrices = ((camera.K, other.K), (camera.T_camera_from_lidar, other.T_camera_from_lidar))
+        if not (same and all(np.array_equal(a, b) for a, b in matrices)):
+            expected = f"the calibration of {first.name}, because one network serves both"
+            raise DataError(drive.name, expected, "another")
     return camera
 
 

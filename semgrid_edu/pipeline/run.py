@@ -14,7 +14,7 @@ from torch import Tensor
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.crf import CrfParams
-from semgrid_edu.datasets.training_cache import resize_image
+from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
 from semgrid_edu.labels import LABEL_SETS

@@ -1,7 +1,4 @@
-"""Files that are read whole and checked: bytes, text, JSON and PNG images, with errors that name the file.
-
-Results that are kept part by part while an experiment runs, so that an interrupted one goes on where it was.
-"""
+"""Files that are read whole and checked: bytes, text, JSON and PNG images, with errors that name the file."""
 
 import io
 import json
@@ -150,13 +147,13 @@ def read_png(path: Path, mode: str, size: tuple[int, int] | None) -> NDArray:
     path : Path
         The file to read.
     mode : str
-        Pillow's name of the pixel format: "RGB", "L" (8 bits) or "I;16".
+        The pixel format: Pillow's "RGB", "L" (8 bits) and "I;16", or "RGB;16" for three channels of 16 bits.
     size : (int, int) or None
         Height and width that the image must have, pixels; None where any size will do.
 
     Returns
     -------
-    (h, w, 3) or (h, w) uint8, or uint16 for "I;16"
+    (h, w, 3) or (h, w) uint8, or uint16 for 16 bits
 
     Raises
     ------
@@ -165,22 +162,34 @@ def read_png(path: Path, mode: str, size: tuple[int, int] | None) -> NDArray:
     """
     content = read_bytes(path)
     try:
-        Image.open(io.BytesIO(content), formats=["PNG"]).verify()
-        image = Image.open(io.BytesIO(content), formats=["PNG"])
-        image.load()
+        _open_png(content).verify()
+        image = _open_png(content)
+        found = "RGB;16" if image.tile[0][3] == "RGB;16B" else image.mode
+        pixels = _sixteen_bits(content) if found == "RGB;16" else np.array(image)
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise DataError(path, "a sound PNG image", f"{str(error).partition(' <')[0]!r}") from error
     if PNG_END not in content:
         raise DataError(path, "a sound PNG image", "one without its end")
-    found = (image.height, image.width)
-    if image.mode != mode or found != (size or found):
+    height, width = pixels.shape[:2]
+    if found != mode or (height, width) != (size or (height, width)):
         expected = f"{mode} of {size[0]} x {size[1]} pixels" if size else mode
-        raise DataError(path, expected, f"{image.mode} of {image.height} x {image.width} pixels")
-    return np.array(image)
+        raise DataError(path, expected, f"{found} of {height} x {width} pixels")
+    return pixels
 
 
-def read_parts(log: str | Path, identity: dict[str, object], key: str, kind: type = dict) -> dict[str, Any]:
-    """Return the parts that a file holds.
+def _open_png(content: bytes) -> Image.Image:
+    return Image.open(io.BytesIO(content), formats=["PNG"])
+
+
+def _sixteen_bits(content: bytes) -> NDArray[np.uint16]:
+    """Decode three channels of 16 bits, of which Pillow keeps 8: the upper ones, or the lower ones if told so."""
+    upper, lower = _open_png(content), _open_png(content)
+    lower.tile = [(*lower.tile[0][:3], "RGB;16L")]
+    return np.array(upper).astype(np.uint16) << 8 | np.array(lower)
+
+
+def resumable_json(log: str | Path, identity: dict[str, object], key: str, kind: type = dict) -> dict[str, Any]:
+    """Return the parts that are done of a result, which an experiment keeps while it runs to go on after a break.
 
     Parameters
     ----------

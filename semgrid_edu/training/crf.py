@@ -1,23 +1,18 @@
 """Learning the CRF: its weights, widths and label costs, on top of a network that stays as it is (section 3.5)."""
 
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
-from tqdm.auto import trange
 
 from semgrid_edu.crf.layer import CrfLayer, save_crf
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.networks import WEIGHTS
-from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.training.batches import frames_of_step
-from semgrid_edu.training.checkpoint import CHECKPOINT, check_folder, load_checkpoint
-from semgrid_edu.training.devices import keep_freed_memory
-from semgrid_edu.training.log import LOG, Step, begin_log
-from semgrid_edu.training.loop import check_finite, learn, write_down
+from semgrid_edu.training.loop import descend
 from semgrid_edu.training.loss import cross_entropy_sums, median_frequency_weights
 from semgrid_edu.training.params import TrainingParams
 
@@ -120,37 +115,14 @@ def train_crf(
         When there is no checkpoint to resume from or it is damaged; when the folder holds a run that a new one would
         overwrite; or when another process trains in it.
     """
-    folder = Path(folder)
     if len(truth) < params.batch_size:
         raise ArgumentError("truth", f"at least one batch of {params.batch_size} frames", f"{len(truth)} frames")
-    check_folder(folder, resume)
-    with sole_writer(folder):
-        check_folder(folder, resume)  # once more: until now another process could write to it
-        _train(layer, (log_g, occupancy, truth), folder, params, seed, resume)
-
-
-def _train(
-    layer: CrfLayer, frames: tuple[NDArray, ...], folder: Path, params: TrainingParams, seed: int, resume: bool
-) -> None:
-    """Do what `train_crf` says, in a folder that no other process writes to."""
-    truth = frames[-1]
     alpha = torch.from_numpy(median_frequency_weights(truth, layer.n_classes, params.weight_limit)).float()
-    objective = CrfObjective(layer, alpha)
-    learning = [parameter for parameter in layer.parameters() if parameter.requires_grad]
-    optimiser = torch.optim.SGD(learning, lr=params.learning_rate, momentum=params.momentum)
     run = {"seed": seed, "frames": len(truth), **asdict(params), **layer.description(), "class weights": alpha.tolist()}
-    start = load_checkpoint(folder / CHECKPOINT, run, layer, optimiser) if resume else 0
-    begin_log(folder / LOG, start)
-    keep_freed_memory()
-    steps = trange(start, params.iterations, initial=start, total=params.iterations, desc=folder.name)
-    for iteration in steps:
-        stage, optimiser.param_groups[0]["lr"] = params.stage(iteration)
+
+    def batch(iteration: int) -> GridBatch:
         chosen = frames_of_step(len(truth), params.batch_size, iteration, seed)
-        batch = GridBatch(*(torch.from_numpy(part[chosen]) for part in frames))
-        loss = learn(objective, optimiser, batch, torch.device("cpu"))
-        step = Step(iteration, stage, optimiser.param_groups[0]["lr"], loss)
-        check_finite(step, params.learning_rate)
-        steps.set_postfix(loss=f"{loss:.4f}", refresh=False)
-        write_down(step, folder, 0, run, layer, optimiser)
-    save_crf(layer, folder / WEIGHTS)
-    (folder / CHECKPOINT).unlink(missing_ok=True)
+        return GridBatch(*(torch.from_numpy(part[chosen]) for part in (log_g, occupancy, truth)))
+
+    objective = CrfObjective(layer, alpha)
+    descend(layer, lambda _: objective, batch, partial(save_crf, layer), Path(folder), params, run, resume)

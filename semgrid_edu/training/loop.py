@@ -1,9 +1,10 @@
 """The training loop: stochastic gradient descent, end to end (paper, section 4.1)."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 import torch
@@ -15,7 +16,7 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, save_net
 from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.storage.locking import sole_writer
-from semgrid_edu.training.batches import draw_batch, share_of_batch
+from semgrid_edu.training.batches import Batch, draw_batch, share_of_batch
 from semgrid_edu.training.checkpoint import CHECKPOINT, check_folder, load_checkpoint, save_checkpoint
 from semgrid_edu.training.devices import keep_freed_memory, mixed_precision
 from semgrid_edu.training.distributed import (
@@ -79,61 +80,96 @@ def train(
         When there is no checkpoint to resume from or it is damaged; when the folder holds a checkpoint or a trained
         network that a new run would overwrite; or when another process trains in it.
     """
-    params, folder, device = params or TrainingParams(), Path(folder), torch.device(device)
-    check_folder(folder, resume)
+    params, device = params or TrainingParams(), torch.device(device)
     _check_dataset(net, dataset, params)
-    with sole_writer(folder) if rank() == 0 else nullcontext():
-        check_folder(folder, resume)  # once more: until now another process could write to it
-        _train(net, dataset, folder, params, seed, resume, device)
-
-
-def _train(
-    net: SemanticGridNet,
-    dataset: Sequence[Sample],
-    folder: Path,
-    params: TrainingParams,
-    seed: int,
-    resume: bool,
-    device: torch.device,
-) -> None:
-    """Do what `train` says, in a folder that no other process writes to."""
     stages = [stage for stage, n in (("image", params.image_iterations), ("grid", params.grid_iterations)) if n]
     alpha = {stage: class_weights(dataset, stage, net.n_classes, params.weight_limit) for stage in stages}
-    optimiser = torch.optim.SGD(net.to(device).parameters(), lr=params.learning_rate, momentum=params.momentum)
     run = {"seed": seed, "frames": len(dataset), **asdict(params), **asdict(net.need_architecture())}
     run |= {f"{stage} class weights": weights.tolist() for stage, weights in alpha.items()}
-    start = load_checkpoint(folder / CHECKPOINT, run, net, optimiser) if resume else 0
-    if rank() == 0:
-        begin_log(folder / LOG, start)
-    keep_freed_memory()
-    with shared_batch_norm(net.train()), _gradients_as_found(net):
+
+    def objective(stage: str) -> nn.Module:
+        return _objective(net, stage, alpha[stage].to(device), params.end_to_end)
+
+    def batch(iteration: int) -> Batch:
+        drawn = draw_batch(dataset, params.batch_size, params.jitter, iteration, seed, params.mirror)
+        return share_of_batch(drawn, rank(), world_size(), device)
+
+    with shared_batch_norm(net), _gradients_as_found(net):
+        descend(net.to(device), objective, batch, partial(save_net, net), Path(folder), params, run, resume)
+    net.eval()
+
+
+def descend(
+    learner: nn.Module,
+    objective: Callable[[str], nn.Module],
+    batch: Callable[[int], tuple],
+    save: Callable[[Path], None],
+    folder: Path,
+    params: TrainingParams,
+    run: dict,
+    resume: bool,
+) -> None:
+    """Make all steps of a training run, in a folder that no other process writes to meanwhile.
+
+    Parameters
+    ----------
+    learner : Module
+        What learns, on its device.
+    objective : callable
+        Name of a stage that begins -> a module: batch -> the two sums whose quotient is the loss, as `Objective`
+        returns them.
+    batch : callable
+        Number of a step -> what the objective takes, on the same device.
+    save : callable
+        Writes what was learnt to a file.
+    folder : Path
+        The folder of the training run.
+    params : TrainingParams
+        Numbers of iterations, rates and the like.
+    run : dict
+        What tells this run from others, as for `save_checkpoint`.
+    resume : bool
+        Whether to continue from the folder's checkpoint.
+
+    Raises
+    ------
+    ArgumentError
+        When the checkpoint belongs to another run, or the loss isn't finite.
+    DataError
+        When there is no checkpoint to resume from or it is damaged; when the folder holds a run that a new one would
+        overwrite; or when another process trains in it.
+    """
+    check_folder(folder, resume)
+    with sole_writer(folder) if rank() == 0 else nullcontext():
+        check_folder(folder, resume)  # once more: until now another process could write to it
+        learning = [parameter for parameter in learner.parameters() if parameter.requires_grad]
+        optimiser = torch.optim.SGD(learning, lr=params.learning_rate, momentum=params.momentum)
+        start = load_checkpoint(folder / CHECKPOINT, run, learner, optimiser) if resume else 0
+        if rank() == 0:
+            begin_log(folder / LOG, start)
+        keep_freed_memory()
         steps = trange(start, params.iterations, initial=start, total=params.iterations, disable=rank() > 0)
         for iteration in steps:
             stage, optimiser.param_groups[0]["lr"] = params.stage(iteration)
             if iteration in (start, params.image_iterations):
-                objective = _objective(net, stage, alpha[stage].to(device), params.end_to_end)
-            batch = draw_batch(dataset, params.batch_size, params.jitter, iteration, seed, params.mirror)
-            loss = learn(objective, optimiser, share_of_batch(batch, rank(), world_size(), device), device)
+                loss_of = objective(stage)
+            loss = learn(loss_of, optimiser, batch(iteration), learning[0].device)
             step = Step(iteration, stage, optimiser.param_groups[0]["lr"], loss)
-            check_finite(step, params.learning_rate)
+            _check_finite(step, params.learning_rate)
             steps.set_postfix(stage=stage, loss=f"{loss:.3f}", refresh=False)
             if rank() == 0:
-                write_down(step, folder, params.image_iterations, run, net, optimiser)
-    net.eval()
-    if rank() == 0:
-        save_net(net, folder / WEIGHTS)
-        (folder / CHECKPOINT).unlink(missing_ok=True)
-
-
-def _objective(net: SemanticGridNet, stage: str, alpha: Tensor, end_to_end: bool) -> nn.Module:
-    """Return the objective of a stage that begins, after stopping the weights that don't learn in it."""
-    if stage == "grid" and not end_to_end:
-        net.segmenter.eval().requires_grad_(False)
-    return in_parallel(Objective(net, stage, alpha), some_unused=stage == "image")
+                append_step(folder / LOG, step)
+                if iteration + 1 == params.image_iterations:
+                    save(folder / IMAGE_STAGE)
+                if (iteration + 1) % CHECKPOINT_EVERY == 0:
+                    save_checkpoint(folder / CHECKPOINT, run, learner, optimiser, iteration + 1)
+        if rank() == 0:
+            save(folder / WEIGHTS)
+            (folder / CHECKPOINT).unlink(missing_ok=True)
 
 
 def learn(objective: nn.Module, optimiser: torch.optim.SGD, batch: tuple, device: torch.device) -> float:
-    """Change the weights by one step of gradient descent.
+    """Change the weights by one step of gradient descent, and return the loss before it, nats.
 
     Parameters
     ----------
@@ -145,11 +181,6 @@ def learn(objective: nn.Module, optimiser: torch.optim.SGD, batch: tuple, device
         What the objective takes, on the device.
     device : torch.device
         The device that computes.
-
-    Returns
-    -------
-    float
-        The loss before the step, nats.
     """
     optimiser.zero_grad()
     with mixed_precision(device):
@@ -159,32 +190,19 @@ def learn(objective: nn.Module, optimiser: torch.optim.SGD, batch: tuple, device
     return process_total(loss.detach()).item() / world_size()
 
 
-def write_down(
-    step: Step, folder: Path, image_iterations: int, run: dict, net: nn.Module, optimiser: torch.optim.SGD
-) -> None:
-    """Log a step, and save the network or a checkpoint if it is time for one.
+def _check_finite(step: Step, learning_rate: float) -> None:
+    """Refuse to go on after a loss that is infinite or NaN, from which nothing can be learnt any more."""
+    if not math.isfinite(step.loss):
+        found = f"{learning_rate}, with which it is {step.loss} in iteration {step.iteration}"
+        raise ArgumentError("learning_rate", "a rate that keeps the loss finite", found)
 
-    Parameters
-    ----------
-    step : Step
-        The step that was just made.
-    folder : Path
-        The folder of the training run.
-    image_iterations : int
-        Number of steps of the first stage, after which the network is saved; 0 without such a stage.
-    run : dict
-        What tells this run from others, as for `save_checkpoint`.
-    net : Module
-        What learns.
-    optimiser : SGD
-        Its optimiser.
-    """
-    append_step(folder / LOG, step)
-    done = step.iteration + 1
-    if done == image_iterations:
-        save_net(net, folder / IMAGE_STAGE)
-    if done % CHECKPOINT_EVERY == 0:
-        save_checkpoint(folder / CHECKPOINT, run, net, optimiser, done)
+
+def _objective(net: SemanticGridNet, stage: str, alpha: Tensor, end_to_end: bool) -> nn.Module:
+    """Return the objective of a stage that begins, after stopping the weights that don't learn in it."""
+    net.train()
+    if stage == "grid" and not end_to_end:
+        net.segmenter.eval().requires_grad_(False)
+    return in_parallel(Objective(net, stage, alpha), some_unused=stage == "image")
 
 
 @contextmanager
@@ -211,23 +229,3 @@ def _check_dataset(net: SemanticGridNet, dataset: Sequence[Sample], params: Trai
         for name, part, want in zip(Sample._fields, sample, expected, strict=True):
             if tuple(part.shape) != want:
                 raise ArgumentError("dataset", f"{name} of shape {want}", f"{tuple(part.shape)} in frame {k}")
-
-
-def check_finite(step: Step, learning_rate: float) -> None:
-    """Refuse to go on after a loss that is infinite or NaN, from which nothing can be learnt any more.
-
-    Parameters
-    ----------
-    step : Step
-        The step that was just made.
-    learning_rate : float
-        The rate at the start of the run, which the error names.
-
-    Raises
-    ------
-    ArgumentError
-        When its loss isn't finite.
-    """
-    if not math.isfinite(step.loss):
-        found = f"{learning_rate}, with which it is {step.loss} in iteration {step.iteration}"
-        raise ArgumentError("learning_rate", "a rate that keeps the loss finite", found)

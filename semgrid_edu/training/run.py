@@ -5,8 +5,8 @@ from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-from semgrid_edu.datasets.cached_labels import POLICIES, MadeTruth
 from semgrid_edu.datasets.index import INDEX_FILE
+from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
@@ -74,7 +74,7 @@ def training_params(
     return params if preset == "compact" else replace(params, learning_rate=1e-3, weight_limit=math.inf)
 
 
-def chosen_truth(name: str) -> MadeTruth | None:
+def chosen_truth(name: str) -> LidarTruth | None:
     """Return how the truth to learn from is made.
 
     Parameters
@@ -85,7 +85,7 @@ def chosen_truth(name: str) -> MadeTruth | None:
 
     Returns
     -------
-    MadeTruth or None
+    LidarTruth or None
         What `TrainingSet` takes; None for "true".
 
     Raises
@@ -95,7 +95,7 @@ def chosen_truth(name: str) -> MadeTruth | None:
     """
     if name != "true" and name not in POLICIES:
         raise ArgumentError("--truth", f"one of true, {', '.join(POLICIES)}", repr(name))
-    return None if name == "true" else MadeTruth(POLICIES[name])
+    return None if name == "true" else LidarTruth(POLICIES[name])
 
 
 def train_network(
@@ -109,7 +109,7 @@ def train_network(
     preset: str = "compact",
     imagenet: str | Path | None = None,
     device: str = "cpu",
-    made: MadeTruth | None = None,
+    truth: LidarTruth | None = None,
 ) -> None:
     """Train a network on the split "train" of a data set; under torchrun, in all of its processes.
 
@@ -133,7 +133,7 @@ def train_network(
         ImageNet weights for the image network of preset "paper": see `load_imagenet`.
     device : str
         "cpu", "cuda", "cuda:N" or "auto", see `choose_device`.
-    made : MadeTruth, optional
+    truth : LidarTruth, optional
         How to make the truth from image labels and LIDAR; the data set's own truth when left out.
 
     Raises
@@ -146,7 +146,7 @@ def train_network(
     began, description = datetime.now(UTC), architecture(segmenter, preset)
     with process_group(device) as chosen:
         with first_process_first():
-            dataset = TrainingSet(dataset_dir, "train", description.grid, description.image_size, made=made)
+            dataset = TrainingSet(dataset_dir, "train", description.grid, description.image_size, truth=truth)
         description = replace(description, label_set=dataset.label_set.name)
         net = build_net(description, dataset.camera, seed)
         if imagenet:
@@ -164,9 +164,9 @@ def train_network(
             "params": {name: str(value) if value == math.inf else value for name, value in asdict(params).items()},
             "dataset": sha256(Path(dataset_dir) / INDEX_FILE),
             **({"imagenet": sha256(imagenet)} if imagenet else {}),
-            **({"truth": asdict(made)} if made else {}),
+            **({"truth": asdict(truth)} if truth else {}),
         }
-        command = _command(dataset_dir, folder, description, imagenet, seed, params, made)
+        command = _command(dataset_dir, folder, description, imagenet, seed, params, truth)
         write_provenance(folder, command, seed, ("torch", "numpy", "safetensors"), **details)
 
 
@@ -177,17 +177,17 @@ def _command(
     imagenet: str | Path | None,
     seed: int,
     params: TrainingParams,
-    made: MadeTruth | None,
+    truth: LidarTruth | None,
 ) -> str:
     """Return the command that makes the same training run, or as near as a command can: not every policy has a name."""
-    named = (name for name, policy in POLICIES.items() if made == MadeTruth(policy))
+    named = (name for name, policy in POLICIES.items() if truth == LidarTruth(policy))
     options = [
         f"--data {_name(dataset_dir)} --out {_name(folder)} --segmenter {description.segmenter}",
         f"--preset {description.preset}" if description.preset != Architecture.preset else "",
         f"--imagenet {_name(imagenet)}" if imagenet else "",
         f"--seed {seed} --iterations {params.grid_iterations}",
         "" if params.end_to_end else "--two-stage",
-        f"--truth {next(named, 'lidar')}" if made else "",
+        f"--truth {next(named, 'lidar')}" if truth else "",
     ]
     return " ".join(["semgrid-edu train", *filter(None, options)])
 

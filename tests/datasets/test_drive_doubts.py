@@ -7,7 +7,7 @@ import pytest
 from tiny_drive import DATE, write_packet, write_tiny_dataset, write_tiny_drive
 
 from semgrid_edu.datasets import KittiRawDrive
-from semgrid_edu.datasets.doubts import dataset_doubts
+from semgrid_edu.datasets.index import dataset_doubts
 from semgrid_edu.datasets.readers.drive_doubts import FASTEST, jumps
 from semgrid_edu.datasets.readers.oxts import read_packet
 from semgrid_edu.datasets.samples import sample_drive
@@ -63,6 +63,6 @@ def test_labels_of_another_set_are_refused(tmp_path):
     root = write_tiny_dataset(tmp_path)
     path = root / DATE / f"{DATE}_drive_0002_sync" / "labels" / "label_set.txt"
     path.write_text("SYNTHIA-10\n")
-    with pytest.raises(DataError, match=r"label_set\.txt: expected KITTI-14, .*found SYNTHIA-10"):
+    with pytest.raises(DataError, match=r"expected the label set of 2026_01_01 0002, SYNTHIA-10, found KITTI-14"):
         dataset_doubts(root, "train")
     assert dataset_doubts(root, "test") == []

@@ -20,7 +20,7 @@ def write(folder, content):
 def test_lists_frames(tmp_path):
     index = load_index(write(tmp_path, SOUND))
     assert (index.root, index.name, index.label_set.name) == (tmp_path, "tiny", "KITTI-14")
-    assert index.splits == {"train": (LabelledFrame(DATE, "0001", 9),), "test": (LabelledFrame(DATE, "0002", 9),)}
+    assert index.splits == {"train": (LabelledFrame((DATE, "0001"), 9),), "test": (LabelledFrame((DATE, "0002"), 9),)}
 
 
 def test_groups_frames_by_drive(tmp_path):

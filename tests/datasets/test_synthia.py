@@ -190,7 +190,7 @@ class TestDamage:
 
     def test_labels_of_another_size(self, root, folder):
         write_png16(folder / "GT/LABELS" / VIEW / "000001.png", [np.zeros((4, 4))] * 3)
-        with pytest.raises(DataError, match="expected 40 x 64 pixels, found 4 x 4 pixels"):
+        with pytest.raises(DataError, match="expected RGB;16 of 40 x 64 pixels, found RGB;16 of 4 x 4 pixels"):
             SynthiaSequence(root, NAME)[1]
 
     def test_no_road_to_stand_on(self, root, folder):

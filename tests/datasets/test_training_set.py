@@ -35,19 +35,13 @@ def no_work(monkeypatch):
     def refuse(*_):
         raise AssertionError("made anew")
 
-    monkeypatch.setattr(training_cache, "_process", refuse)
+    monkeypatch.setattr(training_cache, "in_each_drive", refuse)
 
 
 @pytest.fixture
 def in_this_process(monkeypatch):
     """Make arrays without worker processes, which take seconds to start."""
-
-    def process(index, split, recipe):
-        by_drive = index.frames_by_drive(split).items()
-        drives = [training_cache._process_drive(index.root, *name, frames, recipe) for name, frames in by_drive]
-        return [frame for drive in drives for frame in drive]
-
-    monkeypatch.setattr(training_cache, "_process", process)
+    monkeypatch.setattr(training_cache, "WORKERS", 1)
 
 
 @pytest.mark.usefixtures("no_work")
@@ -95,8 +89,8 @@ class TestBuilt:
 
     def test_another_index_is_not_in_the_cache(self, built, tmp_path):
         root = shutil.copytree(built, tmp_path / "copy")
-        index = json.loads((root / "dataset.json").read_text())
-        (root / "dataset.json").write_text(json.dumps({**index, "seed": 1}))
+        text = (root / "dataset.json").read_text().replace('"frame": 2', '"frame": 1')
+        (root / "dataset.json").write_text(text)
         with pytest.raises(AssertionError, match="made anew"):
             TrainingSet(root, "train", image_size=SMALL)
 
@@ -136,7 +130,7 @@ class TestCacheFolder:
         monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "elsewhere"))
         training = TrainingSet(root, "train", image_size=SMALL)
         assert sorted(root.rglob("*")) == before
-        monkeypatch.setattr(training_cache, "_process", None)
+        monkeypatch.setattr(training_cache, "in_each_drive", None)
         again = TrainingSet(root, "train", image_size=SMALL)
         np.testing.assert_array_equal(training.arrays["occupancy"], again.arrays["occupancy"])
 

@@ -44,12 +44,7 @@ def inputs(tmp_path_factory):
 def quick(monkeypatch):
     """Refine after three trials; run the occupancy filter in this process, since workers take seconds to start."""
 
-    def process(index, split, recipe):
-        drives = index.frames_by_drive(split).items()
-        jobs = [training_cache._process_drive(index.root, *name, labelled, recipe) for name, labelled in drives]
-        return [frame for drive in jobs for frame in drive]
-
-    monkeypatch.setattr(training_cache, "_process", process)
+    monkeypatch.setattr(training_cache, "WORKERS", 1)
     monkeypatch.setattr(rules, "EXPLORED", 3)
     monkeypatch.setattr("semgrid_edu.workshop.studies.crf.crf_search.perf_counter", count().__next__)
 

@@ -142,11 +142,7 @@ def test_intervals_are_those_of_the_drives():
 
 
 def test_evaluates_a_network_from_disk(tmp_path, monkeypatch):
-    def process(index, split, recipe):  # without worker processes, which take seconds to start
-        ((name, labelled), *_) = index.frames_by_drive(split).items()
-        return training_cache._process_drive(index.root, *name, labelled, recipe)
-
-    monkeypatch.setattr(training_cache, "_process", process)
+    monkeypatch.setattr(training_cache, "WORKERS", 1)
     root = write_tiny_dataset(tmp_path / "tiny")
     camera = KittiRawDrive(root, "2026_01_01", "0001").camera
     save_net(build_net(Architecture(), camera), tmp_path / "net.safetensors")
@@ -154,7 +150,7 @@ def test_evaluates_a_network_from_disk(tmp_path, monkeypatch):
     result = evaluate(root, tmp_path / "net.safetensors", confusions_file=tmp_path / "confusions.npz")
     assert {"geometry, end-to-end labels", "geometry, image-stage labels"} < result["scores"].keys()
     assert result == json.loads(json.dumps(result))
-    assert result["frames"] == {"train": 1, "test": 1}
+    assert result["frames"] == {"train": 2, "test": 1}
     assert result["weights"]["sha256"] == sha256(tmp_path / "net.safetensors")
     assert result["command"] == "semgrid-edu evaluate --data tiny --weights net.safetensors"
     assert result["intervals"] is None  # of one drive

@@ -26,13 +26,8 @@ QUICK = replace(CRF_TRAINING, grid_iterations=1)
 def quick():
     """Small windows, two ways to learn; the occupancy filter in this process, since workers take seconds to start."""
 
-    def process(index, split, recipe):
-        drives = index.frames_by_drive(split).items()
-        jobs = [training_cache._process_drive(index.root, *name, labelled, recipe) for name, labelled in drives]
-        return [frame for drive in jobs for frame in drive]
-
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(training_cache, "_process", process)
+        patch.setattr(training_cache, "WORKERS", 1)
         patch.setattr("semgrid_edu.crf.layer.REACH", 0.5)
         patch.setattr(learned_crf_scores, "VARIANTS", learned_crf.VARIANTS[:2])
         yield

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from tiny_runs import HandMadeData
 
-from semgrid_edu.datasets import cached_labels as made_truth
 from semgrid_edu.datasets import training_cache
-from semgrid_edu.datasets.cached_labels import POLICIES, MadeTruth
+from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
 from semgrid_edu.labels import KITTI_14, UNKNOWN_OF_STATE
 from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.storage.workplace import Workplace
@@ -45,7 +44,7 @@ def test_each_policy_is_one_whose_errors_the_laboratory_measures():
 
 
 def test_the_usual_truth_is_the_one_without_a_choice():
-    assert repr(chosen_truth("lidar")) == repr(MadeTruth())  # kept grids are named by it
+    assert repr(chosen_truth("lidar")) == repr(LidarTruth())  # kept grids are named by it
     assert chosen_truth("true") is None
 
 
@@ -92,8 +91,7 @@ def counted(tmp_path_factory):
     usual, bare = (ArraysRun(HandMadeData(), "train", truth) for truth in ("lidar", "no-cleanup"))
     run, here = LabelsRun(bare, usual), Workplace(ThreadPoolExecutor(1), lambda: 1)
     with pytest.MonkeyPatch.context() as patch:
-        for module in (training_cache, made_truth):  # six drives of two frames aren't worth a process
-            patch.setattr(module, "worker_pool", lambda _: ThreadPoolExecutor(1))
+        patch.setattr(training_cache, "WORKERS", 1)  # six drives of two frames aren't worth a process
         assert execute_plan(with_needs([run]), root, here) == {}
     return root, run
 

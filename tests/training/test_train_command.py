@@ -8,8 +8,8 @@ import torch
 from typer.testing import CliRunner
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets import doubts as dataset_doubts
-from semgrid_edu.datasets.cached_labels import POLICIES, MadeTruth
+from semgrid_edu.datasets import index as dataset_index
+from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.networks import SEGMENTERS, Architecture, Fcn, load_net
@@ -31,9 +31,9 @@ class _Noise:
         Architecture().image_size,
     )
 
-    def __init__(self, dataset_dir, split, spec, image_size, made):
+    def __init__(self, dataset_dir, split, spec, image_size, truth):
         assert split == "train"
-        self.made = made
+        self.truth = truth
         self.rng = torch.Generator().manual_seed(0)
 
     def __len__(self):
@@ -54,7 +54,7 @@ class _Noise:
 @pytest.fixture(autouse=True)
 def data_without_doubts(monkeypatch):
     """The data set isn't on disk, so nothing can be asked of it."""
-    monkeypatch.setattr(dataset_doubts, "dataset_doubts", lambda *_: [])
+    monkeypatch.setattr(dataset_index, "dataset_doubts", lambda *_: [])
 
 
 class _Net:
@@ -150,14 +150,14 @@ def test_the_options_reach_the_training(monkeypatch, tmp_path, truth):
     assert given["net"] == experiment.architecture("segnet", "paper")
     assert given["imagenet"] == (_Net.segmenter, imagenet)
     net, dataset, folder, params, seed, resume, device = given["train"]
-    assert dataset.made == MadeTruth(POLICIES[truth])
+    assert dataset.truth == LidarTruth(POLICIES[truth])
     assert (net, folder, seed, resume, device) == (_Net, out, 2, True, torch.device("cpu"))
     assert params == experiment.training_params("paper", 7, end_to_end=False, from_imagenet=True)
     provenance = json.loads((out / "provenance.json").read_text())
     written = "--segmenter segnet --preset paper --imagenet vgg16.safetensors --seed 2 --iterations 7 --two-stage"
     assert provenance["command"] == f"semgrid-edu train --data minikitti --out out {written} --truth {truth}"
     assert provenance["resumed"] is True
-    assert provenance["truth"] == asdict(dataset.made)
+    assert provenance["truth"] == asdict(dataset.truth)
     assert provenance["params"]["weight_limit"] == "inf"
     assert provenance["imagenet"] == sha256(imagenet)
 

@@ -274,4 +274,4 @@ assert all(rows[truth]["distances"]["20-30 m"]["difference"]["high"] < 0 for tru
 # - Northcutt, Athalye, Mueller, *Pervasive label errors in test sets destabilize machine learning benchmarks*, NeurIPS
 #   2021: who may judge.
 # - [The results](../../docs/results/reduced/truth-costs.md) with all metrics, and
-#   [the policies](../../semgrid_edu/datasets/cached_labels.py).
+#   [the policies](../../semgrid_edu/datasets/label_policies.py).

@@ -1,7 +1,4 @@
-"""What all readers of drives have in common: frames that are read when they are asked for, and labels in part.
-
-One LIDAR scan on disk: KITTI's velodyne files, which KITTI raw, tracking and SemanticKITTI share (section 4).
-"""
+"""What readers of drives have in common: what a labelled drive is, frames read on demand, KITTI's scans (section 4)."""
 
 import operator
 import re
@@ -9,13 +6,15 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import overload
+from typing import Protocol, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.camera import Camera
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
+from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, LabelSet
 from semgrid_edu.storage.reading import read_bytes
 
@@ -53,12 +52,59 @@ def read_scan(path: Path) -> NDArray[np.float32]:
     return points
 
 
+class LabelledDrive(Protocol):
+    """What training and scoring ask of a drive: frames, and the truth of some of them.
+
+    Derive a reader from `FrameSequence`, which has most of it.
+
+    Attributes
+    ----------
+    name : str
+        Tells the drive from the others of its data set.
+    camera : Camera
+        The calibration, the same for all frames.
+    label_set : LabelSet
+        The classes of image labels and truth.
+    """
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def camera(self) -> Camera: ...
+    @property
+    def label_set(self) -> LabelSet: ...
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+
+    def __getitem__(self, k: int) -> Frame:
+        """Return frame k; the labelled ones have an image and its labels."""
+
+    def truth(self, k: int, spec: GridSpec) -> NDArray[np.uint8]:
+        """Return the class of each cell at frame k, (H, W); 255 where nothing is known.
+
+        Parameters
+        ----------
+        k : int
+            Number of a labelled frame.
+        spec : GridSpec
+            The grid, (H, W) cells.
+        """
+
+    def files(self) -> list[Path]:
+        """Return the files that the frames are read from: when one changes, what was made of the drive is stale."""
+
+
 class FrameSequence(Sequence[Frame]):
     """The frames of a drive. Each is read, and checked, when it is asked for.
 
     `drive[k]` is frame k, `drive[-1]` the last one, `drive[2:5]` a list of three. A reader derives from this class and
-    defines `__len__` and `_frame`.
+    defines `__len__`, `_frame`, `name`, and `folder`, which holds the files of the drive; for a `LabelledDrive` also
+    `camera` and `label_set`.
     """
+
+    name: str
+    folder: Path
 
     @overload
     def __getitem__(self, index: int) -> Frame: ...
@@ -83,6 +129,29 @@ class FrameSequence(Sequence[Frame]):
         """
         found = [error_of(partial(self._frame, k)) for k in range(len(self))]
         return [error for error in dict.fromkeys(found) if error]
+
+    def truth(self, k: int, spec: GridSpec) -> NDArray[np.uint8]:
+        """Return what the bird's-eye labels of a frame say of the cells that the camera sees.
+
+        Parameters and result are those of `LabelledDrive.truth`.
+
+        Raises
+        ------
+        DataError
+            When the frame has no labels, or a file that it needs is missing or damaged.
+        """
+        labels = self[k].labels
+        if labels is None:
+            raise DataError(self.folder, f"labels of the frame {k}", "none")
+        return visible_labels(labels, spec)
+
+    def files(self) -> list[Path]:
+        """Return all files below the folder of the drive."""
+        return [path for path in self.folder.rglob("*.*") if path.is_file()]
+
+    def doubts(self) -> list[str]:
+        """List what is doubtful, as far as it can be seen without reading the frames; a reader may know something."""
+        return []
 
     @abstractmethod
     def _frame(self, k: int) -> Frame:
@@ -115,6 +184,24 @@ def count_frames(folder: Path, what: str, suffix: str) -> int:
     if not numbers:
         raise DataError(folder, f"{what} such as 000000{suffix}", "none" if folder.is_dir() else "no folder")
     return 1 + max(numbers)
+
+
+def visible_labels(labels: FrameLabels, spec: GridSpec) -> NDArray[np.uint8]:
+    """Return the class of each cell that the camera sees.
+
+    Parameters
+    ----------
+    labels : FrameLabels
+        What is true of the frame.
+    spec : GridSpec
+        The grid: the extent of `LABEL_GRID`, a multiple of its cell.
+
+    Returns
+    -------
+    (H, W) uint8
+        255 where the camera doesn't see, or nothing is labelled.
+    """
+    return np.where(labels.visible_on(spec), labels.birdseye_on(spec), np.uint8(IGNORE))
 
 
 def nothing_known(label_set: LabelSet, image_size: tuple[int, int]) -> FrameLabels:

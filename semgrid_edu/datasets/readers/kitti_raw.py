@@ -11,13 +11,19 @@ from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, invert_rigid
 from semgrid_edu.datasets.readers.calibration import read_camera, read_rectification, read_rigid
-from semgrid_edu.datasets.readers.drive_doubts import jumps, short_scans
+from semgrid_edu.datasets.readers.drive_doubts import jumps, short_scans, what_is
 from semgrid_edu.datasets.readers.frames import FrameSequence, error_of, read_scan
-from semgrid_edu.datasets.readers.kitti_labels import KINDS, is_labelled, read_label, read_labels
-from semgrid_edu.datasets.readers.layouts import what_is
+from semgrid_edu.datasets.readers.kitti_labels import (
+    KINDS,
+    is_labelled,
+    read_label,
+    read_label_set,
+    read_labels,
+)
 from semgrid_edu.datasets.readers.oxts import imu_pose, read_packet, read_timestamps
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.frame import Frame, FrameLabels
+from semgrid_edu.labels import LabelSet
 from semgrid_edu.storage.reading import read_png
 
 VIEWS = ("image_02", "image_03")
@@ -97,6 +103,7 @@ class KittiRawDrive(FrameSequence):
         if view not in VIEWS:
             raise ArgumentError("view", " or ".join(VIEWS), repr(view))
         self.date_folder, self.folder = _existing(Path(root), date, drive)
+        self.name = f"{date} {drive}"
         self.view = view
         self._sensors = ["velodyne_points", "oxts"]
         if images and (self.folder / view).exists():
@@ -108,6 +115,15 @@ class KittiRawDrive(FrameSequence):
     def __len__(self) -> int:
         """Return the number of frames, including those whose scans were never recorded."""
         return self._length
+
+    @property
+    def label_set(self) -> LabelSet:
+        """The classes of the labels, which the file label_set.txt of a labelled drive names."""
+        return read_label_set(self.folder / "labels" / "label_set.txt")
+
+    def files(self) -> list[Path]:
+        """Return the files of the drive, and the calibration of its day."""
+        return [*self.date_folder.glob("*.txt"), *super().files()]
 
     def _frame(self, k: int) -> Frame:
         return Frame(

@@ -63,8 +63,10 @@ class SemanticKittiSequence(FrameSequence):
     >>> truth = sequence.truth(20, GridSpec.compact(), before=20, after=20) # doctest: +SKIP
     """
 
+    label_set = KITTI_14
+
     def __init__(self, root: str | Path, sequence: str) -> None:
-        self.folder = Path(root) / "sequences" / sequence
+        self.folder, self.name = Path(root) / "sequences" / sequence, sequence
         self._length = count_frames(self.folder / "velodyne", "scans", ".bin")
 
     def __len__(self) -> int:

@@ -33,7 +33,6 @@ from semgrid_edu.datasets.readers.frames import FrameSequence, count_frames, err
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.labels import IGNORE, SYNTHIA_10
-from semgrid_edu.storage.png16 import read_png16
 from semgrid_edu.storage.reading import parse_numbers, read_png, read_text
 
 SYNTHIA_CLASSES = ClassTable(
@@ -83,7 +82,7 @@ def read_synthia_labels(path: Path, size: tuple[int, int] | None) -> NDArray[np.
     DataError
         When the file is missing or damaged, or holds a number that is no class.
     """
-    return SYNTHIA_CLASSES.classes(path, read_png16(path, size)[..., 0].astype(np.int64))
+    return SYNTHIA_CLASSES.classes(path, read_png(path, "RGB;16", size)[..., 0].astype(np.int64))
 
 
 def read_synthia_depth(path: Path, size: tuple[int, int] | None) -> NDArray[np.float32]:
@@ -106,7 +105,7 @@ def read_synthia_depth(path: Path, size: tuple[int, int] | None) -> NDArray[np.f
     DataError
         When the file is missing or damaged.
     """
-    centimetres = read_png16(path, size)[..., 0]
+    centimetres = read_png(path, "RGB;16", size)[..., 0]
     nothing = (centimetres == 0) | (centimetres == np.iinfo(np.uint16).max)
     return np.where(nothing, np.float32(np.nan), centimetres.astype(np.float32) * np.float32(0.01))
 
@@ -200,8 +199,10 @@ class SynthiaSequence(FrameSequence):
         damaged.
     """
 
+    label_set = SYNTHIA_10
+
     def __init__(self, root: str | Path, sequence: str) -> None:
-        self.folder = Path(root) / sequence
+        self.folder, self.name = Path(root) / sequence, sequence
         self._length = count_frames(self.folder / "RGB" / VIEW, "images", ".png")
 
     def __len__(self) -> int:

@@ -14,14 +14,13 @@ Drives with Zhang et al.'s labels: KITTI's frames, in raw or tracking layout, an
 
 import io
 import re
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.io import loadmat
 
+from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.readers.class_tables import ClassTable
 from semgrid_edu.datasets.readers.frames import FrameSequence, nothing_known
 from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
@@ -147,6 +146,8 @@ class ZhangLabels:
 
 def _matrix(path: Path) -> NDArray:
     """Read the one matrix of a MATLAB file."""
+    from scipy.io import loadmat  # here, because it is slow to load and no other reader needs it
+
     content = read_bytes(path)
     try:
         variables = {name: value for name, value in loadmat(io.BytesIO(content)).items() if not name.startswith("__")}
@@ -193,7 +194,7 @@ class ZhangDrive(FrameSequence):
 
     Parameters
     ----------
-    drive : sequence of Frame
+    drive : FrameSequence
         The frames of the run: a `KittiTrackingRun`, or a raw drive that begins where the run does.
     labels : ZhangLabels
         The labels of all runs.
@@ -207,12 +208,24 @@ class ZhangDrive(FrameSequence):
     >>> [k for run, k in labels.frames("train") if run == 9][:3]                    # doctest: +SKIP
     """
 
-    def __init__(self, drive: Sequence[Frame], labels: ZhangLabels, run: int) -> None:
+    label_set = KITTI_14
+
+    def __init__(self, drive: FrameSequence, labels: ZhangLabels, run: int) -> None:
         self.drive, self.labels, self.run = drive, labels, run
+        self.name, self.folder = f"run {run}", labels.folder
 
     def __len__(self) -> int:
         """Return the number of frames, labelled or not."""
         return len(self.drive)
+
+    @property
+    def camera(self) -> Camera:
+        """The calibration, the same for all frames."""
+        return self.drive.camera
+
+    def files(self) -> list[Path]:
+        """Return the files of the drive, and all labels."""
+        return [*self.drive.files(), *super().files()]
 
     def _frame(self, k: int) -> Frame:
         frame = self.drive[k]

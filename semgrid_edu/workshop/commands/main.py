@@ -112,12 +112,12 @@ def train(
     device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu, cuda or cuda:N.")] = "auto",
 ) -> None:
     """Train a network: first its image network, then all of it on grids. torchrun runs it in several processes."""
-    from semgrid_edu.datasets.doubts import dataset_doubts
+    from semgrid_edu.datasets.index import dataset_doubts
     from semgrid_edu.training.run import chosen_truth, how_to_go_on, train_network, training_params
 
     params = training_params(preset, iterations, end_to_end=not two_stage, from_imagenet=imagenet is not None)
     tell(dataset_doubts(data, "train"))
-    choices = {"preset": preset, "imagenet": imagenet, "device": device, "made": chosen_truth(truth)}
+    choices = {"preset": preset, "imagenet": imagenet, "device": device, "truth": chosen_truth(truth)}
     try:
         train_network(data, out, segmenter, params, seed, resume, **choices)
     except KeyboardInterrupt:
@@ -139,7 +139,7 @@ def train_crf(
     """Train a CRF on the grids of a trained network: its weights, widths, and costs of labels."""
     from dataclasses import replace
 
-    from semgrid_edu.datasets.doubts import dataset_doubts
+    from semgrid_edu.datasets.index import dataset_doubts
     from semgrid_edu.networks.weights import weights_doubts
     from semgrid_edu.training.crf import CRF_TRAINING
     from semgrid_edu.training.run import how_to_go_on
@@ -182,7 +182,7 @@ def evaluate(
     confusions: Annotated[Path | None, typer.Option(help="Takes each frame's confusion matrices, as .npz.")] = None,
 ) -> None:
     """Score a trained network and the baselines on the test frames."""
-    from semgrid_edu.datasets.doubts import dataset_doubts
+    from semgrid_edu.datasets.index import dataset_doubts
     from semgrid_edu.networks.weights import weights_doubts
     from semgrid_edu.workshop.scoring.evaluate import evaluate, scores_table
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from numpy.typing import NDArray
 from torch import nn
 
-from semgrid_edu.datasets.training_cache import SEED
+from semgrid_edu.datasets.training_arrays import SEED
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS, semantic_cells

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from semgrid_edu.datasets.cached_labels import POLICIES
+from semgrid_edu.datasets.label_policies import POLICIES
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import METRICS, class_iou, pixel_accuracy
 from semgrid_edu.workshop.paper.reports.accuracy_tables import TRUTHS, comparison

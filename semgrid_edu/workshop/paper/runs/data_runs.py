@@ -175,8 +175,8 @@ class ArraysRun(Run):
         DataError
             When the data set is missing or damaged.
         """
-        usual, made = architecture("segnet", self.preset), chosen_truth(self.truth)
-        return TrainingSet(self.data.dataset_dir(root), self.split, usual.grid, usual.image_size, made=made)
+        usual, truth = architecture("segnet", self.preset), chosen_truth(self.truth)
+        return TrainingSet(self.data.dataset_dir(root), self.split, usual.grid, usual.image_size, truth=truth)
 
 
 LABELS = "labels"

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from semgrid_edu.datasets.cached_labels import POLICIES
+from semgrid_edu.datasets.label_policies import POLICIES
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.workshop.paper.runs.data_runs import RECIPE_OF, ArraysRun, DataRun
 from semgrid_edu.workshop.paper.runs.score_runs import ScoreRun

@@ -20,7 +20,7 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.stage_models.crf import all_free, coupled, two_classes
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import versions
-from semgrid_edu.storage.reading import read_parts
+from semgrid_edu.storage.reading import resumable_json
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
 from semgrid_edu.workshop.studies.crf.brute_force import potts_messages, visit_labellings
 
@@ -99,7 +99,7 @@ def crf_coupling(
         name, value = ("seed", seed) if seed < 0 else ("draws", draws)
         raise ArgumentError(name, "a whole number from 0 up, and at least one draw", value)
     identity = {"seed": seed, "draws": draws, "couplings": list(couplings)}
-    done = read_parts(log, identity, "cases")
+    done = resumable_json(log, identity, "cases")
     for height, width, n in ((*grid, n) for grid in grids for n in classes):
         name = f"{height} x {width} cells, {n} classes"
         if name not in done:

@@ -19,7 +19,7 @@ from semgrid_edu.crf import CrfParams, mean_field, mean_field_accurate, mean_fie
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import versions
-from semgrid_edu.storage.reading import read_parts
+from semgrid_edu.storage.reading import resumable_json
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
 from semgrid_edu.workshop.studies.crf.crf_scenes import CrfProblem, crf_scenes
 from semgrid_edu.workshop.studies.crf.nystrom import mean_field_low_rank
@@ -88,7 +88,7 @@ def crf_error(log: str | Path, seed: int = 0, scenes: Mapping[str, Sequence[CrfP
     if seed < 0:
         raise ArgumentError("seed", "a whole number from 0 up", seed)
     identity = {"seed": seed, "iterations": list(ITERATIONS)}
-    done = read_parts(log, identity, "scenes")
+    done = resumable_json(log, identity, "scenes")
     for name, problems in (scenes or crf_scenes(seed)).items():
         if name not in done:
             done[name] = measure_scene(problems, seed, name)

@@ -22,7 +22,7 @@ from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.occupancy import track_drive
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import versions
-from semgrid_edu.storage.reading import read_parts
+from semgrid_edu.storage.reading import resumable_json
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.things.materials import class_of_kind
@@ -85,8 +85,8 @@ def truth_policies(
         raise ArgumentError("lidar", f"one of {', '.join(LIDARS)}", repr(lidar))
     trials, began = TRIALS if trials is None else trials, datetime.now(UTC)
     identity = _identity(seed, grid, lidar, trials)
-    done, sums = read_parts(log, identity, "drives"), read_parts(log, identity, "sums", list)
-    minutes = read_parts(log, identity, "minutes", float).get("of all drives", 0.0)
+    done, sums = resumable_json(log, identity, "drives"), resumable_json(log, identity, "sums", list)
+    minutes = resumable_json(log, identity, "minutes", float).get("of all drives", 0.0)
     with tqdm(total=drives, initial=len(done), desc="truth policies", unit="drive") as bar:
         for number in range(HELD_OUT + 1000 * seed + len(done), HELD_OUT + 1000 * seed + drives):
             counts = score_trials(trials, GRIDS[grid], number, lidar)
@@ -102,7 +102,7 @@ def truth_policies(
         **_legend(trials),
         "drives": done,
         "sums": sums,
-        "minutes": read_parts(log, identity, "minutes", float),
+        "minutes": resumable_json(log, identity, "minutes", float),
         "command": f"semgrid-edu reproduce truth-policies --seed {seed} --drives {drives} {choices}",
         "date": f"{began:%Y-%m-%d}",
         "versions": versions("numpy", "scipy", "numba", "embreex", "trimesh"),

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.special import softmax
 
 from semgrid_edu.datasets.samples import sample_frames
-from semgrid_edu.datasets.training_cache import resize_image
+from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.frame import Frame
 from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.pipeline import Stages

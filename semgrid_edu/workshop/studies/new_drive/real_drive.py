@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.samples import sample_drive, sample_image_stage, sample_weights
-from semgrid_edu.datasets.training_cache import resize_image
+from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.frame import Frame
 from semgrid_edu.metrics import total_variation
 from semgrid_edu.networks import load_net

@@ -7,10 +7,9 @@ import pytest
 import torch
 from tiny_drive import DATE, write_tiny_dataset
 
-from semgrid_edu.datasets import KittiRawDrive, training_cache
-from semgrid_edu.datasets import cached_labels as made_truth
-from semgrid_edu.datasets.cached_labels import MadeTruth
+from semgrid_edu.datasets import KittiRawDrive, cached_labels, training_cache
 from semgrid_edu.datasets.ground_truth import NO_FLAWS, TruthFlaws, TruthPolicy, lidar_truth
+from semgrid_edu.datasets.label_policies import LidarTruth
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
@@ -18,28 +17,12 @@ from semgrid_edu.occupancy import track_drive
 from semgrid_edu.storage.tensors import write_tensors
 
 SMALL = (6, 20)
-EXACT = MadeTruth(flaws=NO_FLAWS)
-
-
-class InThisProcess:
-    """Stands for a pool of worker processes, which take seconds to start."""
-
-    def __init__(self, _):
-        pass
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        pass
-
-    map = staticmethod(map)
+EXACT = LidarTruth(flaws=NO_FLAWS)
 
 
 @pytest.fixture(autouse=True)
 def _no_workers(monkeypatch):
-    for module in (made_truth, training_cache):
-        monkeypatch.setattr(module, "worker_pool", InThisProcess)
+    monkeypatch.setattr(training_cache, "WORKERS", 1)
 
 
 @pytest.fixture(scope="module")
@@ -47,8 +30,8 @@ def root(tmp_path_factory):
     return write_tiny_dataset(tmp_path_factory.mktemp("tiny"))
 
 
-def training(root, made=None, split="train"):
-    return TrainingSet(root, split, image_size=SMALL, made=made)
+def training(root, truth=None, split="train"):
+    return TrainingSet(root, split, image_size=SMALL, truth=truth)
 
 
 def test_the_truth_is_made_and_the_rest_stays(root):
@@ -67,29 +50,29 @@ def test_the_truth_is_made_and_the_rest_stays(root):
 
 def test_it_is_made_once(root, monkeypatch):
     first = training(root, EXACT).arrays["truth"]
-    monkeypatch.setattr(made_truth, "_make_grids", None)
+    monkeypatch.setattr(cached_labels, "in_each_drive", None)
     np.testing.assert_array_equal(training(root, EXACT).arrays["truth"], first)
     for other in (
         replace(EXACT, seed=1),
         replace(EXACT, policy=TruthPolicy(cleanup="none")),
-        MadeTruth(flaws=TruthFlaws()),
+        LidarTruth(flaws=TruthFlaws()),
     ):
         with pytest.raises(TypeError, match="NoneType"):
             training(root, other)
 
 
 def test_seed_policy_and_flaws_decide_it(root):
-    flawed = MadeTruth(TruthPolicy(past=2, movers="carved"), TruthFlaws(rotation=2.0))
+    flawed = LidarTruth(TruthPolicy(past=2, movers="carved"), TruthFlaws(rotation=2.0))
     one, other = (training(root, made).arrays["truth"] for made in (flawed, replace(flawed, seed=1)))
     assert (one != other).any()
-    for path in root.glob("cache/*/train/made-*"):
+    for path in root.glob("cache/*/train/labels-*"):
         path.unlink()
     np.testing.assert_array_equal(training(root, flawed).arrays["truth"], one)
 
 
 def test_a_damaged_file_is_named(root):
     training(root, EXACT, "test")
-    (path,) = root.glob("cache/*/test/made-*.safetensors")
+    (path,) = root.glob("cache/*/test/labels-*.safetensors")
     write_tensors(path, {"other": torch.zeros(1)})
     with pytest.raises(DataError, match="delete the file to make it anew"):
         training(root, EXACT, "test")
@@ -97,4 +80,4 @@ def test_a_damaged_file_is_named(root):
 
 def test_a_negative_seed_is_refused():
     with pytest.raises(ArgumentError, match="seed"):
-        MadeTruth(seed=-1)
+        LidarTruth(seed=-1)

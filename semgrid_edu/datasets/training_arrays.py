@@ -1,0 +1,129 @@
+"""The arrays that a network learns from: images with fewer pixels, occupancy, and the truth of each cell (section 4.1).
+
+`training_cache` keeps them until the code behind this module changes, so nothing stands here that doesn't make them.
+"""
+
+from collections.abc import Sequence
+from itertools import tee
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from semgrid_edu.datasets.grid_truth import fill_unlabelled
+from semgrid_edu.datasets.readers.frames import LabelledDrive
+from semgrid_edu.datasets.readers.project_lidar import seen_returns
+from semgrid_edu.errors import DataError
+from semgrid_edu.frame import Frame
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import CmcdotParams, track_drive
+
+SEED = 0
+"""Seed for the particles of the occupancy filter, in each drive."""
+
+
+class ArrayRecipe(NamedTuple):
+    """How the arrays are made.
+
+    Parameters
+    ----------
+    spec : GridSpec
+        The grid of occupancy and truth.
+    image_size : (int, int)
+        Height and width of the resized images, pixels.
+    params : CmcdotParams
+        Parameters of the occupancy filter.
+    """
+
+    spec: GridSpec
+    image_size: tuple[int, int]
+    params: CmcdotParams
+
+
+def drive_arrays(drive: LabelledDrive, labelled: Sequence[int], recipe: ArrayRecipe) -> list[dict[str, NDArray]]:
+    """Run the occupancy filter over a drive, and make the arrays of its labelled frames.
+
+    Parameters
+    ----------
+    drive : LabelledDrive
+        The drive.
+    labelled : sequence of int
+        Numbers of its labelled frames.
+    recipe : ArrayRecipe
+        Grid, image size and occupancy filter.
+
+    Returns
+    -------
+    list of dict of str to array
+        For each labelled frame "image" (3, h, w) uint8, "labels" (h, w) uint8, "occupancy" (4, H, W) float32, "truth"
+        (H, W) uint8, and "return_pixels" and "return_cells" from `seen_returns`.
+
+    Raises
+    ------
+    DataError
+        When a file of the drive is missing or damaged, or a labelled frame has no image or no labels.
+    """
+    frames, scans = tee(drive[k] for k in range(max(labelled) + 1))
+    beliefs = track_drive(scans, recipe.spec, recipe.params, SEED)
+    arrays = {
+        k: _frame_arrays(drive, k, frame, belief.probability, recipe)
+        for k, (frame, belief) in enumerate(zip(frames, beliefs, strict=True))
+        if k in labelled
+    }
+    return [arrays[k] for k in labelled]
+
+
+def _frame_arrays(
+    drive: LabelledDrive, k: int, frame: Frame, occupancy: NDArray, recipe: ArrayRecipe
+) -> dict[str, NDArray]:
+    """Make the arrays of one frame."""
+    if frame.labels is None or frame.image is None:
+        missing = "image" if frame.image is None else "labels"
+        raise DataError(drive.name, f"image and labels of the frame {k}, which is listed as labelled", f"no {missing}")
+    pixels, cells = seen_returns(frame, recipe.spec, recipe.image_size)
+    return {
+        "image": resize_image(frame.image, recipe.image_size).transpose(2, 0, 1),
+        "labels": resize_labels(frame.labels.image, recipe.image_size),
+        "occupancy": occupancy.astype(np.float32),
+        "truth": fill_unlabelled(drive.truth(k, recipe.spec), occupancy, frame.labels.label_set),
+        "return_pixels": pixels,
+        "return_cells": cells,
+    }
+
+
+def resize_image(image: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
+    """Average an image over larger pixels; its calibration becomes `camera.resized(size)`.
+
+    Parameters
+    ----------
+    image : (h, w, 3) uint8
+        RGB.
+    size : (int, int)
+        The new height and width, pixels.
+
+    Returns
+    -------
+    (*size, 3) uint8
+    """
+    return np.asarray(Image.fromarray(image).resize(size[::-1], Image.Resampling.BOX))
+
+
+def resize_labels(labels: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
+    """Give each larger pixel the class that covers most of it; between two equal shares the smaller number wins.
+
+    Parameters
+    ----------
+    labels : (h, w) uint8
+        The class of each pixel; 255 (unlabelled) counts as a class.
+    size : (int, int)
+        The new height and width, pixels.
+
+    Returns
+    -------
+    (*size,) uint8
+    """
+    classes = np.unique(labels)
+    masks = (Image.fromarray((labels == c).astype(np.float32)) for c in classes)
+    shares = [np.asarray(mask.resize(size[::-1], Image.Resampling.BOX)) for mask in masks]
+    return classes[np.argmax(shares, axis=0)]

@@ -1,0 +1,100 @@
+"""A hash of the code behind a result: when it changes, the result that was kept is stale."""
+
+import ast
+import hashlib
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+"""The folder that holds the package."""
+
+
+def code_hash(modules: Iterable[Path], root: Path = ROOT) -> str:
+    """Hash what modules do, and all that they import of the package. Comments and docstrings don't count.
+
+    Parameters
+    ----------
+    modules : iterable of Path
+        The files of the modules that make the result.
+    root : Path
+        The folder that holds the package.
+
+    Returns
+    -------
+    str
+        SHA-256, hexadecimal. It is another one under a Python whose syntax trees are printed otherwise.
+    """
+    code = sorted(map(ast.dump, _trees(modules, root).values()))
+    return hashlib.sha256("\n".join(code).encode()).hexdigest()
+
+
+def import_closure(modules: Iterable[Path], root: Path = ROOT) -> list[Path]:
+    """Follow the import statements of modules, and of what they import, through the package.
+
+    A name that a package passes on in its `__init__.py` leads to the module that defines it, so that one function of
+    `semgrid_edu.occupancy` doesn't bring all of its modules. What other packages are imported isn't followed.
+
+    Parameters
+    ----------
+    modules : iterable of Path
+        The files to begin with; they may lie outside of the package.
+    root : Path
+        The folder that holds the package.
+
+    Returns
+    -------
+    list of Path
+        The files, those of `modules` included, in alphabetical order.
+    """
+    return sorted(_trees(modules, root))
+
+
+def _trees(modules: Iterable[Path], root: Path) -> dict[Path, ast.Module]:
+    """Return the syntax trees of modules and of all that they import, without docstrings."""
+    trees: dict[Path, ast.Module] = {}
+    waiting = list(modules)
+    while waiting:
+        path = waiting.pop()
+        if path not in trees:
+            trees[path] = _without_docstrings(ast.parse(path.read_text(encoding="utf-8")))
+            waiting += _imported(trees[path], root)
+    return trees
+
+
+def _imported(tree: ast.Module, root: Path) -> Iterator[Path]:
+    """Yield the files of the package that import statements lead to."""
+    for node in ast.walk(tree):
+        names = []
+        if isinstance(node, ast.Import):
+            names = [alias.name.rpartition(".")[::2] for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            names = [(node.module, alias.name) for alias in node.names]
+        yield from filter(None, (_origin(module, name, root) for module, name in names))
+
+
+def _origin(module: str, name: str, root: Path) -> Path | None:
+    """Return the file that a name comes from which is imported from a module; None outside of the package."""
+    place = root.joinpath(*module.split("."))
+    init = place / "__init__.py"
+    for path in (place / f"{name}.py", place / name / "__init__.py", place.with_suffix(".py")):
+        if path.is_file():
+            return path
+    if not init.is_file():
+        return None
+    for node in ast.walk(ast.parse(init.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and any((alias.asname or alias.name) == name for alias in node.names):
+            return _origin(node.module, name, root)
+    return init
+
+
+def _without_docstrings(tree: ast.Module) -> ast.Module:
+    """Drop every string that stands alone, which is how constants are described as well."""
+    for node in ast.walk(tree):
+        for field in ("body", "orelse", "finalbody"):
+            if isinstance(statements := getattr(node, field, None), list):
+                setattr(node, field, [one for one in statements if not _is_docstring(one)])
+    return tree
+
+
+def _is_docstring(node: ast.stmt) -> bool:
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
