@@ -10,7 +10,7 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from semgrid_edu.crf.naive import NEVER, update
+from semgrid_edu.crf.naive import NEVER, mean_field_update
 from semgrid_edu.crf.pair_window import Pairs, bilateral_pairs, spatial_pairs
 from semgrid_edu.crf.params import CrfParams, check_stop
 from semgrid_edu.errors import ArgumentError, DataError
@@ -151,7 +151,7 @@ class CrfLayer(nn.Module):
         log_Q = (-phi).log_softmax(dim=1)
         for _ in range(self.iterations):
             cost = torch.einsum("lm,bmhw->blhw", mu, pairs.sums(log_Q.exp()))
-            log_Q = update(log_Q, phi, cost, step).log_softmax(dim=1)
+            log_Q = mean_field_update(log_Q, phi, cost, step).log_softmax(dim=1)
         return log_Q
 
     def pairs(self, occupancy: Tensor) -> Pairs:

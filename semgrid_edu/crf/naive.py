@@ -1,6 +1,6 @@
 """Mean field with every pair of cells written out, all cells at once or one by one (eq. (3), (4)); for small grids.
 
-`update` is the one rule of mean field: the accurate version, the trainable layer and the story of a cell use it too.
+`mean_field_update` is the one rule of mean field: the accurate version and the trainable layer use it too.
 """
 
 from collections.abc import Callable, Iterator
@@ -95,7 +95,7 @@ def mean_field_updates(unary: ArrayLike, values: ArrayLike, params: CrfParams) -
         yield Q.reshape(unary.shape)
 
 
-def update(log_Q: Any, phi: Any, disagreement: Any, part: Any = 1.0) -> Any:
+def mean_field_update(log_Q: Any, phi: Any, disagreement: Any, part: Any = 1.0) -> Any:
     """Return log Q_i(l) after an update, but for a number in each cell that the soft-max takes off again.
 
         log Q_i(l) <- (1 - p_i) log Q_i(l) + p_i (-phi_i(l) - sum_{j != i} k_ij (1 - Q_j(l)))
@@ -120,7 +120,7 @@ def update(log_Q: Any, phi: Any, disagreement: Any, part: Any = 1.0) -> Any:
 def all_updates(
     phi: NDArray[np.floating], disagreement: Callable[[NDArray], NDArray], part: NDArray[np.floating]
 ) -> Iterator[NDArray[np.floating]]:
-    """Yield Q at first and after each `update` of all cells at once, without end.
+    """Yield Q at first and after each `mean_field_update` of all cells at once, without end.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def all_updates(
     while True:
         Q = np.exp(log_Q)
         yield Q
-        log_Q = log_softmax(update(log_Q, phi, disagreement(Q), part), axis=0)
+        log_Q = log_softmax(mean_field_update(log_Q, phi, disagreement(Q), part), axis=0)
 
 
 def above_best(unary: NDArray[np.floating]) -> NDArray[np.floating]:
@@ -250,5 +250,5 @@ def mean_field_sequential(
     for _ in range(iterations):
         for i in range(phi.shape[1]):
             disagreement = (1 - np.exp(log_Q)) @ weights[i]
-            log_Q[:, i] = log_softmax(update(log_Q[:, i], phi[:, i], disagreement))
+            log_Q[:, i] = log_softmax(mean_field_update(log_Q[:, i], phi[:, i], disagreement))
     return np.exp(log_Q).reshape(unary.shape)

@@ -14,7 +14,7 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.workshop.attic.low_rank import LowRankGaussian, mean_field_low_rank
 from semgrid_edu.workshop.commands.main import run
 from semgrid_edu.workshop.studies.crf import crf_error as study
-from semgrid_edu.workshop.studies.crf.crf_scenes import CROP, N_CROPS, CrfProblem, crops
+from semgrid_edu.workshop.studies.crf.crf_error import CROP, N_CROPS, CrfProblem, crops
 
 
 def problem(seed=0, shape=(6, 7)):

@@ -1,11 +1,7 @@
-"""A search for the CRF's parameters on drives that neither training nor test has seen (section 3.5, claim of 4.3).
-
-Trials of the search for the CRF's parameters: made, valued by each objective, and kept on disk (section 3.5).
-"""
+"""A search for the CRF's parameters on drives that neither training nor test has seen (section 3.5, claim of 4.3)."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
 
@@ -20,7 +16,7 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.networks import load_net
 from semgrid_edu.storage.files import sha256, write_json
-from semgrid_edu.storage.provenance import FILE_NAME, short_path, versions
+from semgrid_edu.storage.provenance import FILE_NAME, made_by, short_path
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.workshop.scoring.evaluate import scores, scores_table
 from semgrid_edu.workshop.studies.crf.crf_scores import (
@@ -29,7 +25,6 @@ from semgrid_edu.workshop.studies.crf.crf_scores import (
     compare_on_test,
     gains_text,
     grid_outputs,
-    outputs_at,
     refined_confusions,
     refined_grids,
     refuse_known_drives,
@@ -42,30 +37,6 @@ class accuracy is at least that of the network without one."""
 
 Trial = dict[str, object]
 """One trial: "params" by name, "scores" by cells and metric as in `Scores`, and the "seconds" that it took."""
-
-
-def next_params(trials: Sequence[Trial], unrefined: dict, cell: float, seed: int) -> CrfParams:
-    """Return the parameters to try next: the defaults first, then those of `next_point`.
-
-    Parameters
-    ----------
-    trials : sequence of dict
-        The trials so far.
-    unrefined : dict
-        Scores of the network without CRF.
-    cell : float
-        Side of a cell, metres.
-    seed : int
-        Seed of the search.
-
-    Returns
-    -------
-    CrfParams
-    """
-    if not trials:
-        return CrfParams.for_cells(cell)
-    points = [point_of(CrfParams(**trial["params"]), cell) for trial in trials]
-    return params_at(next_point(points, objective_values(trials, unrefined), seed), cell)
 
 
 def run_trial(calibrated: GridOutputs, params: CrfParams, label_set: LabelSet) -> Trial:
@@ -156,16 +127,12 @@ def read_trials(log: str | Path, identity: dict) -> list[Trial]:
     if not path.exists():
         return []
     content = read_json(path)
-    try:
-        found, trials = {name: content[name] for name in identity}, content["trials"]
-        for trial in trials:
-            CrfParams(**trial["params"])
-            _ = [float(trial["scores"]["all"][name]) for name in OBJECTIVES[:2]], float(trial["seconds"])
-    except (ValueError, KeyError, TypeError) as error:
-        raise DataError(path, "the trials of a search, or no file", f"something else: {error!r}") from error
+    found = {name: content.get(name) for name in identity}
+    if not isinstance(content.get("trials"), list):
+        raise DataError(path, "the trials of a search, or no file", f"something else: {repr(content)[:200]}")
     if found != identity:
         raise DataError(path, f"trials of the search {identity}", f"{found}: choose another file")
-    return trials
+    return content["trials"]
 
 
 def search_crf(
@@ -173,6 +140,7 @@ def search_crf(
     dataset_dir: str | Path,
     weights: str | Path,
     log: str | Path,
+    *,
     seed: int = 0,
     n_trials: int = 200,
 ) -> dict[str, object]:
@@ -226,15 +194,20 @@ def search_crf(
     identity = _identity(validation_dir, dataset_dir, weights, seed)
     trials, network = read_trials(log, identity), grid_outputs(load_net(weights, validation.camera), validation)
     temperature = fit_temperature(network.columns, network.truth)
-    calibrated, cell = outputs_at(network, temperature), validation.spec.cell
+    calibrated, cell = network.at(temperature), validation.spec.cell
     unrefined = validation_scores(calibrated, None, validation.label_set)
     with tqdm(total=n_trials, initial=len(trials), desc="search", unit="trial") as bar:
         while len(trials) < n_trials:
-            params = next_params(trials, unrefined, cell, seed)
+            points = [point_of(CrfParams(**trial["params"]), cell) for trial in trials]
+            params = CrfParams.for_cells(cell)  # the first trial
+            if trials:
+                params = params_at(next_point(points, objective_values(trials, unrefined), seed), cell)
             trials.append(run_trial(calibrated, params, validation.label_set))
             write_json(log, identity | {"trials": trials})
             bar.update()
     values = objective_values(trials, unrefined)
+    data, test = (Path(folder).resolve().name for folder in (validation_dir, dataset_dir))
+    command = f"semgrid-edu search-crf --data {data} --test {test} --weights {short_path(weights)}"
     chosen = {name: int(k) for name, k in zip(OBJECTIVES, values.argmax(axis=0), strict=True)}
     params = {name: CrfParams(**trials[k]["params"]) for name, k in chosen.items()}
     return identity | {
@@ -246,10 +219,8 @@ def search_crf(
         "chosen": {name: {"trial": k, **trials[k]} for name, k in chosen.items()},
         "pareto": pareto_front(values[:, :2]).tolist(),
         "test": compare_on_test(dataset_dir, weights, temperature, params),
-        "command": _command(validation_dir, dataset_dir, weights, seed, n_trials),
-        "date": f"{datetime.now(UTC):%Y-%m-%d}",
+        **made_by(f"{command} --seed {seed} --trials {n_trials}", "numpy", "torch", "numba", "scipy"),
         "minutes": round(sum(trial["seconds"] for trial in trials) / 60, 1),
-        "versions": versions("numpy", "torch", "numba", "scipy"),
         "trials": trials,
     }
 
@@ -291,8 +262,3 @@ def _identity(validation_dir: str | Path, dataset_dir: str | Path, weights: str 
     trained_on = read_json(record).get("dataset") if record.exists() else None
     used = {"file": short_path(weights), "sha256": sha256(weights), "trained on": trained_on}
     return named | {"weights": used, "seed": seed}
-
-
-def _command(validation_dir: str | Path, dataset_dir: str | Path, weights: str | Path, seed: int, n_trials: int) -> str:
-    data = f"--data {Path(validation_dir).resolve().name} --test {Path(dataset_dir).resolve().name}"
-    return f"semgrid-edu search-crf {data} --weights {short_path(weights)} --seed {seed} --trials {n_trials}"
