@@ -63,19 +63,12 @@ def mean_field_naive(
 def mean_field_updates(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> Iterator[NDArray[np.float64]]:
     """Yield what `mean_field_naive` holds at first and after each update, without end.
 
-    Parameters
-    ----------
-    unary : (C, H, W) float
-        phi_u, see `unary_from_probability`; inf where a class is impossible.
-    values : (4, H, W) float
-        o_i, the occupancy probabilities of each cell: they sum to one.
-    params : CrfParams
-        Weights, widths and normalisation.
+    Parameters are those of `mean_field_naive`.
 
     Yields
     ------
     (C, H, W) float64
-        Q, the distribution over classes in each cell.
+        Q.
 
     Examples
     --------
@@ -144,7 +137,7 @@ def all_updates(
 
 
 def above_best(unary: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Return how far each cost lies above that of the cell's best class.
+    """Return how far each cost lies above that of the cell's best class: the unary term but for a number in each cell.
 
     Parameters
     ----------
@@ -154,7 +147,7 @@ def above_best(unary: NDArray[np.floating]) -> NDArray[np.floating]:
     Returns
     -------
     (C, H W) float
-        The same unary term but for a number in each cell: finite, at most `NEVER`.
+        Finite, at most `NEVER`.
     """
     return np.minimum(unary - unary.min(axis=0), NEVER).reshape(len(unary), -1)
 
@@ -221,27 +214,12 @@ def mean_field_sequential(
 
     Each update minimises the free energy over the distribution of one cell, so none can raise it, and nothing has to be
     damped. But cells have to wait for each other.
-
-    Parameters
-    ----------
-    unary : (C, H, W) float
-        phi_u, see `unary_from_probability`; inf where a class is impossible.
-    values : (4, H, W) float
-        o_i, the occupancy probabilities of each cell: they sum to one.
-    params : CrfParams
-        Weights, widths and normalisation.
-    iterations : int
-        How often each cell is updated.
+    Parameters are those of `mean_field_naive`, and so are errors.
 
     Returns
     -------
     (C, H, W) float64
         Q, the distribution over classes in each cell.
-
-    Raises
-    ------
-    ArgumentError
-        When shapes don't fit, numbers aren't what they should be, or the grid has more than `MAX_CELLS` cells.
     """
     unary, values = check_inputs(unary, values)
     check_stop(iterations)

@@ -9,7 +9,6 @@ drive, on the compact grid and on crops of the paper's.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import islice
 from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
@@ -18,13 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
-from semgrid_edu.crf import (
-    CrfParams,
-    mean_field,
-    mean_field_accurate,
-    mean_field_naive,
-    unary_from_log_probability,
-)
+from semgrid_edu.crf import CrfParams, mean_field, mean_field_accurate, mean_field_naive, unary_from_log_probability
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
@@ -39,7 +32,7 @@ from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
 ITERATIONS = (1, 2, 3, 5, 10, 20, 50, 100)
 """Numbers of updates at which each way is timed and compared."""
 MOST, TOLERANCE = 1000, 1e-5
-"""Converged: no update changes a probability by more than this, or so many updates have been made."""
+"""Mean field has converged when no update changes a probability by more than the tolerance, or after 1000 updates."""
 RANKS = (64, 256, 512)
 """Numbers of landmarks of the low-rank kernel."""
 ROUNDS, ENOUGH = 3, 1.0
@@ -94,8 +87,8 @@ def crf_scenes(seed: int = 0) -> dict[str, list[CrfProblem]]:
     return {"compact grid": [compact], "64 x 64 crops": crops(paper)}
 
 
-def sample_problem(spec: GridSpec, seed: int = 0, frame: int = FRAME) -> CrfProblem:
-    """Return what the shipped SegNet and the filter make of a frame of the shipped drive.
+def sample_problem(spec: GridSpec, seed: int = 0) -> CrfProblem:
+    """Return what the shipped SegNet and the filter make of frame `FRAME` of the shipped drive and all before it.
 
     Parameters
     ----------
@@ -103,17 +96,15 @@ def sample_problem(spec: GridSpec, seed: int = 0, frame: int = FRAME) -> CrfProb
         The grid.
     seed : int
         Seed for the filter's particles.
-    frame : int
-        Number of the frame; the filter also sees all frames before.
     """
     drive = sample_drive()
     trained = load_net(sample_weights(), drive.camera)
     net = build_net(replace(trained.need_architecture(), grid=spec), drive.camera)
     net.load_state_dict(trained.state_dict())
     stages = Stages.of(net.eval(), seed=seed)
-    for belief in stages.track((drive[k] for k in range(frame + 1)), spec):
-        o = belief.probability
-    image = network_image(drive[frame], trained.need_architecture().image_size).numpy()
+    *_, belief = stages.track((drive[k] for k in range(FRAME + 1)), spec)
+    o = belief.probability
+    image = network_image(drive[FRAME], trained.need_architecture().image_size).numpy()
     log_g = stages.fuse(stages.sample(stages.segment(image)), o)
     return CrfProblem(unary_from_log_probability(log_g), o, CrfParams.for_cells(spec.cell))
 
@@ -128,10 +119,8 @@ def crops(problem: CrfProblem) -> list[CrfProblem]:
     """
     _, height, width = problem.unary.shape
     left = (width - CROP) // 2
-    return [
-        CrfProblem(*(a[:, row - CROP : row, left : left + CROP] for a in problem[:2]), problem.params)
-        for row in islice(range(height, 0, -CROP), N_CROPS)
-    ]
+    squares = [np.s_[:, row - CROP : row, left : left + CROP] for row in height - CROP * np.arange(N_CROPS)]
+    return [CrfProblem(problem.unary[square], problem.values[square], problem.params) for square in squares]
 
 
 def crf_ways(seed: int = 0) -> dict[str, Way]:
@@ -199,7 +188,7 @@ def measure_scene(problems: Sequence[CrfProblem], seed: int = 0, name: str = "")
     seed : int
         Seed for the landmarks of the low-rank kernels.
     name : str
-        What the progress bar says.
+        What the progress bars say.
 
     Returns
     -------
@@ -209,14 +198,10 @@ def measure_scene(problems: Sequence[CrfProblem], seed: int = 0, name: str = "")
         Errors are those of `distance`. "settled", a list of one, is the kernel error when both have converged.
     """
     ways, found = crf_ways(seed), []
-    with tqdm(total=len(problems) * len(ways), desc=name, unit="way") as bar:
-        for problem in problems:
-            runs = {}
-            for way, infer in ways.items():
-                runs[way] = _run(infer, problem)
-                bar.update()
-            exact = next(iter(runs.values()))
-            found.append({way: _errors(run, exact) for way, run in runs.items()})
+    for problem in problems:
+        runs = {way: _run(infer, problem) for way, infer in tqdm(ways.items(), desc=name, unit="way")}
+        exact = next(iter(runs.values()))
+        found.append({way: _errors(run, exact) for way, run in runs.items()})
     merged = {way: _merged([one[way] for one in found]) for way in ways}
     shape = list(problems[0].unary.shape)
     return {"shape": shape, "grids": len(problems), "reference": next(iter(ways)), "ways": merged}
@@ -232,7 +217,7 @@ def distance(found: NDArray, reference: NDArray) -> dict[str, float]:
 
     Returns
     -------
-    dict
+    dict of str to float
         "mean" and "max" over the cells of the total variation, 0..1, and "labels", the share of the cells whose most
         probable classes differ.
     """
@@ -243,8 +228,7 @@ def distance(found: NDArray, reference: NDArray) -> dict[str, float]:
 
 def _run(infer: Way, problem: CrfProblem) -> dict:
     """Return seconds and Q at each number of updates, and the converged Q."""
-    corner = CrfProblem(*(a[:, :4, :4] for a in problem[:2]), problem.params)
-    infer(*corner, 1, 0.0)  # compiles
+    infer(problem.unary[:, :4, :4], problem.values[:, :4, :4], problem.params, 1, 0.0)  # compiles
     seconds, Q = zip(*(_timed(lambda n=n: infer(*problem, n, 0.0)) for n in ITERATIONS), strict=True)
     return {"seconds": seconds, "Q": Q, "settled": infer(*problem, MOST, TOLERANCE)}
 
