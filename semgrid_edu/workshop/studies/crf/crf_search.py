@@ -1,7 +1,6 @@
 """A search for the CRF's parameters on drives that neither training nor test has seen (section 3.5, claim of 4.3)."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from time import perf_counter
 
@@ -39,48 +38,23 @@ Trial = dict[str, object]
 """One trial: "params" by name, "scores" by cells and metric as in `Scores`, and the "seconds" that it took."""
 
 
-def run_trial(calibrated: GridOutputs, params: CrfParams, label_set: LabelSet) -> Trial:
+def run_trial(calibrated: GridOutputs, params: CrfParams | None, label_set: LabelSet) -> Trial:
     """Refine every grid with these parameters, and score the result.
 
     Parameters
     ----------
     calibrated : GridOutputs
         The network's grids.
-    params : CrfParams
-        Parameters of the CRF.
-    label_set : LabelSet
-        The classes.
-
-    Returns
-    -------
-    dict
-        A trial.
-    """
-    began = perf_counter()
-    found = validation_scores(calibrated, params, label_set)
-    chosen = {name: value for name, value in asdict(params).items() if name in FACTORS}
-    return {"params": chosen, "scores": found, "seconds": round(perf_counter() - began, 2)}
-
-
-def validation_scores(outputs: GridOutputs, params: CrfParams | None, label_set: LabelSet) -> dict[str, dict]:
-    """Return the metrics of the refined grids.
-
-    Parameters
-    ----------
-    outputs : GridOutputs
-        The network's grids.
     params : CrfParams or None
         Parameters of the CRF; None for no CRF.
     label_set : LabelSet
         The classes.
-
-    Returns
-    -------
-    dict of str to dict
-        Values from 0 to 1, by cells ("all" or "semantic") and metric.
     """
-    confusion = refined_confusions(outputs, refined_grids(outputs, params)).sum(axis=0)
-    return scores({"refined": confusion}, label_set)["refined"]
+    began = perf_counter()
+    confusion = refined_confusions(calibrated, refined_grids(calibrated, params)).sum(axis=0)
+    found = scores({"refined": confusion}, label_set)["refined"]
+    tried = {name: getattr(params, name) for name in FACTORS} if params else {}
+    return {"params": tried, "scores": found, "seconds": round(perf_counter() - began, 2)}
 
 
 def objective_values(trials: Sequence[Trial], unrefined: dict) -> NDArray[np.float64]:
@@ -195,7 +169,7 @@ def search_crf(
     trials, network = read_trials(log, identity), grid_outputs(load_net(weights, validation.camera), validation)
     temperature = fit_temperature(network.columns, network.truth)
     calibrated, cell = network.at(temperature), validation.spec.cell
-    unrefined = validation_scores(calibrated, None, validation.label_set)
+    unrefined = run_trial(calibrated, None, validation.label_set)["scores"]
     with tqdm(total=n_trials, initial=len(trials), desc="search", unit="trial") as bar:
         while len(trials) < n_trials:
             points = [point_of(CrfParams(**trial["params"]), cell) for trial in trials]
