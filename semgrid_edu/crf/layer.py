@@ -20,7 +20,7 @@ from semgrid_edu.storage.reading import parse_json
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
 
 REACH = 4
-"""Half the side of the window in sigma_alpha, unless told otherwise: a pair beyond has at most exp(-8) = 0.0003 of the
+"""Half the side of the window in sigma_alpha, by default: a pair beyond has at most exp(-8) = 0.0003 of the
 weight of neighbours."""
 
 
@@ -50,7 +50,7 @@ class CrfLayer(nn.Module):
     iterations : int
         How often all cells are updated.
     learn_compatibility : bool
-        Whether mu learns. If not, it stays the Potts model, and `params` tells all there is to know.
+        Whether mu learns. If not, it stays the Potts model, and `params` describes the whole layer.
 
     Raises
     ------

@@ -93,7 +93,7 @@ def fit_temperature(log_probability: ArrayLike, truth: ArrayLike, ignore: int = 
     ------
     ArgumentError
         When the shapes don't fit, a label is no class, no cell is labelled, a probability is 0, or the best
-        temperature lies outside: when every cell is right, or log p tells nothing about the truth.
+        temperature lies outside: when every cell is right, or log p has nothing to do with the truth.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What a check of the CRF's input found, in the words in which one would search for it: those of findings.toml."""
+"""What a check of the CRF's input found, in the words in which one would search for it (findings.toml)."""
 
 import textwrap
 import tomllib

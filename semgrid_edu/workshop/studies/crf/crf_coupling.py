@@ -85,8 +85,8 @@ def crf_coupling(
     Returns
     -------
     dict
-        "cases": by name from `measure_coupling`; "symmetric": from `symmetric_case`; and all that made them. JSON can
-        hold it.
+        "cases": by name from `measure_coupling`; "symmetric": from `symmetric_case`; with seed, command and
+        versions. JSON can hold it.
 
     Raises
     ------

@@ -39,7 +39,7 @@ ROUNDS, ENOUGH = 3, 1.0
 """Calls that take less than this many seconds in all are repeated up to three times; the shortest time counts."""
 
 ERRORS = ("total", "kernel", "convergence")
-"""What is told apart: the distance from the exact kernel, converged; and its two parts."""
+"""The distance from the converged result with the exact kernel, and its two parts."""
 
 Way = Callable[[NDArray, NDArray, CrfParams, int, float], NDArray]
 """A way to run mean field: takes unary, values, params, iterations and tolerance, and returns Q."""
@@ -155,7 +155,7 @@ def crf_error(log: str | Path, seed: int = 0, scenes: Mapping[str, Sequence[CrfP
     Returns
     -------
     dict
-        "scenes": by name from `measure_scene`; and all that made them. JSON can hold it.
+        "scenes": by name from `measure_scene`; with seed, command and versions. JSON can hold it.
 
     Raises
     ------
@@ -195,7 +195,7 @@ def measure_scene(problems: Sequence[CrfProblem], seed: int = 0, name: str = "")
     dict
         "shape" (C, H, W), "grids" (their number), "reference" (the way with the exact kernel) and "ways": for each way
         the "seconds", and the "total", "kernel" and "convergence" errors, a list each, as long as `ITERATIONS`.
-        Errors are those of `distance`. "settled", a list of one, is the kernel error when both have converged.
+        Errors come from `distance`. "settled", a list of one, is the kernel error when both have converged.
     """
     ways, found = crf_ways(seed), []
     for problem in problems:

@@ -120,11 +120,11 @@ def search_crf(
 ) -> dict[str, object]:
     """Calibrate a network, search the CRF's parameters, and score what was chosen on the test split.
 
-    Temperature and parameters are chosen on drives of their own. On the drives that it was trained on a network is
-    surer, and more often right, than anywhere else: a temperature fitted there would be too low, and a CRF chosen there
-    would have little to repair. Holding drives back from training would mean to train each network anew on fewer. New
-    drives of the same simulator cost minutes (`semgrid-edu data make validation`) and leave the networks, and all
-    scores in docs/results, as they are. A data set that has a split "validation" of its own serves as well.
+    Temperature and parameters are chosen on drives of their own. On the drives that it was trained on, a network is
+    more confident and more often right than anywhere else: a temperature fitted there would be too low, and a CRF
+    chosen there would have little to repair. Holding drives back would mean training each network again on fewer
+    drives. New drives of the same simulator cost minutes (`semgrid-edu data make validation`) and leave the networks,
+    and all scores in docs/results, as they are. A data set that has a split "validation" of its own serves as well.
 
     The temperature comes first, by likelihood alone (`fit_temperature`), and stays. Then the two weights and three
     widths are searched (`next_point`). Test frames are looked at once, at the end.
@@ -150,7 +150,7 @@ def search_crf(
     dict
         "temperature", "calibration", "unrefined" (validation scores without CRF), "chosen" (a trial for each of
         `OBJECTIVES`), "pareto" (numbers of the trials that no other one beats in both accuracies), "test" (from
-        `compare_on_test`), "trials", and all that made them. JSON can hold it.
+        `compare_on_test`), "trials", and data, weights, command and versions. JSON can hold it.
 
     Raises
     ------

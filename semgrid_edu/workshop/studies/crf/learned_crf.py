@@ -172,7 +172,7 @@ def compare_learned_crfs(
     Returns
     -------
     dict
-        What `scores_on_test` returns, "learnt" (`learnt_values` of each CRF), and all that made them. JSON can hold it.
+        What `scores_on_test` returns, "learnt" (`learnt_values` of each CRF), and how it was made. JSON can hold it.
 
     Raises
     ------
