@@ -200,12 +200,8 @@ def symmetric_case(couplings: Sequence[float] = FINE, shape: tuple[int, int] = (
         cell, (n,), with "exact" first, and as "mean field, other side" and so on with the tilt towards class 1.
     """
     middle, values = (shape[0] // 2, shape[1] // 2), all_free(shape)
-    ways: dict[str, Inference] = {
-        "exact": lambda *crf: visit_labellings(*crf).marginals,
-        "mean field, 10 updates": mean_field_naive,
-        "mean field, converged": _settled,
-        "loopy sum-product": potts_sum_product,
-    }
+    ways: dict[str, Inference] = {"exact": lambda *crf: visit_labellings(*crf).marginals}
+    ways |= {way: WAYS[way] for way in ("mean field, 10 updates", "mean field, converged", "loopy sum-product")}
     probability = {}
     for (side, p), (way, infer) in product({"": tilt, ", other side": 1 - tilt}.items(), ways.items()):
         found = [infer(two_classes(np.full(shape, p)), values, coupled(coupling)) for coupling in couplings]

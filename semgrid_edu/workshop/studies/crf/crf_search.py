@@ -57,6 +57,26 @@ def run_trial(calibrated: GridOutputs, params: CrfParams | None, label_set: Labe
     return {"params": tried, "scores": found, "seconds": round(perf_counter() - began, 2)}
 
 
+def next_params(trials: Sequence[Trial], unrefined: dict, cell: float, seed: int) -> CrfParams:
+    """Return the parameters to try next: the defaults first, then those at the `next_point`.
+
+    Parameters
+    ----------
+    trials : sequence of dict
+        The trials so far.
+    unrefined : dict
+        Scores of the network without CRF.
+    cell : float
+        Side of a cell, metres.
+    seed : int
+        Seed of the search.
+    """
+    if not trials:
+        return CrfParams.for_cells(cell)
+    points = [point_of(CrfParams(**trial["params"]), cell) for trial in trials]
+    return params_at(next_point(points, objective_values(trials, unrefined), seed), cell)
+
+
 def objective_values(trials: Sequence[Trial], unrefined: dict) -> NDArray[np.float64]:
     """Return what each trial is worth by each objective: the higher, the better.
 
@@ -166,19 +186,15 @@ def search_crf(
     refuse_known_drives(validation_dir, dataset_dir)
     validation = TrainingSet(validation_dir, "validation")
     identity = _identity(validation_dir, dataset_dir, weights, seed)
-    trials, network = read_trials(log, identity), grid_outputs(load_net(weights, validation.camera), validation)
+    network = grid_outputs(load_net(weights, validation.camera), validation)
     temperature = fit_temperature(network.columns, network.truth)
     calibrated, cell = network.at(temperature), validation.spec.cell
     unrefined = run_trial(calibrated, None, validation.label_set)["scores"]
-    with tqdm(total=n_trials, initial=len(trials), desc="search", unit="trial") as bar:
-        while len(trials) < n_trials:
-            points = [point_of(CrfParams(**trial["params"]), cell) for trial in trials]
-            params = CrfParams.for_cells(cell)  # the first trial
-            if trials:
-                params = params_at(next_point(points, objective_values(trials, unrefined), seed), cell)
-            trials.append(run_trial(calibrated, params, validation.label_set))
-            write_json(log, identity | {"trials": trials})
-            bar.update()
+    trials = read_trials(log, identity)
+    for _ in tqdm(range(len(trials), n_trials), total=n_trials, initial=len(trials), desc="search", unit="trial"):
+        params = next_params(trials, unrefined, cell, seed)
+        trials.append(run_trial(calibrated, params, validation.label_set))
+        write_json(log, identity | {"trials": trials})
     values = objective_values(trials, unrefined)
     data, test = (Path(folder).resolve().name for folder in (validation_dir, dataset_dir))
     command = f"semgrid-edu search-crf --data {data} --test {test} --weights {short_path(weights)}"
