@@ -186,11 +186,11 @@ def search_crf(
     refuse_known_drives(validation_dir, dataset_dir)
     validation = TrainingSet(validation_dir, "validation")
     identity = _identity(validation_dir, dataset_dir, weights, seed)
+    trials = read_trials(log, identity)
     network = grid_outputs(load_net(weights, validation.camera), validation)
     temperature = fit_temperature(network.columns, network.truth)
     calibrated, cell = network.at(temperature), validation.spec.cell
     unrefined = run_trial(calibrated, None, validation.label_set)["scores"]
-    trials = read_trials(log, identity)
     for _ in tqdm(range(len(trials), n_trials), total=n_trials, initial=len(trials), desc="search", unit="trial"):
         params = next_params(trials, unrefined, cell, seed)
         trials.append(run_trial(calibrated, params, validation.label_set))
