@@ -60,11 +60,6 @@ class WindowedGaussian:
             Weight, widths and normalisation.
         radius : float
             Reach of the window in widths sigma_alpha; infinite for no window at all.
-
-        Returns
-        -------
-        WindowedGaussian
-            Ready to filter values on this grid.
         """
         _, height, width = values.shape
         reach = int(min(np.ceil(radius * params.sigma_alpha), max(height, width) - 1))
@@ -84,18 +79,7 @@ class WindowedGaussian:
         return self.scale.ravel() ** 2
 
     def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Filter values on the grid.
-
-        Parameters
-        ----------
-        values : (H W, K) float32
-            One row per cell, cells counted row by row.
-
-        Returns
-        -------
-        (H W, K) float32
-            sum_j k_ij values_j over the window, the cell itself included.
-        """
+        """Return sum_j k_ij values_j over the window, the cell itself included; one row per cell, (H W, K)."""
         height, width = self.scale.shape
         rows = values.reshape(height, width, -1).transpose(0, 2, 1) * self.scale[:, None]
         sums = _window_sums(self.state, self.taps, rows) * self.scale[:, None]
@@ -157,18 +141,7 @@ class Kernel(Protocol):
     diagonal: NDArray[np.float32]
 
     def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Filter values.
-
-        Parameters
-        ----------
-        values : (N, K) float32
-            One row per cell.
-
-        Returns
-        -------
-        (N, K) float32
-            sum_j k_ij values_j, the cell itself included.
-        """
+        """Return sum_j k_ij values_j, the cell itself included; one row per cell, (N, K)."""
 
 
 def mean_field_accurate(
@@ -184,19 +157,10 @@ def mean_field_accurate(
     Where `mean_field` asks the permutohedral lattice, this function computes the bilateral kernel pair by pair, in a
     window around each cell (`WindowedGaussian`, which says what the window can cost). The time grows with the number
     of cells times that of cells in a window, the memory with the number of cells alone.
+    The other Parameters are those of `mean_field_naive`, and so are errors, but the grid may be of any size.
 
     Parameters
     ----------
-    unary : (C, H, W) float
-        phi_u, see `unary_from_probability`; inf where a class is impossible.
-    values : (4, H, W) float
-        o_i, the occupancy probabilities of each cell: they sum to one.
-    params : CrfParams
-        Weights, widths and normalisation.
-    iterations : int
-        The largest number of updates of all cells.
-    tolerance : float
-        Stop as soon as an update changes no probability by more than this.
     radius : float
         Reach of the bilateral window in widths `sigma_alpha`; infinite for all pairs, exact but for rounding.
 
@@ -204,11 +168,6 @@ def mean_field_accurate(
     -------
     (C, H, W) float32
         Q, the distribution over classes in each cell; the same bits whatever the number of threads.
-
-    Raises
-    ------
-    ArgumentError
-        When shapes don't fit or numbers aren't what they should be.
     """
     unary, values = check_inputs(unary, values)
     check_stop(iterations, tolerance)
@@ -226,7 +185,7 @@ def filtered_updates(unary: NDArray, kernels: Sequence[Kernel]) -> Iterator[NDAr
     Parameters
     ----------
     unary : (C, H, W) float
-        phi_u, see `unary_from_probability`; inf where a class is impossible.
+        phi_u; inf where a class is impossible.
     kernels : sequence of Kernel
         The kernels of eq. (4), with their weights and normalisation; one is enough to try it alone.
 

@@ -64,16 +64,12 @@ def free_energy(Q: ArrayLike, unary: ArrayLike, values: ArrayLike, params: CrfPa
     It is an upper bound of -log Z, and F(Q) + log Z = KL(Q || P) says how far Q is from P(x) = exp(-E(x)) / Z. Each
     pair of cells counts once.
 
+    The other Parameters are those of `energy`.
+
     Parameters
     ----------
     Q : (C, H, W) float
         A distribution over the classes in each cell.
-    unary : (C, H, W) float
-        phi_u, see `unary_from_probability`.
-    values : (4, H, W) float
-        o_i, the occupancy probabilities of each cell.
-    params : CrfParams
-        Weights, widths and normalisation.
 
     Returns
     -------

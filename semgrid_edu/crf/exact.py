@@ -21,14 +21,7 @@ MAX_LABELLINGS = 10**7
 def crf_model(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> GraphicalModel:
     """Build the CRF as a product of factors: P(x) = exp(-E(x)) / Z, with the energy of eq. (3) and (4).
 
-    Parameters
-    ----------
-    unary : (C, H, W) float
-        phi_u, the unary term.
-    values : (4, H, W) float
-        o_i, the occupancy probabilities of each cell.
-    params : CrfParams
-        Parameters of the pair weights.
+    Parameters are those of `exact_marginals`.
 
     Returns
     -------
@@ -85,25 +78,12 @@ def exact_marginals(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> N
 def most_likely(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> NDArray[np.int64]:
     """Find the labelling of least energy, the exact minimum of eq. (3).
 
-    Parameters
-    ----------
-    unary : (C, H, W) float
-        phi_u, see `unary_from_probability`; inf where a class is impossible.
-    values : (4, H, W) float
-        o_i, the occupancy probabilities of each cell.
-    params : CrfParams
-        Weights, widths and normalisation.
+    Parameters are those of `exact_marginals`, and so are errors.
 
     Returns
     -------
     (H, W) int64
         The class of each cell; one of them when several labellings share the least energy.
-
-    Raises
-    ------
-    ArgumentError
-        When shapes don't fit, numbers aren't what they should be, there are more than `MAX_LABELLINGS` labellings, or
-        weights and costs contradict each other by more than `MAX_ENERGY`.
     """
     model, shape = _tiny_model(unary, values, params)
     best = max_product(model)
@@ -113,25 +93,12 @@ def most_likely(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> NDArr
 def log_partition(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> float:
     """Compute log Z, the logarithm of the sum of exp(-E(x)) over all labellings.
 
-    Parameters
-    ----------
-    unary : (C, H, W) float
-        phi_u, see `unary_from_probability`; inf where a class is impossible.
-    values : (4, H, W) float
-        o_i, the occupancy probabilities of each cell.
-    params : CrfParams
-        Weights, widths and normalisation.
+    Parameters are those of `exact_marginals`, and so are errors.
 
     Returns
     -------
     float
         In nats. `free_energy` of a Q plus this is KL(Q || P).
-
-    Raises
-    ------
-    ArgumentError
-        When shapes don't fit, numbers aren't what they should be, there are more than `MAX_LABELLINGS` labellings, or
-        weights and costs contradict each other by more than `MAX_ENERGY`.
     """
     unary, _ = check_inputs(unary, values)
     model, _ = _tiny_model(unary, values, params)

@@ -112,25 +112,13 @@ def _normalise(kernel: NDArray[np.float64]) -> None:
 
 
 def pair_weights(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
-    """Compute the bracket of eq. (4) for every pair of cells.
-
-    Parameters
-    ----------
-    values : (4, H, W) float
-        o_i, the occupancy probabilities of each cell.
-    params : CrfParams
-        Weights, widths and normalisation.
+    """Compute the bracket of eq. (4) for every pair of cells. Parameters are those of `gram_matrix`, and so are errors.
 
     Returns
     -------
     (H W, H W) float64
         The cost of two cells having different labels; cells are counted row by row. Zero on the diagonal, since a cell
         is no pair with itself.
-
-    Raises
-    ------
-    ArgumentError
-        As `gram_matrix` raises it.
     """
     weights = gram_matrix(values, params)
     np.fill_diagonal(weights, 0)

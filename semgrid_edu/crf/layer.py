@@ -1,6 +1,6 @@
 """The CRF as a layer of a network: mean field unrolled in torch, with weights, widths and label costs that learn.
 
-Trained CRF layers on disk: safetensors files with a header that says how to build the layer again.
+A trained layer is kept in a safetensors file whose header says how to build it again.
 """
 
 import json
@@ -10,7 +10,7 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from semgrid_edu.crf.naive import NEVER, update
+from semgrid_edu.crf.naive import NEVER, mean_field_update
 from semgrid_edu.crf.pair_window import Pairs, bilateral_pairs, spatial_pairs
 from semgrid_edu.crf.params import CrfParams, check_stop
 from semgrid_edu.errors import ArgumentError, DataError
@@ -20,7 +20,7 @@ from semgrid_edu.storage.reading import parse_json
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
 
 REACH = 4
-"""Half the side of the window in sigma_alpha, unless told otherwise: a pair beyond has at most exp(-8) = 0.0003 of the
+"""Half the side of the window in sigma_alpha, by default: a pair beyond has at most exp(-8) = 0.0003 of the
 weight of neighbours."""
 
 
@@ -50,7 +50,7 @@ class CrfLayer(nn.Module):
     iterations : int
         How often all cells are updated.
     learn_compatibility : bool
-        Whether mu learns. If not, it stays the Potts model, and `params` tells all there is to know.
+        Whether mu learns. If not, it stays the Potts model, and `params` describes the whole layer.
 
     Raises
     ------
@@ -97,13 +97,7 @@ class CrfLayer(nn.Module):
         return len(self.label_costs)
 
     def description(self) -> dict[str, object]:
-        """Return what a layer is made from beside its weights and widths, by name of the constructor's arguments.
-
-        Returns
-        -------
-        dict
-            "normalization", and all arguments but `params`; JSON can hold it.
-        """
+        """Return the normalisation and all arguments of the constructor but `params`, by name; JSON can hold them."""
         names = ("normalization", "n_classes", "radius", "iterations")
         return {name: getattr(self, name) for name in names} | {"learn_compatibility": self.label_costs.requires_grad}
 
@@ -151,21 +145,16 @@ class CrfLayer(nn.Module):
         log_Q = (-phi).log_softmax(dim=1)
         for _ in range(self.iterations):
             cost = torch.einsum("lm,bmhw->blhw", mu, pairs.sums(log_Q.exp()))
-            log_Q = update(log_Q, phi, cost, step).log_softmax(dim=1)
+            log_Q = mean_field_update(log_Q, phi, cost, step).log_softmax(dim=1)
         return log_Q
 
     def pairs(self, occupancy: Tensor) -> Pairs:
-        """Return the bracket of eq. (4) for all pairs of cells of a batch.
+        """Return the bracket of eq. (4), both kernels together, for all pairs of cells of a batch.
 
         Parameters
         ----------
         occupancy : (B, 4, H, W) float
             o, the probabilities of the four states.
-
-        Returns
-        -------
-        Pairs
-            Both kernels together.
         """
         (w1, w2), (sigma_alpha, sigma_beta, sigma_gamma) = self.log_weights.exp(), self.log_sigmas.exp()
         bilateral = bilateral_pairs(occupancy, self.radius, sigma_alpha, sigma_beta)
@@ -227,7 +216,7 @@ def save_crf(layer: CrfLayer, path: str | Path) -> None:
     Parameters
     ----------
     layer : CrfLayer
-        The layer.
+        Trained or not.
     path : path-like
         The safetensors file to write.
     """
@@ -242,11 +231,6 @@ def load_crf(path: str | Path) -> CrfLayer:
     ----------
     path : path-like
         A file that `save_crf` wrote.
-
-    Returns
-    -------
-    CrfLayer
-        The layer.
 
     Raises
     ------

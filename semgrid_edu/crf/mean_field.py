@@ -61,30 +61,12 @@ def mean_field(
     The sum over all pairs becomes two filters: the spatial one is exact (`SeparableGaussian`), the bilateral one uses
     the permutohedral lattice, whose kernel is only nearly Gaussian. Filters include the cell itself, which is no
     pair, so its own contribution is subtracted.
-
-    Parameters
-    ----------
-    unary : (C, H, W) float
-        phi_u, see `unary_from_probability`; inf where a class is impossible.
-    values : (4, H, W) float
-        o_i, the occupancy probabilities of each cell: they sum to one.
-    params : CrfParams
-        Weights, widths and normalisation.
-    iterations : int
-        The largest number of updates of all cells. With the default parameters nearly all labels have settled after
-        ten; probabilities of single cells still change later.
-    tolerance : float
-        Stop as soon as an update changes no probability by more than this.
+    Parameters are those of `mean_field_naive`, and so are errors, but the grid may be of any size.
 
     Returns
     -------
     (C, H, W) float32
         Q, the distribution over classes in each cell.
-
-    Raises
-    ------
-    ArgumentError
-        When shapes don't fit or numbers aren't what they should be.
     """
     unary, values = check_inputs(unary, values)
     check_stop(iterations, tolerance)

@@ -1,6 +1,6 @@
 """Mean field with every pair of cells written out, all cells at once or one by one (eq. (3), (4)); for small grids.
 
-`update` is the one rule of mean field: the accurate version, the trainable layer and the story of a cell use it too.
+`mean_field_update` is the one rule of mean field: the accurate version and the trainable layer use it too.
 """
 
 from collections.abc import Callable, Iterator
@@ -63,19 +63,12 @@ def mean_field_naive(
 def mean_field_updates(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> Iterator[NDArray[np.float64]]:
     """Yield what `mean_field_naive` holds at first and after each update, without end.
 
-    Parameters
-    ----------
-    unary : (C, H, W) float
-        phi_u, see `unary_from_probability`; inf where a class is impossible.
-    values : (4, H, W) float
-        o_i, the occupancy probabilities of each cell: they sum to one.
-    params : CrfParams
-        Weights, widths and normalisation.
+    Parameters are those of `mean_field_naive`.
 
     Yields
     ------
     (C, H, W) float64
-        Q, the distribution over classes in each cell.
+        Q.
 
     Examples
     --------
@@ -95,7 +88,7 @@ def mean_field_updates(unary: ArrayLike, values: ArrayLike, params: CrfParams) -
         yield Q.reshape(unary.shape)
 
 
-def update(log_Q: Any, phi: Any, disagreement: Any, part: Any = 1.0) -> Any:
+def mean_field_update(log_Q: Any, phi: Any, disagreement: Any, part: Any = 1.0) -> Any:
     """Return log Q_i(l) after an update, but for a number in each cell that the soft-max takes off again.
 
         log Q_i(l) <- (1 - p_i) log Q_i(l) + p_i (-phi_i(l) - sum_{j != i} k_ij (1 - Q_j(l)))
@@ -120,7 +113,7 @@ def update(log_Q: Any, phi: Any, disagreement: Any, part: Any = 1.0) -> Any:
 def all_updates(
     phi: NDArray[np.floating], disagreement: Callable[[NDArray], NDArray], part: NDArray[np.floating]
 ) -> Iterator[NDArray[np.floating]]:
-    """Yield Q at first and after each `update` of all cells at once, without end.
+    """Yield Q at first and after each `mean_field_update` of all cells at once, without end.
 
     Parameters
     ----------
@@ -140,11 +133,11 @@ def all_updates(
     while True:
         Q = np.exp(log_Q)
         yield Q
-        log_Q = log_softmax(update(log_Q, phi, disagreement(Q), part), axis=0)
+        log_Q = log_softmax(mean_field_update(log_Q, phi, disagreement(Q), part), axis=0)
 
 
 def above_best(unary: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Return how far each cost lies above that of the cell's best class.
+    """Return how far each cost lies above that of the cell's best class: the unary term but for a number in each cell.
 
     Parameters
     ----------
@@ -154,7 +147,7 @@ def above_best(unary: NDArray[np.floating]) -> NDArray[np.floating]:
     Returns
     -------
     (C, H W) float
-        The same unary term but for a number in each cell: finite, at most `NEVER`.
+        Finite, at most `NEVER`.
     """
     return np.minimum(unary - unary.min(axis=0), NEVER).reshape(len(unary), -1)
 
@@ -221,27 +214,12 @@ def mean_field_sequential(
 
     Each update minimises the free energy over the distribution of one cell, so none can raise it, and nothing has to be
     damped. But cells have to wait for each other.
-
-    Parameters
-    ----------
-    unary : (C, H, W) float
-        phi_u, see `unary_from_probability`; inf where a class is impossible.
-    values : (4, H, W) float
-        o_i, the occupancy probabilities of each cell: they sum to one.
-    params : CrfParams
-        Weights, widths and normalisation.
-    iterations : int
-        How often each cell is updated.
+    Parameters are those of `mean_field_naive`, and so are errors.
 
     Returns
     -------
     (C, H, W) float64
         Q, the distribution over classes in each cell.
-
-    Raises
-    ------
-    ArgumentError
-        When shapes don't fit, numbers aren't what they should be, or the grid has more than `MAX_CELLS` cells.
     """
     unary, values = check_inputs(unary, values)
     check_stop(iterations)
@@ -250,5 +228,5 @@ def mean_field_sequential(
     for _ in range(iterations):
         for i in range(phi.shape[1]):
             disagreement = (1 - np.exp(log_Q)) @ weights[i]
-            log_Q[:, i] = log_softmax(update(log_Q[:, i], phi[:, i], disagreement))
+            log_Q[:, i] = log_softmax(mean_field_update(log_Q[:, i], phi[:, i], disagreement))
     return np.exp(log_Q).reshape(unary.shape)

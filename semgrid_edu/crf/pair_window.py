@@ -1,7 +1,4 @@
-"""Sums over all pairs of cells in a window, in torch and with gradients: what the trainable CRF rests on (eq. (4)).
-
-Both kernels of eq. (4) in torch, with gradients for their widths.
-"""
+"""Both kernels of eq. (4) in torch, with gradients: sums over the pairs of cells of a window, and over all pairs."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -58,12 +55,7 @@ class PairWindow:
         Parameters
         ----------
         grid : (B, K, H, W) float
-            K numbers for each cell.
-
-        Returns
-        -------
-        (B, K, L) float
-            The same with zeros in the empty columns, L = H (W + margin).
+            K numbers for each cell; in the lines, (B, K, L), zeros stand in the empty columns: L = H (W + margin).
         """
         return F.pad(grid, (0, self.margin)).flatten(2)
 
@@ -73,12 +65,7 @@ class PairWindow:
         Parameters
         ----------
         line : (B, K, L) float
-            K numbers for each cell.
-
-        Returns
-        -------
-        (B, K, H, W) float
-            Grids.
+            Becomes (B, K, H, W).
         """
         return line.unflatten(2, (self.height, self.width + self.margin))[..., : self.width]
 
@@ -116,7 +103,7 @@ class PairSum(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: torch.autograd.function.FunctionCtx, pairs: Tensor, x: Tensor, window: PairWindow) -> Tensor:
-        """Sum over all pairs.
+        """Return y, (B, K, H, W).
 
         Parameters
         ----------
@@ -128,11 +115,6 @@ class PairSum(torch.autograd.Function):
             K values for each cell.
         window : PairWindow
             Which cells form pairs.
-
-        Returns
-        -------
-        (B, K, H, W) float
-            y.
         """
         ctx.save_for_backward(pairs, x)
         ctx.window = window
@@ -140,7 +122,7 @@ class PairSum(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx: torch.autograd.function.FunctionCtx, grad: Tensor) -> tuple[Tensor | None, Tensor | None, None]:
-        """Return the gradients with respect to the weights and to the values.
+        """Return dE/dk (B, P, L) and dE/dx (B, K, H, W), each None when nothing asks for it, and None for the window.
 
         Parameters
         ----------
@@ -148,15 +130,6 @@ class PairSum(torch.autograd.Function):
             What `forward` kept.
         grad : (B, K, H, W) float
             dE/dy.
-
-        Returns
-        -------
-        pairs : (B, P, L) float or None
-            dE/dk, None when nothing asks for it.
-        x : (B, K, H, W) float or None
-            dE/dx, None when nothing asks for it.
-        window : None
-            A window has no gradient.
         """
         (pairs, x), window = ctx.saved_tensors, ctx.window
         grad = window.line(grad)
@@ -206,11 +179,6 @@ class Pairs(NamedTuple):
         ----------
         occupancy : (B, 4, H, W) float
             Any array of the batch: it gives shape and type.
-
-        Returns
-        -------
-        Pairs
-            The normalised kernel.
         """
         root = (self.own + self.sums(torch.ones_like(occupancy[:, :1]))).sqrt()
         return Pairs(lambda x: self.sums(x / root) / root, self.own / root**2)

@@ -10,7 +10,7 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.occupancy import N_STATES
 
 LARGEST_WEIGHT = 1e30
-"""Of a kernel: the fast mean field computes in float32, which ends at 3e38."""
+"""The largest weight of a kernel: the fast mean field computes in float32, whose largest number is 3e38."""
 
 NARROWEST = 0.15
 """Width of a kernel, cells. At this width neighbours lie 6.7 widths apart, out of the lattice's reach; the Gaussian is
@@ -66,11 +66,6 @@ class CrfParams:
         ----------
         cell : float
             Side of a cell, metres; the defaults are for the paper's 0.2.
-
-        Returns
-        -------
-        CrfParams
-            The defaults, with sigmas in cells of that size.
 
         Examples
         --------
@@ -141,7 +136,7 @@ def unary_from_log_probability(log_probability: NDArray) -> NDArray:
 
 
 def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Check what the CRF is given, and return it as float32 or float64.
+    """Check what the CRF is given, and return both arrays as float32 or float64.
 
     Parameters
     ----------
@@ -150,18 +145,11 @@ def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float6
     values : (4, H, W) float
         o, the probability of FREE, STATIC, DYNAMIC and UNKNOWN in each cell.
 
-    Returns
-    -------
-    unary : (C, H, W) float32 or float64
-        The same costs.
-    values : (4, H, W) float32 or float64
-        The same probabilities.
-
     Raises
     ------
     ArgumentError
         When the shapes don't fit, a cost is NaN or -inf, a cell has no possible class, states don't sum to 1, or an
-        argument holds no real numbers or masked ones. `semgrid_edu.crf.check` tells what may have gone wrong before.
+        argument holds no real numbers or masked ones. `semgrid_edu.crf.check` says what the cause may be.
     """
     unary, values = _floats("unary", unary), _floats("values", values)
     if unary.ndim != 3 or 0 in unary.shape:

@@ -44,11 +44,6 @@ class SeparableGaussian:
             Factor of the whole kernel.
         normalization : {"symmetric", "none"}
             How the kernel is normalised, see `CrfParams`.
-
-        Returns
-        -------
-        SeparableGaussian
-            Ready to filter values on such a grid.
         """
         sigma = max(sigma, NARROWEST)
         reach = int(min(np.ceil(5 * sigma), max(shape) - 1))
@@ -65,18 +60,7 @@ class SeparableGaussian:
         return np.outer(self.row_scale**2, self.column_scale**2).ravel()
 
     def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Filter values on the grid.
-
-        Parameters
-        ----------
-        values : (H W, K) float32
-            One row per cell, cells counted row by row.
-
-        Returns
-        -------
-        (H W, K) float32
-            sum_j k_ij values_j, the cell itself included.
-        """
+        """Return sum_j k_ij values_j, the cell itself included; one row per cell, (H W, K)."""
         out = np.empty(values.shape, np.float32)
         self.filter(values, out)
         return out

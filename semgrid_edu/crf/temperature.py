@@ -15,7 +15,7 @@ COLDEST, HOTTEST = 0.01, 100.0
 
 
 class Reliability(NamedTuple):
-    """How often a classifier is right when it is so and so sure: the columns of a reliability diagram.
+    """How often a classifier is right, by its confidence: the columns of a reliability diagram.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Reliability(NamedTuple):
 
 
 def at_temperature(log_probability: ArrayLike, temperature: float) -> NDArray:
-    """Make a distribution less sure (temperature above 1) or surer (below 1): soft-max of log p / T.
+    """Make a distribution less confident (temperature above 1) or more (below 1): soft-max of log p / T.
 
     The order of the classes stays as it is, so the most probable class does too.
 
@@ -49,11 +49,6 @@ def at_temperature(log_probability: ArrayLike, temperature: float) -> NDArray:
     (C, ...) float
         Logarithms of the new distribution, in the type of the argument.
 
-    Raises
-    ------
-    ArgumentError
-        When the temperature isn't a positive number.
-
     Examples
     --------
     >>> np.exp(at_temperature(np.log([0.8, 0.2]), 2.0)).round(3)
@@ -65,26 +60,9 @@ def at_temperature(log_probability: ArrayLike, temperature: float) -> NDArray:
 
 
 def negative_log_likelihood(log_probability: ArrayLike, truth: ArrayLike, ignore: int = IGNORE) -> float:
-    """Return the mean of -log p(truth) over all labelled cells: the smaller, the better the probabilities.
+    """Return the mean of -log p(truth) over all labelled cells, in nats: the smaller, the better the probabilities.
 
-    Parameters
-    ----------
-    log_probability : (C, ...) float
-        log p, natural logarithms.
-    truth : (...) int
-        The class of each cell.
-    ignore : int
-        Class number of what is unlabelled, which counts nowhere.
-
-    Returns
-    -------
-    float
-        Nats per cell.
-
-    Raises
-    ------
-    ArgumentError
-        When the shapes don't fit, a label is no class, or no cell is labelled.
+    Parameters are those of `fit_temperature`.
     """
     columns, classes = _labelled("log_probability", log_probability, truth, ignore)
     return -float(columns[classes, np.arange(len(classes))].mean(dtype=np.float64))
@@ -115,7 +93,7 @@ def fit_temperature(log_probability: ArrayLike, truth: ArrayLike, ignore: int = 
     ------
     ArgumentError
         When the shapes don't fit, a label is no class, no cell is labelled, a probability is 0, or the best
-        temperature lies outside: when every cell is right, or log p tells nothing about the truth.
+        temperature lies outside: when every cell is right, or log p has nothing to do with the truth.
 
     Examples
     --------
@@ -169,16 +147,16 @@ def reliability(probability: ArrayLike, truth: ArrayLike, n_bins: int = 15, igno
     columns, classes = _labelled("probability", probability, truth, ignore)
     if n_bins < 1:
         raise ArgumentError("n_bins", "at least one bin", n_bins)
-    sure = columns.max(axis=0).astype(np.float64)
-    bins = np.clip(np.ceil(sure * n_bins).astype(int) - 1, 0, n_bins - 1)
+    confident = columns.max(axis=0).astype(np.float64)
+    bins = np.clip(np.ceil(confident * n_bins).astype(int) - 1, 0, n_bins - 1)
     right = columns.argmax(axis=0) == classes
-    cells, confidence, accuracy = (np.bincount(bins, weights, n_bins) for weights in (None, sure, right))
+    cells, confidence, accuracy = (np.bincount(bins, weights, n_bins) for weights in (None, confident, right))
     shared = np.maximum(cells, 1)
     return Reliability(confidence / shared, accuracy / shared, cells)
 
 
 def expected_calibration_error(diagram: Reliability) -> float:
-    """Return the mean gap between confidence and accuracy over all cells, 0..1 (Naeini et al. 2015).
+    """Return the mean gap between confidence and accuracy over all cells, ECE (Naeini et al. 2015).
 
     Parameters
     ----------
@@ -188,7 +166,7 @@ def expected_calibration_error(diagram: Reliability) -> float:
     Returns
     -------
     float
-        ECE; 0 for a calibrated classifier.
+        0..1; 0 for a calibrated classifier.
     """
     return float(diagram.cells @ np.abs(diagram.confidence - diagram.accuracy) / diagram.cells.sum())
 

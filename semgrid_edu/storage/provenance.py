@@ -5,6 +5,7 @@ Folders that are shipped with the package: in a clone they lie beside it, in a w
 
 import platform
 import subprocess
+from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
@@ -60,6 +61,24 @@ def versions(*packages: str) -> dict[str, str]:
     ['numpy', 'python', 'semgrid_edu']
     """
     return {"python": platform.python_version()} | {name: version(name) for name in ("semgrid_edu", *packages)}
+
+
+def made_by(command: str, *packages: str) -> dict[str, object]:
+    """Return what a result says of its making: the command that repeats it, today's date, and versions.
+
+    Parameters
+    ----------
+    command : str
+        The command line.
+    *packages : str
+        Names of the packages whose versions matter, see `versions`.
+
+    Returns
+    -------
+    dict
+        "command", "date" (UTC) and "versions".
+    """
+    return {"command": command, "date": f"{datetime.now(UTC):%Y-%m-%d}", "versions": versions(*packages)}
 
 
 def commit() -> str | None:

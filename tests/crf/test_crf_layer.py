@@ -19,7 +19,7 @@ from semgrid_edu.crf import (
 )
 from semgrid_edu.crf import layer as layer_module
 from semgrid_edu.crf.layer import CrfLayer, step_size
-from semgrid_edu.crf.naive import update
+from semgrid_edu.crf.naive import mean_field_update
 from semgrid_edu.crf.pair_window import PairSum, PairWindow
 from semgrid_edu.errors import ArgumentError
 
@@ -136,7 +136,12 @@ def general_free_energy(Q, scores, values, params, costs):
 
 def test_with_any_costs_of_labels_the_free_energy_never_rises(monkeypatch):
     before = []  # log Q before each update
-    monkeypatch.setattr(layer_module, "update", lambda log_Q, *rest: before.append(log_Q) or update(log_Q, *rest))
+
+    def recorded(log_Q, *rest):
+        before.append(log_Q)
+        return mean_field_update(log_Q, *rest)
+
+    monkeypatch.setattr(layer_module, "mean_field_update", recorded)
     for seed in range(150):
         (log_g, occupancy), params = random_grids(seed, batch=1), random_params(seed)
         layer = CrfLayer(params, log_g.shape[1], COVERING, 11, learn_compatibility=True)

@@ -13,7 +13,7 @@ from semgrid_edu.crf import CrfParams, gram_matrix, mean_field_naive, unary_from
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.workshop.commands.main import run
 from semgrid_edu.workshop.studies.crf import crf_error as study
-from semgrid_edu.workshop.studies.crf.crf_scenes import CROP, N_CROPS, CrfProblem, crops
+from semgrid_edu.workshop.studies.crf.crf_error import CROP, N_CROPS, CrfProblem, crops
 from semgrid_edu.workshop.studies.crf.nystrom import LowRankGaussian, mean_field_low_rank
 
 

@@ -17,8 +17,9 @@ from semgrid_edu.storage.provenance import provenance_problems
 from semgrid_edu.training.crf import CRF_TRAINING
 from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.scoring.evaluate import evaluate
-from semgrid_edu.workshop.studies.crf import learned_crf, learned_crf_scores
+from semgrid_edu.workshop.studies.crf import learned_crf
 
+EVERY = learned_crf.VARIANTS
 QUICK = replace(CRF_TRAINING, grid_iterations=1)
 
 
@@ -29,7 +30,7 @@ def quick():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(training_cache, "WORKERS", 1)
         patch.setattr("semgrid_edu.crf.layer.REACH", 0.5)
-        patch.setattr(learned_crf_scores, "VARIANTS", learned_crf.VARIANTS[:2])
+        patch.setattr(learned_crf, "VARIANTS", EVERY[:2])
         yield
 
 
@@ -46,12 +47,12 @@ def inputs(tmp_path_factory):
 @pytest.fixture(scope="module")
 def compared(inputs, tmp_path_factory):
     runs = tmp_path_factory.mktemp("runs")
-    return runs, learned_crf_scores.compare_learned_crfs(*inputs, runs, QUICK)
+    return runs, learned_crf.compare_learned_crfs(*inputs, runs, params=QUICK)
 
 
 def test_each_way_to_learn_has_a_name_and_a_folder_of_its_own():
-    assert len({variant.name for variant in learned_crf.VARIANTS}) == 8
-    assert {variant.folder for variant in learned_crf.VARIANTS} >= {"learnt-weights-balanced-loss-new-drives"}
+    assert len({variant.name for variant in EVERY}) == 8
+    assert {variant.folder for variant in EVERY} >= {"learnt-weights-balanced-loss-new-drives"}
 
 
 def test_network_and_default_crf_score_as_in_every_other_table(compared, inputs):
@@ -64,7 +65,7 @@ def test_network_and_default_crf_score_as_in_every_other_table(compared, inputs)
 
 def test_only_what_learns_changes(compared):
     runs, result = compared
-    only_weights, costs_too = (load_crf(runs / variant.folder / WEIGHTS) for variant in learned_crf.VARIANTS[:2])
+    only_weights, costs_too = (load_crf(runs / variant.folder / WEIGHTS) for variant in EVERY[:2])
     assert only_weights.params().w_bilateral != 4
     assert not costs_too.label_costs.equal(only_weights.label_costs)
     (weights, costs) = result["learnt"].values()
@@ -77,25 +78,25 @@ def test_the_result_can_be_kept_and_names_what_made_it(compared, inputs):
     kept = json.loads(json.dumps(result))
     assert {"scores", "gains", "confusion", "learnt", "command", "seed", "versions", "date"} <= kept.keys()
     assert kept["command"].startswith("semgrid-edu reproduce learned-crf --data tiny --validation held-out")
-    assert "learnt weights, balanced loss, new drives: w1" in learned_crf_scores.learned_crf_table(result)
+    assert "learnt weights, balanced loss, new drives: w1" in learned_crf.learned_crf_table(result)
     assert str(inputs[0]) not in json.dumps(result)
 
 
 def test_what_has_ended_is_not_trained_again(compared, inputs, monkeypatch):
     runs, result = compared
 
-    def fail(*_):
+    def fail(*_, **__):
         raise AssertionError("trained again")
 
-    monkeypatch.setattr(learned_crf_scores, "train_crf_on", fail)
-    assert learned_crf_scores.compare_learned_crfs(*inputs, runs, QUICK)["scores"] == result["scores"]
+    monkeypatch.setattr(learned_crf, "train_crf_on", fail)
+    assert learned_crf.compare_learned_crfs(*inputs, runs, params=QUICK)["scores"] == result["scores"]
 
 
 def test_drives_that_the_network_knows_do_not_pass_for_new_ones(inputs, tmp_path):
     dataset, _, weights = inputs
     known = write_validation(tmp_path / "known", ["0001"])
     with pytest.raises(DataError, match="0001 of train"):
-        learned_crf_scores.compare_learned_crfs(dataset, known, weights, tmp_path, QUICK)
+        learned_crf.compare_learned_crfs(dataset, known, weights, tmp_path, params=QUICK)
 
 
 def test_the_command_leaves_weights_log_and_provenance(inputs, tmp_path):

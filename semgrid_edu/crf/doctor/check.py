@@ -35,7 +35,7 @@ def check(
     params : CrfParams
         Weights, widths and normalisation.
     refined : (C, H, W) float or (H, W) int, optional
-        What the CRF made of them: Q, or the label of each cell.
+        The result of the CRF: Q, or the label of each cell.
     cell : float, optional
         Side of a cell, metres. Widths are in cells, so with it their reach can be judged.
 

@@ -1,4 +1,4 @@
-"""What a check of the CRF's input found, in the words in which one would search for it: those of findings.toml."""
+"""What a check of the CRF's input found, in the words in which one would search for it (findings.toml)."""
 
 import textwrap
 import tomllib
@@ -90,5 +90,11 @@ def finding(key: str, name: str | None = None, **numbers: object) -> Finding:
 
 
 def in_cells(mask: NDArray) -> str:
-    """Say how many cells a mask (H, W) marks, such as "3 of 120 cells"."""
+    """Say how many cells are marked, such as "3 of 120 cells".
+
+    Parameters
+    ----------
+    mask : (H, W) bool
+        True in marked cells.
+    """
     return f"{mask.sum():,} of {mask.size:,} cells"

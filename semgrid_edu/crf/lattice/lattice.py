@@ -99,29 +99,13 @@ class PermutohedralLattice:
         ----------
         scale : (N,) float
             One factor per point.
-
-        Returns
-        -------
-        PermutohedralLattice
-            The same vertices with other weights.
         """
         scale = scale.astype(np.float32)
         slices, splats = _scaled(self.slices, self.splats, self.points, scale)
         return replace(self, slices=slices, splats=splats, diagonal=self.diagonal * scale**2)
 
     def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Filter values at the points.
-
-        Parameters
-        ----------
-        values : (N, K) float32
-            One row per point.
-
-        Returns
-        -------
-        (N, K) float32
-            sum_j k(f_i, f_j) values_j, the point itself included.
-        """
+        """Return sum_j k(f_i, f_j) values_j, the point itself included; one row per point, (N, K)."""
         out = np.zeros(values.shape, np.float32)
         self.add(values, out)
         return out

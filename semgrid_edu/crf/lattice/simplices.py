@@ -162,7 +162,7 @@ def survivors(neighbours, sign):
     Returns
     -------
     (M, 2^(d + 1)) bool
-        Bit j of the column says whether direction j is taken; steps are made in the order of the directions.
+        Bit j of the column says whether direction j is taken; steps follow in the order of the directions.
     """
     size, _, n_vertices = neighbours.shape
     alive = np.zeros((n_vertices, 1 << size), np.bool_)

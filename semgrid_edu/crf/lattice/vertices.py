@@ -96,7 +96,7 @@ def _extent(origins):
 
 @njit(cache=True, parallel=True)
 def _pack(origins, ranks, lowest, units):
-    """Return two integers per point, which tell its simplex: its corner with remainder 0, and the order there."""
+    """Return two integers per point, which identify its simplex: its corner with remainder 0, and the order there."""
     keys, orders = np.zeros(len(origins), np.int64), np.zeros(len(origins), np.int64)
     size = origins.shape[1]
     for i in prange(len(origins)):
@@ -123,7 +123,7 @@ def _hash(key):
 
 @njit(cache=True)
 def _number_simplices(keys, orders):
-    """Return the number of each point's simplex, and a point of each simplex; the integers given tell simplices."""
+    """Return the number of each point's simplex, and one point of each simplex, from the integers of `_pack`."""
     members, first, count = np.empty(len(keys), np.int32), np.empty(len(keys), np.int64), 0
     slots = np.full(_capacity(len(keys)), -1, np.int32)
     for i in range(len(keys)):
@@ -210,7 +210,7 @@ def sort_by_vertex(vertices, n_vertices):
     Returns
     -------
     starts : (M + 1,) int32
-        Where the corners of each vertex begin in `members`, and where those of the last one end.
+        Where the corners of each vertex begin in `members`, and where the corners of the last one end.
     members : (N (d + 1),) int32
         Indices of the corners, vertex after vertex.
     """

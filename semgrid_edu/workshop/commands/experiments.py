@@ -83,7 +83,7 @@ def crf_coupling(
     """Compare approximate with exact inference in the CRF on tiny grids, as the coupling grows (lecture 10)."""
     from semgrid_edu.workshop.studies.crf.crf_coupling import crf_coupling, crf_coupling_tables
 
-    keep_result(out, lambda: crf_coupling(out, seed, draws), crf_coupling_tables)
+    keep_result(out, lambda: crf_coupling(out, seed=seed, draws=draws), crf_coupling_tables)
 
 
 @reproduce.command()
@@ -96,7 +96,7 @@ def learned_crf(
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("learned_crf.json"),
 ) -> None:
     """Learn a CRF's weights, widths and label costs in eight ways, and score them on test frames (lecture 11)."""
-    from semgrid_edu.workshop.studies.crf.learned_crf_scores import compare_learned_crfs, learned_crf_table
+    from semgrid_edu.workshop.studies.crf.learned_crf import compare_learned_crfs, learned_crf_table
 
     keep_result(out, lambda: compare_learned_crfs(data, validation, weights, runs, seed=seed), learned_crf_table)
 

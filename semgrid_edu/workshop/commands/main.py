@@ -146,9 +146,9 @@ def train_crf(
     from semgrid_edu.workshop.studies.crf.learned_crf import CrfVariant, train_crf_on
 
     tell(dataset_doubts(data, split) + weights_doubts(weights))
-    params = replace(CRF_TRAINING, grid_iterations=iterations)
+    params, variant = replace(CRF_TRAINING, grid_iterations=iterations), CrfVariant(split, label_costs, weight_limit)
     try:
-        train_crf_on(data, weights, out, CrfVariant(split, label_costs, weight_limit), params, seed, resume)
+        train_crf_on(data, weights, out, variant, params=params, seed=seed, resume=resume)
     except KeyboardInterrupt:
         sys.exit(f"semgrid-edu: interrupted; {how_to_go_on(out)}")
 
@@ -209,7 +209,7 @@ def search_crf(
     from semgrid_edu.workshop.studies.crf.crf_search import search_crf, search_table
 
     try:
-        keep_result(out, lambda: search_crf(data, test, weights, out, seed, trials), search_table)
+        keep_result(out, lambda: search_crf(data, test, weights, out, seed=seed, n_trials=trials), search_table)
     except KeyboardInterrupt:
         sys.exit(f"semgrid-edu: interrupted; the same command goes on from {out}")
 

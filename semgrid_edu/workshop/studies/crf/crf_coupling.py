@@ -5,8 +5,6 @@ by default. So 4 stands for the default parameters, and 0 for no pairs at all.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from datetime import UTC, datetime
-from functools import partial
 from itertools import product
 from pathlib import Path
 
@@ -19,7 +17,7 @@ from semgrid_edu.crf import CrfParams, mean_field, mean_field_naive, unary_from_
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.stage_models.crf import all_free, coupled, two_classes
 from semgrid_edu.storage.files import write_json
-from semgrid_edu.storage.provenance import versions
+from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.storage.reading import resumable_json
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
 from semgrid_edu.workshop.studies.crf.brute_force import potts_messages, visit_labellings
@@ -58,6 +56,7 @@ ONLY_LABELS = ("loopy max-product",)
 
 def crf_coupling(
     log: str | Path,
+    *,
     seed: int = 0,
     draws: int = N_DRAWS,
     grids: Sequence[tuple[int, int]] = GRIDS,
@@ -85,8 +84,8 @@ def crf_coupling(
     Returns
     -------
     dict
-        "cases": by name from `measure_coupling`; "symmetric": from `symmetric_case`; and all that made them. JSON can
-        hold it.
+        "cases": by name from `measure_coupling`; "symmetric": from `symmetric_case`; with seed, command and
+        versions. JSON can hold it.
 
     Raises
     ------
@@ -108,9 +107,7 @@ def crf_coupling(
     return identity | {
         "cases": done,
         "symmetric": symmetric_case(fine),
-        "command": f"semgrid-edu reproduce crf-coupling --seed {seed} --draws {draws}",
-        "date": f"{datetime.now(UTC):%Y-%m-%d}",
-        "versions": versions("numpy", "scipy", "numba"),
+        **made_by(f"semgrid-edu reproduce crf-coupling --seed {seed} --draws {draws}", "numpy", "scipy", "numba"),
     }
 
 
@@ -202,20 +199,12 @@ def symmetric_case(couplings: Sequence[float] = FINE, shape: tuple[int, int] = (
         cell, (n,), with "exact" first, and as "mean field, other side" and so on with the tilt towards class 1.
     """
     middle, values = (shape[0] // 2, shape[1] // 2), all_free(shape)
-    ways: dict[str, Inference] = {
-        "exact": lambda *crf: visit_labellings(*crf).marginals,
-        "mean field, 10 updates": mean_field_naive,
-        "mean field, converged": _settled,
-        "loopy sum-product": potts_messages,
-    }
-    probability = {
-        way + side: [
-            float(infer(two_classes(np.full(shape, p)), values, coupled(coupling))[(0, *middle)])
-            for coupling in couplings
-        ]
-        for side, p in (("", tilt), (", other side", 1 - tilt))
-        for way, infer in ways.items()
-    }
+    ways: dict[str, Inference] = {"exact": lambda *crf: visit_labellings(*crf).marginals}
+    ways |= {way: WAYS[way] for way in ("mean field, 10 updates", "mean field, converged", "loopy sum-product")}
+    probability = {}
+    for (side, p), (way, infer) in product({"": tilt, ", other side": 1 - tilt}.items(), ways.items()):
+        found = [infer(two_classes(np.full(shape, p)), values, coupled(coupling)) for coupling in couplings]
+        probability[way + side] = [float(Q[(0, *middle)]) for Q in found]
     return {"shape": list(shape), "tilt": tilt, "couplings": list(couplings), "probability": probability}
 
 
@@ -232,13 +221,9 @@ def crf_coupling_tables(result: dict) -> str:
     str
         Mean total variation and share of wrong labels, per cent.
     """
-    tables = []
-    for name, case in result["cases"].items():
-        for part, title in (
-            ("variation", "mean total variation"),
-            ("labels", "labels unlike the most likely labelling"),
-        ):
-            rows = [["coupling", *(f"{coupling:g}" for coupling in result["couplings"])]]
-            rows += [[way, *(f"{100 * np.mean(e):.1f}" for e in errors)] for way, errors in case[part].items()]
-            tables.append(f"{name}, {title}, per cent\n\n{markdown_table(rows)}")
+    titles = {"variation": "mean total variation", "labels": "labels unlike the most likely labelling"}
+    head, tables = ["coupling", *(f"{coupling:g}" for coupling in result["couplings"])], []
+    for (name, case), (part, title) in product(result["cases"].items(), titles.items()):
+        rows = [[way, *(f"{100 * np.mean(e):.1f}" for e in errors)] for way, errors in case[part].items()]
+        tables.append(f"{name}, {title}, per cent\n\n{markdown_table([head, *rows])}")
     return "\n\n".join(tables)

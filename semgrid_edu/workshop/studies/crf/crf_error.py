@@ -1,43 +1,126 @@
-"""Error against time of every way to run mean field, kernel error and convergence error told apart (eq. (3), (4)).
+"""Error against time of every way to run mean field: its kernel error and its convergence error (eq. (3), (4)).
 
 Two things separate a result from the fixed point of exact mean field. Its kernel may differ from the Gaussian: the
 *kernel error* compares it with the exact kernel after the same number of updates. And it may have been stopped early:
-the *convergence error* compares it with the same kernel when nothing changes any more.
+the *convergence error* compares it with the same kernel when nothing changes any more. Both are measured on the shipped
+drive, on the compact grid and on crops of the paper's.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from datetime import UTC, datetime
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
-from semgrid_edu.crf import CrfParams, mean_field, mean_field_accurate, mean_field_naive
+from semgrid_edu.crf import CrfParams, mean_field, mean_field_accurate, mean_field_naive, unary_from_log_probability
+from semgrid_edu.datasets.samples import sample_drive, sample_weights
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.networks import build_net, load_net
+from semgrid_edu.pipeline import Stages, network_image
 from semgrid_edu.storage.files import write_json
-from semgrid_edu.storage.provenance import versions
+from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.storage.reading import resumable_json
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
-from semgrid_edu.workshop.studies.crf.crf_scenes import CrfProblem, crf_scenes
 from semgrid_edu.workshop.studies.crf.nystrom import mean_field_low_rank
 
 ITERATIONS = (1, 2, 3, 5, 10, 20, 50, 100)
 """Numbers of updates at which each way is timed and compared."""
 MOST, TOLERANCE = 1000, 1e-5
-"""Converged: no update changes a probability by more than this, or so many updates have been made."""
+"""Mean field has converged when no update changes a probability by more than the tolerance, or after 1000 updates."""
 RANKS = (64, 256, 512)
 """Numbers of landmarks of the low-rank kernel."""
 ROUNDS, ENOUGH = 3, 1.0
 """Calls that take less than this many seconds in all are repeated up to three times; the shortest time counts."""
 
 ERRORS = ("total", "kernel", "convergence")
-"""What is told apart: the distance from the exact kernel, converged; and its two parts."""
+"""The distance from the converged result with the exact kernel, and its two parts."""
 
 Way = Callable[[NDArray, NDArray, CrfParams, int, float], NDArray]
 """A way to run mean field: takes unary, values, params, iterations and tolerance, and returns Q."""
+
+FRAME, CROP, N_CROPS = 9, 64, 3
+"""The frame of the shipped drive, at which the filter has seen one second; rows and columns of a crop, and the number
+of crops, one ahead of the other, the first at the vehicle."""
+
+
+class CrfProblem(NamedTuple):
+    """What the CRF is given.
+
+    Parameters
+    ----------
+    unary : (C, H, W) float32
+        phi_u of eq. (3).
+    values : (4, H, W) float32
+        o_i, the occupancy probabilities of each cell.
+    params : CrfParams
+        Weights, widths and normalisation.
+    """
+
+    unary: NDArray[np.float32]
+    values: NDArray[np.float32]
+    params: CrfParams
+
+
+def crf_scenes(seed: int = 0) -> dict[str, list[CrfProblem]]:
+    """Return the grids of the shipped drive, each with the default parameters for the size of its cells.
+
+    The shipped network was trained on the compact grid. It is convolutional, so that it takes the paper's grid as well.
+    Its labels there are worse, but what is compared is inference.
+
+    Parameters
+    ----------
+    seed : int
+        Seed for the filter's particles.
+
+    Returns
+    -------
+    dict of str to list of CrfProblem
+        "compact grid" (142 x 62 cells) and "64 x 64 crops" of the paper's grid, small enough for all pairs of cells.
+    """
+    compact, paper = (sample_problem(spec, seed) for spec in (GridSpec.compact(), GridSpec.paper()))
+    return {"compact grid": [compact], "64 x 64 crops": crops(paper)}
+
+
+def sample_problem(spec: GridSpec, seed: int = 0) -> CrfProblem:
+    """Return what the shipped SegNet and the filter make of frame `FRAME` of the shipped drive and all before it.
+
+    Parameters
+    ----------
+    spec : GridSpec
+        The grid.
+    seed : int
+        Seed for the filter's particles.
+    """
+    drive = sample_drive()
+    trained = load_net(sample_weights(), drive.camera)
+    net = build_net(replace(trained.need_architecture(), grid=spec), drive.camera)
+    net.load_state_dict(trained.state_dict())
+    stages = Stages.of(net.eval(), seed=seed)
+    *_, belief = stages.track((drive[k] for k in range(FRAME + 1)), spec)
+    o = belief.probability
+    image = network_image(drive[FRAME], trained.need_architecture().image_size).numpy()
+    log_g = stages.fuse(stages.sample(stages.segment(image)), o)
+    return CrfProblem(unary_from_log_probability(log_g), o, CrfParams.for_cells(spec.cell))
+
+
+def crops(problem: CrfProblem) -> list[CrfProblem]:
+    """Cut squares out of the middle columns, from the vehicle ahead.
+
+    Parameters
+    ----------
+    problem : CrfProblem
+        A grid of at least `CROP` columns and `N_CROPS` times as many rows.
+    """
+    _, height, width = problem.unary.shape
+    left = (width - CROP) // 2
+    squares = [np.s_[:, row - CROP : row, left : left + CROP] for row in height - CROP * np.arange(N_CROPS)]
+    return [CrfProblem(problem.unary[square], problem.values[square], problem.params) for square in squares]
 
 
 def crf_ways(seed: int = 0) -> dict[str, Way]:
@@ -47,10 +130,6 @@ def crf_ways(seed: int = 0) -> dict[str, Way]:
     ----------
     seed : int
         Seed for the landmarks of the low-rank kernels.
-
-    Returns
-    -------
-    dict of str to callable
     """
     return {
         "naive": mean_field_naive,
@@ -76,7 +155,7 @@ def crf_error(log: str | Path, seed: int = 0, scenes: Mapping[str, Sequence[CrfP
     Returns
     -------
     dict
-        "scenes": by name from `measure_scene`; and all that made them. JSON can hold it.
+        "scenes": by name from `measure_scene`; with seed, command and versions. JSON can hold it.
 
     Raises
     ------
@@ -95,9 +174,7 @@ def crf_error(log: str | Path, seed: int = 0, scenes: Mapping[str, Sequence[CrfP
             write_json(log, identity | {"scenes": done})
     return identity | {
         "scenes": done,
-        "command": f"semgrid-edu reproduce crf-error --seed {seed}",
-        "date": f"{datetime.now(UTC):%Y-%m-%d}",
-        "versions": versions("numpy", "scipy", "numba", "torch"),
+        **made_by(f"semgrid-edu reproduce crf-error --seed {seed}", "numpy", "scipy", "numba", "torch"),
     }
 
 
@@ -111,27 +188,23 @@ def measure_scene(problems: Sequence[CrfProblem], seed: int = 0, name: str = "")
     seed : int
         Seed for the landmarks of the low-rank kernels.
     name : str
-        What the progress bar says.
+        What the progress bars say.
 
     Returns
     -------
     dict
         "shape" (C, H, W), "grids" (their number), "reference" (the way with the exact kernel) and "ways": for each way
         the "seconds", and the "total", "kernel" and "convergence" errors, a list each, as long as `ITERATIONS`.
-        Errors are those of `distance`. "settled", a list of one, is the kernel error when both have converged.
+        Errors come from `distance`. "settled", a list of one, is the kernel error when both have converged.
     """
-    shape, found = problems[0].unary.shape, []
-    ways = crf_ways(seed)
-    with tqdm(total=len(problems) * len(ways), desc=name, unit="way") as bar:
-        for problem in problems:
-            runs = {}
-            for way, infer in ways.items():
-                runs[way] = _run(infer, problem)
-                bar.update()
-            exact = next(iter(runs.values()))
-            found.append({way: _errors(run, exact) for way, run in runs.items()})
+    ways, found = crf_ways(seed), []
+    for problem in problems:
+        runs = {way: _run(infer, problem) for way, infer in tqdm(ways.items(), desc=name, unit="way")}
+        exact = next(iter(runs.values()))
+        found.append({way: _errors(run, exact) for way, run in runs.items()})
     merged = {way: _merged([one[way] for one in found]) for way in ways}
-    return {"shape": list(shape), "grids": len(problems), "reference": next(iter(ways)), "ways": merged}
+    shape = list(problems[0].unary.shape)
+    return {"shape": shape, "grids": len(problems), "reference": next(iter(ways)), "ways": merged}
 
 
 def distance(found: NDArray, reference: NDArray) -> dict[str, float]:
@@ -144,7 +217,7 @@ def distance(found: NDArray, reference: NDArray) -> dict[str, float]:
 
     Returns
     -------
-    dict
+    dict of str to float
         "mean" and "max" over the cells of the total variation, 0..1, and "labels", the share of the cells whose most
         probable classes differ.
     """
@@ -155,8 +228,7 @@ def distance(found: NDArray, reference: NDArray) -> dict[str, float]:
 
 def _run(infer: Way, problem: CrfProblem) -> dict:
     """Return seconds and Q at each number of updates, and the converged Q."""
-    corner = CrfProblem(*(a[:, :4, :4] for a in problem[:2]), problem.params)
-    infer(*corner, 1, 0.0)  # compiles
+    infer(problem.unary[:, :4, :4], problem.values[:, :4, :4], problem.params, 1, 0.0)  # compiles
     seconds, Q = zip(*(_timed(lambda n=n: infer(*problem, n, 0.0)) for n in ITERATIONS), strict=True)
     return {"seconds": seconds, "Q": Q, "settled": infer(*problem, MOST, TOLERANCE)}
 
@@ -182,17 +254,16 @@ def _errors(run: dict, exact: dict) -> dict:
 
 
 def _merged(found: Sequence[dict]) -> dict:
-    """Average over grids; of "max" take the largest."""
-    return {
-        "seconds": np.mean([one["seconds"] for one in found], axis=0).tolist(),
-        **{
-            error: [
-                {of: float((np.max if of == "max" else np.mean)([e[of] for e in same])) for of in same[0]}
-                for same in zip(*(one[error] for one in found), strict=True)
-            ]
-            for error in (*ERRORS, "settled")
-        },
+    """Average over grids, but take the largest of each "max"."""
+
+    def over_grids(same: Sequence[dict]) -> dict:
+        return {of: float((np.max if of == "max" else np.mean)([one[of] for one in same])) for of in same[0]}
+
+    merged = {
+        error: [over_grids(same) for same in zip(*(one[error] for one in found), strict=True)]
+        for error in (*ERRORS, "settled")
     }
+    return {"seconds": np.mean([one["seconds"] for one in found], axis=0).tolist()} | merged
 
 
 def crf_error_tables(result: dict, iterations: int = 10) -> str:

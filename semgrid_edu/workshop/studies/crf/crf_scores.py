@@ -1,8 +1,6 @@
-"""What the chosen CRFs are worth on the test split, and how well calibrated the grids are (sections 3.5 and 4.2).
+"""What the CRF makes of a network's grids: kept in memory, refined with any parameters, and scored (3.5, 4.2)."""
 
-What the CRF makes of a network's grids: the grids kept in memory, refined with any parameters, and counted (3.5).
-"""
-
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -54,6 +52,10 @@ class GridOutputs(NamedTuple):
         """The same logarithms with the classes first, (C, N, H, W), as the functions of `semgrid_edu.crf` take them."""
         return self.log_g.swapaxes(0, 1)
 
+    def at(self, temperature: float) -> "GridOutputs":
+        """Return the same grids with log g at another temperature. Parameters are those of `at_temperature`."""
+        return self._replace(log_g=at_temperature(self.columns, temperature).swapaxes(0, 1))
+
 
 def grid_outputs(net: SemanticGridNet, frames: TrainingSet) -> GridOutputs:
     """Run the network once over every frame of a split.
@@ -63,7 +65,7 @@ def grid_outputs(net: SemanticGridNet, frames: TrainingSet) -> GridOutputs:
     net : SemanticGridNet
         The network, for the sizes of the frames.
     frames : TrainingSet
-        The frames.
+        The split.
 
     Returns
     -------
@@ -73,23 +75,6 @@ def grid_outputs(net: SemanticGridNet, frames: TrainingSet) -> GridOutputs:
     shown = tqdm(range(len(frames)), desc="network", unit="frame")
     log_g = np.stack([learned_log_g(net, frames[k]) for k in shown])
     return GridOutputs(log_g, frames.arrays["occupancy"], frames.arrays["truth"])
-
-
-def outputs_at(outputs: GridOutputs, temperature: float) -> GridOutputs:
-    """Return the same grids with log g at another temperature, see `at_temperature`.
-
-    Parameters
-    ----------
-    outputs : GridOutputs
-        The network's grids.
-    temperature : float
-        T, positive.
-
-    Returns
-    -------
-    GridOutputs
-    """
-    return outputs._replace(log_g=at_temperature(outputs.columns, temperature).swapaxes(0, 1))
 
 
 def refined_grids(outputs: GridOutputs, params: CrfParams | None) -> NDArray[np.float32]:
@@ -121,75 +106,50 @@ def refined_confusions(outputs: GridOutputs, refined: NDArray) -> NDArray[np.int
     outputs : GridOutputs
         For the truth.
     refined : (N, C, H, W) float
-        Distributions over the classes, of `refined_grids`.
+        Distributions over the classes, from `refined_grids`.
 
     Returns
     -------
     (N, C, C) int64
-        Number of labelled cells of each frame: one row per true class, one column per class that was called.
+        Number of labelled cells of each frame: one row per true class, one column per predicted class.
     """
-    n_classes = refined.shape[1]
     pairs = zip(outputs.truth, refined.argmax(axis=1), strict=True)
-    return np.stack([confusion_matrix(truth, called, n_classes) for truth, called in pairs])
+    return np.stack([confusion_matrix(truth, predicted, refined.shape[1]) for truth, predicted in pairs])
 
 
-def refuse_known_drives(validation_dir: str | Path, dataset_dir: str | Path) -> None:
-    """Refuse validation drives that a network was trained on or will be tested on.
-
-    Two drives are the same when their first scans are, byte for byte, whatever their numbers are.
-
-    Parameters
-    ----------
-    validation_dir : path-like
-        A data set with the split "validation".
-    dataset_dir : path-like
-        The data set with the splits "train" and "test".
-
-    Raises
-    ------
-    ArgumentError
-        When a split is missing.
-    DataError
-        When a drive of "validation" is one of "train" or "test"; the message names both.
-    """
-    known = load_index(dataset_dir)
-    of_scan = {scan: (split, name) for split in ("train", "test") for name, scan in _first_scans(known, split).items()}
-    validation = load_index(validation_dir)
-    for (date, drive), scan in _first_scans(validation, "validation").items():
-        if scan in of_scan:
-            split, (known_date, known_drive) = of_scan[scan]
-            folder, found = drive_folder(validation.root, date, drive), f"{known_date} {known_drive} of {split}"
-            raise DataError(folder, f"a drive that {known.name} doesn't use for training or testing", found)
-
-
-def _first_scans(index: DatasetIndex, split: str) -> dict[tuple[str, str], str]:
-    """Return the SHA-256 of the first scan of each drive of a split, by date and drive."""
-    folders = {
-        name: drive_folder(index.root, *name) / "velodyne_points" / "data" for name in index.frames_by_drive(split)
-    }
-    first = {name: min(folder.glob("[!.]*.bin"), default=folder) for name, folder in folders.items()}
-    for folder in (path for path in first.values() if not path.is_file()):
-        raise DataError(folder, "scans", "none")
-    return {name: sha256(path) for name, path in first.items()}
-
-
-def calibration(outputs: GridOutputs) -> dict[str, object]:
-    """Return how far a network's probabilities can be believed.
+def scores_by_method(
+    grids: Iterable[tuple[str, NDArray]], outputs: GridOutputs, frames: TrainingSet
+) -> dict[str, object]:
+    """Score what several methods make of the same frames.
 
     Parameters
     ----------
+    grids : iterable of (str, (N, C, H, W) float)
+        Each method and its distributions over the classes; the first is the network without CRF.
     outputs : GridOutputs
-        The network's grids.
+        For the truth.
+    frames : TrainingSet
+        For drives and classes.
 
     Returns
     -------
     dict
-        "NLL", nats per cell; "ECE", 0..1; and the columns of the reliability diagram.
+        "frames"; by method "scores" (see `Scores`), "ECE" (expected calibration error), "gains" over the first method
+        by metric (low, gain, high: see `gains_by_metric`), and "confusion". JSON can hold it.
     """
-    diagram = reliability(np.exp(outputs.columns), outputs.truth)
-    columns = {name: column.tolist() for name, column in diagram._asdict().items()}
-    nll = negative_log_likelihood(outputs.columns, outputs.truth)
-    return {"NLL": nll, "ECE": expected_calibration_error(diagram), "reliability": columns}
+    per_drive, ece = {}, {}
+    for method, refined in grids:
+        ece[method] = expected_calibration_error(reliability(refined.swapaxes(0, 1), outputs.truth))
+        per_drive[method] = drive_confusions(refined_confusions(outputs, refined), frames.drives)
+    confusions = {method: drives.sum(axis=0) for method, drives in per_drive.items()}
+    first, *others = per_drive
+    return {
+        "frames": len(frames),
+        "scores": scores(confusions, frames.label_set),
+        "ECE": ece,
+        "gains": {method: gains_by_metric(per_drive[method], per_drive[first]) for method in others},
+        "confusion": {method: confusion.tolist() for method, confusion in confusions.items()},
+    }
 
 
 def compare_on_test(
@@ -211,32 +171,79 @@ def compare_on_test(
     Returns
     -------
     dict
-        "frames"; "calibration" "before" and "after"; by method "scores" (see `Scores`), "ECE" of the refined
-        probabilities, "gains" over the network by metric (low, gain, high), and "confusion". JSON can hold it.
+        From `scores_by_method`, with the `calibration` "before" and "after". JSON can hold it.
     """
     test = TrainingSet(dataset_dir, "test")
     network, default = grid_outputs(load_net(weights, test.camera), test), CrfParams.for_cells(test.spec.cell)
-    calibrated = outputs_at(network, temperature)
+    calibrated = network.at(temperature)
     methods = {"network": (network, None), "CRF": (network, default), "calibrated, CRF": (calibrated, default)}
     methods |= {f"calibrated, CRF for {objective}": (calibrated, params) for objective, params in chosen.items()}
-    per_drive, ece = {}, {}
-    for method, (outputs, params) in methods.items():
-        refined = refined_grids(outputs, params)
-        ece[method] = expected_calibration_error(reliability(refined.swapaxes(0, 1), outputs.truth))
-        per_drive[method] = drive_confusions(refined_confusions(outputs, refined), test.drives)
-    confusions = {method: confusion.sum(axis=0) for method, confusion in per_drive.items()}
-    return {
-        "frames": len(test),
-        "calibration": {"before": calibration(network), "after": calibration(calibrated)},
-        "scores": scores(confusions, test.label_set),
-        "ECE": ece,
-        "gains": {
-            method: gains_by_metric(confusion, per_drive["network"])
-            for method, confusion in per_drive.items()
-            if method != "network"
-        },
-        "confusion": {method: confusion.tolist() for method, confusion in confusions.items()},
+    grids = ((name, refined_grids(outputs, params)) for name, (outputs, params) in methods.items())
+    return scores_by_method(grids, network, test) | {
+        "calibration": {"before": calibration(network), "after": calibration(calibrated)}
     }
+
+
+def calibration(outputs: GridOutputs) -> dict[str, object]:
+    """Return how far a network's probabilities can be believed.
+
+    Parameters
+    ----------
+    outputs : GridOutputs
+        The network's grids.
+
+    Returns
+    -------
+    dict
+        "NLL", nats per cell; "ECE", 0..1; and the columns of the reliability diagram.
+    """
+    diagram = reliability(np.exp(outputs.columns), outputs.truth)
+    columns = {name: column.tolist() for name, column in diagram._asdict().items()}
+    nll = negative_log_likelihood(outputs.columns, outputs.truth)
+    return {"NLL": nll, "ECE": expected_calibration_error(diagram), "reliability": columns}
+
+
+def refuse_known_drives(validation_dir: str | Path, dataset_dir: str | Path) -> None:
+    """Refuse validation drives that a network was trained on or will be tested on.
+
+    Two drives are the same when their first scans are, byte for byte, whatever their numbers are.
+
+    Parameters
+    ----------
+    validation_dir : path-like
+        A data set with the split "validation".
+    dataset_dir : path-like
+        The data set with the splits "train" and "test".
+
+    Raises
+    ------
+    ArgumentError
+        When a split is missing.
+    DataError
+        When a drive of "validation" is one of "train" or "test"; the message names both.
+    """
+    known, validation = load_index(dataset_dir), load_index(validation_dir)
+    of_scan = {
+        scan: f"{date} {drive} of {split}"
+        for split in ("train", "test")
+        for (date, drive), scan in _first_scans(known, split).items()
+    }
+    expected = f"a drive that {known.name} doesn't use for training or testing"
+    for name, scan in _first_scans(validation, "validation").items():
+        if scan in of_scan:
+            raise DataError(drive_folder(validation.root, *name), expected, of_scan[scan])
+
+
+def _first_scans(index: DatasetIndex, split: str) -> dict[tuple[str, str], str]:
+    """Return the SHA-256 of the first scan of each drive of a split, by date and drive."""
+    first = {}
+    for name in index.frames_by_drive(split):
+        folder = drive_folder(index.root, *name) / "velodyne_points" / "data"
+        scan = min(folder.glob("[!.]*.bin"), default=None)
+        if scan is None:
+            raise DataError(folder, "scans", "none")
+        first[name] = sha256(scan)
+    return first
 
 
 def gains_by_metric(a: NDArray, b: NDArray) -> dict[str, list[float | None]]:

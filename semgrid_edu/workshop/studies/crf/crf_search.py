@@ -1,11 +1,6 @@
-"""A search for the CRF's parameters on drives that neither training nor test has seen (section 3.5, claim of 4.3).
-
-Trials of the search for the CRF's parameters: made, valued by each objective, and kept on disk (section 3.5).
-"""
+"""A search for the CRF's parameters on drives that neither training nor test has seen (section 3.5, claim of 4.3)."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
-from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
 
@@ -20,7 +15,7 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.networks import load_net
 from semgrid_edu.storage.files import sha256, write_json
-from semgrid_edu.storage.provenance import FILE_NAME, short_path, versions
+from semgrid_edu.storage.provenance import FILE_NAME, made_by, short_path
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.workshop.scoring.evaluate import scores, scores_table
 from semgrid_edu.workshop.studies.crf.crf_scores import (
@@ -29,7 +24,6 @@ from semgrid_edu.workshop.studies.crf.crf_scores import (
     compare_on_test,
     gains_text,
     grid_outputs,
-    outputs_at,
     refined_confusions,
     refined_grids,
     refuse_known_drives,
@@ -44,8 +38,27 @@ Trial = dict[str, object]
 """One trial: "params" by name, "scores" by cells and metric as in `Scores`, and the "seconds" that it took."""
 
 
+def run_trial(calibrated: GridOutputs, params: CrfParams | None, label_set: LabelSet) -> Trial:
+    """Refine every grid with these parameters, and score the result.
+
+    Parameters
+    ----------
+    calibrated : GridOutputs
+        The network's grids.
+    params : CrfParams or None
+        Parameters of the CRF; None for no CRF.
+    label_set : LabelSet
+        The classes.
+    """
+    began = perf_counter()
+    confusion = refined_confusions(calibrated, refined_grids(calibrated, params)).sum(axis=0)
+    found = scores({"refined": confusion}, label_set)["refined"]
+    tried = {name: getattr(params, name) for name in FACTORS} if params else {}
+    return {"params": tried, "scores": found, "seconds": round(perf_counter() - began, 2)}
+
+
 def next_params(trials: Sequence[Trial], unrefined: dict, cell: float, seed: int) -> CrfParams:
-    """Return the parameters to try next: the defaults first, then those of `next_point`.
+    """Return the parameters to try next: the defaults first, then those at the `next_point`.
 
     Parameters
     ----------
@@ -57,59 +70,11 @@ def next_params(trials: Sequence[Trial], unrefined: dict, cell: float, seed: int
         Side of a cell, metres.
     seed : int
         Seed of the search.
-
-    Returns
-    -------
-    CrfParams
     """
     if not trials:
         return CrfParams.for_cells(cell)
     points = [point_of(CrfParams(**trial["params"]), cell) for trial in trials]
     return params_at(next_point(points, objective_values(trials, unrefined), seed), cell)
-
-
-def run_trial(calibrated: GridOutputs, params: CrfParams, label_set: LabelSet) -> Trial:
-    """Refine every grid with these parameters, and score the result.
-
-    Parameters
-    ----------
-    calibrated : GridOutputs
-        The network's grids.
-    params : CrfParams
-        Parameters of the CRF.
-    label_set : LabelSet
-        The classes.
-
-    Returns
-    -------
-    dict
-        A trial.
-    """
-    began = perf_counter()
-    found = validation_scores(calibrated, params, label_set)
-    chosen = {name: value for name, value in asdict(params).items() if name in FACTORS}
-    return {"params": chosen, "scores": found, "seconds": round(perf_counter() - began, 2)}
-
-
-def validation_scores(outputs: GridOutputs, params: CrfParams | None, label_set: LabelSet) -> dict[str, dict]:
-    """Return the metrics of the refined grids.
-
-    Parameters
-    ----------
-    outputs : GridOutputs
-        The network's grids.
-    params : CrfParams or None
-        Parameters of the CRF; None for no CRF.
-    label_set : LabelSet
-        The classes.
-
-    Returns
-    -------
-    dict of str to dict
-        Values from 0 to 1, by cells ("all" or "semantic") and metric.
-    """
-    confusion = refined_confusions(outputs, refined_grids(outputs, params)).sum(axis=0)
-    return scores({"refined": confusion}, label_set)["refined"]
 
 
 def objective_values(trials: Sequence[Trial], unrefined: dict) -> NDArray[np.float64]:
@@ -156,16 +121,12 @@ def read_trials(log: str | Path, identity: dict) -> list[Trial]:
     if not path.exists():
         return []
     content = read_json(path)
-    try:
-        found, trials = {name: content[name] for name in identity}, content["trials"]
-        for trial in trials:
-            CrfParams(**trial["params"])
-            _ = [float(trial["scores"]["all"][name]) for name in OBJECTIVES[:2]], float(trial["seconds"])
-    except (ValueError, KeyError, TypeError) as error:
-        raise DataError(path, "the trials of a search, or no file", f"something else: {error!r}") from error
+    found = {name: content.get(name) for name in identity}
+    if not isinstance(content.get("trials"), list):
+        raise DataError(path, "the trials of a search, or no file", f"something else: {repr(content)[:200]}")
     if found != identity:
         raise DataError(path, f"trials of the search {identity}", f"{found}: choose another file")
-    return trials
+    return content["trials"]
 
 
 def search_crf(
@@ -173,16 +134,17 @@ def search_crf(
     dataset_dir: str | Path,
     weights: str | Path,
     log: str | Path,
+    *,
     seed: int = 0,
     n_trials: int = 200,
 ) -> dict[str, object]:
     """Calibrate a network, search the CRF's parameters, and score what was chosen on the test split.
 
-    Temperature and parameters are chosen on drives of their own. On the drives that it was trained on a network is
-    surer, and more often right, than anywhere else: a temperature fitted there would be too low, and a CRF chosen there
-    would have little to repair. Holding drives back from training would mean to train each network anew on fewer. New
-    drives of the same simulator cost minutes (`semgrid-edu data make validation`) and leave the networks, and all
-    scores in docs/results, as they are. A data set that has a split "validation" of its own serves as well.
+    Temperature and parameters are chosen on drives of their own. On the drives that it was trained on, a network is
+    more confident and more often right than anywhere else: a temperature fitted there would be too low, and a CRF
+    chosen there would have little to repair. Holding drives back would mean training each network again on fewer
+    drives. New drives of the same simulator cost minutes (`semgrid-edu data make validation`) and leave the networks,
+    and all scores in docs/results, as they are. A data set that has a split "validation" of its own serves as well.
 
     The temperature comes first, by likelihood alone (`fit_temperature`), and stays. Then the two weights and three
     widths are searched (`next_point`). Test frames are looked at once, at the end.
@@ -208,7 +170,7 @@ def search_crf(
     dict
         "temperature", "calibration", "unrefined" (validation scores without CRF), "chosen" (a trial for each of
         `OBJECTIVES`), "pareto" (numbers of the trials that no other one beats in both accuracies), "test" (from
-        `compare_on_test`), "trials", and all that made them. JSON can hold it.
+        `compare_on_test`), "trials", and data, weights, command and versions. JSON can hold it.
 
     Raises
     ------
@@ -224,17 +186,18 @@ def search_crf(
     refuse_known_drives(validation_dir, dataset_dir)
     validation = TrainingSet(validation_dir, "validation")
     identity = _identity(validation_dir, dataset_dir, weights, seed)
-    trials, network = read_trials(log, identity), grid_outputs(load_net(weights, validation.camera), validation)
+    trials = read_trials(log, identity)
+    network = grid_outputs(load_net(weights, validation.camera), validation)
     temperature = fit_temperature(network.columns, network.truth)
-    calibrated, cell = outputs_at(network, temperature), validation.spec.cell
-    unrefined = validation_scores(calibrated, None, validation.label_set)
-    with tqdm(total=n_trials, initial=len(trials), desc="search", unit="trial") as bar:
-        while len(trials) < n_trials:
-            params = next_params(trials, unrefined, cell, seed)
-            trials.append(run_trial(calibrated, params, validation.label_set))
-            write_json(log, identity | {"trials": trials})
-            bar.update()
+    calibrated, cell = network.at(temperature), validation.spec.cell
+    unrefined = run_trial(calibrated, None, validation.label_set)["scores"]
+    for _ in tqdm(range(len(trials), n_trials), total=n_trials, initial=len(trials), desc="search", unit="trial"):
+        params = next_params(trials, unrefined, cell, seed)
+        trials.append(run_trial(calibrated, params, validation.label_set))
+        write_json(log, identity | {"trials": trials})
     values = objective_values(trials, unrefined)
+    data, test = (Path(folder).resolve().name for folder in (validation_dir, dataset_dir))
+    command = f"semgrid-edu search-crf --data {data} --test {test} --weights {short_path(weights)}"
     chosen = {name: int(k) for name, k in zip(OBJECTIVES, values.argmax(axis=0), strict=True)}
     params = {name: CrfParams(**trials[k]["params"]) for name, k in chosen.items()}
     return identity | {
@@ -246,10 +209,8 @@ def search_crf(
         "chosen": {name: {"trial": k, **trials[k]} for name, k in chosen.items()},
         "pareto": pareto_front(values[:, :2]).tolist(),
         "test": compare_on_test(dataset_dir, weights, temperature, params),
-        "command": _command(validation_dir, dataset_dir, weights, seed, n_trials),
-        "date": f"{datetime.now(UTC):%Y-%m-%d}",
+        **made_by(f"{command} --seed {seed} --trials {n_trials}", "numpy", "torch", "numba", "scipy"),
         "minutes": round(sum(trial["seconds"] for trial in trials) / 60, 1),
-        "versions": versions("numpy", "torch", "numba", "scipy"),
         "trials": trials,
     }
 
@@ -291,8 +252,3 @@ def _identity(validation_dir: str | Path, dataset_dir: str | Path, weights: str 
     trained_on = read_json(record).get("dataset") if record.exists() else None
     used = {"file": short_path(weights), "sha256": sha256(weights), "trained on": trained_on}
     return named | {"weights": used, "seed": seed}
-
-
-def _command(validation_dir: str | Path, dataset_dir: str | Path, weights: str | Path, seed: int, n_trials: int) -> str:
-    data = f"--data {Path(validation_dir).resolve().name} --test {Path(dataset_dir).resolve().name}"
-    return f"semgrid-edu search-crf {data} --weights {short_path(weights)} --seed {seed} --trials {n_trials}"

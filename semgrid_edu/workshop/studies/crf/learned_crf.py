@@ -1,21 +1,35 @@
-"""Ways to learn a CRF on the grids of a network: from which drives, what, and with which loss (section 3.5)."""
+"""CRFs that learn weights, widths and label costs on a network's grids, and their scores (sections 3.5, 4.3)."""
 
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from tqdm.auto import tqdm
+
 from semgrid_edu.crf import CrfParams
-from semgrid_edu.crf.layer import CrfLayer
+from semgrid_edu.crf.layer import CrfLayer, load_crf
 from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.training_set import TrainingSet
-from semgrid_edu.networks import load_net
+from semgrid_edu.networks import WEIGHTS, load_net
 from semgrid_edu.storage.files import sha256
-from semgrid_edu.storage.provenance import short_path, write_provenance
-from semgrid_edu.training import TrainingParams
+from semgrid_edu.storage.provenance import made_by, short_path, write_provenance
+from semgrid_edu.training import CHECKPOINT, TrainingParams
 from semgrid_edu.training.crf import CRF_TRAINING, train_crf
-from semgrid_edu.workshop.studies.crf.crf_scores import grid_outputs
+from semgrid_edu.workshop.scoring.evaluate import scores_table
+from semgrid_edu.workshop.studies.crf.crf_scores import (
+    GridOutputs,
+    gains_text,
+    grid_outputs,
+    refined_grids,
+    refuse_known_drives,
+    scores_by_method,
+)
 
 MEAN_FIELD_UPDATES = 5
 """Updates that a learnt CRF makes, in training and afterwards: Zheng et al. 2015 trained with as many."""
@@ -65,11 +79,12 @@ def train_crf_on(
     weights: str | Path,
     folder: str | Path,
     variant: CrfVariant,
+    *,
     params: TrainingParams = CRF_TRAINING,
     seed: int = 0,
     resume: bool = False,
 ) -> None:
-    """Train a CRF on the grids that a network makes of the frames of a split, and write down how it was made.
+    """Train a CRF on the grids that a network makes of the frames of a split, and write its provenance.
 
     The network stays as it is, so its grids are computed once.
 
@@ -99,14 +114,15 @@ def train_crf_on(
     """
     began, frames = datetime.now(UTC), TrainingSet(dataset_dir, variant.split)
     outputs = grid_outputs(load_net(weights, frames.camera), frames)
-    start = CrfParams.for_cells(frames.spec.cell)
-    updates = MEAN_FIELD_UPDATES
-    layer = CrfLayer(start, len(frames.label_set), iterations=updates, learn_compatibility=variant.label_costs)
+    layer = _untrained(frames, variant.label_costs)
     params = replace(params, weight_limit=variant.weight_limit)
     train_crf(layer, *outputs, folder, params, seed, resume)
+    data, out = (Path(path).resolve().name for path in (dataset_dir, folder))
+    costs = " --label-costs" if variant.label_costs else ""
     write_provenance(
         folder,
-        _train_command(dataset_dir, weights, folder, variant, params, seed),
+        f"semgrid-edu train-crf --data {data} --split {variant.split} --weights {short_path(weights)} --out {out}"
+        f"{costs} --weight-limit {variant.weight_limit:g} --seed {seed} --iterations {params.grid_iterations}",
         seed,
         ("torch", "numpy", "safetensors"),
         date=f"{began:%Y-%m-%d}",
@@ -120,18 +136,158 @@ def train_crf_on(
     )
 
 
-def _train_command(
+def _untrained(frames: TrainingSet, label_costs: bool = False) -> CrfLayer:
+    """Return a layer with the default parameters for these frames."""
+    start = CrfParams.for_cells(frames.spec.cell)
+    return CrfLayer(start, len(frames.label_set), iterations=MEAN_FIELD_UPDATES, learn_compatibility=label_costs)
+
+
+def compare_learned_crfs(
     dataset_dir: str | Path,
+    validation_dir: str | Path,
     weights: str | Path,
-    folder: str | Path,
-    variant: CrfVariant,
-    params: TrainingParams,
-    seed: int,
-) -> str:
-    data, out = (Path(path).resolve().name for path in (dataset_dir, folder))
-    options = [
-        f"--data {data} --split {variant.split} --weights {short_path(weights)} --out {out}",
-        "--label-costs" if variant.label_costs else "",
-        f"--weight-limit {variant.weight_limit:g} --seed {seed} --iterations {params.grid_iterations}",
-    ]
-    return " ".join(["semgrid-edu train-crf", *filter(None, options)])
+    runs: str | Path,
+    *,
+    params: TrainingParams = CRF_TRAINING,
+    seed: int = 0,
+) -> dict[str, object]:
+    """Learn a CRF in each of the ways of `VARIANTS`, and score all of them on the test split.
+
+    Parameters
+    ----------
+    dataset_dir : path-like
+        The data set that the network was trained on, with the splits "train" and "test".
+    validation_dir : path-like
+        A data set with the split "validation", drives that the network has never seen.
+    weights : path-like
+        The network.
+    runs : path-like
+        Takes one folder per training run. A run that has ended isn't repeated, and one that was interrupted is
+        resumed.
+    params : TrainingParams
+        How to train.
+    seed : int
+        Seed for the order of the frames.
+
+    Returns
+    -------
+    dict
+        What `scores_on_test` returns, "learnt" (`learnt_values` of each CRF), and how it was made. JSON can hold it.
+
+    Raises
+    ------
+    ArgumentError
+        When a split is missing.
+    DataError
+        When a file is missing or damaged, or a drive of "validation" is one of "train" or "test".
+    """
+    refuse_known_drives(validation_dir, dataset_dir)
+    data, layers = {"train": Path(dataset_dir), "validation": Path(validation_dir)}, {}
+    for variant in VARIANTS:
+        folder = Path(runs) / variant.folder
+        if not (folder / WEIGHTS).exists():
+            resume = (folder / CHECKPOINT).exists()
+            train_crf_on(data[variant.split], weights, folder, variant, params=params, seed=seed, resume=resume)
+        layers[variant.name] = load_crf(folder / WEIGHTS)
+    names = {split: folder.resolve().name for split, folder in data.items()}
+    return scores_on_test(dataset_dir, weights, layers) | {
+        "learnt": {name: learnt_values(layer) for name, layer in layers.items()},
+        "params": asdict(params),
+        "mean field updates": MEAN_FIELD_UPDATES,
+        "data": {split: {"name": names[split], "sha256": sha256(path / INDEX_FILE)} for split, path in data.items()},
+        "weights": {"file": short_path(weights), "sha256": sha256(weights)},
+        "seed": seed,
+        **made_by(
+            f"semgrid-edu reproduce learned-crf --data {names['train']} --validation {names['validation']} "
+            f"--weights {short_path(weights)} --seed {seed}",
+            *("numpy", "torch", "numba"),
+        ),
+    }
+
+
+def scores_on_test(dataset_dir: str | Path, weights: str | Path, layers: Mapping[str, CrfLayer]) -> dict[str, object]:
+    """Score the network, the default CRF and trained ones on the test split.
+
+    Parameters
+    ----------
+    dataset_dir : path-like
+        A data set with the split "test".
+    weights : path-like
+        The network.
+    layers : dict of str to CrfLayer
+        The trained CRFs by name.
+
+    Returns
+    -------
+    dict
+        From `scores_by_method`, with the names of the "classes".
+    """
+    test = TrainingSet(dataset_dir, "test")
+    outputs = grid_outputs(load_net(weights, test.camera), test)
+
+    def grids() -> Iterator[tuple[str, NDArray]]:
+        yield "network", refined_grids(outputs, None)
+        yield "network + CRF", refined_grids(outputs, CrfParams.for_cells(test.spec.cell))
+        for name, layer in {"untrained layer": _untrained(test), **layers}.items():
+            yield name, layer_grids(layer, outputs)
+
+    return scores_by_method(grids(), outputs, test) | {"classes": list(test.label_set.names)}
+
+
+@torch.inference_mode()
+def layer_grids(layer: CrfLayer, outputs: GridOutputs) -> NDArray[np.float32]:
+    """Refine every grid by a layer.
+
+    Parameters
+    ----------
+    layer : CrfLayer
+        The CRF.
+    outputs : GridOutputs
+        The network's grids.
+
+    Returns
+    -------
+    (N, C, H, W) float32
+        Q, the distribution over the classes in each cell.
+    """
+    frames = zip(outputs.log_g, np.array(outputs.occupancy), strict=True)
+    shown = tqdm(frames, desc="CRF", total=len(outputs.truth), unit="frame")
+    return np.stack([layer(*(torch.from_numpy(part)[None] for part in frame))[0].exp().numpy() for frame in shown])
+
+
+def learnt_values(layer: CrfLayer) -> dict[str, object]:
+    """Return what a CRF has learnt.
+
+    Parameters
+    ----------
+    layer : CrfLayer
+        The CRF.
+
+    Returns
+    -------
+    dict
+        "w1" and "w2"; "sigma_alpha" and "sigma_gamma", cells; "sigma_beta"; "compatibility", mu (C, C).
+    """
+    names = ("w1", "w2", "sigma_alpha", "sigma_beta", "sigma_gamma")
+    values = torch.cat([layer.log_weights, layer.log_sigmas]).exp().tolist()
+    return dict(zip(names, values, strict=True)) | {"compatibility": layer.compatibility.tolist()}
+
+
+def learned_crf_table(result: dict) -> str:
+    """Return scores, gains and learnt parameters as text to print.
+
+    Parameters
+    ----------
+    result : dict
+        From `compare_learned_crfs`.
+
+    Returns
+    -------
+    str
+        Scores in per cent; gains over the network without CRF in points, with 95 % intervals over test drives.
+    """
+    lines = [scores_table(result["scores"]), "", gains_text(result["gains"]), ""]
+    for method, learnt in result["learnt"].items():
+        named = (f"{name} {value:.3g}" for name, value in learnt.items() if name != "compatibility")
+        lines.append(f"{method}: {', '.join(named)}")
+    return "\n".join(lines)

@@ -32,7 +32,7 @@ def params_at(point: ArrayLike, cell: float) -> CrfParams:
     point : (5,) float
         One number for each of `FACTORS`: 0 and 1 are the ends of its axis.
     cell : float
-        Side of a cell, metres; the defaults are those of `CrfParams.for_cells`.
+        Side of a cell, metres; the factors multiply the defaults of `CrfParams.for_cells`.
 
     Returns
     -------
