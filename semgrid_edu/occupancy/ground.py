@@ -1,8 +1,8 @@
 """Where the ground lies under each return: walked outward from the vehicle (after Himmelsbach et al., IV 2010).
 
 A return counts as an obstacle by its height above the ground, but no street is flat: a car's body pitches, roads rise,
-verges slope. So the ground has to be found first. `ground_literal` reads like the method, sector by sector;
-`height_above_ground` does the same fast.
+verges slope. So the ground has to be found first. `height_above_ground_literal` reads like the method, sector by
+sector; `height_above_ground` does the same fast.
 """
 
 from dataclasses import dataclass
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.occupancy.evidence import check_points
 from semgrid_edu.occupancy.polar import beams_of
+from semgrid_edu.occupancy.state import check_fields, not_negative, positive_count
 
 
 @dataclass(frozen=True)
@@ -70,14 +71,11 @@ class GroundParams:
 
     def __post_init__(self) -> None:
         """Refuse parameters with which no ground can be found."""
-        for name in ("sectors", "neighbours"):
-            if not isinstance(getattr(self, name), int | np.integer) or getattr(self, name) < (name == "sectors"):
-                raise ArgumentError(name, "a whole number, at least 1 sector and 0 neighbours", getattr(self, name))
+        check_fields(self, "a whole number, at least 1", positive_count, "sectors")
+        check_fields(self, "a whole number, not negative", lambda n: isinstance(n, int | np.integer) and n >= 0, "neighbours")
         if 2 * self.neighbours >= self.sectors:
             raise ArgumentError("neighbours", f"less than half of the {self.sectors} sectors", self.neighbours)
-        for name in ("step", "slope", "rise", "grade", "gap"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
-                raise ArgumentError(name, "a finite number, not negative", getattr(self, name))
+        check_fields(self, "a finite number, not negative", not_negative, "step", "slope", "rise", "grade", "gap")
         if not (np.isfinite(self.farthest) and 0 < self.bin <= self.farthest):
             raise ArgumentError("bin", f"metres, above 0 and up to farthest, {self.farthest}", self.bin)
 

@@ -11,6 +11,7 @@ from semgrid_edu.occupancy.evidence import Evidence, Sensor, check_sensor
 from semgrid_edu.occupancy.local_belief import observe
 from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll
 from semgrid_edu.occupancy.sensor import SensorModel
+from semgrid_edu.occupancy.state import not_negative
 
 TINY = np.float32(1e-30)
 """Stands for a likelihood of 0, whose logarithm is infinite. The bounds on P(occupied) make the difference vanish."""
@@ -199,7 +200,7 @@ class LogOddsGrid:
             When the points aren't a table of finite coordinates, the time is negative or not finite, or the sensor
             doesn't turn the scan into evidence. The grid then stays as it was.
         """
-        if not (np.isfinite(dt) and dt >= 0):
+        if not not_negative(dt):
             raise ArgumentError("dt", "seconds, not negative", dt)
         shift, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
         seen = observe(self.params.sensor, points_grid, pose, self.map_spec, self.spec)

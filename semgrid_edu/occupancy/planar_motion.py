@@ -1,7 +1,4 @@
-"""Planar motion of the vehicle: what the filter needs to know of ego-motion (paper, section 3.2).
-
-A map that scrolls under the vehicle by whole cells, so that memory stays sharp (paper, section 3.2, step 1).
-"""
+"""Ego-motion in the plane, and a map that scrolls under the vehicle by whole cells (paper, section 3.2, step 1)."""
 
 import math
 from dataclasses import dataclass

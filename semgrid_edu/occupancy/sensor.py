@@ -12,6 +12,7 @@ from semgrid_edu.occupancy.evidence import Evidence, check_points, without_own_r
 from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.polar import beyond_reach, count_returns, fill_gaps, polar_profile, reach
+from semgrid_edu.occupancy.state import check_fields, not_negative, positive_count
 
 
 @dataclass(frozen=True)
@@ -68,21 +69,16 @@ class SensorModel:
 
     def __post_init__(self) -> None:
         """Refuse a sensor that is impossible, or that never errs: no scan could ever correct a cell that is certain."""
-        if not (math.isfinite(self.under) and self.under >= 0):
-            raise ArgumentError("under", "metres, not negative", self.under)
-        if not 0 < self.azimuth_step <= 360:
-            raise ArgumentError("azimuth_step", "degrees, above 0 and up to 360", self.azimuth_step)
-        if not 0 <= self.column_spacing <= 360:
-            raise ArgumentError("column_spacing", "degrees, from 0 to 360", self.column_spacing)
-        if not isinstance(self.max_returns, int | np.integer) or self.max_returns < 1:
-            raise ArgumentError("max_returns", "a whole number of at least 1", self.max_returns)
+        check_fields(self, "metres, not negative", not_negative, "under")
+        check_fields(self, "degrees, above 0 and up to 360", lambda angle: 0 < angle <= 360, "azimuth_step")
+        check_fields(self, "degrees, from 0 to 360", lambda angle: 0 <= angle <= 360, "column_spacing")
+        check_fields(self, "a whole number of at least 1", positive_count, "max_returns")
         if not self.obstacle_min < self.obstacle_max:
             raise ArgumentError("obstacle_min", f"less than obstacle_max, {self.obstacle_max}", self.obstacle_min)
         if len(self.vehicle) != 4 or not (self.vehicle[0] <= self.vehicle[1] and self.vehicle[2] <= self.vehicle[3]):
             raise ArgumentError("vehicle", "x_min, x_max, y_min, y_max in metres, the smaller first", self.vehicle)
-        for name in ("p_hit_occupied", "p_hit_free", "p_pass_occupied", "p_pass_free"):
-            if not 0 < getattr(self, name) < 1:
-                raise ArgumentError(name, "a probability between 0 and 1", getattr(self, name))
+        probabilities = "p_hit_occupied", "p_hit_free", "p_pass_occupied", "p_pass_free"
+        check_fields(self, "a probability between 0 and 1", lambda p: 0 < p < 1, *probabilities)
 
     @property
     def beams(self) -> int:

@@ -1,5 +1,7 @@
 """What the filter believes of each cell: four states and a velocity (paper, section 3.2)."""
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
 
@@ -43,6 +45,52 @@ def check_shape(name: str, values: NDArray, shape: tuple[int, ...]) -> None:
     """
     if np.shape(values) != shape:
         raise ArgumentError(name, f"shape {shape}", f"shape {np.shape(values)}")
+
+
+def check_fields(thing: object, expected: str, holds: Callable[[object], bool], *names: str) -> None:
+    """Refuse an object of which some fields don't have the values that they should have.
+
+    Parameters
+    ----------
+    thing : object
+        The object.
+    expected : str
+        What its fields should be, for the error.
+    holds : callable
+        Whether a value is that.
+    *names : str
+        The fields.
+
+    Raises
+    ------
+    ArgumentError
+        Names the first field with another value.
+    """
+    for name in names:
+        if not holds(getattr(thing, name)):
+            raise ArgumentError(name, expected, getattr(thing, name))
+
+
+def not_negative(number: float) -> bool:
+    """Tell whether a number is finite and at least 0.
+
+    Parameters
+    ----------
+    number : float
+        Any number.
+    """
+    return math.isfinite(number) and number >= 0
+
+
+def positive_count(number: float) -> bool:
+    """Tell whether a number is whole and at least 1.
+
+    Parameters
+    ----------
+    number : float
+        Any number.
+    """
+    return isinstance(number, int | np.integer) and number >= 1
 
 
 def check_part(name: str, part: object, protocol: type, example: str) -> None:

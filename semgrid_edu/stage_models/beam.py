@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.layout import in_rows
+from semgrid_edu.occupancy.state import check_fields
 from semgrid_edu.stage_models.stage_graph import StageGraph, binary, cut_edges, directed
 
 BINS_PER_CELL = 10
@@ -54,15 +55,12 @@ class BeamWorld:
 
     def __post_init__(self) -> None:
         """Refuse values that are impossible, and ranges too fine to be read."""
-        if not 1 <= self.n_cells <= 12:
-            raise ArgumentError("n_cells", "from 1 to 12", self.n_cells)
+        check_fields(self, "from 1 to 12", lambda n: 1 <= n <= 12, "n_cells")
         if not 1 <= self.width <= self.n_cells or self.n_cells % self.width:
             raise ArgumentError("width", f"a divisor of the number of cells, {self.n_cells}", self.width)
         if not (np.isfinite(self.noise) and (self.noise == 0 or self.noise * BINS_PER_CELL >= 1)):
             raise ArgumentError("noise", f"0, or at least {1 / BINS_PER_CELL} cells", self.noise)
-        for name in ("prior", "hit", "clutter"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise ArgumentError(name, "a probability", getattr(self, name))
+        check_fields(self, "a probability", lambda p: 0 <= p <= 1, "prior", "hit", "clutter")
 
     @property
     def cells(self) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.cellwise import ratio
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.resampling import Resampling, draw_indices, draw_velocities
+from semgrid_edu.occupancy.resampling import Resampling, draw_indices, draw_velocities, equal_weights
 from semgrid_edu.occupancy.state import OUTSIDE, Particles
 
 
@@ -113,10 +113,7 @@ def draw_newborn_literal(
 
     Parameters and result are those of `draw_newborn`, and so are the random numbers that are drawn.
     """
-    total = newborn.sum(dtype=np.float64)
-    if total == 0 or count == 0:
-        return Particles.none()
     drawn = draw_indices(resampling, newborn.ravel(), count, rng)
-    corner = np.stack(np.unravel_index(drawn, spec.shape), axis=1) + rng.random((count, 2), np.float32)
+    corner = np.stack(np.unravel_index(drawn, spec.shape), axis=1) + rng.random((len(drawn), 2), np.float32)
     position = (spec.x_max, spec.y_max) - corner * spec.cell
-    return Particles(position, draw_velocities(count, max_speed, rng), np.full(count, total / count))
+    return Particles(position, draw_velocities(len(drawn), max_speed, rng), equal_weights(newborn, len(drawn)))
