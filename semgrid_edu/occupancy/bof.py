@@ -30,18 +30,11 @@ def bof_move(state: BofState, spec: GridSpec, motion: PlanarMotion) -> BofState:
     check_shape("state", state.free, spec.shape)
     if motion == PlanarMotion():
         return state
-    height, width = spec.shape
-    indices = np.indices(spec.shape, dtype=np.float32)
-    row, col = look_up(indices, np.full(2, -1, np.float32), spec, spec, motion).astype(np.intp)
-    inside, source = row >= 0, row * width + col
-    planes = [state.free, state.unknown, *state.occupied]
-    moved = np.empty((len(planes), height, width), np.float32)
-    for plane, target in zip(planes, moved, strict=True):
-        np.take(plane, source, out=target, mode="clip")
-        target *= inside
-    moved[1] += ~inside
+    planes = np.concatenate([[state.unknown, state.free], state.occupied])
+    entering = np.eye(1, len(planes), dtype=np.float32)[0]
+    moved = look_up(planes, entering, spec, spec, motion)
     velocity, remainder = state.velocity @ motion.rotation, state.remainder @ motion.rotation
-    return BofState(moved[0], moved[1], moved[2:], velocity, remainder)
+    return BofState(moved[1], moved[0], moved[2:], velocity, remainder)
 
 
 def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -> BofState:

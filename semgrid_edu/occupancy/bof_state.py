@@ -164,11 +164,6 @@ class BofState:
         lattice : VelocityLattice
             The V velocities that are told apart.
 
-        Returns
-        -------
-        BofState
-            P(UNKNOWN) = 1 in each cell.
-
         Raises
         ------
         ArgumentError

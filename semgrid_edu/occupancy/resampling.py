@@ -52,7 +52,7 @@ class Resampling(Protocol):
 
 
 def draw_indices(resampling: Resampling, weight: NDArray, count: int, rng: np.random.Generator) -> NDArray:
-    """Ask a resampling for indices, and check its answer.
+    """Ask a resampling for indices, and refuse an answer that isn't M indices from 0 to N - 1.
 
     Parameters
     ----------
@@ -69,11 +69,6 @@ def draw_indices(resampling: Resampling, weight: NDArray, count: int, rng: np.ra
     -------
     (M,) int64
         What `resampling.draw` returned; none at all when the weights sum to 0.
-
-    Raises
-    ------
-    ArgumentError
-        When these aren't M indices from 0 to N - 1; it names the class of the resampling.
     """
     if count == 0 or not weight.any():
         return np.empty(0, np.int64)
@@ -88,7 +83,7 @@ def draw_indices(resampling: Resampling, weight: NDArray, count: int, rng: np.ra
 
 
 def equal_weights(weight: NDArray, count: int) -> NDArray[np.float32]:
-    """Return equal weights with the sum of others.
+    """Return equal weights, (M,), with the sum of others.
 
     Parameters
     ----------
@@ -96,10 +91,6 @@ def equal_weights(weight: NDArray, count: int) -> NDArray[np.float32]:
         The others.
     count : int
         How many, M.
-
-    Returns
-    -------
-    (M,) float32
     """
     return np.full(count, weight.sum(dtype=np.float64) / max(count, 1), np.float32)
 

@@ -47,11 +47,6 @@ class SensorModel:
         of its bonnet 2.5 m ahead.
     ground : GroundParams or None
         How the ground is found from which heights count; None for flat ground at z = 0.
-
-    Raises
-    ------
-    ArgumentError
-        When a parameter has a value that is impossible.
     """
 
     obstacle_min: float = 0.3
@@ -93,21 +88,7 @@ class SensorModel:
     def scan(self, points: NDArray) -> "Scan":
         """Take one scan in: find the ground, leave out the vehicle's own returns, and measure how far each beam sees.
 
-        Parameters
-        ----------
-        points : (N, 3+) float
-            Returns: x forward, y left, z above the ground on which the vehicle stands (m), in the grid frame of the
-            vehicle; N may be 0.
-
-        Returns
-        -------
-        Scan
-            Can be asked for the evidence in the cells of any grid.
-
-        Raises
-        ------
-        ArgumentError
-            When `points` isn't a table of finite coordinates.
+        Parameters are those of `Sensor.scan`.
         """
         prepared = prepare_scan(points, self)
         profile = polar_profile(prepared, self.obstacle_min, self.obstacle_max, self.beams)
@@ -156,20 +137,7 @@ class Scan:
     sensor: SensorModel
 
     def evidence(self, spec: GridSpec, pose: PlanarMotion) -> Evidence:
-        """Say what the scan tells of each cell of a grid: look each cell up in its beam.
-
-        Parameters
-        ----------
-        spec : GridSpec
-            The cells, (H, W).
-        pose : PlanarMotion
-            Pose of the vehicle in the frame of `spec`, metres and radians.
-
-        Returns
-        -------
-        Evidence
-            P(z | occupied) and P(z | free), each (H, W).
-        """
+        """Look each cell up in its beam. Parameters and result are those of `Measurement.evidence`."""
         grid = (spec.shape, spec.x_max, spec.y_max, spec.cell, pose.dx, pose.dy, pose.dyaw)
         obstacles, ground = count_returns(self.points, self.sensor.obstacle_min, self.sensor.obstacle_max, *grid)
         beyond = beyond_reach(self.reach, *grid)
@@ -191,11 +159,6 @@ def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray:
     -------
     (M, 3) float
         The other returns, in their order: x, y, and the height above the ground at that place (m).
-
-    Raises
-    ------
-    ArgumentError
-        When `points` isn't a table of finite coordinates.
     """
     points = without_own_returns(check_points(points), sensor.vehicle, sensor.obstacle_min)
     if sensor.ground is not None:

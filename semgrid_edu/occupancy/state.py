@@ -37,11 +37,6 @@ def check_shape(name: str, values: NDArray, shape: tuple[int, ...]) -> None:
         The array.
     shape : tuple of int
         The shape it should have.
-
-    Raises
-    ------
-    ArgumentError
-        When the array has another shape.
     """
     if np.shape(values) != shape:
         raise ArgumentError(name, f"shape {shape}", f"shape {np.shape(values)}")
@@ -60,11 +55,6 @@ def check_fields(thing: object, expected: str, holds: Callable[[object], bool], 
         Whether a value is that.
     *names : str
         The fields.
-
-    Raises
-    ------
-    ArgumentError
-        Names the first field with another value.
     """
     for name in names:
         if not holds(getattr(thing, name)):
@@ -106,11 +96,6 @@ def check_part(name: str, part: object, protocol: type, example: str) -> None:
         The protocol that it has to fulfil.
     example : str
         The method that it needs, and a class that has it.
-
-    Raises
-    ------
-    ArgumentError
-        When it has no such method, or is a class, of which an object has to be made first.
     """
     expected = f"an object with a method {example}"
     if isinstance(part, type):
@@ -156,11 +141,6 @@ class Particles:
         Velocity over ground along the axes of the map, m/s.
     weight : (N,) float32
         Probability that each particle carries. The dynamic probability of a cell is the sum of the weights in it.
-
-    Raises
-    ------
-    ArgumentError
-        When the three arrays have different lengths.
     """
 
     position: NDArray[np.float32]
@@ -198,11 +178,6 @@ class FilterState:
         The dynamic mass of which velocities are known, more or less.
     newborn : (H, W) float32
         Dynamic mass that has just come into being and isn't carried by particles yet. `resample` draws them.
-
-    Raises
-    ------
-    ArgumentError
-        When the two arrays are over different numbers of cells.
     """
 
     probability: NDArray[np.float32]
@@ -221,11 +196,6 @@ class FilterState:
         ----------
         spec : GridSpec
             The cells of the map, (H, W).
-
-        Returns
-        -------
-        FilterState
-            P(UNKNOWN) = 1 in each cell.
         """
         probability = np.zeros((4, *spec.shape), np.float32)
         probability[State.UNKNOWN] = 1

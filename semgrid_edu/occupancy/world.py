@@ -52,11 +52,6 @@ class WorldModel:
     sensor : Sensor
         Turns each scan into evidence. By default a `SensorModel`; any object will do whose `scan(points)` returns
         something with `evidence(spec, pose)`.
-
-    Raises
-    ------
-    ArgumentError
-        When a parameter has a value that is impossible, such as a negative rate.
     """
 
     rates: Rates = (
@@ -102,11 +97,6 @@ def transition_matrix(world: WorldModel, dt: float) -> NDArray[np.float64]:
     (4, 4) float64
         M[i, j] is the probability that a cell in state i is in state j after `dt`; rows sum to 1.
 
-    Raises
-    ------
-    ArgumentError
-        When `dt` is negative or not finite.
-
     Examples
     --------
     After three seconds without a scan, this is what a free cell has become:
@@ -137,11 +127,9 @@ class CmcdotParams(WorldModel):
     birth_share : float
         Share of the particles, between 0 and 1, that is kept for newborn dynamic mass. Without it, new moving things
         would compete for particles with all that are known already, and would be found late.
-
-    Raises
-    ------
-    ArgumentError
-        When a parameter has a value that is impossible.
+    resampling : Resampling
+        How indices are drawn in proportion to weights. By default a `SystematicResampling`; any object will do whose
+        `draw(weight, count, rng)` returns indices.
 
     Examples
     --------

@@ -39,11 +39,6 @@ class BeamWorld:
         P(occupied) of each cell.
     hit, clutter : float
         Probability that an occupied cell, or a free one, reflects a beam that reaches it.
-
-    Raises
-    ------
-    ArgumentError
-        When a parameter has a value that is impossible.
     """
 
     n_cells: int = 8
@@ -93,11 +88,6 @@ def beam_over_cells(world: BeamWorld | None = None, beams: int = 1) -> StageGrap
     StageGraph
         Variables m1 ... mK (0 free, 1 occupied); r1, r2, ..., the range at which each beam is reflected, counted from
         0, whose last state is "none"; and z1, z2, ..., see `range_state`.
-
-    Raises
-    ------
-    ArgumentError
-        When `beams` is below 1.
     """
     if beams < 1:
         raise ArgumentError("beams", "at least 1", beams)
@@ -196,11 +186,6 @@ def range_state(world: BeamWorld, z: float | None) -> int:
     -------
     int
         Index of the nearest of `range_bins`, or of the state "none", which follows them.
-
-    Raises
-    ------
-    ArgumentError
-        When no reflection can give that range.
     """
     bins = range_bins(world)
     if z is None:
@@ -225,10 +210,5 @@ def beam_likelihood(world: BeamWorld, z: float | None) -> Factor:
     -------
     Factor
         A table over `world.cells`.
-
-    Raises
-    ------
-    ArgumentError
-        When no reflection can give that range.
     """
     return (reflection(world) * Factor("r", measurement(world)[:, range_state(world, z)])).sum("r")

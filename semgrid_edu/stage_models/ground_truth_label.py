@@ -37,11 +37,6 @@ def scan_with_pose_error(world: BeamWorld | None = None, rings: int = 2) -> Stag
     -------
     StageGraph
         Variables m1 ... mK, r1, r2, ... and z1, z2, ... as in `beam_over_cells`, and e in tenths of a cell.
-
-    Raises
-    ------
-    ArgumentError
-        When `rings` is below 1, or the noise is 0.
     """
     world = world or same_sensor(1.0)
     if rings < 1:
@@ -162,11 +157,6 @@ class LabelWorld:
         Probability that a return has no labelled pixel, 0..1.
     vote : str
         "majority" or "standing", as in `TruthPolicy`.
-
-    Raises
-    ------
-    ArgumentError
-        When a number is outside its range, or there is no such vote.
     """
 
     returns: int = 3

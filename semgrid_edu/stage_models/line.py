@@ -46,11 +46,6 @@ def bayes_on_a_line(
     -------
     StageGraph
         Variables n0, n1, ... with `n_cells` states each, and z0, z1, ...: 0 is "nothing", 1 is "pole".
-
-    Raises
-    ------
-    ArgumentError
-        When `steps` is below 1, or a probability isn't one.
     """
     if steps < 1:
         raise ArgumentError("steps", "at least 1", steps)

@@ -66,11 +66,6 @@ class SystemWorld:
         the other classes.
     params : WorldModel
         Rates of the street and of the filter, first sight, and p_hit of the scanner.
-
-    Raises
-    ------
-    ArgumentError
-        When a parameter has a value that is impossible.
     """
 
     steps: int = 2
