@@ -201,19 +201,10 @@ def draw_newborn(
         M particles anywhere in their cells, with velocities from the prior; none when there is no newborn mass.
     """
     chosen = draw_indices(resampling, newborn.ravel(), count, rng)
-    part = rng.random((len(chosen), 2), np.float32)
-    position = _anywhere(chosen, part, spec.shape[1], spec.x_max, spec.y_max, spec.cell)
-    return Particles(position, draw_velocities(len(chosen), max_speed, rng), equal_weights(newborn, len(chosen)))
-
-
-@njit(cache=True, nogil=True)
-def _anywhere(cells, part, width, x_max, y_max, cell):
-    position = np.empty_like(part)
-    for m in range(len(cells)):
-        row, col = divmod(cells[m], width)
-        position[m, 0] = x_max - (row + part[m, 0]) * cell
-        position[m, 1] = y_max - (col + part[m, 1]) * cell
-    return position
+    corner = np.stack(np.unravel_index(chosen, spec.shape), axis=1)
+    position = (spec.x_max, spec.y_max) - (corner + rng.random(corner.shape, np.float32)) * spec.cell
+    velocity = draw_velocities(len(chosen), max_speed, rng)
+    return Particles(position.astype(np.float32), velocity, equal_weights(newborn, len(chosen)))
 
 
 def draw_velocities(count: int, max_speed: float, rng: np.random.Generator) -> NDArray[np.float32]:
