@@ -133,10 +133,7 @@ def reflection(world: BeamWorld, name: str = "r") -> Factor:
 def range_bins(world: BeamWorld) -> NDArray[np.float64]:
     """Return the ranges that can be read, in cells: 0 is the middle of the nearest cell, 1 that of the next.
 
-    Parameters
-    ----------
-    world : BeamWorld
-        The cells, and how the beam is reflected and measured.
+    Parameters are those of `reflection`.
 
     Returns
     -------
@@ -153,10 +150,7 @@ def range_bins(world: BeamWorld) -> NDArray[np.float64]:
 def measurement(world: BeamWorld) -> NDArray[np.float64]:
     """Return P(z | r): normal around the range at which the beam is reflected.
 
-    Parameters
-    ----------
-    world : BeamWorld
-        The cells, and how the beam is reflected and measured.
+    Parameters are those of `reflection`.
 
     Returns
     -------
@@ -199,16 +193,6 @@ def range_state(world: BeamWorld, z: float | None) -> int:
 def beam_likelihood(world: BeamWorld, z: float | None) -> Factor:
     """Return P(z | m1 ... mK) of one range as a table over all maps: r is summed out.
 
-    Parameters
-    ----------
-    world : BeamWorld
-        The cells, and how the beam is reflected and measured.
-    z : float or None
-        The range in cells, 0 for the middle of the nearest cell; None when nothing came back.
-
-    Returns
-    -------
-    Factor
-        A table over `world.cells`.
+    Parameters are those of `range_state`.
     """
     return (reflection(world) * Factor("r", measurement(world)[:, range_state(world, z)])).sum("r")
