@@ -59,7 +59,7 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -
     Raises
     ------
     ArgumentError
-        When the state is over other cells than those of `spec`, or of another lattice, or `dt` isn't a time.
+        When the state is over cells other than `spec`, or of another lattice, or `dt` isn't a time.
     """
     check_shape("state", state.occupied, (len(params.lattice), *spec.shape))
     M = transition_matrix(params.world, dt)
@@ -142,9 +142,9 @@ def origins(velocity: NDArray, spec: GridSpec, world: WorldModel) -> NDArray[np.
     (V, 2) int64
         Number of whole cells along the x and y axes of the map, to the place where it was.
     """
-    way = -world.clearing_time * velocity / spec.cell
-    length = np.linalg.norm(way, axis=1, keepdims=True)
-    return np.rint(way * np.maximum(1, ratio(np.full_like(length, world.clearing_cells), length))).astype(np.int64)
+    back = -world.clearing_time * velocity / spec.cell
+    length = np.linalg.norm(back, axis=1, keepdims=True)
+    return np.rint(back * np.maximum(1, ratio(np.full_like(length, world.clearing_cells), length))).astype(np.int64)
 
 
 def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofParams) -> BofState:
@@ -168,7 +168,7 @@ def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofP
     Raises
     ------
     ArgumentError
-        When state or evidence are over other cells than those of `spec`, or of another lattice.
+        When state or evidence are over cells other than `spec`, or of another lattice.
     """
     check_shape("state", state.occupied, (len(params.lattice), *spec.shape))
     before = state.probability
@@ -229,7 +229,7 @@ class Bof:
     Raises
     ------
     ArgumentError
-        When the lattice has so many velocities that those of all cells don't fit into memory.
+        When the lattice has so many velocities that their mass in all cells doesn't fit into memory.
 
     Examples
     --------
@@ -269,7 +269,7 @@ def _doubt(mixed: NDArray, reach: NDArray[np.int64]) -> NDArray[np.float32]:
 
 
 def _moved(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:
-    """Return a plane moved by whole cells along x and y; zeros where that is no way at all."""
+    """Return a plane moved by whole cells along x and y; all zeros when they are 0, because then nothing has moved."""
     out = np.zeros_like(plane)
     if cells.any():
         _shift(plane, cells, out)

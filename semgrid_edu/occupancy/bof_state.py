@@ -59,7 +59,7 @@ class VelocityLattice:
 
     @cached_property
     def prior(self) -> NDArray[np.float64]:
-        """(V,): the prior over velocities of something of which nothing is known but that it moves; sums to 1.
+        """(V,): the prior over velocities of something about which nothing is known except that it moves; sums to 1.
 
         The density of `particles.draw_velocities`, any heading and a speed that is the square of a uniform
         number, is proportional to |v|^(-3/2) in the plane of velocities.

@@ -208,7 +208,7 @@ def draw_newborn(
 
 
 def draw_velocities(count: int, max_speed: float, rng: np.random.Generator) -> NDArray[np.float32]:
-    """Draw velocities of things of which nothing is known but that they move.
+    """Draw velocities for things about which nothing is known except that they move.
 
     The heading is uniform. The speed is `max_speed` times the square of a uniform number, so that slow things are more
     frequent than fast ones: of speeds up to 25 m/s, about one in four is no faster than a pedestrian's 1.4 m/s. If

@@ -1,6 +1,6 @@
 """CMCDOT's four steps, each a pure function: move, predict, update, resample (paper, section 3.2).
 
-Each refuses a state, or evidence, over other cells than those of `spec`.
+Each refuses a state, or evidence, over cells other than `spec`.
 """
 
 from dataclasses import replace
@@ -120,7 +120,7 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
     STATIC and DYNAMIC share P(z | occupied), because one scan can't tell them apart. UNKNOWN means that no scan has
     said anything of the cell; as soon as one does, `initialise_unknown` shares its UNKNOWN mass among the others.
 
-    Of a cell that is hidden a scan says nothing, but what moves does: one thing can't be in two places. Where a thing
+    A scan says nothing about a hidden cell, but what moves does: one thing can't be in two places. Where a thing
     was `clearing_time` ago (a slow one, `clearing_cells` ago) it isn't any more, so "it has come from there" and "it
     stands there" are struck out together (`clear_wakes`). This is how a car that was taken for a standing one at first
     takes that belief along when it goes.
@@ -195,7 +195,7 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
     Raises
     ------
     ArgumentError
-        When the state is over other cells than those of `spec`, or the resampling doesn't return indices.
+        When the state is over cells other than `spec`, or the resampling doesn't return indices.
     """
     check_shape("state", state.newborn, spec.shape)
     births = round(params.birth_share * params.n_particles)
