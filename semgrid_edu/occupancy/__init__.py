@@ -10,7 +10,6 @@ from semgrid_edu.occupancy.bof import Bof, bof_move, bof_predict, bof_update, bo
 from semgrid_edu.occupancy.bof_state import BofParams, BofState, VelocityLattice
 from semgrid_edu.occupancy.cmcdot import Cmcdot, track_drive
 from semgrid_edu.occupancy.evidence import Evidence, Measurement, Sensor, scan_evidence
-from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
 from semgrid_edu.occupancy.literal.bof import bof_predict_literal, bof_update_literal
 from semgrid_edu.occupancy.literal.cmcdot import move_literal, predict_literal, resample_literal, update_literal
 from semgrid_edu.occupancy.literal.evidence import scan_evidence_literal
@@ -39,7 +38,6 @@ __all__ = [
     "CmcdotParams",
     "Evidence",
     "FilterState",
-    "GroundParams",
     "LogOddsGrid",
     "LogOddsParams",
     "Measurement",
@@ -59,7 +57,6 @@ __all__ = [
     "bof_update",
     "bof_update_literal",
     "bof_velocity",
-    "height_above_ground",
     "log_odds",
     "move",
     "move_literal",

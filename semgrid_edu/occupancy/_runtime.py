@@ -9,10 +9,15 @@ import numpy as np
 
 @contextmanager
 def on_another_core(function: Callable, *arguments: object) -> Iterator[Future]:
-    """Run a function in a thread while the body of `with` runs.
+    """Run a function in a thread while the body of `with` runs, and hand out its future result.
 
     Evidence doesn't depend on what `move` and `predict` do, and takes about as long. Both spend their time in compiled
     loops, which release Python's lock, so a thread is enough to use two cores.
+
+    Parameters
+    ----------
+    function, arguments : callable, objects
+        What to call, and with what.
     """
     with ThreadPoolExecutor(1) as thread:
         yield thread.submit(function, *arguments)
@@ -24,6 +29,11 @@ def undo_after_errors(rng: np.random.Generator) -> Iterator[None]:
 
     `predict` has drawn random numbers by the time a sensor or a resampling is refused. If these were lost, the same
     seed would give another drive after an error that was caught.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        The generator that the body draws from.
     """
     before = rng.bit_generator.state
     try:

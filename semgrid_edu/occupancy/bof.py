@@ -30,18 +30,11 @@ def bof_move(state: BofState, spec: GridSpec, motion: PlanarMotion) -> BofState:
     check_shape("state", state.free, spec.shape)
     if motion == PlanarMotion():
         return state
-    height, width = spec.shape
-    indices = np.indices(spec.shape, dtype=np.float32)
-    row, col = look_up(indices, np.full(2, -1, np.float32), spec, spec, motion).astype(np.intp)
-    inside, source = row >= 0, row * width + col
-    planes = [state.free, state.unknown, *state.occupied]
-    moved = np.empty((len(planes), height, width), np.float32)
-    for plane, target in zip(planes, moved, strict=True):
-        np.take(plane, source, out=target, mode="clip")
-        target *= inside
-    moved[1] += ~inside
+    planes = np.concatenate([[state.unknown, state.free], state.occupied])
+    entering = np.eye(1, len(planes), dtype=np.float32)[0]
+    moved = look_up(planes, entering, spec, spec, motion)
     velocity, remainder = state.velocity @ motion.rotation, state.remainder @ motion.rotation
-    return BofState(moved[0], moved[1], moved[2:], velocity, remainder)
+    return BofState(moved[1], moved[0], moved[2:], velocity, remainder)
 
 
 def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -> BofState:
@@ -66,7 +59,7 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -
     Raises
     ------
     ArgumentError
-        When the state is over other cells than those of `spec`, or of another lattice, or `dt` isn't a time.
+        When the state is over cells other than `spec`, or of another lattice, or `dt` isn't a time.
     """
     check_shape("state", state.occupied, (len(params.lattice), *spec.shape))
     M = transition_matrix(params.world, dt)
@@ -149,9 +142,9 @@ def origins(velocity: NDArray, spec: GridSpec, world: WorldModel) -> NDArray[np.
     (V, 2) int64
         Number of whole cells along the x and y axes of the map, to the place where it was.
     """
-    way = -world.clearing_time * velocity / spec.cell
-    length = np.linalg.norm(way, axis=1, keepdims=True)
-    return np.rint(way * np.maximum(1, ratio(np.full_like(length, world.clearing_cells), length))).astype(np.int64)
+    back = -world.clearing_time * velocity / spec.cell
+    length = np.linalg.norm(back, axis=1, keepdims=True)
+    return np.rint(back * np.maximum(1, ratio(np.full_like(length, world.clearing_cells), length))).astype(np.int64)
 
 
 def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofParams) -> BofState:
@@ -175,7 +168,7 @@ def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofP
     Raises
     ------
     ArgumentError
-        When state or evidence are over other cells than those of `spec`, or of another lattice.
+        When state or evidence are over cells other than `spec`, or of another lattice.
     """
     check_shape("state", state.occupied, (len(params.lattice), *spec.shape))
     before = state.probability
@@ -236,7 +229,7 @@ class Bof:
     Raises
     ------
     ArgumentError
-        When the lattice has so many velocities that those of all cells don't fit into memory.
+        When the lattice has so many velocities that their mass in all cells doesn't fit into memory.
 
     Examples
     --------
@@ -276,7 +269,7 @@ def _doubt(mixed: NDArray, reach: NDArray[np.int64]) -> NDArray[np.float32]:
 
 
 def _moved(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:
-    """Return a plane moved by whole cells along x and y; zeros where that is no way at all."""
+    """Return a plane moved by whole cells along x and y; all zeros when they are 0, because then nothing has moved."""
     out = np.zeros_like(plane)
     if cells.any():
         _shift(plane, cells, out)

@@ -1,7 +1,4 @@
-"""What the BOF believes of each cell, and its parameters (Coue et al., IJRR 2006; paper, section 3.2).
-
-The finitely many velocities that the BOF tells apart (Coue et al., IJRR 2006; paper, section 3.2).
-"""
+"""What the BOF believes of each cell, and the velocities that it tells apart (Coue et al., IJRR 2006; section 3.2)."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,6 +8,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.state import check_fields
 from semgrid_edu.occupancy.world import WorldModel
 
 FINEST = 100
@@ -45,8 +43,7 @@ class VelocityLattice:
 
     def __post_init__(self) -> None:
         """Refuse a lattice of no velocity but zero, or of too many."""
-        if not (np.isfinite(self.spacing) and self.spacing > 0):
-            raise ArgumentError("spacing", "a positive speed in m/s", self.spacing)
+        check_fields(self, "a positive speed in m/s", lambda v: np.isfinite(v) and v > 0, "spacing")
         if not self.spacing <= self.max_speed <= FINEST * self.spacing:
             expected = f"from 1 to {FINEST} times the spacing of {self.spacing} m/s"
             raise ArgumentError("max_speed", expected, self.max_speed)
@@ -62,7 +59,7 @@ class VelocityLattice:
 
     @cached_property
     def prior(self) -> NDArray[np.float64]:
-        """(V,): the prior over velocities of something of which nothing is known but that it moves; sums to 1.
+        """(V,): the prior over velocities of something about which nothing is known except that it moves; sums to 1.
 
         The density of `particles.draw_velocities`, any heading and a speed that is the square of a uniform
         number, is proportional to |v|^(-3/2) in the plane of velocities.
@@ -166,11 +163,6 @@ class BofState:
             The cells, (H, W).
         lattice : VelocityLattice
             The V velocities that are told apart.
-
-        Returns
-        -------
-        BofState
-            P(UNKNOWN) = 1 in each cell.
 
         Raises
         ------

@@ -18,22 +18,12 @@ from semgrid_edu.occupancy.state import check_part, check_shape
 
 
 def check_points(points: NDArray) -> NDArray:
-    """Return the points of a scan as an array of floating-point numbers, or refuse them.
+    """Return the points of a scan as an array of float32 or float64, or refuse them.
 
     Parameters
     ----------
     points : (N, 3+) float
         Returns: x forward, y left, z up (m), in the grid frame of the vehicle; N may be 0.
-
-    Returns
-    -------
-    (N, 3+) float32 or float64
-        The same numbers.
-
-    Raises
-    ------
-    ArgumentError
-        When `points` isn't a table of finite coordinates.
     """
     points = np.asarray(points)
     if points.ndim != 2 or points.shape[1] < 3:
@@ -212,11 +202,6 @@ def check_sensor(sensor: Sensor) -> None:
     ----------
     sensor : Sensor
         The model of a sensor, an object with a method `scan`.
-
-    Raises
-    ------
-    ArgumentError
-        When it has no such method, or is a class, of which an object has to be made first.
     """
     check_part("sensor", sensor, Sensor, ".scan(points), such as SensorModel()")
 
@@ -230,11 +215,6 @@ def take_scan(sensor: Sensor, points: NDArray) -> Measurement:
         The model of the sensor.
     points : (N, 3+) float
         Returns in the grid frame of the vehicle, as for `scan_evidence`.
-
-    Returns
-    -------
-    Measurement
-        What `sensor.scan` returned.
 
     Raises
     ------
@@ -259,16 +239,6 @@ def evidence_of(measurement: Measurement, spec: GridSpec, pose: PlanarMotion) ->
         The cells, (H, W).
     pose : PlanarMotion
         Pose of the vehicle in the frame of `spec`, metres and radians.
-
-    Returns
-    -------
-    Evidence
-        What `measurement.evidence` returned.
-
-    Raises
-    ------
-    ArgumentError
-        When it isn't an `Evidence`, or is one over other cells than those of `spec`.
     """
     evidence = measurement.evidence(spec, pose)
     if not isinstance(evidence, Evidence):

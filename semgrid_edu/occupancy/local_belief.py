@@ -48,16 +48,6 @@ def observe(
         Pose of the vehicle in the frame of the map, metres and radians.
     map_spec, spec : GridSpec
         The cells of the map, (H, W), and those of the grid around the vehicle, (H', W').
-
-    Returns
-    -------
-    Observation
-        The evidence in both grids, and the pose.
-
-    Raises
-    ------
-    ArgumentError
-        When the points aren't a table of finite coordinates, or the sensor doesn't turn them into evidence.
     """
     measurement = take_scan(sensor, points_grid)
     in_grid = evidence_of(measurement, spec, PlanarMotion())
@@ -90,11 +80,6 @@ def local_belief(
         The cells of the map, (H, W), and those of the vehicle, (H', W').
     world : WorldModel
         What `update` assumes.
-
-    Returns
-    -------
-    Belief
-        What is handed out: the belief in the vehicle's cells, (H', W'), in its grid frame.
     """
     here = look_up(predicted, NOTHING_KNOWN, map_spec, spec, seen.pose)
     prior = FilterState(here, Particles.none(), np.zeros(spec.shape, np.float32))

@@ -11,6 +11,7 @@ from semgrid_edu.occupancy.evidence import Evidence, Sensor, check_sensor
 from semgrid_edu.occupancy.local_belief import observe
 from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll
 from semgrid_edu.occupancy.sensor import SensorModel
+from semgrid_edu.occupancy.state import not_negative
 
 TINY = np.float32(1e-30)
 """Stands for a likelihood of 0, whose logarithm is infinite. The bounds on P(occupied) make the difference vanish."""
@@ -30,11 +31,6 @@ class LogOddsParams:
         al., Autonomous Robots 2013).
     sensor : Sensor
         Turns each scan into evidence; by default a `SensorModel`.
-
-    Raises
-    ------
-    ArgumentError
-        When a parameter has a value that is impossible.
     """
 
     prior: float = 0.5
@@ -64,11 +60,6 @@ def log_odds(p: ArrayLike) -> NDArray[np.floating]:
     (...) float
         Their log-odds: 0 for one half, positive above.
 
-    Raises
-    ------
-    ArgumentError
-        When a number isn't between 0 and 1.
-
     Examples
     --------
     >>> log_odds(np.array([0.5, 0.97])).round(2)
@@ -87,11 +78,6 @@ def probability(L: ArrayLike) -> NDArray[np.floating]:
     ----------
     L : (...) float
         Log-odds, any numbers.
-
-    Returns
-    -------
-    (...) float
-        Probabilities from 0 to 1.
     """
     return 1 / (1 + np.exp(-np.asarray(L)))
 
@@ -113,11 +99,6 @@ def update_log_odds(L: NDArray, evidence: Evidence, params: LogOddsParams) -> ND
         The likelihoods of the scan, (H, W).
     params : LogOddsParams
         The bounds of P(occupied).
-
-    Returns
-    -------
-    (H, W) float
-        Log-odds given the scan, within the bounds, in the type of `L`.
     """
     ratio = np.log(np.maximum(evidence.occupied, TINY)) - np.log(np.maximum(evidence.free, TINY))
     bounds = log_odds([params.lowest, params.highest]).astype(L.dtype)
@@ -125,7 +106,7 @@ def update_log_odds(L: NDArray, evidence: Evidence, params: LogOddsParams) -> ND
 
 
 def smear_area(p_occupied: NDArray, left: NDArray[np.bool_], spec: GridSpec) -> float:
-    """Measure the smear of something that has moved: the area that it has left and is still believed to occupy.
+    """Measure the smear of something that has moved: the area, m^2, that it has left but is believed to occupy still.
 
     Parameters
     ----------
@@ -135,11 +116,6 @@ def smear_area(p_occupied: NDArray, left: NDArray[np.bool_], spec: GridSpec) -> 
         The cells in which the thing was once, and isn't any more.
     spec : GridSpec
         The grid of these cells.
-
-    Returns
-    -------
-    float
-        Area of those of the cells with P(occupied) > 1/2, square metres.
     """
     return float(np.count_nonzero((p_occupied > 0.5) & left) * spec.cell**2)
 
@@ -175,31 +151,12 @@ class LogOddsGrid:
         self._log_odds = np.full(self.map_spec.shape, self._prior, np.float32)
 
     def step(self, points_grid: NDArray, motion: PlanarMotion, dt: float) -> NDArray[np.float32]:
-        """Take in one scan.
+        """Take in one scan, and return P(occupied) of each cell of `spec`, (H, W), in the vehicle's grid frame now.
 
-        Parameters
-        ----------
-        points_grid : (N, 3+) float
-            The scan's returns: x forward, y left, z above the ground on which the vehicle stands (m), in the grid
-            frame of the vehicle now.
-        motion : PlanarMotion
-            Motion of the vehicle since the last step, metres and radians. At the first step nothing has been seen yet
-            that it could move.
-        dt : float
-            Time since the last step, seconds. It is only checked, because this grid believes that nothing changes.
-
-        Returns
-        -------
-        (H, W) float32
-            P(occupied) of each cell of `spec`, in the grid frame of the vehicle now.
-
-        Raises
-        ------
-        ArgumentError
-            When the points aren't a table of finite coordinates, the time is negative or not finite, or the sensor
-            doesn't turn the scan into evidence. The grid then stays as it was.
+        `dt` is only checked, because this grid believes that nothing changes. Parameters and errors are those of
+        `Cmcdot.step`.
         """
-        if not (np.isfinite(dt) and dt >= 0):
+        if not not_negative(dt):
             raise ArgumentError("dt", "seconds, not negative", dt)
         shift, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
         seen = observe(self.params.sensor, points_grid, pose, self.map_spec, self.spec)

@@ -19,7 +19,7 @@ SLOW = np.float32(16)
 
 
 def cells_of(position: NDArray, spec: GridSpec) -> NDArray[np.int32]:
-    """Return the cell that each particle is in, as an index into the flattened grid.
+    """Return the cell that each particle is in, (N,) int32: row * W + column, or `OUTSIDE`.
 
     Parameters
     ----------
@@ -27,11 +27,6 @@ def cells_of(position: NDArray, spec: GridSpec) -> NDArray[np.int32]:
         x and y of each particle in the frame of `spec`, metres.
     spec : GridSpec
         The cells, (H, W).
-
-    Returns
-    -------
-    (N,) int32
-        row * W + column; `OUTSIDE` for a particle that lies in no cell.
     """
     return _cells_of(position.ravel(), spec.shape, spec.x_max, spec.y_max, spec.cell)
 
@@ -46,7 +41,7 @@ def _cells_of(xy, shape, x_max, y_max, cell):
 
 @njit(cache=True, nogil=True)
 def weight_in_cells(weight: NDArray, cells: NDArray, shape: tuple[int, ...]) -> NDArray:
-    """Add the weights up in each cell.
+    """Add the weights up in each cell, in the order of the particles and in double precision.
 
     Parameters
     ----------
@@ -56,11 +51,6 @@ def weight_in_cells(weight: NDArray, cells: NDArray, shape: tuple[int, ...]) -> 
         The cell of each particle, from `cells_of`; or from `by_origin`, for sums of shape (2, H, W).
     shape : (int, int) or (int, int, int)
         Shape of the result: H, W, or 2, H, W.
-
-    Returns
-    -------
-    (H, W) or (2, H, W) float32
-        The sums, added up in the order of the particles in double precision.
     """
     total = np.zeros(shape)
     flat = total.ravel()
@@ -72,7 +62,7 @@ def weight_in_cells(weight: NDArray, cells: NDArray, shape: tuple[int, ...]) -> 
 
 @njit(cache=True, nogil=True)
 def scale_in_cells(weight: NDArray, cells: NDArray, factor: NDArray) -> NDArray[np.float32]:
-    """Multiply each weight by the factor of its cell.
+    """Multiply each weight by the factor of its cell, and by zero outside.
 
     Parameters
     ----------
@@ -82,11 +72,6 @@ def scale_in_cells(weight: NDArray, cells: NDArray, factor: NDArray) -> NDArray[
         The cell of each particle, from `cells_of`; or from `by_origin`, for factors of shape (2, H, W).
     factor : (H, W) or (2, H, W) float
         The factor of each cell.
-
-    Returns
-    -------
-    (N,) float32
-        The new weights; zero for particles outside.
     """
     scaled, flat = np.zeros(len(weight), np.float32), factor.ravel()
     for i in range(len(weight)):
@@ -159,7 +144,7 @@ def _cells_at(xy, velocity, cells, time, least, shape, x_max, y_max, cell):
 
 
 def fly(particles: Particles, max_acceleration: float, dt: float, rng: np.random.Generator) -> Particles:
-    """Let particles fly for a while: constant velocity plus noise.
+    """Let particles fly for a while, with noise: v' = v + a dt, x' = x + v dt + a dt^2 / 2.
 
     Parameters
     ----------
@@ -172,11 +157,6 @@ def fly(particles: Particles, max_acceleration: float, dt: float, rng: np.random
         How long they fly, seconds.
     rng : numpy.random.Generator
         Source of the accelerations.
-
-    Returns
-    -------
-    Particles
-        The same particles at the end of their flight: v' = v + a dt, x' = x + v dt + a dt^2 / 2.
     """
     noise = rng.random((len(particles), 2), np.float32)
     change = np.float32(max_acceleration * dt)
@@ -197,7 +177,7 @@ def _fly(position, velocity, noise, max_change, dt):
 
 
 def slow_down(particles: Particles, stop_rate: float, stop_speed: float, dt: float) -> Particles:
-    """Keep of each weight what goes on moving: a particle of speed v stops at a rate that falls with v.
+    """Keep of each weight what goes on moving, exp(-stop_rate dt exp(-v^2 / (2 stop_speed^2))).
 
     Parameters
     ----------
@@ -207,11 +187,6 @@ def slow_down(particles: Particles, stop_rate: float, stop_speed: float, dt: flo
         Rate of stopping at v = 0, 1/s, and the speed above which it falls, m/s.
     dt : float
         The time step, seconds.
-
-    Returns
-    -------
-    Particles
-        The same particles with weights times exp(-stop_rate dt exp(-v^2 / (2 stop_speed^2))).
     """
     stops, scale = np.float32(stop_rate * dt), np.float32(0.5 / stop_speed**2)
     weight = _slow_down(particles.velocity, particles.weight, stops, scale)
@@ -239,11 +214,6 @@ def transform(particles: Particles, motion: PlanarMotion) -> Particles:
         N particles in the old frame.
     motion : PlanarMotion
         Pose of the new frame in the old one, metres and radians.
-
-    Returns
-    -------
-    Particles
-        The same particles in the new frame: positions and velocities turned, weights as they were.
     """
     T = (motion.dx, motion.dy, np.cos(motion.dyaw), np.sin(motion.dyaw))
     position, velocity = _transform(particles.position.ravel(), particles.velocity.ravel(), *T)

@@ -1,7 +1,4 @@
-"""Planar motion of the vehicle: what the filter needs to know of ego-motion (paper, section 3.2).
-
-A map that scrolls under the vehicle by whole cells, so that memory stays sharp (paper, section 3.2, step 1).
-"""
+"""Ego-motion in the plane, and a map that scrolls under the vehicle by whole cells (paper, section 3.2, step 1)."""
 
 import math
 from dataclasses import dataclass
@@ -26,11 +23,6 @@ class PlanarMotion:
         Displacement forward and to the left, metres.
     dyaw : float
         Turn to the left, radians.
-
-    Raises
-    ------
-    ArgumentError
-        When one of them isn't finite.
 
     Examples
     --------
@@ -60,11 +52,6 @@ class PlanarMotion:
         -------
         PlanarMotion
             Displacement and turn in the plane of the previous instant's x and y axes; height, pitch and roll are lost.
-
-        Raises
-        ------
-        ArgumentError
-            When one isn't a finite 4x4 matrix.
         """
         for name, T in (("T_world_from_before", T_world_from_before), ("T_world_from_now", T_world_from_now)):
             if np.shape(T) != (4, 4) or not np.isfinite(T).all():
@@ -86,11 +73,6 @@ class PlanarMotion:
         ----------
         xy : (..., 2) float
             x and y in the grid frame of now, metres.
-
-        Returns
-        -------
-        (..., 2) float
-            x and y in the grid frame of the previous instant, metres.
         """
         return xy @ self.rotation.T + (self.dx, self.dy)
 
@@ -101,11 +83,6 @@ class PlanarMotion:
         ----------
         xy : (..., 2) float
             x and y in the grid frame of the previous instant, metres.
-
-        Returns
-        -------
-        (..., 2) float
-            x and y in the grid frame of now, metres.
         """
         return (xy - (self.dx, self.dy)) @ self.rotation
 
@@ -116,11 +93,6 @@ class PlanarMotion:
         ----------
         motion : PlanarMotion
             The motion that follows, in the frame to which this one leads.
-
-        Returns
-        -------
-        PlanarMotion
-            The pose after both motions, in the frame before them.
         """
         dx, dy = self.to_previous(np.array([motion.dx, motion.dy]))
         return PlanarMotion(float(dx), float(dy), self.dyaw + motion.dyaw)
@@ -197,11 +169,6 @@ def look_up(values: NDArray, outside: NDArray, source: GridSpec, target: GridSpe
         The two grids, (H, W) and (H', W') cells.
     pose : PlanarMotion
         Pose of the frame of `target` in that of `source`, metres and radians.
-
-    Returns
-    -------
-    (K, H', W') float32
-        K values of each cell of `target`.
     """
     corners = (source.x_max, source.y_max, source.cell, target.x_max, target.y_max, target.cell)
     return _look_up(np.ascontiguousarray(values), outside, *corners, target.shape, pose.dx, pose.dy, pose.dyaw)

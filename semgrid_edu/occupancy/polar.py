@@ -14,7 +14,7 @@ ROUGH = 3e-5
 
 @njit(cache=True, inline="always")
 def beam_of(x, y, beams):
-    """Return the beam in whose sector a point lies.
+    """Return the beam in whose sector a point lies, from 0 to B - 1; beam 0 begins straight behind the vehicle.
 
     Parameters
     ----------
@@ -22,28 +22,18 @@ def beam_of(x, y, beams):
         The point in the grid frame of the vehicle, metres.
     beams : int
         Number of beams in a turn, B.
-
-    Returns
-    -------
-    int
-        The beam, from 0 to B - 1. Beam 0 begins straight behind the vehicle, and the beams go counter-clockwise.
     """
     return min(int((np.arctan2(y, x) + np.pi) * (beams / (2 * np.pi))), beams - 1)
 
 
 @njit(cache=True, inline="always", error_model="numpy")
 def rough_azimuth(x, y):
-    """Return the azimuth of a point, arctan2(y, x), by a polynomial of the tangent.
+    """Return arctan2(y, x) to within `ROUGH` radians, by a polynomial of the tangent; NaN for x = y = 0.
 
     Parameters
     ----------
     x, y : float
         The point, metres.
-
-    Returns
-    -------
-    float
-        The azimuth, radians, to within `ROUGH`; NaN for x = y = 0.
     """
     along, across = abs(x), abs(y)
     t = min(along, across) / max(along, across)
@@ -67,11 +57,6 @@ def beams_of(x, y, beams):
         The points in the grid frame of the vehicle, metres.
     beams : int
         Number of beams in a turn, B.
-
-    Returns
-    -------
-    (N,) int32
-        The beam of each point, from 0 to B - 1.
     """
     x, y = np.ascontiguousarray(x), np.ascontiguousarray(y)
     per_radian, unsure = beams / (2 * np.pi), np.empty(len(x), np.bool_)
@@ -121,17 +106,12 @@ def polar_profile(points, low, high, beams):
 
 
 def reach(first_obstacle: NDArray, last_ground: NDArray) -> NDArray[np.float32]:
-    """Return how far each beam sees: to its first obstacle, else to its last ground return.
+    """Return how far each beam sees, (B,) metres: to its first obstacle, else to its last ground return, else 0.
 
     Parameters
     ----------
     first_obstacle, last_ground : (B,) float32
         Ranges from `polar_profile`, metres.
-
-    Returns
-    -------
-    (B,) float32
-        How far each beam sees, metres; zero where nothing came back.
     """
     return np.where(np.isfinite(first_obstacle), first_obstacle, last_ground)
 
@@ -149,11 +129,6 @@ def fill_gaps(reach, gap):
         How far each beam sees, metres; zero where nothing came back.
     gap : int
         Largest number of empty beams between two neighbouring columns of returns.
-
-    Returns
-    -------
-    (B,) float
-        How far each beam sees, metres, with the gaps filled.
 
     Examples
     --------

@@ -52,14 +52,14 @@ class Resampling(Protocol):
 
 
 def draw_indices(resampling: Resampling, weight: NDArray, count: int, rng: np.random.Generator) -> NDArray:
-    """Ask a resampling for indices, and check its answer.
+    """Ask a resampling for indices, and refuse an answer that isn't M indices from 0 to N - 1.
 
     Parameters
     ----------
     resampling : Resampling
         How to draw.
     weight : (N,) float
-        The weights, not negative and not all zero.
+        The weights, not negative.
     count : int
         How many to draw, M.
     rng : numpy.random.Generator
@@ -68,13 +68,10 @@ def draw_indices(resampling: Resampling, weight: NDArray, count: int, rng: np.ra
     Returns
     -------
     (M,) int64
-        What `resampling.draw` returned.
-
-    Raises
-    ------
-    ArgumentError
-        When these aren't M indices from 0 to N - 1; it names the class of the resampling.
+        What `resampling.draw` returned; none at all when the weights sum to 0.
     """
+    if count == 0 or not weight.any():
+        return np.empty(0, np.int64)
     drawn = np.asarray(resampling.draw(weight.astype(np.float64), count, rng))
     found = f"shape {drawn.shape}, type {drawn.dtype}"
     if drawn.shape == (count,) and drawn.dtype.kind in "iu":
@@ -83,6 +80,19 @@ def draw_indices(resampling: Resampling, weight: NDArray, count: int, rng: np.ra
         found = f"indices from {drawn.min()} to {drawn.max()}"
     expected = f".draw(weight, count, rng) to return {count} whole numbers from 0 to {len(weight) - 1}"
     raise ArgumentError(type(resampling).__name__, expected, found)
+
+
+def equal_weights(weight: NDArray, count: int) -> NDArray[np.float32]:
+    """Return equal weights, (M,), with the sum of others.
+
+    Parameters
+    ----------
+    weight : (...) float
+        The others.
+    count : int
+        How many, M.
+    """
+    return np.full(count, weight.sum(dtype=np.float64) / max(count, 1), np.float32)
 
 
 @dataclass(frozen=True)
@@ -155,12 +165,9 @@ def draw_again(particles: Particles, count: int, resampling: Resampling, rng: np
     Particles
         M particles with the same sum of weights; none when that sum is zero.
     """
-    total = particles.weight.sum(dtype=np.float64)
-    if total == 0 or count == 0:
-        return Particles.none()
     chosen = draw_indices(resampling, particles.weight, count, rng)
     position, velocity = (np.take(values, chosen, axis=0) for values in (particles.position, particles.velocity))
-    return Particles(position, velocity, np.full(count, total / count, np.float32))
+    return Particles(position, velocity, equal_weights(particles.weight, len(chosen)))
 
 
 def draw_newborn(
@@ -193,26 +200,15 @@ def draw_newborn(
     Particles
         M particles anywhere in their cells, with velocities from the prior; none when there is no newborn mass.
     """
-    total = newborn.sum(dtype=np.float64)
-    if total == 0 or count == 0:
-        return Particles.none()
     chosen = draw_indices(resampling, newborn.ravel(), count, rng)
-    position = _anywhere(chosen, rng.random((count, 2), np.float32), spec.shape[1], spec.x_max, spec.y_max, spec.cell)
-    return Particles(position, draw_velocities(count, max_speed, rng), np.full(count, total / count, np.float32))
-
-
-@njit(cache=True, nogil=True)
-def _anywhere(cells, part, width, x_max, y_max, cell):
-    position = np.empty_like(part)
-    for m in range(len(cells)):
-        row, col = divmod(cells[m], width)
-        position[m, 0] = x_max - (row + part[m, 0]) * cell
-        position[m, 1] = y_max - (col + part[m, 1]) * cell
-    return position
+    corner = np.stack(np.unravel_index(chosen, spec.shape), axis=1)
+    position = (spec.x_max, spec.y_max) - (corner + rng.random(corner.shape, np.float32)) * spec.cell
+    velocity = draw_velocities(len(chosen), max_speed, rng)
+    return Particles(position.astype(np.float32), velocity, equal_weights(newborn, len(chosen)))
 
 
 def draw_velocities(count: int, max_speed: float, rng: np.random.Generator) -> NDArray[np.float32]:
-    """Draw velocities of things of which nothing is known but that they move.
+    """Draw velocities for things about which nothing is known except that they move.
 
     The heading is uniform. The speed is `max_speed` times the square of a uniform number, so that slow things are more
     frequent than fast ones: of speeds up to 25 m/s, about one in four is no faster than a pedestrian's 1.4 m/s. If

@@ -12,6 +12,7 @@ from semgrid_edu.occupancy.evidence import Evidence, check_points, without_own_r
 from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.polar import beyond_reach, count_returns, fill_gaps, polar_profile, reach
+from semgrid_edu.occupancy.state import check_fields, not_negative, positive_count
 
 
 @dataclass(frozen=True)
@@ -46,11 +47,6 @@ class SensorModel:
         of its bonnet 2.5 m ahead.
     ground : GroundParams or None
         How the ground is found from which heights count; None for flat ground at z = 0.
-
-    Raises
-    ------
-    ArgumentError
-        When a parameter has a value that is impossible.
     """
 
     obstacle_min: float = 0.3
@@ -68,21 +64,16 @@ class SensorModel:
 
     def __post_init__(self) -> None:
         """Refuse a sensor that is impossible, or that never errs: no scan could ever correct a cell that is certain."""
-        if not (math.isfinite(self.under) and self.under >= 0):
-            raise ArgumentError("under", "metres, not negative", self.under)
-        if not 0 < self.azimuth_step <= 360:
-            raise ArgumentError("azimuth_step", "degrees, above 0 and up to 360", self.azimuth_step)
-        if not 0 <= self.column_spacing <= 360:
-            raise ArgumentError("column_spacing", "degrees, from 0 to 360", self.column_spacing)
-        if not isinstance(self.max_returns, int | np.integer) or self.max_returns < 1:
-            raise ArgumentError("max_returns", "a whole number of at least 1", self.max_returns)
+        check_fields(self, "metres, not negative", not_negative, "under")
+        check_fields(self, "degrees, above 0 and up to 360", lambda angle: 0 < angle <= 360, "azimuth_step")
+        check_fields(self, "degrees, from 0 to 360", lambda angle: 0 <= angle <= 360, "column_spacing")
+        check_fields(self, "a whole number of at least 1", positive_count, "max_returns")
         if not self.obstacle_min < self.obstacle_max:
             raise ArgumentError("obstacle_min", f"less than obstacle_max, {self.obstacle_max}", self.obstacle_min)
         if len(self.vehicle) != 4 or not (self.vehicle[0] <= self.vehicle[1] and self.vehicle[2] <= self.vehicle[3]):
             raise ArgumentError("vehicle", "x_min, x_max, y_min, y_max in metres, the smaller first", self.vehicle)
-        for name in ("p_hit_occupied", "p_hit_free", "p_pass_occupied", "p_pass_free"):
-            if not 0 < getattr(self, name) < 1:
-                raise ArgumentError(name, "a probability between 0 and 1", getattr(self, name))
+        probabilities = "p_hit_occupied", "p_hit_free", "p_pass_occupied", "p_pass_free"
+        check_fields(self, "a probability between 0 and 1", lambda p: 0 < p < 1, *probabilities)
 
     @property
     def beams(self) -> int:
@@ -97,21 +88,7 @@ class SensorModel:
     def scan(self, points: NDArray) -> "Scan":
         """Take one scan in: find the ground, leave out the vehicle's own returns, and measure how far each beam sees.
 
-        Parameters
-        ----------
-        points : (N, 3+) float
-            Returns: x forward, y left, z above the ground on which the vehicle stands (m), in the grid frame of the
-            vehicle; N may be 0.
-
-        Returns
-        -------
-        Scan
-            Can be asked for the evidence in the cells of any grid.
-
-        Raises
-        ------
-        ArgumentError
-            When `points` isn't a table of finite coordinates.
+        Parameters are those of `Sensor.scan`.
         """
         prepared = prepare_scan(points, self)
         profile = polar_profile(prepared, self.obstacle_min, self.obstacle_max, self.beams)
@@ -160,20 +137,7 @@ class Scan:
     sensor: SensorModel
 
     def evidence(self, spec: GridSpec, pose: PlanarMotion) -> Evidence:
-        """Say what the scan tells of each cell of a grid: look each cell up in its beam.
-
-        Parameters
-        ----------
-        spec : GridSpec
-            The cells, (H, W).
-        pose : PlanarMotion
-            Pose of the vehicle in the frame of `spec`, metres and radians.
-
-        Returns
-        -------
-        Evidence
-            P(z | occupied) and P(z | free), each (H, W).
-        """
+        """Look each cell up in its beam. Parameters and result are those of `Measurement.evidence`."""
         grid = (spec.shape, spec.x_max, spec.y_max, spec.cell, pose.dx, pose.dy, pose.dyaw)
         obstacles, ground = count_returns(self.points, self.sensor.obstacle_min, self.sensor.obstacle_max, *grid)
         beyond = beyond_reach(self.reach, *grid)
@@ -195,11 +159,6 @@ def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray:
     -------
     (M, 3) float
         The other returns, in their order: x, y, and the height above the ground at that place (m).
-
-    Raises
-    ------
-    ArgumentError
-        When `points` isn't a table of finite coordinates.
     """
     points = without_own_returns(check_points(points), sensor.vehicle, sensor.obstacle_min)
     if sensor.ground is not None:

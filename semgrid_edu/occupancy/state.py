@@ -1,5 +1,7 @@
-"""What the filter believes of each cell: four states and a velocity (paper, section 3.2)."""
+"""What the filter believes of each cell, four states and a velocity; and what refuses values that can't be (3.2)."""
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
 
@@ -35,14 +37,50 @@ def check_shape(name: str, values: NDArray, shape: tuple[int, ...]) -> None:
         The array.
     shape : tuple of int
         The shape it should have.
-
-    Raises
-    ------
-    ArgumentError
-        When the array has another shape.
     """
     if np.shape(values) != shape:
         raise ArgumentError(name, f"shape {shape}", f"shape {np.shape(values)}")
+
+
+def check_fields(thing: object, expected: str, holds: Callable[[object], bool], *names: str) -> None:
+    """Refuse an object of which some fields don't have the values that they should have.
+
+    Parameters
+    ----------
+    thing : object
+        The object.
+    expected : str
+        What its fields should be, for the error.
+    holds : callable
+        Whether a value is that.
+    *names : str
+        The fields.
+    """
+    for name in names:
+        if not holds(getattr(thing, name)):
+            raise ArgumentError(name, expected, getattr(thing, name))
+
+
+def not_negative(number: float) -> bool:
+    """Tell whether a number is finite and at least 0.
+
+    Parameters
+    ----------
+    number : float
+        Any number.
+    """
+    return math.isfinite(number) and number >= 0
+
+
+def positive_count(number: float) -> bool:
+    """Tell whether a number is whole and at least 1.
+
+    Parameters
+    ----------
+    number : float
+        Any number.
+    """
+    return isinstance(number, int | np.integer) and number >= 1
 
 
 def check_part(name: str, part: object, protocol: type, example: str) -> None:
@@ -58,11 +96,6 @@ def check_part(name: str, part: object, protocol: type, example: str) -> None:
         The protocol that it has to fulfil.
     example : str
         The method that it needs, and a class that has it.
-
-    Raises
-    ------
-    ArgumentError
-        When it has no such method, or is a class, of which an object has to be made first.
     """
     expected = f"an object with a method {example}"
     if isinstance(part, type):
@@ -108,11 +141,6 @@ class Particles:
         Velocity over ground along the axes of the map, m/s.
     weight : (N,) float32
         Probability that each particle carries. The dynamic probability of a cell is the sum of the weights in it.
-
-    Raises
-    ------
-    ArgumentError
-        When the three arrays have different lengths.
     """
 
     position: NDArray[np.float32]
@@ -150,11 +178,6 @@ class FilterState:
         The dynamic mass of which velocities are known, more or less.
     newborn : (H, W) float32
         Dynamic mass that has just come into being and isn't carried by particles yet. `resample` draws them.
-
-    Raises
-    ------
-    ArgumentError
-        When the two arrays are over different numbers of cells.
     """
 
     probability: NDArray[np.float32]
@@ -173,11 +196,6 @@ class FilterState:
         ----------
         spec : GridSpec
             The cells of the map, (H, W).
-
-        Returns
-        -------
-        FilterState
-            P(UNKNOWN) = 1 in each cell.
         """
         probability = np.zeros((4, *spec.shape), np.float32)
         probability[State.UNKNOWN] = 1

@@ -1,4 +1,7 @@
-"""CMCDOT's four steps, each a pure function: move, predict, update, resample (paper, section 3.2)."""
+"""CMCDOT's four steps, each a pure function: move, predict, update, resample (paper, section 3.2).
+
+Each refuses a state, or evidence, over cells other than `spec`.
+"""
 
 from dataclasses import replace
 
@@ -41,16 +44,6 @@ def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterStat
         The cells, (H, W), the same in both frames.
     motion : PlanarMotion
         Pose of the new frame in the old one, metres and radians.
-
-    Returns
-    -------
-    FilterState
-        The belief in the new frame.
-
-    Raises
-    ------
-    ArgumentError
-        When the state is over other cells than those of `spec`.
     """
     check_shape("state", state.newborn, spec.shape)
     probability = look_up(state.probability, NOTHING_KNOWN, spec, spec, motion)
@@ -96,16 +89,6 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
         Time since the previous instant, seconds, not negative.
     rng : numpy.random.Generator
         Source of the particles' accelerations.
-
-    Returns
-    -------
-    FilterState
-        The belief at the present instant, before its scan.
-
-    Raises
-    ------
-    ArgumentError
-        When the state is over other cells than those of `spec`, or `dt` is negative or not finite.
     """
     check_shape("state", state.newborn, spec.shape)
     M = transition_matrix(world, dt)
@@ -137,7 +120,7 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
     STATIC and DYNAMIC share P(z | occupied), because one scan can't tell them apart. UNKNOWN means that no scan has
     said anything of the cell; as soon as one does, `initialise_unknown` shares its UNKNOWN mass among the others.
 
-    Of a cell that is hidden a scan says nothing, but what moves does: one thing can't be in two places. Where a thing
+    A scan says nothing about a hidden cell, but what moves does: one thing can't be in two places. Where a thing
     was `clearing_time` ago (a slow one, `clearing_cells` ago) it isn't any more, so "it has come from there" and "it
     stands there" are struck out together (`clear_wakes`). This is how a car that was taken for a standing one at first
     takes that belief along when it goes.
@@ -153,16 +136,6 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
         that was held possible explains the scan, the cell becomes UNKNOWN.
     world : WorldModel
         What UNKNOWN cells turn out to be, `first_sight`, and how soon things have left a place.
-
-    Returns
-    -------
-    FilterState
-        The belief given the scan.
-
-    Raises
-    ------
-    ArgumentError
-        When state or evidence are over other cells than those of `spec`.
     """
     check_shape("state", state.newborn, spec.shape)
     check_shape("evidence", evidence.free, spec.shape)
@@ -188,11 +161,6 @@ def initialise_unknown(state: FilterState, seen: NDArray, world: WorldModel) -> 
         Whether the scan says anything of the cell.
     world : WorldModel
         What UNKNOWN cells turn out to be, `first_sight`; the dynamic part is newborn.
-
-    Returns
-    -------
-    FilterState
-        The belief with UNKNOWN mass only in cells of which the scan says nothing.
     """
     revealed = np.where(seen, state.probability[UNKNOWN], 0)
     shares = np.array([*world.first_sight, -1], dtype=revealed.dtype)
@@ -227,7 +195,7 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
     Raises
     ------
     ArgumentError
-        When the state is over other cells than those of `spec`, or the resampling doesn't return indices.
+        When the state is over cells other than `spec`, or the resampling doesn't return indices.
     """
     check_shape("state", state.newborn, spec.shape)
     births = round(params.birth_share * params.n_particles)

@@ -10,7 +10,7 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.occupancy.evidence import Sensor, check_sensor
 from semgrid_edu.occupancy.resampling import Resampling, SystematicResampling
 from semgrid_edu.occupancy.sensor import SensorModel
-from semgrid_edu.occupancy.state import check_part
+from semgrid_edu.occupancy.state import check_fields, check_part, not_negative, positive_count
 
 Rates = tuple[tuple[float, ...], ...]
 AGES = 1e9
@@ -52,11 +52,6 @@ class WorldModel:
     sensor : Sensor
         Turns each scan into evidence. By default a `SensorModel`; any object will do whose `scan(points)` returns
         something with `evidence(spec, pose)`.
-
-    Raises
-    ------
-    ArgumentError
-        When a parameter has a value that is impossible, such as a negative rate.
     """
 
     rates: Rates = (
@@ -79,11 +74,9 @@ class WorldModel:
         rates = np.asarray(self.rates, dtype=float)
         if rates.shape != (4, 4) or not np.isfinite(rates).all() or (rates < 0).any():
             raise ArgumentError("rates", "4 x 4 finite rates, none negative", self.rates)
-        for name in ("stop_rate", "max_acceleration", "clearing_time", "clearing_cells"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
-                raise ArgumentError(name, "a finite number, not negative", getattr(self, name))
-        if not (np.isfinite(self.stop_speed) and self.stop_speed > 0):
-            raise ArgumentError("stop_speed", "a positive speed in m/s", self.stop_speed)
+        rates_and_times = "stop_rate", "max_acceleration", "clearing_time", "clearing_cells"
+        check_fields(self, "a finite number, not negative", not_negative, *rates_and_times)
+        check_fields(self, "a positive speed in m/s", lambda v: np.isfinite(v) and v > 0, "stop_speed")
         if len(self.first_sight) != 3 or min(self.first_sight) < 0 or not np.isclose(sum(self.first_sight), 1):
             raise ArgumentError("first_sight", "three probabilities that sum to 1", self.first_sight)
         check_sensor(self.sensor)
@@ -104,11 +97,6 @@ def transition_matrix(world: WorldModel, dt: float) -> NDArray[np.float64]:
     (4, 4) float64
         M[i, j] is the probability that a cell in state i is in state j after `dt`; rows sum to 1.
 
-    Raises
-    ------
-    ArgumentError
-        When `dt` is negative or not finite.
-
     Examples
     --------
     After three seconds without a scan, this is what a free cell has become:
@@ -116,7 +104,7 @@ def transition_matrix(world: WorldModel, dt: float) -> NDArray[np.float64]:
     >>> transition_matrix(WorldModel(), dt=3.0)[0].round(2)
     array([0.37, 0.03, 0.01, 0.59])
     """
-    if not (np.isfinite(dt) and dt >= 0):
+    if not not_negative(dt):
         raise ArgumentError("dt", "seconds, not negative", dt)
     R = np.array(world.rates, dtype=np.float64)
     np.fill_diagonal(R, 0)
@@ -139,11 +127,9 @@ class CmcdotParams(WorldModel):
     birth_share : float
         Share of the particles, between 0 and 1, that is kept for newborn dynamic mass. Without it, new moving things
         would compete for particles with all that are known already, and would be found late.
-
-    Raises
-    ------
-    ArgumentError
-        When a parameter has a value that is impossible.
+    resampling : Resampling
+        How indices are drawn in proportion to weights. By default a `SystematicResampling`; any object will do whose
+        `draw(weight, count, rng)` returns indices.
 
     Examples
     --------
@@ -160,11 +146,8 @@ class CmcdotParams(WorldModel):
     def __post_init__(self) -> None:
         """Refuse parameters that describe no filter."""
         super().__post_init__()
-        if not isinstance(self.n_particles, int | np.integer) or self.n_particles < 1:
-            raise ArgumentError("n_particles", "a whole number of at least 1", self.n_particles)
-        if not (np.isfinite(self.max_speed) and self.max_speed >= 0):
-            raise ArgumentError("max_speed", "a finite speed in m/s, not negative", self.max_speed)
-        if not 0 < self.birth_share < 1:
-            raise ArgumentError("birth_share", "a share between 0 and 1", self.birth_share)
+        check_fields(self, "a whole number of at least 1", positive_count, "n_particles")
+        check_fields(self, "a finite speed in m/s, not negative", not_negative, "max_speed")
+        check_fields(self, "a share between 0 and 1", lambda share: 0 < share < 1, "birth_share")
         example = ".draw(weight, count, rng), such as SystematicResampling()"
         check_part("resampling", self.resampling, Resampling, example)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.layout import in_rows
+from semgrid_edu.occupancy.state import check_fields
 from semgrid_edu.stage_models.stage_graph import StageGraph, binary, cut_edges, directed
 
 BINS_PER_CELL = 10
@@ -38,11 +39,6 @@ class BeamWorld:
         P(occupied) of each cell.
     hit, clutter : float
         Probability that an occupied cell, or a free one, reflects a beam that reaches it.
-
-    Raises
-    ------
-    ArgumentError
-        When a parameter has a value that is impossible.
     """
 
     n_cells: int = 8
@@ -54,15 +50,12 @@ class BeamWorld:
 
     def __post_init__(self) -> None:
         """Refuse values that are impossible, and ranges too fine to be read."""
-        if not 1 <= self.n_cells <= 12:
-            raise ArgumentError("n_cells", "from 1 to 12", self.n_cells)
+        check_fields(self, "from 1 to 12", lambda n: 1 <= n <= 12, "n_cells")
         if not 1 <= self.width <= self.n_cells or self.n_cells % self.width:
             raise ArgumentError("width", f"a divisor of the number of cells, {self.n_cells}", self.width)
         if not (np.isfinite(self.noise) and (self.noise == 0 or self.noise * BINS_PER_CELL >= 1)):
             raise ArgumentError("noise", f"0, or at least {1 / BINS_PER_CELL} cells", self.noise)
-        for name in ("prior", "hit", "clutter"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise ArgumentError(name, "a probability", getattr(self, name))
+        check_fields(self, "a probability", lambda p: 0 <= p <= 1, "prior", "hit", "clutter")
 
     @property
     def cells(self) -> tuple[str, ...]:
@@ -95,11 +88,6 @@ def beam_over_cells(world: BeamWorld | None = None, beams: int = 1) -> StageGrap
     StageGraph
         Variables m1 ... mK (0 free, 1 occupied); r1, r2, ..., the range at which each beam is reflected, counted from
         0, whose last state is "none"; and z1, z2, ..., see `range_state`.
-
-    Raises
-    ------
-    ArgumentError
-        When `beams` is below 1.
     """
     if beams < 1:
         raise ArgumentError("beams", "at least 1", beams)
@@ -145,10 +133,7 @@ def reflection(world: BeamWorld, name: str = "r") -> Factor:
 def range_bins(world: BeamWorld) -> NDArray[np.float64]:
     """Return the ranges that can be read, in cells: 0 is the middle of the nearest cell, 1 that of the next.
 
-    Parameters
-    ----------
-    world : BeamWorld
-        The cells, and how the beam is reflected and measured.
+    Parameters are those of `reflection`.
 
     Returns
     -------
@@ -165,10 +150,7 @@ def range_bins(world: BeamWorld) -> NDArray[np.float64]:
 def measurement(world: BeamWorld) -> NDArray[np.float64]:
     """Return P(z | r): normal around the range at which the beam is reflected.
 
-    Parameters
-    ----------
-    world : BeamWorld
-        The cells, and how the beam is reflected and measured.
+    Parameters are those of `reflection`.
 
     Returns
     -------
@@ -198,11 +180,6 @@ def range_state(world: BeamWorld, z: float | None) -> int:
     -------
     int
         Index of the nearest of `range_bins`, or of the state "none", which follows them.
-
-    Raises
-    ------
-    ArgumentError
-        When no reflection can give that range.
     """
     bins = range_bins(world)
     if z is None:
@@ -216,21 +193,6 @@ def range_state(world: BeamWorld, z: float | None) -> int:
 def beam_likelihood(world: BeamWorld, z: float | None) -> Factor:
     """Return P(z | m1 ... mK) of one range as a table over all maps: r is summed out.
 
-    Parameters
-    ----------
-    world : BeamWorld
-        The cells, and how the beam is reflected and measured.
-    z : float or None
-        The range in cells, 0 for the middle of the nearest cell; None when nothing came back.
-
-    Returns
-    -------
-    Factor
-        A table over `world.cells`.
-
-    Raises
-    ------
-    ArgumentError
-        When no reflection can give that range.
+    Parameters are those of `range_state`.
     """
     return (reflection(world) * Factor("r", measurement(world)[:, range_state(world, z)])).sum("r")

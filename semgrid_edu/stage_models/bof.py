@@ -64,17 +64,9 @@ def bof_beliefs(world: CellsInARow) -> NDArray[np.float64]:
 
 
 def bof_errors(world: CellsInARow) -> NDArray[np.float64]:
-    """Compare BOF with joint inference over all cells.
+    """Return the total variation between BOF's distribution of each cell and the exact one, (T, K).
 
-    Parameters
-    ----------
-    world : CellsInARow
-        A row of K cells with T scans.
-
-    Returns
-    -------
-    (T, K) float64
-        Total variation between BOF's distribution of each cell and the exact one.
+    Parameters are those of `bof_beliefs`.
 
     Examples
     --------
@@ -87,17 +79,12 @@ def bof_errors(world: CellsInARow) -> NDArray[np.float64]:
 
 
 def expected_things(beliefs: NDArray) -> NDArray[np.float64]:
-    """Return how many things are expected in the row: the sum of all cells' probabilities of being occupied.
+    """Return how many things are expected in the row after each step, (T,): the sum of P(occupied) over all cells.
 
     Parameters
     ----------
     beliefs : (T, K, 5) float
         Each cell's distribution, from `bof_beliefs` or `exact_beliefs`.
-
-    Returns
-    -------
-    (T,) float64
-        The expected number of things after each step.
     """
     return beliefs[..., [Cell.STATIC, Cell.LEFT, Cell.RIGHT]].sum(axis=(1, 2))
 
@@ -109,11 +96,6 @@ def bof_stage(world: CellsInARow = STANDING_OR_DRIVING) -> StageGraph:
     ----------
     world : CellsInARow
         The row, of which the first belief and the first scan are used.
-
-    Returns
-    -------
-    StageGraph
-        Its model is `row_model(world, 1)`.
     """
     columns = range(1, len(world.cells) + 1)
     rows = {"one{},1": 1.0, "c{},0": 0.0, "c{},1": -1.4, "z{},1": -2.4}

@@ -78,11 +78,6 @@ def sampling_error(world: CellsInARow, numbers: Sequence[int], seeds: Sequence[i
     seeds : sequence of int
         Seeds of the runs; the errors are averaged over them.
 
-    Returns
-    -------
-    SamplingError
-        The errors for each number of particles.
-
     Examples
     --------
     >>> error = sampling_error(LEFT_OR_RIGHT, [100, 1600], seeds=range(10))

@@ -40,11 +40,6 @@ def coupled(coupling: float) -> CrfParams:
     ----------
     coupling : float
         The weight w_bilateral: 0 for no pair term, 4 for the package's default.
-
-    Returns
-    -------
-    CrfParams
-        The scaled parameters.
     """
     default = CrfParams()
     return CrfParams(w_bilateral=coupling, w_spatial=coupling * default.w_spatial / default.w_bilateral)
@@ -183,11 +178,6 @@ def coupling_sweep(
         phi_u, the unary term; that of `UNDECIDED` when left out.
     values : (4, H, W) float, optional
         Occupancy of each cell; all free when left out.
-
-    Returns
-    -------
-    CouplingSweep
-        Distributions and labellings at each coupling.
 
     Notes
     -----

@@ -16,6 +16,7 @@ from semgrid_edu.graphical.exact import eliminate
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.layout import in_rows
 from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
+from semgrid_edu.occupancy.state import check_fields
 from semgrid_edu.stage_models.beam import BINS_PER_CELL, MARGIN, BeamWorld, range_bins, range_state, reflection
 from semgrid_edu.stage_models.stage_graph import StageGraph, binary, cut_edges, directed
 from semgrid_edu.stage_models.thick_walls import beam_beliefs, occupied, package_row, same_sensor
@@ -36,11 +37,6 @@ def scan_with_pose_error(world: BeamWorld | None = None, rings: int = 2) -> Stag
     -------
     StageGraph
         Variables m1 ... mK, r1, r2, ... and z1, z2, ... as in `beam_over_cells`, and e in tenths of a cell.
-
-    Raises
-    ------
-    ArgumentError
-        When `rings` is below 1, or the noise is 0.
     """
     world = world or same_sensor(1.0)
     if rings < 1:
@@ -161,11 +157,6 @@ class LabelWorld:
         Probability that a return has no labelled pixel, 0..1.
     vote : str
         "majority" or "standing", as in `TruthPolicy`.
-
-    Raises
-    ------
-    ArgumentError
-        When a number is outside its range, or there is no such vote.
     """
 
     returns: int = 3
@@ -176,13 +167,9 @@ class LabelWorld:
 
     def __post_init__(self) -> None:
         """Refuse what the graph can't hold."""
-        if not 1 <= self.returns <= 9:
-            raise ArgumentError("returns", "a number from 1 to 9", self.returns)
-        for name in ("outline", "calibration", "lost"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise ArgumentError(name, "a probability", getattr(self, name))
-        if self.vote not in ("majority", "standing"):
-            raise ArgumentError("vote", "majority or standing", repr(self.vote))
+        check_fields(self, "a number from 1 to 9", lambda n: 1 <= n <= 9, "returns")
+        check_fields(self, "a probability", lambda p: 0 <= p <= 1, "outline", "calibration", "lost")
+        check_fields(self, "majority or standing", lambda vote: vote in ("majority", "standing"), "vote")
 
 
 def made_label_stage(world: LabelWorld | None = None) -> StageGraph:

@@ -52,11 +52,6 @@ def row_evidence(world: CellsInARow, steps: int) -> dict[str, int]:
         The row, of which the scans are used.
     steps : int
         Number of steps.
-
-    Returns
-    -------
-    dict of str to int
-        The observed states, for `eliminate(row_model(world, steps), ..., given=...)`.
     """
     given = {}
     for step, scan in enumerate(world.scans[:steps], start=1):

@@ -46,11 +46,6 @@ def bayes_on_a_line(
     -------
     StageGraph
         Variables n0, n1, ... with `n_cells` states each, and z0, z1, ...: 0 is "nothing", 1 is "pole".
-
-    Raises
-    ------
-    ArgumentError
-        When `steps` is below 1, or a probability isn't one.
     """
     if steps < 1:
         raise ArgumentError("steps", "at least 1", steps)
@@ -97,38 +92,18 @@ def filtered(stage: StageGraph, readings: Sequence[int]) -> NDArray[np.float64]:
 
 
 def smoothed(stage: StageGraph, readings: Sequence[int]) -> NDArray[np.float64]:
-    """Return P(n_t | all readings), past and future: the product of forward and backward messages.
+    """Return P(n_t | all readings) for each step, (T, N): the product of forward and backward messages.
 
-    Parameters
-    ----------
-    stage : StageGraph
-        A graph from `bayes_on_a_line`.
-    readings : (T,) int
-        What the sensor said at each step: 0 for "nothing", 1 for "pole".
-
-    Returns
-    -------
-    (T, N) float64
-        One belief per step.
+    Parameters are those of `filtered`.
     """
     marginals = sum_product(stage.model, _given(stage, readings)).marginals
     return np.array([marginals[f"n{t}"] for t in range(len(readings))])
 
 
 def most_likely_path(stage: StageGraph, readings: Sequence[int]) -> list[int]:
-    """Return the most likely sequence of places given all readings (Viterbi).
+    """Return the most likely sequence of places, one cell per step, given all readings (Viterbi).
 
-    Parameters
-    ----------
-    stage : StageGraph
-        A graph from `bayes_on_a_line`.
-    readings : (T,) int
-        What the sensor said at each step: 0 for "nothing", 1 for "pole".
-
-    Returns
-    -------
-    list of int
-        One cell per step.
+    Parameters are those of `filtered`.
     """
     best = max_product(stage.model, _given(stage, readings))
     return [best[f"n{t}"] for t in range(len(readings))]
@@ -157,11 +132,6 @@ def future_gain(stage: StageGraph) -> FutureGain:
     ----------
     stage : StageGraph
         A graph from `bayes_on_a_line` with T steps: all 2^T sequences of readings are enumerated.
-
-    Returns
-    -------
-    FutureGain
-        The mean entropies, with and without later readings.
     """
     total = np.zeros((2, len(stage.observed)))
     for readings in product((0, 1), repeat=len(stage.observed)):

@@ -26,11 +26,6 @@ def read_scans(says: str, sensor: SensorModel | None = None) -> NDArray[np.float
     (T, 2) float64
         P(z | occupied) and P(z | free) of each scan.
 
-    Raises
-    ------
-    ArgumentError
-        When `says` holds another letter.
-
     Examples
     --------
     >>> read_scans(".# ").round(2).tolist()
@@ -55,11 +50,6 @@ def check_scans(scans: ArrayLike) -> NDArray[np.float64]:
     -------
     (T, 2) float64
         The same numbers.
-
-    Raises
-    ------
-    ArgumentError
-        When `scans` isn't such a table.
     """
     table = np.asarray(scans, dtype=np.float64)
     if table.ndim != 2 or table.shape[1] != 2 or len(table) == 0:

@@ -39,10 +39,6 @@ def cut_edges(stage: str) -> tuple[CutEdge, ...]:
     ----------
     stage : str
         A key of `CATALOGUE`, such as "bof".
-
-    Returns
-    -------
-    tuple of CutEdge
     """
     return tuple(CutEdge(**edge) for edge in tomllib.loads(CATALOGUE.read_text(encoding="utf-8"))[stage])
 
@@ -54,10 +50,6 @@ def directed(factors: Iterable[Factor]) -> GraphicalModel:
     ----------
     factors : iterable of Factor
         One per variable.
-
-    Returns
-    -------
-    GraphicalModel
     """
     factors = tuple(factors)
     return GraphicalModel(factors, {factor.names[-1]: factor.names[:-1] for factor in factors})
@@ -72,10 +64,6 @@ def binary(name: str, p: float) -> Factor:
         The variable.
     p : float
         Its probability of being 1.
-
-    Returns
-    -------
-    Factor
     """
     return Factor(name, [1 - p, p])
 

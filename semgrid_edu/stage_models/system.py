@@ -217,11 +217,6 @@ def system_gain(world: SystemWorld | None = None) -> SystemGain:
     ----------
     world : SystemWorld, optional
         The toy street and its sensors; the defaults, with two instants, when left out.
-
-    Returns
-    -------
-    SystemGain
-        The scores.
     """
     world = world or SystemWorld()
     joint = class_and_sensors(world, world.steps - 1)

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
     FilterState,
@@ -20,6 +19,7 @@ from semgrid_edu.occupancy import (
     update,
 )
 from semgrid_edu.occupancy.sensor import likelihoods
+from semgrid_edu.occupancy.state import check_fields
 from semgrid_edu.stage_models.beam import BeamWorld, reflection
 
 CLASSES = ("road", "sidewalk", "car", "building")
@@ -66,11 +66,6 @@ class SystemWorld:
         the other classes.
     params : WorldModel
         Rates of the street and of the filter, first sight, and p_hit of the scanner.
-
-    Raises
-    ------
-    ArgumentError
-        When a parameter has a value that is impossible.
     """
 
     steps: int = 2
@@ -81,11 +76,8 @@ class SystemWorld:
 
     def __post_init__(self) -> None:
         """Refuse values that are impossible."""
-        if self.steps not in (1, 2, 3):
-            raise ArgumentError("steps", "1, 2 or 3", self.steps)
-        for name in ("range_error", "pixel_right"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise ArgumentError(name, "a probability", getattr(self, name))
+        check_fields(self, "1, 2 or 3", lambda steps: steps in (1, 2, 3), "steps")
+        check_fields(self, "a probability", lambda p: 0 <= p <= 1, "range_error", "pixel_right")
 
     def change(self) -> NDArray[np.float64]:
         """Return P(content now | content before), (5, 5), by the filter's rates, but without any towards UNKNOWN.

@@ -58,11 +58,6 @@ def beam_beliefs(world: BeamWorld, ranges: Sequence[float | None]) -> BeamBelief
         The cells, and how the beam is reflected and measured.
     ranges : (n,) float or None
         The ranges in cells, 0 for the middle of the nearest cell; None when nothing came back.
-
-    Returns
-    -------
-    BeamBeliefs
-        What is believed after each range.
     """
     posterior = independent(world, np.full(world.n_cells, world.prior))
     kept, steps = posterior, []
@@ -77,7 +72,7 @@ def beam_beliefs(world: BeamWorld, ranges: Sequence[float | None]) -> BeamBelief
 
 
 def independent(world: BeamWorld, p: ArrayLike) -> Factor:
-    """Return the distribution over maps in which cells are independent.
+    """Return the distribution over maps in which cells are independent, a table over `world.cells`.
 
     Parameters
     ----------
@@ -85,27 +80,17 @@ def independent(world: BeamWorld, p: ArrayLike) -> Factor:
         The cells, and how the beam is reflected and measured.
     p : (K,) float
         P(occupied) of each cell.
-
-    Returns
-    -------
-    Factor
-        A table over `world.cells`.
     """
     return product(Factor(cell, [1 - one, one]) for cell, one in zip(world.cells, np.asarray(p), strict=True))
 
 
 def occupied(belief: Factor) -> NDArray[np.float64]:
-    """Return the marginals P(occupied) of a distribution over maps.
+    """Return the marginals P(occupied) of a distribution over maps, (K,).
 
     Parameters
     ----------
     belief : Factor
         A distribution over K cells, each 0 (free) or 1 (occupied).
-
-    Returns
-    -------
-    (K,) float64
-        P(occupied) of each cell.
     """
     tables = [belief.sum(*(other for other in belief.names if other != cell)).normalised() for cell in belief.names]
     return np.array([table.table[1] for table in tables])
@@ -134,11 +119,6 @@ def same_sensor(noise: float, params: LogOddsParams = PARAMS, n_cells: int = 8) 
         Parameters of the grid, of which the prior and the sensor's p_hit are used.
     n_cells : int
         Number of cells in the row.
-
-    Returns
-    -------
-    BeamWorld
-        The cells, and how the beam is reflected and measured.
     """
     sensor = params.sensor
     return BeamWorld(n_cells, noise, prior=params.prior, hit=sensor.p_hit_occupied, clutter=sensor.p_hit_free)
@@ -241,11 +221,6 @@ def thick_walls(noise: float = 0.5, scans: int = 20, draws: int = 50, wall: int 
         The only occupied cell of eight, counted from 0.
     seed : int
         Seed for reflections and noise.
-
-    Returns
-    -------
-    Walls
-        The mean beliefs and thicknesses.
     """
     world, rng = same_sensor(noise), np.random.default_rng(seed)
     row = np.arange(world.n_cells) == wall

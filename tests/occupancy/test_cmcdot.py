@@ -233,3 +233,9 @@ def test_the_memory_of_one_step_serves_the_next():
     """
     done = subprocess.run([sys.executable, "-c", PAGES], capture_output=True, text=True, check=True)
     assert int(done.stdout) < 1250
+
+
+def test_importing_the_filter_loads_nothing_heavy():
+    code = "import sys, semgrid_edu.occupancy as _; print({'torch', 'matplotlib', 'scipy.stats'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"

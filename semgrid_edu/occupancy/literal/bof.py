@@ -24,7 +24,7 @@ def bof_predict_literal(state: BofState, spec: GridSpec, params: BofParams, dt: 
     M = transition_matrix(params.world, dt)
     of_each = Particles(np.zeros_like(state.velocity), state.velocity, np.ones(len(state.velocity)))
     kept = slow_down_literal(of_each, params.world.stop_rate, params.world.stop_speed, dt).weight
-    changed = accelerate(state, params, dt)
+    changed = _accelerate(state, params, dt)
     cells, remainder = whole_cells(state, spec, dt)
     own, newborn, vacated = np.zeros((4, *spec.shape)), np.zeros(spec.shape), np.zeros(spec.shape)
     stays, arrives = np.zeros((2, *state.occupied.shape))
@@ -53,23 +53,10 @@ def bof_predict_literal(state: BofState, spec: GridSpec, params: BofParams, dt: 
     return BofState(own[FREE], own[UNKNOWN], occupied, state.velocity, remainder)
 
 
-def accelerate(state: BofState, params: BofParams, dt: float) -> NDArray[np.float64]:
-    """Return the mass of each velocity after some of it has changed to neighbouring velocities.
+def _accelerate(state: BofState, params: BofParams, dt: float) -> NDArray[np.float64]:
+    """Return the mass of each velocity, (V, H, W), after some of it has changed to neighbouring velocities.
 
-    Parameters
-    ----------
-    state : BofState
-        The belief before, with mass (V, H, W).
-    params : BofParams
-        The lattice, and how much things accelerate.
-    dt : float
-        The time step, seconds.
-
-    Returns
-    -------
-    (V, H, W) float64
-        The mass of each velocity in each cell. Mass at the first velocity, zero, stays there: what stands doesn't set
-        off by accelerating a little.
+    Mass at the first velocity, zero, stays there: what stands doesn't set off by accelerating a little.
     """
     change = params.lattice.change_probability(params.world.max_acceleration, dt)
     changed = np.zeros(state.occupied.shape)

@@ -1,7 +1,4 @@
-"""Evidence from a scan by walking every ray cell by cell: the literal twin of `Scan` (paper, section 3.2).
-
-Where the ground lies under each return, sector by sector: the literal twin of `ground` (for section 3.2).
-"""
+"""Evidence by walking along rays, the ground by walking along sectors: twins of `Scan` and `ground` (section 3.2)."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.cellwise import ratio
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.resampling import Resampling, draw_indices, draw_velocities
 from semgrid_edu.occupancy.state import OUTSIDE, Particles
 
 
@@ -99,24 +98,3 @@ class SystematicResamplingLiteral:
     def draw(self, weight: NDArray, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
         """Draw indices. Parameters and result are those of `Resampling.draw`."""
         return systematic_resample_literal(weight, count, rng.random())
-
-
-def draw_newborn_literal(
-    newborn: NDArray,
-    spec: GridSpec,
-    count: int,
-    max_speed: float,
-    resampling: Resampling,
-    rng: np.random.Generator,
-) -> Particles:
-    """Draw new particles anywhere in their cells: the literal twin of `draw_newborn`.
-
-    Parameters and result are those of `draw_newborn`, and so are the random numbers that are drawn.
-    """
-    total = newborn.sum(dtype=np.float64)
-    if total == 0 or count == 0:
-        return Particles.none()
-    drawn = draw_indices(resampling, newborn.ravel(), count, rng)
-    corner = np.stack(np.unravel_index(drawn, spec.shape), axis=1) + rng.random((count, 2), np.float32)
-    position = (spec.x_max, spec.y_max) - corner * spec.cell
-    return Particles(position, draw_velocities(count, max_speed, rng), np.full(count, total / count))

@@ -1,7 +1,7 @@
 """How much a map blurs when it moves with the vehicle: three schemes compared (paper, section 3.2, step 1)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,7 @@ MARGIN = 1.5
 """Distance that drops keep from the map's borders, metres, so that hardly any ink crosses them."""
 
 
-@dataclass(frozen=True, eq=False)
-class Blur:
+class Blur(NamedTuple):
     """How much a moving map has blurred, after each of T steps.
 
     Parameters
@@ -105,7 +104,8 @@ def measure_blur(
     start, rest, T_start_from_map = spec.centers()[row, col], PlanarMotion(), PlanarMotion()
     measured = []
     for motion in motions:
-        moved, rest = _follow(scheme, rest.then(motion), spec.cell)
+        pose = rest.then(motion)
+        moved, rest = scroll(pose, spec.cell, MAX_YAW) if scheme == "scrolling" else (pose, PlanarMotion())
         fields = _carry(scheme, fields, spec, moved)
         T_start_from_map = T_start_from_map.then(moved)
         measured.append(_measure(fields, spec, T_start_from_map, start, held))
@@ -123,11 +123,6 @@ def _always_held(spec: GridSpec, motions: Sequence[PlanarMotion]) -> NDArray[np.
     if not held.any():
         raise ArgumentError("motions", "motions that leave some of the map in it", f"{pose} in {spec}")
     return held
-
-
-def _follow(scheme: str, pose: PlanarMotion, cell: float) -> tuple[PlanarMotion, PlanarMotion]:
-    """Return how the map moves when the vehicle is at `pose` in it, and the vehicle's pose in it then."""
-    return scroll(pose, cell, MAX_YAW) if scheme == "scrolling" else (pose, PlanarMotion())
 
 
 def _carry(scheme: str, fields: NDArray[np.float32], spec: GridSpec, moved: PlanarMotion) -> NDArray[np.float32]:

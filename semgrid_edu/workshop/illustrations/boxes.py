@@ -126,10 +126,7 @@ def cells_in(box: Box, spec: GridSpec, x: float = 0.0, y: float = 0.0, margin: f
     margin : float
         By how much the box is widened on every side, metres.
     """
-    centre_x, centre_y = np.moveaxis(spec.centers() + np.array([x, y]), -1, 0)
-    return (
-        (centre_x > box.x_min - margin)
-        & (centre_x < box.x_max + margin)
-        & (centre_y > box.y_min - margin)
-        & (centre_y < box.y_max + margin)
-    )
+    low = np.array([box.x_min, box.y_min]) - margin
+    high = np.array([box.x_max, box.y_max]) + margin
+    centre = spec.centers() + np.array([x, y])
+    return ((centre > low) & (centre < high)).all(axis=-1)
