@@ -17,8 +17,7 @@ from semgrid_edu.storage.workplace import Workplace, workplace
 from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS
 from semgrid_edu.workshop.paper.reports.reproduce import Request, reproduce
 from semgrid_edu.workshop.paper.runs.scales import SCALES, scale_named
-from semgrid_edu.workshop.scheduler.execute import execute_plan
-from semgrid_edu.workshop.scheduler.one_run import check_runs_folder, claim_folder, run_one
+from semgrid_edu.workshop.scheduler.execute import check_runs_folder, claim_folder, execute_plan, run_one
 from semgrid_edu.workshop.scheduler.plan import estimate, plan_table, with_needs
 from semgrid_edu.workshop.simulation.datasets import DatasetRecipe, Route, make_from_recipe
 

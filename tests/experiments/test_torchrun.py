@@ -14,13 +14,13 @@ from tiny_runs import Note, SharedNote, results, tiny_training_runs, wait_for
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.training.log import LOG, read_log
 from semgrid_edu.workshop.paper.reports.reproduce import Request, reproduce
-from semgrid_edu.workshop.scheduler.one_run import run_one
+from semgrid_edu.workshop.scheduler.execute import run_one
 from semgrid_edu.workshop.scheduler.runs import OUTPUT
 
 SCRIPT = """
 import sys
 from tiny_runs import SharedNote
-from semgrid_edu.workshop.scheduler.one_run import run_one
+from semgrid_edu.workshop.scheduler.execute import run_one
 run_one(SharedNote("long", seconds_each=600.0), sys.argv[1], processes=2)
 """
 

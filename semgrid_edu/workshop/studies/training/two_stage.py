@@ -15,7 +15,7 @@ from semgrid_edu.storage.provenance import versions
 from semgrid_edu.training import CHECKPOINT, TrainingParams
 from semgrid_edu.training.run import train_network
 from semgrid_edu.workshop.scoring.evaluate import Scores, scores
-from semgrid_edu.workshop.scoring.learned_grids import best_labels, learned_log_g
+from semgrid_edu.workshop.scoring.grids import best_labels, learned_log_g
 
 METHODS = ("end-to-end", "two-stage")
 """The two training regimes."""
