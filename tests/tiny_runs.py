@@ -18,7 +18,9 @@ from semgrid_edu.workshop.paper.runs.variants import Variant
 from semgrid_edu.workshop.scheduler.runs import Run
 from semgrid_edu.workshop.simulation.datasets import DatasetRecipe, Route
 
-data_runs.RECIPE_OF["tiny"] = DatasetRecipe("tiny", "KITTI-14", (Route("train", 2, False),) * 6)
+TRAIN, TEST = (Route(split, 2, False) for split in ("train", "test"))
+data_runs.RECIPE_OF["tiny"] = DatasetRecipe("tiny", "KITTI-14", (TRAIN,) * 6)
+data_runs.RECIPE_OF["tinytested"] = DatasetRecipe("tinytested", "KITTI-14", (TRAIN,) * 6 + (TEST,) * 2)
 
 
 @dataclass(frozen=True)
@@ -30,13 +32,10 @@ class Note(Run):
     fails_without: str = ""
     seconds_each: float = 0.0
 
-    name = property(lambda self: f"note-{self.label}")
+    kind = pace = "note"
+    steps, trial_seconds = 2, 30.0
+    tag = property(lambda self: self.label)
     needs = property(lambda self: self.after)
-    steps = property(lambda self: 2)
-    pace = property(lambda self: "note")
-
-    def probe(self) -> float:
-        return 30.0
 
     def work(self, root: Path, device: str) -> None:
         with (self.folder(root) / "started").open("a") as file:
@@ -67,18 +66,17 @@ class SharedNote(Note):
 
 @dataclass(frozen=True)
 class HandMadeData(DataRun):
-    """Six drives to learn from, two frames each, the last one labelled."""
+    """The drives of a recipe written by hand, two frames each, the last one labelled: six of "tiny" to learn from."""
 
     data: str = "tiny"
 
     def work(self, root: Path, device: str) -> None:
-        folder = self.dataset_dir(root)
+        folder, splits = self.dataset_dir(root), {}
         folder.mkdir(exist_ok=True)
-        drives = [f"{k:04d}" for k in range(1, 7)]
-        for drive in drives:
-            write_tiny_drive(folder, drive, n_frames=2, labelled=(1,))
-        frames = [{"date": DATE, "drive": drive, "frame": 1} for drive in drives]
-        index = {"name": "tiny", "label_set": "KITTI-14", "splits": {"train": frames}}
+        for k, route in enumerate(data_runs.RECIPE_OF[self.data].routes, start=1):
+            write_tiny_drive(folder, f"{k:04d}", n_frames=2, labelled=(1,))
+            splits.setdefault(route.split, []).append({"date": DATE, "drive": f"{k:04d}", "frame": 1})
+        index = {"name": self.data, "label_set": "KITTI-14", "splits": splits}
         (folder / "dataset.json").write_text(json.dumps(index))
 
 

@@ -137,23 +137,25 @@ SCALES = {scale.name: scale for scale in (QUICK, REDUCED, PAPER)}
 """Every scale by name."""
 
 
-def scale_named(name: str, segmenters: tuple[str, ...] = ()) -> Scale:
+def scale_named(name: str) -> Scale:
     """Return a scale.
 
     Parameters
     ----------
     name : str
-        A key of `SCALES`.
-    segmenters : tuple of str
-        Image networks that Table 1 compares beside its own.
+        A key of `SCALES`. "quick+unet" is the scale "quick" whose Table 1 compares U-Net too, and so on for any image
+        network that is registered in `SEGMENTERS`.
 
     Raises
     ------
     ArgumentError
         When there is no such scale or image network.
     """
-    if name not in SCALES:
-        raise ArgumentError("--scale", f"one of {', '.join(SCALES)}", repr(name))
-    for unknown in (one for one in segmenters if one not in SEGMENTERS):
-        raise ArgumentError("--segmenter", f"one of {', '.join(SEGMENTERS)}", repr(unknown))
-    return replace(SCALES[name], networks=tuple(dict.fromkeys((*SCALES[name].networks, *segmenters))))
+    known, *others = name.split("+")
+    if known not in SCALES:
+        raise ArgumentError("--scale", f"one of {', '.join(SCALES)}", repr(known))
+    for other in others:
+        if other not in SEGMENTERS:
+            raise ArgumentError("--scale", f"after a plus one of {', '.join(SEGMENTERS)}", repr(other))
+    scale = SCALES[known]
+    return replace(scale, name=name, networks=tuple(dict.fromkeys((*scale.networks, *others))))

@@ -23,7 +23,7 @@ from semgrid_edu.workshop.paper.runs.variants import EXACT, CalibrationError
 from semgrid_edu.workshop.scheduler.runs import Run
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions, load_confusions, save_confusions, seed_confusions
 from semgrid_edu.workshop.scoring.counting import Grids, count_grids
-from semgrid_edu.workshop.scoring.grids import MAJORITY, NETWORK, OCCUPANCY_ALONE, baseline_grids, network_grids
+from semgrid_edu.workshop.scoring.grids import MAJORITY, NETWORK, OCCUPANCY_ALONE, Refine, baseline_grids, network_grids
 
 CONFUSIONS, RELIABILITY = "confusions.npz", "reliability.npz"
 """The files of a run that scores: confusion matrices by frame, and how often a method is right by its confidence."""
@@ -190,11 +190,16 @@ class ScoreRun(CountingRun):
     def grids(self, root: Path, frames: TrainingSet) -> Grids:
         """Return the network's grids. Parameters are those of `CountingRun.grids`."""
         net = self.network.trained(root, self.calibration.applied_to(frames.camera))
-        refinements = {"CRF": (1.0, CrfParams.for_cells(frames.spec.cell))}
-        if self.network.image_stage.segmenter in SEARCHED:
-            refinements["searched CRF"] = SEARCHED[self.network.image_stage.segmenter]
-        chosen = {name: partial(_refined, *how) for name, how in refinements.items() if self.crf}
-        return network_grids(net, frames, chosen)
+        return network_grids(net, frames, self._refinements(frames.spec.cell) if self.crf else {})
+
+    def _refinements(self, cell: float) -> dict[str, Refine]:
+        """Return the CRF with default parameters, and with searched ones if there are any."""
+        found = {"CRF": partial(_refined, 1.0, CrfParams.for_cells(cell))}
+        segmenter = self.network.image_stage.segmenter
+        if segmenter in SEARCHED:
+            return found | {"searched CRF": partial(_refined, *SEARCHED[segmenter])}
+        print(f"No CRF parameters were searched for {segmenter}, so {WITH_SEARCHED!r} is left out.")
+        return found
 
 
 def _refined(temperature: float, params: CrfParams, log_g: NDArray, o: NDArray) -> NDArray:
