@@ -38,7 +38,7 @@ class ThreeFrames:
 class Here(CountingRun):
     """A run whose folder is the folder of all runs. It is only read, never done."""
 
-    tag = pace = grids = None
+    tag = steps = pace = grids = None
 
     def folder(self, root):
         return root

@@ -122,8 +122,8 @@ def test_a_refinement_that_gives_no_probabilities_is_refused():
 def test_table_shows_every_method_and_number(found):
     lines = scores_table(found).splitlines()
     assert len(lines) == 2 + len(found)
-    (line,) = (line for line in lines if line.startswith("geometry, true labels "))
-    assert [float(word) for word in line.split("labels")[1].split()] == [100.0] * 6
+    (line,) = (line for line in lines if line.startswith("| geometry, true labels  "))
+    assert [float(cell) for cell in line.split("|")[2:-1]] == [100.0] * 6
     assert json.loads(json.dumps(found)) == found
 
 

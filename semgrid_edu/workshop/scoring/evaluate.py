@@ -18,7 +18,7 @@ from semgrid_edu.storage.provenance import versions
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions, save_confusions
 from semgrid_edu.workshop.scoring.counting import GridCounts, count_grids, truths_of_frames
 from semgrid_edu.workshop.scoring.grids import Refine, baseline_grids, network_grids
-from semgrid_edu.workshop.scoring.score_with_interval import all_metrics
+from semgrid_edu.workshop.scoring.score_with_interval import all_metrics, markdown_table, per_cent
 
 Scores = dict[str, dict[str, dict[str, float]]]
 """Values of the metrics, 0..1: by method, by cells ("all" or "semantic"), by metric."""
@@ -199,23 +199,16 @@ def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:
 
 
 def scores_table(result: Scores) -> str:
-    """Return the scores as a table to print, in per cent.
+    """Return the scores as a Markdown table, in per cent: one row per method.
 
     Parameters
     ----------
     result : Scores
         What `scores` returns.
-
-    Returns
-    -------
-    str
-        One line per method under two lines of headings.
     """
-    width = max(map(len, result))
-    group = " ".join(f"{name:>14}" for name in METRICS)
-    lines = [f"{'':{width}}  {'all labelled cells':^{len(group)}}   {'cells with a semantic class':^{len(group)}}"]
-    lines.append(f"{'':{width}}  {group}   {group}")
-    for method, cells in result.items():
-        groups = (" ".join(f"{100 * value:14.1f}" for value in cells[name].values()) for name in ("all", "semantic"))
-        lines.append(f"{method:{width}}  {'   '.join(groups)}")
-    return "\n".join(lines)
+    head = [f"{name}{cells}" for cells in ("", ", semantic cells") for name in METRICS]
+    rows = [
+        [method, *(per_cent(value) for cells in ("all", "semantic") for value in by_cells[cells].values())]
+        for method, by_cells in result.items()
+    ]
+    return markdown_table([["", *head], *rows])

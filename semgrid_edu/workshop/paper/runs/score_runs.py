@@ -18,7 +18,7 @@ from semgrid_edu.datasets.readers.project_lidar import seen_returns
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.storage.tensors import read_arrays, write_arrays
 from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun
-from semgrid_edu.workshop.paper.runs.training_runs import GridStageRun
+from semgrid_edu.workshop.paper.runs.training_runs import NetworkRun
 from semgrid_edu.workshop.paper.runs.variants import EXACT, CalibrationError
 from semgrid_edu.workshop.scheduler.runs import Run
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions, load_confusions, save_confusions, seed_confusions
@@ -59,13 +59,6 @@ LABELS = "labels"
 
 class CountingRun(Run):
     """A run that counts grids against the truth of `frames`, an `ArraysRun`."""
-
-    frames: ArraysRun
-
-    @property
-    def steps(self) -> int:
-        """Number of frames that are scored."""
-        return self.frames.n_labelled
 
     @abstractmethod
     def grids(self, root: Path, frames: TrainingSet) -> Grids:
@@ -152,23 +145,17 @@ def by_seed(
 
 
 @dataclass(frozen=True)
-class ScoreRun(CountingRun):
+class ScoreRun(CountingRun, NetworkRun):
     """Score a network on the frames of a split.
 
     Parameters
     ----------
-    network : GridStageRun
-        The run that trains the network.
-    frames : ArraysRun
-        The frames; with labels made with the LIDAR, they are scored against these and against the true ones.
     crf : bool
         Whether the CRF refines the grids as well, with default parameters and with searched ones if there are any.
     calibration : CalibrationError
         What the network believes wrongly about where the camera stands.
     """
 
-    network: GridStageRun
-    frames: ArraysRun
     crf: bool = True
     calibration: CalibrationError = EXACT
     kind: ClassVar[str] = "score"
@@ -176,7 +163,7 @@ class ScoreRun(CountingRun):
     @property
     def tag(self) -> str:
         """Network, frames, calibration, and whether the CRF is scored."""
-        return f"{self.network.tag}-on-{self.frames.tag}{self.calibration.name}" + "-crf" * self.crf
+        return f"{super().tag}{self.calibration.name}" + "-crf" * self.crf
 
     @property
     def pace(self) -> str:
@@ -208,21 +195,17 @@ def _refined(temperature: float, params: CrfParams, log_g: NDArray, o: NDArray) 
 
 
 @dataclass(frozen=True)
-class BaselineRun(CountingRun):
+class BaselineRun(CountingRun, NetworkRun):
     """Score all of `BASELINES` on the frames of a split.
+
+    The image stage of the network labels the images, and the majority is that of the frames that it learned from.
 
     Parameters
     ----------
-    network : GridStageRun
-        The network to compare with: its image stage labels the images, and the majority is that of its frames.
-    frames : ArraysRun
-        The frames to score.
     calibration : CalibrationError
         What geometry believes wrongly about where the camera stands.
     """
 
-    network: GridStageRun
-    frames: ArraysRun
     calibration: CalibrationError = EXACT
     kind: ClassVar[str] = "baselines"
     trial_seconds: ClassVar[float] = 0.2
@@ -284,20 +267,10 @@ class LabelsRun(CountingRun):
     usual: ArraysRun
     kind: ClassVar[str] = "labels"
 
-    @property
-    def frames(self) -> ArraysRun:
-        """The frames with the labels to compare with."""
-        return self.usual
-
-    @property
-    def tag(self) -> str:
-        """The labels."""
-        return self.labels.tag
-
-    @property
-    def pace(self) -> str:
-        """It depends on the size of the grid."""
-        return f"labels {self.labels.preset}"
+    frames = property(lambda self: self.usual)
+    steps = property(lambda self: self.labels.n_labelled)
+    tag = property(lambda self: self.labels.tag)
+    pace = property(lambda self: f"labels {self.labels.preset}")
 
     def probe(self) -> float:
         """Return the seconds that a frame took on one core when this was written."""

@@ -226,3 +226,34 @@ class GridStageRun(TrainingRun):
     def chosen(self, frames: TrainingSet) -> Sequence[Sample]:
         """Return the frames that its image network learned from. Parameters are those of `ImageStageRun.chosen`."""
         return self.image_stage.chosen(frames)
+
+
+@dataclass(frozen=True)
+class NetworkRun(Run):
+    """A run that looks at a trained network on the frames of a split.
+
+    Parameters
+    ----------
+    network : GridStageRun
+        The run that trains the network.
+    frames : ArraysRun
+        The frames; with labels made with the LIDAR, these and the true ones are what grids are compared with.
+    """
+
+    network: GridStageRun
+    frames: ArraysRun
+
+    @property
+    def tag(self) -> str:
+        """Network and frames."""
+        return f"{self.network.tag}-on-{self.frames.tag}"
+
+    @property
+    def steps(self) -> int:
+        """Number of frames."""
+        return self.frames.n_labelled
+
+    @property
+    def pace(self) -> str:
+        """It depends on the size of the network."""
+        return f"{self.kind} {self.frames.preset}"
