@@ -3,6 +3,7 @@ import torch
 from sklearn.metrics import accuracy_score
 from tiny_drive import write_tiny_dataset
 
+from semgrid_edu.datasets import training_cache
 from semgrid_edu.labels import IGNORE
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, load_net
 from semgrid_edu.training import CHECKPOINT, TrainingParams
@@ -14,7 +15,9 @@ QUICK = TrainingParams(image_iterations=1, grid_iterations=1, batch_size=2)
 @pytest.fixture(scope="module")
 def compared(tmp_path_factory):
     root = write_tiny_dataset(tmp_path_factory.mktemp("tiny"))
-    return root, two_stage.compare_training(root, root / "runs", 1, QUICK)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(training_cache, "WORKERS", 1)  # three drives of three frames aren't worth a process
+        return root, two_stage.compare_training(root, root / "runs", 1, QUICK)
 
 
 def test_both_start_from_the_same_image_network_and_one_keeps_it(compared):
