@@ -9,12 +9,12 @@ from semgrid_edu.workshop.paper.reports.claim_statements import called, called_v
 from semgrid_edu.workshop.paper.reports.claims import CLAIMS
 from semgrid_edu.workshop.paper.reports.deviations import deviations
 from semgrid_edu.workshop.paper.reports.verdicts import Statement, verdict
+from semgrid_edu.workshop.paper.runs.other_runs import time_saved
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS, TABLE_1_SCORES, TABLE_3_CONFUSION
 from semgrid_edu.workshop.paper.runs.scales import SCALES
 from semgrid_edu.workshop.paper.runs.score_runs import NETWORK, WITH_CRF
-from semgrid_edu.workshop.paper.runs.time_runs import time_saved
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions
-from semgrid_edu.workshop.scoring.score_with_interval import measured, on_cells, shown, shown_seeds
+from semgrid_edu.workshop.scoring.score_with_interval import on_cells, score_with_interval, shown, shown_seeds
 
 DRIVES, CELLS = 12, 2000
 
@@ -110,7 +110,7 @@ def test_the_paper_tells_every_network_with_and_without_crf():
 
 
 def test_a_score_of_one_drive_has_no_interval():
-    value = measured(np.array([[[[3, 1], [0, 4]]], [[[4, 0], [1, 3]]]]), pixel_accuracy)
+    value = score_with_interval(np.array([[[[3, 1], [0, 4]]], [[[4, 0], [1, 3]]]]), pixel_accuracy)
     assert value == {"mean": 7 / 8, "low": None, "high": None, "seeds": [7 / 8, 7 / 8]}
     assert shown(value) == "87.5"
     assert shown_seeds(value) == "87.5, 87.5"

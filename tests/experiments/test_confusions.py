@@ -1,4 +1,4 @@
-"""Confusion matrices of frames counted by hand, summed by drive, and kept on disk."""
+"""Confusion matrices of frames, summed by drive and by distance, and kept on disk."""
 
 import numpy as np
 import pytest
@@ -8,8 +8,8 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.storage.tensors import write_arrays
 from semgrid_edu.workshop.scoring.confusions import (
     FrameConfusions,
+    distance_band_names,
     drive_confusions,
-    frame_confusions,
     load_confusions,
     save_confusions,
     seed_confusions,
@@ -18,35 +18,29 @@ from semgrid_edu.workshop.scoring.confusions import (
 ROAD, CAR = (KITTI_14.index(name) for name in ("road", "car"))
 
 
-class ThreeFrames:
-    """Three frames of 1 x 2 cells, of two drives that take turns."""
-
-    label_set, drives = KITTI_14, ("b", "a", "b")
-    arrays = {"truth": np.array([[[ROAD, CAR]], [[CAR, 255]], [[ROAD, ROAD]]], np.uint8)}  # noqa: RUF012
-
-    def __len__(self):
-        return 3
+COUNTS = np.zeros((3, 14, 14), np.int64)
+COUNTS[:, ROAD, ROAD], COUNTS[:, CAR, ROAD] = (1, 0, 2), (1, 1, 0)
 
 
-def all_road(frames, k):
-    return {"road": np.full((1, 2), ROAD), "true": np.minimum(frames.arrays["truth"][k], 13)}
-
-
-@pytest.fixture(scope="module")
+@pytest.fixture
 def found():
-    return frame_confusions(all_road, ThreeFrames())
+    """Three frames of two drives that take turns."""
+    return FrameConfusions(("b", "a", "b"), {"road": COUNTS, "twice": 2 * COUNTS})
 
 
-def test_frames_and_drives_are_those_counted_by_hand(found):
-    assert found.counts["road"].shape == (3, 14, 14)
-    assert found.counts["road"][:, ROAD, ROAD].tolist() == [1, 0, 2]
-    assert found.counts["road"][:, CAR, ROAD].tolist() == [1, 1, 0]
-    assert found.counts["road"].sum() == 5  # the unlabelled cell counts nowhere
-    by_drive = found.by_drive("road")  # b comes first, as in the frames
+def test_drives_come_in_the_order_of_their_first_frames(found):
+    by_drive = found.by_drive("road")
     assert by_drive[:, ROAD, ROAD].tolist() == [3, 0]
     assert by_drive[:, CAR, ROAD].tolist() == [1, 1]
     np.testing.assert_array_equal(found.total("road"), by_drive.sum(axis=0))
-    assert np.trace(found.total("true")) == 5
+
+
+def test_bands_of_distance_are_added_up_unless_one_is_named():
+    keys = [f"network, true labels, {band}" for band in distance_band_names()]
+    others = {"network, lidar labels, 0-10 m": COUNTS, "network + CRF, true labels, 0-10 m": COUNTS}
+    found = FrameConfusions(("b", "a", "b"), {key: k * COUNTS for k, key in enumerate(keys)} | others)
+    assert found.of("network", "true", "20-30 m").total("network").sum() == 2 * COUNTS.sum()
+    assert found.of("network", "true").total("network").sum() == sum(range(7)) * COUNTS.sum()
 
 
 def test_matrices_come_back_from_disk(found, tmp_path):

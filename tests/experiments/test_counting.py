@@ -1,27 +1,44 @@
-from types import SimpleNamespace
+"""Grids counted against the truth by distance and confidence, and what is counted otherwise."""
+
+import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 from sklearn.metrics import confusion_matrix
 
 from semgrid_edu.camera import project, transform_points
-from semgrid_edu.crf import expected_calibration_error
+from semgrid_edu.crf import CrfParams, expected_calibration_error
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.workshop.paper.runs.counting import BANDS, CountingRun, GridCounts, distance_band_names
-from semgrid_edu.workshop.paper.runs.overturned_runs import boxes_on
-from semgrid_edu.workshop.paper.runs.score_runs import SEARCHED
+from semgrid_edu.storage.tensors import write_arrays
+from semgrid_edu.workshop.paper.runs.other_runs import boxes_on
+from semgrid_edu.workshop.paper.runs.score_runs import CONFUSIONS, RELIABILITY, SEARCHED, CountingRun
 from semgrid_edu.workshop.paper.runs.variants import EXACT, CalibrationError
-from semgrid_edu.workshop.scoring.distances import distance_bands
+from semgrid_edu.workshop.scoring.confusions import BANDS, distance_band_names, save_confusions
+from semgrid_edu.workshop.scoring.counting import count_grids, distance_bands
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 
 SPEC = GridSpec(0.0, 71.0, -15.5, 15.5, 0.5)
 
 
+class ThreeFrames:
+    """Frames of two drives."""
+
+    drives, spec, label_set = ("a", "a", "b"), SPEC, KITTI_14
+
+    def __init__(self, truth, true):
+        self.arrays = {"truth": truth, "true": true}
+
+    def __len__(self):
+        return len(self.drives)
+
+
 class Here(CountingRun):
     """A run whose folder is the folder of all runs. It is only read, never done."""
 
-    name = steps = pace = probe = work = None
+    tag = steps = pace = grids = None
 
     def folder(self, root):
         return root
@@ -33,25 +50,38 @@ def counted(tmp_path_factory):
     rng, folder = np.random.default_rng(0), tmp_path_factory.mktemp("counted")
     made, true = rng.integers(0, 14, (2, 3, *SPEC.shape)).astype(np.uint8)
     probability = rng.dirichlet(np.ones(14), (3, *SPEC.shape)).transpose(0, 3, 1, 2)
-    frames = SimpleNamespace(
-        arrays={"truth": made, "true": true}, drives=("a", "a", "b"), spec=SPEC, label_set=KITTI_14
-    )
-    counts = GridCounts(frames)
-    for k in range(3):
-        counts.add_probability("network", k, probability[k])
-    counts.write(folder)
+    frames = ThreeFrames(made, true)
+    counts = count_grids(lambda k: {"network": probability[k], "classes": probability[k].argmax(axis=0)}, frames)
+    write_arrays(folder / RELIABILITY, counts.reliability)
+    save_confusions(folder / CONFUSIONS, counts.confusions)
+    assert counts.methods == ("network", "classes")
     return folder, {"lidar": made, "true": true}, probability
 
 
+@pytest.mark.parametrize("method", ["network", "classes"])
 @pytest.mark.parametrize("truth", ["lidar", "true"])
-def test_all_bands_together_are_the_whole_grid(counted, truth):
+def test_all_bands_together_are_the_whole_grid(counted, truth, method):
     folder, truths, probability = counted
-    found = Here().confusions(folder, "network", truth)
+    found = Here().confusions(folder, method, truth)
     called = probability.argmax(axis=1)
     for k in range(3):
         expected = confusion_matrix(truths[truth][k].ravel(), called[k].ravel(), labels=range(14))
-        np.testing.assert_array_equal(found.counts["network"][k], expected)
-    assert found.by_drive("network").shape == (2, 14, 14)
+        np.testing.assert_array_equal(found.counts[method][k], expected)
+    assert found.by_drive(method).shape == (2, 14, 14)
+
+
+def test_frames_labelled_by_their_data_set_have_one_truth():
+    true = np.full((3, *SPEC.shape), 255, np.uint8)
+    true[0, 0, 0] = 3
+    counts = count_grids(lambda k: {"car": np.full(SPEC.shape, 3)}, ThreeFrames(true, true))
+    assert {key.split(", ")[1] for key in counts.confusions.counts} == {"true labels"}
+    assert counts.confusions.of("car", "true").total("car").sum() == 1  # unlabelled cells count nowhere
+    assert counts.reliability == {}
+
+
+def test_a_grid_of_another_shape_is_refused():
+    with pytest.raises(ArgumentError, match="grids: expected the shape of the truth"):
+        count_grids(lambda k: {"car": np.zeros((2, 2), int)}, ThreeFrames(*np.zeros((2, 3, *SPEC.shape), np.uint8)))
 
 
 def test_a_band_holds_the_cells_at_its_distance(counted):
@@ -63,12 +93,12 @@ def test_a_band_holds_the_cells_at_its_distance(counted):
     assert distance_bands(SPEC, BANDS)[-1, SPEC.shape[1] // 2] == 0
 
 
-def test_sureness_adds_up_over_the_frames(counted):
+def test_reliability_adds_up_over_the_frames(counted):
     """The expected calibration error, computed from all cells at once."""
     folder, truths, probability = counted
-    sure, right = probability.max(axis=1), probability.argmax(axis=1) == truths["true"]
-    bins = np.ceil(sure * 15).astype(int)
-    expected = sum(abs((sure - right)[bins == b].sum()) for b in range(1, 16)) / sure.size
+    confidence, right = probability.max(axis=1), probability.argmax(axis=1) == truths["true"]
+    bins = np.ceil(confidence * 15).astype(int)
+    expected = sum(abs((confidence - right)[bins == b].sum()) for b in range(1, 16)) / confidence.size
     assert expected_calibration_error(Here().reliability(folder, "network")) == pytest.approx(expected)
 
 
@@ -109,12 +139,9 @@ def test_a_box_covers_its_cells():
 
 
 def test_searched_parameters_are_those_of_the_searches():
-    import json
-    from pathlib import Path
-
     results = Path(__file__).parents[2] / "docs" / "results"
     for segmenter, (temperature, params) in SEARCHED.items():
         name = "crf_search.json" if segmenter == "segnet" else f"crf_search_{segmenter}.json"
         found = json.loads((results / name).read_text())
         assert temperature == pytest.approx(found["temperature"], abs=1e-4)
-        assert params == tuple(found["chosen"]["pixel accuracy"]["params"].values())
+        assert params == CrfParams(**found["chosen"]["pixel accuracy"]["params"])

@@ -15,8 +15,8 @@ from semgrid_edu.metrics import pixel_accuracy
 from semgrid_edu.networks import Architecture, build_net, save_net
 from semgrid_edu.pipeline import StageError
 from semgrid_edu.storage.files import sha256
-from semgrid_edu.workshop.scoring.confusions import FrameConfusions, frame_confusions, load_confusions
-from semgrid_edu.workshop.scoring.evaluate import compared_grids, evaluate, intervals, scores, scores_table
+from semgrid_edu.workshop.scoring.confusions import FrameConfusions, load_confusions
+from semgrid_edu.workshop.scoring.evaluate import count_methods, evaluate, intervals, scores_of_counts, scores_table
 from semgrid_edu.workshop.scoring.statistics import drive_interval
 
 ROAD, CAR, FREE, STATIC = (KITTI_14.index(name) for name in ("road", "car", "unknown-free", "unknown-static"))
@@ -40,7 +40,7 @@ class FourCells:
     label_set, drives = KITTI_14, ("2026_01_01 0001",)
     spec = GridSpec(0.0, 1.0, 0.0, 1.0, 0.5)
     camera = LOOKS_DOWN
-    arrays = {"truth": TRUTH, "occupancy": OCCUPANCY[None], "labels": LABELS[None]}  # noqa: RUF012
+    arrays = {"truth": TRUTH, "true": TRUTH, "occupancy": OCCUPANCY[None]}  # noqa: RUF012
 
     def __len__(self):
         return 1
@@ -74,16 +74,14 @@ class AlwaysRoad:
         return 9 * torch.eye(14)[ROAD].reshape(1, 14, 1, 1).expand(1, 14, 2, 2)
 
 
-def confusions_of(segmenters, refine=None):
-    """The confusion matrices of a network that sees road everywhere, when cars are the majority of each cell."""
-    grids = compared_grids(AlwaysRoad(), segmenters, AllCars(), refine)
-    found = frame_confusions(grids, FourCells())
-    return {method: found.total(method) for method in found.counts}
+def evaluated(segmenters, refine=None):
+    """A network that sees road everywhere, when cars are the majority of each cell."""
+    return scores_of_counts(count_methods(AlwaysRoad(), AllCars(), FourCells(), segmenters, refine), FourCells())
 
 
 @pytest.fixture(scope="module")
 def found():
-    return scores(confusions_of({"all-road": AlwaysRoad().segmenter}), KITTI_14)
+    return evaluated({"all-road": AlwaysRoad().segmenter})["scores"]
 
 
 def test_scores_are_those_counted_by_hand(found):
@@ -111,21 +109,21 @@ def test_another_refinement_has_a_row_of_its_own():
         assert o.shape == (4, 2, 2)
         return np.eye(14)[np.full((2, 2), CAR)].transpose(2, 0, 1)
 
-    confusions = confusions_of({}, always_car)
+    confusions = evaluated({}, always_car)["confusion"]
     assert confusions.keys() >= {"network", "network + always_car"}
     np.testing.assert_array_equal(np.argwhere(confusions["network + always_car"])[:, 1], CAR)
 
 
 def test_a_refinement_that_gives_no_probabilities_is_refused():
     with pytest.raises(StageError, match=r"^refine \(test_evaluate.py, line \d+\), frame 0: .* log-probabilities"):
-        confusions_of({}, lambda log_g, o: log_g)
+        evaluated({}, lambda log_g, o: log_g)
 
 
 def test_table_shows_every_method_and_number(found):
     lines = scores_table(found).splitlines()
     assert len(lines) == 2 + len(found)
-    (line,) = (line for line in lines if line.startswith("geometry, true labels "))
-    assert [float(word) for word in line.split("labels")[1].split()] == [100.0] * 6
+    (line,) = (line for line in lines if line.startswith("| geometry, true labels  "))
+    assert [float(cell) for cell in line.split("|")[2:-1]] == [100.0] * 6
     assert json.loads(json.dumps(found)) == found
 
 
@@ -157,5 +155,5 @@ def test_evaluates_a_network_from_disk(tmp_path, monkeypatch):
     kept = load_confusions(tmp_path / "confusions.npz")
     assert kept.drives == ("2026_01_01 0003",)
     for method, confusion in result["confusion"].items():
-        assert kept.total(method).tolist() == confusion
+        assert kept.of(method, "true").total(method).tolist() == confusion
         assert np.sum(confusion) == 142 * 62, method  # every cell has a class

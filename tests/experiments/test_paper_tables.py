@@ -3,7 +3,7 @@ import json
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from tiny_runs import Note
+from tiny_notes import Note
 
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.workshop.paper.reports.accuracy_tables import (

@@ -1,5 +1,6 @@
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -8,17 +9,19 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from tiny_runs import HandMadeData, Note, results, tiny_training_runs, wait_for
+from tiny_notes import Note, wait_for
+from tiny_runs import results, tiny_training_runs
 
+from semgrid_edu.datasets import training_cache
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.networks import WEIGHTS
 from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.storage.workplace import Workplace, workplace
+from semgrid_edu.training.log import LOG, read_log
 from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS
 from semgrid_edu.workshop.paper.reports.reproduce import Request, reproduce
 from semgrid_edu.workshop.paper.runs.scales import SCALES, scale_named
-from semgrid_edu.workshop.scheduler.execute import execute_plan
-from semgrid_edu.workshop.scheduler.one_run import check_runs_folder, claim_folder, run_one
+from semgrid_edu.workshop.scheduler.execute import check_runs_folder, claim_folder, execute_plan, run_one
 from semgrid_edu.workshop.scheduler.plan import estimate, plan_table, with_needs
 from semgrid_edu.workshop.simulation.datasets import DatasetRecipe, Route, make_from_recipe
 
@@ -124,7 +127,9 @@ def test_an_unknown_scale_is_refused():
 def trained(tmp_path_factory):
     """Two tiny networks, trained without any interruption."""
     root = tmp_path_factory.mktemp("runs")
-    assert execute_plan(with_needs(tiny_training_runs()), root, here(1)) == {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(training_cache, "WORKERS", 1)  # six drives of two frames aren't worth a process
+        assert execute_plan(with_needs(tiny_training_runs()), root, here(1)) == {}
     return root
 
 
@@ -133,6 +138,23 @@ def test_the_image_stage_is_trained_once_and_both_networks_start_from_it(trained
     assert len(list(trained.glob(f"grid-*/{WEIGHTS}"))) == 2
     names = sorted(path.name for path in trained.glob("grid-*"))
     assert names == ["grid-tiny-segnet-true-2+2-seed1", "grid-tiny-segnet-true-2planes-unbalanced-2+2-seed1"]
+
+
+def copied(trained, root, *kinds):
+    """A folder in which the runs of these kinds are still to be done."""
+    return Path(shutil.copytree(trained, root, ignore=shutil.ignore_patterns(*(f"{kind}-*" for kind in kinds))))
+
+
+def test_two_processes_train_as_one_does(trained, tmp_path, monkeypatch):
+    """Half the batch in each is the same step but for rounding, and the folder holds the same files."""
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(Path(__file__).parents[1]), *sys.path]))
+    run, two = tiny_training_runs()[0].image_stage, copied(trained, tmp_path / "two", "image")
+    assert run_one(run, two, processes=2).error is None
+    assert run.record(two)["processes"] == 2
+    assert "processes" not in run.record(trained)
+    assert results(two).keys() == results(trained).keys()
+    losses = [read_log(run.folder(root) / LOG).loss for root in (trained, two)]
+    assert losses[1] == pytest.approx(losses[0], rel=1e-3)
 
 
 SCRIPT = """
@@ -150,7 +172,7 @@ if __name__ == "__main__":
 
 def test_a_killed_plan_goes_on_with_the_same_bytes(trained, tmp_path):
     """Killed as a whole when the first of two networks has been trained and the second begins."""
-    script, root = tmp_path / "script.py", tmp_path / "runs"
+    script, root = tmp_path / "script.py", copied(trained, tmp_path / "runs", "grid")
     script.write_text(SCRIPT)
     paths = os.pathsep.join([str(Path(__file__).parents[1]), *sys.path])
     command = [sys.executable, str(script), str(root)]
@@ -160,7 +182,7 @@ def test_a_killed_plan_goes_on_with_the_same_bytes(trained, tmp_path):
     process.send_signal(signal.SIGKILL)
     process.wait()
     time.sleep(1)  # the worker notices within an instant that its parent is gone
-    assert HandMadeData().has_ended(root)
+    assert tiny_training_runs()[0].has_ended(root)
     assert not second.has_ended(root)
     assert execute_plan(with_needs(tiny_training_runs()), root, here(1)) == {}
     assert results(root) == results(trained)
@@ -181,20 +203,20 @@ def cluster():
 
 
 def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(cluster, trained, tmp_path):
-    first = tiny_training_runs()[0]
+    first, root = tiny_training_runs()[0], copied(trained, tmp_path / "runs", "grid")
     with (
         cluster.get_client() as client,
         ThreadPoolExecutor(1) as driver,
         workplace(scheduler=cluster.scheduler_address) as place,
     ):
         pids = client.run(os.getpid)
-        ended = driver.submit(execute_plan, with_needs(tiny_training_runs()), tmp_path, place)
-        wait_for(lambda: (first.folder(tmp_path) / "log.csv").exists() or ended.done())
+        ended = driver.submit(execute_plan, with_needs(tiny_training_runs()), root, place)
+        wait_for(lambda: (first.folder(root) / "log.csv").exists() or ended.done())
         busy = [address for address, tasks in client.processing().items() if tasks]
         os.kill(pids[busy[0]], signal.SIGKILL)
         assert ended.result() == {}
         assert set(client.run(os.getpid).values()) != set(pids.values())
-    assert results(tmp_path) == results(trained)
+    assert results(root) == results(trained)
 
 
 def test_a_cluster_makes_the_same_data(cluster, tmp_path):

@@ -7,7 +7,7 @@ from scipy import stats
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.metrics import METRICS, class_accuracy, pixel_accuracy
-from semgrid_edu.workshop.scoring.score_with_interval import compared, measured
+from semgrid_edu.workshop.scoring.score_with_interval import compared, score_with_interval
 from semgrid_edu.workshop.scoring.statistics import drive_interval, paired_interval
 
 
@@ -121,7 +121,7 @@ def test_what_gives_no_interval_is_refused():
 def test_what_was_measured_is_the_interval_and_every_seed():
     confusions = matrices(np.random.default_rng(0).uniform(60, 90, (3, 8)))
     for metric in METRICS.values():
-        value, interval = measured(confusions, metric), drive_interval(confusions, metric)
+        value, interval = score_with_interval(confusions, metric), drive_interval(confusions, metric)
         assert (value["low"], value["mean"], value["high"]) == interval
         assert value["seeds"] == [metric(matrix) for matrix in confusions.sum(axis=1)]
         assert np.mean(value["seeds"]) == pytest.approx(value["mean"])

@@ -1,7 +1,6 @@
 """Runs whose work several processes share, started by torchrun."""
 
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -9,18 +8,17 @@ import time
 from pathlib import Path
 
 import pytest
-from tiny_runs import Note, SharedNote, results, tiny_training_runs, wait_for
+from tiny_notes import Note, SharedNote, wait_for
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.training.log import LOG, read_log
 from semgrid_edu.workshop.paper.reports.reproduce import Request, reproduce
-from semgrid_edu.workshop.scheduler.one_run import run_one
+from semgrid_edu.workshop.scheduler.execute import run_one
 from semgrid_edu.workshop.scheduler.runs import OUTPUT
 
 SCRIPT = """
 import sys
-from tiny_runs import SharedNote
-from semgrid_edu.workshop.scheduler.one_run import run_one
+from tiny_notes import SharedNote
+from semgrid_edu.workshop.scheduler.execute import run_one
 run_one(SharedNote("long", seconds_each=600.0), sys.argv[1], processes=2)
 """
 
@@ -29,20 +27,6 @@ run_one(SharedNote("long", seconds_each=600.0), sys.argv[1], processes=2)
 def _found_by_processes(monkeypatch):
     """What this process finds, its processes find too."""
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(Path(__file__).parents[1]), *sys.path]))
-
-
-def test_two_processes_train_as_one_does(tmp_path):
-    """Half the batch in each is the same step but for rounding, and the folder holds the same files."""
-    run, one, two = tiny_training_runs()[0].image_stage, tmp_path / "one", tmp_path / "two"
-    for needed in (run.arrays.data, run.arrays, run):
-        assert run_one(needed, one).error is None
-    shutil.copytree(one, two, ignore=shutil.ignore_patterns("image-*"))
-    assert run_one(run, two, processes=2).error is None
-    assert run.record(two)["processes"] == 2
-    assert "processes" not in run.record(one)
-    assert results(two).keys() == results(one).keys()
-    losses = [read_log(run.folder(root) / LOG).loss for root in (one, two)]
-    assert losses[1] == pytest.approx(losses[0], rel=1e-3)
 
 
 def test_an_error_in_a_process_is_that_of_the_run(tmp_path):

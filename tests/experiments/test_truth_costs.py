@@ -19,8 +19,9 @@ from semgrid_edu.workshop.paper.reports.truth_costs import (
     truth_costs_markdown,
     truth_costs_picture,
 )
-from semgrid_edu.workshop.paper.runs.data_runs import LABELS, ArraysRun, DataRun, LabelsRun
+from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun, DataRun
 from semgrid_edu.workshop.paper.runs.scales import SCALES
+from semgrid_edu.workshop.paper.runs.score_runs import LABELS, LabelsRun
 from semgrid_edu.workshop.scheduler.execute import execute_plan
 from semgrid_edu.workshop.scheduler.plan import with_needs
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions

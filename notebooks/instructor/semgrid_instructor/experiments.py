@@ -11,7 +11,7 @@ from semgrid_edu.crf import expected_calibration_error, reliability
 from semgrid_edu.metrics import METRICS, class_accuracy
 from semgrid_edu.workshop.paper.reports.verdicts import Statement, verdict
 from semgrid_edu.workshop.scoring.confusions import drive_confusions
-from semgrid_edu.workshop.scoring.score_with_interval import Measured
+from semgrid_edu.workshop.scoring.score_with_interval import ScoreWithInterval
 from semgrid_edu.workshop.scoring.statistics import drive_interval, paired_interval
 from semgrid_instructor import generator, hidden
 
@@ -55,7 +55,7 @@ def check_judge(judge: Callable) -> None:
             assert right, f"{got!r} instead of {wanted!r}, {seeds} seeds, {drives} drives, claimed {sides}"
 
 
-def _value(low: float, high: float) -> Measured:
+def _value(low: float, high: float) -> ScoreWithInterval:
     """Return a number with its interval."""
     return {"mean": (low + high) / 2, "low": low, "high": high, "seeds": []}
 

@@ -37,7 +37,10 @@ def _command(experiment: str) -> Callable[..., None]:
     def command(
         runs: Annotated[Path, typer.Option(help="Takes one folder per run; the same command goes on.")],
         out: Annotated[Path, typer.Option(help="Takes the results: JSON, Markdown and pictures.")],
-        scale: Annotated[str, typer.Option(help="quick (minutes), reduced (hours) or paper (needs a GPU).")] = "quick",
+        scale: Annotated[
+            str,
+            typer.Option(help="quick (minutes), reduced (hours) or paper (GPU); quick+unet adds U-Net to Table 1."),
+        ] = "quick",
         seeds: Annotated[
             int | None, typer.Option(min=1, max=1000, help="Number of seeds; the scale's own by default.")
         ] = None,

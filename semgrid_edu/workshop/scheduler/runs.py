@@ -4,6 +4,7 @@ import json
 from abc import ABC, abstractmethod
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.reading import read_json
@@ -18,22 +19,35 @@ class Run(ABC):
     """One unit of work. A subclass is a frozen dataclass whose fields decide the result, and nothing else does.
 
     Two experiments that need equal runs share them: equal runs have the same folder.
+
+    Attributes
+    ----------
+    kind : str
+        What such runs do, in one word: the first part of their folder's name.
+    is_training : bool
+        Whether it is a training run, so that several processes can share its batches (`process_group`).
+    trial_seconds : float
+        Seconds that a step took on one core when this was written.
     """
+
+    kind: ClassVar[str]
+    is_training: ClassVar[bool] = False
+    trial_seconds: ClassVar[float]
 
     @property
     @abstractmethod
+    def tag(self) -> str:
+        """What tells the run from others of its kind: the rest of its folder's name."""
+
+    @property
     def name(self) -> str:
         """The name of its folder."""
+        return f"{self.kind}-{self.tag}"
 
     @property
     def needs(self) -> tuple["Run", ...]:
-        """The runs that must have ended before this one starts."""
-        return ()
-
-    @property
-    def is_training(self) -> bool:
-        """Whether it is a training run, so that several processes can share its batches (`process_group`)."""
-        return False
+        """The runs that must have ended before this one starts: by default those among its fields."""
+        return tuple(value for field in fields(self) if isinstance(value := getattr(self, field.name), Run))
 
     @property
     @abstractmethod
@@ -45,9 +59,9 @@ class Run(ABC):
     def pace(self) -> str:
         """What the time of a step depends on: runs of the same pace take the same time per step."""
 
-    @abstractmethod
     def probe(self) -> float:
         """Return the seconds that a step probably takes, for the estimate of a plan."""
+        return self.trial_seconds
 
     @abstractmethod
     def work(self, root: Path, device: str) -> None:
@@ -72,22 +86,11 @@ class Run(ABC):
         return Path(root) / self.name
 
     def has_ended(self, root: str | Path) -> bool:
-        """Return whether the run is done, so that nothing is left to do.
-
-        Parameters
-        ----------
-        root : path-like
-            The folder of all runs.
-        """
+        """Return whether nothing is left to do. Parameters are those of `Run.folder`."""
         return (self.folder(root) / ENDED).exists()
 
     def record(self, root: str | Path) -> dict:
-        """Return what the run recorded when it ended.
-
-        Parameters
-        ----------
-        root : path-like
-            The folder of all runs.
+        """Return what the run recorded when it ended. Parameters are those of `Run.folder`.
 
         Returns
         -------
@@ -121,8 +124,6 @@ def _unusual(thing: object) -> object:
         return [_unusual(part) for part in thing]
     if not is_dataclass(thing):
         return thing
-    given = {field.name: getattr(thing, field.name) for field in fields(thing)}
-    usual = {field.name: field.default for field in fields(thing)}
-    return {"kind": type(thing).__name__} | {
-        name: _unusual(value) for name, value in given.items() if usual[name] is MISSING or value != usual[name]
-    }
+    given = {field.name: (getattr(thing, field.name), field.default) for field in fields(thing)}
+    unusual = {name: value for name, (value, usual) in given.items() if usual is MISSING or value != usual}
+    return {"kind": type(thing).__name__} | {name: _unusual(value) for name, value in unusual.items()}

@@ -1,7 +1,4 @@
-"""A training run in several processes, which torchrun starts, each with its share of every batch (section 4.1).
-
-How many threads a run computes with.
-"""
+"""A training run in several processes, which torchrun starts; each takes its share of every batch (section 4.1)."""
 
 import os
 import pickle

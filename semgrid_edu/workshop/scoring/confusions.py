@@ -2,96 +2,103 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm.auto import tqdm
 
-from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.metrics import confusion_matrix
-from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.storage.tensors import read_arrays, write_arrays
-from semgrid_edu.workshop.scoring.learned_grids import Grids, network_grids
 
 DRIVES = "drives"
 """The name that the drives have in a file of confusion matrices, so that no method can have it."""
 
+BANDS = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, np.inf)
+"""Limits of the bands of distance from the LIDAR by which cells are counted, metres."""
+
 
 @dataclass(frozen=True, eq=False)
 class FrameConfusions:
-    """How often each true class is called each class, frame by frame, by one or several methods.
+    """How often each true class is called each class, frame by frame.
 
     Parameters
     ----------
     drives : tuple of str
         The drive of each of the F frames, such as "2026_01_01 0143".
     counts : dict of str to (F, C, C) int64
-        By method the number of labelled cells of each frame: one row per true class, one column per called class.
+        The number of labelled cells of each frame, one row per true class, one column per called class: by method, or
+        by method, truth and band of distance, as `count_grids` names them.
     """
 
     drives: tuple[str, ...]
     counts: dict[str, NDArray[np.int64]]
 
+    def of(self, method: str, truth: str, band: str | None = None) -> "FrameConfusions":
+        """Return how often `count_grids` counted one method against one truth.
+
+        Parameters
+        ----------
+        method : str
+            Such as "network".
+        truth : str
+            The labels that it is compared with, "true" or "lidar".
+        band : str, optional
+            One of `distance_band_names`; all distances when left out.
+
+        Returns
+        -------
+        FrameConfusions
+            With one key, `method`.
+        """
+        keys = [confusion_key(method, truth, one) for one in ([band] if band else distance_band_names())]
+        return FrameConfusions(self.drives, {method: sum(self.counts[key] for key in keys)})
+
     def by_drive(self, method: str) -> NDArray[np.int64]:
-        """Return one matrix per drive.
+        """Return one matrix per drive, (V, C, C), in the order of the drives' first frames.
 
         Parameters
         ----------
         method : str
             A key of `counts`.
-
-        Returns
-        -------
-        (V, C, C) int64
-            The sum over the frames of each drive, in the order of the drives' first frames.
         """
         return drive_confusions(self.counts[method], self.drives)
 
     def total(self, method: str) -> NDArray[np.int64]:
-        """Return one matrix for all frames.
-
-        Parameters
-        ----------
-        method : str
-            A key of `counts`.
-
-        Returns
-        -------
-        (C, C) int64
-        """
+        """Return one matrix (C, C) for all frames. Parameters are those of `FrameConfusions.by_drive`."""
         return self.counts[method].sum(axis=0)
 
 
-def frame_confusions(grids: SemanticGridNet | Grids, frames: TrainingSet) -> FrameConfusions:
-    """Compare the grids of one or several methods with the truth, frame by frame.
+def band_names(edges: Sequence[float]) -> list[str]:
+    """Name bands of distance.
 
     Parameters
     ----------
-    grids : SemanticGridNet or callable
-        What makes the grids: a network in evaluation mode, or a function as `Grids` describes it, such as
-        `network_grids(net, refine)` or `lambda frames, k: {"majority class": majority}`.
-    frames : TrainingSet
-        The frames, with truth.
+    edges : sequence of B + 1 float
+        Where they begin and end, metres; the last one may be infinite.
 
-    Returns
-    -------
-    FrameConfusions
-        The methods have the names that `grids` gives them; a network alone is called "network".
-
-    Raises
-    ------
-    ArgumentError
-        When a grid has another shape than the truth, or a class that the frames don't have.
+    Examples
+    --------
+    >>> band_names([0, 10, 20, np.inf])
+    ['0-10 m', '10-20 m', 'beyond 20 m']
     """
-    if isinstance(grids, SemanticGridNet):
-        grids = network_grids(grids)
-    n_classes, counts = len(frames.label_set), {}
-    for k in tqdm(range(len(frames)), desc="evaluate", unit="frame"):
-        for method, grid in grids(frames, k).items():
-            counts.setdefault(method, []).append(confusion_matrix(frames.arrays["truth"][k], grid, n_classes))
-    return FrameConfusions(frames.drives, {method: np.stack(matrices) for method, matrices in counts.items()})
+    return [f"{low:g}-{high:g} m" if np.isfinite(high) else f"beyond {low:g} m" for low, high in pairwise(edges)]
+
+
+def distance_band_names() -> list[str]:
+    """Return the names of `BANDS`, nearest first, such as "0-10 m"."""
+    return band_names(BANDS)
+
+
+def confusion_key(method: str, truth: str, band: str) -> str:
+    """Return the key of a method's counts against one truth in one band of distance.
+
+    Parameters
+    ----------
+    method, truth, band : str
+        What is counted, as `FrameConfusions.of` takes it.
+    """
+    return f"{method}, {truth} labels, {band}"
 
 
 def drive_confusions(counts: NDArray, drives: Sequence[str]) -> NDArray[np.int64]:
@@ -174,16 +181,12 @@ def save_confusions(path: str | Path, confusions: FrameConfusions) -> None:
 
 
 def load_confusions(path: str | Path) -> FrameConfusions:
-    """Read the matrices of all frames.
+    """Read the matrices that `save_confusions` wrote.
 
     Parameters
     ----------
     path : path-like
-        A file that `save_confusions` wrote.
-
-    Returns
-    -------
-    FrameConfusions
+        The file.
 
     Raises
     ------

@@ -1,5 +1,6 @@
 """The trained network compared with simple baselines, on frames kept for testing (sections 4.2 and 4.3)."""
 
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -14,16 +15,15 @@ from semgrid_edu.networks import IMAGE_STAGE, SemanticGridNet, load_net
 from semgrid_edu.pipeline import Stages
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import versions
-from semgrid_edu.workshop.scoring.baseline_grids import baseline_grids, carried_grids
-from semgrid_edu.workshop.scoring.confusions import FrameConfusions, frame_confusions, save_confusions
-from semgrid_edu.workshop.scoring.learned_grids import Grids, Refine, best_labels, network_grids
-from semgrid_edu.workshop.scoring.score_with_interval import on_cells
-from semgrid_edu.workshop.scoring.statistics import drive_interval
+from semgrid_edu.workshop.scoring.confusions import FrameConfusions, save_confusions
+from semgrid_edu.workshop.scoring.counting import GridCounts, count_grids, truths_of_frames
+from semgrid_edu.workshop.scoring.grids import Refine, baseline_grids, network_grids
+from semgrid_edu.workshop.scoring.score_with_interval import all_metrics, markdown_table, per_cent
 
 Scores = dict[str, dict[str, dict[str, float]]]
 """Values of the metrics, 0..1: by method, by cells ("all" or "semantic"), by metric."""
 
-Intervals = dict[str, dict[str, dict[str, list[float]]]]
+Intervals = dict[str, dict[str, dict[str, list[float | None]]]]
 """The same with [low, value, high] of a 95 % interval in place of the value."""
 
 
@@ -46,13 +46,12 @@ def evaluate(
     refine : callable, optional
         Refines the network's grids, as in `Stages`, and is named in the row "network + ..."; the CRF when left out.
     confusions_file : path-like, optional
-        Takes the confusion matrix of each frame, see `save_confusions`.
+        Takes the confusion matrices of each frame by method, truth and distance, see `save_confusions`.
 
     Returns
     -------
     dict
-        "scores" (see `Scores`), "intervals" (see `Intervals`; None when there is one test drive), "confusion" (a matrix
-        for each method, one row per true class), and what they were computed from; it can be written as JSON.
+        What `evaluate_frames` returns, and what it was computed from; it can be written as JSON.
 
     Raises
     ------
@@ -69,15 +68,10 @@ def evaluate(
     image_stage = Path(weights).with_name(IMAGE_STAGE)
     if image_stage.exists():
         segmenters["image-stage"] = load_net(image_stage, test.camera).segmenter
-    compared = frame_confusions(compared_grids(net, segmenters, training, refine), test)
+    counted = count_methods(net, training, test, segmenters, refine)
     if confusions_file:
-        save_confusions(confusions_file, compared)
-    confusions = {method: compared.total(method) for method in compared.counts}
-    return {
-        "scores": scores(confusions, test.label_set),
-        "intervals": intervals(compared, test.label_set) if len(set(test.drives)) > 1 else None,
-        "confusion": {method: confusion.tolist() for method, confusion in confusions.items()},
-        "classes": list(test.label_set.names),
+        save_confusions(confusions_file, counted.confusions)
+    return scores_of_counts(counted, test) | {
         "frames": {"train": len(training), "test": len(test)},
         "weights": {"file": Path(weights).name, "sha256": sha256(weights)},
         "command": _command(Path(dataset_dir).name, Path(weights).name, refine),
@@ -88,6 +82,7 @@ def evaluate(
 
 
 def _command(data: str, weights: str, refine: Refine | None) -> str:
+    """Return the command, or the call where no command can name the refinement."""
     if refine is None:
         return f"semgrid-edu evaluate --data {data} --weights {weights}"
     return f'evaluate("{data}", "{weights}", refine={_name(refine)})'
@@ -97,37 +92,62 @@ def _name(refine: Refine | None) -> str:
     return "CRF" if refine is None else getattr(refine, "__name__", type(refine).__name__)
 
 
-def compared_grids(
-    net: SemanticGridNet, segmenters: dict[str, nn.Module], training: TrainingSet, refine: Refine | None = None
-) -> Grids:
-    """Return the function that makes the grids of every method for a frame, as `frame_confusions` takes it.
+def count_methods(
+    net: SemanticGridNet,
+    training: TrainingSet,
+    test: TrainingSet,
+    segmenters: Mapping[str, nn.Module],
+    refine: Refine | None = None,
+) -> GridCounts:
+    """Count the grids of a network and of the baselines, on any frames that can be trained on.
 
     Parameters
     ----------
     net : SemanticGridNet
         The network, for the grid and the images of the frames.
-    segmenters : dict of str to Module
-        Image networks by name, i -> s. Geometry carries their labels from the image to the grid, see `carried_grids`.
-    training : TrainingSet
-        The frames that the baselines learn from.
+    training, test : TrainingSet
+        The frames that the baselines learn from, and those to score.
+    segmenters : mapping of str to Module
+        Image networks by name, i -> s, whose labels geometry carries to the grid, see `carried_grids`.
     refine : callable, optional
         Refines the network's grids, as in `evaluate`.
 
     Returns
     -------
-    callable
-        (frames, k) -> grids of frame k by method.
+    GridCounts
+        For "network", "network + ..." and the baselines of `baseline_grids`.
     """
-    learned = network_grids(net, {_name(refine): refine or Stages.of(net).refine})
-    baselines = baseline_grids(training)
+    learned = network_grids(net, test, {_name(refine): refine or Stages.of(net).refine})
+    baselines = baseline_grids(training, test, segmenters)
+    return count_grids(lambda k: {**learned(k), **baselines(k)}, test)
 
-    def grids(frames: TrainingSet, k: int) -> dict[str, NDArray]:
-        found = {**learned(frames, k), **baselines(frames, k)}
-        for name, segmenter in segmenters.items():
-            found |= carried_grids(name, best_labels(segmenter, frames[k]), frames, k)
-        return found
 
-    return grids
+def scores_of_counts(counted: GridCounts, test: TrainingSet) -> dict[str, object]:
+    """Return the scores of every method, against the labels that networks learn from.
+
+    Parameters
+    ----------
+    counted : GridCounts
+        From `count_methods`.
+    test : TrainingSet
+        The frames that were scored.
+
+    Returns
+    -------
+    dict
+        "scores" (see `Scores`), "intervals" (see `Intervals`; None when there is one test drive), "confusion" (a matrix
+        for each method, one row per true class), and the "classes".
+    """
+    truth, *_ = truths_of_frames(test)
+    found = {method: counted.confusions.of(method, truth).counts[method] for method in counted.methods}
+    compared = FrameConfusions(test.drives, found)
+    confusions = {method: compared.total(method) for method in found}
+    return {
+        "scores": scores(confusions, test.label_set),
+        "intervals": intervals(compared, test.label_set) if len(set(test.drives)) > 1 else None,
+        "confusion": {method: confusion.tolist() for method, confusion in confusions.items()},
+        "classes": list(test.label_set.names),
+    }
 
 
 def intervals(compared: FrameConfusions, label_set: LabelSet) -> Intervals:
@@ -136,26 +156,22 @@ def intervals(compared: FrameConfusions, label_set: LabelSet) -> Intervals:
     Parameters
     ----------
     compared : FrameConfusions
-        Confusion matrices of the frames of two drives or more.
+        Confusion matrices of the frames of two drives or more, by method.
     label_set : LabelSet
         The classes, of which it says which are semantic.
 
     Returns
     -------
     Intervals
-        From `drive_interval`: each is for this one network, or baseline, on new drives.
+        From `all_metrics`: each is for this one network, or baseline, on new drives.
     """
-    result: Intervals = {}
-    for method in compared.counts:
-        by_drive = compared.by_drive(method)[None]
-        result[method] = {
-            cells: {
-                name: list(drive_interval(on_cells(by_drive, cells, label_set), metric))
-                for name, metric in METRICS.items()
-            }
-            for cells in ("all", "semantic")
+    return {
+        method: {
+            cells: {name: [value["low"], value["mean"], value["high"]] for name, value in by_metric.items()}
+            for cells, by_metric in all_metrics(compared.by_drive(method)[None], label_set).items()
         }
-    return result
+        for method in compared.counts
+    }
 
 
 def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:
@@ -183,23 +199,16 @@ def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:
 
 
 def scores_table(result: Scores) -> str:
-    """Return the scores as a table to print, in per cent.
+    """Return the scores as a Markdown table, in per cent: one row per method.
 
     Parameters
     ----------
     result : Scores
         What `scores` returns.
-
-    Returns
-    -------
-    str
-        One line per method under two lines of headings.
     """
-    width = max(map(len, result))
-    group = " ".join(f"{name:>14}" for name in METRICS)
-    lines = [f"{'':{width}}  {'all labelled cells':^{len(group)}}   {'cells with a semantic class':^{len(group)}}"]
-    lines.append(f"{'':{width}}  {group}   {group}")
-    for method, cells in result.items():
-        groups = (" ".join(f"{100 * value:14.1f}" for value in cells[name].values()) for name in ("all", "semantic"))
-        lines.append(f"{method:{width}}  {'   '.join(groups)}")
-    return "\n".join(lines)
+    head = [f"{name}{cells}" for cells in ("", ", semantic cells") for name in METRICS]
+    rows = [
+        [method, *(per_cent(value) for cells in ("all", "semantic") for value in by_cells[cells].values())]
+        for method, by_cells in result.items()
+    ]
+    return markdown_table([["", *head], *rows])

@@ -1,7 +1,4 @@
-"""A score with all that is known of it: mean, confidence interval, and every seed's value (section 4.2).
-
-Results as text: shares in per cent, and tables in Markdown.
-"""
+"""A score with its confidence interval and every seed's value, as numbers and as text (section 4.2)."""
 
 from collections.abc import Callable
 
@@ -13,57 +10,15 @@ from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS, semantic_cells
 from semgrid_edu.workshop.scoring.statistics import Interval, drive_interval, paired_interval
 
-
-def per_cent(value: float | None) -> str:
-    """Write a share in per cent.
-
-    Parameters
-    ----------
-    value : float or None
-        A share, 0..1; None for a share of nothing.
-
-    Returns
-    -------
-    str
-    """
-    return "-" if value is None else f"{100 * value:.1f}"
-
-
-def markdown_table(rows: list[list[str]]) -> str:
-    """Lay out rows as a Markdown table whose columns also line up in plain text.
-
-    Parameters
-    ----------
-    rows : list of list of str
-        The cells of each row, the header first.
-
-    Returns
-    -------
-    str
-    """
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = [
-        "| "
-        + " | ".join(
-            f"{row[0]:{widths[0]}}" if k == 0 else f"{text:>{w}}"
-            for k, (text, w) in enumerate(zip(row, widths, strict=True))
-        )
-        + " |"
-        for row in rows
-    ]
-    lines.insert(1, "|" + "|".join("-" * (w + 1) + ("-" if k == 0 else ":") for k, w in enumerate(widths)) + "|")
-    return "\n".join(lines)
-
-
-Measured = dict[str, object]
+ScoreWithInterval = dict[str, object]
 """The "mean" over the seeds, "low" and "high" of its 95 % interval, and the value of each of the "seeds"; None where
 it can't be computed."""
 
 SHOWN_SEEDS = 5
-"""Up to so many seeds each one's value is shown."""
+"""With more seeds than this, `shown_seeds` shows only the lowest and the highest value."""
 
 
-def measured(confusions: NDArray, metric: Callable[[NDArray], float]) -> Measured:
+def score_with_interval(confusions: NDArray, metric: Callable[[NDArray], float]) -> ScoreWithInterval:
     """Return a score.
 
     Parameters
@@ -72,17 +27,12 @@ def measured(confusions: NDArray, metric: Callable[[NDArray], float]) -> Measure
         By seed and drive, see `drive_interval`.
     metric : callable
         Takes a confusion matrix (C, C), row: truth, and returns a number.
-
-    Returns
-    -------
-    dict
-        As `Measured` says, in the unit of the metric.
     """
     seeds = [float(metric(matrix)) for matrix in confusions.sum(axis=1)]
     return _with_interval(seeds, lambda: drive_interval(confusions, metric))
 
 
-def compared(a: NDArray, b: NDArray, metric: Callable[[NDArray], float]) -> Measured:
+def compared(a: NDArray, b: NDArray, metric: Callable[[NDArray], float]) -> ScoreWithInterval:
     """Return the score of a minus that of b, on the same seeds and drives.
 
     Parameters
@@ -91,18 +41,13 @@ def compared(a: NDArray, b: NDArray, metric: Callable[[NDArray], float]) -> Meas
         By seed and drive, see `paired_interval`; a method without seeds may come as (1, V, C, C).
     metric : callable
         Takes a confusion matrix (C, C), row: truth, and returns a number.
-
-    Returns
-    -------
-    dict
-        As `Measured` says, in the unit of the metric.
     """
     ours, theirs = np.broadcast_arrays(*([metric(matrix) for matrix in some.sum(axis=1)] for some in (a, b)))
     return _with_interval((ours - theirs).tolist(), lambda: paired_interval(a, b, metric))
 
 
-def _with_interval(seeds: list[float], interval: Callable[[], Interval]) -> Measured:
-    """Return a score with its interval, if there is one: not for one drive, nor where a class is in one drive alone."""
+def _with_interval(seeds: list[float], interval: Callable[[], Interval]) -> ScoreWithInterval:
+    """Add the interval to a score. There is none for one drive, nor where a class occurs in one drive alone."""
     try:
         low, mean, high = interval()
     except ArgumentError:
@@ -133,7 +78,7 @@ def on_cells(confusions: NDArray, cells: str, label_set: LabelSet) -> NDArray[np
     return np.stack([semantic_cells(matrix, label_set) for matrix in flat]).reshape(confusions.shape)
 
 
-def all_metrics(confusions: NDArray, label_set: LabelSet) -> dict[str, dict[str, Measured]]:
+def all_metrics(confusions: NDArray, label_set: LabelSet) -> dict[str, dict[str, ScoreWithInterval]]:
     """Return every metric over all cells and over those with a semantic class.
 
     Parameters
@@ -148,25 +93,22 @@ def all_metrics(confusions: NDArray, label_set: LabelSet) -> dict[str, dict[str,
     dict
         By cells, "all" or "semantic", and by metric.
     """
+    kept = {cells: on_cells(confusions, cells, label_set) for cells in ("all", "semantic")}
     return {
-        cells: {name: measured(on_cells(confusions, cells, label_set), metric) for name, metric in METRICS.items()}
-        for cells in ("all", "semantic")
+        cells: {name: score_with_interval(matrices, metric) for name, metric in METRICS.items()}
+        for cells, matrices in kept.items()
     }
 
 
-def shown(value: Measured, digits: int = 1) -> str:
+def shown(value: ScoreWithInterval, digits: int = 1) -> str:
     """Return a score as text, per cent: mean and interval.
 
     Parameters
     ----------
-    value : dict
-        From `measured` or `compared`.
+    value : ScoreWithInterval
+        From `score_with_interval` or `compared`.
     digits : int
         Digits after the point.
-
-    Returns
-    -------
-    str
 
     Examples
     --------
@@ -181,12 +123,40 @@ def shown(value: Measured, digits: int = 1) -> str:
     return f"{mean} ({100 * value['low']:.{digits}f} to {100 * value['high']:.{digits}f})"
 
 
-def shown_seeds(value: Measured, digits: int = 1) -> str:
-    """Return every seed's value as text, per cent; of many, the lowest and the highest.
+def shown_seeds(value: ScoreWithInterval, digits: int = 1) -> str:
+    """Return every seed's value as text, per cent; of more than five seeds the lowest and the highest.
 
-    Parameters and result are those of `shown`.
+    Parameters are those of `shown`.
     """
     seeds = ["-" if one is None else f"{100 * one:.{digits}f}" for one in value["seeds"]]
     if len(seeds) <= SHOWN_SEEDS:
         return ", ".join(seeds)
     return f"{min(seeds, key=float)} to {max(seeds, key=float)} ({len(seeds)} seeds)"
+
+
+def per_cent(value: float | None) -> str:
+    """Write a share in per cent.
+
+    Parameters
+    ----------
+    value : float or None
+        A share, 0..1; None for a share of nothing.
+    """
+    return "-" if value is None else f"{100 * value:.1f}"
+
+
+def markdown_table(rows: list[list[str]]) -> str:
+    """Lay out rows as a Markdown table whose columns also line up in plain text.
+
+    Parameters
+    ----------
+    rows : list of list of str
+        The cells of each row, the header first.
+    """
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = []
+    for first, *others in rows:
+        cells = [f"{first:{widths[0]}}", *(f"{text:>{w}}" for text, w in zip(others, widths[1:], strict=True))]
+        lines.append(f"| {' | '.join(cells)} |")
+    lines.insert(1, f"|{'-' * (widths[0] + 2)}|" + "".join(f"{'-' * (w + 1)}:|" for w in widths[1:]))
+    return "\n".join(lines)

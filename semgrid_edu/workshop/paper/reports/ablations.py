@@ -13,13 +13,19 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import METRICS, pixel_accuracy
 from semgrid_edu.workshop.paper.reports.accuracy_tables import TRUTHS, comparison
 from semgrid_edu.workshop.paper.runs.claim_runs import table1_runs
-from semgrid_edu.workshop.paper.runs.counting import by_seed, distance_band_names
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
 from semgrid_edu.workshop.paper.runs.scales import Scale
-from semgrid_edu.workshop.paper.runs.score_runs import NETWORK, WITH_CRF, WITH_SEARCHED, ScoreRun
+from semgrid_edu.workshop.paper.runs.score_runs import NETWORK, WITH_CRF, WITH_SEARCHED, ScoreRun, by_seed
 from semgrid_edu.workshop.paper.runs.variants import CalibrationError, Variant
 from semgrid_edu.workshop.scheduler.runs import Run
-from semgrid_edu.workshop.scoring.score_with_interval import all_metrics, markdown_table, measured, on_cells, shown
+from semgrid_edu.workshop.scoring.confusions import distance_band_names
+from semgrid_edu.workshop.scoring.score_with_interval import (
+    all_metrics,
+    markdown_table,
+    on_cells,
+    score_with_interval,
+    shown,
+)
 
 SECTIONS = {
     "variants": "Networks that are trained differently. Usual: SegNet, 20 planes 0.2 m apart, occupancy grid, "
@@ -221,7 +227,7 @@ def _band(band: str, usual: Sequence[ScoreRun], root: Path) -> dict:
     """Return the scores of the cells in a band of distance, by the true labels."""
     found = by_seed(usual, root, NETWORK, "true", band)
     kept = on_cells(found, "semantic", KITTI_14)
-    return {"what": band, "cells": int(kept.sum()), "pixel accuracy": measured(kept, pixel_accuracy)}
+    return {"what": band, "cells": int(kept.sum()), "pixel accuracy": score_with_interval(kept, pixel_accuracy)}
 
 
 def _calibration(method: str, usual: Sequence[ScoreRun], root: Path) -> dict:

@@ -6,10 +6,16 @@ from pathlib import Path
 
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS
-from semgrid_edu.workshop.paper.runs.baseline_runs import BASELINES, BaselineRun
-from semgrid_edu.workshop.paper.runs.counting import CountingRun, by_seed
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
-from semgrid_edu.workshop.paper.runs.score_runs import NETWORK, WITH_CRF, ScoreRun
+from semgrid_edu.workshop.paper.runs.score_runs import (
+    BASELINES,
+    NETWORK,
+    WITH_CRF,
+    BaselineRun,
+    CountingRun,
+    ScoreRun,
+    by_seed,
+)
 from semgrid_edu.workshop.scoring.score_with_interval import (
     all_metrics,
     compared,

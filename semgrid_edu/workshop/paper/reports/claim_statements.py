@@ -14,14 +14,19 @@ from numpy.typing import NDArray
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.metrics import METRICS, class_accuracy, pixel_accuracy
 from semgrid_edu.workshop.paper.reports.verdicts import Statement
-from semgrid_edu.workshop.paper.runs.baseline_runs import GEOMETRY, OCCUPANCY_ALONE, TRUE_GEOMETRY
 from semgrid_edu.workshop.paper.runs.claim_runs import ClaimRuns
-from semgrid_edu.workshop.paper.runs.counting import by_seed
-from semgrid_edu.workshop.paper.runs.overturned_runs import OVERTURNED
+from semgrid_edu.workshop.paper.runs.other_runs import OVERTURNED, time_saved
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
-from semgrid_edu.workshop.paper.runs.score_runs import NETWORK, WITH_CRF, ScoreRun
-from semgrid_edu.workshop.paper.runs.time_runs import time_saved
-from semgrid_edu.workshop.scoring.score_with_interval import compared, measured
+from semgrid_edu.workshop.paper.runs.score_runs import (
+    GEOMETRY,
+    NETWORK,
+    OCCUPANCY_ALONE,
+    TRUE_GEOMETRY,
+    WITH_CRF,
+    ScoreRun,
+    by_seed,
+)
+from semgrid_edu.workshop.scoring.score_with_interval import compared, score_with_interval
 
 MARGIN = 0.005
 """Half a point: by less than that, a score counts as unchanged in claim 8."""
@@ -77,15 +82,17 @@ def errors_on_perfect_data(runs: ClaimRuns, root: Path) -> list[Statement]:
 
     road, car, lane, pole = classes.values()
     return [
-        Statement("share of errors on things that are called void", measured(found, called_void), 0.5),
-        Statement("road called right, above the mean class", measured(found, above_mean(road))),
-        Statement("car called right, above the mean class", measured(found, above_mean(car))),
+        Statement("share of errors on things that are called void", score_with_interval(found, called_void), 0.5),
+        Statement("road called right, above the mean class", score_with_interval(found, above_mean(road))),
+        Statement("car called right, above the mean class", score_with_interval(found, above_mean(car))),
         Statement(
             "lane called lane - road called lane",
-            measured(found, lambda m: called(m, lane, lane) - called(m, road, lane)),
+            score_with_interval(found, lambda m: called(m, lane, lane) - called(m, road, lane)),
         ),
         Statement(
-            "cells called pole over cells of poles", measured(found, lambda m: m[:, pole].sum() / m[pole].sum()), 1
+            "cells called pole over cells of poles",
+            score_with_interval(found, lambda m: m[:, pole].sum() / m[pole].sum()),
+            1,
         ),
     ]
 
@@ -162,7 +169,7 @@ def overturned_cars(runs: ClaimRuns, root: Path) -> list[Statement]:
     car = KITTI_14.index("car")
     with_grid, without = (by_seed(some, root, OVERTURNED, "true") for some in (runs.overturned, runs.overturned_blind))
     return [
-        Statement("overturned cars called car", measured(with_grid, lambda m: called(m, car, car)), 0.5),
+        Statement("overturned cars called car", score_with_interval(with_grid, lambda m: called(m, car, car)), 0.5),
         Statement(
             "the same: with occupancy grid - without", compared(with_grid, without, lambda m: called(m, car, car))
         ),
@@ -174,8 +181,14 @@ def road_and_sidewalk(runs: ClaimRuns, root: Path) -> list[Statement]:
     network = by_seed(runs.usual, root, NETWORK, "true")
     alone = by_seed(runs.baselines, root, OCCUPANCY_ALONE, "true")
     return [
-        Statement("road called road, of those called either", measured(network, lambda m: _apart(m)[0]), 0.5),
-        Statement("sidewalk called sidewalk, of those called either", measured(network, lambda m: _apart(m)[1]), 0.5),
+        Statement(
+            "road called road, of those called either", score_with_interval(network, lambda m: _apart(m)[0]), 0.5
+        ),
+        Statement(
+            "sidewalk called sidewalk, of those called either",
+            score_with_interval(network, lambda m: _apart(m)[1]),
+            0.5,
+        ),
         Statement(
             "mean of both: network - occupancy alone", compared(network, alone, lambda m: float(_apart(m).mean()))
         ),

@@ -8,10 +8,15 @@ from numpy.typing import NDArray
 
 from semgrid_edu.labels import SYNTHIA_10
 from semgrid_edu.metrics import METRICS
-from semgrid_edu.workshop.paper.runs.counting import by_seed
 from semgrid_edu.workshop.paper.runs.paper import TABLE_3_CONFUSION, TABLE_3_SCORES
-from semgrid_edu.workshop.paper.runs.score_runs import NETWORK, ScoreRun
-from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, measured, per_cent, shown, shown_seeds
+from semgrid_edu.workshop.paper.runs.score_runs import NETWORK, ScoreRun, by_seed
+from semgrid_edu.workshop.scoring.score_with_interval import (
+    markdown_table,
+    per_cent,
+    score_with_interval,
+    shown,
+    shown_seeds,
+)
 
 
 def confusion_result(runs: Sequence[ScoreRun], root: Path) -> dict:
@@ -36,7 +41,7 @@ def confusion_result(runs: Sequence[ScoreRun], root: Path) -> dict:
         "classes": list(SYNTHIA_10.names),
         "paper": {"scores": TABLE_3_SCORES, "matrix": [list(row) for row in TABLE_3_CONFUSION]},
         "ours": {
-            "scores": {name: measured(found, metric) for name, metric in METRICS.items()},
+            "scores": {name: score_with_interval(found, metric) for name, metric in METRICS.items()},
             "matrix": [[None if np.isnan(share) else round(float(share), 2) for share in row] for row in shares],
         },
         "confusion": found.sum(axis=(0, 1)).tolist(),

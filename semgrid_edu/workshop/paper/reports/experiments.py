@@ -30,8 +30,14 @@ from semgrid_edu.workshop.paper.reports.truth_costs import (
     truth_costs_markdown,
     truth_costs_picture,
 )
-from semgrid_edu.workshop.paper.runs.claim_runs import table1_baselines, table1_runs, table2_runs, table3_runs
-from semgrid_edu.workshop.paper.runs.figure_runs import figure_runs, shown_frames
+from semgrid_edu.workshop.paper.runs.claim_runs import (
+    figure_runs,
+    shown_frames,
+    table1_baselines,
+    table1_runs,
+    table2_runs,
+    table3_runs,
+)
 from semgrid_edu.workshop.paper.runs.paper import TABLE_1_SCORES, TABLE_2_SCORES
 from semgrid_edu.workshop.paper.runs.scales import Scale
 from semgrid_edu.workshop.paper.runs.score_runs import ScoreRun

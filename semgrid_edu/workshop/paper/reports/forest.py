@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.workshop.scoring.score_with_interval import Measured, shown
+from semgrid_edu.workshop.scoring.score_with_interval import ScoreWithInterval, shown
 
 SCORE_COLOUR, SEED_COLOUR = "#1f4e79", "#d95f02"
 """The colours of interval and mean, and of single seeds."""
@@ -15,7 +15,7 @@ _SEED_DROP = 0.24
 
 
 def forest_plot(
-    rows: Mapping[str, Measured],
+    rows: Mapping[str, ScoreWithInterval],
     ax: Axes | None = None,
     label: str = "score [%]",
     reference: float | None = None,
@@ -25,7 +25,7 @@ def forest_plot(
     Parameters
     ----------
     rows : mapping of str to dict
-        Scores from `measured` or differences from `compared` by name, from top to bottom.
+        Scores from `score_with_interval` or differences from `compared` by name, from top to bottom.
     ax : Axes, optional
         Axes to draw into.
     label : str
@@ -44,7 +44,7 @@ def forest_plot(
 
     Examples
     --------
-    >>> rows = {name: measured(matrices, pixel_accuracy) for name, matrices in methods.items()}  # doctest: +SKIP
+    >>> rows = {name: score_with_interval(counts[name], pixel_accuracy) for name in counts}      # doctest: +SKIP
     >>> forest_plot(rows, label="pixel accuracy [%]")                                            # doctest: +SKIP
     """
     if not rows:
@@ -66,7 +66,7 @@ def forest_plot(
     return ax
 
 
-def draw_score(ax: Axes, place: float, value: Measured) -> None:
+def draw_score(ax: Axes, place: float, value: ScoreWithInterval) -> None:
     """Draw one score as a line of a chart, per cent: interval, mean, and below them a circle for every seed.
 
     Parameters
@@ -76,7 +76,7 @@ def draw_score(ax: Axes, place: float, value: Measured) -> None:
     place : float
         Where the line is on the vertical axis.
     value : dict
-        From `measured` or `compared`.
+        From `score_with_interval` or `compared`.
     """
     if value["mean"] is None:
         return

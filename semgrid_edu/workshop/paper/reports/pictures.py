@@ -128,7 +128,7 @@ def accuracy_picture(result: dict) -> Figure:
     for ax, metric in zip(axes, METRICS, strict=True):
         for place, row in enumerate(rows):
             draw_score(ax, place, row["scores"]["lidar"]["all"][metric])
-            ax.plot(100 * row["paper"][metric], place, "X", color=PAPERS, label="the paper's", zorder=3)
+            ax.plot(100 * (row["paper"][metric] or np.nan), place, "X", color=PAPERS, label="the paper's", zorder=3)
         ax.set(title=metric, xlabel="per cent of all labelled cells" if metric != "FmIoU" else "per cent")
         ax.grid(axis="x", alpha=0.3)
     axes[0].set_yticks(range(len(rows)), names)

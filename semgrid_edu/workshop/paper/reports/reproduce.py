@@ -13,8 +13,7 @@ from semgrid_edu.training.devices import choose_device
 from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS, Experiment
 from semgrid_edu.workshop.paper.reports.results import write_result
 from semgrid_edu.workshop.paper.runs.scales import Scale, scale_named
-from semgrid_edu.workshop.scheduler.execute import execute_plan
-from semgrid_edu.workshop.scheduler.one_run import check_runs_folder
+from semgrid_edu.workshop.scheduler.execute import check_runs_folder, execute_plan
 from semgrid_edu.workshop.scheduler.plan import estimate, plan_table, with_needs
 from semgrid_edu.workshop.scheduler.runs import OUTPUT, Run
 

@@ -17,19 +17,18 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import METRICS, class_iou, pixel_accuracy
 from semgrid_edu.workshop.paper.reports.accuracy_tables import TRUTHS, comparison
 from semgrid_edu.workshop.paper.reports.forest import forest_plot
-from semgrid_edu.workshop.paper.runs.counting import CountingRun, by_seed, distance_band_names
-from semgrid_edu.workshop.paper.runs.data_runs import LABELS, LabelsRun
 from semgrid_edu.workshop.paper.runs.scales import Scale
-from semgrid_edu.workshop.paper.runs.score_runs import NETWORK, ScoreRun
+from semgrid_edu.workshop.paper.runs.score_runs import LABELS, NETWORK, CountingRun, LabelsRun, ScoreRun, by_seed
 from semgrid_edu.workshop.scheduler.runs import Run
+from semgrid_edu.workshop.scoring.confusions import distance_band_names
 from semgrid_edu.workshop.scoring.score_with_interval import (
-    Measured,
+    ScoreWithInterval,
     all_metrics,
     compared,
     markdown_table,
-    measured,
     on_cells,
     per_cent,
+    score_with_interval,
     shown,
 )
 
@@ -271,14 +270,14 @@ def _part(
     root: Path,
     metric: Callable[[NDArray], float],
     band: str | None = None,
-) -> dict[str, Measured]:
+) -> dict[str, ScoreWithInterval]:
     """Return one score of labels and networks, over cells with a true semantic class."""
     of_labels, ours, theirs = (
         on_cells(by_seed(runs, root, method, "true", band), "semantic", KITTI_14)
         for runs, method in ((labels, LABELS), (networks, NETWORK), (usual, NETWORK))
     )
     return {
-        "labels": measured(of_labels, metric),
-        "networks": measured(ours, metric),
+        "labels": score_with_interval(of_labels, metric),
+        "networks": score_with_interval(ours, metric),
         "difference": compared(ours, theirs, metric),
     }

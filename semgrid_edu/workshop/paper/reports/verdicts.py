@@ -12,7 +12,7 @@ a 95 % interval over drives and seeds. Then the claim is
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from semgrid_edu.workshop.scoring.score_with_interval import Measured
+from semgrid_edu.workshop.scoring.score_with_interval import ScoreWithInterval
 
 REPRODUCED, NOT_REPRODUCED, CANNOT_TELL = "reproduced", "not reproduced", "cannot tell"
 """The three verdicts."""
@@ -32,7 +32,7 @@ class Statement(NamedTuple):
     what : str
         What the number is.
     value : dict
-        The number with its interval, as `measured` and `compared` return it.
+        The number with its interval, as `score_with_interval` and `compared` return it.
     limit : float
         What it is compared with, in the same unit.
     above : bool
@@ -40,7 +40,7 @@ class Statement(NamedTuple):
     """
 
     what: str
-    value: Measured
+    value: ScoreWithInterval
     limit: float = 0.0
     above: bool = True
 

@@ -1,82 +1,87 @@
-"""The runs that the claims are judged by; those of Table 1 are shared with it (section 4).
+"""The runs of Tables 1 to 3 and of the figures, and those that the claims are judged by (sections 4.2 to 4.4)."""
 
-The runs of Tables 1 to 3, which the claims and the ablations share (sections 4.2 to 4.4).
-"""
+from dataclasses import dataclass, fields, replace
+from itertools import chain
+from pathlib import Path
 
-from semgrid_edu.workshop.paper.runs.baseline_runs import BaselineRun
+from semgrid_edu.workshop.paper.runs.other_runs import GRIDS, FigureRun, OverturnedRun, TimeRun
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
 from semgrid_edu.workshop.paper.runs.scales import Scale
-from semgrid_edu.workshop.paper.runs.score_runs import ScoreRun
-from dataclasses import dataclass, fields
-from itertools import chain
-from semgrid_edu.workshop.paper.runs.baseline_runs import BaselineRun
-from semgrid_edu.workshop.paper.runs.variants import CalibrationError
-from semgrid_edu.workshop.paper.runs.overturned_runs import OverturnedRun
+from semgrid_edu.workshop.paper.runs.score_runs import BaselineRun, ScoreRun
+from semgrid_edu.workshop.paper.runs.variants import CalibrationError, Variant
 from semgrid_edu.workshop.scheduler.runs import Run
-from semgrid_edu.workshop.paper.runs.scales import Scale
-from semgrid_edu.workshop.paper.runs.score_runs import ScoreRun
-from semgrid_edu.workshop.paper.runs.time_runs import TimeRun
-from semgrid_edu.workshop.paper.runs.variants import Variant
+
+WRONG_CALIBRATION = CalibrationError(pitch=1.0)
+"""The error of calibration that geometry and network are compared with."""
+
 
 def table1_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
-    """Return the runs of Table 1.
+    """Return the runs of Table 1: by image network one per seed.
 
     Parameters
     ----------
     scale : Scale
-        How large they are.
+        How large they are, and which image networks are compared.
     seeds : int
         Number of seeds.
-
-    Returns
-    -------
-    dict of str to list of ScoreRun
-        By image network one per seed.
     """
-    return {segmenter: [scale.scored(scale.kitti, segmenter, seed) for seed in range(seeds)] for segmenter in NETWORKS}
+    return {name: [scale.scored(scale.kitti, name, seed) for seed in range(seeds)] for name in scale.networks}
 
 
 def table1_baselines(scale: Scale, seeds: int) -> list[BaselineRun]:
-    """Return the runs of the baselines that Table 1's SegNet is compared with, one per seed.
-
-    Parameters
-    ----------
-    scale : Scale
-        How large they are.
-    seeds : int
-        Number of seeds.
-
-    Returns
-    -------
-    list of BaselineRun
-    """
+    """Return the runs of the baselines of Table 1's SegNet, one per seed. Parameters are those of `table1_runs`."""
     return [BaselineRun(run.network, run.frames) for run in table1_runs(scale, seeds)["segnet"]]
 
 
 def table2_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
-    """Return the runs of Table 2: routes that were never driven in training. Parameters are those of `table1_runs`.
+    """Return the runs of Table 2: SegNet on routes that were never driven in training.
 
-    Returns
-    -------
-    dict of str to list of ScoreRun
-        By image network, SegNet alone, one per seed.
+    Parameters and result are those of `table1_runs`.
     """
     return {"segnet": [scale.scored(scale.chroma, "segnet", seed) for seed in range(seeds)]}
 
 
 def table3_runs(scale: Scale, seeds: int) -> list[ScoreRun]:
-    """Return the runs of Table 3: SegNet on data without any error. Parameters are those of `table1_runs`.
+    """Return the runs of Table 3, one per seed: SegNet on data without any error.
+
+    Parameters are those of `table1_runs`.
+    """
+    return [scale.scored(scale.synthia, "segnet", seed, "true", crf=False) for seed in range(seeds)]
+
+
+def figure_runs(scale: Scale, seeds: int) -> list[FigureRun]:
+    """Return the runs of Figures 6 and 7: SegNet's first seed on the data of Table 1 and of Table 3.
+
+    Parameters
+    ----------
+    scale : Scale
+        How large they are.
+    seeds : int
+        Not used: pictures are of one network.
+    """
+    data = {scale.kitti: "lidar", scale.synthia: "true"}
+    scored = [scale.scored(name, "segnet", 0, truth) for name, truth in data.items()]
+    return [FigureRun(run.network, run.frames) for run in scored]
+
+
+def shown_frames(scale: Scale, seeds: int, root: Path) -> dict:
+    """Return which frames the figures show, and where their grids are.
+
+    Parameters
+    ----------
+    scale, seeds
+        As `figure_runs` takes them.
+    root : Path
+        The folder of all runs.
 
     Returns
     -------
-    list of ScoreRun
-        One per seed.
+    dict
+        "figures": by name the numbers of the "frames", and where the "grids" are, as a path below `root`.
     """
-    return [scale.scored(scale.synthia, "segnet", seed, truth="true", crf=False) for seed in range(seeds)]
-
-
-WRONG_CALIBRATION = CalibrationError(pitch=1.0)
-"""The error of calibration that geometry and network are compared with."""
+    runs = dict(zip(("Figure 6", "Figure 7"), figure_runs(scale, seeds), strict=True))
+    frames = {name: run.grids(root)["frame"].tolist() for name, run in runs.items()}
+    return {"figures": {name: {"frames": frames[name], "grids": f"{run.name}/{GRIDS}"} for name, run in runs.items()}}
 
 
 @dataclass(frozen=True)
@@ -141,26 +146,24 @@ def runs_of_claims(scale: Scale, seeds: int) -> ClaimRuns:
     ClaimRuns
     """
     every, all_seeds = range(seeds), max(seeds, scale.table1_seeds if seeds == scale.seeds else seeds)
-    networks = table1_runs(scale, all_seeds)
+    networks = table1_runs(replace(scale, networks=tuple(NETWORKS)), all_seeds)
     usual = networks["segnet"][:seeds]
     blind, unreduced = (
         [scale.scored(scale.kitti, "segnet", seed, variant=variant, crf=False) for seed in every]
         for variant in (Variant(occupancy=False), Variant(reduces=False))
     )
-    routes, perfect = (
-        scale.arrays(scale.chroma_routes, "test", "lidar"),
-        scale.arrays(scale.synthia_routes, "test", "true"),
-    )
+    routes = scale.arrays(scale.chroma_routes, "test", "lidar")
+    perfect = scale.arrays(scale.synthia_routes, "test", "true")
     lying = scale.arrays(scale.overturned, "test", "true")
     return ClaimRuns(
         networks=networks,
         new_routes=[ScoreRun(scale.grid_stage(scale.chroma, "segnet", seed), routes) for seed in every],
-        perfect=[ScoreRun(scale.grid_stage(scale.synthia, "segnet", seed, "true"), perfect, False) for seed in every],
+        perfect=[ScoreRun(scale.grid_stage(scale.synthia, "segnet", seed, "true"), perfect, crf=False) for seed in every],
         overturned=[OverturnedRun(run.network, lying) for run in usual],
         overturned_blind=[OverturnedRun(run.network, lying) for run in blind],
         unreduced=unreduced,
         times=TimeRun(usual[0].network, unreduced[0].network, usual[0].frames),
         baselines=[BaselineRun(run.network, run.frames) for run in usual],
         baselines_off=[BaselineRun(run.network, run.frames, WRONG_CALIBRATION) for run in usual],
-        usual_off=[ScoreRun(run.network, run.frames, False, WRONG_CALIBRATION) for run in usual],
+        usual_off=[ScoreRun(run.network, run.frames, crf=False, calibration=WRONG_CALIBRATION) for run in usual],
     )

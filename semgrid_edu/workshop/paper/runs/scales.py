@@ -1,18 +1,20 @@
 """The scales at which the paper's experiments can be done (section 4)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from semgrid_edu.datasets.label_policies import POLICIES
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.networks import SEGMENTERS
 from semgrid_edu.workshop.paper.runs.data_runs import RECIPE_OF, ArraysRun, DataRun
+from semgrid_edu.workshop.paper.runs.paper import NETWORKS
 from semgrid_edu.workshop.paper.runs.score_runs import ScoreRun
 from semgrid_edu.workshop.paper.runs.training_runs import GridStageRun, ImageStageRun
 from semgrid_edu.workshop.paper.runs.variants import USUAL, Variant
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Scale:
-    """How large the experiments are.
+    """How large the experiments are. What is left out is as in the scale "reduced".
 
     Parameters
     ----------
@@ -32,43 +34,29 @@ class Scale:
         Number of seeds for Table 1, and for everything else.
     policies : tuple of str
         The ways to make labels, beside the usual one, that networks learn from: keys of `POLICIES`.
+    networks : tuple of str
+        The image networks of Table 1, keys of `SEGMENTERS`.
     """
 
     name: str
-    kitti: str
-    chroma: str
-    synthia: str
-    chroma_routes: str
-    synthia_routes: str
-    overturned: str
-    preset: str
-    image_iterations: int
-    grid_iterations: int
-    table1_seeds: int
-    seeds: int
+    kitti: str = "minikitti"
+    chroma: str = "minichroma"
+    synthia: str = "minisynthia"
+    chroma_routes: str = "chromaroutes"
+    synthia_routes: str = "synthiaroutes"
+    overturned: str = "overturned"
+    preset: str = "compact"
+    image_iterations: int = 500
+    grid_iterations: int = 500
+    table1_seeds: int = 5
+    seeds: int = 3
     policies: tuple[str, ...] = tuple(name for name in POLICIES if name != "lidar")
+    networks: tuple[str, ...] = tuple(NETWORKS)
 
     @property
     def frames_to_train(self) -> int:
         """Number of labelled frames that Table 1's networks learn from."""
         return sum(len(route.labelled) for route in RECIPE_OF[self.kitti].routes if route.split == "train")
-
-    def image_stage(self, data: str, segmenter: str, seed: int, n_frames: int | None = None) -> ImageStageRun:
-        """Return the run that trains an image network.
-
-        Parameters
-        ----------
-        data : str
-            The data set, a key of `RECIPE_OF`.
-        segmenter : str
-            The image network, a key of `SEGMENTERS`.
-        seed : int
-            Seed of the run.
-        n_frames : int, optional
-            How many frames it learns from; all when left out.
-        """
-        arrays = self.arrays(data, "train", "true")
-        return ImageStageRun(arrays, segmenter, seed, self.image_iterations, n_frames)
 
     def grid_stage(
         self,
@@ -76,6 +64,7 @@ class Scale:
         segmenter: str,
         seed: int,
         truth: str = "lidar",
+        *,
         variant: Variant = USUAL,
         n_frames: int | None = None,
     ) -> GridStageRun:
@@ -96,84 +85,55 @@ class Scale:
         n_frames : int, optional
             How many frames it learns from; all when left out.
         """
-        image_stage = self.image_stage(data, segmenter, seed, n_frames)
+        images = self.arrays(data, "train", "true")
+        image_stage = ImageStageRun(images, segmenter, seed, self.image_iterations, n_frames)
         return GridStageRun(image_stage, self.arrays(data, "train", truth), self.grid_iterations, variant)
 
     def scored(
-        self,
-        data: str,
-        segmenter: str,
-        seed: int,
-        truth: str = "lidar",
-        variant: Variant = USUAL,
-        n_frames: int | None = None,
-        crf: bool = True,
+        self, data: str, segmenter: str, seed: int, truth: str = "lidar", *, crf: bool = True, **network: object
     ) -> ScoreRun:
         """Return the run that scores a network on the test frames of the data that it learned from.
 
         Parameters
         ----------
-        data, segmenter, seed, truth, variant, n_frames
+        data, segmenter, seed, truth
             The network, as `Scale.grid_stage` takes it.
         crf : bool
             Whether the CRF is scored as well.
+        **network
+            In what else the network differs: `variant` and `n_frames` of `Scale.grid_stage`.
         """
-        network = self.grid_stage(data, segmenter, seed, truth, variant, n_frames)
-        return ScoreRun(network, self.arrays(data, "test", truth), crf)
+        trained = self.grid_stage(data, segmenter, seed, truth, **network)
+        return ScoreRun(trained, self.arrays(data, "test", truth), crf)
 
     def arrays(self, data: str, split: str, truth: str) -> ArraysRun:
         """Return the run that makes the arrays of a split. Parameters are those of `ArraysRun`."""
         return ArraysRun(DataRun(data), split, truth, self.preset)
 
 
-SCALES = {
-    scale.name: scale
-    for scale in (
-        Scale(
-            "quick",
-            "quickkitti",
-            "quickchroma",
-            "quicksynthia",
-            "quickchromaroutes",
-            "quicksynthiaroutes",
-            "quickoverturned",
-            "compact",
-            12,
-            10,
-            table1_seeds=2,
-            seeds=2,
-            policies=("no-cleanup", "accumulated-carved"),
-        ),
-        Scale(
-            "reduced",
-            "minikitti",
-            "minichroma",
-            "minisynthia",
-            "chromaroutes",
-            "synthiaroutes",
-            "overturned",
-            "compact",
-            500,
-            500,
-            table1_seeds=5,
-            seeds=3,
-        ),
-        Scale(
-            "paper",
-            "minikitti",
-            "minichroma",
-            "minisynthia",
-            "chromaroutes",
-            "synthiaroutes",
-            "overturned",
-            "paper",
-            2000,
-            2000,
-            table1_seeds=5,
-            seeds=3,
-        ),
-    )
-}
+QUICK = Scale(
+    name="quick",
+    kitti="quickkitti",
+    chroma="quickchroma",
+    synthia="quicksynthia",
+    chroma_routes="quickchromaroutes",
+    synthia_routes="quicksynthiaroutes",
+    overturned="quickoverturned",
+    image_iterations=12,
+    grid_iterations=10,
+    table1_seeds=2,
+    seeds=2,
+    policies=("no-cleanup", "accumulated-carved"),
+)
+"""Minutes on a laptop: whether everything works, not whether it is true."""
+
+REDUCED = Scale(name="reduced")
+"""Hours on a laptop."""
+
+PAPER = Scale(name="paper", preset="paper", image_iterations=2000, grid_iterations=2000)
+"""The paper's sizes, which need a GPU."""
+
+SCALES = {scale.name: scale for scale in (QUICK, REDUCED, PAPER)}
 """Every scale by name."""
 
 
@@ -183,13 +143,19 @@ def scale_named(name: str) -> Scale:
     Parameters
     ----------
     name : str
-        A key of `SCALES`.
+        A key of `SCALES`. "quick+unet" is the scale "quick" whose Table 1 compares U-Net too, and so on for any image
+        network that is registered in `SEGMENTERS`.
 
     Raises
     ------
     ArgumentError
-        When there is none of that name.
+        When there is no such scale or image network.
     """
-    if name not in SCALES:
-        raise ArgumentError("--scale", f"one of {', '.join(SCALES)}", repr(name))
-    return SCALES[name]
+    known, *others = name.split("+")
+    if known not in SCALES:
+        raise ArgumentError("--scale", f"one of {', '.join(SCALES)}", repr(known))
+    for other in others:
+        if other not in SEGMENTERS:
+            raise ArgumentError("--scale", f"after a plus one of {', '.join(SEGMENTERS)}", repr(other))
+    scale = SCALES[known]
+    return replace(scale, name=name, networks=tuple(dict.fromkeys((*scale.networks, *others))))

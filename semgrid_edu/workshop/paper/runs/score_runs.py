@@ -1,71 +1,169 @@
-"""Runs that score: a trained network on the frames of a test split, drive by drive and by distance (section 4.2)."""
+"""Runs that score grids against the truth: networks, baselines, and the labels themselves (sections 3.3 and 4.2)."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from abc import abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm.auto import tqdm
 
 from semgrid_edu.crf import CrfParams, at_temperature, mean_field, unary_from_log_probability
-from semgrid_edu.workshop.scoring.learned_grids import learned_log_g
-from semgrid_edu.workshop.paper.runs.variants import EXACT, CalibrationError
-from semgrid_edu.workshop.paper.runs.counting import CountingRun, GridCounts
+from semgrid_edu.crf.temperature import Reliability
+from semgrid_edu.datasets.index import load_index
+from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
+from semgrid_edu.datasets.readers.project_lidar import seen_returns
+from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.storage.tensors import read_arrays, write_arrays
 from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun
+from semgrid_edu.workshop.paper.runs.training_runs import NetworkRun
+from semgrid_edu.workshop.paper.runs.variants import EXACT, CalibrationError
 from semgrid_edu.workshop.scheduler.runs import Run
-from semgrid_edu.workshop.paper.runs.training_runs import GridStageRun
-from semgrid_edu.networks import WEIGHTS, load_net
+from semgrid_edu.workshop.scoring.confusions import FrameConfusions, load_confusions, save_confusions, seed_confusions
+from semgrid_edu.workshop.scoring.counting import Grids, count_grids
+from semgrid_edu.workshop.scoring.grids import MAJORITY, NETWORK, OCCUPANCY_ALONE, Refine, baseline_grids, network_grids
 
-NETWORK, WITH_CRF, WITH_SEARCHED = "network", "network + CRF", "network + searched CRF"
-"""The methods: the network's own grid, refined with the CRF's default parameters, and with those that were searched."""
+CONFUSIONS, RELIABILITY = "confusions.npz", "reliability.npz"
+"""The files of a run that scores: confusion matrices by frame, and how often a method is right by its confidence."""
+
+WITH_CRF, WITH_SEARCHED = f"{NETWORK} + CRF", f"{NETWORK} + searched CRF"
+"""The network's grid, refined with the CRF's default parameters, and with those that were searched."""
 
 SEARCHED = {
-    "segnet": (1.1622, (1.82, 3.42, 1.79, 0.0756, 0.536)),
-    "fcn": (1.2057, (0.947, 1.64, 26.9, 0.868, 1.27)),
-    "deeplab": (1.2656, (1.32, 2.36, 18.7, 0.873, 0.957)),
+    "segnet": (1.1622, CrfParams(1.82, 3.42, 1.79, 0.0756, 0.536)),
+    "fcn": (1.2057, CrfParams(0.947, 1.64, 26.9, 0.868, 1.27)),
+    "deeplab": (1.2656, CrfParams(1.32, 2.36, 18.7, 0.873, 0.957)),
 }
-"""For each image network the temperature and the CRF's five parameters that `semgrid-edu search-crf` chose for pixel
-accuracy on validation drives, with the shipped network of that kind (docs/results/crf_search*.json)."""
+"""For each image network the temperature and the CRF's parameters that `semgrid-edu search-crf` chose for pixel
+accuracy on validation drives, with the shipped network of that kind (docs/results/crf_search*.json). A network for which
+nothing was searched is scored without them."""
+
+GEOMETRY, TRUE_GEOMETRY, FLAT_GROUND = "geometry", "geometry with true image labels", "flat ground"
+"""Image labels carried by the LIDAR's depth with gaps closed, from the image network and true ones; and image labels
+looked up where flat ground would be."""
+
+BASELINES = {
+    MAJORITY: MAJORITY,
+    OCCUPANCY_ALONE: OCCUPANCY_ALONE,
+    FLAT_GROUND: f"flat ground, {NETWORK} labels, observed cells",
+    GEOMETRY: f"geometry, {NETWORK} labels, gaps closed",
+    TRUE_GEOMETRY: "geometry, true labels, gaps closed",
+}
+"""The baselines of the paper's tables, and what `baseline_grids` calls each."""
+
+LABELS = "labels"
+"""The method: the labels themselves, counted like the grids of a network."""
+
+
+class CountingRun(Run):
+    """A run that counts grids against the truth of `frames`, an `ArraysRun`."""
+
+    @abstractmethod
+    def grids(self, root: Path, frames: TrainingSet) -> Grids:
+        """Return the function that makes the grids of a frame.
+
+        Parameters
+        ----------
+        root : Path
+            The folder of all runs.
+        frames : TrainingSet
+            The frames to score.
+        """
+
+    def work(self, root: Path, device: str) -> None:
+        """Count the grids. Parameters are those of `Run.work`."""
+        frames = self.frames.frames(root)
+        counted = count_grids(self.grids(root, frames), frames)
+        write_arrays(self.folder(root) / RELIABILITY, counted.reliability)
+        save_confusions(self.folder(root) / CONFUSIONS, counted.confusions)
+
+    def confusions(self, root: str | Path, method: str, truth: str, band: str | None = None) -> FrameConfusions:
+        """Return the confusion matrices of one method.
+
+        Parameters
+        ----------
+        root : path-like
+            The folder of all runs.
+        method, truth, band
+            What to count, as `FrameConfusions.of` takes it.
+
+        Raises
+        ------
+        DataError
+            When the run hasn't ended, or its file is damaged.
+        """
+        return load_confusions(self.folder(root) / CONFUSIONS).of(method, truth, band)
+
+    def reliability(self, root: str | Path, method: str) -> Reliability:
+        """Return how often a method is right by its confidence, over all frames and by the true labels.
+
+        Parameters
+        ----------
+        root : path-like
+            The folder of all runs.
+        method : str
+            Such as `NETWORK`.
+
+        Raises
+        ------
+        DataError
+            When the run hasn't ended, or its file is damaged.
+        """
+        cells, confidence, right = read_arrays(self.folder(root) / RELIABILITY)[method]
+        some = np.maximum(cells, 1)
+        return Reliability(confidence / some, right / some, cells.astype(np.int64))
+
+
+def by_seed(
+    runs: Sequence[CountingRun], root: str | Path, method: str, truth: str, band: str | None = None
+) -> NDArray[np.int64]:
+    """Return the confusion matrices of a method, seed by seed and drive by drive.
+
+    Parameters
+    ----------
+    runs : sequence of S CountingRun
+        The same network, trained with S seeds.
+    root : path-like
+        The folder of all runs.
+    method, truth, band
+        What to count, as `FrameConfusions.of` takes it.
+
+    Returns
+    -------
+    (S, V, C, C) int64
+
+    Raises
+    ------
+    ArgumentError
+        When there is no run, or two of them were scored on other frames.
+    DataError
+        When a run hasn't ended, or its file is damaged.
+    """
+    return seed_confusions([run.confusions(root, method, truth, band) for run in runs], method)
 
 
 @dataclass(frozen=True)
-class ScoreRun(CountingRun):
+class ScoreRun(CountingRun, NetworkRun):
     """Score a network on the frames of a split.
 
     Parameters
     ----------
-    network : GridStageRun
-        The run that trains the network.
-    frames : ArraysRun
-        The frames; with labels made with the LIDAR, they are scored against these and against the true ones.
     crf : bool
-        Whether the CRF refines the grids as well, with default and with searched parameters.
+        Whether the CRF refines the grids as well, with default parameters and with searched ones if there are any.
     calibration : CalibrationError
         What the network believes wrongly about where the camera stands.
     """
 
-    network: GridStageRun
-    frames: ArraysRun
     crf: bool = True
     calibration: CalibrationError = EXACT
+    kind: ClassVar[str] = "score"
 
     @property
-    def name(self) -> str:
-        """The name of its folder."""
-        where = self.frames.name.removeprefix("arrays-")
-        return f"score-{self.network.name.removeprefix('grid-')}-on-{where}{self.calibration.name}" + "-crf" * self.crf
-
-    @property
-    def needs(self) -> tuple[Run, ...]:
-        """The network and the frames."""
-        return self.network, self.frames
-
-    @property
-    def steps(self) -> int:
-        """Number of frames that are scored."""
-        return self.frames.n_labelled
+    def tag(self) -> str:
+        """Network, frames, calibration, and whether the CRF is scored."""
+        return f"{super().tag}{self.calibration.name}" + "-crf" * self.crf
 
     @property
     def pace(self) -> str:
@@ -76,28 +174,109 @@ class ScoreRun(CountingRun):
         """Return the seconds that a frame took on one core when this was written."""
         return (0.8 if self.crf else 0.15) * (1 if self.frames.preset == "compact" else 10)
 
-    def work(self, root: Path, device: str) -> None:
-        """Score the network. Parameters are those of `Run.work`."""
-        frames = self.frames.frames(root)
-        net = load_net(self.network.folder(root) / WEIGHTS, self.calibration.applied_to(frames.camera))
-        refinements = self._refinements(frames.spec.cell) if self.crf else {}
-        counted = GridCounts(frames)
-        for k in tqdm(range(len(frames)), desc="score", unit="frame"):
-            sample = frames[k]
-            log_g, o = learned_log_g(net, sample), sample.occupancy.numpy()
-            counted.add_probability(NETWORK, k, np.exp(log_g))
-            for method, refine in refinements.items():
-                counted.add_probability(method, k, refine(log_g, o))
-        counted.write(self.folder(root))
+    def grids(self, root: Path, frames: TrainingSet) -> Grids:
+        """Return the network's grids. Parameters are those of `CountingRun.grids`."""
+        net = self.network.trained(root, self.calibration.applied_to(frames.camera))
+        return network_grids(net, frames, self._refinements(frames.spec.cell) if self.crf else {})
 
-    def _refinements(self, cell: float) -> dict[str, Callable]:
-        temperature, searched = SEARCHED[self.network.image_stage.segmenter]
-        return {
-            WITH_CRF: partial(_refined, CrfParams.for_cells(cell), 1.0),
-            WITH_SEARCHED: partial(_refined, CrfParams(*searched), temperature),
-        }
+    def _refinements(self, cell: float) -> dict[str, Refine]:
+        """Return the CRF with default parameters, and with searched ones if there are any."""
+        found = {"CRF": partial(_refined, 1.0, CrfParams.for_cells(cell))}
+        segmenter = self.network.image_stage.segmenter
+        if segmenter in SEARCHED:
+            return found | {"searched CRF": partial(_refined, *SEARCHED[segmenter])}
+        print(f"No CRF parameters were searched for {segmenter}, so {WITH_SEARCHED!r} is left out.")
+        return found
 
 
-def _refined(params: CrfParams, temperature: float, log_g: NDArray, o: NDArray) -> NDArray:
+def _refined(temperature: float, params: CrfParams, log_g: NDArray, o: NDArray) -> NDArray:
     """Refine a grid by the CRF, after its log-probabilities were divided by a temperature."""
     return mean_field(unary_from_log_probability(at_temperature(log_g, temperature)), o, params)
+
+
+@dataclass(frozen=True)
+class BaselineRun(CountingRun, NetworkRun):
+    """Score all of `BASELINES` on the frames of a split.
+
+    The image stage of the network labels the images, and the majority is that of the frames that it learned from.
+
+    Parameters
+    ----------
+    calibration : CalibrationError
+        What geometry believes wrongly about where the camera stands.
+    """
+
+    calibration: CalibrationError = EXACT
+    kind: ClassVar[str] = "baselines"
+    trial_seconds: ClassVar[float] = 0.2
+
+    @property
+    def tag(self) -> str:
+        """Image network, labels, frames and calibration."""
+        first = self.network.image_stage
+        labels = f"{first.label}-{self.network.arrays.truth}-{first.iterations}-seed{first.seed}"
+        return f"{labels}-on-{self.frames.tag}{self.calibration.name}"
+
+    @property
+    def needs(self) -> tuple[Run, ...]:
+        """The image network, and the frames of both splits."""
+        return self.network.image_stage, self.network.arrays, self.frames
+
+    @property
+    def pace(self) -> str:
+        """It depends on the image network."""
+        return f"baselines {self.network.image_stage.segmenter} {self.frames.preset}"
+
+    def grids(self, root: Path, frames: TrainingSet) -> Grids:
+        """Return the grids of the baselines. Parameters are those of `CountingRun.grids`."""
+        segmenters = {NETWORK: self.network.image_stage.trained(root, frames.camera).segmenter}
+        camera = self.calibration.applied_to(frames.camera)
+        returns = None if self.calibration == EXACT else self._believed_returns(root, frames)
+        made = baseline_grids(self.network.arrays.frames(root), frames, segmenters, camera, returns)
+
+        def grids(k: int) -> dict[str, NDArray]:
+            found = made(k)
+            return {name: found[full_name] for name, full_name in BASELINES.items()}
+
+        return grids
+
+    def _believed_returns(self, root: Path, frames: TrainingSet) -> Callable[[int], tuple[NDArray, NDArray]]:
+        """Return pixels and cells of each frame's returns, as the believed calibration has them."""
+        index, found = load_index(self.frames.data.dataset_dir(root)), []
+        for name, numbers in index.frames_by_drive(self.frames.split).items():
+            drive = KittiRawDrive(index.root, *name, images=False)
+            for frame in (drive[number] for number in numbers):
+                believed = replace(frame, camera=self.calibration.applied_to(frame.camera))
+                found.append(seen_returns(believed, frames.spec, frames.camera.size))
+        return found.__getitem__
+
+
+@dataclass(frozen=True)
+class LabelsRun(CountingRun):
+    """Count the labels of a split against the true ones, and against those that are made in the usual way.
+
+    Parameters
+    ----------
+    labels : ArraysRun
+        The labels to count.
+    usual : ArraysRun
+        The same frames with the usual labels, made with the LIDAR.
+    """
+
+    labels: ArraysRun
+    usual: ArraysRun
+    kind: ClassVar[str] = "labels"
+
+    frames = property(lambda self: self.usual)
+    steps = property(lambda self: self.labels.n_labelled)
+    tag = property(lambda self: self.labels.tag)
+    pace = property(lambda self: f"labels {self.labels.preset}")
+
+    def probe(self) -> float:
+        """Return the seconds that a frame took on one core when this was written."""
+        return 0.01 if self.labels.preset == "compact" else 0.1
+
+    def grids(self, root: Path, frames: TrainingSet) -> Grids:
+        """Return the labels. Parameters are those of `CountingRun.grids`."""
+        classes = self.labels.frames(root).arrays["truth"]
+        return lambda k: {LABELS: classes[k]}

@@ -1,39 +1,94 @@
 """Runs that train: the image network on image labels, and from there the whole network on grids (sections 3.4, 4.1)."""
 
+import time
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import torch
 from torch.utils.data import Subset
 
+from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.training_set import Sample, TrainingSet
-from semgrid_edu.workshop.paper.runs.data_runs import RECIPE_OF, ArraysRun
-from semgrid_edu.workshop.scheduler.runs import Run
-from semgrid_edu.workshop.scheduler.trials import seconds_per_step
-from semgrid_edu.workshop.paper.runs.variants import USUAL, Variant
-from semgrid_edu.networks import WEIGHTS, Architecture, SemanticGridNet, build_net
+from semgrid_edu.labels import LABEL_SETS
+from semgrid_edu.networks import WEIGHTS, Architecture, SemanticGridNet, build_net, load_net
+from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.storage.tensors import read_tensors
-from semgrid_edu.training import CHECKPOINT, TrainingParams, train
+from semgrid_edu.training import CHECKPOINT, Objective, TrainingParams, train
+from semgrid_edu.training.batches import Batch
 from semgrid_edu.training.distributed import first_process_first, process_group
+from semgrid_edu.training.loop import learn
 from semgrid_edu.training.run import architecture, training_params
+from semgrid_edu.workshop.paper.runs.data_runs import RECIPE_OF, ArraysRun
+from semgrid_edu.workshop.paper.runs.variants import USUAL, Variant
+from semgrid_edu.workshop.scheduler.runs import Run
+from semgrid_edu.workshop.scheduler.torchrun import few_threads
+from semgrid_edu.workshop.simulation.sensors.rig import Rig
+
+TIMED_STEPS = 2
+"""Number of steps that a trial times, after one that it doesn't."""
 
 
 class TrainingRun(Run):
-    """A run that trains, and does nothing else: one step per iteration."""
+    """A run that trains a network on `arrays`, one step per iteration, as `architecture` and `params` say."""
 
-    iterations: int
-
-    @property
-    def is_training(self) -> bool:
-        """It is."""
-        return True
+    is_training: ClassVar[bool] = True
 
     @property
     def steps(self) -> int:
         """Number of training steps."""
         return self.iterations
+
+    def probe(self) -> float:
+        """Return the seconds of a training step on this machine's CPU, from a short trial."""
+        return _seconds_per_step(self.architecture, self.params, self.kind)
+
+    @abstractmethod
+    def net(self, root: Path, camera: Camera) -> SemanticGridNet:
+        """Return the network before its first step.
+
+        Parameters
+        ----------
+        root : Path
+            The folder of all runs.
+        camera : Camera
+            The camera of the frames.
+        """
+
+    def work(self, root: Path, device: str) -> None:
+        """Train, going on from a checkpoint if there is one. Parameters are those of `Run.work`."""
+        folder = self.folder(root)
+        with process_group(device) as chosen:
+            with first_process_first():
+                frames = self.arrays.frames(root)
+            if not (folder / WEIGHTS).exists():
+                resume = (folder / CHECKPOINT).exists()
+                net = self.net(root, frames.camera)
+                train(net, self.chosen(frames), folder, self.params, self.seed, resume, chosen)
+
+    def trained(self, root: Path, camera: Camera) -> SemanticGridNet:
+        """Return the network after its last step. Parameters are those of `TrainingRun.net`."""
+        return load_net(self.folder(root) / WEIGHTS, camera)
+
+
+def _seconds_per_step(described: Architecture, params: TrainingParams, stage: str) -> float:
+    """Return how long a step of the stage "image" or "grid" takes on this machine's CPU, tried on grey frames."""
+    net = build_net(described, Rig().camera).train()
+    size, shape, n = described.image_size, described.grid.shape, params.batch_size
+    image, occupancy = torch.full((n, 3, *size), 0.5), torch.full((n, N_STATES, *shape), 1 / N_STATES)
+    labels, truth = (torch.zeros((n, *part), dtype=torch.uint8) for part in (size, shape))
+    batch = Batch(Sample(image, labels, occupancy, truth), mirrored=False)
+    optimiser = torch.optim.SGD(net.parameters(), lr=1e-6, momentum=params.momentum)
+    objective = Objective(net, stage, torch.ones(len(LABEL_SETS[described.label_set])))
+    with few_threads():
+        learn(objective, optimiser, batch, torch.device("cpu"))
+        began = time.perf_counter()
+        for _ in range(TIMED_STEPS):
+            learn(objective, optimiser, batch, torch.device("cpu"))
+    return (time.perf_counter() - began) / TIMED_STEPS
 
 
 @dataclass(frozen=True)
@@ -59,23 +114,19 @@ class ImageStageRun(TrainingRun):
     seed: int = 0
     iterations: int = 500
     n_frames: int | None = None
+    kind: ClassVar[str] = "image"
 
     @property
-    def name(self) -> str:
-        """The name of its folder."""
-        return f"image-{self.label}-{self.iterations}-seed{self.seed}"
+    def tag(self) -> str:
+        """What it learns from, and how."""
+        return f"{self.label}-{self.iterations}-seed{self.seed}"
 
     @property
     def label(self) -> str:
-        """What tells it and the runs after it from others: data set, network, number of frames."""
-        parts = [self.arrays.data.name.removeprefix("data-"), self.segmenter]
+        """What the names of the runs after it say of it: data set, network, number of frames."""
+        parts = [self.arrays.data.tag, self.segmenter]
         parts += [self.arrays.preset] * (self.arrays.preset != "compact")
         return "-".join(parts + [f"{self.n_frames}frames"] * (self.n_frames is not None))
-
-    @property
-    def needs(self) -> tuple[Run, ...]:
-        """The arrays."""
-        return (self.arrays,)
 
     @property
     def pace(self) -> str:
@@ -94,17 +145,9 @@ class ImageStageRun(TrainingRun):
         usual = training_params(self.arrays.preset, self.iterations)
         return replace(usual, image_iterations=self.iterations, grid_iterations=0)
 
-    def probe(self) -> float:
-        """Return the seconds of a training step, from a short trial."""
-        return seconds_per_step(self.architecture, self.params, "image")
-
-    def work(self, root: Path, device: str) -> None:
-        """Train it. Parameters are those of `Run.work`."""
-        with process_group(device) as chosen:
-            with first_process_first():
-                frames = self.arrays.frames(root)
-            net = build_net(self.architecture, frames.camera, self.seed)
-            train_or_resume(net, self.chosen(frames), self.folder(root), self.params, self.seed, chosen)
+    def net(self, root: Path, camera: Camera) -> SemanticGridNet:
+        """Return a network with random weights. Parameters are those of `TrainingRun.net`."""
+        return build_net(self.architecture, camera, self.seed)
 
     def chosen(self, frames: TrainingSet) -> Sequence[Sample]:
         """Return the frames to learn from.
@@ -140,18 +183,19 @@ class GridStageRun(TrainingRun):
     arrays: ArraysRun
     iterations: int = 500
     variant: Variant = USUAL
+    kind: ClassVar[str] = "grid"
 
     @property
-    def name(self) -> str:
-        """The name of its folder."""
+    def tag(self) -> str:
+        """What it learns from, and how."""
         first = self.image_stage
         label = f"{first.label}-{self.arrays.truth}{self.variant.name}"
-        return f"grid-{label}-{first.iterations}+{self.iterations}-seed{first.seed}"
+        return f"{label}-{first.iterations}+{self.iterations}-seed{self.seed}"
 
     @property
-    def needs(self) -> tuple[Run, ...]:
-        """The image network and the arrays."""
-        return self.image_stage, self.arrays
+    def seed(self) -> int:
+        """The seed of its image network."""
+        return self.image_stage.seed
 
     @property
     def pace(self) -> str:
@@ -166,68 +210,50 @@ class GridStageRun(TrainingRun):
     @property
     def params(self) -> TrainingParams:
         """How it is trained."""
-        usual = training_params(self.arrays.preset, self.iterations, self.variant.end_to_end)
+        usual = training_params(self.arrays.preset, self.iterations)
         limit = usual.weight_limit if self.variant.balanced else 1.0
         return replace(usual, image_iterations=0, weight_limit=limit)
 
-    def probe(self) -> float:
-        """Return the seconds of a training step, from a short trial."""
-        return seconds_per_step(self.architecture, self.params, "grid")
+    def net(self, root: Path, camera: Camera) -> SemanticGridNet:
+        """Return a network whose image network is trained already. Parameters are those of `TrainingRun.net`."""
+        net = build_net(self.architecture, camera, self.seed)
+        # The file is that of the usual network; of its weights, those of the image network fit every variant.
+        _, tensors = read_tensors(self.image_stage.folder(root) / WEIGHTS)
+        learnt = {name: part for name, part in tensors.items() if name.startswith("segmenter.")}
+        net.segmenter.load_state_dict({name.removeprefix("segmenter."): part for name, part in learnt.items()})
+        return net
 
-    def work(self, root: Path, device: str) -> None:
-        """Train it. Parameters are those of `Run.work`."""
-        with process_group(device) as chosen:
-            with first_process_first():
-                frames = self.arrays.frames(root)
-            seed = self.image_stage.seed
-            net = build_net(self.architecture, frames.camera, seed)
-            net.segmenter.load_state_dict(image_network(self.image_stage.folder(root) / WEIGHTS))
-            train_or_resume(net, self.image_stage.chosen(frames), self.folder(root), self.params, seed, chosen)
-
-
-def image_network(weights: Path) -> dict[str, torch.Tensor]:
-    """Return the weights of the image network alone, which is the same whatever comes after it.
-
-    Parameters
-    ----------
-    weights : Path
-        The file of a whole network.
-
-    Returns
-    -------
-    dict of str to Tensor
-        By their names inside the image network.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or damaged.
-    """
-    _, tensors = read_tensors(weights)
-    return {name.removeprefix("segmenter."): part for name, part in tensors.items() if name.startswith("segmenter.")}
+    def chosen(self, frames: TrainingSet) -> Sequence[Sample]:
+        """Return the frames that its image network learned from. Parameters are those of `ImageStageRun.chosen`."""
+        return self.image_stage.chosen(frames)
 
 
-def train_or_resume(
-    net: SemanticGridNet,
-    frames: Sequence[Sample],
-    folder: Path,
-    params: TrainingParams,
-    seed: int,
-    device: torch.device,
-) -> None:
-    """Train a network, going on from the folder's checkpoint if there is one; a trained one stays as it is.
+@dataclass(frozen=True)
+class NetworkRun(Run):
+    """A run that looks at a trained network on the frames of a split.
 
     Parameters
     ----------
-    net, frames, folder, params, seed, device
-        As `train` takes them.
-
-    Raises
-    ------
-    ArgumentError
-        When several processes can't share a batch evenly, or as `train` raises it.
-    DataError
-        When the checkpoint is damaged, or of another run.
+    network : GridStageRun
+        The run that trains the network.
+    frames : ArraysRun
+        The frames; with labels made with the LIDAR, these and the true ones are what grids are compared with.
     """
-    if not (folder / WEIGHTS).exists():
-        train(net, frames, folder, params, seed, resume=(folder / CHECKPOINT).exists(), device=device)
+
+    network: GridStageRun
+    frames: ArraysRun
+
+    @property
+    def tag(self) -> str:
+        """Network and frames."""
+        return f"{self.network.tag}-on-{self.frames.tag}"
+
+    @property
+    def steps(self) -> int:
+        """Number of frames."""
+        return self.frames.n_labelled
+
+    @property
+    def pace(self) -> str:
+        """It depends on the size of the network."""
+        return f"{self.kind} {self.frames.preset}"

@@ -1,19 +1,18 @@
-"""In what a network can differ from the paper's: the rows of the ablations (section 4).
-
-Errors of calibration: the camera stands and looks a little differently from what the network is told (3.3).
-"""
+"""In what a network can differ from the paper's, and what it can be told wrongly: the ablations' rows (section 4)."""
 
 from dataclasses import dataclass, replace
+
 import numpy as np
 from scipy.spatial.transform import Rotation
+
 from semgrid_edu.camera import Camera, rigid_transform
-from dataclasses import dataclass, replace
 from semgrid_edu.networks import Architecture
 from semgrid_edu.planes import plane_heights
 
+
 @dataclass(frozen=True)
 class CalibrationError:
-    """By how much the calibration that the network is given differs from the true one.
+    """An error of calibration (3.3): by how much the calibration that the network is given differs from the true one.
 
     Parameters
     ----------
@@ -70,8 +69,6 @@ class Variant:
         Whether a 1x1 convolution reduces the planes.
     balanced : bool
         Whether the loss weights rare classes more (median frequency balancing).
-    end_to_end : bool
-        Whether the loss on the grid teaches the image network too.
     """
 
     n_planes: int = 20
@@ -79,7 +76,6 @@ class Variant:
     occupancy: bool = True
     reduces: bool = True
     balanced: bool = True
-    end_to_end: bool = True
 
     @property
     def name(self) -> str:
@@ -90,7 +86,6 @@ class Variant:
             ("no-occupancy", self.occupancy),
             ("no-reduction", self.reduces),
             ("unbalanced", self.balanced),
-            ("two-stage", self.end_to_end),
         )
         return "".join(f"-{part}" for part, as_usual in parts if not as_usual)
 

@@ -5,6 +5,7 @@ by default. So 4 stands for the default parameters, and 0 for no pairs at all.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from itertools import product
 from pathlib import Path
 

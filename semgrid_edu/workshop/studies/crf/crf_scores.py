@@ -26,7 +26,7 @@ from semgrid_edu.networks import SemanticGridNet, load_net
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.workshop.scoring.confusions import drive_confusions
 from semgrid_edu.workshop.scoring.evaluate import scores
-from semgrid_edu.workshop.scoring.learned_grids import learned_log_g
+from semgrid_edu.workshop.scoring.grids import learned_log_g
 from semgrid_edu.workshop.scoring.statistics import paired_interval
 
 

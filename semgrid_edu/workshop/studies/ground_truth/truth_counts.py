@@ -17,7 +17,7 @@ from semgrid_edu.datasets.ground_truth.policy import MOVERS
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LabelSet
-from semgrid_edu.workshop.scoring.distances import distance_bands
+from semgrid_edu.workshop.scoring.counting import distance_bands
 
 REACH = 9
 """Number of scans before, and after, the labelled one: 0.9 s. minikitti has as many before its labelled frames."""

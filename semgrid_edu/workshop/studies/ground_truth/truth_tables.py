@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.workshop.scoring.distances import band_names
+from semgrid_edu.workshop.scoring.confusions import band_names
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
 from semgrid_edu.workshop.studies.ground_truth.truth_policies import counts_of
 

@@ -18,6 +18,7 @@ from semgrid_edu.networks import SEGMENTERS, Architecture, SemanticGridNet, buil
 from semgrid_edu.storage.provenance import versions
 from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.training.log import LOG, read_log
+from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
 
 FRAMES = 4
 """Number of frames."""
@@ -56,11 +57,9 @@ def overfit(seed: int = 0) -> OverfitResult:
     """
     began = datetime.now(UTC)
     frames, camera = sample_frames()[:FRAMES], sample_drive().camera
+    nets = {name: build_net(Architecture(name), camera, seed) for name in SEGMENTERS}
     return {
-        "networks": {
-            name: learn_by_heart(build_net(Architecture(name), camera, seed), frames, PARAMS, seed)
-            for name in SEGMENTERS
-        },
+        "networks": {name: learn_by_heart(net, frames, PARAMS, seed) for name, net in nets.items()},
         "frames": len(frames),
         "params": asdict(PARAMS),
         "command": f"semgrid-edu reproduce overfit --seed {seed}",
@@ -98,7 +97,8 @@ def learn_by_heart(net: SemanticGridNet, frames: Sequence[Sample], params: Train
         "iterations": len(loss),
         "losses": [*loss[:-1:LOSS_EVERY].tolist(), float(loss[-1])],
         "pixel accuracy": {
-            mode: network_accuracy(net, frames, training=mode == "training") for mode in ("evaluation", "training")
+            "evaluation": network_accuracy(net, frames, training=False),
+            "training": network_accuracy(net, frames, training=True),
         },
         "minutes": round((perf_counter() - began) / 60, 1),
     }
@@ -130,21 +130,15 @@ def network_accuracy(net: SemanticGridNet, frames: Sequence[Sample], training: b
 
 
 def overfit_table(networks: dict[str, OverfitResult]) -> str:
-    """Return the accuracies as a table to print, per cent.
+    """Return the accuracies, per cent, as a Markdown table.
 
     Parameters
     ----------
     networks : dict of str to dict
         The "networks" of a result of `overfit`.
-
-    Returns
-    -------
-    str
     """
-    lines = [f"{'':8} {'evaluation':>12} {'training mode':>14} {'last loss':>10} {'minutes':>8}"]
+    rows = [["", "evaluation", "training mode", "last loss", "minutes"]]
     for name, result in networks.items():
-        evaluation, training = (100 * result["pixel accuracy"][mode] for mode in ("evaluation", "training"))
-        lines.append(
-            f"{name:8} {evaluation:12.2f} {training:14.2f} {result['losses'][-1]:10.4f} {result['minutes']:8.1f}"
-        )
-    return "\n".join(lines)
+        shares = (f"{100 * result['pixel accuracy'][mode]:.2f}" for mode in ("evaluation", "training"))
+        rows.append([name, *shares, f"{result['losses'][-1]:.4f}", f"{result['minutes']:.1f}"])
+    return markdown_table(rows)

@@ -15,7 +15,8 @@ from semgrid_edu.storage.provenance import versions
 from semgrid_edu.training import CHECKPOINT, TrainingParams
 from semgrid_edu.training.run import train_network
 from semgrid_edu.workshop.scoring.evaluate import Scores, scores
-from semgrid_edu.workshop.scoring.learned_grids import best_labels, learned_log_g
+from semgrid_edu.workshop.scoring.grids import best_labels, learned_log_g
+from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
 
 METHODS = ("end-to-end", "two-stage")
 """The two training regimes."""
@@ -49,18 +50,18 @@ def compare_training(
         all that made them. JSON can hold it.
     """
     params, test = params or TrainingParams(), TrainingSet(dataset_dir, "test")
-    result: dict[str, list[Scores]] = {method: [] for method in METHODS}
+    folders = {method: [Path(runs) / f"{method}-{seed}" for seed in range(n_seeds)] for method in METHODS}
     for seed in range(n_seeds):
         for method in METHODS:
-            folder = Path(runs) / f"{method}-{seed}"
+            folder, chosen = folders[method][seed], replace(params, end_to_end=method == "end-to-end")
             if not (folder / WEIGHTS).exists():
-                chosen = replace(params, end_to_end=method == "end-to-end")
-                resume = (folder / CHECKPOINT).exists()
-                train_network(dataset_dir, folder, "segnet", chosen, seed, resume)
-            result[method].append(score_grid_and_image(load_net(folder / WEIGHTS, test.camera), test))
-    trained = [Path(runs) / f"{method}-{seed}" for seed in range(n_seeds) for method in METHODS]
+                train_network(dataset_dir, folder, "segnet", chosen, seed, (folder / CHECKPOINT).exists())
+    trained = [folder for of_seed in zip(*folders.values(), strict=True) for folder in of_seed]
     return {
-        "scores": result,
+        "scores": {
+            method: [score_grid_and_image(load_net(folder / WEIGHTS, test.camera), test) for folder in of_method]
+            for method, of_method in folders.items()
+        },
         "frames": len(test),
         "weights": {folder.name: sha256(folder / WEIGHTS) for folder in trained},
         "image stages": {folder.name: sha256(folder / IMAGE_STAGE) for folder in trained},
@@ -87,32 +88,24 @@ def score_grid_and_image(net: SemanticGridNet, test: TrainingSet) -> Scores:
         Scores of "grid" and of "image". An image has no unknown classes, so its "all" and "semantic" are the same.
     """
     confusions = {"grid": 0, "image": 0}
-    for k in tqdm(range(len(test)), desc="score", unit="frame"):
-        sample = test[k]
-        for name, truth, predicted in (
-            ("grid", sample.truth, learned_log_g(net, sample).argmax(axis=0)),
-            ("image", sample.labels, best_labels(net.segmenter, sample)),
-        ):
-            confusions[name] = confusions[name] + confusion_matrix(truth.numpy(), predicted, net.n_classes)
+    for sample in tqdm((test[k] for k in range(len(test))), desc="score", total=len(test), unit="frame"):
+        called = learned_log_g(net, sample).argmax(axis=0), best_labels(net.segmenter, sample)
+        for name, truth, classes in zip(confusions, (sample.truth, sample.labels), called, strict=True):
+            confusions[name] += confusion_matrix(truth.numpy(), classes, net.n_classes)
     return scores(confusions, test.label_set)
 
 
 def two_stage_table(result: dict[str, list[Scores]]) -> str:
-    """Return mean and range over the seeds as a table to print, per cent.
+    """Return mean and range over the seeds, per cent, as a Markdown table.
 
     Parameters
     ----------
     result : dict of str to list of Scores
         The "scores" of a result of `compare_training`.
-
-    Returns
-    -------
-    str
     """
-    lines = [f"{'':12} {'cells':9}" + "".join(f"{name:>24}" for name in METRICS)]
+    rows = [["", "cells", *METRICS]]
     for method, runs in result.items():
-        for part, cells in (("grid", "all"), ("grid", "semantic"), ("image", "all")):
+        for what, part, cells in (("all", "grid", "all"), ("semantic", "grid", "semantic"), ("pixels", "image", "all")):
             values = [[100 * run[part][cells][name] for run in runs] for name in METRICS]
-            shown = "".join(f"{np.mean(v):10.1f} ({min(v):.1f}-{max(v):.1f})".rjust(24) for v in values)
-            lines.append(f"{method:12} {'pixels' if part == 'image' else cells:9}{shown}")
-    return "\n".join(lines)
+            rows.append([method, what, *(f"{np.mean(v):.1f} ({min(v):.1f}-{max(v):.1f})" for v in values)])
+    return markdown_table(rows)
