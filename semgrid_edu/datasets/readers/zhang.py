@@ -3,13 +3,10 @@
 What their own readme (12 August 2015) says: 252 acquisitions of eight runs of KITTI's *tracking* training set are
 labelled, every tenth or twentieth; 140 in the runs 9, 10, 11 and 19 for training, 112 in the runs 0, 4, 5 and 13 for
 testing (the paper says 142 and 110). Image labels are MATLAB files image_02/(trn or test)/(run)/(acquisition), each a
-matrix of the numbers in `ZHANG_CLASSES`; pictures in the colours of `ZHANG_COLOURS` come with them.
+matrix of the numbers in `ZHANG_CLASSES`.
 
-What is assumed here, since the archive itself couldn't be looked at: files end in .mat and .png; their names and the
-runs' folders are numbers, with or without leading zeros; a picture lies beside its matrix; a matrix is the only
-two-dimensional variable of its file.
-
-Drives with Zhang et al.'s labels: KITTI's frames, in raw or tracking layout, and what they show (section 4).
+What is assumed here, since the archive itself couldn't be looked at: files end in .mat; their names and the runs'
+folders are numbers, with or without leading zeros; a matrix is the only two-dimensional variable of its file.
 """
 
 import io
@@ -27,7 +24,7 @@ from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.frame import Frame, FrameLabels
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.storage.reading import read_bytes, read_png
+from semgrid_edu.storage.reading import read_bytes
 
 ZHANG_CLASSES = ClassTable(
     KITTI_14,
@@ -46,21 +43,6 @@ ZHANG_CLASSES = ClassTable(
     },
 )
 """KITTI-14's class of each number in their matrices."""
-
-ZHANG_COLOURS = {
-    0: (255, 255, 255),
-    1: (153, 0, 0),
-    2: (0, 51, 102),
-    3: (160, 160, 160),
-    4: (0, 102, 0),
-    5: (255, 228, 196),
-    6: (255, 200, 50),
-    7: (255, 153, 255),
-    8: (204, 153, 255),
-    9: (130, 255, 255),
-    10: (193, 120, 87),
-}
-"""Red, green and blue of each number in their pictures."""
 
 ZHANG_RUNS = {"train": (9, 10, 11, 19), "test": (0, 4, 5, 13)}
 """The runs of KITTI's tracking training set that each split consists of."""
@@ -83,8 +65,8 @@ class ZhangLabels:
     def __init__(self, folder: str | Path) -> None:
         self.folder = Path(folder)
         self._files: dict[tuple[int, int], Path] = {}
-        for path in sorted(self.folder.glob("image_02/*/*/*"), key=lambda path: path.suffix, reverse=True):
-            if path.suffix in (".mat", ".png") and re.fullmatch(r"\d+/\d+", f"{path.parent.name}/{path.stem}"):
+        for path in sorted(self.folder.glob("image_02/*/*/*.mat")):
+            if re.fullmatch(r"\d+/\d+", f"{path.parent.name}/{path.stem}"):
                 self._files[int(path.parent.name), int(path.stem)] = path
         if not self._files:
             expected = "labels such as image_02/trn/0009/000000.mat"
@@ -138,7 +120,7 @@ class ZhangLabels:
         path = self._files.get((run, acquisition))
         if path is None:
             return None
-        numbers = _matrix(path) if path.suffix == ".mat" else _numbers_of_colours(path, image_size)
+        numbers = _matrix(path)
         if numbers.shape != image_size:
             raise DataError(path, "labels of {} x {} pixels".format(*image_size), "{} x {}".format(*numbers.shape))
         return replace(nothing_known(KITTI_14, image_size), image=ZHANG_CLASSES.classes(path, numbers))
@@ -159,19 +141,6 @@ def _matrix(path: Path) -> NDArray:
     if len(found) != 1 or found[0].ndim != 2 or found[0].dtype.kind not in "iufb":
         raise DataError(path, "one matrix of numbers", f"the variables {', '.join(variables) or '(none)'}")
     return found[0]
-
-
-def _numbers_of_colours(path: Path, image_size: tuple[int, int]) -> NDArray[np.int64]:
-    """Read a picture of labels, refusing a colour that stands for nothing."""
-    picture = read_png(path, "RGB", image_size).astype(np.int64)
-    codes = picture @ (1 << 16, 1 << 8, 1)
-    known = {(r << 16) + (g << 8) + b: number for number, (r, g, b) in ZHANG_COLOURS.items()}
-    values, places = np.unique(codes, return_inverse=True)
-    for value in values:
-        if value not in known:
-            colour = (int(value) >> 16, int(value) >> 8 & 255, int(value) & 255)
-            raise DataError(path, "the colours of Zhang et al.'s readme", f"{colour}")
-    return np.array([known[value] for value in values])[places].reshape(codes.shape)
 
 
 RAW_DRIVES = {
