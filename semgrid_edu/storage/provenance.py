@@ -145,15 +145,9 @@ def provenance_problems(folder: str | Path) -> list[str]:
     if not isinstance(expected, dict):
         raise DataError(record, "a provenance file with checksums by file name", repr(expected)[:200])
     found = _checksums(folder)
-    return (
-        [f"{folder / name}: missing" for name in sorted(expected.keys() - found.keys())]
-        + [f"{folder / name}: not in {FILE_NAME}" for name in sorted(found.keys() - expected.keys())]
-        + [
-            f"{folder / name}: changed"
-            for name in sorted(expected.keys() & found.keys())
-            if expected[name] != found[name]
-        ]
-    )
+    changed = sorted(name for name in expected.keys() | found.keys() if expected.get(name) != found.get(name))
+    how = {name: "changed" if name in expected else f"not in {FILE_NAME}" for name in found}
+    return [f"{folder / name}: {how.get(name, 'missing')}" for name in changed]
 
 
 def _checksums(folder: Path) -> dict[str, str]:

@@ -6,9 +6,9 @@ from PIL import Image
 from scipy.io import savemat
 from tiny_drive import BASELINE, CAMERA_FROM_LIDAR, LIDAR_FROM_IMU, SIZE, K, write_packet, write_tiny_drive
 
-from semgrid_edu.datasets import KittiRawDrive, KittiTrackingRun, ZhangDrive, ZhangLabels, zhang_raw_drive
-from semgrid_edu.datasets.readers import zhang
+from semgrid_edu.datasets import KittiRawDrive, KittiTrackingRun, ZhangDrive, ZhangLabels
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
 
 README = ["building", "sky", "road", "vegetation", "sidewalk", "car", "pedestrian", "bicycle", "signage", "fence"]
@@ -177,19 +177,15 @@ class TestLabelledDrive:
         np.testing.assert_array_equal(drive[1].labels.image, EXPECTED[numbers])
         np.testing.assert_array_equal(drive[1].points, drive.drive[1].points)
 
-    def test_raw_drives_too(self, tmp_path, folder, numbers, monkeypatch):
+    def test_raw_drives_too(self, tmp_path, folder, numbers):
         write_tiny_drive(tmp_path)
-        monkeypatch.setitem(zhang.RAW_DRIVES, 9, ("2026_01_01", "0001", 3))
-        drive = zhang_raw_drive(tmp_path, ZhangLabels(folder), 9)
+        raw = KittiRawDrive(tmp_path, "2026_01_01", "0001")
+        drive = ZhangDrive(raw, ZhangLabels(folder), 9)
         np.testing.assert_array_equal(drive[1].labels.image, EXPECTED[numbers])
-        np.testing.assert_array_equal(drive[1].points, KittiRawDrive(tmp_path, "2026_01_01", "0001")[1].points)
+        np.testing.assert_array_equal(drive[1].points, raw[1].points)
 
-    def test_a_raw_drive_of_another_length_is_another_drive(self, tmp_path, folder, monkeypatch):
-        write_tiny_drive(tmp_path)
-        monkeypatch.setitem(zhang.RAW_DRIVES, 9, ("2026_01_01", "0001", 803))
-        with pytest.raises(DataError, match="expected the 803 frames of tracking run 9, found 3"):
-            zhang_raw_drive(tmp_path, ZhangLabels(folder), 9)
-
-    def test_a_run_without_a_known_raw_drive(self, tmp_path, folder):
-        with pytest.raises(ArgumentError, match="run: expected one of 0, 4, 5, 10, 11, 13, 19, found 9"):
-            zhang_raw_drive(tmp_path, ZhangLabels(folder), 9)
+    def test_it_is_what_a_training_set_takes(self, tmp_path, folder):
+        drive = ZhangDrive(KittiTrackingRun(write_run(tmp_path), 9), ZhangLabels(folder), 9)
+        assert (drive.name, drive.label_set, drive.camera) == ("run 9", KITTI_14, drive.drive.camera)
+        assert {"000001.mat", "000001.bin", "000001.png"} <= {path.name for path in drive.files()}
+        assert (drive.truth(1, GridSpec.compact()) == IGNORE).all()  # the data set says nothing of cells
