@@ -1,8 +1,11 @@
 """The networks: i -> s and (p, o) -> g, each by itself and joined (paper, sections 3.1 and 3.4)."""
 
 from semgrid_edu.networks.architecture import Architecture
+from semgrid_edu.networks.backbones.deeplab import DeepLab
+from semgrid_edu.networks.backbones.fcn import Fcn
 from semgrid_edu.networks.backbones.registry import SEGMENTERS, build_segmenter
 from semgrid_edu.networks.backbones.segmenter import Segmenter, unit_image
+from semgrid_edu.networks.backbones.segnet import SegNet
 from semgrid_edu.networks.build import build_net
 from semgrid_edu.networks.fusion import FusionNet
 from semgrid_edu.networks.imagenet import load_imagenet
@@ -14,7 +17,10 @@ __all__ = [
     "SEGMENTERS",
     "WEIGHTS",
     "Architecture",
+    "DeepLab",
+    "Fcn",
     "FusionNet",
+    "SegNet",
     "Segmenter",
     "SemanticGridNet",
     "build_net",
