@@ -1,7 +1,4 @@
-"""Where numba keeps compiled functions, when the package and the user's own cache folder can't be written to.
-
-Where arrays that are made of a data set are kept.
-"""
+"""Where things are kept that can be made anew: what is made of a data set, and the functions that numba compiles."""
 
 import os
 import sys

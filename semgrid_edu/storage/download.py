@@ -1,7 +1,4 @@
-"""Downloads that go on where they broke off, for `pooch`, whose own downloader begins anew.
-
-Zip archives that are unpacked whole or not at all, and nowhere but in their folder.
-"""
+"""Downloads that go on where they broke off, and zip archives that are unpacked whole or not at all."""
 
 import shutil
 import stat

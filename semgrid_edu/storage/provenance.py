@@ -1,7 +1,4 @@
-"""Provenance: the command, seed and versions that made a result, and checksums that show whether it was changed.
-
-Folders that are shipped with the package: in a clone they lie beside it, in a wheel inside it.
-"""
+"""Provenance: how a result was made, and checksums that show whether it was changed; where shipped results lie."""
 
 import platform
 import subprocess

@@ -1,7 +1,4 @@
-"""Named tensors on disk: safetensors files with a header of strings, which are written whole or not at all.
-
-Named arrays on disk: compressed npz files that are written whole or not at all, and read with checks.
-"""
+"""Named tensors (safetensors) and named arrays (npz) on disk: written whole or not at all, and read with checks."""
 
 import io
 from pathlib import Path

@@ -1,7 +1,4 @@
-"""Where independent tasks are done: in processes of this machine, or on a dask.distributed cluster.
-
-Worker processes that share the work on the drives of a data set, and end with the process that started them.
-"""
+"""Where independent tasks are done: in processes of this machine, or on a dask.distributed cluster."""
 
 import os
 import threading

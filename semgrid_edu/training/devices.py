@@ -1,7 +1,4 @@
-"""The device that a training run computes on, and the precision that it computes with (section 4.1).
-
-The system's memory allocator and the large buffers that every training step makes and frees (section 4.1).
-"""
+"""The device that a training run computes on, its precision, and the memory that the run keeps (section 4.1)."""
 
 import ctypes
 import re

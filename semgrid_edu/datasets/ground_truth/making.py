@@ -1,7 +1,4 @@
-"""A semantic grid made from image labels and LIDAR scans by a policy: the paper's ground truth, and others (4).
-
-Which cells the camera sees, as far as a LIDAR scan tells: no farther than the last return in their direction (4).
-"""
+"""A semantic grid made from image labels and LIDAR scans by a policy: the paper's ground truth, and others (4)."""
 
 from collections.abc import Sequence
 from dataclasses import replace

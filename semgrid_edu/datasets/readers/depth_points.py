@@ -1,7 +1,4 @@
-"""A depth image as points in space, all of them or thinned to a LIDAR's sparsity (section 4: SYNTHIA).
-
-Labelled points seen from above: the class of each cell in which points with classes lie (section 4).
-"""
+"""Points with classes seen from above; a depth image as such points, as sparse as a LIDAR's if wished (section 4)."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,7 +1,4 @@
-"""Poses from GPS and inertial packets (OXTS), by the Mercator projection of the KITTI development kit (section 4).
-
-KITTI's timestamps.txt: one line per frame, to the nanosecond (section 4).
-"""
+"""KITTI's times, and poses from its GPS and inertial packets (OXTS) by the Mercator projection (section 4)."""
 
 import re
 from pathlib import Path

@@ -7,15 +7,12 @@
 
 Of the eight cameras this is the left one that looks ahead: the paper uses one pair of camera and depth.
 
-The files of a SYNTHIA sequence: labels, depth, intrinsics and poses (section 4; Ros et al., CVPR 2016).
-
 From the readme of the data set (26 June 2016): 5 frames a second; the first channel of a label PNG is the class, the
-second one the instance; depth is in centimetres, 16 bits, in any of three channels.
-
-From published programs that read it, since no sequence could be looked at: label PNGs have 16 bits a channel;
-intrinsics.txt holds focal length, principal point (u, v) and stereo baseline; a pose is 16 numbers, column by column
-the matrix that takes points from the camera to the world, with a camera whose x points right, y up and z *back*. If a
-sequence keeps its poses otherwise, `SynthiaSequence.problems` says that the camera doesn't move the way it looks.
+second one the instance; depth is in centimetres, 16 bits, in any of three channels. The rest is taken from published
+programs that read it, since no sequence could be looked at: label PNGs have 16 bits a channel; intrinsics.txt holds
+focal length, principal point (u, v) and stereo baseline; a pose is 16 numbers, column by column the matrix that takes
+points from the camera to the world, with a camera whose x points right, y up and z *back*. If a sequence keeps its
+poses otherwise, `SynthiaSequence.problems` says that the camera doesn't move the way it looks.
 """
 
 from functools import cached_property

@@ -1,7 +1,4 @@
-"""What all image networks share: RGB in 0..1 -> one score per class and pixel (paper, section 3.1).
-
-From the bytes of an image to the numbers that an image network takes (paper, section 3.1).
-"""
+"""What all image networks share: bytes -> RGB in 0..1 -> one score per class and pixel (paper, section 3.1)."""
 
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar
