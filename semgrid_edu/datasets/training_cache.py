@@ -106,15 +106,6 @@ def array_code(drives: LabelledDrives, recipe: ArrayRecipe) -> list[Path]:
         The drives; their readers may stand outside of the package.
     recipe : ArrayRecipe
         How the arrays are made; so may its sensor model.
-
-    Returns
-    -------
-    list of Path
-
-    Raises
-    ------
-    ArgumentError
-        When a reader or a sensor model isn't defined in a file, but, say, in a notebook.
     """
     parts = {type(recipe.params.sensor), *(type(drive) for drive, _ in drives)}
     return [Path(training_arrays.__file__), *map(_file_of, parts)]

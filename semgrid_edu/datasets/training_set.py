@@ -207,15 +207,6 @@ def read_excerpt(folder: str | Path) -> list[Sample]:
     ----------
     folder : path-like
         The folder that it wrote to.
-
-    Returns
-    -------
-    list of Sample
-
-    Raises
-    ------
-    DataError
-        When the file is missing or damaged.
     """
     path = Path(folder) / FRAMES
     _, tensors = read_tensors(path)

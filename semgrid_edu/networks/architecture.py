@@ -38,11 +38,6 @@ class Architecture:
         compared.
     reduces : bool
         Whether the 1x1 convolution reduces the planes. Without, all D x C of them go into the conv-deconv network.
-
-    Raises
-    ------
-    ArgumentError
-        When the image has no pixel, or images or planes ask for too much memory.
     """
 
     segmenter: str = "segnet"

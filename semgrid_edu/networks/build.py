@@ -34,11 +34,6 @@ def build_net(architecture: Architecture, camera: Camera, seed: int = 0) -> Sema
     -------
     SemanticGridNet
         The network, in training mode, as PyTorch's modules are when they are new.
-
-    Raises
-    ------
-    ArgumentError
-        When there is no such label set, image network or preset, or the heights aren't finite numbers.
     """
     if architecture.label_set not in LABEL_SETS:
         raise ArgumentError("label_set", f"one of {', '.join(LABEL_SETS)}", repr(architecture.label_set))
@@ -65,11 +60,6 @@ def plane_operator(grid: GridSpec, heights: ArrayLike, camera: Camera) -> PlaneO
     -------
     PlaneOperator
         The operator for one image; it is shared by all that ask for the same calibration.
-
-    Raises
-    ------
-    ArgumentError
-        When `heights` isn't a list of one or more finite numbers.
     """
     K, T = (np.asarray(matrix, np.float64).tobytes() for matrix in (camera.K, camera.T_camera_from_lidar))
     return _remembered(grid, tuple(check_heights(heights).tolist()), K, T, tuple(camera.size), camera.lidar_height)

@@ -120,12 +120,6 @@ def check_tensors(path: str | Path, found: dict[str, Tensor], expected: dict[str
         The file that they come from.
     found, expected : dict of str to Tensor
         The tensors of the file and those of the network; names and shapes are compared.
-
-    Raises
-    ------
-    DataError
-        When a tensor is missing, isn't the network's, has another shape, or holds a number that isn't finite or
-        a variance below 0.
     """
     for name in sorted(found.keys() | expected.keys()):
         have, want = (

@@ -130,11 +130,6 @@ def provenance_problems(folder: str | Path) -> list[str]:
     -------
     list of str
         One line for each file that is missing, changed or not recorded; empty when all is as it was made.
-
-    Raises
-    ------
-    DataError
-        When the folder has no readable `provenance.json`.
     """
     folder = Path(folder)
     record = folder / FILE_NAME

@@ -50,11 +50,6 @@ def read_arrays(path: str | Path) -> dict[str, NDArray]:
     -------
     dict of str to array
         Arrays by name, in memory.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or damaged, or holds objects, which would have to be unpickled.
     """
     content = io.BytesIO(read_bytes(Path(path)))
     try:
@@ -100,11 +95,6 @@ def read_tensors(path: str | Path) -> tuple[dict[str, str], dict[str, Tensor]]:
         Empty when the file has none.
     tensors : dict of str to Tensor
         Tensors by name, on the CPU.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or damaged.
     """
     if not Path(path).is_file():
         raise DataError(path, "a safetensors file", "no such file")

@@ -78,11 +78,6 @@ def check_workers(workers: int) -> None:
     ----------
     workers : int
         Number of processes; two can share one core.
-
-    Raises
-    ------
-    ArgumentError
-        When there is none, or there are more than two and more than cores.
     """
     cores = usable_cores()
     if not 1 <= workers <= max(2, cores):

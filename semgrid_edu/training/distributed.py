@@ -34,11 +34,6 @@ def process_group(device: str = "auto") -> Iterator[torch.device]:
     ------
     torch.device
         The device of this process.
-
-    Raises
-    ------
-    ArgumentError
-        When there is no such device.
     """
     chosen = choose_device(device, int(os.environ.get("LOCAL_RANK", 0)))
     gpu = chosen if chosen.type == "cuda" else None

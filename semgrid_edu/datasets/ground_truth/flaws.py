@@ -43,11 +43,6 @@ class TruthFlaws:
         Probability that such a small thing is missed, 0..1: an assumption.
     skewed : bool
         Whether scans are skewed as a turning scanner on a moving vehicle records them (`skew_scan`).
-
-    Raises
-    ------
-    ArgumentError
-        When a number is negative, or the probability is above 1.
     """
 
     rotation: float = 0.2
@@ -80,10 +75,6 @@ def miscalibrated(camera: Camera, flaws: TruthFlaws, rng: np.random.Generator) -
         How large the error is.
     rng : numpy.random.Generator
         Source of the error: one generator always gives the same camera.
-
-    Returns
-    -------
-    Camera
     """
     angles, shift = rng.standard_normal((2, 3)) * [[flaws.rotation], [flaws.translation]]
     error = rigid_transform(Rotation.from_rotvec(angles, degrees=True).as_matrix(), shift)

@@ -139,11 +139,6 @@ def drive_truth(
     -------
     (H, W) uint8
         A class of the frame's label set in every cell.
-
-    Raises
-    ------
-    ArgumentError
-        When there is no such frame, it has no belief, or as `lidar_truth` raises it.
     """
     if not 0 <= k < len(moments) or moments[k].belief is None:
         raise ArgumentError("k", f"a frame with a belief, 0 to {len(moments) - 1}", k)

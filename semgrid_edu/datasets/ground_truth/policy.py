@@ -46,11 +46,6 @@ class TruthPolicy:
         (`close_gaps`). "close": what stands is closed, and only the ground spreads (`close_and_spread`). The paper says
         that it uses morphological methods, not which.
 
-    Raises
-    ------
-    ArgumentError
-        When there is no such choice.
-
     Examples
     --------
     >>> TruthPolicy(past=9, movers="carried").visible_to

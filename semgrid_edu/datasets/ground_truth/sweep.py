@@ -41,15 +41,6 @@ def ego_velocity(frame: Frame, other: Frame) -> EgoVelocity:
         The frame.
     other : Frame
         The frame before or after it.
-
-    Returns
-    -------
-    EgoVelocity
-
-    Raises
-    ------
-    ArgumentError
-        When both frames have the same time.
     """
     seconds = other.time - frame.time
     if seconds == 0:

@@ -68,10 +68,6 @@ def gather_returns(
     policy : TruthPolicy
         Numbers of scans, which image labels them, whether they are de-skewed, and what happens to moving things.
 
-    Returns
-    -------
-    LabelledReturns
-
     Raises
     ------
     ArgumentError

@@ -45,11 +45,6 @@ class ClassTable:
         -------
         (...) uint8
             Classes of the label set; 255 where unlabelled.
-
-        Raises
-        ------
-        DataError
-            When the file holds a number that the table doesn't have.
         """
         known = np.array(sorted(self.names))
         places = np.searchsorted(known, numbers).clip(max=len(known) - 1)

@@ -47,10 +47,6 @@ def drive_folder(root: str | Path, date: str, drive: str) -> Path:
     drive : str
         Number of the drive, such as "0013".
 
-    Returns
-    -------
-    Path
-
     Examples
     --------
     >>> drive_folder("kitti_raw", "2011_09_26", "0013").name

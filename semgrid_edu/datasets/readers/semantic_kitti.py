@@ -78,11 +78,6 @@ def read_point_labels(path: Path, n_points: int) -> NDArray[np.int64]:
     -------
     (N,) int64
         Numbers of SemanticKITTI, which `SEMANTIC_KITTI_CLASSES` translates.
-
-    Raises
-    ------
-    DataError
-        When the file is missing, or doesn't have a label for each return.
     """
     content = read_bytes(path)
     if len(content) != 4 * n_points:
@@ -139,11 +134,6 @@ class SemanticKittiSequence(FrameSequence):
         -------
         (N, 4) float32
             LIDAR frame, metres, and reflectance.
-
-        Raises
-        ------
-        DataError
-            When the file is missing or damaged.
         """
         return read_scan(self.folder / "velodyne" / f"{k:06d}.bin")
 
@@ -154,11 +144,6 @@ class SemanticKittiSequence(FrameSequence):
         -------
         (N,) uint8
             Classes of KITTI-14; 255 where unlabelled.
-
-        Raises
-        ------
-        DataError
-            When the file is missing or damaged, or holds a number that is no class.
         """
         return SEMANTIC_KITTI_CLASSES.classes(self._label_file(k), self._numbers(k))
 
@@ -193,11 +178,6 @@ class SemanticKittiSequence(FrameSequence):
         -------
         (H, W) uint8
             Classes of KITTI-14; 255 in a cell in which there is no labelled return.
-
-        Raises
-        ------
-        DataError
-            When a file that this needs is missing or damaged.
         """
         window = range(max(0, k - before), min(len(self), k + after + 1))
         labelled = [self._labelled_points(j, k) for j in window]
@@ -248,13 +228,7 @@ class SemanticKittiSequence(FrameSequence):
 
     @cached_property
     def camera(self) -> Camera:
-        """The calibration of image_2, the same for all frames; its size from the first image or `IMAGE_SIZES`.
-
-        Raises
-        ------
-        DataError
-            When a file is missing or damaged, or nothing tells the size.
-        """
+        """The calibration of image_2, the same for all frames; its size from the first image or `IMAGE_SIZES`."""
         if self._has_images:
             height, width = read_png(self._image_file(0), "RGB", None).shape[:2]
         elif self.folder.name in IMAGE_SIZES:

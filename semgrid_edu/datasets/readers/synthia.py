@@ -73,11 +73,6 @@ def read_synthia_labels(path: Path, size: tuple[int, int] | None) -> NDArray[np.
     -------
     (h, w) uint8
         Classes of SYNTHIA-10.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or damaged, or holds a number that is no class.
     """
     return SYNTHIA_CLASSES.classes(path, read_png(path, "RGB;16", size)[..., 0].astype(np.int64))
 
@@ -96,11 +91,6 @@ def read_synthia_depth(path: Path, size: tuple[int, int] | None) -> NDArray[np.f
     -------
     (h, w) float32
         Metres along the optical axis; NaN where the file holds 0 or 65535, so that nothing was met.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or damaged.
     """
     centimetres = read_png(path, "RGB;16", size)[..., 0]
     nothing = (centimetres == 0) | (centimetres == np.iinfo(np.uint16).max)
@@ -119,11 +109,6 @@ def read_synthia_intrinsics(path: Path) -> NDArray[np.float64]:
     -------
     (3, 3) float64
         K, pixels.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or doesn't hold four numbers.
     """
     numbers = parse_numbers(path, read_text(path), "focal length, principal point and baseline")
     if numbers.size != 4 or numbers[0] <= 0:
@@ -144,11 +129,6 @@ def read_synthia_pose(path: Path) -> NDArray[np.float64]:
     -------
     (4, 4) float64
         T_world_from_camera, metres, for a camera whose x points right, y down and z ahead.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or its numbers are no rigid transform.
     """
     numbers = parse_numbers(path, read_text(path), "a pose")
     if numbers.size != 16 or not np.array_equal(numbers[3::4], [0, 0, 0, 1]):

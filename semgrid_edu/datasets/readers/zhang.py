@@ -54,11 +54,6 @@ class ZhangLabels:
     ----------
     folder : path-like
         Where the archive was unpacked: holds image_02.
-
-    Raises
-    ------
-    DataError
-        When there are no labels in the folder.
     """
 
     def __init__(self, folder: str | Path) -> None:
@@ -83,11 +78,6 @@ class ZhangLabels:
         -------
         list of (int, int)
             Run and acquisition, in ascending order.
-
-        Raises
-        ------
-        ArgumentError
-            When there is no such split.
         """
         if split not in ZHANG_RUNS:
             raise ArgumentError("split", f"one of {', '.join(ZHANG_RUNS)}", repr(split))
@@ -110,11 +100,6 @@ class ZhangLabels:
         FrameLabels or None
             Image labels only: depth is NaN and nothing of the bird's-eye view is labelled or visible, because the data
             set says nothing about them. None for a frame without labels.
-
-        Raises
-        ------
-        DataError
-            When the file is damaged or has another size.
         """
         path = self._files.get((run, acquisition))
         if path is None:

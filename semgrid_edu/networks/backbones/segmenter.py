@@ -57,11 +57,6 @@ class Segmenter(nn.Module, ABC):
         Name of a size in `PRESETS`: "compact" or "paper".
     seed : int
         Seed for the initial weights.
-
-    Raises
-    ------
-    ArgumentError
-        When there is no such preset.
     """
 
     PRESETS: ClassVar[dict[str, dict[str, Any]]]
@@ -93,11 +88,6 @@ class Segmenter(nn.Module, ABC):
         -------
         (B, C, h, w) float
             One score per class and pixel.
-
-        Raises
-        ------
-        ArgumentError
-            When the image isn't of floats, has another shape, or is too small for the network.
         """
         if image.ndim != 4 or image.shape[1] != 3:
             raise ArgumentError("image", "shape (B, 3, h, w)", tuple(image.shape))
