@@ -153,11 +153,7 @@ def flawed_drive(frames: Sequence[Frame], flaws: TruthFlaws, seed: int, number: 
 
 
 def flawed_frame(
-    frame: Frame,
-    flaws: TruthFlaws,
-    seed: int,
-    key: tuple[int, ...] = (),
-    velocity: EgoVelocity | None = None,
+    frame: Frame, flaws: TruthFlaws, seed: int, key: tuple[int, ...] = (), velocity: EgoVelocity | None = None
 ) -> Frame:
     """Return a frame as real data would have it: its calibration off, its labels drawn by hand, its scan skewed.
 

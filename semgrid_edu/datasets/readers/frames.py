@@ -62,12 +62,9 @@ class LabelledDrive(Protocol):
         The classes of image labels and truth.
     """
 
-    @property
-    def name(self) -> str: ...
-    @property
-    def camera(self) -> Camera: ...
-    @property
-    def label_set(self) -> LabelSet: ...
+    name: str
+    camera: Camera
+    label_set: LabelSet
 
     def __len__(self) -> int:
         """Return the number of frames."""

@@ -13,13 +13,7 @@ from semgrid_edu.camera import Camera, invert_rigid
 from semgrid_edu.datasets.readers.calibration import read_camera, read_rectification, read_rigid
 from semgrid_edu.datasets.readers.drive_doubts import jumps, short_scans, what_is
 from semgrid_edu.datasets.readers.frames import FrameSequence, error_of, read_scan
-from semgrid_edu.datasets.readers.kitti_labels import (
-    KINDS,
-    is_labelled,
-    read_label,
-    read_label_set,
-    read_labels,
-)
+from semgrid_edu.datasets.readers.kitti_labels import KINDS, is_labelled, read_label, read_label_set, read_labels
 from semgrid_edu.datasets.readers.oxts import imu_pose, read_packet, read_timestamps
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.frame import Frame, FrameLabels
