@@ -61,7 +61,7 @@ def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:
     Raises
     ------
     DataError
-        When the file is missing, damaged or of another program, its weights aren't those of the architecture in its
+        When the file is missing, damaged or of another program, its weights don't fit the architecture in its
         header, or one isn't a finite number.
     """
     header, tensors = read_tensors(path)

@@ -69,7 +69,7 @@ def user_cache() -> Path:
 
 
 def takes_files(folder: Path) -> bool:
-    """Return whether files can be written to a folder, which is made when missing.
+    """Return whether files can be written to a folder, which is created when missing.
 
     Parameters
     ----------

@@ -85,7 +85,7 @@ def write_provenance(folder: str | Path, command: str, seed: int, packages: tupl
     ----------
     folder : path-like
         The folder. All files below it are recorded with their SHA-256, except those in `cache/`, which can be made
-        anew, and what is hidden, alone or in a hidden folder: a writer that was killed leaves such.
+        anew, and hidden files and folders, which a writer that was killed may leave.
     command : str
         The command that made the files.
     seed : int

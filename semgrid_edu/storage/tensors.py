@@ -24,7 +24,7 @@ def write_arrays(path: str | Path, arrays: dict[str, NDArray]) -> None:
     Parameters
     ----------
     path : path-like
-        The .npz file to write; its folder is made when missing.
+        The .npz file to write; its folder is created when missing.
     arrays : dict of str to array
         Arrays of numbers or strings, by name.
 
@@ -65,7 +65,7 @@ def write_tensors(path: str | Path, tensors: dict[str, Tensor], header: dict[str
     Parameters
     ----------
     path : path-like
-        The safetensors file to write; its folder is made when missing.
+        The safetensors file to write; its folder is created when missing.
     tensors : dict of str to Tensor
         Tensors by name, contiguous and on the CPU.
     header : dict of str to str, optional

@@ -16,7 +16,7 @@ def keep_freed_memory() -> None:
     """Let this process keep the memory that it frees, for the next buffer of that size.
 
     On Linux, glibc hands freed buffers above 32 MB back to the system at once, and the system clears every page of the
-    next such buffer anew when it is touched. The twenty planes of a batch are larger than that: at the paper's scale,
+    next such buffer anew when it is touched. The twenty planes of a batch are larger than that. At the paper's scale,
     sampling them took 30 ms with glibc's defaults and 12 ms with kept memory. The price is that the process never
     shrinks below its peak. On systems other than Linux with glibc nothing changes.
     """

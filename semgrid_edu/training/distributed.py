@@ -129,7 +129,7 @@ def in_parallel(module: nn.Module, some_unused: bool) -> nn.Module:
     Parameters
     ----------
     module : Module
-        A module whose forward pass gives what the loss is made of.
+        A module whose forward pass gives the two sums of the loss.
     some_unused : bool
         Whether the loss doesn't depend on some of the weights.
 

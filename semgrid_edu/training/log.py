@@ -141,7 +141,7 @@ def append_step(path: Path, step: Step) -> None:
     path : Path
         The file to add to.
     step : Step
-        The step that was just made.
+        The step that has just been done.
 
     Raises
     ------

@@ -127,7 +127,7 @@ def descend(
     params : TrainingParams
         Numbers of iterations, rates and the like.
     run : dict
-        What tells this run from others, as for `save_checkpoint`.
+        What distinguishes this run from others, as for `save_checkpoint`.
     resume : bool
         Whether to continue from the folder's checkpoint.
     """

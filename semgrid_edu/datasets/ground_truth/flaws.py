@@ -145,7 +145,7 @@ def flawed_drive(frames: Sequence[Frame], flaws: TruthFlaws, seed: int, number: 
     Returns
     -------
     list of Frame
-        The scan of a drive with one frame alone isn't skewed, since nothing tells how the vehicle moves.
+        The scan of a drive with one frame alone isn't skewed, because a single pose doesn't show how the vehicle moves.
     """
     others = [frames[k - 1 if k else min(1, len(frames) - 1)] for k in range(len(frames))]
     velocities = [ego_velocity(a, b) if a is not b else None for a, b in zip(frames, others, strict=True)]
@@ -164,11 +164,11 @@ def flawed_frame(
     flaws : TruthFlaws
         How large the errors are.
     seed : int
-        Seed for the error of calibration: frames with the same seed have the same one, as those of one day do.
+        Seed for the error of calibration: frames with the same seed have the same one, as all frames of one day have.
     key : tuple of int
         Tells frames with the same seed apart, so that the errors in their labels differ.
     velocity : EgoVelocity, optional
-        Of the vehicle; without it the scan isn't skewed.
+        Velocity of the vehicle; without it the scan isn't skewed.
 
     Returns
     -------

@@ -76,8 +76,8 @@ def lidar_truth(
     policy : TruthPolicy, optional
         What is done differently; the paper's way when left out.
     before, after : sequence of Moment
-        The frames before and after this one, in the order of time, for policies that need them. Of these, as many are
-        used as there are.
+        The frames before and after this one, in the order of time, for policies that need them. When there are fewer
+        than the policy asks for, those that exist are used.
 
     Returns
     -------

@@ -49,7 +49,7 @@ def birdseye_votes(
 
 
 LIDAR_ROW_STEP, LIDAR_COL_STEP = 4, 2
-"""Of how many rows and columns one is kept to make a depth image about as sparse as a LIDAR scan."""
+"""Every fourth row and every second column makes a depth image about as sparse as a LIDAR scan."""
 
 DEPTH_RANGE = 80.0
 """Metres up to which a depth image is used: what a LIDAR reaches on most surfaces."""
@@ -67,7 +67,7 @@ def points_from_depth(
     camera : Camera
         The camera that took it, of this size.
     row_step, col_step : int
-        One row and one column of so many is kept, beginning with the first; 1 keeps all.
+        Every `row_step`-th row and every `col_step`-th column is kept, beginning with the first; 1 keeps all.
 
     Returns
     -------

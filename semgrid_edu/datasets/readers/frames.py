@@ -187,7 +187,7 @@ def visible_labels(labels: FrameLabels, spec: GridSpec) -> NDArray[np.uint8]:
 
 
 def nothing_known(label_set: LabelSet, image_size: tuple[int, int]) -> FrameLabels:
-    """Return the truth of a frame of which nothing is known, in which a reader replaces what its data set does tell.
+    """Return labels that say nothing, in which a reader replaces what its data set knows.
 
     Parameters
     ----------

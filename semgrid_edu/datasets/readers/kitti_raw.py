@@ -54,7 +54,7 @@ class KittiRawDrive(FrameSequence):
 
     `drive[k]` is frame k as KITTI numbers it, `drive[-1]` the last one, `drive[2:5]` a list of three. Some of KITTI's
     drives have gaps, such as 0009, which lacks the scans 177 to 180. A frame in a gap keeps its number, time and image;
-    it has no points, so that the filter predicts without being corrected. `gaps` tells which these are.
+    it has no points, so that the filter predicts without being corrected. `gaps` lists these frames.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class KittiRawDrive(FrameSequence):
         Whether to read the images. Without them, as if the drive had none, reading is quicker.
     view : str
         The folder of the images: "image_02" for the left camera, "image_03" for the right one. Labels of simulated
-        drives are those of the left one.
+        drives belong to the left one.
 
     Raises
     ------

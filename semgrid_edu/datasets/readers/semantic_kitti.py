@@ -33,7 +33,7 @@ from semgrid_edu.storage.reading import parse_numbers, read_bytes, read_png, rea
 IMAGE_SIZES = {"00": (376, 1241), "01": (376, 1241), "02": (376, 1241), "03": (375, 1242)} | {
     f"{sequence:02d}": (370, 1226) for sequence in range(4, 11)
 }
-"""Height and width of the images of the sequences with labels, pixels: calib.txt doesn't tell."""
+"""Height and width of the images of the sequences with labels, pixels: calib.txt doesn't give it."""
 
 
 SEMANTIC_KITTI_CLASSES = ClassTable(

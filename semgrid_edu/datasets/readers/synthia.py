@@ -56,7 +56,7 @@ SYNTHIA_CLASSES = ClassTable(
 """SYNTHIA-10's class of each number in the labels: the paper leaves sky, people, bicycles and traffic lights out."""
 
 SYNTHIA_CAMERA_AXES = np.diag([1.0, -1.0, -1.0])
-"""(3, 3): from this package's camera axes (x right, y down, z ahead) to those of SYNTHIA's poses."""
+"""(3, 3): from this package's camera axes (x right, y down, z ahead) to the axes of SYNTHIA's poses."""
 
 
 def read_synthia_labels(path: Path, size: tuple[int, int] | None) -> NDArray[np.uint8]:
@@ -144,13 +144,13 @@ SYNTHIA_PERIOD = 0.2
 """Seconds between frames: the readme says 5 a second."""
 
 GROUND_RANGE = 20.0
-"""Metres ahead up to which road in the first image tells how high the camera stands."""
+"""Metres ahead. Road in the first image that is closer shows how high the camera stands."""
 
 STANDING, MOSTLY = 0.05, 0.9
 """A camera that moves less far than this (metres a frame) stands; one that drives goes this share of its way ahead."""
 
 _CAMERA_FROM_LIDAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
-"""From axes that point forward, left and up to those of a camera."""
+"""From axes that point forward, left and up to the axes of a camera."""
 
 
 class SynthiaSequence(FrameSequence):
