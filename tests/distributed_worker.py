@@ -125,8 +125,10 @@ def refuse(folder):
 
 def fail(folder):
     """The second process alone meets an error, while the first waits for it."""
+    torch.set_default_dtype(torch.float32)
     streets = tiny_streets()
-    train(build_net(SMALL, CAMERA), Broken(streets, 17) if rank() == 1 else streets, folder, TrainingParams(10, 10, 2))
+    data = Broken(streets, 17) if rank() == 1 else streets
+    train(build_net(SMALL, CAMERA), data, folder / "fails", TrainingParams(10, 10, 2))
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
 from semgrid_edu.datasets.readers.kitti_tracking import KittiTrackingRun
 from semgrid_edu.datasets.readers.semantic_kitti import SemanticKittiSequence
 from semgrid_edu.datasets.readers.synthia import SynthiaSequence
-from semgrid_edu.datasets.readers.zhang import ZhangDrive, ZhangLabels, zhang_raw_drive
+from semgrid_edu.datasets.readers.zhang import ZhangDrive, ZhangLabels
 
 __all__ = [
     "DatasetIndex",
@@ -19,5 +19,4 @@ __all__ = [
     "ZhangLabels",
     "grid_truth",
     "load_index",
-    "zhang_raw_drive",
 ]

@@ -40,11 +40,6 @@ def cached_labels(drives: LabelledDrives, recipe: ArrayRecipe, truth: LidarTruth
     -------
     (N, H, W) uint8
         By drive.
-
-    Raises
-    ------
-    DataError
-        When the data set, or what was kept, is damaged.
     """
     key = f"{truth!r} {code_hash([Path(label_policies.__file__)])}"
     path = folder / f"labels-{hashlib.sha256(key.encode()).hexdigest()[:16]}.safetensors"

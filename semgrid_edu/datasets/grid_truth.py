@@ -28,11 +28,6 @@ def grid_truth(labels: FrameLabels, belief_probability: NDArray, spec: GridSpec)
     -------
     (H, W) uint8
         A class of the label set in every cell.
-
-    Raises
-    ------
-    ArgumentError
-        As `fill_unlabelled` raises it.
     """
     return fill_unlabelled(visible_labels(labels, spec), belief_probability, labels.label_set)
 
@@ -56,11 +51,6 @@ def fill_unlabelled(truth: NDArray[np.uint8], belief_probability: NDArray, label
     Returns
     -------
     (H, W) uint8
-
-    Raises
-    ------
-    ArgumentError
-        When it isn't known what cells without a label are in the label set, or shapes disagree.
     """
     if np.shape(belief_probability) != (4, *truth.shape):
         raise ArgumentError("belief_probability", f"shape {(4, *truth.shape)}", f"{np.shape(belief_probability)}")

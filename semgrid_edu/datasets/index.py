@@ -94,11 +94,6 @@ class DatasetIndex:
         -------
         dict of tuple of str to list of int
             The numbers of the labelled frames by drive, (date, number) for KITTI raw, in the order of the index.
-
-        Raises
-        ------
-        ArgumentError
-            When there is no such split.
         """
         if split not in self.splits:
             raise ArgumentError("split", f"one of {', '.join(self.splits)}", repr(split))
@@ -152,11 +147,6 @@ def dataset_doubts(dataset_dir: str | Path, *splits: str) -> list[str]:
     -------
     list of str
         One line for each doubtful thing, from the reader's `doubts`.
-
-    Raises
-    ------
-    ArgumentError, DataError
-        As `DatasetIndex.drives` raises them.
     """
     index = load_index(dataset_dir)
     drives = [drive for split in splits for drive, _ in index.drives(split)]
@@ -170,15 +160,6 @@ def load_index(dataset_dir: str | Path) -> DatasetIndex:
     ----------
     dataset_dir : path-like
         The folder of the data set, such as data/minikitti.
-
-    Returns
-    -------
-    DatasetIndex
-
-    Raises
-    ------
-    DataError
-        When the file is missing or isn't such an index.
     """
     root = Path(dataset_dir)
     path = root / INDEX_FILE

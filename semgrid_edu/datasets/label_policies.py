@@ -45,11 +45,6 @@ class LidarTruth:
         errors like those of real data. `NO_FLAWS` for real data.
     seed : int
         Seed for these errors. The error of calibration is the same in the whole data set.
-
-    Raises
-    ------
-    ArgumentError
-        When the seed is negative.
     """
 
     policy: TruthPolicy = field(default_factory=TruthPolicy)

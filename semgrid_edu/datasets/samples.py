@@ -38,15 +38,6 @@ def sample_weights(segmenter: str = "segnet") -> Path:
     ----------
     segmenter : str
         Name of its image network, one of `trained_segmenters`.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ArgumentError
-        When no such network is shipped.
     """
     from semgrid_edu.networks import WEIGHTS
 
@@ -60,15 +51,6 @@ def sample_image_stage(segmenter: str = "segnet") -> Path:
     ----------
     segmenter : str
         Name of its image network, one of `trained_segmenters`.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ArgumentError
-        When no such network is shipped.
     """
     from semgrid_edu.networks import IMAGE_STAGE
 
@@ -106,11 +88,6 @@ def samples_problems(folder: Path | None = None) -> list[str]:
     -------
     list of str
         One line for each file that is missing, changed or not recorded.
-
-    Raises
-    ------
-    DataError
-        When there is no such folder, or it holds no samples, or one has no provenance file.
     """
     folder = samples_dir() if folder is None else folder
     folders = (path for path in folder.iterdir() if path.is_dir()) if folder.is_dir() else ()

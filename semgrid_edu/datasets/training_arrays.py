@@ -58,11 +58,6 @@ def drive_arrays(drive: LabelledDrive, labelled: Sequence[int], recipe: ArrayRec
     list of dict of str to array
         For each labelled frame "image" (3, h, w) uint8, "labels" (h, w) uint8, "occupancy" (4, H, W) float32, "truth"
         (H, W) uint8, and "return_pixels" and "return_cells" from `seen_returns`.
-
-    Raises
-    ------
-    DataError
-        When a file of the drive is missing or damaged, or a labelled frame has no image or no labels.
     """
     frames, scans = tee(drive[k] for k in range(max(labelled) + 1))
     beliefs = track_drive(scans, recipe.spec, recipe.params, SEED)

@@ -105,16 +105,7 @@ def array_code(drives: LabelledDrives, recipe: ArrayRecipe) -> list[Path]:
     drives : sequence of (LabelledDrive, list of int)
         The drives; their readers may stand outside of the package.
     recipe : ArrayRecipe
-        How the arrays are made; so may its sensor model.
-
-    Returns
-    -------
-    list of Path
-
-    Raises
-    ------
-    ArgumentError
-        When a reader or a sensor model isn't defined in a file, but, say, in a notebook.
+        How the arrays are made. Its sensor model may stand outside of the package too.
     """
     parts = {type(recipe.params.sensor), *(type(drive) for drive, _ in drives)}
     return [Path(training_arrays.__file__), *map(_file_of, parts)]

@@ -61,7 +61,7 @@ class TrainingSet(Dataset[Sample]):
     spec : GridSpec, optional
         The grid of occupancy and truth; the compact one when left out.
     image_size : (int, int)
-        Height and width to which the images are resized, pixels; those of the compact network when left out.
+        Height and width to which the images are resized, pixels; the compact network's size when left out.
     params : CmcdotParams, optional
         Parameters of the occupancy filter; the package's own when left out.
     truth : LidarTruth, optional
@@ -207,15 +207,6 @@ def read_excerpt(folder: str | Path) -> list[Sample]:
     ----------
     folder : path-like
         The folder that it wrote to.
-
-    Returns
-    -------
-    list of Sample
-
-    Raises
-    ------
-    DataError
-        When the file is missing or damaged.
     """
     path = Path(folder) / FRAMES
     _, tensors = read_tensors(path)

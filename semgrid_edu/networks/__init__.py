@@ -1,19 +1,15 @@
 """The networks: i -> s and (p, o) -> g, each by itself and joined (paper, sections 3.1 and 3.4)."""
 
 from semgrid_edu.networks.architecture import Architecture
-from semgrid_edu.networks.backbones.conv_deconv import ConvDeconv
 from semgrid_edu.networks.backbones.deeplab import DeepLab
 from semgrid_edu.networks.backbones.fcn import Fcn
 from semgrid_edu.networks.backbones.registry import SEGMENTERS, build_segmenter
-from semgrid_edu.networks.backbones.resnet import ResNet
 from semgrid_edu.networks.backbones.segmenter import Segmenter, unit_image
 from semgrid_edu.networks.backbones.segnet import SegNet
-from semgrid_edu.networks.backbones.unet import UNet
-from semgrid_edu.networks.backbones.vgg import Vgg
 from semgrid_edu.networks.build import build_net
 from semgrid_edu.networks.fusion import FusionNet
 from semgrid_edu.networks.imagenet import load_imagenet
-from semgrid_edu.networks.semantic_grid import NetOutputs, SemanticGridNet
+from semgrid_edu.networks.semantic_grid import SemanticGridNet
 from semgrid_edu.networks.weights import IMAGE_STAGE, WEIGHTS, load_net, save_net
 
 __all__ = [
@@ -21,17 +17,12 @@ __all__ = [
     "SEGMENTERS",
     "WEIGHTS",
     "Architecture",
-    "ConvDeconv",
     "DeepLab",
     "Fcn",
     "FusionNet",
-    "NetOutputs",
-    "ResNet",
     "SegNet",
     "Segmenter",
     "SemanticGridNet",
-    "UNet",
-    "Vgg",
     "build_net",
     "build_segmenter",
     "load_imagenet",

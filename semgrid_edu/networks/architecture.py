@@ -7,8 +7,8 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.planes import plane_heights
 
 MOST_PIXELS, MOST_POINTS = 2**22, 2**24
-"""Pixels of an image, and points of all planes together: nine and fifteen times those of the published size. What asks
-for more is a mistake, or a damaged file, and would take all memory."""
+"""Pixels of an image, and points of all planes together: nine and fifteen times as many as at the published size. What
+asks for more is a mistake, or a damaged file, and would take all memory."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +38,6 @@ class Architecture:
         compared.
     reduces : bool
         Whether the 1x1 convolution reduces the planes. Without, all D x C of them go into the conv-deconv network.
-
-    Raises
-    ------
-    ArgumentError
-        When the image has no pixel, or images or planes ask for too much memory.
     """
 
     segmenter: str = "segnet"

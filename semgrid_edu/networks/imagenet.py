@@ -65,11 +65,6 @@ def imagenet_tensors(segmenter: Segmenter) -> dict[str, Tensor]:
     -------
     dict of str to Tensor
         The tensors by their names in the file; they are the network's own, not copies.
-
-    Raises
-    ------
-    ArgumentError
-        When the network has no published ImageNet weights.
     """
     if not (isinstance(segmenter, Segmenter) and segmenter.IMAGENET):
         published = ", ".join(name for name, network in SEGMENTERS.items() if network.IMAGENET)

@@ -76,13 +76,7 @@ class SemanticGridNet(nn.Module):
         )
 
     def need_architecture(self) -> Architecture:
-        """Return the architecture, for work that can't be done without it, such as saving or training.
-
-        Raises
-        ------
-        ArgumentError
-            When the network was put together by hand, without one.
-        """
+        """Return the architecture, for work that can't be done without it, such as saving or training."""
         if self.architecture is None:
             expected = "a network of build_net, which records its architecture"
             raise ArgumentError("net", expected, "one made by hand, without an architecture")
@@ -106,12 +100,6 @@ class SemanticGridNet(nn.Module):
         -------
         NetOutputs
             Scores, planes and logits.
-
-        Raises
-        ------
-        ArgumentError
-            When a size isn't the one that the network was built for, the image or the occupancy grid isn't of
-            floats, or there are more of one than of the other.
         """
         _check("image", image, (3, *self.sampler.image_size))
         _check("occupancy", occupancy, (N_STATES, *self.sampler.planes_shape[1:]))

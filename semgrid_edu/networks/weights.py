@@ -61,7 +61,7 @@ def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:
     Raises
     ------
     DataError
-        When the file is missing, damaged or of another program, its weights aren't those of the architecture in its
+        When the file is missing, damaged or of another program, its weights don't fit the architecture in its
         header, or one isn't a finite number.
     """
     header, tensors = read_tensors(path)
@@ -120,12 +120,6 @@ def check_tensors(path: str | Path, found: dict[str, Tensor], expected: dict[str
         The file that they come from.
     found, expected : dict of str to Tensor
         The tensors of the file and those of the network; names and shapes are compared.
-
-    Raises
-    ------
-    DataError
-        When a tensor is missing, isn't the network's, has another shape, or holds a number that isn't finite or
-        a variance below 0.
     """
     for name in sorted(found.keys() | expected.keys()):
         have, want = (

@@ -24,11 +24,11 @@ def code_hash(modules: Iterable[Path], root: Path = ROOT) -> str:
     str
         SHA-256, hexadecimal. It is another one under a Python whose syntax trees are printed otherwise.
     """
-    code = sorted(map(ast.dump, _trees(modules, root).values()))
+    code = sorted(map(ast.dump, import_closure(modules, root).values()))
     return hashlib.sha256("\n".join(code).encode()).hexdigest()
 
 
-def import_closure(modules: Iterable[Path], root: Path = ROOT) -> list[Path]:
+def import_closure(modules: Iterable[Path], root: Path = ROOT) -> dict[Path, ast.Module]:
     """Follow the import statements of modules, and of what they import, through the package.
 
     A name that a package passes on in its `__init__.py` leads to the module that defines it, so that one function of
@@ -43,14 +43,9 @@ def import_closure(modules: Iterable[Path], root: Path = ROOT) -> list[Path]:
 
     Returns
     -------
-    list of Path
-        The files, those of `modules` included, in alphabetical order.
+    dict of Path to ast.Module
+        The syntax trees of these modules and of all that they lead to, without docstrings.
     """
-    return sorted(_trees(modules, root))
-
-
-def _trees(modules: Iterable[Path], root: Path) -> dict[Path, ast.Module]:
-    """Return the syntax trees of modules and of all that they import, without docstrings."""
     trees: dict[Path, ast.Module] = {}
     waiting = list(modules)
     while waiting:

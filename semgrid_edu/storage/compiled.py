@@ -1,7 +1,4 @@
-"""Where numba keeps compiled functions, when the package and the user's own cache folder can't be written to.
-
-Where arrays that are made of a data set are kept.
-"""
+"""Where things are kept that can be made anew: what is made of a data set, and the functions that numba compiles."""
 
 import os
 import sys
@@ -72,7 +69,7 @@ def user_cache() -> Path:
 
 
 def takes_files(folder: Path) -> bool:
-    """Return whether files can be written to a folder, which is made when missing.
+    """Return whether files can be written to a folder, which is created when missing.
 
     Parameters
     ----------

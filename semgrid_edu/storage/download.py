@@ -1,7 +1,4 @@
-"""Downloads that go on where they broke off, for `pooch`, whose own downloader begins anew.
-
-Zip archives that are unpacked whole or not at all, and nowhere but in their folder.
-"""
+"""Downloads that go on where they broke off, and zip archives that are unpacked whole or not at all."""
 
 import shutil
 import stat
@@ -74,7 +71,7 @@ def _move(source: Path, target: Path) -> None:
 
 
 CHUNK = 2**16
-"""Bytes that are read at once; so many at most are lost when a connection breaks off."""
+"""Bytes that are read at once. When a connection breaks off, at most one such piece is lost."""
 
 _BROKEN = (requests.ConnectionError, requests.Timeout, requests.exceptions.ChunkedEncodingError)
 """What `requests` raises when a connection can't be made or breaks off; a server's own fault (5xx) counts as that."""
@@ -83,7 +80,7 @@ _BROKEN = (requests.ConnectionError, requests.Timeout, requests.exceptions.Chunk
 class ResumingDownloader:
     """A downloader for `pooch` that keeps what it has when a connection breaks off, and then asks for the rest.
 
-    After so many attempts it gives up, and the next download goes on from what was kept. What was kept is used only if
+    After `attempts` attempts it gives up; the next download goes on from what was kept. What was kept is used only if
     the file still has the entity tag (HTTP's ETag) that it had then; without tags every attempt begins anew.
 
     Parameters

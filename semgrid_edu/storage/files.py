@@ -21,7 +21,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     Parameters
     ----------
     path : path-like
-        The file to write; its folder is made when missing.
+        The file to write; its folder is created when missing.
 
     Yields
     ------
@@ -73,7 +73,7 @@ def check_writable(path: str | Path) -> None:
     Parameters
     ----------
     path : path-like
-        The file; its folder is made when missing.
+        The file; its folder is created when missing.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def write_bytes(path: str | Path, content: bytes) -> None:
     Parameters
     ----------
     path : path-like
-        The file to write; its folder is made when missing.
+        The file to write; its folder is created when missing.
     content : bytes
         All that the file is to hold.
     """
@@ -109,7 +109,7 @@ def write_text(path: str | Path, content: str) -> None:
     Parameters
     ----------
     path : path-like
-        The file to write; its folder is made when missing.
+        The file to write; its folder is created when missing.
     content : str
         All that the file is to hold.
     """
@@ -122,7 +122,7 @@ def write_json(path: str | Path, content: object) -> None:
     Parameters
     ----------
     path : path-like
-        The file to write; its folder is made when missing.
+        The file to write; its folder is created when missing.
     content : object
         Whatever JSON can hold.
     """

@@ -24,7 +24,7 @@ def sole_writer(folder: str | Path) -> Iterator[None]:
     Parameters
     ----------
     folder : path-like
-        The folder; it is made when missing.
+        The folder; it is created when missing.
 
     Raises
     ------

@@ -1,7 +1,4 @@
-"""Provenance: the command, seed and versions that made a result, and checksums that show whether it was changed.
-
-Folders that are shipped with the package: in a clone they lie beside it, in a wheel inside it.
-"""
+"""Provenance: how a result was made, and checksums that show whether it was changed; where shipped results lie."""
 
 import platform
 import subprocess
@@ -107,7 +104,7 @@ def write_provenance(folder: str | Path, command: str, seed: int, packages: tupl
     ----------
     folder : path-like
         The folder. All files below it are recorded with their SHA-256, except those in `cache/`, which can be made
-        anew, and what is hidden, alone or in a hidden folder: a writer that was killed leaves such.
+        anew, and hidden files and folders, which a writer that was killed may leave.
     command : str
         The command that made the files.
     seed : int
@@ -152,11 +149,6 @@ def provenance_problems(folder: str | Path) -> list[str]:
     -------
     list of str
         One line for each file that is missing, changed or not recorded; empty when all is as it was made.
-
-    Raises
-    ------
-    DataError
-        When the folder has no readable `provenance.json`.
     """
     folder = Path(folder)
     record = folder / FILE_NAME
@@ -164,15 +156,9 @@ def provenance_problems(folder: str | Path) -> list[str]:
     if not isinstance(expected, dict):
         raise DataError(record, "a provenance file with checksums by file name", repr(expected)[:200])
     found = _checksums(folder)
-    return (
-        [f"{folder / name}: missing" for name in sorted(expected.keys() - found.keys())]
-        + [f"{folder / name}: not in {FILE_NAME}" for name in sorted(found.keys() - expected.keys())]
-        + [
-            f"{folder / name}: changed"
-            for name in sorted(expected.keys() & found.keys())
-            if expected[name] != found[name]
-        ]
-    )
+    changed = sorted(name for name in expected.keys() | found.keys() if expected.get(name) != found.get(name))
+    how = {name: "changed" if name in expected else f"not in {FILE_NAME}" for name in found}
+    return [f"{folder / name}: {how.get(name, 'missing')}" for name in changed]
 
 
 def _checksums(folder: Path) -> dict[str, str]:

@@ -22,11 +22,6 @@ def read_bytes(path: Path) -> bytes:
     ----------
     path : Path
         The file to read.
-
-    Raises
-    ------
-    DataError
-        When the file is missing, can't be opened, is empty, or is no file but, say, a pipe, which could wait for ever.
     """
     try:
         if path.exists() and not path.is_file():
@@ -48,11 +43,6 @@ def read_text(path: Path) -> str:
     ----------
     path : Path
         The file to read: ASCII, as all of KITTI's text files are.
-
-    Raises
-    ------
-    DataError
-        When the file is missing, can't be opened, is empty or isn't ASCII.
     """
     try:
         return read_bytes(path).decode("ascii")
@@ -69,11 +59,6 @@ def read_json(path: str | Path, kind: type = dict) -> Any:
         The file to read: UTF-8.
     kind : type
         What it has to hold: `dict` for an object, `list` for an array.
-
-    Raises
-    ------
-    DataError
-        When the file is missing, damaged, nested too deeply to be meant, or holds something else.
     """
     return parse_json(path, read_bytes(Path(path)), kind)
 
@@ -89,11 +74,6 @@ def parse_json(path: str | Path, text: str | bytes, kind: type = dict) -> Any:
         The JSON; bytes are UTF-8.
     kind : type
         What it has to hold: `dict` for an object, `list` for an array.
-
-    Raises
-    ------
-    DataError
-        When the text isn't JSON, is nested too deeply to be meant, or holds something else.
     """
     expected = "a JSON array" if kind is list else "a JSON object"
     try:
@@ -122,11 +102,6 @@ def parse_numbers(path: Path, text: str, what: str) -> NDArray[np.float64]:
     Returns
     -------
     (N,) float64
-
-    Raises
-    ------
-    DataError
-        When a word isn't a finite number.
     """
     try:
         numbers = np.array([float(word) for word in text.split()])

@@ -1,7 +1,4 @@
-"""Named tensors on disk: safetensors files with a header of strings, which are written whole or not at all.
-
-Named arrays on disk: compressed npz files that are written whole or not at all, and read with checks.
-"""
+"""Named tensors (safetensors) and named arrays (npz) on disk: written whole or not at all, and read with checks."""
 
 import io
 from pathlib import Path
@@ -27,7 +24,7 @@ def write_arrays(path: str | Path, arrays: dict[str, NDArray]) -> None:
     Parameters
     ----------
     path : path-like
-        The .npz file to write; its folder is made when missing.
+        The .npz file to write; its folder is created when missing.
     arrays : dict of str to array
         Arrays of numbers or strings, by name.
 
@@ -53,11 +50,6 @@ def read_arrays(path: str | Path) -> dict[str, NDArray]:
     -------
     dict of str to array
         Arrays by name, in memory.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or damaged, or holds objects, which would have to be unpickled.
     """
     content = io.BytesIO(read_bytes(Path(path)))
     try:
@@ -73,7 +65,7 @@ def write_tensors(path: str | Path, tensors: dict[str, Tensor], header: dict[str
     Parameters
     ----------
     path : path-like
-        The safetensors file to write; its folder is made when missing.
+        The safetensors file to write; its folder is created when missing.
     tensors : dict of str to Tensor
         Tensors by name, contiguous and on the CPU.
     header : dict of str to str, optional
@@ -103,11 +95,6 @@ def read_tensors(path: str | Path) -> tuple[dict[str, str], dict[str, Tensor]]:
         Empty when the file has none.
     tensors : dict of str to Tensor
         Tensors by name, on the CPU.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or damaged.
     """
     if not Path(path).is_file():
         raise DataError(path, "a safetensors file", "no such file")

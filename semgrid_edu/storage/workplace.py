@@ -1,7 +1,4 @@
-"""Where independent tasks are done: in processes of this machine, or on a dask.distributed cluster.
-
-Worker processes that share the work on the drives of a data set, and end with the process that started them.
-"""
+"""Where independent tasks are done: in processes of this machine, or on a dask.distributed cluster."""
 
 import os
 import threading
@@ -81,11 +78,6 @@ def check_workers(workers: int) -> None:
     ----------
     workers : int
         Number of processes; two can share one core.
-
-    Raises
-    ------
-    ArgumentError
-        When there is none, or there are more than two and more than cores.
     """
     cores = usable_cores()
     if not 1 <= workers <= max(2, cores):

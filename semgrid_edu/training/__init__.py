@@ -1,23 +1,7 @@
 """Learning the weights: batches, loss, loop, checkpoints, devices and processes (paper, section 4.1)."""
 
-from semgrid_edu.training.loop import CHECKPOINT, CHECKPOINT_EVERY, train
-from semgrid_edu.training.loss import (
-    Objective,
-    class_frequencies,
-    class_weights,
-    median_frequency_weights,
-    weighted_cross_entropy,
-)
+from semgrid_edu.training.loop import CHECKPOINT, train
+from semgrid_edu.training.loss import Objective, median_frequency_weights, weighted_cross_entropy
 from semgrid_edu.training.params import TrainingParams
 
-__all__ = [
-    "CHECKPOINT",
-    "CHECKPOINT_EVERY",
-    "Objective",
-    "TrainingParams",
-    "class_frequencies",
-    "class_weights",
-    "median_frequency_weights",
-    "train",
-    "weighted_cross_entropy",
-]
+__all__ = ["CHECKPOINT", "Objective", "TrainingParams", "median_frequency_weights", "train", "weighted_cross_entropy"]

@@ -53,7 +53,7 @@ def save_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimise
         The safetensors file. It is written atomically: after a kill or on a full disk, the checkpoint before it is
         still there.
     run : dict
-        What tells this run from others, such as its seed, by name; anything that JSON can hold.
+        What distinguishes this run from others, such as its seed, by name; anything that JSON can hold.
     net : Module
         The network that learns.
     optimiser : SGD
@@ -76,7 +76,7 @@ def load_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimise
     path : Path
         A file that `save_checkpoint` wrote.
     run : dict
-        What tells this run from others; it must equal what the file says.
+        What distinguishes this run from others; it must equal what the file says.
     net : Module
         The network, whose weights are replaced.
     optimiser : SGD

@@ -1,7 +1,4 @@
-"""The device that a training run computes on, and the precision that it computes with (section 4.1).
-
-The system's memory allocator and the large buffers that every training step makes and frees (section 4.1).
-"""
+"""The device that a training run computes on, its precision, and the memory that the run keeps (section 4.1)."""
 
 import ctypes
 import re
@@ -19,7 +16,7 @@ def keep_freed_memory() -> None:
     """Let this process keep the memory that it frees, for the next buffer of that size.
 
     On Linux, glibc hands freed buffers above 32 MB back to the system at once, and the system clears every page of the
-    next such buffer anew when it is touched. The twenty planes of a batch are larger than that: at the paper's scale,
+    next such buffer anew when it is touched. The twenty planes of a batch are larger than that. At the paper's scale,
     sampling them took 30 ms with glibc's defaults and 12 ms with kept memory. The price is that the process never
     shrinks below its peak. On systems other than Linux with glibc nothing changes.
     """

@@ -34,11 +34,6 @@ def process_group(device: str = "auto") -> Iterator[torch.device]:
     ------
     torch.device
         The device of this process.
-
-    Raises
-    ------
-    ArgumentError
-        When there is no such device.
     """
     chosen = choose_device(device, int(os.environ.get("LOCAL_RANK", 0)))
     gpu = chosen if chosen.type == "cuda" else None
@@ -134,7 +129,7 @@ def in_parallel(module: nn.Module, some_unused: bool) -> nn.Module:
     Parameters
     ----------
     module : Module
-        A module whose forward pass gives what the loss is made of.
+        A module whose forward pass gives the two sums of the loss.
     some_unused : bool
         Whether the loss doesn't depend on some of the weights.
 

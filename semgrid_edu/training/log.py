@@ -71,12 +71,6 @@ def read_log(path: str | Path) -> TrainingLog:
     -------
     TrainingLog
         N steps.
-
-    Raises
-    ------
-    DataError
-        When there is no such file, a line isn't one of a log, or steps are missing or out of order; the message gives
-        the number of the line.
     """
     path = Path(path)
     if not path.is_file():
@@ -147,7 +141,7 @@ def append_step(path: Path, step: Step) -> None:
     path : Path
         The file to add to.
     step : Step
-        The step that was just made.
+        The step that has just been done.
 
     Raises
     ------

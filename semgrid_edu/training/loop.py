@@ -127,17 +127,9 @@ def descend(
     params : TrainingParams
         Numbers of iterations, rates and the like.
     run : dict
-        What tells this run from others, as for `save_checkpoint`.
+        What distinguishes this run from others, as for `save_checkpoint`.
     resume : bool
         Whether to continue from the folder's checkpoint.
-
-    Raises
-    ------
-    ArgumentError
-        When the checkpoint belongs to another run, or the loss isn't finite.
-    DataError
-        When there is no checkpoint to resume from or it is damaged; when the folder holds a run that a new one would
-        overwrite; or when another process trains in it.
     """
     check_folder(folder, resume)
     with sole_writer(folder) if rank() == 0 else nullcontext():

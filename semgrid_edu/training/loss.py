@@ -35,11 +35,6 @@ def class_frequencies(maps: Iterable[NDArray], n_classes: int) -> NDArray[np.flo
     (C,) float64
         A share, 0..1; 0 for a class that occurs in no map.
 
-    Raises
-    ------
-    ArgumentError
-        When a map holds a number that is neither a class nor 255.
-
     Examples
     --------
     >>> class_frequencies([[0, 0, 0, 1], [0, 0, 0, 0]], n_classes=3)
@@ -77,11 +72,6 @@ def median_frequency_weights(maps: Iterable[NDArray], n_classes: int, limit: flo
     (C,) float64
         0 for a class that occurs in no map; such a class isn't part of the median.
 
-    Raises
-    ------
-    ArgumentError
-        When no cell is labelled, or a map holds a number that is neither a class nor 255.
-
     Examples
     --------
     >>> median_frequency_weights([[0, 0, 0, 1], [0, 0, 0, 2]], n_classes=4)
@@ -114,11 +104,6 @@ def class_weights(dataset: Sequence[Sample], stage: str, n_classes: int, limit: 
     -------
     (C,) float32
         alpha_c, 0 for a class that occurs in no frame.
-
-    Raises
-    ------
-    ArgumentError
-        When nothing is labelled, or a label is neither a class nor 255.
     """
     maps = (getattr(sample, TRUTH[stage]).numpy() for sample in dataset)
     try:

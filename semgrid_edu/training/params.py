@@ -36,11 +36,6 @@ class TrainingParams:
     mirror : bool
         Whether about half of the batches, by chance, are mirrored: a street with left and right exchanged is just as
         likely.
-
-    Raises
-    ------
-    ArgumentError
-        When nothing can be learnt with one of the numbers.
     """
 
     image_iterations: int = 2000

@@ -34,11 +34,6 @@ def architecture(segmenter: str, preset: str = "compact") -> Architecture:
     -------
     Architecture
         What `build_net` takes.
-
-    Raises
-    ------
-    ArgumentError
-        When there is no such preset.
     """
     if preset == "compact":
         return Architecture(segmenter)
@@ -87,11 +82,6 @@ def chosen_truth(name: str) -> LidarTruth | None:
     -------
     LidarTruth or None
         What `TrainingSet` takes; None for "true".
-
-    Raises
-    ------
-    ArgumentError
-        When there is no such truth.
     """
     if name != "true" and name not in POLICIES:
         raise ArgumentError("--truth", f"one of true, {', '.join(POLICIES)}", repr(name))

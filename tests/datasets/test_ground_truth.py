@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets.ground_truth import Moment, TruthPolicy, drive_truth, in_sight, lidar_truth
+from semgrid_edu.datasets.ground_truth import Moment, TruthPolicy, drive_truth, lidar_truth
+from semgrid_edu.datasets.ground_truth.making import in_sight
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec

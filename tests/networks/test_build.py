@@ -24,11 +24,11 @@ COARSE = Architecture(
 @pytest.fixture
 def built(monkeypatch):
     """Forget what other tests built; return a list that grows by one for each operator built."""
-    building.plane_operator.cache_clear()
+    building._remembered.cache_clear()
     sizes, original = [], PlaneOperator.build
     monkeypatch.setattr(PlaneOperator, "build", lambda *points: sizes.append(points[-1]) or original(*points))
     yield sizes
-    building.plane_operator.cache_clear()
+    building._remembered.cache_clear()
 
 
 def _tensors(sampler):

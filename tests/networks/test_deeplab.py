@@ -3,8 +3,9 @@ import torch
 from torch import nn
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.networks import ResNet, build_segmenter
+from semgrid_edu.networks import build_segmenter
 from semgrid_edu.networks.backbones.deeplab import DeepLab, interpolate
+from semgrid_edu.networks.backbones.resnet import ResNet
 
 
 def _count(module):

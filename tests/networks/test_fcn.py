@@ -3,8 +3,9 @@ import pytest
 import torch
 from torch import nn
 
-from semgrid_edu.networks import Vgg, build_segmenter
+from semgrid_edu.networks import build_segmenter
 from semgrid_edu.networks.backbones.fcn import enlarge
+from semgrid_edu.networks.backbones.vgg import Vgg
 
 PAPER = (64, 128, 256, 512, 512)
 

@@ -60,9 +60,9 @@ def test_changed_missing_and_added_files_are_each_named(recorded):
     write_text(recorded / "3.txt", "three")
     problems = provenance_problems(recorded)
     assert [line.rsplit("/", 1)[-1] for line in problems] == [
-        "1.txt: missing",
-        "3.txt: not in provenance.json",
         "2.txt: changed",
+        "3.txt: not in provenance.json",
+        "1.txt: missing",
     ]
 
 

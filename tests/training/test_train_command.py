@@ -12,7 +12,8 @@ from semgrid_edu.datasets import index as dataset_index
 from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
-from semgrid_edu.networks import SEGMENTERS, Architecture, Fcn, load_net
+from semgrid_edu.networks import SEGMENTERS, Architecture, load_net
+from semgrid_edu.networks.backbones.fcn import Fcn
 from semgrid_edu.storage.files import sha256, write_text
 from semgrid_edu.storage.provenance import provenance_problems
 from semgrid_edu.training import CHECKPOINT

@@ -42,11 +42,6 @@ def carry_labels(
     Returns
     -------
     (H, W) uint8
-
-    Raises
-    ------
-    ArgumentError
-        When a pixel or a cell lies outside, or the label set has no unknown classes.
     """
     labels = np.asarray(labels)
     unknown = np.array(unknown_numbers(label_set), np.uint8)[np.argmax(occupancy, axis=-3)]
@@ -82,11 +77,6 @@ def close_gaps(
     -------
     (H, W) uint8
         Each cell that was observed, but that no label reached, takes the class of the nearest cell that has one.
-
-    Raises
-    ------
-    ArgumentError
-        When the label set has no unknown classes.
     """
     unobserved = unknown_numbers(label_set)[State.UNKNOWN]
     unlabelled = grid >= label_set.n_semantic
@@ -116,11 +106,6 @@ def close_and_spread(grid: NDArray, cell: float, label_set: LabelSet = KITTI_14)
     -------
     (H, W) uint8
         Cells that were observed, but that no label reached, may have one now; the others are as they were.
-
-    Raises
-    ------
-    ArgumentError
-        When the label set has no unknown classes.
     """
     flat = np.array([label_set.index(name) for name in label_set.flat])
     only_ground = np.where((grid < label_set.n_semantic) & ~np.isin(grid, flat), unknown_numbers(label_set)[0], grid)
@@ -147,11 +132,6 @@ def unknown_numbers(label_set: LabelSet) -> tuple[int, ...]:
     -------
     tuple of 4 int
         Class numbers in the order FREE, STATIC, DYNAMIC, UNKNOWN.
-
-    Raises
-    ------
-    ArgumentError
-        When the label set has no unknown classes.
 
     Examples
     --------

@@ -43,11 +43,6 @@ class TruthFlaws:
         Probability that such a small thing is missed, 0..1: an assumption.
     skewed : bool
         Whether scans are skewed as a turning scanner on a moving vehicle records them (`skew_scan`).
-
-    Raises
-    ------
-    ArgumentError
-        When a number is negative, or the probability is above 1.
     """
 
     rotation: float = 0.2
@@ -80,10 +75,6 @@ def miscalibrated(camera: Camera, flaws: TruthFlaws, rng: np.random.Generator) -
         How large the error is.
     rng : numpy.random.Generator
         Source of the error: one generator always gives the same camera.
-
-    Returns
-    -------
-    Camera
     """
     angles, shift = rng.standard_normal((2, 3)) * [[flaws.rotation], [flaws.translation]]
     error = rigid_transform(Rotation.from_rotvec(angles, degrees=True).as_matrix(), shift)
@@ -154,7 +145,7 @@ def flawed_drive(frames: Sequence[Frame], flaws: TruthFlaws, seed: int, number: 
     Returns
     -------
     list of Frame
-        The scan of a drive with one frame alone isn't skewed, since nothing tells how the vehicle moves.
+        The scan of a drive with one frame alone isn't skewed, because a single pose doesn't show how the vehicle moves.
     """
     others = [frames[k - 1 if k else min(1, len(frames) - 1)] for k in range(len(frames))]
     velocities = [ego_velocity(a, b) if a is not b else None for a, b in zip(frames, others, strict=True)]
@@ -162,11 +153,7 @@ def flawed_drive(frames: Sequence[Frame], flaws: TruthFlaws, seed: int, number: 
 
 
 def flawed_frame(
-    frame: Frame,
-    flaws: TruthFlaws,
-    seed: int,
-    key: tuple[int, ...] = (),
-    velocity: EgoVelocity | None = None,
+    frame: Frame, flaws: TruthFlaws, seed: int, key: tuple[int, ...] = (), velocity: EgoVelocity | None = None
 ) -> Frame:
     """Return a frame as real data would have it: its calibration off, its labels drawn by hand, its scan skewed.
 
@@ -177,11 +164,11 @@ def flawed_frame(
     flaws : TruthFlaws
         How large the errors are.
     seed : int
-        Seed for the error of calibration: frames with the same seed have the same one, as those of one day do.
+        Seed for the error of calibration: frames with the same seed have the same one, as all frames of one day have.
     key : tuple of int
         Tells frames with the same seed apart, so that the errors in their labels differ.
     velocity : EgoVelocity, optional
-        Of the vehicle; without it the scan isn't skewed.
+        Velocity of the vehicle; without it the scan isn't skewed.
 
     Returns
     -------

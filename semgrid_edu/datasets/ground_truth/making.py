@@ -1,7 +1,4 @@
-"""A semantic grid made from image labels and LIDAR scans by a policy: the paper's ground truth, and others (4).
-
-Which cells the camera sees, as far as a LIDAR scan tells: no farther than the last return in their direction (4).
-"""
+"""A semantic grid made from image labels and LIDAR scans by a policy: the paper's ground truth, and others (4)."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -79,8 +76,8 @@ def lidar_truth(
     policy : TruthPolicy, optional
         What is done differently; the paper's way when left out.
     before, after : sequence of Moment
-        The frames before and after this one, in the order of time, for policies that need them. Of these, as many are
-        used as there are.
+        The frames before and after this one, in the order of time, for policies that need them. When there are fewer
+        than the policy asks for, those that exist are used.
 
     Returns
     -------
@@ -142,11 +139,6 @@ def drive_truth(
     -------
     (H, W) uint8
         A class of the frame's label set in every cell.
-
-    Raises
-    ------
-    ArgumentError
-        When there is no such frame, it has no belief, or as `lidar_truth` raises it.
     """
     if not 0 <= k < len(moments) or moments[k].belief is None:
         raise ArgumentError("k", f"a frame with a belief, 0 to {len(moments) - 1}", k)

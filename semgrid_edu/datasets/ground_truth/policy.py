@@ -39,17 +39,12 @@ class TruthPolicy:
         the ground's only if none does, as in the true grids (`LabelSet.most_voted`); a thin pole then keeps its cell,
         but so does one wrong return. "majority": the most frequent one.
     visible_to : str
-        Which cells may keep a label. "any": all. "camera": those in the sight of the camera, as far as this scan tells
+        Which cells may keep a label. "any": all. "camera": those in the sight of the camera, as far as this scan shows
         (`in_sight`). "lidar": those about which the LIDAR has said something: their most probable state isn't UNKNOWN.
     cleanup : str
         How the gaps between the rings are closed. "none": not. "spread": all classes alike spread into them
         (`close_gaps`). "close": what stands is closed, and only the ground spreads (`close_and_spread`). The paper says
         that it uses morphological methods, not which.
-
-    Raises
-    ------
-    ArgumentError
-        When there is no such choice.
 
     Examples
     --------

@@ -41,15 +41,6 @@ def ego_velocity(frame: Frame, other: Frame) -> EgoVelocity:
         The frame.
     other : Frame
         The frame before or after it.
-
-    Returns
-    -------
-    EgoVelocity
-
-    Raises
-    ------
-    ArgumentError
-        When both frames have the same time.
     """
     seconds = other.time - frame.time
     if seconds == 0:
@@ -94,7 +85,7 @@ def deskew_scan(points: NDArray, velocity: EgoVelocity) -> NDArray:
         Returns as they were recorded: x forward, y left, z up in the frame of the LIDAR as it stood when each was
         measured, metres.
     velocity : EgoVelocity
-        Of the vehicle.
+        Velocity of the vehicle.
 
     Returns
     -------
@@ -116,7 +107,7 @@ def skew_scan(points: NDArray, velocity: EgoVelocity) -> NDArray:
     points : (N, 3+) float
         Returns in the frame of the LIDAR at one instant: x forward, y left, z up, metres.
     velocity : EgoVelocity
-        Of the vehicle.
+        Velocity of the vehicle.
 
     Returns
     -------

@@ -62,21 +62,19 @@ def gather_returns(
     frame : Frame
         The labelled frame.
     before, after : sequence of Moment
-        What came before it and after it, in the order of time; the nearest are used, as many as there are.
+        What came before it and after it, in the order of time; the nearest are used. There may be fewer than the policy
+        asks for.
     spec : GridSpec
         The grid of the beliefs.
     policy : TruthPolicy
         Numbers of scans, which image labels them, whether they are de-skewed, and what happens to moving things.
 
-    Returns
-    -------
-    LabelledReturns
-
     Raises
     ------
     ArgumentError
         When labels are missing or have another size than the image; when moving things are to be treated and a belief
-        is missing; when a scan is to be de-skewed and no other frame tells how the vehicle moves.
+        is missing; when a scan is to be de-skewed and there is no other frame from whose pose the vehicle's motion
+        follows.
     """
     moments = [*before, Moment(frame, None), *after]
     frames = [moment.frame for moment in moments]
@@ -114,7 +112,7 @@ def _scan(frames: list[Frame], k: int, deskew: bool) -> NDArray[np.float32]:
     if not deskew:
         return frames[k].points
     if len(frames) < 2:
-        raise ArgumentError("before, after", "a frame beside the labelled one, whose pose tells the motion", "none")
+        raise ArgumentError("before, after", "a frame beside the labelled one, whose pose shows the motion", "none")
     return deskew_scan(frames[k].points, ego_velocity(frames[k], frames[k - 1 if k else 1]))
 
 

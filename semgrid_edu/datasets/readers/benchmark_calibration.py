@@ -43,15 +43,6 @@ def read_benchmark_calibration(path: Path) -> BenchmarkCalibration:
     ----------
     path : Path
         calib.txt of an odometry sequence, or the file of a tracking run.
-
-    Returns
-    -------
-    BenchmarkCalibration
-
-    Raises
-    ------
-    DataError
-        When the file is missing or damaged.
     """
     entries = _entries(path)
     K, T_camera_from_rectified = projection(path, entries, "P2")
@@ -82,11 +73,6 @@ def parse_pose(path: Path, text: str, what: str) -> NDArray[np.float64]:
     -------
     (4, 4) float64
         Metres.
-
-    Raises
-    ------
-    DataError
-        When there are more or fewer numbers, or they are no rigid transform.
     """
     return _rigid(path, {what: text}, what)
 

@@ -27,15 +27,6 @@ def read_camera(folder: Path, name: str = "image_02") -> Camera:
         The folder of a date, which holds calib_cam_to_cam.txt and calib_velo_to_cam.txt.
     name : str
         Name of the folder that its images lie in, "image_00" to "image_03".
-
-    Returns
-    -------
-    Camera
-
-    Raises
-    ------
-    DataError
-        When a file is missing or damaged.
     """
     K, T_camera_from_camera0, size = read_rectification(folder / "calib_cam_to_cam.txt", name)
     T_camera0_from_lidar = read_rigid(folder / "calib_velo_to_cam.txt")
@@ -62,11 +53,6 @@ def read_rectification(
         Rigid transform from the unrectified camera 0, metres.
     size : (int, int)
         Height and width, pixels.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or damaged.
     """
     calibration = read_calibration(path)
     number = name.removeprefix("image_")
@@ -96,11 +82,6 @@ def projection(path: Path, calibration: dict[str, str], key: str) -> tuple[NDArr
         Intrinsic matrix, pixels.
     T_camera_from_rectified : (4, 4) float64
         Shift from the rectified frame of camera 0 along its x axis, metres.
-
-    Raises
-    ------
-    DataError
-        When the key is missing or has no such matrix.
     """
     P = entry_of(path, calibration, key, (3, 4))
     if not (P[0, 0] > 0 and P[1, 1] > 0 and P[1, 0] == 0 and np.array_equal(P[2, :3], [0, 0, 1])):
@@ -120,11 +101,6 @@ def read_rigid(path: Path) -> NDArray[np.float64]:
     -------
     (4, 4) float64
         Metres.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or damaged, or R isn't a rotation.
     """
     calibration = read_calibration(path)
     return rigid_transform(_rotation(path, calibration, "R"), entry_of(path, calibration, "T", (3,)))
@@ -142,11 +118,6 @@ def read_calibration(path: Path) -> dict[str, str]:
     -------
     dict of str to str
         The values of each key, not parsed yet.
-
-    Raises
-    ------
-    DataError
-        When the file is missing, a line has no key, a key comes twice, or the last line is cut short.
     """
     text = read_text(path)
     if not text.endswith("\n"):
@@ -177,11 +148,6 @@ def entry_of(path: Path, calibration: dict[str, str], key: str, shape: tuple[int
     Returns
     -------
     (shape) float64
-
-    Raises
-    ------
-    DataError
-        When the key is missing, or has more or fewer numbers.
     """
     if key not in calibration:
         raise DataError(path, f"the key {key}", f"the keys {', '.join(calibration)}")
@@ -212,11 +178,6 @@ def check_rotation(path: Path, R: NDArray[np.float64], what: str) -> NDArray[np.
     -------
     (3, 3) float64
         `R` as it is.
-
-    Raises
-    ------
-    DataError
-        When it isn't a rotation.
     """
     if np.abs(R @ R.T - np.eye(3)).max() > ROTATION_TOLERANCE or np.linalg.det(R) < 0:
         raise DataError(path, f"a rotation matrix for {what}", R.tolist())

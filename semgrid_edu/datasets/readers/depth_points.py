@@ -1,7 +1,4 @@
-"""A depth image as points in space, all of them or thinned to a LIDAR's sparsity (section 4: SYNTHIA).
-
-Labelled points seen from above: the class of each cell in which points with classes lie (section 4).
-"""
+"""Points with classes seen from above; a depth image as such points, as sparse as a LIDAR's if wished (section 4)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +49,7 @@ def birdseye_votes(
 
 
 LIDAR_ROW_STEP, LIDAR_COL_STEP = 4, 2
-"""Of how many rows and columns one is kept to make a depth image about as sparse as a LIDAR scan."""
+"""Every fourth row and every second column makes a depth image about as sparse as a LIDAR scan."""
 
 DEPTH_RANGE = 80.0
 """Metres up to which a depth image is used: what a LIDAR reaches on most surfaces."""
@@ -70,7 +67,7 @@ def points_from_depth(
     camera : Camera
         The camera that took it, of this size.
     row_step, col_step : int
-        One row and one column of so many is kept, beginning with the first; 1 keeps all.
+        Every `row_step`-th row and every `col_step`-th column is kept, beginning with the first; 1 keeps all.
 
     Returns
     -------

@@ -44,10 +44,6 @@ def fetch_kitti(folder: str | Path, drive: str, source: str = KITTI_SOURCE) -> K
     source : str
         Where the archives are.
 
-    Returns
-    -------
-    KittiRawDrive
-
     Raises
     ------
     ArgumentError

@@ -34,11 +34,6 @@ def read_scan(path: Path) -> NDArray[np.float32]:
     -------
     (N, 4) float32
         x forward, y left, z up in the LIDAR frame (metres), and reflectance.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or cut short, or a number is no measurement.
     """
     content = read_bytes(path)
     if len(content) % 16:
@@ -67,12 +62,9 @@ class LabelledDrive(Protocol):
         The classes of image labels and truth.
     """
 
-    @property
-    def name(self) -> str: ...
-    @property
-    def camera(self) -> Camera: ...
-    @property
-    def label_set(self) -> LabelSet: ...
+    name: str
+    camera: Camera
+    label_set: LabelSet
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -134,11 +126,6 @@ class FrameSequence(Sequence[Frame]):
         """Return what the bird's-eye labels of a frame say of the cells that the camera sees.
 
         Parameters and result are those of `LabelledDrive.truth`.
-
-        Raises
-        ------
-        DataError
-            When the frame has no labels, or a file that it needs is missing or damaged.
         """
         labels = self[k].labels
         if labels is None:
@@ -174,11 +161,6 @@ def count_frames(folder: Path, what: str, suffix: str) -> int:
     -------
     int
         One more than the highest number, since files of some frames may be missing.
-
-    Raises
-    ------
-    DataError
-        When there is no such file.
     """
     numbers = [int(path.stem) for path in folder.glob(f"*{suffix}") if re.fullmatch(r"\d{6}", path.stem)]
     if not numbers:
@@ -205,7 +187,7 @@ def visible_labels(labels: FrameLabels, spec: GridSpec) -> NDArray[np.uint8]:
 
 
 def nothing_known(label_set: LabelSet, image_size: tuple[int, int]) -> FrameLabels:
-    """Return the truth of a frame of which nothing is known, in which a reader replaces what its data set does tell.
+    """Return labels that say nothing, in which a reader replaces what its data set knows.
 
     Parameters
     ----------

@@ -33,11 +33,6 @@ def read_labels(folder: Path, name: str, image_size: tuple[int, int]) -> FrameLa
     -------
     FrameLabels or None
         None for a frame without labels.
-
-    Raises
-    ------
-    DataError
-        When only some of the files are there, or one is damaged.
     """
     if not is_labelled(folder, name):
         return None
@@ -76,11 +71,6 @@ def read_label(folder: Path, kind: str, name: str, image_size: tuple[int, int] |
     -------
     (h, w) or (710, 310), of the type that it has in `FrameLabels`
         The field of `FrameLabels` that `kind` names.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or damaged.
     """
     path = folder / kind / name
     if kind == "depth":
@@ -98,11 +88,6 @@ def read_label_set(path: Path) -> LabelSet:
     ----------
     path : Path
         label_set.txt of a drive.
-
-    Raises
-    ------
-    DataError
-        When the file is missing, or there is no such label set.
     """
     name = read_text(path).strip()
     if name not in LABEL_SETS:

@@ -13,13 +13,7 @@ from semgrid_edu.camera import Camera, invert_rigid
 from semgrid_edu.datasets.readers.calibration import read_camera, read_rectification, read_rigid
 from semgrid_edu.datasets.readers.drive_doubts import jumps, short_scans, what_is
 from semgrid_edu.datasets.readers.frames import FrameSequence, error_of, read_scan
-from semgrid_edu.datasets.readers.kitti_labels import (
-    KINDS,
-    is_labelled,
-    read_label,
-    read_label_set,
-    read_labels,
-)
+from semgrid_edu.datasets.readers.kitti_labels import KINDS, is_labelled, read_label, read_label_set, read_labels
 from semgrid_edu.datasets.readers.oxts import imu_pose, read_packet, read_timestamps
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.frame import Frame, FrameLabels
@@ -47,10 +41,6 @@ def drive_folder(root: str | Path, date: str, drive: str) -> Path:
     drive : str
         Number of the drive, such as "0013".
 
-    Returns
-    -------
-    Path
-
     Examples
     --------
     >>> drive_folder("kitti_raw", "2011_09_26", "0013").name
@@ -64,7 +54,7 @@ class KittiRawDrive(FrameSequence):
 
     `drive[k]` is frame k as KITTI numbers it, `drive[-1]` the last one, `drive[2:5]` a list of three. Some of KITTI's
     drives have gaps, such as 0009, which lacks the scans 177 to 180. A frame in a gap keeps its number, time and image;
-    it has no points, so that the filter predicts without being corrected. `gaps` tells which these are.
+    it has no points, so that the filter predicts without being corrected. `gaps` lists these frames.
 
     Parameters
     ----------
@@ -78,7 +68,7 @@ class KittiRawDrive(FrameSequence):
         Whether to read the images. Without them, as if the drive had none, reading is quicker.
     view : str
         The folder of the images: "image_02" for the left camera, "image_03" for the right one. Labels of simulated
-        drives are those of the left one.
+        drives belong to the left one.
 
     Raises
     ------

@@ -1,7 +1,4 @@
-"""Poses from GPS and inertial packets (OXTS), by the Mercator projection of the KITTI development kit (section 4).
-
-KITTI's timestamps.txt: one line per frame, to the nanosecond (section 4).
-"""
+"""KITTI's times, and poses from its GPS and inertial packets (OXTS) by the Mercator projection (section 4)."""
 
 import re
 from pathlib import Path
@@ -31,11 +28,6 @@ def read_timestamps(path: Path, n_frames: int) -> NDArray[np.datetime64]:
     -------
     (n_frames,) datetime64[ns]
         NaT for an empty line, by which KITTI marks a scan that was never recorded.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or damaged, a line isn't a time, the number of lines is wrong, or time runs backwards.
     """
     lines = read_text(path).splitlines()
     times = np.array([_parse(path, number, line) for number, line in enumerate(lines, 1)], dtype="datetime64[ns]")
@@ -80,11 +72,6 @@ def read_packet(path: Path) -> NDArray[np.float64]:
     -------
     (30,) float64
         Latitude and longitude (degrees), altitude (m), roll, pitch and yaw (rad), and 24 numbers more.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or damaged, or its numbers are no position or no attitude.
     """
     return parse_packet(path, read_text(path))
 
@@ -103,11 +90,6 @@ def parse_packet(path: Path, text: str) -> NDArray[np.float64]:
     -------
     (30,) float64
         As `read_packet` says.
-
-    Raises
-    ------
-    DataError
-        When the numbers are no position or no attitude.
     """
     packet = parse_numbers(path, text, "an oxts packet")
     if packet.size != PACKET_FIELDS:

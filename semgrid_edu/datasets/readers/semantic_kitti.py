@@ -20,7 +20,7 @@ from semgrid_edu.datasets.readers.benchmark_calibration import (
     parse_pose,
     read_benchmark_calibration,
 )
-from semgrid_edu.datasets.readers.class_tables import FIRST_MOVING, SEMANTIC_KITTI_CLASSES, read_point_labels
+from semgrid_edu.datasets.readers.class_tables import ClassTable
 from semgrid_edu.datasets.readers.depth_points import birdseye_votes
 from semgrid_edu.datasets.readers.frames import FrameSequence, count_frames, nothing_known, read_scan
 from semgrid_edu.datasets.readers.project_lidar import seen_returns
@@ -28,12 +28,61 @@ from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
-from semgrid_edu.storage.reading import parse_numbers, read_png, read_text
+from semgrid_edu.storage.reading import parse_numbers, read_bytes, read_png, read_text
 
 IMAGE_SIZES = {"00": (376, 1241), "01": (376, 1241), "02": (376, 1241), "03": (375, 1242)} | {
     f"{sequence:02d}": (370, 1226) for sequence in range(4, 11)
 }
-"""Height and width of the images of the sequences with labels, pixels: calib.txt doesn't tell."""
+"""Height and width of the images of the sequences with labels, pixels: calib.txt doesn't give it."""
+
+
+SEMANTIC_KITTI_CLASSES = ClassTable(
+    KITTI_14,
+    {
+        **dict.fromkeys((40, 44, 60), "road"),  # road, parking, lane marking
+        **dict.fromkeys((48,), "sidewalk"),
+        **dict.fromkeys((70, 71, 72), "vegetation"),  # vegetation, trunk, terrain
+        **dict.fromkeys((10, 13, 16, 18, 20), "car"),  # car, bus, on rails, truck, other vehicle
+        **dict.fromkeys((252, 256, 257, 258, 259), "car"),  # the same that move: car, on rails, bus, truck, other
+        **dict.fromkeys((30, 254), "pedestrian"),
+        **dict.fromkeys((11, 15, 31, 32, 253, 255), "bicycle"),  # bicycle, motorcycle, and who rides them
+        **dict.fromkeys((50,), "building"),
+        **dict.fromkeys((80, 81), "signage"),  # pole, traffic sign
+        **dict.fromkeys((51,), "fence"),
+        **dict.fromkeys((0, 1, 49, 52, 99), None),  # unlabelled, outlier, other ground, other structure, other object
+    },
+)
+"""KITTI-14's class of each number in the labels, which is that of the data set's own semantic-kitti.yaml.
+
+As in the rest of the package, poles are signage, whoever rides a bicycle belongs to it, and grass is vegetation.
+KITTI-14 has no classes for larger vehicles and for motorcycles, so they become cars and bicycles."""
+
+FIRST_MOVING = 252
+"""From this number on, a class is of things that move."""
+
+
+def read_point_labels(path: Path, n_points: int) -> NDArray[np.int64]:
+    """Read the number of each return's class.
+
+    The file holds a little-endian uint32 for each return: the class in the lower 16 bits, the instance in the upper
+    ones.
+
+    Parameters
+    ----------
+    path : Path
+        The file, such as labels/000000.label.
+    n_points : int
+        N, the number of returns of the scan.
+
+    Returns
+    -------
+    (N,) int64
+        Numbers of SemanticKITTI, which `SEMANTIC_KITTI_CLASSES` translates.
+    """
+    content = read_bytes(path)
+    if len(content) != 4 * n_points:
+        raise DataError(path, f"4 bytes for each of the scan's {n_points} returns", f"{len(content)} bytes")
+    return (np.frombuffer(content, dtype="<u4") & 0xFFFF).astype(np.int64)
 
 
 class SemanticKittiSequence(FrameSequence):
@@ -85,11 +134,6 @@ class SemanticKittiSequence(FrameSequence):
         -------
         (N, 4) float32
             LIDAR frame, metres, and reflectance.
-
-        Raises
-        ------
-        DataError
-            When the file is missing or damaged.
         """
         return read_scan(self.folder / "velodyne" / f"{k:06d}.bin")
 
@@ -100,11 +144,6 @@ class SemanticKittiSequence(FrameSequence):
         -------
         (N,) uint8
             Classes of KITTI-14; 255 where unlabelled.
-
-        Raises
-        ------
-        DataError
-            When the file is missing or damaged, or holds a number that is no class.
         """
         return SEMANTIC_KITTI_CLASSES.classes(self._label_file(k), self._numbers(k))
 
@@ -139,11 +178,6 @@ class SemanticKittiSequence(FrameSequence):
         -------
         (H, W) uint8
             Classes of KITTI-14; 255 in a cell in which there is no labelled return.
-
-        Raises
-        ------
-        DataError
-            When a file that this needs is missing or damaged.
         """
         window = range(max(0, k - before), min(len(self), k + after + 1))
         labelled = [self._labelled_points(j, k) for j in window]
@@ -194,13 +228,7 @@ class SemanticKittiSequence(FrameSequence):
 
     @cached_property
     def camera(self) -> Camera:
-        """The calibration of image_2, the same for all frames; its size from the first image or `IMAGE_SIZES`.
-
-        Raises
-        ------
-        DataError
-            When a file is missing or damaged, or nothing tells the size.
-        """
+        """The calibration of image_2, the same for all frames; its size from the first image or `IMAGE_SIZES`."""
         if self._has_images:
             height, width = read_png(self._image_file(0), "RGB", None).shape[:2]
         elif self.folder.name in IMAGE_SIZES:

@@ -7,15 +7,12 @@
 
 Of the eight cameras this is the left one that looks ahead: the paper uses one pair of camera and depth.
 
-The files of a SYNTHIA sequence: labels, depth, intrinsics and poses (section 4; Ros et al., CVPR 2016).
-
 From the readme of the data set (26 June 2016): 5 frames a second; the first channel of a label PNG is the class, the
-second one the instance; depth is in centimetres, 16 bits, in any of three channels.
-
-From published programs that read it, since no sequence could be looked at: label PNGs have 16 bits a channel;
-intrinsics.txt holds focal length, principal point (u, v) and stereo baseline; a pose is 16 numbers, column by column
-the matrix that takes points from the camera to the world, with a camera whose x points right, y up and z *back*. If a
-sequence keeps its poses otherwise, `SynthiaSequence.problems` says that the camera doesn't move the way it looks.
+second one the instance; depth is in centimetres, 16 bits, in any of three channels. The rest is taken from published
+programs that read it, since no sequence could be looked at: label PNGs have 16 bits a channel; intrinsics.txt holds
+focal length, principal point (u, v) and stereo baseline; a pose is 16 numbers, column by column the matrix that takes
+points from the camera to the world, with a camera whose x points right, y up and z *back*. If a sequence keeps its
+poses otherwise, `SynthiaSequence.problems` says that the camera doesn't move the way it looks.
 """
 
 from functools import cached_property
@@ -59,7 +56,7 @@ SYNTHIA_CLASSES = ClassTable(
 """SYNTHIA-10's class of each number in the labels: the paper leaves sky, people, bicycles and traffic lights out."""
 
 SYNTHIA_CAMERA_AXES = np.diag([1.0, -1.0, -1.0])
-"""(3, 3): from this package's camera axes (x right, y down, z ahead) to those of SYNTHIA's poses."""
+"""(3, 3): from this package's camera axes (x right, y down, z ahead) to the axes of SYNTHIA's poses."""
 
 
 def read_synthia_labels(path: Path, size: tuple[int, int] | None) -> NDArray[np.uint8]:
@@ -76,11 +73,6 @@ def read_synthia_labels(path: Path, size: tuple[int, int] | None) -> NDArray[np.
     -------
     (h, w) uint8
         Classes of SYNTHIA-10.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or damaged, or holds a number that is no class.
     """
     return SYNTHIA_CLASSES.classes(path, read_png(path, "RGB;16", size)[..., 0].astype(np.int64))
 
@@ -99,11 +91,6 @@ def read_synthia_depth(path: Path, size: tuple[int, int] | None) -> NDArray[np.f
     -------
     (h, w) float32
         Metres along the optical axis; NaN where the file holds 0 or 65535, so that nothing was met.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or damaged.
     """
     centimetres = read_png(path, "RGB;16", size)[..., 0]
     nothing = (centimetres == 0) | (centimetres == np.iinfo(np.uint16).max)
@@ -122,11 +109,6 @@ def read_synthia_intrinsics(path: Path) -> NDArray[np.float64]:
     -------
     (3, 3) float64
         K, pixels.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or doesn't hold four numbers.
     """
     numbers = parse_numbers(path, read_text(path), "focal length, principal point and baseline")
     if numbers.size != 4 or numbers[0] <= 0:
@@ -147,11 +129,6 @@ def read_synthia_pose(path: Path) -> NDArray[np.float64]:
     -------
     (4, 4) float64
         T_world_from_camera, metres, for a camera whose x points right, y down and z ahead.
-
-    Raises
-    ------
-    DataError
-        When the file is missing or its numbers are no rigid transform.
     """
     numbers = parse_numbers(path, read_text(path), "a pose")
     if numbers.size != 16 or not np.array_equal(numbers[3::4], [0, 0, 0, 1]):
@@ -167,13 +144,13 @@ SYNTHIA_PERIOD = 0.2
 """Seconds between frames: the readme says 5 a second."""
 
 GROUND_RANGE = 20.0
-"""Metres ahead up to which road in the first image tells how high the camera stands."""
+"""Metres ahead. Road in the first image that is closer shows how high the camera stands."""
 
 STANDING, MOSTLY = 0.05, 0.9
 """A camera that moves less far than this (metres a frame) stands; one that drives goes this share of its way ahead."""
 
 _CAMERA_FROM_LIDAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
-"""From axes that point forward, left and up to those of a camera."""
+"""From axes that point forward, left and up to the axes of a camera."""
 
 
 class SynthiaSequence(FrameSequence):

@@ -3,13 +3,10 @@
 What their own readme (12 August 2015) says: 252 acquisitions of eight runs of KITTI's *tracking* training set are
 labelled, every tenth or twentieth; 140 in the runs 9, 10, 11 and 19 for training, 112 in the runs 0, 4, 5 and 13 for
 testing (the paper says 142 and 110). Image labels are MATLAB files image_02/(trn or test)/(run)/(acquisition), each a
-matrix of the numbers in `ZHANG_CLASSES`; pictures in the colours of `ZHANG_COLOURS` come with them.
+matrix of the numbers in `ZHANG_CLASSES`.
 
-What is assumed here, since the archive itself couldn't be looked at: files end in .mat and .png; their names and the
-runs' folders are numbers, with or without leading zeros; a picture lies beside its matrix; a matrix is the only
-two-dimensional variable of its file.
-
-Drives with Zhang et al.'s labels: KITTI's frames, in raw or tracking layout, and what they show (section 4).
+What is assumed here, since the archive itself couldn't be looked at: files end in .mat; their names and the runs'
+folders are numbers, with or without leading zeros; a matrix is the only two-dimensional variable of its file.
 """
 
 import io
@@ -23,11 +20,10 @@ from numpy.typing import NDArray
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.readers.class_tables import ClassTable
 from semgrid_edu.datasets.readers.frames import FrameSequence, nothing_known
-from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.frame import Frame, FrameLabels
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.storage.reading import read_bytes, read_png
+from semgrid_edu.storage.reading import read_bytes
 
 ZHANG_CLASSES = ClassTable(
     KITTI_14,
@@ -47,21 +43,6 @@ ZHANG_CLASSES = ClassTable(
 )
 """KITTI-14's class of each number in their matrices."""
 
-ZHANG_COLOURS = {
-    0: (255, 255, 255),
-    1: (153, 0, 0),
-    2: (0, 51, 102),
-    3: (160, 160, 160),
-    4: (0, 102, 0),
-    5: (255, 228, 196),
-    6: (255, 200, 50),
-    7: (255, 153, 255),
-    8: (204, 153, 255),
-    9: (130, 255, 255),
-    10: (193, 120, 87),
-}
-"""Red, green and blue of each number in their pictures."""
-
 ZHANG_RUNS = {"train": (9, 10, 11, 19), "test": (0, 4, 5, 13)}
 """The runs of KITTI's tracking training set that each split consists of."""
 
@@ -73,18 +54,13 @@ class ZhangLabels:
     ----------
     folder : path-like
         Where the archive was unpacked: holds image_02.
-
-    Raises
-    ------
-    DataError
-        When there are no labels in the folder.
     """
 
     def __init__(self, folder: str | Path) -> None:
         self.folder = Path(folder)
         self._files: dict[tuple[int, int], Path] = {}
-        for path in sorted(self.folder.glob("image_02/*/*/*"), key=lambda path: path.suffix, reverse=True):
-            if path.suffix in (".mat", ".png") and re.fullmatch(r"\d+/\d+", f"{path.parent.name}/{path.stem}"):
+        for path in sorted(self.folder.glob("image_02/*/*/*.mat")):
+            if re.fullmatch(r"\d+/\d+", f"{path.parent.name}/{path.stem}"):
                 self._files[int(path.parent.name), int(path.stem)] = path
         if not self._files:
             expected = "labels such as image_02/trn/0009/000000.mat"
@@ -102,11 +78,6 @@ class ZhangLabels:
         -------
         list of (int, int)
             Run and acquisition, in ascending order.
-
-        Raises
-        ------
-        ArgumentError
-            When there is no such split.
         """
         if split not in ZHANG_RUNS:
             raise ArgumentError("split", f"one of {', '.join(ZHANG_RUNS)}", repr(split))
@@ -129,16 +100,11 @@ class ZhangLabels:
         FrameLabels or None
             Image labels only: depth is NaN and nothing of the bird's-eye view is labelled or visible, because the data
             set says nothing about them. None for a frame without labels.
-
-        Raises
-        ------
-        DataError
-            When the file is damaged or has another size.
         """
         path = self._files.get((run, acquisition))
         if path is None:
             return None
-        numbers = _matrix(path) if path.suffix == ".mat" else _numbers_of_colours(path, image_size)
+        numbers = _matrix(path)
         if numbers.shape != image_size:
             raise DataError(path, "labels of {} x {} pixels".format(*image_size), "{} x {}".format(*numbers.shape))
         return replace(nothing_known(KITTI_14, image_size), image=ZHANG_CLASSES.classes(path, numbers))
@@ -161,41 +127,15 @@ def _matrix(path: Path) -> NDArray:
     return found[0]
 
 
-def _numbers_of_colours(path: Path, image_size: tuple[int, int]) -> NDArray[np.int64]:
-    """Read a picture of labels, refusing a colour that stands for nothing."""
-    picture = read_png(path, "RGB", image_size).astype(np.int64)
-    codes = picture @ (1 << 16, 1 << 8, 1)
-    known = {(r << 16) + (g << 8) + b: number for number, (r, g, b) in ZHANG_COLOURS.items()}
-    values, places = np.unique(codes, return_inverse=True)
-    for value in values:
-        if value not in known:
-            colour = (int(value) >> 16, int(value) >> 8 & 255, int(value) & 255)
-            raise DataError(path, "the colours of Zhang et al.'s readme", f"{colour}")
-    return np.array([known[value] for value in values])[places].reshape(codes.shape)
-
-
-RAW_DRIVES = {
-    0: ("2011_09_26", "0005", 154),
-    4: ("2011_09_26", "0014", 314),
-    5: ("2011_09_26", "0015", 297),
-    10: ("2011_09_26", "0056", 294),
-    11: ("2011_09_26", "0059", 373),
-    13: ("2011_09_26", "0091", 340),
-    19: ("2011_09_29", "0071", 1059),
-}
-"""Date, number and frames of the raw drive that a run of the tracking set was taken from.
-
-Assumed, because drive and run have equally many frames, as far as we know: it couldn't be checked against the data, and
-for run 9 we know of no such drive. Look at some labels over their images before you rely on an entry."""
-
-
 class ZhangDrive(FrameSequence):
     """The frames of a drive, with the labels of those that Zhang et al. labelled.
 
     Parameters
     ----------
     drive : FrameSequence
-        The frames of the run: a `KittiTrackingRun`, or a raw drive that begins where the run does.
+        The frames of the run: a `KittiTrackingRun`, or a raw drive that begins where the run does. By their numbers of
+        frames these seem to be, for the runs 0, 4, 5, 10, 11 and 13, the drives 0005, 0014, 0015, 0056, 0059 and 0091
+        of 2011_09_26, and for run 19 drive 0071 of 2011_09_29; look at some labels over their images first.
     labels : ZhangLabels
         The labels of all runs.
     run : int
@@ -230,35 +170,3 @@ class ZhangDrive(FrameSequence):
     def _frame(self, k: int) -> Frame:
         frame = self.drive[k]
         return replace(frame, labels=self.labels.read(self.run, k, frame.camera.size))
-
-
-def zhang_raw_drive(root: str | Path, labels: ZhangLabels, run: int) -> ZhangDrive:
-    """Open a labelled run whose frames are in KITTI's raw layout.
-
-    Parameters
-    ----------
-    root : path-like
-        The folder of KITTI raw drives, which holds the folders of the dates.
-    labels : ZhangLabels
-        The labels of all runs.
-    run : int
-        A key of `RAW_DRIVES`.
-
-    Returns
-    -------
-    ZhangDrive
-
-    Raises
-    ------
-    ArgumentError
-        When it isn't known which raw drive the run was taken from.
-    DataError
-        When there is no such drive, or it has another number of frames than the run.
-    """
-    if run not in RAW_DRIVES:
-        raise ArgumentError("run", f"one of {', '.join(map(str, RAW_DRIVES))}", run)
-    date, number, n_frames = RAW_DRIVES[run]
-    drive = KittiRawDrive(root, date, number)
-    if len(drive) != n_frames:
-        raise DataError(drive.folder, f"the {n_frames} frames of tracking run {run}", f"{len(drive)}")
-    return ZhangDrive(drive, labels, run)

@@ -77,11 +77,6 @@ class ConvDeconv(nn.Module):
         -------
         (B, n_out, H, W) float
             The result of the last layer.
-
-        Raises
-        ------
-        ArgumentError
-            When a side is smaller than 2^S: after S halvings nothing would be left of it.
         """
         smallest = 2 ** len(self.encoder)
         if min(x.shape[2:]) < smallest:

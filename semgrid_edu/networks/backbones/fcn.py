@@ -23,7 +23,7 @@ class Fcn(Segmenter):
         C, the number of classes that are scored.
     preset : str
         "paper" is VGG16 with 4096 channels in conv6 and conv7; "compact" has the same layers, narrow, with batch
-        normalisation, without which so many layers hardly learn from random weights.
+        normalisation, without which a network this deep hardly learns from random weights.
     seed : int
         Seed for the initial weights.
 

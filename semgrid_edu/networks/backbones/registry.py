@@ -36,11 +36,6 @@ def build_segmenter(name: str, n_classes: int, preset: str = "compact", seed: in
     Segmenter
         (B, 3, h, w) RGB in 0..1 -> (B, C, h, w) scores, without a soft-max.
 
-    Raises
-    ------
-    ArgumentError
-        When there is no such network or preset, or less than one class.
-
     Examples
     --------
     >>> sum(p.numel() for p in build_segmenter("segnet", n_classes=14).parameters())

@@ -27,11 +27,6 @@ class ResNet(nn.Module):
     output_stride : int
         Pixels from one cell of the result to the next. 8: the last two stages are atrous, with rates 2 and 4, as in
         DeepLab; 16: only the last stage is; 32: none is, as in the publication.
-
-    Raises
-    ------
-    ArgumentError
-        When the output stride is none of these.
     """
 
     def __init__(self, width: int, depths: tuple[int, ...], output_stride: int = 8) -> None:

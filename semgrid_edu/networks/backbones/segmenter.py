@@ -1,7 +1,4 @@
-"""What all image networks share: RGB in 0..1 -> one score per class and pixel (paper, section 3.1).
-
-From the bytes of an image to the numbers that an image network takes (paper, section 3.1).
-"""
+"""What all image networks share: bytes -> RGB in 0..1 -> one score per class and pixel (paper, section 3.1)."""
 
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar
@@ -60,11 +57,6 @@ class Segmenter(nn.Module, ABC):
         Name of a size in `PRESETS`: "compact" or "paper".
     seed : int
         Seed for the initial weights.
-
-    Raises
-    ------
-    ArgumentError
-        When there is no such preset.
     """
 
     PRESETS: ClassVar[dict[str, dict[str, Any]]]
@@ -96,11 +88,6 @@ class Segmenter(nn.Module, ABC):
         -------
         (B, C, h, w) float
             One score per class and pixel.
-
-        Raises
-        ------
-        ArgumentError
-            When the image isn't of floats, has another shape, or is too small for the network.
         """
         if image.ndim != 4 or image.shape[1] != 3:
             raise ArgumentError("image", "shape (B, 3, h, w)", tuple(image.shape))

@@ -63,13 +63,7 @@ class UNet(Segmenter):
         self.score = nn.Conv2d(widths[0], n_classes, 1)
 
     def scores(self, x: Tensor) -> Tensor:
-        """Return the scores. Parameters and result are those of `Segmenter.scores`.
-
-        Raises
-        ------
-        ArgumentError
-            When a side of the image is too small to be halved S - 1 times.
-        """
+        """Return the scores. Parameters and result are those of `Segmenter.scores`."""
         smallest = 2 ** len(self.up)
         if min(x.shape[2:]) < smallest:
             raise ArgumentError("image", f"{smallest} x {smallest} pixels or more", tuple(x.shape))
