@@ -198,7 +198,7 @@ class StudentProcess:
                 with suppress(OSError):
                     pipe.close()
         if self.keeps:
-            shutil.copytree(self.folder / "prepared", self.prepared, copy_function=_replace, dirs_exist_ok=True)
+            keep_compiled(self.folder / "prepared", self.prepared)
         _delete(self.folder)
 
 
@@ -215,6 +215,17 @@ def worker_environment(folder: Path) -> dict[str, str]:
     threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
     inline = {"MPLBACKEND": "module://matplotlib_inline.backend_inline", "PYTHONDONTWRITEBYTECODE": "1"}
     return {name: os.environ[name] for name in INHERITED if name in os.environ} | here | threads | inline
+
+
+def keep_compiled(source: Path, target: Path) -> None:
+    """Copy what was compiled to where others find it.
+
+    Parameters
+    ----------
+    source, target : Path
+        The two folders.
+    """
+    shutil.copytree(source, target, copy_function=_replace, dirs_exist_ok=True)
 
 
 def _replace(source: str, target: str) -> None:
