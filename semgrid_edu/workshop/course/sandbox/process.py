@@ -218,20 +218,19 @@ def worker_environment(folder: Path) -> dict[str, str]:
 
 
 def keep_compiled(source: Path, target: Path) -> None:
-    """Copy what was compiled to where others find it.
+    """Copy what was compiled to where others find it; nobody who reads an old file meanwhile gets half of a new one.
 
     Parameters
     ----------
     source, target : Path
         The two folders.
     """
-    shutil.copytree(source, target, copy_function=_replace, dirs_exist_ok=True)
 
+    def replace_file(source: str, target: str) -> None:
+        with atomic_path(target) as path:
+            shutil.copyfile(source, path)
 
-def _replace(source: str, target: str) -> None:
-    """Copy a file, so that nobody who reads the old one meanwhile gets half of the new."""
-    with atomic_path(target) as path:
-        shutil.copyfile(source, path)
+    shutil.copytree(source, target, copy_function=replace_file, dirs_exist_ok=True)
 
 
 def _called(callbacks: list[Callable], reply: dict) -> dict[str, Any]:
