@@ -51,7 +51,7 @@ def test_importing_the_package_leaves_the_environment_as_it_was():
 
 def test_the_command_line_sets_the_wait_policy_before_openmp_is_loaded():
     code = (
-        "import os, sys; from semgrid_edu import cli; "
+        "import os, sys; from semgrid_edu.workshop.commands import main as cli; "
         "cli.app = lambda: print(os.environ['OMP_WAIT_POLICY'], {'torch', 'numba'} & sys.modules.keys()); cli.run()"
     )
     assert printed(code) == "PASSIVE set()\n"

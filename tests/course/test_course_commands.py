@@ -13,13 +13,6 @@ from semgrid_edu.workshop.course.nbgrader.build import build_course
 from semgrid_edu.workshop.course.sandbox.limits import PARTS
 
 
-def test_build_lays_out_a_course_and_points_to_its_guide(tmp_path):
-    result = CliRunner().invoke(cli.app, ["course", "build", str(tmp_path / "course")], catch_exceptions=False)
-    assert result.exit_code == 0
-    assert "00_tour" in result.output
-    assert (tmp_path / "course" / "README.md").is_file()
-
-
 def test_unknown_lecture_is_refused():
     with pytest.raises(ArgumentError, match="99_nothing"):
         CliRunner().invoke(cli.app, ["course", "notebooks", "99_nothing"], catch_exceptions=False)

@@ -11,8 +11,6 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 from semgrid_edu.workshop.course.registers import EQUATIONS, equation_table, find_code
 
-FUNCTIONS = [pytest.param(entry, name, id=f"{entry.id}-{name}") for entry in EQUATIONS for name in entry.functions]
-
 
 def names_equation(text, number):
     """Whether a text says "equation (2)", "eq. (2)" or "equations (1), (2)"."""
@@ -24,29 +22,35 @@ def names_section(text, section):
     return re.search(rf"(?i)\bsec(s?\.|tions?)\s+([\d.]+(,|\s+and)?\s+)*{re.escape(section)}(?![.\d]*\d)", text)
 
 
-@pytest.mark.parametrize(("entry", "name"), FUNCTIONS)
-def test_code_names_its_equation(entry, name):
+def test_code_names_its_equation():
+    functions = [(entry, name) for entry in EQUATIONS for name in entry.functions]
+    assert [name for entry, name in functions if not says_where(entry, name)] == []
+
+
+def says_where(entry, name):
+    """Whether the code of an entry names its equation or section."""
     code = find_code(name)
     docstring = inspect.getdoc(code) or ""
     if entry.id.startswith("eq-"):
-        assert names_equation(docstring, entry.id.removeprefix("eq-"))
-        return
+        return names_equation(docstring, entry.id.removeprefix("eq-"))
     text = docstring + "\n" + sys.modules[code.__module__].__doc__.splitlines()[0]
     numbers = [e.id.removeprefix("eq-") for e in EQUATIONS if e.section == entry.section and e.id.startswith("eq-")]
-    assert names_section(text, entry.section) or any(names_equation(text, number) for number in numbers)
+    return names_section(text, entry.section) or any(names_equation(text, number) for number in numbers)
 
 
-@pytest.mark.parametrize("entry", [e for e in EQUATIONS if e.lecture], ids=lambda e: e.id)
-def test_lecture_has_the_tagged_cell(entry):
-    name, _, tag = entry.lecture.partition("#")
+def test_each_lecture_has_the_tagged_cell():
+    assert [entry.id for entry in EQUATIONS if entry.lecture and not has_cell(entry.lecture)] == []
+
+
+def has_cell(place):
+    name, _, tag = place.partition("#")
     cells = read_percent(NOTEBOOKS / "src" / f"{name}.py").cells
-    assert any(tag in cell.metadata.get("tags", []) for cell in cells)
+    return any(tag in cell.metadata.get("tags", []) for cell in cells)
 
 
-@pytest.mark.parametrize("entry", [e for e in EQUATIONS if e.exercise], ids=lambda e: e.id)
-def test_exercise_has_the_task(entry):
-    name, _, task = entry.exercise.partition("#")
-    assert task in tasks(NOTEBOOKS / "src" / "exercises" / f"{name}.py")
+def test_each_exercise_has_the_task():
+    places = [entry.exercise.split("#") for entry in EQUATIONS if entry.exercise]
+    assert [at for at in places if at[1] not in tasks(NOTEBOOKS / "src" / "exercises" / f"{at[0]}.py")] == []
 
 
 def test_every_numbered_equation_is_registered_once():

@@ -58,11 +58,11 @@ def test_student_version_is_what_nbgrader_releases(course, source):
     assert sources(student_version(source)) == sources(released)
 
 
-@pytest.mark.parametrize("source", exercise_sources(), ids=lambda source: source.stem)
-def test_students_get_neither_solutions_nor_hidden_tests(source):
-    text = "\n".join(cell.source for cell in student_version(source).cells)
-    for secret in ("SOLUTION", "HIDDEN", "semgrid_instructor", *reference_answers(source).values()):
-        assert secret not in text
+def test_students_get_neither_solutions_nor_hidden_tests():
+    for source in exercise_sources():
+        text = "\n".join(cell.source for cell in student_version(source).cells)
+        secrets = ["SOLUTION", "HIDDEN", "semgrid_instructor", *reference_answers(source).values()]
+        assert [secret for secret in secrets if secret in text] == [], source.stem
 
 
 def test_student_version_keeps_signatures_and_nothing_of_the_answers(source):
@@ -210,11 +210,11 @@ def test_released_exercises_link_to_where_students_find_the_lectures(tmp_path):
         build_course(course, notebooks, "my lectures")
 
 
-@pytest.mark.parametrize("source", exercise_sources(), ids=lambda source: source.stem)
-def test_no_link_of_a_released_exercise_is_dead(source):
-    text = "\n".join(cell.source for cell in student_version(source).cells if cell.cell_type == "markdown")
-    assert "](../" in text, "an exercise links to its lecture"
-    assert not re.search(RELATIVE, point_links(text, "")), "a link that course build doesn't know"
+def test_no_link_of_a_released_exercise_is_dead():
+    for source in exercise_sources():
+        text = "\n".join(cell.source for cell in student_version(source).cells if cell.cell_type == "markdown")
+        assert "](../" in text, f"{source.stem}: an exercise links to its lecture"
+        assert not re.search(RELATIVE, point_links(text, "")), f"{source.stem}: a link that course build doesn't know"
 
 
 def test_without_exercises_nothing_is_written(tmp_path):

@@ -1,7 +1,5 @@
 """The table of the stages' graphical models names only what exists."""
 
-import pytest
-
 from semgrid_edu.workshop.course import registers
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 from semgrid_edu.workshop.course.registers import STAGES, StageModel, find_code, stage_table
@@ -21,15 +19,15 @@ def has_cell(place):
     return any(tag in cell.metadata.get("tags", []) for cell in cells)
 
 
-@pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.id)
-def test_what_a_stage_names_exists(stage):
-    assert callable(find_code(stage.model))
-    path, is_test, test = stage.check.partition("::")
-    if is_test:
-        assert f"def {test}(" in (NOTEBOOKS.parent / path).read_text(encoding="utf-8")
-    else:
-        assert has_cell(stage.check)
-    assert stage.lecture is None or has_cell(stage.lecture)
+def test_what_a_stage_names_exists():
+    for stage in STAGES:
+        assert callable(find_code(stage.model)), stage.id
+        path, is_test, test = stage.check.partition("::")
+        if is_test:
+            assert f"def {test}(" in (NOTEBOOKS.parent / path).read_text(encoding="utf-8"), stage.id
+        else:
+            assert has_cell(stage.check), stage.id
+        assert stage.lecture is None or has_cell(stage.lecture), stage.id
 
 
 def test_each_stage_is_there_once():

@@ -15,7 +15,7 @@ from nbgrader.utils import is_grade, is_locked, is_solution
 from semgrid_edu.workshop.course.nbgrader.build import exercise_sources
 from semgrid_edu.workshop.course.notebooks.build import read_percent
 
-every_exercise = pytest.mark.parametrize("source", exercise_sources(), ids=lambda source: source.stem)
+EXERCISES = exercise_sources()
 
 
 @functools.cache
@@ -51,6 +51,7 @@ def setup(source) -> NotebookNode:
     return next(cell for cell in code_cells(source) if name_of(cell) == "setup")
 
 
+@functools.cache
 def answers(source) -> set[str]:
     return set().union(*(defined(cell.source) for cell in code_cells(source) if is_solution(cell)))
 
@@ -64,54 +65,66 @@ def checks(source) -> list[NotebookNode]:
     return [cell for cell in code_cells(source) if is_grade(cell) and not is_solution(cell)]
 
 
-@every_exercise
-def test_each_test_cell_is_one_function_and_its_call(source):
-    for cell in checks(source):
-        function, call = ast.parse(cell.source).body
-        assert isinstance(function, ast.FunctionDef), name_of(cell)
-        assert function.name == "_test", name_of(cell)
-        assert ast.unparse(call) == "_test()", name_of(cell)
+def offenders(cells, fault) -> list[str]:
+    """The cells of all exercises in which something is wrong, and what."""
+    found = [(source, cell, fault(source, cell)) for source in EXERCISES for cell in cells(source)]
+    return [f"{source.stem}, {name_of(cell)}: {wrong}" for source, cell, wrong in found if wrong]
 
 
-@every_exercise
-def test_tests_rely_on_nothing_that_a_student_may_overwrite(source):
-    private = {name for cell in fixtures(source) for name in defined(cell.source)}
-    assert {name for name in private if not name.startswith("_")} == set()
-    allowed = defined(setup(source).source) | answers(source) | private
-    for cell in [*checks(source), *fixtures(source)]:
-        assert relied_on(cell.source) <= allowed, name_of(cell)
+def test_each_test_cell_is_one_function_and_its_call():
+    def fault(source, cell):
+        body = ast.parse(cell.source).body
+        names = [getattr(body[0], "name", None), ast.unparse(body[-1])]
+        return len(body) != 2 or not isinstance(body[0], ast.FunctionDef) or names != ["_test", "_test()"]
+
+    assert offenders(checks, fault) == []
 
 
-@every_exercise
-def test_tests_change_no_name_outside(source):
-    for cell in checks(source):
-        outward = [node for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Global | ast.Nonlocal)]
-        assert outward == [], name_of(cell)
+def private(source) -> set[str]:
+    return {name for cell in fixtures(source) for name in defined(cell.source)}
 
 
-@every_exercise
-def test_tests_look_at_results_of_answers_and_never_into_them(source):
-    for cell in checks(source):
+def test_tests_rely_on_nothing_that_a_student_may_overwrite():
+    def fault(source, cell):
+        return relied_on(cell.source) - defined(setup(source).source) - answers(source) - private(source)
+
+    assert offenders(lambda source: [*checks(source), *fixtures(source)], fault) == []
+    assert [name for source in EXERCISES for name in private(source) if not name.startswith("_")] == []
+
+
+def test_tests_change_no_name_outside():
+    def fault(source, cell):
+        nodes = ast.walk(ast.parse(cell.source))
+        return [ast.unparse(node) for node in nodes if isinstance(node, ast.Global | ast.Nonlocal)]
+
+    assert offenders(checks, fault) == []
+
+
+def test_tests_look_at_results_of_answers_and_never_into_them():
+    def fault(source, cell):
         nodes = list(ast.walk(ast.parse(cell.source)))
         inside = {ast.unparse(n.value) for n in nodes if isinstance(n, ast.Attribute)} & answers(source)
-        assert inside == set(), name_of(cell)
-        assert {"inspect", "tracemalloc"} & {n.id for n in nodes if isinstance(n, ast.Name)} == set(), name_of(cell)
+        return inside | ({"inspect", "tracemalloc"} & {n.id for n in nodes if isinstance(n, ast.Name)})
+
+    assert offenders(checks, fault) == []
 
 
-@every_exercise
-def test_solutions_use_nothing_of_the_tests(source):
-    offered = {name for name in defined(setup(source).source) if not name.startswith("_")} | answers(source)
-    for cell in code_cells(source):
-        if is_solution(cell):
-            assert relied_on(cell.source) <= offered, name_of(cell)
+def test_solutions_use_nothing_of_the_tests():
+    def fault(source, cell):
+        offered = {name for name in defined(setup(source).source) if not name.startswith("_")}
+        return relied_on(cell.source) - offered - answers(source)
+
+    assert offenders(lambda source: filter(is_solution, code_cells(source)), fault) == []
 
 
-@every_exercise
-def test_helpers_that_only_tests_use_are_private(source):
-    used = set().union(*(relied_on(cell.source) for cell in code_cells(source) if is_solution(cell)))
-    text = "\n".join(cell.source for cell in read_percent(source).cells if cell.cell_type == "markdown")
-    helpers = [node.name for node in ast.parse(setup(source).source).body if isinstance(node, ast.FunctionDef)]
-    assert [h for h in helpers if not h.startswith("_") and h not in used and f"`{h}" not in text] == []
+def test_helpers_that_only_tests_use_are_private():
+    def fault(source, cell):
+        used = set().union(*(relied_on(cell.source) for cell in code_cells(source) if is_solution(cell)))
+        text = "\n".join(cell.source for cell in read_percent(source).cells if cell.cell_type == "markdown")
+        helpers = [node.name for node in ast.parse(cell.source).body if isinstance(node, ast.FunctionDef)]
+        return [h for h in helpers if not h.startswith("_") and h not in used and f"`{h}" not in text]
+
+    assert offenders(lambda source: [setup(source)], fault) == []
 
 
 @pytest.mark.parametrize(

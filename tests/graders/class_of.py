@@ -38,7 +38,7 @@ def inside(name, line):
     return REFERENCE | {name: f"{head}{quotes}    {line}\n{rest}"}
 
 
-def graded(course, student, notebook):
+def graded(course, student, notebook, settings=SETTINGS):
     """Hand in a notebook and return its result."""
     path = place(course, "submitted", student, NAME)
     if isinstance(notebook, str):
@@ -46,4 +46,4 @@ def graded(course, student, notebook):
         path.write_text(notebook)
     else:
         write_notebook(notebook, path)
-    return grade_one(course, NAME, student, SETTINGS)
+    return grade_one(course, NAME, student, settings)

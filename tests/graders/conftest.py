@@ -3,18 +3,24 @@
 import shutil
 
 import pytest
+from typer.testing import CliRunner
 
-from semgrid_edu.workshop.course.nbgrader.build import build_course
+from semgrid_edu.workshop.commands.main import app
 
 pytest.register_assert_rewrite("grader_checks")
 
 
 @pytest.fixture(scope="session")
-def new_course(tmp_path_factory):
+def built(tmp_path_factory):
+    """The folder of a course, and what the command says that builds it."""
+    folder = tmp_path_factory.mktemp("built")
+    return folder, CliRunner().invoke(app, ["course", "build", str(folder)], catch_exceptions=False)
+
+
+@pytest.fixture(scope="session")
+def new_course(built, tmp_path_factory):
     """Return a function that lays out a course of its own at each call; built once, then copied."""
-    built = tmp_path_factory.mktemp("built")
-    build_course(built)
-    return lambda: shutil.copytree(built, tmp_path_factory.mktemp("course"), dirs_exist_ok=True)
+    return lambda: shutil.copytree(built[0], tmp_path_factory.mktemp("course"), dirs_exist_ok=True)
 
 
 def pytest_generate_tests(metafunc):

@@ -12,7 +12,7 @@ from nbgrader_scores import autograde, tasks
 from warm import grade_warm, warm_processes
 
 from semgrid_edu.workshop.course.nbgrader.autograde import reference_answers, submission
-from semgrid_edu.workshop.course.nbgrader.preprocessors import prepare
+from semgrid_edu.workshop.course.nbgrader.preprocessors import prepared_folder
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 
 TIMEOUT = {"answer": 12, "endless loop": 2}
@@ -89,20 +89,29 @@ class GraderChecks:
 
     @pytest.fixture(scope="class")
     @classmethod
-    def graded(cls, source, students, course):
+    def start(cls, source, course):
+        """A function that returns a warm process."""
+        with warm_processes(source, prepared_folder(course, cls.exercise)) as start:
+            yield start
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def graded(cls, source, students, start):
         """Every student's (score, points, message) by student and task, from one warm session."""
         loops = {f"student-{n}" for n, answers in enumerate(pack(cls.entries)) if kind(answers) == "endless loop"}
-        with warm_processes(source, prepare(course, cls.exercise, memory=4000)) as start:
-            scores = {
-                name: grade_warm(source, answers, start, TIMEOUT["endless loop" if name in loops else "answer"])
-                for name, answers in students.items()
-            }
+        scores = {
+            name: grade_warm(source, answers, start, TIMEOUT["endless loop" if name in loops else "answer"])
+            for name, answers in students.items()
+        }
         return {student: cls.by_task(source, cells) for student, cells in scores.items()}
 
     @pytest.fixture(scope="class")
     @classmethod
-    def graded_by_nbgrader(cls, source, students, course):
-        """The same of the reference, the stub and the first packed student, graded as a class is."""
+    def graded_by_nbgrader(cls, source, students, course, start):
+        """The same of the reference, the stub and the first packed student, graded as a class is.
+
+        `start` comes first, because nbgrader then needn't compile again what the warm session has compiled.
+        """
         notebooks = {name: submission(source, students[name]) for name in ("reference", "stub", "student-0")}
         scores = autograde(course, cls.exercise, notebooks, timeout=TIMEOUT["answer"])
         return {student: cls.by_task(source, cells) for student, cells in scores.items()}

@@ -64,6 +64,13 @@ def graded(new_course):
     return course, {student: points for student, (_, points) in students.items()}, table
 
 
+def test_build_lays_out_a_course_and_points_to_its_guide(built):
+    folder, result = built
+    assert result.exit_code == 0
+    assert "00_tour" in result.output
+    assert (folder / "README.md").is_file()
+
+
 def test_each_grade_is_what_it_should_be(graded):
     _, expected, table = graded
     assert {student: float(row["score"]) for student, row in table.items()} == expected

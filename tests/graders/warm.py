@@ -1,13 +1,12 @@
 """Grading without nbgrader: the same sandbox and test cells, with students' processes forked from one that is ready.
 
-A server runs an exercise's source once, so that everything is imported and compiled. From then on it forks a new
-process for each student, with a fresh namespace, and with a folder and limits of its own as in real grading.
+A server (`warm_server`) runs an exercise's source once, so that everything is imported and compiled. From then on it
+forks a new process for each student, with a fresh namespace, and with its own folder and limits as in real grading.
 """
 
 import os
 import select
 import shutil
-import signal
 import socket
 import subprocess
 import sys
@@ -23,9 +22,9 @@ from semgrid_edu.workshop.course.nbgrader.preprocessors import instructors_cells
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.notebook import cell_name, run_submission
-from semgrid_edu.workshop.course.sandbox.process import StudentProcess, worker_environment
-from semgrid_edu.workshop.course.sandbox.values import Wire
-from semgrid_edu.workshop.course.sandbox.worker import Shell, Worker
+from semgrid_edu.workshop.course.sandbox.process import StudentProcess, keep_compiled, worker_environment
+
+SERVER = Path(__file__).with_name("warm_server.py")
 
 
 def grade_warm(source, answers, start, timeout):
@@ -47,7 +46,10 @@ def _score(cell):
 
 @contextmanager
 def warm_processes(source, prepared):
-    """Start a server for an exercise, with what `prepare` had compiled; give a function that returns a new process."""
+    """Start a server for an exercise; give a function that returns a new process.
+
+    `prepared` is the folder of what is compiled already, and takes what the server compiles.
+    """
     use_instructor(NOTEBOOKS / "instructor")
     if not hasattr(os, "pidfd_open"):
         yield lambda: StudentProcess(Limits(), prepared)
@@ -55,10 +57,12 @@ def warm_processes(source, prepared):
     with tempfile.TemporaryDirectory() as folder:
         shutil.copytree(prepared, Path(folder, "prepared"))
         ours, theirs = socket.socketpair()
-        command = [sys.executable, __file__, str(source), str(theirs.fileno())]
+        command = [sys.executable, SERVER, source, str(theirs.fileno())]
         environment = worker_environment(Path(folder)) | {"NUMBA_THREADING_LAYER": "workqueue"}
         with subprocess.Popen(command, cwd=folder, env=environment, pass_fds=[theirs.fileno()]), ours:
             theirs.close()
+            assert ours.recv(1), "the exercise has run"
+            keep_compiled(Path(folder, "prepared"), prepared)
             yield lambda: ForkedProcess(ours)
 
 
@@ -93,41 +97,3 @@ class Forked:
 
     def wait(self):
         select.select([self.handle], [], [])
-
-
-def _serve(source, server):
-    """Run the exercise; then fork a worker for each folder and pair of pipes that come in."""
-    use_instructor(NOTEBOOKS / "instructor")
-    worker = Worker(None)
-    for cell in read_percent(source).cells:
-        if cell.cell_type == "code" and "error" in (reply := worker.run(cell.source)):
-            raise SystemExit("\n".join(reply["error"]["traceback"]))
-    signal.signal(signal.SIGCHLD, signal.SIG_IGN)
-    while True:
-        folder, pipes, _, _ = socket.recv_fds(server, 4096, 2)
-        if not folder:
-            return
-        if (pid := os.fork()) == 0:
-            _be_student(folder.decode(), pipes)
-        server.send(pid.to_bytes(8, "big"))
-        for pipe in pipes:
-            os.close(pipe)
-
-
-def _be_student(folder, pipes):
-    """Serve the grader in a fresh namespace until it hangs up."""
-    os.setsid()
-    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-    os.chdir(folder)
-    os.environ.update(dict.fromkeys(("HOME", "TMPDIR", "IPYTHONDIR"), folder))
-    tempfile.tempdir = None
-    nothing = os.open(os.devnull, os.O_RDWR)
-    for stream in (0, 1, 2):
-        os.dup2(nothing, stream)
-    Shell.clear_instance()
-    Worker(Wire(os.fdopen(pipes[0], "rb"), os.fdopen(pipes[1], "wb"))).serve()
-    os._exit(0)
-
-
-if __name__ == "__main__":
-    _serve(Path(sys.argv[1]), socket.socket(fileno=int(sys.argv[2])))

@@ -24,9 +24,7 @@ def needs_tools() -> None:
 
 @course.command()
 def notebooks(
-    names: Annotated[
-        list[str] | None, typer.Argument(help="Such as 00_tour or graphical_models; all by default.")
-    ] = None,
+    names: Annotated[list[str] | None, typer.Argument(help="Such as 00_tour; all by default.")] = None,
 ) -> None:
     """Execute lectures and companions and write the students' exercises, from their sources."""
     from semgrid_edu.workshop.course.nbgrader.build import build_exercise, exercise_sources
@@ -44,12 +42,8 @@ def notebooks(
 
 
 @course.command()
-def minutes(
-    names: Annotated[
-        list[str] | None, typer.Argument(help="Such as 00_tour, for its sections; all by default.")
-    ] = None,
-) -> None:
-    """Tell how many minutes each notebook takes a student, and what takes them."""
+def minutes(names: Annotated[list[str] | None, typer.Argument(help="Such as 00_tour; all by default.")] = None) -> None:
+    """Show how many minutes each notebook takes a student, and what takes them; one notebook section by section."""
     from semgrid_edu.workshop.course.notebooks.build import companion_sources, lecture_sources, named
     from semgrid_edu.workshop.course.notebooks.minutes import minutes_table
 
@@ -67,9 +61,7 @@ def check() -> None:
 @course.command()
 def build(
     folder: Annotated[Path, typer.Argument(help="A missing or empty folder, or a course built before.")],
-    lectures: Annotated[
-        str | None, typer.Option(help="Address or path at which students find 00_tour.ipynb; exercises link there.")
-    ] = None,
+    lectures: Annotated[str | None, typer.Option(help="Address or path where students find 00_tour.ipynb.")] = None,
 ) -> None:
     """Lay out a complete nbgrader course for an instructor."""
     from semgrid_edu.workshop.course.nbgrader.build import build_course
@@ -85,18 +77,17 @@ def build(
 def grade(
     folder: Annotated[Path, typer.Argument(help="A course that `course build` wrote, with what was handed in.")],
     assignments: Annotated[list[str] | None, typer.Argument(help="Such as 01_bayes; all by default.")] = None,
-    again: Annotated[bool, typer.Option("--again", help="Grade also what is graded already.")] = False,
+    again: Annotated[bool, typer.Option("--again", help="Grade what is graded already, too.")] = False,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Submissions at the same time.")] = os.cpu_count() or 1,
     timeout: Annotated[int, typer.Option(min=1, help="Seconds for a cell, or for all calls of a test.")] = 30,
     memory: Annotated[int, typer.Option(min=100, help="Megabytes of memory for a student's code.")] = 4000,
-    container: Annotated[
-        str, typer.Option(help='Runs students\' code in a container: "docker run --rm -i --network none IMAGE".')
-    ] = "",
-    seed_by_student: Annotated[
-        bool, typer.Option("--seed-by-student", help="Hidden tests draw other inputs for each student.")
-    ] = False,
+    container: Annotated[str, typer.Option(help='Such as "docker run --rm -i --network none IMAGE".')] = "",
+    seed_by_student: Annotated[bool, typer.Option("--seed-by-student", help="Draw hidden inputs per student.")] = False,
 ) -> None:
-    """Grade a class with nbgrader: students' code runs in processes of its own, apart from tests and gradebook."""
+    """Grade a class with nbgrader: students' code runs in processes of its own, apart from tests and gradebook.
+
+    With --container it runs in a container, which the given command starts.
+    """
     from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, UngradedError
     from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course, missing_limits
     from semgrid_edu.workshop.course.nbgrader.gradebook import misplaced, write_graded

@@ -13,17 +13,16 @@ data = typer.Typer(no_args_is_help=True, help="Make, fetch and check data.")
 
 @data.command()
 def make(
-    name: Annotated[
-        str, typer.Argument(help="minikitti, minichroma, minisynthia, validation, sample, or all for the first three.")
-    ],
-    folder: Annotated[Path, typer.Argument(help="Takes the data set's own folder.")],
+    name: Annotated[str, typer.Argument(help="minikitti, minichroma, minisynthia, validation, sample or all.")],
+    folder: Annotated[Path, typer.Argument(help="Where the data set's own folder is made.")],
     seed: Annotated[int, typer.Option(help="Seed for the drives; the same seed gives the same bytes.")] = 0,
     workers: Annotated[int, typer.Option(help="Number of processes that share the work.")] = 2,
-    scheduler: Annotated[
-        str | None, typer.Option(help="tcp://HOST:PORT of a dask.distributed cluster that shares the work instead.")
-    ] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Instead, a dask cluster: tcp://HOST:PORT.")] = None,
 ) -> None:
-    """Simulate a data set in KITTI's raw layout; the same command finishes one that was interrupted."""
+    """Simulate a data set in KITTI's raw layout; "all" makes the first three.
+
+    The same command continues after an interruption.
+    """
     from semgrid_edu.workshop.simulation.datasets import DATA_SETS, make_dataset
 
     for one in DATA_SETS if name == "all" else [name]:
@@ -34,9 +33,9 @@ def make(
 def fetch(
     name: Annotated[str, typer.Argument(help="kitti: real drives, from their official archives.")],
     drive: Annotated[str, typer.Option(help="Date and number, such as 2011_09_26_0013.")],
-    folder: Annotated[Path, typer.Option(help="Takes the folder of the day, and the archives.")] = Path("kitti_raw"),
+    folder: Annotated[Path, typer.Option(help="Where the day's folder and the archives go.")] = Path("kitti_raw"),
 ) -> None:
-    """Download a real drive and its calibration, and unpack them; the same command goes on after an interruption."""
+    """Download a real drive and its calibration, and unpack them. The same command continues after an interruption."""
     from semgrid_edu.datasets.readers.fetch import KITTI_LICENCE, fetch_kitti
 
     if name != "kitti":
@@ -62,20 +61,20 @@ def excerpt(
     data: Annotated[Path, typer.Option(help="A data set with train frames, such as data/minikitti.")],
     frames: Annotated[int, typer.Option(min=1, help="Number of frames.")] = 6,
 ) -> None:
-    """Keep a few labelled frames of a data set, in the form in which a network takes them."""
+    """Keep a few labelled frames of a data set, in the form that a network takes."""
     from semgrid_edu.datasets.training_set import write_excerpt
 
     write_excerpt(data, frames, folder)
 
 
-def report(problems: list[str], sound: str) -> None:
+def report(problems: list[str], success: str) -> None:
     """Print every problem on a line of its own and exit with 1, or print something else when there is none.
 
     Parameters
     ----------
     problems : list of str
         One line for each problem.
-    sound : str
+    success : str
         What to print when there is no problem.
 
     Raises
@@ -86,4 +85,4 @@ def report(problems: list[str], sound: str) -> None:
     if problems:
         typer.echo("\n".join(problems), err=True)
         raise typer.Exit(1)
-    typer.echo(sound)
+    typer.echo(success)

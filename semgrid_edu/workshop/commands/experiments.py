@@ -1,4 +1,4 @@
-"""The commands of `semgrid-edu reproduce`: each runs an experiment, keeps its result and prints its table."""
+"""The commands of `semgrid-edu reproduce`: the lectures' experiments one by one, and those of the paper (`PAPER`)."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -118,9 +118,7 @@ def truth_policies(
 
 @reproduce.command()
 def real_drive(
-    kitti: Annotated[
-        list[Path], typer.Option(help="A folder of KITTI raw drives; once more for another stretch of the same drive.")
-    ],
+    kitti: Annotated[list[Path], typer.Option(help="A folder of KITTI raw drives; again for another stretch.")],
     date: Annotated[str, typer.Option(help="Such as 2011_09_26.")] = "2011_09_26",
     drive: Annotated[str, typer.Option(help="Such as 0013.")] = "0013",
     out: Annotated[Path, typer.Option(help="Where to write the numbers.")] = Path("real_drive.json"),
@@ -152,3 +150,48 @@ def keep_result(out: Path, compute: Callable[[], dict], table: Callable[[dict], 
     result = compute()
     write_json(out, result)
     typer.echo(f"{table(result)}\n\nwritten to {out}")
+
+
+PAPER = {
+    "table1": "Table 1: SegNet, FCN and DeepLab, with and without the CRF.",
+    "table2": "Table 2: SegNet on routes that were never driven in training.",
+    "table3": "Table 3: SegNet's confusion matrix on data without any error.",
+    "claims": "The paper's nine claims, each with a verdict.",
+    "ablations": "What the paper leaves open: planes, occupancy, reduction, balancing, calibration, frames, distance.",
+    "truth-costs": "What training costs on truth made in other ways: clean-up, mask, de-skew, scans added up.",
+    "figures": "Figures 6 and 7: a few test frames with their labels and grids.",
+    "all": "All of these.",
+}
+"""The experiments of the paper, and their commands' help."""
+
+
+def _command(experiment: str) -> Callable[..., None]:
+    """Return the command of an experiment."""
+
+    def command(
+        runs: Annotated[Path, typer.Option(help="Takes one folder per run; the same command goes on.")],
+        out: Annotated[Path, typer.Option(help="Takes the results: JSON, Markdown and pictures.")],
+        scale: Annotated[
+            str,
+            typer.Option(help="quick (minutes), reduced (hours) or paper (GPU); quick+unet adds U-Net to Table 1."),
+        ] = "quick",
+        seeds: Annotated[int | None, typer.Option(min=1, max=1000, help="Seeds; by default the scale's own.")] = None,
+        workers: Annotated[int | None, typer.Option(help="Runs at a time; one per core by default.")] = None,
+        scheduler: Annotated[str | None, typer.Option(help="Instead, a dask cluster: tcp://HOST:PORT.")] = None,
+        device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu, cuda or cuda:N.")] = "cpu",
+        processes: Annotated[int, typer.Option(min=1, max=256, help="Processes (GPUs) of each training run.")] = 1,
+        plan: Annotated[bool, typer.Option("--plan", help="Only show the runs and how long they will take.")] = False,
+    ) -> None:
+        from semgrid_edu.workshop.paper.reports.reproduce import Request, reproduce
+
+        request = Request(experiment, scale, seeds, runs, out, workers, scheduler, device, processes)
+        problems = reproduce(request, typer.echo, plan)
+        if problems:
+            typer.echo(problems, err=True)
+            raise typer.Exit(1)
+
+    return command
+
+
+for _name, _help in PAPER.items():
+    reproduce.command(_name, help=f"{_help} Runs that have ended aren't repeated.")(_command(_name))

@@ -14,23 +14,21 @@ from semgrid_edu.workshop.commands.arguments import check_arguments, tell
 from semgrid_edu.workshop.commands.course import course
 from semgrid_edu.workshop.commands.data import data
 from semgrid_edu.workshop.commands.experiments import keep_result, reproduce
-from semgrid_edu.workshop.commands.reproduce import add_commands
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 app.add_typer(data, name="data")
 app.add_typer(course, name="course")
 app.add_typer(reproduce, name="reproduce")
-add_commands(reproduce)
 
 
 @app.callback()
 def main(
-    cache: Annotated[
-        Path | None,
-        typer.Option(help="Keeps what is made of data sets; otherwise each keeps it itself, so it can't be read-only."),
-    ] = None,
+    cache: Annotated[Path | None, typer.Option(help="Where preprocessed data are kept.")] = None,
 ) -> None:
-    """Probabilistic bird's-eye semantic perception, taught notebook by notebook."""
+    """Probabilistic bird's-eye semantic perception, taught notebook by notebook.
+
+    Without --cache each data set keeps its preprocessed data itself, so it can't be read-only.
+    """
     if cache is not None:
         os.environ[CACHE_VARIABLE] = str(cache.resolve())
 
@@ -40,21 +38,16 @@ def demo(
     kitti: Annotated[Path | None, typer.Option(help="A folder of KITTI raw drives, which holds the dates.")] = None,
     date: Annotated[str | None, typer.Option(help="Such as 2011_09_26.")] = None,
     drive: Annotated[str | None, typer.Option(help="Such as 0013.")] = None,
-    camera: Annotated[
-        str, typer.Option(help="image_02, the left colour camera, or image_03, the right one.")
-    ] = "image_02",
+    camera: Annotated[str, typer.Option(help="image_02 (left colour camera) or image_03 (right).")] = "image_02",
     weights: Annotated[Path | None, typer.Option(help="A trained network; the shipped SegNet by default.")] = None,
-    frames: Annotated[
-        str | None,
-        typer.Option(help="FIRST:LAST or FIRST:LAST:STEP (LAST excluded), such as 40:120:2; all by default."),
-    ] = None,
-    stages: Annotated[
-        Path | None,
-        typer.Option(help="A Python file with your own track, segment, sample, fuse or refine, to compare."),
-    ] = None,
+    frames: Annotated[str | None, typer.Option(help="FIRST:LAST[:STEP], LAST excluded, such as 40:120:2.")] = None,
+    stages: Annotated[Path | None, typer.Option(help="A Python file with stages of your own, to compare.")] = None,
     out: Annotated[Path, typer.Option(help="Where to write the page.")] = Path("out/demo"),
 ) -> None:
-    """Run every stage over a drive, the shipped one by default, and write a page that shows it."""
+    """Run every stage over a drive, the shipped one by default, and write a page that shows it.
+
+    Without --frames all frames are run. A file for --stages defines some of track, segment, sample, fuse and refine.
+    """
     from semgrid_edu.datasets import KittiRawDrive
     from semgrid_edu.datasets.readers.kitti_raw import VIEWS
     from semgrid_edu.datasets.samples import sample_drive, sample_weights
@@ -90,28 +83,20 @@ def train(
     data: Annotated[Path, typer.Option(help="A data set with train frames, such as data/minikitti.")],
     out: Annotated[Path, typer.Option(help="A folder for the weights, the log and their provenance.")],
     segmenter: Annotated[str, typer.Option(help="The image network.")] = "segnet",
-    preset: Annotated[
-        str, typer.Option(help="compact, or paper: published size, whole images, 0.2 m cells.")
-    ] = "compact",
-    imagenet: Annotated[
-        Path | None, typer.Option(help="ImageNet weights (VGG16 or ResNet-101, safetensors) to start --preset paper.")
-    ] = None,
+    preset: Annotated[str, typer.Option(help="compact or paper (published size, 0.2 m cells).")] = "compact",
+    imagenet: Annotated[Path | None, typer.Option(help="ImageNet weights from which --preset paper starts.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed for the initial weights and the order of the frames.")] = 0,
     iterations: Annotated[int, typer.Option(min=1, help="Steps of each of the two stages.")] = 2000,
-    two_stage: Annotated[
-        bool, typer.Option("--two-stage", help="Keep the image network fixed while the fusion learns.")
-    ] = False,
-    truth: Annotated[
-        str,
-        typer.Option(
-            help="true; lidar: made from image labels and LIDAR with real data's errors; or made in another way, "
-            "such as no-cleanup."
-        ),
-    ] = "true",
+    two_stage: Annotated[bool, typer.Option("--two-stage", help="Train the fusion on a fixed image network.")] = False,
+    truth: Annotated[str, typer.Option(help="true, lidar, or another way, such as no-cleanup.")] = "true",
     resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was interrupted.")] = False,
     device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu, cuda or cuda:N.")] = "auto",
 ) -> None:
-    """Train a network: first its image network, then all of it on grids. torchrun runs it in several processes."""
+    """Train a network: first its image network, then all of it on grids. torchrun runs it in several processes.
+
+    ImageNet weights (VGG16 or ResNet-101) are a safetensors file. --truth lidar makes labels from image labels and
+    LIDAR, with the errors of real data; other ways of making them, such as no-cleanup, have names of their own.
+    """
     from semgrid_edu.datasets.index import dataset_doubts
     from semgrid_edu.training.run import chosen_truth, how_to_go_on, train_network, training_params
 

@@ -211,16 +211,29 @@ def prepare(course: Path, assignment: str, memory: int, container: tuple[str, ..
         When the reference answers don't pass their own tests.
     """
     use_instructor(course / "instructor")
-    # What is compiled serves all of the user's courses, unless the user's cache can't be written to.
-    shared = user_cache() / "semgrid_edu" / "prepared" / assignment
-    folder = shared if takes_files(shared) else course / "prepared" / assignment
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = prepared_folder(course, assignment)
     passed = course / "prepared" / f"{assignment} passed{' in a container' if container else ''}"
     passed.parent.mkdir(exist_ok=True)
     with FileLock(folder.with_suffix(".lock")):
         if not passed.exists():
             _grade_reference(course, assignment, folder, starter(memory, container, keeps=True))
             passed.touch()
+    return folder
+
+
+def prepared_folder(course: Path, assignment: str) -> Path:
+    """Return the folder of what is compiled: in the user's cache for all courses, or in this one if need be.
+
+    Parameters
+    ----------
+    course : Path
+        A course that `build_course` wrote.
+    assignment : str
+        The exercise.
+    """
+    shared = user_cache() / "semgrid_edu" / "prepared" / assignment
+    folder = shared if takes_files(shared) else course / "prepared" / assignment
+    folder.mkdir(parents=True, exist_ok=True)
     return folder
 
 

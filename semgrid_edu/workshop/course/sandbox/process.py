@@ -198,7 +198,7 @@ class StudentProcess:
                 with suppress(OSError):
                     pipe.close()
         if self.keeps:
-            shutil.copytree(self.folder / "prepared", self.prepared, copy_function=_replace, dirs_exist_ok=True)
+            keep_compiled(self.folder / "prepared", self.prepared)
         _delete(self.folder)
 
 
@@ -217,10 +217,20 @@ def worker_environment(folder: Path) -> dict[str, str]:
     return {name: os.environ[name] for name in INHERITED if name in os.environ} | here | threads | inline
 
 
-def _replace(source: str, target: str) -> None:
-    """Copy a file, so that nobody who reads the old one meanwhile gets half of the new."""
-    with atomic_path(target) as path:
-        shutil.copyfile(source, path)
+def keep_compiled(source: Path, target: Path) -> None:
+    """Copy what was compiled to where others find it; nobody who reads an old file meanwhile gets half of a new one.
+
+    Parameters
+    ----------
+    source, target : Path
+        The two folders.
+    """
+
+    def replace_file(source: str, target: str) -> None:
+        with atomic_path(target) as path:
+            shutil.copyfile(source, path)
+
+    shutil.copytree(source, target, copy_function=replace_file, dirs_exist_ok=True)
 
 
 def _called(callbacks: list[Callable], reply: dict) -> dict[str, Any]:

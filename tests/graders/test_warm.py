@@ -1,0 +1,51 @@
+"""The warm session is as honest as nbgrader's grading: nothing of one student reaches the next, and limits hold."""
+
+import pytest
+from class_of import NAME, REFERENCE, SOURCE, inside
+from warm import grade_warm, warm_processes
+
+from semgrid_edu.workshop.course.sandbox.linux import landlock_version
+
+
+@pytest.fixture(scope="module")
+def start(tmp_path_factory):
+    with warm_processes(SOURCE, tmp_path_factory.mktemp(NAME)) as start:
+        yield start
+
+
+def points(start, answers, timeout=5):
+    return sum(cell.score or 0 for cell in grade_warm(SOURCE, answers, start, timeout).values())
+
+
+SPOILS = """
+import builtins, pathlib, semgrid_edu.answers, sys, tempfile
+np.asarray = np.array = np.zeros = sum
+builtins.len = builtins.enumerate = semgrid_edu.answers.answer_array = lambda *a: None
+sys.modules["numpy"] = None
+for folder in (".", "..", tempfile.gettempdir()):
+    try: pathlib.Path(folder, "left").write_text("x")
+    except OSError: pass
+"""
+
+FINDS = """
+import pathlib, tempfile
+assert "SPOILED" not in globals() and np.zeros(1) == len("") == 0
+assert not any(pathlib.Path(folder, "left").exists() for folder in (".", "..", tempfile.gettempdir()))
+"""
+
+
+def test_nothing_of_one_student_reaches_the_next(start):
+    assert points(start, REFERENCE | {"locate": REFERENCE["locate"] + SPOILS + "\nSPOILED = 1"}) < 13
+    assert points(start, {name: FINDS + code for name, code in REFERENCE.items()}) == 13
+
+
+@pytest.mark.parametrize("line", ["import os; os._exit(0)", "while True: pass", "bytearray(10**11)"])
+def test_an_answer_that_ends_python_costs_its_own_points(start, line):
+    assert points(start, inside("predict", line), timeout=1) == 10
+
+
+@pytest.mark.skipif(not landlock_version(), reason="this system has no Landlock")
+def test_the_reference_cannot_be_read(start):
+    reads = f"open({str(SOURCE)!r}).read()"
+    assert points(start, inside("predict", reads)) == 10
+    assert points(start, inside("predict", "from semgrid_instructor import bayes")) == 10
