@@ -26,9 +26,15 @@ from semgrid_edu.pipeline import STAGES, run_pipeline
 from semgrid_edu.plotting import depth_colours
 from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.demo import write_demo
-from semgrid_edu.workshop.demo.grids import arrows_path, grid_svg
 from semgrid_edu.workshop.demo.page import Summary, page_html
-from semgrid_edu.workshop.demo.rasters import classes_uri, points_layer, raster_uri, scores_layer
+from semgrid_edu.workshop.demo.pictures import (
+    arrows_path,
+    classes_uri,
+    grid_svg,
+    points_layer,
+    raster_uri,
+    scores_layer,
+)
 from semgrid_edu.workshop.demo.record import FrameView, Record
 from semgrid_edu.workshop.demo.run import ChosenFrames
 
@@ -168,7 +174,7 @@ class TestMetrics:
 
     def test_times_are_medians_of_the_stages(self):
         record = Record(GridSpec.compact(), KITTI_14)
-        record._seconds = [[5.0] * 5, [0.01] * 5, [0.03, 0.01, 0.01, 0.01, 0.01]]
+        record._seconds[""] = [[5.0] * 5, [0.01] * 5, [0.03, 0.01, 0.01, 0.01, 0.01]]
         assert record.milliseconds() == pytest.approx(dict(zip(STAGES, [30, 10, 10, 10, 10], strict=True)))
 
 

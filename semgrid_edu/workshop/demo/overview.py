@@ -18,7 +18,7 @@ from semgrid_edu.plotting.colours import colour_patches
 from semgrid_edu.plotting.images import draw_image
 from semgrid_edu.storage.files import atomic_path
 from semgrid_edu.workshop.demo.comparison import Comparison
-from semgrid_edu.workshop.demo.rasters import scores_layer
+from semgrid_edu.workshop.demo.pictures import scores_layer
 
 REACH = 50.0
 """How far ahead the picture shows the grids, metres: few cells are seen beyond."""

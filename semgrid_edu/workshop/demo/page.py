@@ -1,11 +1,12 @@
-"""The demo's page: one HTML file that holds its pictures, style and script."""
+"""The demo's page: one HTML file that holds its figures, style, script and data."""
 
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from html import escape
 from importlib.resources import files
 from string import Template
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,9 +14,8 @@ from semgrid_edu.camera import Camera
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.plotting import DEPTH_RANGE, STATE_COLOURS, STATE_NAMES, depth_colours
 from semgrid_edu.workshop.demo.comparison import Comparison, metrics_table, times_table
-from semgrid_edu.workshop.demo.details import StoryData
-from semgrid_edu.workshop.demo.panels import PanelFrame, column_svg, panels_html, your_scores_html
-from semgrid_edu.workshop.demo.record import FrameView
+from semgrid_edu.workshop.demo.pictures import grid_svg
+from semgrid_edu.workshop.demo.record import YOURS, FrameView
 
 NOTICE = (
     '<p class="notice"><b>Expect poor semantics here.</b> The truth is not known for this drive, and the network has '
@@ -32,6 +32,48 @@ SWITCHES = (
     '<button id="errors" type="button" aria-pressed="false">Errors</button>'
 )
 """The switches of the grids: a closer look, and what is wrong where the truth is known."""
+
+
+class Panel(NamedTuple):
+    """A bird's-eye panel: the name of its raster in a `FrameView`, title and symbol of its caption, and what to see."""
+
+    name: str
+    title: str
+    symbol: str
+    see: str
+
+
+GRID_PANELS = (
+    Panel(
+        "occupancy",
+        "Occupancy grid",
+        "o",
+        "Light cells are free, dark cells hold something that stands still, orange cells something that moves. Grey "
+        "cells are unknown: a grey shadow lies behind each obstacle, because no beam gets there. An arrow is as long "
+        "as the distance covered in 0.5&nbsp;s.",
+    ),
+    Panel(
+        "grid",
+        "Semantic grid",
+        "g",
+        "The occupancy grid says where something stands, and the image says what it is. Look at road and sidewalk: "
+        "both are simply free in the occupancy grid, and only here are they told apart.",
+    ),
+    Panel(
+        "refined",
+        "Refined grid",
+        "g after the CRF",
+        "The CRF lets nearby cells with similar occupancy agree on a class. This removes specks and closes holes, but "
+        "it can also remove what is thin or rare: compare with the semantic grid.",
+    ),
+    Panel(
+        "truth",
+        "Truth",
+        "",
+        "The class of what stands in each cell that the camera sees. The other cells are unknown, and are named by "
+        "their most probable occupancy state. Where does the estimate differ, and how far away is that?",
+    ),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +102,8 @@ class Summary:
         Which stages come from a student's file, when a second run with them is shown beside the package's own.
     your_milliseconds : dict of str to float
         Median time of each stage in that run, ms.
-    story : StoryData, optional
-        What all stories of cells have in common; without it, the page tells none.
+    story : dict of str to object, optional
+        `story_data`; without it, the page tells no stories of cells.
     choice : str
         Which frames of the drive are shown, as `ChosenFrames.told` says it.
     broken : str
@@ -78,7 +120,7 @@ class Summary:
     milliseconds: dict[str, float]
     comparison: Comparison | None = None
     your_milliseconds: dict[str, float] = field(default_factory=dict)
-    story: StoryData | None = None
+    story: dict[str, object] | None = None
     choice: str = ""
     broken: str = ""
 
@@ -98,17 +140,16 @@ def page_html(summary: Summary, frames: Sequence[FrameView]) -> str:
     str
         HTML that refers to nothing outside itself.
     """
-    first, ramp = frames[0], depth_colours(np.geomspace(*DEPTH_RANGE, 9))
-    near, far = DEPTH_RANGE
-    shared = PanelFrame(summary.spec, summary.camera, first)
+    first, (near, far) = frames[0], DEPTH_RANGE
+    panels = [panel for panel in GRID_PANELS if panel.name != "truth" or summary.labelled]
     return Template(_resource("page.html")).substitute(
         title=escape(f"semgrid_edu: {summary.title}"),
         style=_resource("page.css"),
         script="\n".join(map(_resource, ("page.js", "story.js", "panel.js") if summary.story else ("page.js",))),
         panel=_panel(summary) if summary.story else "",
         switches=SWITCHES if summary.story else "",
-        column=column_svg(summary.camera),
-        story=_json(summary.story and asdict(summary.story)),
+        column=_column_svg(summary.camera),
+        story=_json(summary.story),
         lead=_lead(summary, len(frames)),
         notice=_broken(summary.broken) + ("" if summary.labelled else NOTICE),
         last=len(frames) - 1,
@@ -118,15 +159,56 @@ def page_html(summary: Summary, frames: Sequence[FrameView]) -> str:
         **{f"{name}_text": escape(first.texts[name]) for name in ("points", "scores")},
         near=f"{near:g}",
         far=f"{far:g}",
-        ramp=",".join(f"rgb{tuple(colour)}" for colour in ramp.tolist()),
+        ramp=",".join(f"rgb{tuple(colour)}" for colour in depth_colours(np.geomspace(near, far, 9)).tolist()),
         network_size="{1} × {0} pixels".format(*summary.network_size),
-        your_scores=your_scores_html(first, summary.camera, summary.comparison),
-        grids=panels_html(shared, bool(summary.labelled), summary.comparison),
+        your_scores=_your_scores(summary, first),
+        grids="\n".join(_single_or_pair(panel, summary, first) for panel in panels),
         states=_swatches(zip(STATE_NAMES, STATE_COLOURS, strict=True)),
         classes=_swatches(summary.classes),
         metrics=metrics_table(summary.metrics, summary.labelled, summary.comparison) if summary.labelled else "",
         times=times_table(summary.milliseconds, summary.your_milliseconds, summary.comparison),
         frames=_json([vars(frame) for frame in frames]),
+    )
+
+
+def _single_or_pair(panel: Panel, summary: Summary, first: FrameView) -> str:
+    """Return a panel as a figure; in a comparison, the package's and the student's in a pair if they can differ."""
+    comparison = summary.comparison
+    if comparison is None or panel.name not in comparison.changed:
+        return _figure(panel, summary, first)
+    package = panel._replace(title=f"{panel.title}, the package's")
+    title, symbol = f"{panel.title}, {comparison.file}", panel.symbol.removesuffix(" after the CRF")
+    yours = Panel(YOURS + panel.name, title, symbol, comparison.made_with(panel.name))
+    return f'<div class="pair">{_figure(package, summary, first)}{_figure(yours, summary, first)}</div>'
+
+
+def _figure(panel: Panel, summary: Summary, first: FrameView) -> str:
+    raster, text = first.images.get(panel.name, ""), escape(first.texts.get(panel.name, ""))
+    svg = grid_svg(panel.name, summary.spec, summary.camera, raster, text, arrows=panel.name in first.arrows)
+    hidden = " hidden" if panel.name in first.images else ""
+    missing = f'<p class="note" data-missing="{panel.name}"{hidden}>Nobody labelled this frame.</p>'
+    symbol = f" <i>{panel.symbol}</i>" if panel.symbol else ""
+    return f"<figure>{svg}{missing}<figcaption><b>{escape(panel.title)}</b>{symbol} — {panel.see}</figcaption></figure>"
+
+
+def _column_svg(camera: Camera) -> str:
+    """Return an empty layer over an image, in which the script draws the points above a cell (eq. (1))."""
+    height, width = camera.size
+    return f'<svg data-column viewBox="-0.5 -0.5 {width} {height}" aria-hidden="true"></svg>'
+
+
+def _your_scores(summary: Summary, first: FrameView) -> str:
+    """Return the figure of the image scores of a student's own network; empty when the package's made the scores."""
+    comparison = summary.comparison
+    if comparison is None or "scores" not in comparison.changed:
+        return ""
+    name = f"{YOURS}scores"
+    image, text = first.images[name], escape(first.texts[name])
+    return (
+        f'\n<figure>\n<div class="stack"><img data-image="photo" src="{first.images["photo"]}" alt="">'
+        f'<img data-image="{name}" data-text="{name}" src="{image}" alt="{text}">{_column_svg(summary.camera)}</div>\n'
+        f"<figcaption><b>Image scores, {escape(comparison.file)}</b> <i>s</i> — {comparison.made_with('scores')}"
+        "</figcaption>\n</figure>"
     )
 
 

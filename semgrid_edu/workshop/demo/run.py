@@ -1,7 +1,4 @@
-"""The demo: run every stage over every frame of a drive, then write the page and its picture.
-
-Which frames of a drive the demo runs over, and which of them its page shows.
-"""
+"""The demo: run every stage over every frame of a drive, then write the page and its picture."""
 
 import re
 from collections.abc import Iterable
@@ -18,10 +15,10 @@ from semgrid_edu.networks import load_net
 from semgrid_edu.pipeline import FrameResult, Stages, load_stages, run_side_by_side
 from semgrid_edu.storage.files import write_text
 from semgrid_edu.workshop.demo.comparison import Comparison
-from semgrid_edu.workshop.demo.details import StoryData
+from semgrid_edu.workshop.demo.details import story_data
 from semgrid_edu.workshop.demo.overview import save_overview
 from semgrid_edu.workshop.demo.page import Summary, page_html
-from semgrid_edu.workshop.demo.record import Record
+from semgrid_edu.workshop.demo.record import YOURS, Record
 
 SHOWN = 40
 """Most frames that the page shows if nobody asks for more, evenly spaced, so that its size stays near 10 MB."""
@@ -98,7 +95,7 @@ class ChosenFrames(NamedTuple):
 
 
 STORIES = 200_000
-"""Most cells that have a story, in all frames together: one takes some 45 bytes of the page."""
+"""Most cells that have a story, in all frames together: one takes some 55 bytes of the page."""
 
 
 def write_demo(
@@ -162,8 +159,8 @@ def write_demo(
         labelled=record.labelled,
         milliseconds=record.milliseconds(),
         comparison=comparison,
-        your_milliseconds=record.your_milliseconds(),
-        story=StoryData.of(net, drive.camera, record.layout),
+        your_milliseconds=record.milliseconds(YOURS),
+        story=story_data(net, drive.camera, record.layout),
     )
     save_overview(*record.liveliest, record.spec, label_set, Path(out) / "overview.png", comparison)
     page = Path(out) / "index.html"
