@@ -23,7 +23,7 @@ class StageError(ArgumentError):
 
 
 @dataclass(frozen=True)
-class Seam:
+class StageCheck:
     """One call of a stage, and what its result must look like.
 
     A function that isn't the package's own gets copies of its arguments, and its result is copied too. So it may change
@@ -203,8 +203,8 @@ class Seam:
             )
 
 
-_VALUES = {"segment": Seam.finite, "fuse": Seam.log_probabilities, "refine": Seam.probabilities}
-"""What is checked beyond the shape. The planes hold too many numbers to check them at each frame: see `FrameWork`."""
+_VALUES = {"segment": StageCheck.finite, "fuse": StageCheck.log_probabilities, "refine": StageCheck.probabilities}
+"""What is checked beyond the shape. The planes hold too many numbers to check them at each frame: see `FrameRunner`."""
 
 _PLURAL = {"class": "classes", "state": "states"}
 

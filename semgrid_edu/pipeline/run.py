@@ -20,8 +20,8 @@ from semgrid_edu.frame import Frame
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.networks import Architecture, SemanticGridNet, unit_image
 from semgrid_edu.occupancy import Belief, CmcdotParams
-from semgrid_edu.pipeline.checks import Seam, StageError
-from semgrid_edu.pipeline.following import Follower
+from semgrid_edu.pipeline.checks import StageCheck, StageError
+from semgrid_edu.pipeline.tracker_adapter import TrackerAdapter
 from semgrid_edu.pipeline.stages import STAGES, Stages
 
 
@@ -54,7 +54,7 @@ class FrameResult:
     seconds: dict[str, float]
 
 
-class FrameWork:
+class FrameRunner:
     """Run one or several sets of stages on a frame; a call that several sets have in common is made only once.
 
     Parameters
@@ -102,7 +102,7 @@ class FrameWork:
             log_g, t_fuse = self._call("fuse", stages.fuse, p, o)
         except StageError:
             # The planes hold millions of numbers, so they are searched for NaN after an error, not at each frame.
-            Seam("sample", stages.sample, self._number).finite(p)
+            StageCheck("sample", stages.sample, self._number).finite(p)
             raise
         refined, t_refine = self._call("refine", stages.refine, log_g, o)
         times = dict(zip(STAGES, (seconds, t_segment, t_sample, t_fuse, t_refine), strict=True))
@@ -112,7 +112,7 @@ class FrameWork:
         """Return a stage's result and its time; the same function isn't called again on the same arrays."""
         key = (id(function), *map(id, inputs))
         if key not in self._done:
-            self._done[key] = Seam(stage, function, self._number).call(self._shapes[stage], *inputs)
+            self._done[key] = StageCheck(stage, function, self._number).call(self._shapes[stage], *inputs)
         return self._done[key]
 
 
@@ -233,9 +233,9 @@ def run_side_by_side(frames: Iterable[Frame], *several: Stages) -> Iterator[tupl
             raise ArgumentError("several", "complete sets of stages, see `Stages.over`", f"only {stages.given}")
         if stages.architecture is None or stages.architecture != architecture:
             raise ArgumentError("several", f"one architecture, such as {architecture}", stages.architecture)
-    trackers = {id(stages.track): Follower(stages.track, architecture.grid) for stages in several}
+    trackers = {id(stages.track): TrackerAdapter(stages.track, architecture.grid) for stages in several}
     for number, frame in enumerate(frames):
-        work = FrameWork(number, frame, architecture)
+        work = FrameRunner(number, frame, architecture)
         beliefs = {key: tracker.belief(frame, number) for key, tracker in trackers.items()}
         yield tuple(work.result(stages, *beliefs[id(stages.track)]) for stages in several)
     for tracker in trackers.values():

@@ -10,7 +10,7 @@ from torch import nn
 from semgrid_edu.datasets.training_set import Sample, TrainingSet
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import SemanticGridNet, unit_image
-from semgrid_edu.pipeline.checks import Seam
+from semgrid_edu.pipeline.checks import StageCheck
 
 Refine = Callable[[NDArray, NDArray], NDArray]
 """A stage (log_g (C, H, W), o (4, H, W)) -> g (C, H, W), as `semgrid_edu.pipeline.Stages` describes it."""
@@ -47,7 +47,7 @@ def network_grids(net: SemanticGridNet, refinements: Mapping[str, Refine] | None
         log_g = learned_log_g(net, sample)
         found = {"network": log_g.argmax(axis=0)}
         for name, refine in (refinements or {}).items():
-            refined, _ = Seam("refine", refine, k).call(log_g.shape, log_g, sample.occupancy.numpy())
+            refined, _ = StageCheck("refine", refine, k).call(log_g.shape, log_g, sample.occupancy.numpy())
             found[f"network + {name}"] = refined.argmax(axis=0)
         return found
 
