@@ -127,10 +127,6 @@ class Camera:
         ----------
         size : (int, int)
             The new height and width, pixels.
-
-        Returns
-        -------
-        Camera
         """
         scale_v, scale_u = size[0] / self.size[0], size[1] / self.size[1]
         S = np.array([[scale_u, 0, (scale_u - 1) / 2], [0, scale_v, (scale_v - 1) / 2], [0, 0, 1]])

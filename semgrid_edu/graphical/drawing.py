@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.graphical.factor import as_names, check_name
 from semgrid_edu.graphical.layout import Place, arrange
 from semgrid_edu.graphical.model import GraphicalModel
-from semgrid_edu.graphical.variables import as_names, check_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,7 +1,4 @@
-"""A graphical model: a product of factors; directed when each is the distribution of a child given its parents.
-
-What makes a model directed: no cycle, one factor per child, each a distribution of its child (Bayesian network).
-"""
+"""A graphical model: a product of factors; directed when each is the distribution of a child given its parents."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,45 +10,19 @@ from math import prod
 import numpy as np
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.graphical.factor import Factor
-from semgrid_edu.graphical.variables import as_names, check_name, check_states, shared_cardinalities
+from semgrid_edu.graphical.factor import Factor, as_names, check_name, check_states, shared_cardinalities
 
 SUM_TOLERANCE = 1e-9
 """How far the sum over a child may be from 1: rounding, no more."""
 
 
 def families(parents: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
-    """Return each child followed by its parents: the variables of its factor.
-
-    Parameters
-    ----------
-    parents : dict of str to tuple of str
-        The parents of every variable.
-
-    Returns
-    -------
-    dict of str to tuple of str
-    """
+    """Return each child followed by its parents: the variables of its factor."""
     return {child: (child, *above) for child, above in parents.items()}
 
 
 def topological_order(parents: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
-    """Sort variables so that parents stand before their children.
-
-    Parameters
-    ----------
-    parents : dict of str to tuple of str
-        The parents of every variable.
-
-    Returns
-    -------
-    tuple of str
-
-    Raises
-    ------
-    ArgumentError
-        When there is a cycle; the message shows it.
-    """
+    """Sort variables so that parents stand before their children; an error shows the cycle that prevents it."""
     try:
         return tuple(TopologicalSorter(parents).static_order())
     except CycleError as error:
@@ -63,24 +34,7 @@ def check_directed(
 ) -> dict[str, tuple[str, ...]]:
     """Check that factors are the conditional distributions that `parents` announces, and complete `parents`.
 
-    Parameters
-    ----------
-    factors : sequence of Factor
-        One per variable.
-    parents : dict of str to tuple of str
-        The parents of each child; a variable that is left out has none.
-    names : sequence of str
-        All variables.
-
-    Returns
-    -------
-    dict of str to tuple of str
-        The parents of every variable, () of those without.
-
-    Raises
-    ------
-    ArgumentError
-        Names the factor or variable at fault.
+    A variable that `parents` leaves out has none. An error names the factor or variable at fault.
     """
     complete = {name: as_names(parents.get(name, ())) for name in names}
     for name in {*parents, *(above for family in complete.values() for above in family)}:
@@ -205,11 +159,6 @@ class GraphicalModel:
         GraphicalModel
             Undirected, not normalised, with one factor for each of this model's, in the same order. A factor
             whose variables are all known becomes a constant.
-
-        Raises
-        ------
-        ArgumentError
-            When the model has no such variable, or the variable no such state.
         """
         check_states(states, self.cardinalities)
         return GraphicalModel(
@@ -228,11 +177,6 @@ class GraphicalModel:
         -------
         float
             In a directed model the probability of the assignment; in an undirected one it is Z times that.
-
-        Raises
-        ------
-        ArgumentError
-            When a variable is missing or unknown, or has no such state.
         """
         check_states(assignment, self.cardinalities)
         if missing := set(self.names) - set(assignment):
@@ -242,24 +186,7 @@ class GraphicalModel:
 
 
 def possible(model: GraphicalModel, given: Mapping[str, int]) -> GraphicalModel:
-    """Return the model of the variables that aren't given, unless what is given makes a factor zero everywhere.
-
-    Parameters
-    ----------
-    model : GraphicalModel
-        Directed or not.
-    given : dict of str to int
-        The states of known variables.
-
-    Returns
-    -------
-    GraphicalModel
-
-    Raises
-    ------
-    ArgumentError
-        Names the factor that is zero, or the unknown variable or state.
-    """
+    """Return the model of the variables that aren't given; refuse what makes a factor zero everywhere, by its label."""
     sliced = model.given(**given)
     for label, factor in zip(model.labels, sliced.factors, strict=True):
         if not factor.table.any():

@@ -7,8 +7,8 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.graphical.factor import as_names, check_name
 from semgrid_edu.graphical.model import GraphicalModel
-from semgrid_edu.graphical.variables import as_names, check_name
 
 Names = str | Iterable[str]
 """One name or several."""
@@ -26,10 +26,6 @@ def d_separated(model: GraphicalModel, a: Names, b: Names, given: Names = ()) ->
     given : str or iterable of str
         Variables whose states are known; a dictionary of evidence serves too.
 
-    Returns
-    -------
-    bool
-
     Raises
     ------
     ArgumentError
@@ -40,7 +36,7 @@ def d_separated(model: GraphicalModel, a: Names, b: Names, given: Names = ()) ->
     Two cells and the beam that both may reflect: independent, until the beam has been seen.
 
     >>> import numpy as np
-    >>> from semgrid_edu.graphical.factor import Factor
+    >>> from semgrid_edu.graphical.factor import Factor, as_names, check_name
     >>> cells = [Factor("m1", [0.8, 0.2]), Factor("m2", [0.8, 0.2])]
     >>> reflection = Factor(("r", "m1", "m2"), np.full((2, 2, 2), 0.5))
     >>> beam = GraphicalModel([*cells, reflection], parents={"r": ("m1", "m2")})
@@ -77,7 +73,7 @@ def why_dependent(model: GraphicalModel, a: Names, b: Names, given: Names = ()) 
 
     Examples
     --------
-    >>> from semgrid_edu.graphical.factor import Factor
+    >>> from semgrid_edu.graphical.factor import Factor, as_names, check_name
     >>> chain = GraphicalModel([Factor(("x", "y"), [[2, 1], [1, 2]]), Factor(("y", "z"), [[2, 1], [1, 2]])])
     >>> why_dependent(chain, "x", "z"), why_dependent(chain, "x", "z", given="y")
     (('x', 'y', 'z'), None)

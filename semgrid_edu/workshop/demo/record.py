@@ -14,16 +14,9 @@ from semgrid_edu.occupancy import PlanarMotion, State
 from semgrid_edu.pipeline import STAGES, FrameResult
 from semgrid_edu.plotting import occupancy_colours
 from semgrid_edu.plotting.images import visible_points
+from semgrid_edu.workshop.demo import pictures
 from semgrid_edu.workshop.demo.comparison import MADE_BY, Comparison
 from semgrid_edu.workshop.demo.details import frame_details
-from semgrid_edu.workshop.demo.pictures import (
-    arrows_path,
-    classes_uri,
-    photo_uri,
-    points_layer,
-    raster_uri,
-    scores_layer,
-)
 
 YOURS = "your_"
 """Prefix of the names of pictures that are made with a student's stages."""
@@ -178,7 +171,7 @@ class Record:
             self._draw(view, result, prefix)
         for name, labels in maps.items():
             self._occurs[np.unique(labels)] = True
-            view.images[name] = classes_uri(labels, self.label_set)
+            view.images[name] = pictures.classes_uri(labels, self.label_set)
             view.texts[name] = f"{self._whose(name)}Map of classes seen from above: {_shares(labels, self.label_set)}."
         self.views.append(view)
 
@@ -186,7 +179,7 @@ class Record:
         """Return a view with what the sensors gave, and none of the stages' pictures yet."""
         frame, scanned = result.frame, len(result.frame.points) > 0
         clock = f"frame {self._number}, {frame.time:.1f} s" + ("" if scanned else ", no scan: predicted")
-        images = {"photo": photo_uri(frame.image), "points": raster_uri(points_layer(frame))}
+        images = {"photo": pictures.photo_uri(frame.image), "points": pictures.raster_uri(pictures.points_layer(frame))}
         returns = f"Camera image with the {len(visible_points(frame)[1])} LIDAR returns that the camera sees."
         if self._first_pose is None:
             self._first_pose = frame.T_world_from_lidar
@@ -206,14 +199,14 @@ class Record:
         if "scores" in self._pictures[prefix]:
             name, best = f"{prefix}scores", _best(result.scores)
             self._occurs[np.unique(best)] = True
-            view.images[name] = raster_uri(scores_layer(result.scores, self.label_set))
+            view.images[name] = pictures.raster_uri(pictures.scores_layer(result.scores, self.label_set))
             shares = _shares(best, self.label_set)
             view.texts[name] = f"{self._whose(name)}Camera image painted with classes: {shares}."
         if "occupancy" in self._pictures[prefix]:
             name, belief = f"{prefix}occupancy", result.belief
-            view.images[name] = raster_uri(occupancy_colours(belief.probability))
+            view.images[name] = pictures.raster_uri(occupancy_colours(belief.probability))
             view.texts[name] = f"{self._whose(name)}Occupancy grid seen from above: {_states(belief.probability)}."
-            view.arrows[name] = arrows_path(self.spec, belief.probability, belief.velocity)
+            view.arrows[name] = pictures.arrows_path(self.spec, belief.probability, belief.velocity)
 
     def _whose(self, name: str) -> str:
         return f"{self.comparison.file}: " if name.startswith(YOURS) else ""
@@ -224,10 +217,9 @@ def _rows(comparison: Comparison | None) -> dict[str, str]:
     if comparison is None:
         return {"network": "grid", "network + CRF": "refined"}
     words = {"grid": "semantic grid", "refined": "refined grid"}
+    yours = [name for name in ESTIMATES if name in comparison.changed]
     rows = {f"{words[name]}, the package's": name for name in ESTIMATES}
-    return rows | {
-        f"{words[name]}, {comparison.file}": YOURS + name for name in ESTIMATES if name in comparison.changed
-    }
+    return rows | {f"{words[name]}, {comparison.file}": YOURS + name for name in yours}
 
 
 def _best(values: NDArray) -> NDArray[np.uint8]:

@@ -17,8 +17,8 @@ from semgrid_edu.storage.files import write_text
 from semgrid_edu.workshop.demo.comparison import Comparison
 from semgrid_edu.workshop.demo.details import story_data
 from semgrid_edu.workshop.demo.overview import save_overview
-from semgrid_edu.workshop.demo.page import Summary, page_html
-from semgrid_edu.workshop.demo.record import YOURS, Record
+from semgrid_edu.workshop.demo.page import page_html
+from semgrid_edu.workshop.demo.record import Record
 
 SHOWN = 40
 """Most frames that the page shows if nobody asks for more, evenly spaced, so that its size stays near 10 MB."""
@@ -50,10 +50,6 @@ class ChosenFrames(NamedTuple):
             FIRST:LAST or FIRST:LAST:STEP. Frames from FIRST up to the one before LAST are run, as Python slices a list,
             and one in STEP is shown. Each number may be left out. All frames by default, of which at most `SHOWN` are
             shown if there is no STEP.
-
-        Returns
-        -------
-        ChosenFrames
 
         Raises
         ------
@@ -147,24 +143,12 @@ def write_demo(
     record = Record(net.architecture.grid, label_set, chosen.shown, comparison, net, stories)
     results = run_side_by_side((drive[k] for k in chosen.run), own, *yours)
     broken = _record_all(tqdm(results, total=len(chosen.run), desc=drive.folder.name, unit="frame"), record)
-    summary = Summary(
-        title=drive.folder.name,
-        choice=chosen.told(len(drive)),
-        broken=str(broken or ""),
-        spec=record.spec,
-        camera=drive.camera,
-        network_size=net.architecture.image_size,
-        classes=record.classes(),
-        metrics=record.metrics(),
-        labelled=record.labelled,
-        milliseconds=record.milliseconds(),
-        comparison=comparison,
-        your_milliseconds=record.milliseconds(YOURS),
-        story=story_data(net, drive.camera, record.layout),
-    )
-    save_overview(*record.liveliest, record.spec, label_set, Path(out) / "overview.png", comparison)
+    save_overview(record, Path(out) / "overview.png")
     page = Path(out) / "index.html"
-    write_text(page, page_html(summary, record.views))
+    story = story_data(net, drive.camera, record.layout)
+    words = {"choice": chosen.told(len(drive)), "broken": str(broken or "")}
+    html = page_html(record, drive.folder.name, drive.camera, net.architecture.image_size, story, **words)
+    write_text(page, html)
     if broken:
         raise DataError(broken.path, broken.args[1], f"{broken.args[2]}; {page} shows the frames before it") from broken
     return page
