@@ -36,7 +36,7 @@ def d_separated(model: GraphicalModel, a: Names, b: Names, given: Names = ()) ->
     Two cells and the beam that both may reflect: independent, until the beam has been seen.
 
     >>> import numpy as np
-    >>> from semgrid_edu.graphical.factor import Factor, as_names, check_name
+    >>> from semgrid_edu.graphical.factor import Factor
     >>> cells = [Factor("m1", [0.8, 0.2]), Factor("m2", [0.8, 0.2])]
     >>> reflection = Factor(("r", "m1", "m2"), np.full((2, 2, 2), 0.5))
     >>> beam = GraphicalModel([*cells, reflection], parents={"r": ("m1", "m2")})
@@ -73,7 +73,7 @@ def why_dependent(model: GraphicalModel, a: Names, b: Names, given: Names = ()) 
 
     Examples
     --------
-    >>> from semgrid_edu.graphical.factor import Factor, as_names, check_name
+    >>> from semgrid_edu.graphical.factor import Factor
     >>> chain = GraphicalModel([Factor(("x", "y"), [[2, 1], [1, 2]]), Factor(("y", "z"), [[2, 1], [1, 2]])])
     >>> why_dependent(chain, "x", "z"), why_dependent(chain, "x", "z", given="y")
     (('x', 'y', 'z'), None)

@@ -13,20 +13,12 @@ from torch import Tensor
 
 from semgrid_edu.occupancy import N_STATES
 
+AXES = {"classes": "class", "states": "state"}
+"""What the first axis of an array of probabilities is called."""
+
 
 def where(function: Callable) -> str:
-    """Say where a function is written.
-
-    Parameters
-    ----------
-    function : callable
-        A function, or an object that can be called.
-
-    Returns
-    -------
-    str
-        A place such as "my_stages.py, line 12", or the class of an object when no line of Python is known.
-    """
+    """Say where a function is written: "my_stages.py, line 12", or the class of an object without a line of Python."""
     code = _code(function)
     if code is None:
         return f"an object of class {type(function).__name__}"
@@ -34,37 +26,13 @@ def where(function: Callable) -> str:
 
 
 def file_of(function: Callable) -> str:
-    """Return the file that a function is written in.
-
-    Parameters
-    ----------
-    function : callable
-        A function, or an object that can be called.
-
-    Returns
-    -------
-    str
-        The file's path; "" when it can't be known, as for a function written in C.
-    """
+    """Return the path of the file that a function is written in; "" when it can't be known, as for one written in C."""
     code = _code(function)
     return code.co_filename if code else ""
 
 
 def in_short(error: BaseException, file: str) -> str:
-    """Describe an exception in one line.
-
-    Parameters
-    ----------
-    error : BaseException
-        The exception.
-    file : str
-        The file of interest.
-
-    Returns
-    -------
-    str
-        Class and first line of the message, and the last line of the file that the exception passed through, if any.
-    """
+    """Describe an exception in one line: class, message, and the last line of a file that it passed through."""
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
     first_line = str(error).strip().partition("\n")[0]
     message = f"{type(error).__name__}: {first_line}" if first_line else type(error).__name__
@@ -84,18 +52,7 @@ def _place(file: str, line: int) -> str:
 
 
 def kind_of(value: object) -> str:
-    """Name what a stage returned in place of an array, and the usual cause.
-
-    Parameters
-    ----------
-    value : object
-        Anything but an array.
-
-    Returns
-    -------
-    str
-        The end of the sentence "found ...".
-    """
+    """Name what a stage returned in place of an array, and the usual cause, as the end of "found ..."."""
     if value is None:
         return "None: is the `return` missing?"
     if isinstance(value, Tensor):
@@ -106,20 +63,8 @@ def kind_of(value: object) -> str:
 
 
 def shape_hint(found: tuple[int, ...], expected: tuple[int, ...]) -> str:
-    """Return the probable cause of a wrong shape, as the end of a sentence; "" when there is no guess.
+    """Return the probable cause of a wrong shape as the end of a sentence, with its colon; "" without a guess.
 
-    Parameters
-    ----------
-    found, expected : tuple of int
-        The shape of the array that a stage returned, and the shape that it should have.
-
-    Returns
-    -------
-    str
-        Begins with a colon.
-
-    Examples
-    --------
     >>> shape_hint((355, 155, 14), (14, 355, 155))
     ': is the class axis last? np.moveaxis(x, -1, 0) moves it to the front'
     """
@@ -138,44 +83,16 @@ def shape_hint(found: tuple[int, ...], expected: tuple[int, ...]) -> str:
 
 
 def sum_hint(values: NDArray, total: float, axis: str) -> str:
-    """Return the probable cause of probabilities that don't sum to 1.
-
-    Parameters
-    ----------
-    values : (K, H, W) float
-        The values of all cells.
-    total : float
-        The sum in a cell where it is wrong; may be NaN.
-    axis : str
-        What the first axis stands for: "class" or "state".
-
-    Returns
-    -------
-    str
-        A question to the student, and sometimes the remedy.
-    """
+    """Return the probable cause of probabilities (K, H, W) over classes or states that sum to a total other than 1."""
     if np.isnan(total):
         return "was something divided by a sum of 0?"
     if (values <= 0).all() and _sums_to_one(np.exp(values)):
         return "are these log-probabilities? Return np.exp of them"
-    return f"did you normalise over the {axis} axis (axis 0)?"
+    return f"did you normalise over the {AXES[axis]} axis (axis 0)?"
 
 
 def log_sum_hint(values: NDArray, total: float) -> str:
-    """Return the probable cause of log-probabilities whose exponentials don't sum to 1.
-
-    Parameters
-    ----------
-    values : (C, H, W) float
-        The values of all cells.
-    total : float
-        The sum of the exponentials in a cell where it is wrong; may be NaN.
-
-    Returns
-    -------
-    str
-        A question to the student, and sometimes the remedy.
-    """
+    """Return the probable cause of log-probabilities (C, H, W) whose exponentials sum to a total other than 1."""
     if np.isnan(total):
         return "is there a logarithm of a negative number?"
     if (values >= 0).all() and _sums_to_one(values):

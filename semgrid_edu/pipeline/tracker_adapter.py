@@ -1,4 +1,4 @@
-"""A tracker that follows a drive: it takes the frames one at a time, and yields a belief for each."""
+"""A student's tracker or the package's own in step with the other stages: one frame in, one belief out."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -17,10 +17,9 @@ _END = object()
 
 
 class TrackerAdapter:
-    """Run a tracker in step with the other stages: it gets a frame only when they need its belief.
+    """Run a tracker in step with the other stages: hand it one frame at a time, and take one belief for each.
 
-    A tracker is a generator that reads the frames itself. This class hands it one frame at a time, and takes one belief
-    for each.
+    A tracker is a generator that reads the frames itself. Its methods raise `StageError`.
 
     Parameters
     ----------
@@ -54,11 +53,6 @@ class TrackerAdapter:
             probabilities.
         seconds : float
             How long the tracker took.
-
-        Raises
-        ------
-        StageError
-            When the tracker doesn't yield one belief for each frame, or not four probabilities for each cell.
         """
         check = self._check = replace(self._check, frame=number)
         self._waiting = frame if check.own else replace(frame, points=frame.points.copy())
@@ -72,13 +66,7 @@ class TrackerAdapter:
         return self._checked(yielded), seconds
 
     def finish(self) -> None:
-        """Tell the tracker that there are no more frames.
-
-        Raises
-        ------
-        StageError
-            When it yields another belief.
-        """
+        """Tell the tracker that there are no more frames; another belief of it is refused."""
         self._over = True
         if self._beliefs is not None and self._next() is not _END:
             raise self._check.error("one belief for each frame", "another one after the last frame")
@@ -109,7 +97,7 @@ class TrackerAdapter:
         belief = yielded if isinstance(yielded, Belief) else _without_velocity(yielded, grid)
         shapes = {"probability": (N_STATES, *grid), "velocity": (2, *grid), "velocity_covariance": (2, 2, *grid)}
         arrays = {name: self._check.array(getattr(belief, name), shape) for name, shape in shapes.items()}
-        self._check.probabilities(arrays["probability"], "state")
+        self._check.probabilities(arrays["probability"], "states")
         return replace(belief, **arrays)
 
 
