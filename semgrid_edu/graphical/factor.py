@@ -240,18 +240,42 @@ def shared_cardinalities(tables: Iterable[Mapping[str, int]]) -> dict[str, int]:
 
 
 def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
-    """Return names as a tuple; a single string is one name, not a sequence of letters."""
+    """Return names as a tuple; a single string is one name, not a sequence of letters.
+
+    Parameters
+    ----------
+    names : str or iterable of str
+        One name or several.
+    """
     return (names,) if isinstance(names, str) else tuple(names)
 
 
 def check_name(argument: str, name: str, known: Iterable[str]) -> None:
-    """Refuse the name of a variable that isn't among those known; the error is about the argument."""
+    """Refuse the name of a variable that isn't there.
+
+    Parameters
+    ----------
+    argument : str
+        What the message calls the argument.
+    name : str
+        The variable asked for.
+    known : iterable of str
+        The variables there are.
+    """
     if name not in (known := tuple(known)):
         raise ArgumentError(argument, f"variables among {known}", name)
 
 
 def check_states(states: Mapping[str, int], cardinalities: Mapping[str, int]) -> None:
-    """Refuse unknown variables, and states that a variable doesn't have."""
+    """Refuse unknown variables, and states that a variable doesn't have.
+
+    Parameters
+    ----------
+    states : dict of str to int
+        What is given.
+    cardinalities : dict of str to int
+        The number of states of each variable.
+    """
     for name, state in states.items():
         check_name("given", name, cardinalities)
         count = cardinalities[name]

@@ -158,7 +158,7 @@ def arrange(
     equations: Mapping[str, str],
     plates: Mapping[str, tuple[str, ...]],
 ) -> Arrangement:
-    """Find a place for everything that `draw` draws; the arguments are those of `draw`."""
+    """Find a place for everything that `draw` draws. Parameters are those of `draw`."""
     places = _places(model, positions)
     said = {name: _said(name, labels) for name in model.names}
     texts = {name: (text, _beside(name, places, said)) for name, text in equations.items()}
@@ -210,7 +210,13 @@ def _symbol(letter: str, index: str) -> str:
 
 
 def half_width(text: str) -> float:
-    """Return how far a node reaches to either side of its centre: words make it wider."""
+    """Return how far a node reaches to either side of its centre: words make it wider.
+
+    Parameters
+    ----------
+    text : str
+        What the node says.
+    """
     return max(NODE, LETTER * _letters(text)) / 2
 
 

@@ -17,12 +17,24 @@ SUM_TOLERANCE = 1e-9
 
 
 def families(parents: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
-    """Return each child followed by its parents: the variables of its factor."""
+    """Return each child followed by its parents: the variables of its factor.
+
+    Parameters
+    ----------
+    parents : dict of str to tuple of str
+        The parents of every variable.
+    """
     return {child: (child, *above) for child, above in parents.items()}
 
 
 def topological_order(parents: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
-    """Sort variables so that parents stand before their children; an error shows the cycle that prevents it."""
+    """Sort variables so that parents stand before their children; an error shows the cycle that prevents it.
+
+    Parameters
+    ----------
+    parents : dict of str to tuple of str
+        The parents of every variable.
+    """
     try:
         return tuple(TopologicalSorter(parents).static_order())
     except CycleError as error:
@@ -34,7 +46,14 @@ def check_directed(
 ) -> dict[str, tuple[str, ...]]:
     """Check that factors are the conditional distributions that `parents` announces, and complete `parents`.
 
-    A variable that `parents` leaves out has none. An error names the factor or variable at fault.
+    Parameters
+    ----------
+    factors : sequence of Factor
+        One per variable; an error names the one at fault.
+    parents : dict of str to tuple of str
+        The parents of each child; a variable that is left out has none.
+    names : sequence of str
+        All variables.
     """
     complete = {name: as_names(parents.get(name, ())) for name in names}
     for name in {*parents, *(above for family in complete.values() for above in family)}:
@@ -186,7 +205,15 @@ class GraphicalModel:
 
 
 def possible(model: GraphicalModel, given: Mapping[str, int]) -> GraphicalModel:
-    """Return the model of the variables that aren't given; refuse what makes a factor zero everywhere, by its label."""
+    """Return the model of the variables that aren't given; refuse what makes a factor zero everywhere, by its label.
+
+    Parameters
+    ----------
+    model : GraphicalModel
+        Directed or not.
+    given : dict of str to int
+        The states of known variables.
+    """
     sliced = model.given(**given)
     for label, factor in zip(model.labels, sliced.factors, strict=True):
         if not factor.table.any():

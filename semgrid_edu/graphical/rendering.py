@@ -23,7 +23,17 @@ def render(
     observed: Collection[str],
     highlight: Collection[str],
 ) -> None:
-    """Draw plates, then edges, then nodes, with texts of a size in points; other arguments as for `draw`."""
+    """Draw plates, then edges, then nodes.
+
+    Parameters
+    ----------
+    model, ax, observed, highlight
+        Those of `draw`.
+    where : Arrangement
+        Where everything stands.
+    size : float
+        Size of the texts, points.
+    """
     nodes = {
         name: daft.Node(
             name,

@@ -80,7 +80,13 @@ class StageCheck:
         return result, seconds
 
     def error(self, expected: object, found: object) -> StageError:
-        """Return an error that names this call, what was expected of it, and what was found instead."""
+        """Return an error that names this call.
+
+        Parameters
+        ----------
+        expected, found : object
+            What was expected of the stage, and what was found instead.
+        """
         return StageError(str(self), expected, found)
 
     @contextmanager
@@ -96,7 +102,15 @@ class StageCheck:
             raise self.error("a result", f"an error: {in_short(error, file_of(self.function))}") from error
 
     def array(self, value: object, shape: tuple[int, ...]) -> NDArray[np.float32]:
-        """Return a result as float32 in its own memory layout; refuse all but an array of floats of this shape."""
+        """Return a result as float32 in its own memory layout; refuse all but an array of floats of this shape.
+
+        Parameters
+        ----------
+        value : object
+            What the stage returned.
+        shape : tuple of int
+            The shape that it must have.
+        """
         if not isinstance(value, np.ndarray):
             raise self.error("a numpy array", kind_of(value))
         if value.shape != shape:
@@ -107,13 +121,27 @@ class StageCheck:
             return value.astype(np.float32, order="K", copy=not self.own)
 
     def finite(self, values: NDArray) -> None:
-        """Refuse NaN and infinity."""
+        """Refuse NaN and infinity.
+
+        Parameters
+        ----------
+        values : array
+            What the stage returned.
+        """
         if not np.isfinite(values).all():
             place = _first(~np.isfinite(values))
             raise self.error("finite numbers", f"{values[place]} at index {place}")
 
     def probabilities(self, values: NDArray, axis: str = "classes") -> None:
-        """Refuse (K, H, W) values that aren't a distribution in each cell over its classes, or its states."""
+        """Refuse values that aren't a distribution in each cell.
+
+        Parameters
+        ----------
+        values : (K, H, W) float32
+            What the stage returned.
+        axis : str
+            What the first axis holds: "classes" or "states".
+        """
         cell, total = _wrong_sum(values)
         if cell is not None:
             found = f"that the {len(values)} {axis} of cell {cell} sum to {total:.4g}: {sum_hint(values, total, axis)}"
@@ -123,7 +151,13 @@ class StageCheck:
             raise self.error("probabilities from 0 to 1", f"{values[:, *cell].min():.4g} in cell {cell}")
 
     def log_probabilities(self, values: NDArray) -> None:
-        """Refuse (C, H, W) values that aren't natural logarithms of a distribution over the classes in each cell."""
+        """Refuse values that aren't logarithms of a distribution over the classes in each cell.
+
+        Parameters
+        ----------
+        values : (C, H, W) float32
+            What the stage returned, natural logarithms.
+        """
         with np.errstate(over="ignore"):
             cell, total = _wrong_sum(np.exp(values))
         if cell is not None:

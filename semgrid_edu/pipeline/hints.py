@@ -18,7 +18,13 @@ AXES = {"classes": "class", "states": "state"}
 
 
 def where(function: Callable) -> str:
-    """Say where a function is written: "my_stages.py, line 12", or the class of an object without a line of Python."""
+    """Say where a function is written: "my_stages.py, line 12", or the class of an object without a line of Python.
+
+    Parameters
+    ----------
+    function : callable
+        A function, or an object that can be called.
+    """
     code = _code(function)
     if code is None:
         return f"an object of class {type(function).__name__}"
@@ -26,13 +32,24 @@ def where(function: Callable) -> str:
 
 
 def file_of(function: Callable) -> str:
-    """Return the path of the file that a function is written in; "" when it can't be known, as for one written in C."""
+    """Return the path of the file that a function is written in; "" when it can't be known.
+
+    Parameters are those of `where`.
+    """
     code = _code(function)
     return code.co_filename if code else ""
 
 
 def in_short(error: BaseException, file: str) -> str:
-    """Describe an exception in one line: class, message, and the last line of a file that it passed through."""
+    """Describe an exception in one line: class, message, and where it passed through a file.
+
+    Parameters
+    ----------
+    error : BaseException
+        The exception.
+    file : str
+        The file of interest, whose last line is named.
+    """
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
     first_line = str(error).strip().partition("\n")[0]
     message = f"{type(error).__name__}: {first_line}" if first_line else type(error).__name__
@@ -52,7 +69,13 @@ def _place(file: str, line: int) -> str:
 
 
 def kind_of(value: object) -> str:
-    """Name what a stage returned in place of an array, and the usual cause, as the end of "found ..."."""
+    """Name what a stage returned in place of an array, and the usual cause, as the end of "found ...".
+
+    Parameters
+    ----------
+    value : object
+        Anything but an array.
+    """
     if value is None:
         return "None: is the `return` missing?"
     if isinstance(value, Tensor):
@@ -67,6 +90,11 @@ def shape_hint(found: tuple[int, ...], expected: tuple[int, ...]) -> str:
 
     >>> shape_hint((355, 155, 14), (14, 355, 155))
     ': is the class axis last? np.moveaxis(x, -1, 0) moves it to the front'
+
+    Parameters
+    ----------
+    found, expected : tuple of int
+        The shape of what a stage returned, and the shape that it should have.
     """
     axis = {2: "velocity", N_STATES: "state"}.get(expected[0], "class")
     if found == (*expected[1:], expected[0]):
@@ -83,7 +111,17 @@ def shape_hint(found: tuple[int, ...], expected: tuple[int, ...]) -> str:
 
 
 def sum_hint(values: NDArray, total: float, axis: str) -> str:
-    """Return the probable cause of probabilities (K, H, W) over classes or states that sum to a total other than 1."""
+    """Return the probable cause of probabilities that don't sum to 1, as a question to the student.
+
+    Parameters
+    ----------
+    values : (K, H, W) float
+        The values of all cells.
+    total : float
+        The sum in a cell where it is wrong; may be NaN.
+    axis : str
+        What the first axis holds: "classes" or "states".
+    """
     if np.isnan(total):
         return "was something divided by a sum of 0?"
     if (values <= 0).all() and _sums_to_one(np.exp(values)):
@@ -92,7 +130,10 @@ def sum_hint(values: NDArray, total: float, axis: str) -> str:
 
 
 def log_sum_hint(values: NDArray, total: float) -> str:
-    """Return the probable cause of log-probabilities (C, H, W) whose exponentials sum to a total other than 1."""
+    """Return the probable cause of log-probabilities whose exponentials don't sum to 1.
+
+    Parameters are those of `sum_hint`.
+    """
     if np.isnan(total):
         return "is there a logarithm of a negative number?"
     if (values >= 0).all() and _sums_to_one(values):

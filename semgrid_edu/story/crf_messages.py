@@ -95,7 +95,7 @@ def neighbour_pull(
 
 
 def beliefs_before_last_update(g: NDArray, o: NDArray, params: CrfParams, iterations: int = 10) -> NDArray[np.float32]:
-    """Return Q, (C, H, W), before the last of the CRF's updates; arguments are those of `neighbour_pull`."""
+    """Return Q, (C, H, W), before the last of the CRF's updates. Parameters are those of `neighbour_pull`."""
     if iterations < 1:
         raise ArgumentError("iterations", "at least one update to explain", iterations)
     return mean_field(unary_from_probability(g), o, params, iterations - 1)

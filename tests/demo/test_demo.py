@@ -38,6 +38,8 @@ from semgrid_edu.workshop.demo.pictures import (
 from semgrid_edu.workshop.demo.record import FrameView, Record
 from semgrid_edu.workshop.demo.run import ChosenFrames
 
+pytestmark = pytest.mark.usefixtures("few_stories")
+
 
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory):

@@ -63,15 +63,12 @@ class StoryMaps(NamedTuple):
 
     def layout(self) -> dict[str, list[int]]:
         """Return for each name where its bytes begin, K, and the steps to a cell's next byte and to the next cell."""
-        n_cells, places, at = next(iter(self.smooth.values()))[0].size, {}, 0
+        n_cells, places = next(iter(self.smooth.values()))[0].size, {}
         per_cell = sum(map(len, self.alike.values()))
-        for name, maps in self.alike.items():
-            places[name] = [at, len(maps), 1, per_cell]
-            at += len(maps)
-        at *= n_cells
-        for name, maps in self.smooth.items():
-            places[name] = [at, len(maps), n_cells, 1]
-            at += len(maps) * n_cells
+        for at, maps, step, stride in ((0, self.alike, 1, per_cell), (per_cell * n_cells, self.smooth, n_cells, 1)):
+            for name, part in maps.items():
+                places[name] = [at, len(part), step, stride]
+                at += len(part) * step
         return places
 
 
@@ -117,7 +114,13 @@ def frame_details(result: FrameResult, net: SemanticGridNet, truth: NDArray | No
 
 
 def states_bytes(probability: NDArray) -> NDArray[np.uint8]:
-    """Round the four states of each cell, (4, H, W), to 255ths that sum to 255."""
+    """Round the four states of each cell to 255ths that sum to 255.
+
+    Parameters
+    ----------
+    probability : (4, H, W) float
+        Probabilities that sum to 1.
+    """
     upto = np.rint(255 * np.clip(np.cumsum(probability, axis=0), 0, 1)).astype(np.int64)
     upto[-1] = 255
     return np.diff(np.maximum.accumulate(upto, axis=0), axis=0, prepend=0).astype(np.uint8)

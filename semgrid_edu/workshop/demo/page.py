@@ -24,7 +24,17 @@ COMPARED = " The package's occupancy grid names the unknown cells of the truth, 
 
 
 class Panel(NamedTuple):
-    """A bird's-eye panel: the name of its raster in a `FrameView`, title and symbol of its caption, and what to see."""
+    """A bird's-eye panel.
+
+    Parameters
+    ----------
+    name : str
+        Name of its raster among the images of a `FrameView`.
+    title, symbol : str
+        The first words of its caption, and its symbol in Fig. 2, if any.
+    see : str
+        What to look for, as HTML.
+    """
 
     name: str
     title: str

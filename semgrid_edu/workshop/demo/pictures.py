@@ -30,17 +30,37 @@ TICK = 10
 
 
 def photo_uri(image: NDArray[np.uint8]) -> str:
-    """Return a photograph, (h, w, 3) RGB, as the data URI of a WebP."""
+    """Return a photograph as the data URI of a WebP.
+
+    Parameters
+    ----------
+    image : (h, w, 3) uint8
+        RGB.
+    """
     return _uri(Image.fromarray(image), "webp", quality=PHOTO_QUALITY, method=2)
 
 
 def raster_uri(raster: NDArray[np.uint8]) -> str:
-    """Return a raster, (h, w, 3) RGB or (h, w, 4) RGBA, as the data URI of a PNG, without loss."""
+    """Return a raster as the data URI of a PNG, without loss.
+
+    Parameters
+    ----------
+    raster : (h, w, 3) or (h, w, 4) uint8
+        RGB or RGBA.
+    """
     return _uri(Image.fromarray(raster), "png", optimize=True)
 
 
 def classes_uri(labels: NDArray[np.uint8], label_set: LabelSet) -> str:
-    """Return a map of classes, (h, w), as the data URI of a PNG whose palette holds the colours of the label set."""
+    """Return a map of classes as the data URI of a PNG.
+
+    Parameters
+    ----------
+    labels : (h, w) uint8
+        The class of each pixel or cell.
+    label_set : LabelSet
+        The classes, whose colours become the palette of the PNG.
+    """
     image = Image.fromarray(labels).convert("P")
     image.putpalette(label_set.colours(np.arange(256)).tobytes())
     return _uri(image, "png", optimize=True)

@@ -141,9 +141,12 @@ class Record:
         self._number += 1
 
     def milliseconds(self, prefix: str = "") -> dict[str, float]:
-        """Return the median time of each of the package's stages, or with the prefix `YOURS` of a student's run.
+        """Return the median time of each stage; a median, because the first frames also load compiled code.
 
-        A median, because the first frames also load compiled code. Empty when there was no such run.
+        Parameters
+        ----------
+        prefix : str
+            Whose stages: empty for the package's, `YOURS` for a student's. Without such a run nothing is returned.
         """
         if not self._seconds[prefix]:
             return {}
