@@ -12,7 +12,7 @@ KITTI_LIDAR_HEIGHT = 1.73
 
 
 def rigid_transform(rotation: NDArray, translation: NDArray) -> NDArray[np.float64]:
-    """Return the 4x4 transform that rotates, then shifts.
+    """Return the transform that rotates, then shifts, for homogeneous column vectors, (4, 4).
 
     Parameters
     ----------
@@ -20,11 +20,6 @@ def rigid_transform(rotation: NDArray, translation: NDArray) -> NDArray[np.float
         Rotation matrix.
     translation : (3,) float
         Shift, metres.
-
-    Returns
-    -------
-    (4, 4) float64
-        For homogeneous column vectors.
     """
     T = np.eye(4)
     T[:3, :3] = rotation
@@ -33,17 +28,12 @@ def rigid_transform(rotation: NDArray, translation: NDArray) -> NDArray[np.float
 
 
 def invert_rigid(T: NDArray) -> NDArray[np.float64]:
-    """Return the inverse of a rigid transform, by transposing its rotation.
+    """Return T_source_from_target, (4, 4), by transposing the rotation.
 
     Parameters
     ----------
     T : (4, 4) float
-        Rigid transform, metres.
-
-    Returns
-    -------
-    (4, 4) float64
-        If `T` is T_target_from_source, this is T_source_from_target.
+        The rigid transform T_target_from_source, metres.
     """
     rotation = T[:3, :3].T
     return rigid_transform(rotation, -rotation @ T[:3, 3])
@@ -69,17 +59,12 @@ def transform_points(T_target_from_source: NDArray, points: NDArray) -> NDArray:
 
 
 def lidar_from_grid(lidar_height: float) -> NDArray[np.float64]:
-    """Return the transform from the grid frame, on the ground below the LIDAR, to the LIDAR frame.
+    """Return T_lidar_from_grid, (4, 4), from the ground below the LIDAR: a shift, as both frames have the same axes.
 
     Parameters
     ----------
     lidar_height : float
         Height of the LIDAR above the ground, metres.
-
-    Returns
-    -------
-    (4, 4) float64
-        T_lidar_from_grid: a shift, because both frames have the same axes.
     """
     return rigid_transform(np.eye(3), np.array([0.0, 0.0, -lidar_height]))
 
@@ -127,10 +112,6 @@ class Camera:
         ----------
         size : (int, int)
             The new height and width, pixels.
-
-        Returns
-        -------
-        Camera
         """
         scale_v, scale_u = size[0] / self.size[0], size[1] / self.size[1]
         S = np.array([[scale_u, 0, (scale_u - 1) / 2], [0, scale_v, (scale_v - 1) / 2], [0, 0, 1]])
@@ -154,11 +135,6 @@ def project(points: NDArray, camera: Camera) -> tuple[NDArray, NDArray[np.bool_]
     visible : (...) bool
         Whether the point is in front of the camera and its pixel lies among the centres of the image's
         pixels, 0 <= u <= w - 1, 0 <= v <= h - 1, where equation (2) can interpolate.
-
-    Raises
-    ------
-    ArgumentError
-        When the last axis of `points` isn't X, Y, Z.
 
     Examples
     --------

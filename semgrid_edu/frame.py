@@ -42,43 +42,24 @@ class FrameLabels:
         """Pool the bird's-eye labels to a coarser grid.
 
         A cell takes the class that `LabelSet.most_voted` finds among its fine cells: what stands in it, even if that is
-        a thin pole in a single fine cell, or else the ground.
+        a thin pole in a single fine cell, or else the ground. It is 255 where no fine cell is labelled.
 
         Parameters
         ----------
         spec : GridSpec
             The extent of `LABEL_GRID`, a multiple of its cell.
-
-        Returns
-        -------
-        (H, W) uint8
-            255 where no fine cell is labelled.
-
-        Raises
-        ------
-        ArgumentError
-            When `spec` isn't a coarsening of `LABEL_GRID`.
         """
         fine = blocks(self.birdseye, spec)
         counts = np.stack([(fine == c).sum(axis=-1) for c in range(len(self.label_set))])
         return self.label_set.most_voted(counts, otherwise=IGNORE)
 
     def visible_on(self, spec: GridSpec) -> NDArray[np.bool_]:
-        """Pool visibility to a coarser grid: a cell is visible when any part of it is.
+        """Pool visibility to a coarser grid, (H, W) bool: a cell is visible when any part of it is.
 
         Parameters
         ----------
         spec : GridSpec
             The extent of `LABEL_GRID`, a multiple of its cell.
-
-        Returns
-        -------
-        (H, W) bool
-
-        Raises
-        ------
-        ArgumentError
-            When `spec` isn't a coarsening of `LABEL_GRID`.
         """
         return blocks(self.visible, spec).any(axis=-1)
 
@@ -97,11 +78,6 @@ def blocks(fine: NDArray, spec: GridSpec) -> NDArray:
     -------
     (H, W, n) of the same type
         The n fine values in each cell, row by row.
-
-    Raises
-    ------
-    ArgumentError
-        When `spec` isn't a coarsening of `LABEL_GRID`.
     """
     factor = round(spec.cell / LABEL_GRID.cell)
     height, width = spec.shape
@@ -140,18 +116,7 @@ class Frame:
     labels: FrameLabels | None = None
 
     def need_image(self) -> NDArray[np.uint8]:
-        """Return the image, for callers that need one.
-
-        Returns
-        -------
-        (h, w, 3) uint8
-            RGB.
-
-        Raises
-        ------
-        ArgumentError
-            When the frame has none.
-        """
+        """Return the image, (h, w, 3) RGB, for callers that can't do without one."""
         if self.image is None:
             raise ArgumentError("frame", "a frame with a camera image", "a frame without one")
         return self.image

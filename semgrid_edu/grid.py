@@ -22,11 +22,6 @@ class GridSpec:
     cell : float
         The side of a cell, metres.
 
-    Raises
-    ------
-    ArgumentError
-        When a border isn't finite, the cell isn't positive, or a side isn't a whole number of cells.
-
     Examples
     --------
     >>> spec = GridSpec(x_min=0, x_max=4, y_min=-1, y_max=1, cell=1)
@@ -73,13 +68,7 @@ class GridSpec:
         return round((self.x_max - self.x_min) / self.cell), round((self.y_max - self.y_min) / self.cell)
 
     def centers(self) -> NDArray[np.float64]:
-        """Return the centre of every cell.
-
-        Returns
-        -------
-        (H, W, 2) float64
-            x and y in the grid frame, metres.
-        """
+        """Return x and y of the centre of every cell in the grid frame, (H, W, 2), metres."""
         height, width = self.shape
         x = self.x_max - (np.arange(height) + 0.5) * self.cell
         y = self.y_max - (np.arange(width) + 0.5) * self.cell
@@ -99,11 +88,6 @@ class GridSpec:
             The cell of each point; 0 for a point outside, so use them only where `inside` holds.
         inside : (N,) bool
             Whether the point lies in the grid. The borders x_max and y_max belong to it, x_min and y_min don't.
-
-        Raises
-        ------
-        ArgumentError
-            When `xy` isn't a table of points.
         """
         xy = np.asarray(xy)
         if xy.ndim != 2 or xy.shape[1] < 2:

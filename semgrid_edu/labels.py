@@ -51,28 +51,18 @@ class LabelSet:
         ----------
         name : str
             The name of a class of this set.
-
-        Raises
-        ------
-        ArgumentError
-            When the set has no such class.
         """
         if name not in self.names:
             raise ArgumentError("name", f"a class of {self.name}: {', '.join(self.names)}", repr(name))
         return self.names.index(name)
 
     def colours(self, labels: NDArray) -> NDArray[np.uint8]:
-        """Paint a map of classes.
+        """Paint a map of classes in RGB, (..., 3).
 
         Parameters
         ----------
         labels : (...) int
             Class numbers; 255 (unlabelled) is painted white.
-
-        Returns
-        -------
-        (..., 3) uint8
-            RGB.
         """
         palette = np.full((256, 3), 255, dtype=np.uint8)
         palette[: len(self)] = self.rgb
@@ -90,10 +80,6 @@ class LabelSet:
             How often each class was seen in each cell.
         otherwise : (...) int, or int
             The class of cells without a vote.
-
-        Returns
-        -------
-        (...) uint8
 
         Examples
         --------

@@ -26,11 +26,6 @@ def confusion_matrix(truth: ArrayLike, predicted: ArrayLike, n_classes: int, ign
     (C, C) int64
         Row: truth; column: prediction.
 
-    Raises
-    ------
-    ArgumentError
-        When the shapes differ, the labels aren't integers, or a labelled cell has a number outside the classes.
-
     Examples
     --------
     >>> confusion_matrix([0, 0, 1, 255], [0, 1, 1, 0], n_classes=2)
@@ -41,10 +36,8 @@ def confusion_matrix(truth: ArrayLike, predicted: ArrayLike, n_classes: int, ign
     if truth.shape != predicted.shape:
         raise ArgumentError("predicted", f"the shape of truth, {truth.shape}", predicted.shape)
     labelled = truth != ignore
-    truth, predicted = (
-        _classes("truth", truth[labelled], n_classes),
-        _classes("predicted", predicted[labelled], n_classes),
-    )
+    truth = _classes("truth", truth[labelled], n_classes)
+    predicted = _classes("predicted", predicted[labelled], n_classes)
     return np.bincount(truth * n_classes + predicted, minlength=n_classes**2).reshape(n_classes, n_classes)
 
 
@@ -67,7 +60,7 @@ def semantic_cells(confusion: ArrayLike, label_set: LabelSet) -> NDArray[np.int6
     Parameters
     ----------
     confusion : (C, C) int
-        How often each true class (row) is called each class (column).
+        Row: truth; column: prediction.
     label_set : LabelSet
         Its first `n_semantic` classes are the semantic ones.
 
@@ -75,33 +68,22 @@ def semantic_cells(confusion: ArrayLike, label_set: LabelSet) -> NDArray[np.int6
     -------
     (C, C) int64
         The same matrix with the rows of the other classes emptied.
-
-    Raises
-    ------
-    ArgumentError
-        When the matrix isn't one of this label set.
     """
     kept = _matrix(confusion).copy()
     if len(kept) != len(label_set):
-        raise ArgumentError(
-            "confusion", f"a row for each of the {len(label_set)} classes of {label_set.name}", len(kept)
-        )
+        wanted = f"a row for each of the {len(label_set)} classes of {label_set.name}"
+        raise ArgumentError("confusion", wanted, len(kept))
     kept[label_set.n_semantic :] = 0
     return kept
 
 
 def pixel_accuracy(confusion: ArrayLike) -> float:
-    """Return the share of labelled cells that are called right, 0..1.
+    """Return the share of labelled cells that are called right, 0..1; NaN when no cell is labelled.
 
     Parameters
     ----------
     confusion : (C, C) int
         How often each true class (row) is called each class (column).
-
-    Returns
-    -------
-    float
-        NaN when no cell is labelled.
     """
     matrix = _matrix(confusion)
     return _ratio(np.trace(matrix), matrix.sum())
@@ -110,15 +92,8 @@ def pixel_accuracy(confusion: ArrayLike) -> float:
 def class_accuracy(confusion: ArrayLike) -> float:
     """Return the mean over classes of the share of a class's cells that are called right, 0..1.
 
-    Parameters
-    ----------
-    confusion : (C, C) int
-        How often each true class (row) is called each class (column).
-
-    Returns
-    -------
-    float
-        A class without truth cells is left out of the mean; NaN when no cell is labelled.
+    A class without truth cells is left out of the mean; NaN when no cell is labelled. Parameters are those of
+    `pixel_accuracy`.
     """
     matrix = _matrix(confusion)
     cells = matrix.sum(axis=1)
@@ -129,16 +104,8 @@ def class_accuracy(confusion: ArrayLike) -> float:
 def frequency_weighted_iou(confusion: ArrayLike) -> float:
     """Return FmIoU: the mean over classes of intersection over union, weighted by frequency, 0..1.
 
-    Parameters
-    ----------
-    confusion : (C, C) int
-        How often each true class (row) is called each class (column).
-
-    Returns
-    -------
-    float
-        sum_c n_c / N * TP_c / (n_c + m_c - TP_c) for n_c true, m_c predicted and TP_c rightly predicted cells of
-        class c, and N labelled cells; NaN when no cell is labelled.
+    With N labelled cells, of which class c has n_c, is predicted m_c times, and TP_c times rightly, it is
+    sum_c n_c / N * TP_c / (n_c + m_c - TP_c); NaN when no cell is labelled. Parameters are those of `pixel_accuracy`.
     """
     matrix = _matrix(confusion)
     cells, hits = matrix.sum(axis=1), np.diag(matrix)
@@ -148,18 +115,9 @@ def frequency_weighted_iou(confusion: ArrayLike) -> float:
 
 
 def class_iou(confusion: ArrayLike) -> NDArray[np.float64]:
-    """Return the intersection over union of each class, 0..1.
+    """Return the intersection over union of each class, (C,), 0..1; NaN for a class that no cell has or is called.
 
-    Parameters
-    ----------
-    confusion : (C, C) int
-        How often each true class (row) is called each class (column).
-
-    Returns
-    -------
-    (C,) float64
-        TP_c / (n_c + m_c - TP_c) for n_c true, m_c predicted and TP_c rightly predicted cells of class c; NaN for a
-        class that no cell has or is called.
+    TP_c / (n_c + m_c - TP_c), see `frequency_weighted_iou`. Parameters are those of `pixel_accuracy`.
     """
     matrix = _matrix(confusion)
     hits = np.diag(matrix)
@@ -190,10 +148,6 @@ def total_variation(p: ArrayLike, q: ArrayLike) -> NDArray[np.float64]:
     ----------
     p, q : (..., K) float
         Distributions along the last axis.
-
-    Returns
-    -------
-    (...) float64
 
     Examples
     --------

@@ -1,29 +1,20 @@
 """Pictures of graphical models: circles are variables, arrows conditional distributions, black squares factors.
 
-`nodes` draws them; this module decides where they stand and what they say. matplotlib is imported where it is used: it
-takes half a second, and those who only infer don't need it.
+matplotlib is imported where it is used: it takes half a second, and whoever only infers doesn't need it.
 """
 
-import re
 from collections.abc import Iterable, Mapping
-from itertools import chain, count
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.graphical.layout import NODE, Place, automatic
+from semgrid_edu.graphical.factor import as_names, check_name
+from semgrid_edu.graphical.layout import Place, arrange
 from semgrid_edu.graphical.model import GraphicalModel
-from semgrid_edu.graphical.variables import as_names, check_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-MARGIN = 0.45
-"""How far a plate and the picture reach beyond the centres of nodes, at least."""
-
-LETTER = 0.12
-"""Width of a letter, roughly, in a figure of its own."""
 
 INCHES = 0.8
 """From one node to the next in a figure of its own."""
@@ -82,17 +73,14 @@ def draw(
     >>> beam = GraphicalModel([Factor("m", [0.8, 0.2]), Factor(("m", "z"), [[0.9, 0.1], [0.2, 0.8]])], {"z": ("m",)})
     >>> ax = draw(beam, observed="z", highlight="m", positions=in_rows(["m"], ["z"]))
     """
-    from semgrid_edu.graphical.layout import model_edges, plate_boxes, render, variable_nodes
+    from semgrid_edu.graphical.rendering import render
 
-    labels, equations = labels or {}, equations or {}
+    positions, labels, equations = positions or {}, labels or {}, equations or {}
     plates = {text: as_names(of) for text, of in (plates or {}).items()}
     observed, highlight = as_names(observed), as_names(highlight)
-    _check(model, positions or {}, equations, observed, highlight, labels, *plates.values())
-    places = _places(model, positions or {})
-    said = {name: _said(name, labels) for name in model.names}
-    texts = {name: (text, _beside(name, places, said)) for name, text in equations.items()}
-    boxes = {text: _box(text, of, places, said, texts) for text, of in plates.items()}
-    low, high = _extent(places, said, boxes, texts.values())
+    _check(model, positions, equations, observed, highlight, labels, *plates.values())
+    where = arrange(model, positions, labels, equations, plates)
+    low, high = where.corners
     if ax is None:
         import matplotlib.pyplot as plt
 
@@ -100,10 +88,8 @@ def draw(
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     ax.set_axis_off()
     size = _font_size(ax, high - low)
-    widths = {name: 2 * _half_width(text) for name, text in said.items()}
-    nodes = variable_nodes(places, said, widths, size, observed, highlight)
-    render([*plate_boxes(boxes, size), *model_edges(model, places, nodes), *nodes.values()], ax)
-    for text, place in texts.values():
+    render(model, where, ax, size, observed, highlight)
+    for text, place in where.texts:
         ax.text(*place, text, fontsize=size, ha="left", va="center")
     return ax
 
@@ -116,83 +102,6 @@ def _check(model: GraphicalModel, positions, equations, *groups) -> None:
             check_name(argument, name, (*model.names, *model.labels))
     for name in (name for group in groups for name in group):
         check_name("observed, highlight, labels, plates", name, model.names)
-
-
-def _places(model: GraphicalModel, positions: Mapping[str, Place]) -> dict[str, Place]:
-    """Return the place of every variable and, by label, of every factor."""
-    places = automatic(model) if set(model.names) - set(positions) else {}
-    places |= {name: (float(x), float(y)) for name, (x, y) in positions.items()}
-    factors = [] if model.directed else list(zip(model.labels, model.factors, strict=True))
-    # Factors of one variable can stand anywhere around it, so they come last.
-    for label, factor in sorted(factors, key=lambda pair: len(pair[1].names), reverse=True):
-        if label not in places and factor.names:
-            places[label] = _factor_place(factor.names, places)
-    taken = list(places.values())
-    if crowded := [name for name, place in places.items() if taken.count(place) > 1]:
-        raise ArgumentError("positions", "a place of its own for each node", f"one for {', '.join(crowded)}")
-    return places
-
-
-def _factor_place(names: tuple[str, ...], places: Mapping[str, Place]) -> Place:
-    """Put a factor in the middle of its variables, or beside its only one: the first place that is clear of others."""
-    x, y = np.mean([places[name] for name in names], axis=0)
-    around = [(-0.35, 0.35), (0.0, 0.5), (0.35, 0.35), (-0.35, -0.35), (0.35, -0.35), (0.0, -0.5)]
-    rings = (np.multiply(scale, aside) for scale in count(1.0, 0.5) for aside in around)
-    tried = chain([(0.0, 0.0)] if len(names) > 1 else [], rings)
-    taken = np.array(list(places.values()))
-    clear = ((x + right, y + up) for right, up in tried if np.hypot(*(taken - (x + right, y + up)).T).min() > 0.3)
-    return tuple(map(float, next(clear)))
-
-
-def _said(name: str, labels: Mapping[str, str]) -> str:
-    """Return the text of a node: m1 and m_1 are symbols with an index, a single letter a symbol, all else a word."""
-    index = re.fullmatch(r"([A-Za-z])_?([\d,]*)", name)
-    return labels.get(name, _symbol(*index.groups()) if index else name)
-
-
-def _symbol(letter: str, index: str) -> str:
-    return f"${letter}_{{{index}}}$" if index else f"${letter}$"
-
-
-def _half_width(text: str) -> float:
-    """Return how far a node reaches to either side of its centre: words make it wider."""
-    return max(NODE, LETTER * _letters(text)) / 2
-
-
-def _box(text: str, names: tuple[str, ...], places, said, texts) -> tuple[np.ndarray, np.ndarray]:
-    """Return two corners of a plate: its text stands at the lower left, clear of arrows, those of its nodes inside."""
-    centres = np.array([places[name] for name in names])
-    aside = max(MARGIN, *(_half_width(said[name]) + 0.1 for name in names))
-    left = max(aside, LETTER * _letters(text) + 0.15)
-    right, top = centres.max(axis=0) + np.array([aside, MARGIN])
-    ends = [_end(*texts[name]) + 0.1 for name in names if name in texts]
-    return centres.min(axis=0) - (left, 0.65), np.array([max([right, *ends]), top])
-
-
-def _beside(name: str, places, said) -> Place:
-    """Return where an equation begins: to the right of a variable, above a factor."""
-    x, y = places[name]
-    return (x + _half_width(said[name]) + 0.08, y) if name in said else (x - 0.06, y + 0.2)
-
-
-def _extent(places, said, boxes, texts) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners of the picture: nodes, plates and, at a guess, the texts beside nodes."""
-    reach = np.array([(max(MARGIN, _half_width(said.get(name, "")) + 0.05), MARGIN) for name in places])
-    centres = np.array(list(places.values()))
-    ends = [(_end(text, (x, y)), y) for text, (x, y) in texts]
-    corners = [centres - reach, centres + reach, np.reshape(ends, (-1, 2)), *map(np.array, boxes.values())]
-    corners = np.concatenate(corners)
-    return corners.min(axis=0) - 0.03, corners.max(axis=0) + 0.03
-
-
-def _end(text: str, place: Place) -> float:
-    """Return where a text that begins at a place ends, at a guess."""
-    return place[0] + LETTER * _letters(text)
-
-
-def _letters(text: str) -> int:
-    """Return about how many letters wide a text is, mathematics included."""
-    return len(re.sub(r"\\[A-Za-z]+", "x", text).translate(str.maketrans("", "", "${}_^\\")))
 
 
 def _font_size(ax: "Axes", extent: np.ndarray) -> float:

@@ -1,7 +1,4 @@
-"""Exact inference: the sum over all assignments, and variable elimination (Koller and Friedman, chapters 9 and 13).
-
-In which order variables are eliminated: it decides how large the tables grow.
-"""
+"""Exact inference: the sum over all assignments, and variable elimination (Koller and Friedman, chapters 9 and 13)."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
@@ -12,53 +9,8 @@ from types import MappingProxyType
 import numpy as np
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.graphical.factor import Factor, rescaled_product
+from semgrid_edu.graphical.factor import Factor, as_names, check_name, rescaled_product
 from semgrid_edu.graphical.model import GraphicalModel, possible
-from semgrid_edu.graphical.variables import as_names, check_name
-
-
-def min_fill_order(model: GraphicalModel, keep: Iterable[str] = ()) -> tuple[str, ...]:
-    """Order variables for elimination: next is always the one whose elimination links the fewest strangers.
-
-    Eliminating a variable couples all its neighbours. Pairs that weren't neighbours before are the fill; few of them
-    keep the tables small. Among equals the first in the model's order is taken.
-
-    Parameters
-    ----------
-    model : GraphicalModel
-        Directed or not; two variables are neighbours when a factor contains both.
-    keep : iterable of str
-        Variables that aren't eliminated.
-
-    Returns
-    -------
-    tuple of str
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from semgrid_edu.graphical.factor import Factor
-    >>> chain = GraphicalModel([Factor(("a", "b"), np.ones((2, 2))), Factor(("b", "c"), np.ones((2, 2)))])
-    >>> min_fill_order(chain)
-    ('a', 'b', 'c')
-    """
-    neighbours, keep = model.neighbours, set(keep)
-    order: list[str] = []
-    while left := [name for name in model.names if name in neighbours and name not in keep]:
-        name = min(left, key=lambda name: len(_fill(neighbours, name)))
-        for one, other in _fill(neighbours, name):
-            neighbours[one].add(other)
-            neighbours[other].add(one)
-        for other in neighbours.pop(name):
-            neighbours[other].discard(name)
-        order.append(name)
-    return tuple(order)
-
-
-def _fill(neighbours: Mapping[str, set[str]], name: str) -> list[tuple[str, str]]:
-    """Return the pairs of neighbours of a variable that aren't neighbours of each other."""
-    return [(one, other) for one, other in combinations(sorted(neighbours[name]), 2) if other not in neighbours[one]]
-
 
 MAX_ASSIGNMENTS = 10**6
 """As many assignments as a loop in Python visits in about half a minute."""
@@ -242,6 +194,45 @@ def max_product(model: GraphicalModel, given: Mapping[str, int] = NOTHING) -> di
         known = {other: best[other] for other in clique.names if other != name}
         best[name] = int(np.argmax(clique.given(**known).table))
     return {name: best[name] for name in model.names}
+
+
+def min_fill_order(model: GraphicalModel, keep: Iterable[str] = ()) -> tuple[str, ...]:
+    """Order variables for elimination: next is always the one whose elimination links the fewest strangers.
+
+    Eliminating a variable couples all its neighbours. Pairs that weren't neighbours before are the fill; few of them
+    keep the tables small. Among equals the first in the model's order is taken.
+
+    Parameters
+    ----------
+    model : GraphicalModel
+        Directed or not; two variables are neighbours when a factor contains both.
+    keep : iterable of str
+        Variables that aren't eliminated.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from semgrid_edu.graphical.factor import Factor
+    >>> chain = GraphicalModel([Factor(("a", "b"), np.ones((2, 2))), Factor(("b", "c"), np.ones((2, 2)))])
+    >>> min_fill_order(chain)
+    ('a', 'b', 'c')
+    """
+    neighbours, keep = model.neighbours, set(keep)
+    order: list[str] = []
+    while left := [name for name in model.names if name in neighbours and name not in keep]:
+        name = min(left, key=lambda name: len(_fill(neighbours, name)))
+        for one, other in _fill(neighbours, name):
+            neighbours[one].add(other)
+            neighbours[other].add(one)
+        for other in neighbours.pop(name):
+            neighbours[other].discard(name)
+        order.append(name)
+    return tuple(order)
+
+
+def _fill(neighbours: Mapping[str, set[str]], name: str) -> list[tuple[str, str]]:
+    """Return the pairs of neighbours of a variable that aren't neighbours of each other."""
+    return [(one, other) for one, other in combinations(sorted(neighbours[name]), 2) if other not in neighbours[one]]
 
 
 def _summed_out(

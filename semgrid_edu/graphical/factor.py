@@ -2,11 +2,9 @@
 
 Product, sum, maximum, slice: every algorithm of this package is a sequence of these four (Koller and Friedman,
 Probabilistic Graphical Models, section 4.2 and chapter 9).
-
-Products of factors: of a few, as they are; of thousands, with powers of two taken out on the way.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import reduce
 from math import frexp, prod
@@ -15,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.graphical.variables import as_names, check_name, check_states, shared_cardinalities
+
+MAX_ENTRIES = 10**7
+"""The largest table that a product may have: 80 MB of float64."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,22 +65,12 @@ class Factor:
         return dict(zip(self.names, self.table.shape, strict=True))
 
     def __mul__(self, other: "Factor") -> "Factor":
-        """Multiply entry by entry; the result is a table over the variables of both.
+        """Multiply entry by entry; axes are the left factor's, then those that only the right one has.
 
         Parameters
         ----------
         other : Factor
             A variable that occurs in both must have the same number of states in both.
-
-        Returns
-        -------
-        Factor
-            Its axes: those of the left factor, then those that only the right one has.
-
-        Raises
-        ------
-        ArgumentError
-            When the two disagree about a variable's number of states.
         """
         if not isinstance(other, Factor):
             return NotImplemented
@@ -103,15 +93,6 @@ class Factor:
         *names : str
             Every variable of the factor, once.
 
-        Returns
-        -------
-        Factor
-
-        Raises
-        ------
-        ArgumentError
-            When `names` aren't the factor's variables.
-
         Examples
         --------
         >>> Factor(("x", "y"), [[1, 2, 3], [4, 5, 6]]).ordered("y", "x").table.shape
@@ -127,17 +108,7 @@ class Factor:
         Parameters
         ----------
         *names : str
-            The variables that disappear.
-
-        Returns
-        -------
-        Factor
-            Over the other variables; a constant when none is left.
-
-        Raises
-        ------
-        ArgumentError
-            When the factor has no such variable.
+            The variables that disappear; a constant remains when none is left.
         """
         return self._reduce(np.sum, names)
 
@@ -148,24 +119,14 @@ class Factor:
         ----------
         *names : str
             The variables that disappear.
-
-        Returns
-        -------
-        Factor
-            Over the other variables; a constant when none is left.
-
-        Raises
-        ------
-        ArgumentError
-            When the factor has no such variable.
         """
         return self._reduce(np.max, names)
 
-    def _reduce(self, operation, names: tuple[str, ...]) -> "Factor":
+    def _reduce(self, operation: Callable, names: tuple[str, ...]) -> "Factor":
         for name in names:
             check_name("names", name, self.names)
         axes = tuple(self.names.index(name) for name in names)
-        return Factor(tuple(name for name in self.names if name not in names), operation(self.table, axis=axes))
+        return Factor([name for name in self.names if name not in names], operation(self.table, axis=axes))
 
     def given(self, /, **states: int) -> "Factor":
         """Return the slice of the table where variables have known states: f.given(x=1).
@@ -173,28 +134,14 @@ class Factor:
         Parameters
         ----------
         **states : int
-            The state of each known variable, from 0.
-
-        Returns
-        -------
-        Factor
-            Over the other variables, not normalised.
-
-        Raises
-        ------
-        ArgumentError
-            When the factor has no such variable, or the variable no such state.
+            The state of each known variable, from 0. The slice isn't normalised.
         """
         check_states(states, self.cardinalities)
         index = tuple(int(states[name]) if name in states else slice(None) for name in self.names)
-        return Factor(tuple(name for name in self.names if name not in states), self.table[index])
+        return Factor([name for name in self.names if name not in states], self.table[index])
 
     def normalised(self) -> "Factor":
         """Divide by the sum of all entries, so that they sum to 1.
-
-        Returns
-        -------
-        Factor
 
         Raises
         ------
@@ -203,11 +150,8 @@ class Factor:
         """
         table = self.rescaled()[0].table
         if not table.any():
-            raise ArgumentError(
-                f"factor over {self.names}",
-                "at least one positive entry to normalise by",
-                "only zeros: no assignment agrees with all factors and with what is given",
-            )
+            zeros = "only zeros: no assignment agrees with all factors and with what is given"
+            raise ArgumentError(f"factor over {self.names}", "at least one positive entry to normalise by", zeros)
         return Factor(self.names, table / table.sum())
 
     def rescaled(self) -> tuple["Factor", int]:
@@ -230,10 +174,6 @@ class Factor:
         return Factor(self.names, np.ldexp(self.table, -power)), power
 
 
-MAX_ENTRIES = 10**7
-"""The largest table that a product may have: 80 MB of float64."""
-
-
 def product(factors: Iterable[Factor]) -> Factor:
     """Multiply factors, after checking that the table of the product isn't too large.
 
@@ -241,10 +181,6 @@ def product(factors: Iterable[Factor]) -> Factor:
     ----------
     factors : iterable of Factor
         None at all gives the constant 1.
-
-    Returns
-    -------
-    Factor
 
     Raises
     ------
@@ -268,11 +204,6 @@ def rescaled_product(factors: Iterable[Factor]) -> tuple[Factor, int]:
         Their product divided by 2^n; its largest entry is from 1/2 to 1.
     int
         n.
-
-    Raises
-    ------
-    ArgumentError
-        As `product` does.
     """
     total, power = Factor((), 1.0).rescaled()
     for factor in _checked(factors):
@@ -286,7 +217,67 @@ def _checked(factors: Iterable[Factor]) -> tuple[Factor, ...]:
     states = shared_cardinalities(factor.cardinalities for factor in factors)
     entries = prod(states.values())
     if entries > MAX_ENTRIES:
-        raise ArgumentError(
-            f"clique ({', '.join(states)})", f"a table of at most {MAX_ENTRIES:,} entries", f"{entries:,}"
-        )
+        wanted = f"a table of at most {MAX_ENTRIES:,} entries"
+        raise ArgumentError(f"clique ({', '.join(states)})", wanted, f"{entries:,}")
     return factors
+
+
+def shared_cardinalities(tables: Iterable[Mapping[str, int]]) -> dict[str, int]:
+    """Collect {name: number of states} of several tables, in the order in which the variables first occur.
+
+    Parameters
+    ----------
+    tables : iterable of dict of str to int
+        The number of states of each variable of a table. A variable may occur in several, which have to agree.
+    """
+    states: dict[str, int] = {}
+    for table in tables:
+        for name, count in table.items():
+            if states.setdefault(name, count) != count:
+                found = f"{count} in one over {tuple(table)}"
+                raise ArgumentError(f"variable {name}", f"{states[name]} states in every factor", found)
+    return states
+
+
+def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
+    """Return names as a tuple; a single string is one name, not a sequence of letters.
+
+    Parameters
+    ----------
+    names : str or iterable of str
+        One name or several.
+    """
+    return (names,) if isinstance(names, str) else tuple(names)
+
+
+def check_name(argument: str, name: str, known: Iterable[str]) -> None:
+    """Refuse the name of a variable that isn't there.
+
+    Parameters
+    ----------
+    argument : str
+        What the message calls the argument.
+    name : str
+        The variable asked for.
+    known : iterable of str
+        The variables there are.
+    """
+    if name not in (known := tuple(known)):
+        raise ArgumentError(argument, f"variables among {known}", name)
+
+
+def check_states(states: Mapping[str, int], cardinalities: Mapping[str, int]) -> None:
+    """Refuse unknown variables, and states that a variable doesn't have.
+
+    Parameters
+    ----------
+    states : dict of str to int
+        What is given.
+    cardinalities : dict of str to int
+        The number of states of each variable.
+    """
+    for name, state in states.items():
+        check_name("given", name, cardinalities)
+        count = cardinalities[name]
+        if not isinstance(state, (int, np.integer, np.bool_)) or not 0 <= state < count:
+            raise ArgumentError(f"given {name}", f"a state from 0 to {count - 1}", state)

@@ -1,24 +1,27 @@
-"""Where the nodes of a graph stand in a drawing, in units of the distance between neighbours, y upwards.
+"""Where the nodes, texts and plates of a drawing stand, in units of the distance between neighbours, y upwards."""
 
-Nodes, edges and plates as daft draws them (https://docs.daft-pgm.org).
-"""
-
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+import re
+from collections.abc import Mapping, Sequence
+from itertools import chain, count
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical.model import GraphicalModel, topological_order
-
-if TYPE_CHECKING:  # daft brings matplotlib along, which takes half a second: it is imported where it draws
-    import daft
-    from matplotlib.axes import Axes
 
 Place = tuple[float, float]
 """x to the right, y upwards."""
 
 NODE = 0.56
 """Diameter of a node, when neighbours are 1 apart."""
+
+MARGIN = 0.45
+"""How far a plate and the picture reach beyond the centres of nodes, at least."""
+
+LETTER = 0.12
+"""Width of a letter, roughly, in a figure of its own."""
 
 CLEARANCE = 0.4
 """An edge that passes a node nearer than this seems to end there."""
@@ -124,132 +127,120 @@ def _distance(point: Place, start: Place, end: Place) -> float:
     return float(np.hypot(*(point - start - share * along)))
 
 
-SQUARE = 0.14
-"""Side of a factor."""
-
-HIGHLIGHT = "#d95f02"
-"""Outline of the highlighted node, which is three times as thick as the others: colour isn't the only mark."""
-
-
-def variable_nodes(
-    places: Mapping[str, Place],
-    texts: Mapping[str, str],
-    widths: Mapping[str, float],
-    size: float,
-    observed: Collection[str],
-    highlight: Collection[str],
-) -> "dict[str, daft.Node]":
-    """Make the nodes of variables.
+class Arrangement(NamedTuple):
+    """Where everything in a drawing stands.
 
     Parameters
     ----------
     places : dict of str to (float, float)
-        The centre of each; neighbours are about 1 apart.
-    texts : dict of str to str
-        What each says; these are the variables.
-    widths : dict of str to float
-        How wide each is, at least `NODE`.
-    size : float
-        Of the text, points.
-    observed, highlight : collection of str
-        Which are shaded, and which have a thick coloured outline.
-
-    Returns
-    -------
-    dict of str to daft.Node
-        By variable.
-    """
-    import daft
-
-    outline = {True: {"ec": HIGHLIGHT, "lw": 3.0}, False: {}}
-    return {
-        name: daft.Node(
-            name,
-            text,
-            *places[name],
-            aspect=widths[name] / NODE,
-            observed=name in observed,
-            fontsize=size,
-            plot_params=outline[name in highlight],
-        )
-        for name, text in texts.items()
-    }
-
-
-def model_edges(model: GraphicalModel, places: Mapping[str, Place], nodes: "Mapping[str, daft.Node]") -> list:
-    """Make the arrows of a directed model, or the squares of an undirected one and the lines to them.
-
-    Parameters
-    ----------
-    model : GraphicalModel
-        The model.
-    places : dict of str to (float, float)
-        The centre of each factor, by its label.
-    nodes : dict of str to daft.Node
-        The nodes of its variables.
-
-    Returns
-    -------
-    list
-        daft's edges and nodes.
-    """
-    import daft
-
-    if model.parents is not None:
-        arrow = {"head_length": 0.14, "head_width": 0.1}
-        return [
-            daft.Edge(nodes[above], nodes[child], plot_params=arrow)
-            for child, family in model.parents.items()
-            for above in family
-        ]
-    things = []
-    for label, factor in zip(model.labels, model.factors, strict=True):
-        if factor.names:
-            square = daft.Node(
-                label, "", *places[label], scale=SQUARE / NODE, plot_params={"fc": "k"}, shape="rectangle"
-            )
-            # daft can't end an upright line at a rectangle, so lines end at a circle under the square.
-            circle = daft.Node(label, "", *places[label], scale=SQUARE / NODE)
-            things += [daft.Edge(nodes[name], circle, directed=False) for name in factor.names] + [square]
-    return things
-
-
-def plate_boxes(boxes: Mapping[str, tuple[np.ndarray, np.ndarray]], size: float) -> "list[daft.Plate]":
-    """Make plates.
-
-    Parameters
-    ----------
+        The centre of each variable and, by label, of each factor.
+    said : dict of str to str
+        What each variable's node says.
+    texts : list of (str, (float, float))
+        Equations, and where they begin.
     boxes : dict of str to (ndarray, ndarray), each shape (2,)
         Lower left and upper right corner of each plate, by the text in it.
-    size : float
-        Of the text, points.
-
-    Returns
-    -------
-    list of daft.Plate
-        One for each box.
+    corners : (2, 2) float64
+        Lower left and upper right corner of the picture.
     """
-    import daft
 
-    return [
-        daft.Plate([*low, *(high - low)], label=text, fontsize=size, rect_params={"fc": "none"})
-        for text, (low, high) in boxes.items()
-    ]
+    places: dict[str, Place]
+    said: dict[str, str]
+    texts: list[tuple[str, Place]]
+    boxes: dict[str, tuple[NDArray, NDArray]]
+    corners: NDArray[np.float64]
 
 
-def render(things: Iterable, ax: "Axes") -> None:
-    """Draw daft's objects into our axes: `daft.PGM.render` would open a figure of its own.
+def arrange(
+    model: GraphicalModel,
+    positions: Mapping[str, Place],
+    labels: Mapping[str, str],
+    equations: Mapping[str, str],
+    plates: Mapping[str, tuple[str, ...]],
+) -> Arrangement:
+    """Find a place for everything that `draw` draws. Parameters are those of `draw`."""
+    places = _places(model, positions)
+    said = {name: _said(name, labels) for name in model.names}
+    texts = {name: (text, _beside(name, places, said)) for name, text in equations.items()}
+    boxes = {text: _box(text, of, places, said, texts) for text, of in plates.items()}
+    reach = np.array([(max(MARGIN, half_width(said.get(name, "")) + 0.05), MARGIN) for name in places])
+    centres = np.array(list(places.values()))
+    ends = [(_end(text, place), place[1]) for text, place in texts.values()]
+    points = np.concatenate(
+        [centres - reach, centres + reach, np.reshape(ends, (-1, 2)), *map(np.array, boxes.values())]
+    )
+    ends = np.array([points.min(axis=0) - 0.03, points.max(axis=0) + 0.03])
+    return Arrangement(places, said, list(texts.values()), boxes, ends)
+
+
+def _places(model: GraphicalModel, positions: Mapping[str, Place]) -> dict[str, Place]:
+    """Return the place of every variable and, by label, of every factor."""
+    places = automatic(model) if set(model.names) - set(positions) else {}
+    places |= {name: (float(x), float(y)) for name, (x, y) in positions.items()}
+    factors = [] if model.directed else list(zip(model.labels, model.factors, strict=True))
+    # Factors of one variable can stand anywhere around it, so they come last.
+    for label, factor in sorted(factors, key=lambda pair: len(pair[1].names), reverse=True):
+        if label not in places and factor.names:
+            places[label] = _factor_place(factor.names, places)
+    taken = list(places.values())
+    if crowded := [name for name, place in places.items() if taken.count(place) > 1]:
+        raise ArgumentError("positions", "a place of its own for each node", f"one for {', '.join(crowded)}")
+    return places
+
+
+def _factor_place(names: tuple[str, ...], places: Mapping[str, Place]) -> Place:
+    """Put a factor in the middle of its variables, or beside its only one: the first place that is clear of others."""
+    x, y = np.mean([places[name] for name in names], axis=0)
+    around = [(-0.35, 0.35), (0.0, 0.5), (0.35, 0.35), (-0.35, -0.35), (0.35, -0.35), (0.0, -0.5)]
+    rings = (np.multiply(scale, aside) for scale in count(1.0, 0.5) for aside in around)
+    tried = chain([(0.0, 0.0)] if len(names) > 1 else [], rings)
+    taken = np.array(list(places.values()))
+    clear = ((x + right, y + up) for right, up in tried if np.hypot(*(taken - (x + right, y + up)).T).min() > 0.3)
+    return tuple(map(float, next(clear)))
+
+
+def _said(name: str, labels: Mapping[str, str]) -> str:
+    """Return the text of a node: m1 and m_1 are symbols with an index, a single letter a symbol, all else a word."""
+    index = re.fullmatch(r"([A-Za-z])_?([\d,]*)", name)
+    return labels.get(name, _symbol(*index.groups()) if index else name)
+
+
+def _symbol(letter: str, index: str) -> str:
+    return f"${letter}_{{{index}}}$" if index else f"${letter}$"
+
+
+def half_width(text: str) -> float:
+    """Return how far a node reaches to either side of its centre: words make it wider.
 
     Parameters
     ----------
-    things : iterable
-        Nodes, edges and plates; later ones lie over earlier ones.
-    ax : matplotlib Axes
-        Where.
+    text : str
+        What the node says.
     """
-    import daft
+    return max(NODE, LETTER * _letters(text)) / 2
 
-    context = daft.PGM(grid_unit=1.0, node_unit=NODE)._ctx
-    context._ax = ax
-    for thing in things:
-        thing.render(context)
+
+def _box(text: str, names: tuple[str, ...], places, said, texts) -> tuple[np.ndarray, np.ndarray]:
+    """Return two corners of a plate: its text stands at the lower left, clear of arrows, those of its nodes inside."""
+    centres = np.array([places[name] for name in names])
+    aside = max(MARGIN, *(half_width(said[name]) + 0.1 for name in names))
+    left = max(aside, LETTER * _letters(text) + 0.15)
+    right, top = centres.max(axis=0) + np.array([aside, MARGIN])
+    ends = [_end(*texts[name]) + 0.1 for name in names if name in texts]
+    return centres.min(axis=0) - (left, 0.65), np.array([max([right, *ends]), top])
+
+
+def _beside(name: str, places, said) -> Place:
+    """Return where an equation begins: to the right of a variable, above a factor."""
+    x, y = places[name]
+    return (x + half_width(said[name]) + 0.08, y) if name in said else (x - 0.06, y + 0.2)
+
+
+def _end(text: str, place: Place) -> float:
+    """Return where a text that begins at a place ends, at a guess."""
+    return place[0] + LETTER * _letters(text)
+
+
+def _letters(text: str) -> int:
+    """Return about how many letters wide a text is, mathematics included."""
+    return len(re.sub(r"\\[A-Za-z]+", "x", text).translate(str.maketrans("", "", "${}_^\\")))

@@ -41,7 +41,7 @@ def mean_field_graph(
     given : dict of str to int
         The states of known variables.
     iterations : int
-        At most so many sweeps over all variables, at least 1.
+        The largest number of sweeps over all variables, at least 1.
     seed : int, optional
         Start from random distributions.
 

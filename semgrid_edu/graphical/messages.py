@@ -1,7 +1,4 @@
-"""Messages on a factor graph, sum-product and max-product: exact on trees, "loopy" elsewhere (Kschischang 2001).
-
-What approximate inference returns: marginals, and how far they can be trusted.
-"""
+"""Messages on a factor graph, sum-product and max-product: exact on trees, "loopy" elsewhere (Kschischang 2001)."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -70,7 +67,7 @@ def sum_product(
     given : dict of str to int
         The states of known variables; their factors are sliced first, which may open loops.
     iterations : int
-        At most so many, at least 1.
+        The largest number of iterations, at least 1.
     damping : float
         Share of the old message that is kept, 0 <= damping < 1. It helps loopy graphs to converge.
 

@@ -1,7 +1,4 @@
-"""A graphical model: a product of factors; directed when each is the distribution of a child given its parents.
-
-What makes a model directed: no cycle, one factor per child, each a distribution of its child (Bayesian network).
-"""
+"""A graphical model: a product of factors; directed when each is the distribution of a child given its parents."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,8 +10,7 @@ from math import prod
 import numpy as np
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.graphical.factor import Factor
-from semgrid_edu.graphical.variables import as_names, check_name, check_states, shared_cardinalities
+from semgrid_edu.graphical.factor import Factor, as_names, check_name, check_states, shared_cardinalities
 
 SUM_TOLERANCE = 1e-9
 """How far the sum over a child may be from 1: rounding, no more."""
@@ -27,30 +23,17 @@ def families(parents: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...
     ----------
     parents : dict of str to tuple of str
         The parents of every variable.
-
-    Returns
-    -------
-    dict of str to tuple of str
     """
     return {child: (child, *above) for child, above in parents.items()}
 
 
 def topological_order(parents: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
-    """Sort variables so that parents stand before their children.
+    """Sort variables so that parents stand before their children; an error shows the cycle that prevents it.
 
     Parameters
     ----------
     parents : dict of str to tuple of str
         The parents of every variable.
-
-    Returns
-    -------
-    tuple of str
-
-    Raises
-    ------
-    ArgumentError
-        When there is a cycle; the message shows it.
     """
     try:
         return tuple(TopologicalSorter(parents).static_order())
@@ -66,21 +49,11 @@ def check_directed(
     Parameters
     ----------
     factors : sequence of Factor
-        One per variable.
+        One per variable; an error names the one at fault.
     parents : dict of str to tuple of str
         The parents of each child; a variable that is left out has none.
     names : sequence of str
         All variables.
-
-    Returns
-    -------
-    dict of str to tuple of str
-        The parents of every variable, () of those without.
-
-    Raises
-    ------
-    ArgumentError
-        Names the factor or variable at fault.
     """
     complete = {name: as_names(parents.get(name, ())) for name in names}
     for name in {*parents, *(above for family in complete.values() for above in family)}:
@@ -205,11 +178,6 @@ class GraphicalModel:
         GraphicalModel
             Undirected, not normalised, with one factor for each of this model's, in the same order. A factor
             whose variables are all known becomes a constant.
-
-        Raises
-        ------
-        ArgumentError
-            When the model has no such variable, or the variable no such state.
         """
         check_states(states, self.cardinalities)
         return GraphicalModel(
@@ -228,11 +196,6 @@ class GraphicalModel:
         -------
         float
             In a directed model the probability of the assignment; in an undirected one it is Z times that.
-
-        Raises
-        ------
-        ArgumentError
-            When a variable is missing or unknown, or has no such state.
         """
         check_states(assignment, self.cardinalities)
         if missing := set(self.names) - set(assignment):
@@ -242,7 +205,7 @@ class GraphicalModel:
 
 
 def possible(model: GraphicalModel, given: Mapping[str, int]) -> GraphicalModel:
-    """Return the model of the variables that aren't given, unless what is given makes a factor zero everywhere.
+    """Return the model of the variables that aren't given; refuse what makes a factor zero everywhere, by its label.
 
     Parameters
     ----------
@@ -250,15 +213,6 @@ def possible(model: GraphicalModel, given: Mapping[str, int]) -> GraphicalModel:
         Directed or not.
     given : dict of str to int
         The states of known variables.
-
-    Returns
-    -------
-    GraphicalModel
-
-    Raises
-    ------
-    ArgumentError
-        Names the factor that is zero, or the unknown variable or state.
     """
     sliced = model.given(**given)
     for label, factor in zip(model.labels, sliced.factors, strict=True):

@@ -7,8 +7,8 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.graphical.factor import as_names, check_name
 from semgrid_edu.graphical.model import GraphicalModel
-from semgrid_edu.graphical.variables import as_names, check_name
 
 Names = str | Iterable[str]
 """One name or several."""
@@ -25,10 +25,6 @@ def d_separated(model: GraphicalModel, a: Names, b: Names, given: Names = ()) ->
         One variable or several.
     given : str or iterable of str
         Variables whose states are known; a dictionary of evidence serves too.
-
-    Returns
-    -------
-    bool
 
     Raises
     ------

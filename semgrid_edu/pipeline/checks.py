@@ -23,8 +23,8 @@ class StageError(ArgumentError):
 
 
 @dataclass(frozen=True)
-class Seam:
-    """One call of a stage, and what its result must look like.
+class StageCheck:
+    """One call of a stage, and what its result must look like. Its methods raise `StageError`.
 
     A function that isn't the package's own gets copies of its arguments, and its result is copied too. So it may change
     its arguments, and return the same array at each frame.
@@ -68,12 +68,6 @@ class Seam:
             What the stage returned.
         seconds : float
             How long the function took, without checks and copies.
-
-        Raises
-        ------
-        StageError
-            When the function raises an error, its result isn't an array of floats of that shape, scores aren't finite,
-            or probabilities don't sum to 1 in a cell.
         """
         given = inputs if self.own else [np.copy(array) for array in inputs]
         start = time.perf_counter()
@@ -92,11 +86,6 @@ class Seam:
         ----------
         expected, found : object
             What was expected of the stage, and what was found instead.
-
-        Returns
-        -------
-        StageError
-            The error, to be raised.
         """
         return StageError(str(self), expected, found)
 
@@ -113,7 +102,7 @@ class Seam:
             raise self.error("a result", f"an error: {in_short(error, file_of(self.function))}") from error
 
     def array(self, value: object, shape: tuple[int, ...]) -> NDArray[np.float32]:
-        """Return a result as float32 in its own memory layout, or refuse it.
+        """Return a result as float32 in its own memory layout; refuse all but an array of floats of this shape.
 
         Parameters
         ----------
@@ -121,16 +110,6 @@ class Seam:
             What the stage returned.
         shape : tuple of int
             The shape that it must have.
-
-        Returns
-        -------
-        (*shape) float32
-            The same numbers.
-
-        Raises
-        ------
-        StageError
-            When it isn't an array of floats of that shape.
         """
         if not isinstance(value, np.ndarray):
             raise self.error("a numpy array", kind_of(value))
@@ -148,75 +127,57 @@ class Seam:
         ----------
         values : array
             What the stage returned.
-
-        Raises
-        ------
-        StageError
-            When one of the values isn't finite.
         """
         if not np.isfinite(values).all():
             place = _first(~np.isfinite(values))
             raise self.error("finite numbers", f"{values[place]} at index {place}")
 
-    def probabilities(self, values: NDArray, axis: str = "class") -> None:
-        """Refuse arrays that don't hold a distribution over the first axis in each cell.
+    def probabilities(self, values: NDArray, axis: str = "classes") -> None:
+        """Refuse values that aren't a distribution in each cell.
 
         Parameters
         ----------
         values : (K, H, W) float32
             What the stage returned.
         axis : str
-            What the first axis stands for: "class" or "state".
-
-        Raises
-        ------
-        StageError
-            When the values of a cell don't sum to 1, or one of them is negative.
+            What the first axis holds: "classes" or "states".
         """
-        wrong, total = _wrong_sums(values)
-        if wrong is not None:
-            found = f"that the {len(values)} {_PLURAL[axis]} of cell {wrong} sum to {total:.4g}"
-            raise self.error("probabilities that sum to 1 in each cell", f"{found}: {sum_hint(values, total, axis)}")
+        cell, total = _wrong_sum(values)
+        if cell is not None:
+            found = f"that the {len(values)} {axis} of cell {cell} sum to {total:.4g}: {sum_hint(values, total, axis)}"
+            raise self.error("probabilities that sum to 1 in each cell", found)
         if values.min() < -TOLERANCE:
             cell = _first((values < -TOLERANCE).any(axis=0))
             raise self.error("probabilities from 0 to 1", f"{values[:, *cell].min():.4g} in cell {cell}")
 
     def log_probabilities(self, values: NDArray) -> None:
-        """Refuse arrays that don't hold the logarithms of a distribution over the first axis in each cell.
+        """Refuse values that aren't logarithms of a distribution over the classes in each cell.
 
         Parameters
         ----------
         values : (C, H, W) float32
             What the stage returned, natural logarithms.
-
-        Raises
-        ------
-        StageError
-            When the exponentials of a cell don't sum to 1.
         """
         with np.errstate(over="ignore"):
-            wrong, total = _wrong_sums(np.exp(values))
-        if wrong is not None:
-            found = f"that exp of the {len(values)} classes of cell {wrong} sums to {total:.4g}"
-            raise self.error(
-                "log-probabilities, whose exp sums to 1 in each cell", f"{found}: {log_sum_hint(values, total)}"
-            )
+            cell, total = _wrong_sum(np.exp(values))
+        if cell is not None:
+            found = f"that exp of the {len(values)} classes of cell {cell} sums to {total:.4g}"
+            wanted = "log-probabilities, whose exp sums to 1 in each cell"
+            raise self.error(wanted, f"{found}: {log_sum_hint(values, total)}")
 
 
-_VALUES = {"segment": Seam.finite, "fuse": Seam.log_probabilities, "refine": Seam.probabilities}
-"""What is checked beyond the shape. The planes hold too many numbers to check them at each frame: see `FrameWork`."""
-
-_PLURAL = {"class": "classes", "state": "states"}
+_VALUES = {"segment": StageCheck.finite, "fuse": StageCheck.log_probabilities, "refine": StageCheck.probabilities}
+"""What is checked beyond the shape. The planes hold too many numbers to check them at each frame: see `FrameRunner`."""
 
 
-def _wrong_sums(values: NDArray) -> tuple[tuple[int, int] | None, float]:
+def _wrong_sum(values: NDArray) -> tuple[tuple[int, int] | None, float]:
     """Return the first cell of (K, H, W) whose values don't sum to 1, or None, and its sum."""
     with np.errstate(invalid="ignore"):
         total = values.sum(axis=0)
-    right = np.abs(total - 1) <= TOLERANCE  # NaN isn't
-    if right.all():
+    wrong = ~(np.abs(total - 1) <= TOLERANCE)  # NaN is
+    if not wrong.any():
         return None, 1.0
-    cell = _first(~right)
+    cell = _first(wrong)
     return cell, float(total[cell])
 
 

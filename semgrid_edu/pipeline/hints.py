@@ -13,19 +13,17 @@ from torch import Tensor
 
 from semgrid_edu.occupancy import N_STATES
 
+AXES = {"classes": "class", "states": "state"}
+"""What the first axis of an array of probabilities is called."""
+
 
 def where(function: Callable) -> str:
-    """Say where a function is written.
+    """Say where a function is written: "my_stages.py, line 12", or the class of an object without a line of Python.
 
     Parameters
     ----------
     function : callable
         A function, or an object that can be called.
-
-    Returns
-    -------
-    str
-        A place such as "my_stages.py, line 12", or the class of an object when no line of Python is known.
     """
     code = _code(function)
     if code is None:
@@ -34,36 +32,23 @@ def where(function: Callable) -> str:
 
 
 def file_of(function: Callable) -> str:
-    """Return the file that a function is written in.
+    """Return the path of the file that a function is written in; "" when it can't be known.
 
-    Parameters
-    ----------
-    function : callable
-        A function, or an object that can be called.
-
-    Returns
-    -------
-    str
-        The file's path; "" when it can't be known, as for a function written in C.
+    Parameters are those of `where`.
     """
     code = _code(function)
     return code.co_filename if code else ""
 
 
 def in_short(error: BaseException, file: str) -> str:
-    """Describe an exception in one line.
+    """Describe an exception in one line: class, message, and where it passed through a file.
 
     Parameters
     ----------
     error : BaseException
         The exception.
     file : str
-        The file of interest.
-
-    Returns
-    -------
-    str
-        Class and first line of the message, and the last line of the file that the exception passed through, if any.
+        The file of interest, whose last line is named.
     """
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
     first_line = str(error).strip().partition("\n")[0]
@@ -84,17 +69,12 @@ def _place(file: str, line: int) -> str:
 
 
 def kind_of(value: object) -> str:
-    """Name what a stage returned in place of an array, and the usual cause.
+    """Name what a stage returned in place of an array, and the usual cause, as the end of "found ...".
 
     Parameters
     ----------
     value : object
         Anything but an array.
-
-    Returns
-    -------
-    str
-        The end of the sentence "found ...".
     """
     if value is None:
         return "None: is the `return` missing?"
@@ -106,22 +86,15 @@ def kind_of(value: object) -> str:
 
 
 def shape_hint(found: tuple[int, ...], expected: tuple[int, ...]) -> str:
-    """Return the probable cause of a wrong shape, as the end of a sentence; "" when there is no guess.
+    """Return the probable cause of a wrong shape as the end of a sentence, with its colon; "" without a guess.
+
+    >>> shape_hint((355, 155, 14), (14, 355, 155))
+    ': is the class axis last? np.moveaxis(x, -1, 0) moves it to the front'
 
     Parameters
     ----------
     found, expected : tuple of int
-        The shape of the array that a stage returned, and the shape that it should have.
-
-    Returns
-    -------
-    str
-        Begins with a colon.
-
-    Examples
-    --------
-    >>> shape_hint((355, 155, 14), (14, 355, 155))
-    ': is the class axis last? np.moveaxis(x, -1, 0) moves it to the front'
+        The shape of what a stage returned, and the shape that it should have.
     """
     axis = {2: "velocity", N_STATES: "state"}.get(expected[0], "class")
     if found == (*expected[1:], expected[0]):
@@ -138,7 +111,7 @@ def shape_hint(found: tuple[int, ...], expected: tuple[int, ...]) -> str:
 
 
 def sum_hint(values: NDArray, total: float, axis: str) -> str:
-    """Return the probable cause of probabilities that don't sum to 1.
+    """Return the probable cause of probabilities that don't sum to 1, as a question to the student.
 
     Parameters
     ----------
@@ -147,34 +120,19 @@ def sum_hint(values: NDArray, total: float, axis: str) -> str:
     total : float
         The sum in a cell where it is wrong; may be NaN.
     axis : str
-        What the first axis stands for: "class" or "state".
-
-    Returns
-    -------
-    str
-        A question to the student, and sometimes the remedy.
+        What the first axis holds: "classes" or "states".
     """
     if np.isnan(total):
         return "was something divided by a sum of 0?"
     if (values <= 0).all() and _sums_to_one(np.exp(values)):
         return "are these log-probabilities? Return np.exp of them"
-    return f"did you normalise over the {axis} axis (axis 0)?"
+    return f"did you normalise over the {AXES[axis]} axis (axis 0)?"
 
 
 def log_sum_hint(values: NDArray, total: float) -> str:
     """Return the probable cause of log-probabilities whose exponentials don't sum to 1.
 
-    Parameters
-    ----------
-    values : (C, H, W) float
-        The values of all cells.
-    total : float
-        The sum of the exponentials in a cell where it is wrong; may be NaN.
-
-    Returns
-    -------
-    str
-        A question to the student, and sometimes the remedy.
+    Parameters are those of `sum_hint`.
     """
     if np.isnan(total):
         return "is there a logarithm of a negative number?"

@@ -1,7 +1,4 @@
-"""A drive through every stage, from LIDAR scans and images to refined semantic grids (paper, Fig. 2).
-
-What the stages do with one frame, from its belief to the refined grid (paper, Fig. 2).
-"""
+"""A drive through every stage, from LIDAR scans and images to refined semantic grids (paper, Fig. 2)."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -20,9 +17,9 @@ from semgrid_edu.frame import Frame
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.networks import Architecture, SemanticGridNet, unit_image
 from semgrid_edu.occupancy import Belief, CmcdotParams
-from semgrid_edu.pipeline.checks import Seam, StageError
-from semgrid_edu.pipeline.following import Follower
+from semgrid_edu.pipeline.checks import StageCheck, StageError
 from semgrid_edu.pipeline.stages import STAGES, Stages
+from semgrid_edu.pipeline.tracker_adapter import TrackerAdapter
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,102 +49,6 @@ class FrameResult:
     grid: NDArray[np.float32]
     refined: NDArray[np.float32]
     seconds: dict[str, float]
-
-
-class FrameWork:
-    """Run one or several sets of stages on a frame; a call that several sets have in common is made only once.
-
-    Parameters
-    ----------
-    number : int
-        Number of the frame, for error messages.
-    frame : Frame
-        The frame; it has to have an image.
-    architecture : Architecture
-        What all sets work with: the grid, the image size, the planes and the classes.
-    """
-
-    def __init__(self, number: int, frame: Frame, architecture: Architecture) -> None:
-        self._number, self._frame = number, frame
-        self._image = network_image(frame, architecture.image_size).numpy()
-        self._shapes = _result_shapes(architecture)
-        self._done: dict[tuple[int, ...], tuple[NDArray[np.float32], float]] = {}
-
-    def result(self, stages: Stages, belief: Belief, seconds: float) -> FrameResult:
-        """Send the frame through the stages that follow the filter.
-
-        Parameters
-        ----------
-        stages : Stages
-            A complete set: five functions.
-        belief : Belief
-            What `stages.track` yields for the frame.
-        seconds : float
-            How long that took.
-
-        Returns
-        -------
-        FrameResult
-            What every stage made of the frame.
-
-        Raises
-        ------
-        StageError
-            When a stage raises an error, or returns what the next one can't use.
-        """
-        o = belief.probability
-        s, t_segment = self._call("segment", stages.segment, self._image)
-        p, t_sample = self._call("sample", stages.sample, s)
-        try:
-            log_g, t_fuse = self._call("fuse", stages.fuse, p, o)
-        except StageError:
-            # The planes hold millions of numbers, so they are searched for NaN after an error, not at each frame.
-            Seam("sample", stages.sample, self._number).finite(p)
-            raise
-        refined, t_refine = self._call("refine", stages.refine, log_g, o)
-        times = dict(zip(STAGES, (seconds, t_segment, t_sample, t_fuse, t_refine), strict=True))
-        return FrameResult(self._frame, belief, s, np.exp(log_g), refined, times)
-
-    def _call(self, stage: str, function: Callable, *inputs: NDArray) -> tuple[NDArray[np.float32], float]:
-        """Return a stage's result and its time; the same function isn't called again on the same arrays."""
-        key = (id(function), *map(id, inputs))
-        if key not in self._done:
-            self._done[key] = Seam(stage, function, self._number).call(self._shapes[stage], *inputs)
-        return self._done[key]
-
-
-def _result_shapes(architecture: Architecture) -> dict[str, tuple[int, ...]]:
-    """Return the shape of what each stage after the filter returns, by the name of the stage."""
-    n_classes, grid = len(LABEL_SETS[architecture.label_set]), architecture.grid.shape
-    return {
-        "segment": (n_classes, *architecture.image_size),
-        "sample": (n_classes, len(architecture.heights), *grid),
-        "fuse": (n_classes, *grid),
-        "refine": (n_classes, *grid),
-    }
-
-
-def network_image(frame: Frame, size: tuple[int, int]) -> Tensor:
-    """Turn a frame's image into what a network takes.
-
-    Parameters
-    ----------
-    frame : Frame
-        The frame; it has to have an image.
-    size : (int, int)
-        Height and width, pixels; `frame.camera.resized(size)` is the camera of the result.
-
-    Returns
-    -------
-    (3, h, w) float32
-        RGB, 0..1.
-
-    Raises
-    ------
-    ArgumentError
-        When the frame has no image.
-    """
-    return unit_image(torch.tensor(resize_image(frame.need_image(), size)).permute(2, 0, 1))
 
 
 def run_pipeline(
@@ -233,9 +134,9 @@ def run_side_by_side(frames: Iterable[Frame], *several: Stages) -> Iterator[tupl
             raise ArgumentError("several", "complete sets of stages, see `Stages.over`", f"only {stages.given}")
         if stages.architecture is None or stages.architecture != architecture:
             raise ArgumentError("several", f"one architecture, such as {architecture}", stages.architecture)
-    trackers = {id(stages.track): Follower(stages.track, architecture.grid) for stages in several}
+    trackers = {id(stages.track): TrackerAdapter(stages.track, architecture.grid) for stages in several}
     for number, frame in enumerate(frames):
-        work = FrameWork(number, frame, architecture)
+        work = FrameRunner(number, frame, architecture)
         beliefs = {key: tracker.belief(frame, number) for key, tracker in trackers.items()}
         yield tuple(work.result(stages, *beliefs[id(stages.track)]) for stages in several)
     for tracker in trackers.values():
@@ -250,3 +151,89 @@ def _complete(
     if isinstance(stages, SemanticGridNet):
         return Stages.of(stages, occupancy, crf, seed)
     raise ArgumentError("stages", "a network, or Stages(...) with functions in it", type(stages).__name__)
+
+
+class FrameRunner:
+    """Run one or several sets of stages on a frame; a call that several sets have in common is made only once.
+
+    Parameters
+    ----------
+    number : int
+        Number of the frame, for error messages.
+    frame : Frame
+        The frame; it has to have an image.
+    architecture : Architecture
+        What all sets work with: the grid, the image size, the planes and the classes.
+    """
+
+    def __init__(self, number: int, frame: Frame, architecture: Architecture) -> None:
+        self._number, self._frame = number, frame
+        self._image = network_image(frame, architecture.image_size).numpy()
+        self._shapes = _result_shapes(architecture)
+        self._done: dict[tuple[int, ...], tuple[NDArray[np.float32], float]] = {}
+
+    def result(self, stages: Stages, belief: Belief, seconds: float) -> FrameResult:
+        """Send the frame through the stages that follow the filter.
+
+        Parameters
+        ----------
+        stages : Stages
+            A complete set: five functions.
+        belief : Belief
+            What `stages.track` yields for the frame.
+        seconds : float
+            How long that took.
+        """
+        o = belief.probability
+        s, t_segment = self._call("segment", stages.segment, self._image)
+        p, t_sample = self._call("sample", stages.sample, s)
+        try:
+            log_g, t_fuse = self._call("fuse", stages.fuse, p, o)
+        except StageError:
+            # The planes hold millions of numbers, so they are searched for NaN after an error, not at each frame.
+            StageCheck("sample", stages.sample, self._number).finite(p)
+            raise
+        refined, t_refine = self._call("refine", stages.refine, log_g, o)
+        times = dict(zip(STAGES, (seconds, t_segment, t_sample, t_fuse, t_refine), strict=True))
+        return FrameResult(self._frame, belief, s, np.exp(log_g), refined, times)
+
+    def _call(self, stage: str, function: Callable, *inputs: NDArray) -> tuple[NDArray[np.float32], float]:
+        """Return a stage's result and its time; the same function isn't called again on the same arrays."""
+        key = (id(function), *map(id, inputs))
+        if key not in self._done:
+            self._done[key] = StageCheck(stage, function, self._number).call(self._shapes[stage], *inputs)
+        return self._done[key]
+
+
+def _result_shapes(architecture: Architecture) -> dict[str, tuple[int, ...]]:
+    """Return the shape of what each stage after the filter returns, by the name of the stage."""
+    n_classes, grid = len(LABEL_SETS[architecture.label_set]), architecture.grid.shape
+    return {
+        "segment": (n_classes, *architecture.image_size),
+        "sample": (n_classes, len(architecture.heights), *grid),
+        "fuse": (n_classes, *grid),
+        "refine": (n_classes, *grid),
+    }
+
+
+def network_image(frame: Frame, size: tuple[int, int]) -> Tensor:
+    """Turn a frame's image into what a network takes.
+
+    Parameters
+    ----------
+    frame : Frame
+        The frame; it has to have an image.
+    size : (int, int)
+        Height and width, pixels; `frame.camera.resized(size)` is the camera of the result.
+
+    Returns
+    -------
+    (3, h, w) float32
+        RGB, 0..1.
+
+    Raises
+    ------
+    ArgumentError
+        When the frame has no image.
+    """
+    return unit_image(torch.tensor(resize_image(frame.need_image(), size)).permute(2, 0, 1))

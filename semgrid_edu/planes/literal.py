@@ -25,11 +25,6 @@ def sample_planes_naive(scores: ArrayLike, pixels: ArrayLike, visible: ArrayLike
     (C, D, H, W) float64
         p, one value per class and point.
 
-    Raises
-    ------
-    ArgumentError
-        When the shapes don't agree or a visible point lies outside the image.
-
     Examples
     --------
     >>> scores = np.array([[[0.0, 1.0], [2.0, 3.0]]])

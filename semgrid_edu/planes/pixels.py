@@ -24,11 +24,6 @@ def plane_heights(n_planes: int = 20, spacing: float = 0.2) -> NDArray[np.float6
     (D,) float64
         Heights in metres, from 0 upwards.
 
-    Raises
-    ------
-    ArgumentError
-        When there is no plane, or the spacing isn't a positive distance.
-
     Examples
     --------
     >>> plane_heights(4, spacing=0.5)
@@ -62,11 +57,6 @@ def plane_pixels(spec: GridSpec, heights: ArrayLike, camera: Camera) -> tuple[ND
         u, v of each point in pixels; NaN for points behind the camera.
     visible : (D, H, W) bool
         Whether the point is in front of the camera and inside the image.
-
-    Raises
-    ------
-    ArgumentError
-        When `heights` isn't a list of one or more finite numbers.
     """
     heights = check_heights(heights)
     centers, T_camera_from_grid = spec.centers(), camera.T_camera_from_grid
@@ -80,22 +70,12 @@ def plane_pixels(spec: GridSpec, heights: ArrayLike, camera: Camera) -> tuple[ND
 
 
 def check_heights(heights: ArrayLike) -> NDArray[np.float64]:
-    """Check the heights of planes, and return them as an array.
+    """Return the heights of planes as an array; refuse all but one or more finite numbers.
 
     Parameters
     ----------
     heights : (D,) float
         delta_i, metres above the ground.
-
-    Returns
-    -------
-    (D,) float64
-        The same heights.
-
-    Raises
-    ------
-    ArgumentError
-        When they aren't a list of one or more finite numbers.
     """
     heights = np.asarray(heights, dtype=np.float64)
     if heights.ndim != 1 or not heights.size or not np.isfinite(heights).all():
@@ -104,7 +84,7 @@ def check_heights(heights: ArrayLike) -> NDArray[np.float64]:
 
 
 def check_plane_points(pixels: NDArray, visible: NDArray, image_size: tuple[int, int]) -> None:
-    """Refuse points of planes whose pixels don't fit each other or the image.
+    """Refuse points of planes whose shapes don't agree, or visible ones outside the image.
 
     Parameters
     ----------
@@ -114,11 +94,6 @@ def check_plane_points(pixels: NDArray, visible: NDArray, image_size: tuple[int,
         The points that take a value.
     image_size : (int, int)
         Height h and width w of the image, pixels.
-
-    Raises
-    ------
-    ArgumentError
-        When the shapes don't agree or a visible point lies outside the image.
     """
     if visible.ndim != 3 or not visible.size or visible.dtype != bool:
         raise ArgumentError("visible", "bool, shape (D, H, W), not empty", f"{visible.dtype}, shape {visible.shape}")

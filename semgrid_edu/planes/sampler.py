@@ -1,7 +1,4 @@
-"""Equation (2), fast and differentiable, as a module of a network (section 3.3).
-
-Equation (2) of one calibration as a fixed operator, from the pixels of an image to its planes (section 3.3).
-"""
+"""Equation (2), fast and differentiable: a fixed operator for each calibration, and the module that holds it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -47,20 +44,7 @@ class PlaneOperator:
 
     @classmethod
     def build(cls, pixels: ArrayLike, visible: ArrayLike, image_size: tuple[int, int]) -> "PlaneOperator":
-        """Work out the operator of points whose pixels are known, for one image.
-
-        Parameters are those of `PlaneSampler`.
-
-        Returns
-        -------
-        PlaneOperator
-            The operator of D planes of H x W points.
-
-        Raises
-        ------
-        ArgumentError
-            When the shapes don't agree or a visible point lies outside the image.
-        """
+        """Work out the operator for one image of known pixels. Parameters are those of `PlaneSampler`."""
         pixels, visible = np.asarray(pixels), np.asarray(visible)
         check_plane_points(pixels, visible, image_size)
         by_cell = np.moveaxis(pixels, 0, 2), np.moveaxis(visible, 0, 2)
@@ -78,11 +62,6 @@ class PlaneOperator:
         ----------
         n_images : int
             B, the number of images. The new operator needs B times the memory of this one.
-
-        Returns
-        -------
-        PlaneOperator
-            Built from this operator of one image.
         """
         n_pixels, n_points = prod(self.image_size), prod(self.planes_shape)
         matrix = self.matrix.block_diagonal(n_images, n_pixels)
@@ -97,11 +76,6 @@ class PlaneOperator:
         ----------
         change : callable
             Takes each tensor of the two matrices, and returns the one to take its place.
-
-        Returns
-        -------
-        PlaneOperator
-            A new operator; this one stays as it is.
         """
         matrix, transpose = (SparseMatrix(*map(change, part)) for part in (self.matrix, self.transpose))
         return replace(self, matrix=matrix, transpose=transpose)
@@ -159,17 +133,12 @@ class PlaneSampler(nn.Module):
 
     @classmethod
     def from_operator(cls, operator: PlaneOperator) -> "PlaneSampler":
-        """Return a sampler around an operator that is already there, which it shares with others that have it.
+        """Return a sampler around an operator, which it shares with others that have it.
 
         Parameters
         ----------
         operator : PlaneOperator
             The operator for one image.
-
-        Returns
-        -------
-        PlaneSampler
-            A module of its own.
         """
         sampler = cls.__new__(cls)
         nn.Module.__init__(sampler)

@@ -50,18 +50,10 @@ def _corners(points: NDArray, image_size: tuple[int, int]) -> tuple[NDArray[np.i
     right_weight, lower_weight = u - left, v - top
     # On the last column or row the far neighbour has no weight, but it must exist.
     right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
-    indices = np.stack(
-        [top * width + left, top * width + right, bottom * width + left, bottom * width + right], axis=-1
-    )
-    weights = np.stack(
-        [
-            (1 - lower_weight) * (1 - right_weight),
-            (1 - lower_weight) * right_weight,
-            lower_weight * (1 - right_weight),
-            lower_weight * right_weight,
-        ],
-        axis=-1,
-    )
+    rows = (top, 1 - lower_weight), (bottom, lower_weight)
+    columns = (left, 1 - right_weight), (right, right_weight)
+    indices = np.stack([row * width + column for row, _ in rows for column, _ in columns], axis=-1)
+    weights = np.stack([lower * sideways for _, lower in rows for _, sideways in columns], axis=-1)
     return indices.astype(np.int32), weights.astype(np.float32)
 
 
@@ -90,31 +82,19 @@ class SparseMatrix(NamedTuple):
         ----------
         matrix : csr_array
             The matrix, (rows, columns).
-
-        Returns
-        -------
-        SparseMatrix
-            The same weights.
         """
         return cls(*map(torch.from_numpy, (matrix.indices, matrix.indptr, matrix.data)))
 
     def multiply(self, rows: Tensor) -> Tensor:
-        """Return the product with a dense matrix: equation (2) for all points at once.
+        """Return the product with a dense matrix, (rows, C): equation (2) for all points at once.
+
+        PyTorch's bag of embeddings computes just that, a weighted sum of gathered rows, and on a CPU it is several
+        times faster than PyTorch's sparse matrices.
 
         Parameters
         ----------
         rows : (columns, C) float
             One row per pixel, its C scores.
-
-        Returns
-        -------
-        (rows, C) float
-            One row per point, in the type of the argument.
-
-        Notes
-        -----
-        PyTorch's bag of embeddings computes just that, a weighted sum of gathered rows, and on a CPU it is
-        several times faster than PyTorch's sparse matrices.
         """
         weights = self.weights.to(rows.dtype)
         return F.embedding_bag(
@@ -130,11 +110,6 @@ class SparseMatrix(NamedTuple):
             How often this matrix stands along the diagonal: once per image.
         n_columns : int
             The number of columns of this matrix. Its entries don't say, since its last columns may be empty.
-
-        Returns
-        -------
-        SparseMatrix
-            With n_blocks times as many rows, columns and weights.
         """
         block = torch.arange(n_blocks, dtype=self.offsets.dtype, device=self.offsets.device)[:, None]
         n_weights = self.offsets[-1:]
@@ -155,7 +130,7 @@ class SparseProduct(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx, rows: Tensor, matrix: SparseMatrix, transpose: SparseMatrix) -> Tensor:
-        """Return the product A x.
+        """Return A x.
 
         Parameters
         ----------
@@ -165,18 +140,13 @@ class SparseProduct(torch.autograd.Function):
             x, one row per column of A.
         matrix, transpose : SparseMatrix
             A and its transpose.
-
-        Returns
-        -------
-        (rows, C) float
-            A x.
         """
         ctx.matrices = matrix, transpose
         return matrix.multiply(rows.contiguous())
 
     @staticmethod
     def backward(ctx, grad: Tensor) -> tuple[Tensor, None, None]:
-        """Return the gradient with respect to x, which can be differentiated again; the matrices have none.
+        """Return A^T dL/dy, which can be differentiated again, and no gradient of the two matrices.
 
         Parameters
         ----------
@@ -184,11 +154,6 @@ class SparseProduct(torch.autograd.Function):
             PyTorch's store, filled by `forward`.
         grad : (rows, C) float
             dL/dy, the gradient of the loss with respect to the product.
-
-        Returns
-        -------
-        (columns, C) float, None, None
-            A^T dL/dy, and nothing for the two matrices.
         """
         matrix, transpose = ctx.matrices
         return SparseProduct.apply(grad, transpose, matrix), None, None

@@ -1,7 +1,4 @@
-"""What one scan says of one cell: its returns, and the beam that crosses its centre (paper, section 3.2).
-
-One place on the ground in the beliefs of earlier frames, while the vehicle drives on (paper, section 3.2).
-"""
+"""What a scan says of cells, and what was believed of one place while the vehicle drove on (paper, section 3.2)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,9 +8,122 @@ from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import PlanarMotion, SensorModel
-from semgrid_edu.occupancy.sensor import likelihoods
+from semgrid_edu.occupancy.polar import beams_of
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN
 from semgrid_edu.pipeline import FrameResult
+
+VERDICTS = ("silent", "passed", "ground", "hit")
+"""What a scan can say of a cell, see `ScanMaps.verdict`."""
+
+
+@dataclass(frozen=True, eq=False)
+class ScanMaps:
+    """What one scan says of each cell, and why.
+
+    Parameters
+    ----------
+    points : (M, 3) float
+        The returns that count: x and y in the grid frame, height above the ground, metres.
+    obstacle, ground : (M,) bool
+        Which of them come from obstacles, and which from the ground. Returns from above `obstacle_max` are neither.
+    distance, reach : (H, W) float
+        Distance of each cell's centre from the LIDAR, and how far the beam through it sees, metres: to its first
+        obstacle, else to its last ground return; 0 where nothing came back.
+    occupied, free : (H, W) float32
+        P(z | occupied) and P(z | free) of `Scan.evidence`; equal where the scan says nothing.
+    verdict : (H, W) int
+        What the scan says, as an index of `VERDICTS`: nothing; the beam passes the cell from end to end; the ground was
+        seen in it; or an obstacle was hit, which overrules all else.
+    """
+
+    points: NDArray[np.floating]
+    obstacle: NDArray[np.bool_]
+    ground: NDArray[np.bool_]
+    distance: NDArray[np.float64]
+    reach: NDArray[np.float32]
+    occupied: NDArray[np.float32]
+    free: NDArray[np.float32]
+    verdict: NDArray[np.int64]
+
+
+def scan_maps(points: NDArray, spec: GridSpec, sensor: SensorModel) -> ScanMaps:
+    """Ask a scan about every cell.
+
+    Parameters
+    ----------
+    points : (N, 3+) float
+        The scan: x forward, y left, z above the ground (m), in the grid frame of the vehicle.
+    spec : GridSpec
+        The grid, (H, W).
+    sensor : SensorModel
+        The sensor that took the scan.
+
+    Returns
+    -------
+    ScanMaps
+        The evidence, and what it rests on.
+
+    Raises
+    ------
+    ArgumentError
+        When `points` isn't a table of finite coordinates.
+    """
+    scan = sensor.scan(points)
+    evidence, height = scan.evidence(spec, PlanarMotion()), scan.points[:, 2]
+    x, y = np.moveaxis(spec.centers(), -1, 0)
+    distance = np.hypot(x, y)
+    reach = scan.reach[beams_of(x.ravel(), y.ravel(), len(scan.reach))].reshape(spec.shape)
+    says = [evidence.occupied > evidence.free, evidence.free <= evidence.occupied, reach - distance >= spec.cell / 2]
+    verdict = np.select(says, [VERDICTS.index(word) for word in ("hit", "silent", "passed")], VERDICTS.index("ground"))
+    obstacle = (height >= sensor.obstacle_min) & (height <= sensor.obstacle_max)
+    ground = height < sensor.obstacle_min
+    return ScanMaps(scan.points, obstacle, ground, distance, reach, evidence.occupied, evidence.free, verdict)
+
+
+@dataclass(frozen=True, eq=False)
+class CellScan:
+    """What one scan says of one cell, and why.
+
+    Parameters
+    ----------
+    obstacles, ground : (N, 3), (M, 3) float
+        Its returns from obstacles and from the ground: x and y in the grid frame, height above the ground, metres.
+    distance, reach, occupied, free : float
+        The cell's numbers in `ScanMaps`.
+    verdict : str
+        What the scan says, one of `VERDICTS`.
+    """
+
+    obstacles: NDArray[np.floating]
+    ground: NDArray[np.floating]
+    distance: float
+    reach: float
+    occupied: float
+    free: float
+    verdict: str
+
+
+def cell_scan(points: NDArray, spec: GridSpec, cell: tuple[int, int], sensor: SensorModel) -> CellScan:
+    """Ask a scan about one cell.
+
+    Parameters
+    ----------
+    points, spec, sensor
+        As for `scan_maps`, which does the work.
+    cell : (int, int)
+        Row and column of the cell.
+
+    Returns
+    -------
+    CellScan
+        The returns in the cell, the beam through its centre, and the two likelihoods.
+    """
+    maps = scan_maps(points, spec, sensor)
+    rows, cols, inside = spec.cells(maps.points)
+    here = inside & (rows == cell[0]) & (cols == cell[1])
+    numbers = (float(values[cell]) for values in (maps.distance, maps.reach, maps.occupied, maps.free))
+    returns = (maps.points[here & kind, :3] for kind in (maps.obstacle, maps.ground))
+    return CellScan(*returns, *numbers, VERDICTS[maps.verdict[cell]])
 
 
 def place_history(
@@ -46,83 +156,3 @@ def place_history(
         (row,), (col,), (inside,) = spec.cells(motion.to_previous(spec.centers()[cell])[None])
         states.append(result.belief.probability[:, row, col] if inside else NOTHING_KNOWN)
     return np.array([result.frame.time for result in results]), np.stack(states, axis=1)
-
-
-@dataclass(frozen=True, eq=False)
-class CellScan:
-    """What one scan says of one cell, and why.
-
-    Parameters
-    ----------
-    obstacles, ground : (N, 3), (M, 3) float64
-        Its returns from obstacles and from the ground: x and y in the grid frame, height above the ground, metres.
-        Returns from above `obstacle_max` say nothing, and are in neither.
-    distance : float
-        Distance of the cell's centre from the LIDAR, metres.
-    reach : float
-        How far the beam through the centre sees, metres: to its first obstacle, else to its last ground return; 0 where
-        nothing came back.
-    passed : bool
-        Whether the beam passes the cell from end to end.
-    under : bool
-        Whether the cell lies so shortly behind the beam's first obstacle that ground returns in it don't count.
-    occupied, free : float
-        P(z | occupied) and P(z | free); equal when the scan says nothing of the cell.
-    """
-
-    obstacles: NDArray[np.float64]
-    ground: NDArray[np.float64]
-    distance: float
-    reach: float
-    passed: bool
-    under: bool
-    occupied: float
-    free: float
-
-    @property
-    def verdict(self) -> str:
-        """What the scan says: "hit", "passed", "ground" or "silent". A hit overrules all else."""
-        if len(self.obstacles):
-            return "hit"
-        if self.passed:
-            return "passed"
-        return "ground" if len(self.ground) and not self.under else "silent"
-
-
-def cell_scan(points: NDArray, spec: GridSpec, cell: tuple[int, int], sensor: SensorModel) -> CellScan:
-    """Ask a scan about one cell: the rule of `Scan.evidence`, for this cell alone and in plain numpy.
-
-    Parameters
-    ----------
-    points : (N, 3+) float
-        The scan: x forward, y left, z above the ground (m), in the grid frame of the vehicle.
-    spec : GridSpec
-        The grid.
-    cell : (int, int)
-        Row and column of the cell.
-    sensor : SensorModel
-        The sensor that took the scan.
-
-    Returns
-    -------
-    CellScan
-        The returns in the cell, the beam through its centre, and the two likelihoods.
-
-    Raises
-    ------
-    ArgumentError
-        When `points` isn't a table of finite coordinates.
-    """
-    scan = sensor.scan(points)
-    rows, cols, inside = spec.cells(scan.points)
-    here = scan.points[inside & (rows == cell[0]) & (cols == cell[1]), :3].astype(np.float64)
-    obstacles = here[(here[:, 2] >= sensor.obstacle_min) & (here[:, 2] <= sensor.obstacle_max)]
-    ground = here[here[:, 2] < sensor.obstacle_min]
-    x, y = spec.centers()[cell]
-    beam = min(int((np.arctan2(y, x) + np.pi) * (sensor.beams / (2 * np.pi))), sensor.beams - 1)
-    beyond = np.float32(np.hypot(x, y) - scan.reach[beam])
-    passed, under = bool(beyond <= -spec.cell / 2), bool(spec.cell / 2 < beyond < sensor.under)
-    free = passed or (len(ground) > 0 and not under)
-    evidence = likelihoods(np.array([len(obstacles)]), np.array([free]), sensor)
-    likely = (float(evidence.occupied[0]), float(evidence.free[0]))
-    return CellScan(obstacles, ground, float(np.hypot(x, y)), float(scan.reach[beam]), passed, under, *likely)

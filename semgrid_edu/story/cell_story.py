@@ -4,14 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.special import softmax
 
 from semgrid_edu.crf import CrfParams
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import LABEL_SETS
+from semgrid_edu.labels import IGNORE, LABEL_SETS
 from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.occupancy import SensorModel
 from semgrid_edu.pipeline import FrameResult
@@ -134,7 +134,7 @@ def cell_story(
     cell = _checked(cell, spec)
     o = result.belief.probability
     truth = _truth(result, spec, cell)
-    label, rival = label_and_rival(result.grid[:, *cell], truth)
+    label, rival = map(int, label_and_rival(result.grid[:, *cell], IGNORE if truth is None else truth))
     times, history = place_history([*past[max(0, len(past) - FRAMES + 1) :], result], spec, cell)
     pixels, visible = plane_pixels(spec, architecture.heights, result.frame.camera)
     parts = [cell_contributions(net, result.scores, o, cell, c) for c in (label, rival)]
@@ -160,24 +160,23 @@ def cell_story(
     )
 
 
-def label_and_rival(probability: NDArray, truth: int | None) -> tuple[int, int]:
-    """Return a cell's most probable class, and the one that it is compared with.
+def label_and_rival(probability: NDArray, truth: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the most probable class of each cell, and the one that it is compared with.
 
     Parameters
     ----------
-    probability : (C,) float
-        The cell's distribution.
-    truth : int or None
-        The true class, where it is known.
+    probability : (C, ...) float
+        The distribution of each cell, or of one.
+    truth : (...) int
+        The true class; `IGNORE` where it isn't known.
 
     Returns
     -------
-    label, rival : int
+    label, rival : (...) int64
         The rival is the truth where that is another class of the distribution, otherwise the second most probable one.
     """
-    label, second = (int(c) for c in np.argsort(-probability, kind="stable")[:2])
-    wrong = truth is not None and truth != label and truth < len(probability)
-    return label, truth if wrong else second
+    label, second = np.argsort(-probability, axis=0, kind="stable")[:2]
+    return label, np.where((truth != label) & (truth < len(probability)), truth, second)
 
 
 def _checked(cell: tuple[int, int], spec: GridSpec) -> tuple[int, int]:

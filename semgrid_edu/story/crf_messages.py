@@ -1,16 +1,16 @@
-"""The neighbours that pulled a cell in the last mean-field update, by the naive formula (eq. (4))."""
+"""What the neighbours of a cell add in the CRF's last mean-field update (eq. (3), (4)), by the CRF's own kernels."""
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import softmax
 
-from semgrid_edu.crf import CrfParams, mean_field, unary_from_probability
-from semgrid_edu.crf.accurate import WindowedGaussian
-from semgrid_edu.crf.naive import damping
-from semgrid_edu.crf.spatial import SeparableGaussian
+from semgrid_edu.crf import CrfParams, SeparableGaussian, WindowedGaussian, mean_field, unary_from_probability
 from semgrid_edu.errors import ArgumentError
+
+REACH = 4
+"""Neighbours are looked for up to this many widths sigma_alpha away, the window of `WindowedGaussian`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,16 +25,12 @@ class NeighbourPull:
         k_ij, the bracket of eq. (4), for each other cell j; 0 for the cell itself.
     neighbours : (C, H, W) float32
         Q_j before the last update.
-    settled : (C,) float64
-        What the naive formula makes of the cell in the last update. It differs from `after` by as much as the fast
-        filters differ from the sum over all pairs.
     """
 
     before: NDArray[np.float64]
     after: NDArray[np.float64]
     weights: NDArray[np.float64]
     neighbours: NDArray[np.float32]
-    settled: NDArray[np.float64]
 
     @property
     def messages(self) -> NDArray[np.float64]:
@@ -66,7 +62,7 @@ class NeighbourPull:
 def neighbour_pull(
     g: NDArray, refined: NDArray, o: NDArray, cell: tuple[int, int], params: CrfParams, iterations: int = 10
 ) -> NeighbourPull:
-    """Repeat the CRF up to its last update, and write that one out for one cell.
+    """Repeat the CRF up to its last update, and write out what one cell's neighbours add in that one.
 
     Parameters
     ----------
@@ -93,47 +89,125 @@ def neighbour_pull(
     ArgumentError
         When there is no update to explain, or an argument isn't what `mean_field` takes.
     """
+    Q = beliefs_before_last_update(g, o, params, iterations)
+    before, after = (np.asarray(grid[:, *cell], np.float64) for grid in (g, refined))
+    return NeighbourPull(before, after, weights_of_cell(o, params, cell), Q)
+
+
+def beliefs_before_last_update(g: NDArray, o: NDArray, params: CrfParams, iterations: int = 10) -> NDArray[np.float32]:
+    """Return Q, (C, H, W), before the last of the CRF's updates. Parameters are those of `neighbour_pull`."""
     if iterations < 1:
         raise ArgumentError("iterations", "at least one update to explain", iterations)
-    unary = unary_from_probability(g)
-    Q = mean_field(unary, o, params, iterations - 1)
-    weights, own = weights_of_cell(o, params, cell)
-    log_Q = np.log(np.maximum(Q[:, *cell].astype(np.float64), np.finfo(np.float32).tiny))
-    target = np.einsum("hw,chw->c", weights, Q) - unary[:, *cell]
-    part = damping(own)
-    settled = softmax((1 - part) * log_Q + part * target)
-    before, after = (np.asarray(grid[:, *cell], np.float64) for grid in (g, refined))
-    return NeighbourPull(before, after, weights, Q, settled)
+    return mean_field(unary_from_probability(g), o, params, iterations - 1)
 
 
-def weights_of_cell(o: NDArray, params: CrfParams, cell: tuple[int, int]) -> tuple[NDArray[np.float64], float]:
-    """Compute the bracket of eq. (4) between one cell and every other: one row of `pair_weights`, for any size of grid.
+def weights_of_cell(o: NDArray, params: CrfParams, cell: tuple[int, int]) -> NDArray[np.float64]:
+    """Return the bracket of eq. (4) between one cell and every other: one row of `pair_weights`, for any size of grid.
+
+    The kernels are symmetric filters, so the row is what they make of a grid of zeros with a 1 in the cell.
 
     Parameters
     ----------
     o : (4, H, W) float
         o_i, the probabilities of the four states.
     params : CrfParams
-        Weights, widths and normalisation. The row sums by which the bilateral kernel is normalised are summed over a
-        window of four widths sigma_alpha (`WindowedGaussian`), which holds nearly all of them.
+        Weights, widths and normalisation.
     cell : (int, int)
         Row and column of the cell i.
 
     Returns
     -------
-    weights : (H, W) float64
-        k_ij for each cell j; 0 for the cell itself, which is no pair with itself.
-    own : float
-        k_ii, which decides how far an update goes (`damping`).
+    (H, W) float64
+        k_ij for each cell j; 0 for the cell itself, which is no pair with itself, and beyond the kernels' windows.
     """
-    apart = sum((index - at) ** 2.0 for index, at in zip(np.indices(o.shape[1:]), cell, strict=True))
-    unlike = ((o - o[:, *cell][:, None, None]).astype(np.float64) ** 2).sum(axis=0)
-    bilateral = WindowedGaussian.build(o, params).scale.astype(np.float64)
+    alone = np.zeros(o.shape[1:], np.float32)
+    alone[cell] = 1
+    weights = sum(kernel(alone.reshape(-1, 1)) for kernel in _kernels(o, params)).reshape(alone.shape)
+    weights[cell] = 0
+    return weights.astype(np.float64)
+
+
+def neighbour_messages(Q: NDArray, o: NDArray, params: CrfParams) -> NDArray[np.float32]:
+    """Return `NeighbourPull.messages` of every cell at once.
+
+    Parameters
+    ----------
+    Q : (C, H, W) float32
+        What every cell believed before the update.
+    o, params
+        As for `weights_of_cell`.
+
+    Returns
+    -------
+    (C, H, W) float32
+        sum_{j != i} k_ij Q_j(l).
+    """
+    rows = np.ascontiguousarray(Q.reshape(len(Q), -1).T)
+    sums = sum(kernel(rows) - kernel.diagonal[:, None] * rows for kernel in _kernels(o, params))
+    return sums.T.reshape(Q.shape)
+
+
+def strongest_neighbours(
+    Q: NDArray, labels: NDArray, o: NDArray, params: CrfParams, number: int = 5
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """Return `NeighbourPull.strongest` of every cell at once.
+
+    Parameters
+    ----------
+    Q, o, params
+        As for `neighbour_messages`.
+    labels : (H, W) int
+        The class l of each cell i towards which it is pulled.
+    number : int
+        How many neighbours.
+
+    Returns
+    -------
+    steps : (2, number, H, W) int64
+        Rows and columns from each cell to its neighbours, the strongest first; 0 where there are fewer.
+    pull : (number, H, W) float32
+        k_ij Q_j(l) of each.
+    """
+    place = np.indices(labels.shape, dtype=np.float32)
+    near, close = place / params.sigma_gamma, np.concatenate([place / params.sigma_alpha, o / params.sigma_beta])
+    # k_ij of a kernel is exp(-|f_i - f_j|^2 / 2) times a factor of i and one of j, whose squares are its diagonal.
+    alike, beside = (np.sqrt(kernel.diagonal).reshape(labels.shape) for kernel in _kernels(o, params))
+    reach = int(np.ceil(REACH * params.sigma_alpha))
+    padded = [_padded(maps, reach) for maps in (close, alike, near, beside, Q)]
+    steps = sorted(product(range(-reach, reach + 1), repeat=2), key=np.linalg.norm)
+    pull, which = np.zeros((number, *labels.shape), np.float32), np.zeros((number, *labels.shape), np.int64)
+    for k, step in enumerate(steps[1:], start=1):
+        close_j, alike_j, near_j, beside_j, Q_j = (_shifted(maps, reach, step) for maps in padded)
+        weights = alike * alike_j * _gaussian(close, close_j) + beside * beside_j * _gaussian(near, near_j)
+        _insert(pull, which, weights * np.take_along_axis(Q_j, labels[None], axis=0)[0], k)
+    return np.moveaxis(np.array(steps)[which], -1, 0), pull
+
+
+def _kernels(o: NDArray, params: CrfParams) -> tuple[WindowedGaussian, SeparableGaussian]:
+    """Return both kernels of eq. (4), pair by pair."""
     spatial = SeparableGaussian.build(o.shape[1:], params.sigma_gamma, params.w_spatial, params.normalization)
-    of_place = np.outer(spatial.row_scale, spatial.column_scale).astype(np.float64)
-    weights = (
-        bilateral[cell] * bilateral * np.exp(-0.5 * (apart / params.sigma_alpha**2 + unlike / params.sigma_beta**2))
-    )
-    weights += of_place[cell] * of_place * np.exp(-0.5 * apart / params.sigma_gamma**2)
-    own, weights[cell] = float(weights[cell]), 0
-    return weights, own
+    return WindowedGaussian.build(o, params), spatial
+
+
+def _gaussian(one: NDArray, other: NDArray) -> NDArray:
+    return np.exp(-0.5 * ((one - other) ** 2).sum(axis=0))
+
+
+def _padded(maps: NDArray, reach: int) -> NDArray:
+    """Put zeros around maps (..., H, W): cells beyond the border have no weight."""
+    return np.pad(maps, [(0, 0)] * (maps.ndim - 2) + [(reach, reach)] * 2)
+
+
+def _shifted(padded: NDArray, reach: int, step: tuple[int, int]) -> NDArray:
+    """Return for each cell of padded maps what stands so many rows and columns further on."""
+    rows, cols = (slice(reach + by, size - reach + by) for by, size in zip(step, padded.shape[-2:], strict=True))
+    return padded[..., rows, cols]
+
+
+def _insert(pull: NDArray, which: NDArray, term: NDArray, number: int) -> None:
+    """Put a term of each cell, and its number, into the cell's list of its largest terms if it is one of them."""
+    at = term > pull[-1]
+    terms = np.concatenate([pull[:, at], term[None, at]])
+    numbers = np.concatenate([which[:, at], np.full((1, at.sum()), number)])
+    order = np.argsort(-terms, axis=0, kind="stable")[:-1]
+    pull[:, at], which[:, at] = (np.take_along_axis(of, order, axis=0) for of in (terms, numbers))

@@ -256,7 +256,7 @@ class TestStory:
         for layer in range(2):
             points = page.locator("[data-column]").nth(layer).locator("circle")
             drawn = points.evaluate_all("(all) => all.map((one) => [one.cx.baseVal.value, one.cy.baseVal.value])")
-            np.testing.assert_allclose(np.reshape(drawn, (-1, 2)), expected, atol=0.01)
+            np.testing.assert_allclose(np.reshape(drawn, (-1, 2)), expected, atol=0.02)  # rounded to 1/32
             photo = page.locator(".stack").nth(layer).locator("img").first.bounding_box()
             for k, (u, v) in enumerate(expected):
                 scale = photo["width"] / sample_drive().camera.size[1]

@@ -13,17 +13,15 @@ from read_page import Page
 from tiny_drive import DATE, write_tiny_drive
 
 import semgrid_edu.workshop.demo.page as page_module
-from semgrid_edu.crf import CrfParams
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import Architecture, build_net, load_net, save_net
 from semgrid_edu.pipeline import Stages, run_pipeline
-from semgrid_edu.story import cell_story, weights_of_cell
-from semgrid_edu.story.cell_story import label_and_rival
+from semgrid_edu.story import cell_story
 from semgrid_edu.workshop.demo import write_demo
-from semgrid_edu.workshop.demo.details import PART_STEP, REACH_STEP, VERDICTS, label_and_rival_maps, states_bytes
+from semgrid_edu.workshop.demo.details import FILTER_STEPS, NOT_SEEN, STEPS, VERDICTS, states_bytes
 from semgrid_edu.workshop.demo.record import Record
 from semgrid_edu.workshop.demo.run import STORIES, _stories_every
 
@@ -63,21 +61,34 @@ def stories(drive, out):
 def maps(page):
     """The maps of the last frame, read back with nothing of the page's own."""
     story = json.loads(page.text["storydata"])
-    kind, details = json.loads(page.text["frames"])[-1]["details"].split(",")
+    return unpacked(json.loads(page.text["frames"])[-1]["details"], story["layout"])
+
+
+def unpacked(uri, layout):
+    kind, details = uri.split(",")
     assert kind == "data:application/zlib;base64"
-    raw = zlib.decompress(base64.b64decode(details, validate=True))
-    whole = np.frombuffer(raw, np.uint8).reshape(-1, *SPEC.shape)
-    ends = np.cumsum(list(story["layout"].values()))
-    assert ends[-1] == len(whole)
-    return dict(zip(story["layout"], np.split(whole, ends[:-1]), strict=True))
+    raw = np.frombuffer(zlib.decompress(base64.b64decode(details, validate=True)), np.uint8)
+    n_cells, maps = SPEC.shape[0] * SPEC.shape[1], {}
+    assert len(raw) == n_cells * sum(number for _, number, _, _ in layout.values())
+    for name, (start, number, step, stride) in layout.items():
+        index = start + step * np.arange(number)[:, None] + stride * np.arange(n_cells)
+        maps[name] = raw[index].reshape(number, *SPEC.shape)
+        if stride == 1:
+            maps[name] = np.cumsum(maps[name], axis=1, dtype=np.uint8)
+    return maps
+
+
+def wide(maps, cell):
+    high, low = np.split(maps[:, *cell].astype(int), 2)
+    return 256 * high + low
 
 
 class TestBytes:
     def test_states_of_every_step(self, maps, stories):
         for story in stories[1]:
+            known = dict(zip(FILTER_STEPS, np.split(maps["states"][:, *story.cell].astype(int), 5), strict=True))
             for name, states in story.steps.items():
-                known = maps[name][:, *story.cell].astype(int)
-                np.testing.assert_allclose([*known, 255 - known.sum()], 255 * states, atol=1.001)
+                np.testing.assert_allclose(known[name], 255 * states, atol=1.001)
 
     def test_what_the_scan_says(self, maps, stories):
         for story in stories[1]:
@@ -85,17 +96,21 @@ class TestBytes:
             assert maps["obstacles"][at] == len(story.scan.obstacles)
             assert maps["ground"][at] == len(story.scan.ground)
             assert VERDICTS[maps["verdict"][at]] == story.scan.verdict
-            assert maps["reach"][at] * REACH_STEP == pytest.approx(story.scan.reach, abs=REACH_STEP / 2)
+            assert maps["reach"][at] * STEPS["reach"] == pytest.approx(story.scan.reach, abs=STEPS["reach"] / 2)
 
     def test_parts_of_the_score(self, maps, stories):
         for story in stories[1]:
             why = story.for_label.minus(story.for_rival)
             for name, axis in (("planes", 0), ("scores", 1)):
-                parts = PART_STEP * (maps[name][:, *story.cell].astype(int) - 128)
+                parts = STEPS["part"] * (maps[name][:, *story.cell].astype(int) - 128)
                 np.testing.assert_allclose(parts, why.planes.sum(axis=axis), atol=0.051)
-            high, low = np.split(maps["large"][:, *story.cell].astype(int), 2)
-            large = PART_STEP * (256 * high + low - 2**15)
-            np.testing.assert_allclose(large, [*why.occupancy, why.score], atol=0.051)
+            *states, image, occupancy, rest, score = STEPS["part"] * (wide(maps["totals"], story.cell) - 2**15)
+            np.testing.assert_allclose(states, why.occupancy, atol=0.051)
+            expected = [why.planes.sum(), why.occupancy.sum(), why.score]
+            np.testing.assert_allclose([image, occupancy, score], expected, atol=0.051)
+            assert image + occupancy + rest == pytest.approx(score, abs=1e-9)
+            digits, power = maps["times"][:, *story.cell].astype(int)
+            assert digits * 10.0 ** (power - 1) == pytest.approx(np.exp(why.score), rel=0.051)
 
     def test_classes_and_their_probabilities(self, maps, stories):
         for story in stories[1]:
@@ -103,21 +118,36 @@ class TestBytes:
             assert maps["classes"][:, *story.cell].tolist() == [*classes, story.truth]
             np.testing.assert_allclose(maps["before"][:, *story.cell], 255 * story.pull.before[classes], atol=0.51)
             np.testing.assert_allclose(maps["after"][:, *story.cell], 255 * story.pull.after[classes], atol=0.51)
-            at = (slice(None), *story.cell)
-            np.testing.assert_allclose(maps["neighbours"][at], 255 * story.pull.neighbours[at], atol=0.51)
+
+    def test_what_the_neighbours_add(self, maps, stories):
+        for story in stories[1]:
+            found = STEPS["message"] * maps["messages"][:, *story.cell]
+            expected = story.pull.messages[[story.label, story.rival, story.refined]]
+            np.testing.assert_allclose(found, expected, atol=0.051)
+            rows, cols, pull = np.split(maps["strongest"][:, *story.cell].astype(int), 3)
+            expected = story.pull.strongest(story.refined)[1]
+            np.testing.assert_allclose(STEPS["message"] * pull, expected, atol=0.051)
+            places = np.stack([rows, cols], axis=-1) - 128 + story.cell
+            terms = story.pull.weights * story.pull.neighbours[story.refined]
+            np.testing.assert_allclose(terms[tuple(places.T)], expected, rtol=1e-4)  # cells, where none pull alike
+
+    def test_what_holds_in_every_frame(self, page, stories):
+        data = json.loads(page.text["storydata"])
+        places = unpacked(data["places"], data["places_layout"])
+        for story in stories[1]:
+            assert STEPS["distance"] * wide(places["distance"], story.cell) == pytest.approx(
+                story.scan.distance, abs=0.051
+            )
+            found = wide(places["pixels"], story.cell).reshape(2, -1).T
+            np.testing.assert_array_equal(found[:, 0] != NOT_SEEN, story.visible)
+            uv = STEPS["pixel"] * found[story.visible]
+            np.testing.assert_allclose(uv, story.pixels[story.visible], atol=STEPS["pixel"] / 2)
 
     def test_states_sum_to_255_and_none_is_negative(self):
         probability = np.random.default_rng(1).dirichlet([0.05] * 4, (50, 40)).transpose(2, 0, 1).astype(np.float32)
         known = states_bytes(probability).astype(int)
-        assert known.sum(axis=0).max() <= 255
-        np.testing.assert_allclose(known, 255 * probability[:3], atol=1.001)
-
-    def test_the_two_classes_of_a_cell_are_those_of_its_story(self):
-        rng = np.random.default_rng(4)
-        g, truth = rng.dirichlet(np.ones(6), (9, 8)).transpose(2, 0, 1), rng.choice([0, 1, 2, 3, 4, 5, 255], (9, 8))
-        labels = label_and_rival_maps(g, truth)
-        for cell in np.ndindex(truth.shape):
-            assert tuple(int(one[cell]) for one in labels) == label_and_rival(g[:, *cell], int(truth[cell]))
+        assert (known.sum(axis=0) == 255).all()
+        np.testing.assert_allclose(known, 255 * probability, atol=1.001)
 
 
 @pytest.mark.parametrize(("n_shown", "every"), [(1, 1), (20, 1), (22, 1), (23, 2), (40, 2)])
@@ -128,7 +158,7 @@ def test_a_long_drive_has_stories_of_some_frames(n_shown, every):
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="needs node, to run the page's script")
 class TestScript:
-    """The script's numbers, computed by node from the page's own data."""
+    """What the script reads, run by node on the page's own data, is what the maps hold."""
 
     @pytest.fixture(scope="class")
     @staticmethod
@@ -141,18 +171,14 @@ class TestScript:
             """
             (async () => {
               const now = frames[frames.length - 1];
-              const reads = await Promise.all(frames.map(async (f) => reader(story, await unpack(f.details))));
-              const read = reads[reads.length - 1];
-              console.log(JSON.stringify(cells.map((cell) => {
-                const of = weights(story, read, cell);
-                return {
-                  steps: ["shown", "move", "predict", "update", "resample"].map((name) => states(read, name, cell)),
-                  parts: parts(story, read, cell), centre: centre(story.grid, cell), pixels: pixels(story, cell),
-                  then: frames.map((f) => cellThen(story.grid, f.pose, now.pose, cell)),
-                  weights: [...of], messages: messages(story, read, of),
-                  strongest: strongest(read, of, read("classes", cell)[2], 5).map(({ pull }) => pull),
-                };
-              })));
+              const places = await unpack(story.grid, story.places_layout, story.places);
+              const read = await unpack(story.grid, story.layout, now.details);
+              console.log(JSON.stringify(cells.map((cell) => ({
+                steps: story.filter_steps.map((name) => states(story, read, name, cell)),
+                parts: parts(story, read, cell), centre: centre(story.grid, cell), pixels: pixels(story, places, cell),
+                then: frames.map((f) => cellThen(story.grid, f.pose, now.pose, cell)),
+                messages: messages(story, read, cell), strongest: strongest(story, read, cell),
+              }))));
             })();
             """,
             encoding="utf-8",
@@ -160,39 +186,44 @@ class TestScript:
         run = subprocess.run(["node", str(program)], capture_output=True, text=True, check=True, timeout=120)
         return json.loads(run.stdout)
 
-    def test_states_sum_to_one(self, told, stories):
+    def test_states(self, told, stories):
         for one, story in zip(told, stories[1], strict=True):
             np.testing.assert_allclose(np.sum(one["steps"], axis=1), 1, atol=1e-12)
-            np.testing.assert_allclose(one["steps"][0], story.steps["shown"], atol=0.005)
+            for name, states in zip(FILTER_STEPS, one["steps"], strict=True):
+                np.testing.assert_allclose(states, story.steps[name], atol=0.005)
 
-    def test_parts_sum_to_the_score(self, told, stories):
+    def test_parts(self, told, stories):
         for one, story in zip(told, stories[1], strict=True):
             parts, why = one["parts"], story.for_label.minus(story.for_rival)
-            assert sum(parts["planes"]) + sum(parts["occupancy"]) + parts["rest"] == pytest.approx(parts["score"])
-            assert parts["score"] == pytest.approx(why.score, abs=0.051)
-            assert parts["rest"] == pytest.approx(why.rest, abs=0.051 * 25)
+            np.testing.assert_allclose(parts["planes"], why.planes.sum(axis=0), atol=0.051)
+            np.testing.assert_allclose(parts["scores"], why.planes.sum(axis=1), atol=0.051)
+            np.testing.assert_allclose(parts["occupancy"], why.occupancy, atol=0.051)
+            image, occupancy, rest, score = parts["totals"]
+            assert image + occupancy + rest == pytest.approx(score)
+            assert score == pytest.approx(why.score, abs=0.051)
+            assert rest == pytest.approx(why.rest, abs=0.151)
+            assert parts["times"] == pytest.approx(np.exp(why.score), rel=0.051)
 
-    def test_points_above_a_cell_follow_eq_1(self, told, stories):
+    def test_points_above_a_cell(self, told, stories):
         for one, story in zip(told, stories[1], strict=True):
             assert one["centre"] == pytest.approx(story.xy)
-            assert [point["visible"] for point in one["pixels"]] == story.visible.tolist()
-            uv = np.array([[point["u"], point["v"]] for point in one["pixels"]])
-            np.testing.assert_allclose(uv[story.visible], story.pixels[story.visible], atol=1e-9)
+            assert [point is not None for point in one["pixels"]] == story.visible.tolist()
+            uv = np.array([point for point in one["pixels"] if point]).reshape(-1, 2)
+            np.testing.assert_allclose(uv, story.pixels[story.visible], atol=STEPS["pixel"] / 2)
 
     def test_a_place_is_followed_through_the_poses(self, told):
         for one, (row, col) in zip(told, CELLS, strict=True):  # the vehicle drives two rows a frame
             then = [(row - 2 * back) * SPEC.shape[1] + col if row >= 2 * back else -1 for back in (2, 1, 0)]
             assert one["then"] == then
 
-    def test_neighbours_weigh_as_much_as_in_eq_4(self, told, stories):
-        o = stories[0][-1].belief.probability
+    def test_neighbours(self, told, stories):
         for one, story in zip(told, stories[1], strict=True):
-            expected, _ = weights_of_cell(o, CrfParams.for_cells(SPEC.cell), story.cell)
-            found = np.zeros(SPEC.shape)
-            found.ravel()[[cell for cell, _ in one["weights"]]] = [weight for _, weight in one["weights"]]
-            np.testing.assert_allclose(found, expected, atol=0.03 * expected.max())
-            np.testing.assert_allclose(one["messages"], story.pull.messages, atol=0.1)
-            np.testing.assert_allclose(one["strongest"], story.pull.strongest(story.refined)[1], atol=0.03)
+            expected = story.pull.messages[[story.label, story.rival, story.refined]]
+            np.testing.assert_allclose(one["messages"], expected, atol=0.051)
+            terms = (story.pull.weights * story.pull.neighbours[story.refined]).ravel()
+            pulls = [(terms[neighbour["cell"]], neighbour["pull"]) for neighbour in one["strongest"]]
+            np.testing.assert_allclose([term for term, _ in pulls], story.pull.strongest(story.refined)[1], rtol=1e-4)
+            np.testing.assert_allclose(*zip(*pulls, strict=True), atol=0.051)
 
     @pytest.mark.parametrize("name", ["page.js", "story.js", "panel.js"])
     def test_is_written_without_mistakes_of_grammar(self, name):

@@ -27,6 +27,8 @@ from semgrid_edu.workshop.demo.comparison import MADE_BY, Comparison
 
 EXAMPLE = Path(example_stages.__file__)
 
+pytestmark = pytest.mark.usefixtures("few_stories")
+
 
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory):
@@ -45,6 +47,12 @@ def out(drive, tmp_path_factory):
     result = CliRunner().invoke(app, ["demo", *arguments, "--out", str(folder / "out")])
     assert result.exit_code == 0, result.exception
     return folder / "out"
+
+
+@pytest.fixture(scope="module")
+def alone(drive, tmp_path_factory):
+    """The page of the package's own stages."""
+    return write_demo(drive, sample_weights(), tmp_path_factory.mktemp("alone")).parent
 
 
 @pytest.fixture(scope="module")
@@ -156,14 +164,13 @@ class TestPage:
         row = re.search(r"<tr><th>all cells, refined grid, my_stages.py</th><td>([\d.]+)</td>", html)
         assert float(row[1]) == pytest.approx(100 * np.mean(right), abs=0.051)
 
-    def test_the_package_alone_gives_the_same_pictures(self, drive, frames, tmp_path):
-        alone = Page(write_demo(drive, sample_weights(), tmp_path).read_text(encoding="utf-8"))
+    def test_the_package_alone_gives_the_same_pictures(self, frames, alone):
+        alone = Page((alone / "index.html").read_text(encoding="utf-8"))
         for both, one in zip(frames, json.loads(alone.text["frames"]), strict=True):
             assert both["images"].items() >= one["images"].items()
 
-    def test_overview_has_a_second_row(self, drive, out, tmp_path):
-        write_demo(drive, sample_weights(), tmp_path)
-        with Image.open(out / "overview.png") as both, Image.open(tmp_path / "overview.png") as one:
+    def test_overview_has_a_second_row(self, out, alone):
+        with Image.open(out / "overview.png") as both, Image.open(alone / "overview.png") as one:
             assert both.width == one.width
             assert both.height > 1.5 * one.height
 

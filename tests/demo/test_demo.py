@@ -20,17 +20,25 @@ from semgrid_edu.datasets.samples import sample_image_stage, sample_weights
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import KITTI_14
+from semgrid_edu.labels import KITTI_14, LabelSet
 from semgrid_edu.networks import Architecture, build_net, save_net
 from semgrid_edu.pipeline import STAGES, run_pipeline
 from semgrid_edu.plotting import depth_colours
 from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.demo import write_demo
-from semgrid_edu.workshop.demo.grids import arrows_path, grid_svg
-from semgrid_edu.workshop.demo.page import Summary, page_html
-from semgrid_edu.workshop.demo.rasters import classes_uri, points_layer, raster_uri, scores_layer
+from semgrid_edu.workshop.demo.page import page_html
+from semgrid_edu.workshop.demo.pictures import (
+    arrows_path,
+    classes_uri,
+    grid_svg,
+    points_layer,
+    raster_uri,
+    scores_layer,
+)
 from semgrid_edu.workshop.demo.record import FrameView, Record
 from semgrid_edu.workshop.demo.run import ChosenFrames
+
+pytestmark = pytest.mark.usefixtures("few_stories")
 
 
 @pytest.fixture(scope="module")
@@ -168,7 +176,7 @@ class TestMetrics:
 
     def test_times_are_medians_of_the_stages(self):
         record = Record(GridSpec.compact(), KITTI_14)
-        record._seconds = [[5.0] * 5, [0.01] * 5, [0.03, 0.01, 0.01, 0.01, 0.01]]
+        record._seconds[""] = [[5.0] * 5, [0.01] * 5, [0.03, 0.01, 0.01, 0.01, 0.01]]
         assert record.milliseconds() == pytest.approx(dict(zip(STAGES, [30, 10, 10, 10, 10], strict=True)))
 
 
@@ -235,10 +243,11 @@ class TestPanels:
         names = ("photo", "points", "scores", "occupancy", "grid", "refined")
         texts = dict.fromkeys(names[1:], '</script><b a="')
         view = FrameView("</script>", dict.fromkeys(names, uri), texts, {"occupancy": ""})
-        summary = Summary(
-            "<i>&", self.SPEC, self.CAMERA, (96, 320), [("<u>", (1, 2, 3))], {}, 0, dict.fromkeys(STAGES, 1)
-        )
-        html = page_html(summary, [view])
+        record = Record(self.SPEC, LabelSet("two", ("<u>", "car"), ((1, 2, 3), (4, 5, 6)), 2, ()))
+        record.views.append(view)
+        record._occurs[0] = True
+        record._seconds[""] = [[0.1] * 5]
+        html = page_html(record, "<i>&", self.CAMERA, (96, 320))
         page = Page(html)
         assert "<i>&" not in html
         assert "<u>" not in html

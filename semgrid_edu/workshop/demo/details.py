@@ -1,47 +1,79 @@
-"""What the page needs to tell the story of any cell of a frame: one byte map after the other, compressed.
-
-What all stories of cells on a page have in common: the grid, the camera, the planes, the classes, the CRF.
-"""
+"""The numbers from which the page tells the story of any cell, rounded to bytes, one map of the grid for each."""
 
 import base64
 import zlib
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.crf import CrfParams, mean_field, unary_from_probability
+from semgrid_edu.crf import CrfParams
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import LABEL_SETS
+from semgrid_edu.labels import IGNORE, LABEL_SETS
 from semgrid_edu.networks import SemanticGridNet
-from semgrid_edu.occupancy import PlanarMotion, SensorModel
-from semgrid_edu.occupancy.polar import beams_of
+from semgrid_edu.occupancy import SensorModel
 from semgrid_edu.pipeline import FrameResult
+from semgrid_edu.planes import plane_pixels
 from semgrid_edu.plotting import STATE_COLOURS
-from semgrid_edu.story import ContributionMaps, contribution_maps
+from semgrid_edu.story import ContributionMaps, contribution_maps, scan_maps
+from semgrid_edu.story.cell_evidence import VERDICTS
+from semgrid_edu.story.cell_story import label_and_rival
+from semgrid_edu.story.crf_messages import beliefs_before_last_update, neighbour_messages, strongest_neighbours
 
-PART_STEP = 0.1
-"""Parts of a score are rounded to this step; a byte reaches 12.7 to both sides, more than nearly every plane has."""
+STEPS = {"part": 0.1, "reach": 0.5, "distance": 0.1, "pixel": 1 / 32, "message": 0.1}
+"""To what the numbers are rounded: parts of a score, metres, pixels, and what neighbours add.
 
-REACH_STEP = 0.5
-"""How far a beam sees is rounded to this step, metres, so that a byte reaches 127 m."""
+A byte then holds parts up to 12.7, which nearly every plane stays below, and a reach up to 127 m.
+"""
 
-NO_TRUTH = 255
-"""The byte of a cell whose truth isn't known."""
+NOT_SEEN = 2**16 - 1
+"""Both coordinates of a point that the camera doesn't see."""
 
-VERDICTS = ("silent", "passed", "ground", "hit")
-"""What a scan can say of a cell, see `CellScan.verdict`; a byte holds the index."""
-
-UPDATES = 10
-"""Number of the CRF's updates, the default of `mean_field`."""
+FILTER_STEPS = ("move", "predict", "update", "resample", "shown")
+"""After which of the filter's steps the states are told, see `CellStory.steps`."""
 
 Maps = dict[str, NDArray[np.uint8]]
+"""By name (K, H, W); what doesn't fit into a byte has K high bytes followed by K low ones."""
 
 
-def frame_details(result: FrameResult, net: SemanticGridNet, truth: NDArray | None) -> Maps:
-    """Collect what the page tells of the cells of a frame, rounded to bytes.
+class StoryMaps(NamedTuple):
+    """Maps of bytes in the order in which they compress best.
+
+    Parameters
+    ----------
+    alike : dict of str to (K, H, W) uint8
+        Maps of which a cell has often what another cell has: all bytes of a cell stand together.
+    smooth : dict of str to (K, H, W) uint8
+        Maps that change little from row to row: one after the other, each row as the difference to the one before.
+    """
+
+    alike: Maps
+    smooth: Maps
+
+    def packed(self) -> str:
+        """Return the data URI of a zlib stream."""
+        alike, smooth = (np.concatenate([*maps.values()]) for maps in self)
+        rows = np.diff(smooth, axis=1, prepend=np.uint8(0))  # bytes wrap around, and so does their sum in the script
+        raw = np.ascontiguousarray(alike.transpose(1, 2, 0)).tobytes() + rows.tobytes()
+        compressor = zlib.compressobj(9, strategy=zlib.Z_FILTERED)
+        stream = compressor.compress(raw) + compressor.flush()
+        return f"data:application/zlib;base64,{base64.b64encode(stream).decode()}"
+
+    def layout(self) -> dict[str, list[int]]:
+        """Return for each name where its bytes begin, K, and the steps to a cell's next byte and to the next cell."""
+        n_cells, places = next(iter(self.smooth.values()))[0].size, {}
+        per_cell = sum(map(len, self.alike.values()))
+        for at, maps, step, stride in ((0, self.alike, 1, per_cell), (per_cell * n_cells, self.smooth, n_cells, 1)):
+            for name, part in maps.items():
+                places[name] = [at, len(part), step, stride]
+                at += len(part) * step
+        return places
+
+
+def frame_details(result: FrameResult, net: SemanticGridNet, truth: NDArray | None) -> StoryMaps:
+    """Collect what the page tells of the cells of a frame.
 
     Parameters
     ----------
@@ -54,183 +86,148 @@ def frame_details(result: FrameResult, net: SemanticGridNet, truth: NDArray | No
 
     Returns
     -------
-    dict of str to (K, H, W) uint8
-        The same names with the same numbers of maps K for every frame of a network.
+    StoryMaps
+        The same names with the same numbers of maps for every frame of a network.
     """
-    spec = net.need_architecture().grid
-    o = result.belief.probability
-    steps = {name: states_bytes(states) for name, states in {"shown": o, **result.belief.steps}.items()}
-    parts = contribution_maps(net, result.scores, o)
-    return steps | _said(result, spec) | _neighbours(result, spec) | _classes(result, truth, parts)
+    spec, o = net.need_architecture().grid, result.belief.probability
+    params = CrfParams.for_cells(spec.cell)
+    known = np.full(spec.shape, IGNORE) if truth is None else truth
+    named = np.stack([*label_and_rival(result.grid, known), result.refined.argmax(axis=0)])
+    before, after = (np.take_along_axis(g, named, axis=0) for g in (result.grid, result.refined))
+    states = {"shown": o, **result.belief.steps}
+    Q = beliefs_before_last_update(result.grid, o, params)
+    messages = np.take_along_axis(neighbour_messages(Q, o, params), named, axis=0)
+    (rows, cols), pull = strongest_neighbours(Q, named[2], o, params)
+    alike = {
+        "states": np.concatenate([states_bytes(states[step]) for step in FILTER_STEPS]),
+        **_scan(result, spec),
+        "classes": np.stack([*named, known]).astype(np.uint8),
+        "after": _bytes(255 * after),
+        "strongest": _bytes(np.concatenate([rows + 128, cols + 128, pull / STEPS["message"]])),
+    }
+    smooth = {
+        "before": _bytes(255 * before),
+        "messages": _bytes(messages / STEPS["message"]),
+        **_parts(contribution_maps(net, result.scores, o), *named[:2]),
+    }
+    return StoryMaps(alike, smooth)
 
 
 def states_bytes(probability: NDArray) -> NDArray[np.uint8]:
-    """Round the four states of each cell to 255ths that sum to 255, and leave the last one out.
+    """Round the four states of each cell to 255ths that sum to 255.
 
     Parameters
     ----------
     probability : (4, H, W) float
         Probabilities that sum to 1.
-
-    Returns
-    -------
-    (3, H, W) uint8
-        FREE, STATIC and DYNAMIC; UNKNOWN is what is missing from 255.
     """
-    upto = np.rint(255 * np.clip(np.cumsum(probability[:3], axis=0), 0, 1)).astype(np.int64)
+    upto = np.rint(255 * np.clip(np.cumsum(probability, axis=0), 0, 1)).astype(np.int64)
+    upto[-1] = 255
     return np.diff(np.maximum.accumulate(upto, axis=0), axis=0, prepend=0).astype(np.uint8)
 
 
-def packed(maps: Mapping[str, NDArray[np.uint8]]) -> str:
-    """Compress maps, one after the other.
-
-    Parameters
-    ----------
-    maps : mapping of str to (K, H, W) uint8
-        The maps.
-
-    Returns
-    -------
-    str
-        Data URI of a zlib stream.
-    """
-    raw = b"".join(np.ascontiguousarray(part).tobytes() for part in maps.values())
-    return f"data:application/zlib;base64,{base64.b64encode(zlib.compress(raw, 6)).decode()}"
+def _bytes(values: NDArray) -> NDArray[np.uint8]:
+    return np.rint(values).clip(0, 255).astype(np.uint8)
 
 
-def _said(result: FrameResult, spec: GridSpec) -> Maps:
+def _wide(values: NDArray) -> NDArray[np.uint8]:
+    """Return the high bytes of (K, H, W) numbers from 0 to 65535, then their low ones."""
+    values = values.astype(np.int64)
+    return np.concatenate([values >> 8, values & 255]).astype(np.uint8)
+
+
+def _scan(result: FrameResult, spec: GridSpec) -> Maps:
     """Return the numbers of returns, the reach of the beam and what the scan says: `cell_scan` for all cells."""
-    sensor = SensorModel()
-    scan = sensor.scan(result.frame.points_grid)
-    rows, cols, inside = spec.cells(scan.points)
-    height = scan.points[:, 2].astype(np.float64)
-    obstacle = inside & (height >= sensor.obstacle_min) & (height <= sensor.obstacle_max)
-    ground = inside & (height < sensor.obstacle_min)
-    counts = [np.bincount(rows[k] * spec.shape[1] + cols[k], minlength=np.prod(spec.shape)) for k in (obstacle, ground)]
-    x, y = spec.centers().reshape(-1, 2).T
-    reach = scan.reach[beams_of(x, y, len(scan.reach))]
-    evidence = scan.evidence(spec, PlanarMotion())
-    beyond = (np.hypot(x, y) - reach).astype(np.float32)
-    verdict = np.where(evidence.free.ravel() > evidence.occupied.ravel(), np.where(beyond <= -spec.cell / 2, 1, 2), 0)
-    verdict[counts[0] > 0] = VERDICTS.index("hit")
-    maps = {"obstacles": counts[0], "ground": counts[1], "verdict": verdict, "reach": np.rint(reach / REACH_STEP)}
-    return {name: np.minimum(values, 255).astype(np.uint8).reshape(1, *spec.shape) for name, values in maps.items()}
+    said = scan_maps(result.frame.points_grid, spec, SensorModel())
+    rows, cols, inside = spec.cells(said.points)
+    counts = {}
+    for name, kind in (("obstacles", said.obstacle), ("ground", said.ground)):
+        cells = (rows * spec.shape[1] + cols)[inside & kind]
+        counts[name] = np.bincount(cells, minlength=said.verdict.size).reshape(1, *spec.shape)
+    maps = {**counts, "verdict": said.verdict[None], "reach": said.reach[None] / STEPS["reach"]}
+    return {name: _bytes(values) for name, values in maps.items()}
 
 
-def _neighbours(result: FrameResult, spec: GridSpec) -> Maps:
-    """Return what every cell believed before the last update of the CRF."""
-    unary = unary_from_probability(result.grid)
-    Q = mean_field(unary, result.belief.probability, CrfParams.for_cells(spec.cell), UPDATES - 1)
-    return {"neighbours": np.rint(255 * Q).astype(np.uint8)}
+def _parts(parts: ContributionMaps, label: NDArray, rival: NDArray) -> Maps:
+    """Return what speaks for one class rather than another.
 
-
-def _classes(result: FrameResult, truth: NDArray | None, parts: ContributionMaps) -> Maps:
-    """Return the classes that are compared, their probabilities around the CRF, and the parts of the score."""
-    known = np.full(result.grid.shape[1:], NO_TRUTH) if truth is None else truth
-    label, rival = label_and_rival_maps(result.grid, known)
-    refined = result.refined.argmax(axis=0)
-    named = np.stack([label, rival, refined])
-    before, after = (np.rint(255 * np.take_along_axis(g, named, axis=0)) for g in (result.grid, result.refined))
+    The totals are the four states, then image, occupancy, constants and their sum: what rounding loses is counted among
+    the constants, so that the page's numbers add up. Last comes how many times as probable the class is, as two digits
+    and a power of ten.
+    """
 
     def difference(part: NDArray) -> NDArray:
         of = [np.take_along_axis(part, c.reshape((1,) * (part.ndim - 2) + c.shape), axis=-3) for c in (label, rival)]
-        return np.rint((of[0] - of[1])[..., 0, :, :] / PART_STEP)
+        return (of[0] - of[1])[..., 0, :, :]
 
-    small = {name: difference(part) for name, part in (("planes", parts.by_plane), ("scores", parts.by_class))}
-    large = np.concatenate([difference(parts.occupancy), difference(parts.score)[None]]).astype(np.int64) + 2**15
+    planes, scores, states = map(difference, (parts.by_plane, parts.by_class, parts.occupancy))
+    score = difference(parts.score)
+    *tenths, image, occupancy, total = np.rint(
+        np.stack([*states, planes.sum(axis=0), states.sum(axis=0), score]) / STEPS["part"]
+    )
+    power = np.floor(np.maximum(score, 0) / np.log(10))
     return {
-        "classes": np.stack([*named, known]).astype(np.uint8),
-        "before": before.astype(np.uint8),
-        "after": after.astype(np.uint8),
-        **{name: (np.clip(part, -127, 127) + 128).astype(np.uint8) for name, part in small.items()},
-        "large": np.concatenate([large >> 8, large & 255]).astype(np.uint8),
+        "planes": _bytes((planes / STEPS["part"]).clip(-127, 127) + 128),
+        "scores": _bytes((scores / STEPS["part"]).clip(-127, 127) + 128),
+        "totals": _wide(np.stack([*tenths, image, occupancy, total - image - occupancy, total]) + 2**15),
+        "times": _bytes(np.stack([10 * np.exp(score - power * np.log(10)), power])),
     }
 
 
-def label_and_rival_maps(g: NDArray, truth: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return each cell's most probable class and the one that it is compared with: `label_and_rival` for all cells.
+def cell_places(spec: GridSpec, heights: ArrayLike, camera: Camera) -> StoryMaps:
+    """Return what holds of a cell in every frame: its distance, and the pixels of its points on the planes (eq. (1)).
 
     Parameters
     ----------
-    g : (C, H, W) float
-        The semantic grid.
-    truth : (H, W) int
-        The true classes; a number of no class where it isn't known.
+    spec : GridSpec
+        The grid, (H, W).
+    heights : (D,) float
+        Heights of the planes, metres.
+    camera : Camera
+        The camera at the size of the drive's images.
 
     Returns
     -------
-    label, rival : (H, W) int64
-        Classes.
+    StoryMaps
+        "distance", and "pixels": u of the D points, then v.
     """
-    label, second = np.argsort(-g, axis=0, kind="stable")[:2]
-    return label, np.where((truth != label) & (truth < len(g)), truth, second)
+    pixels, visible = plane_pixels(spec, heights, camera)
+    steps = np.where(visible[..., None], np.rint(pixels / STEPS["pixel"]), NOT_SEEN)
+    distance = np.hypot(*np.moveaxis(spec.centers(), -1, 0))[None]
+    alike = {"distance": _wide(np.rint(distance / STEPS["distance"]))}
+    return StoryMaps(alike, {"pixels": _wide(np.moveaxis(steps, -1, 0).reshape(-1, *spec.shape))})
 
 
-@dataclass(frozen=True)
-class StoryData:
-    """What the page's script needs besides the maps of each frame, as plain numbers for JSON.
+def story_data(net: SemanticGridNet, camera: Camera, frame_layout: dict[str, list[int]]) -> dict[str, object]:
+    """Gather what the page's script needs besides the maps of each frame, as plain numbers and text for JSON.
 
     Parameters
     ----------
-    grid : dict of str to float
-        The fields of `GridSpec`, and "rows" and "cols".
-    camera : dict of str to list of float
-        "K" and "T_camera_from_grid" row by row, and "size" (h, w), of the camera at the size of the drive's images.
-    heights : list of float
-        Heights of the planes, metres.
-    names : list of str
-        Names of the classes.
-    colours : dict of str to list of list of int
-        Colours of the "classes" and of the "states".
-    crf : dict of str to float or str
-        The fields of `CrfParams`.
-    layout : dict of str to int
-        Names of the maps of a frame, in their order, and how many there are of each.
-    verdicts : list of str
-        What a scan can say of a cell.
-    steps : dict of str to float
-        How the numbers are rounded: "part" of a score, and "reach" of a beam in metres.
+    net : SemanticGridNet
+        The network of the package's results.
+    camera : Camera
+        The camera at the size of the drive's images.
+    frame_layout : dict of str to list of int
+        `StoryMaps.layout` of the frames.
+
+    Returns
+    -------
+    dict of str to object
+        The grid, the images' width, heights of the planes, names and colours, the rounding, and the maps of all frames.
     """
-
-    grid: dict[str, float]
-    camera: dict[str, list[float]]
-    heights: list[float]
-    names: list[str]
-    colours: dict[str, list[list[int]]]
-    crf: dict[str, float | str]
-    layout: dict[str, int]
-    verdicts: list[str]
-    steps: dict[str, float]
-
-    @classmethod
-    def of(cls, net: SemanticGridNet, camera: Camera, layout: dict[str, int]) -> "StoryData":
-        """Gather it from a network and a camera.
-
-        Parameters
-        ----------
-        net : SemanticGridNet
-            The network of the package's results.
-        camera : Camera
-            The camera at the size of the drive's images.
-        layout : dict of str to int
-            The maps of a frame.
-
-        Returns
-        -------
-        StoryData
-            Plain numbers.
-        """
-        architecture = net.need_architecture()
-        spec, label_set = architecture.grid, LABEL_SETS[architecture.label_set]
-        matrices = {"K": camera.K, "T_camera_from_grid": camera.T_camera_from_grid}
-        return cls(
-            grid={**asdict(spec), "rows": spec.shape[0], "cols": spec.shape[1]},
-            camera={**{name: matrix.ravel().tolist() for name, matrix in matrices.items()}, "size": list(camera.size)},
-            heights=list(architecture.heights),
-            names=list(label_set.names),
-            colours={"classes": [list(c) for c in label_set.rgb], "states": [list(c) for c in STATE_COLOURS]},
-            crf=asdict(CrfParams.for_cells(spec.cell)),
-            layout=layout,
-            verdicts=list(VERDICTS),
-            steps={"part": PART_STEP, "reach": REACH_STEP},
-        )
+    architecture = net.need_architecture()
+    spec, label_set = architecture.grid, LABEL_SETS[architecture.label_set]
+    places = cell_places(spec, architecture.heights, camera)
+    return {
+        "grid": {**asdict(spec), "rows": spec.shape[0], "cols": spec.shape[1]},
+        "width": camera.size[1],
+        "heights": list(architecture.heights),
+        "names": label_set.names,
+        "colours": {"classes": label_set.rgb, "states": STATE_COLOURS},
+        "verdicts": VERDICTS,
+        "steps": STEPS,
+        "layout": frame_layout,
+        "filter_steps": FILTER_STEPS,
+        "places": places.packed(),
+        "places_layout": places.layout(),
+    }

@@ -1,132 +1,153 @@
-"""The demo's page: one HTML file that holds its pictures, style and script."""
+"""The demo's page: one HTML file that holds its figures, style, script and data."""
 
 import json
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, field
+import tomllib
+from collections.abc import Iterable
 from html import escape
 from importlib.resources import files
 from string import Template
+from typing import NamedTuple
 
 import numpy as np
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.cmcdot import LIDAR_PERIOD
 from semgrid_edu.plotting import DEPTH_RANGE, STATE_COLOURS, STATE_NAMES, depth_colours
-from semgrid_edu.workshop.demo.comparison import Comparison, metrics_table, times_table
-from semgrid_edu.workshop.demo.details import StoryData
-from semgrid_edu.workshop.demo.panels import PanelFrame, column_svg, panels_html, your_scores_html
-from semgrid_edu.workshop.demo.record import FrameView
+from semgrid_edu.workshop.demo.comparison import STAGE_WORDS, Comparison
+from semgrid_edu.workshop.demo.pictures import grid_svg
+from semgrid_edu.workshop.demo.record import YOURS, FrameView, Record
 
-NOTICE = (
-    '<p class="notice"><b>Expect poor semantics here.</b> The truth is not known for this drive, and the network has '
-    "learned from simulated streets alone. Real images look different, so expect many wrong classes in the image "
-    "scores, the semantic grid and the refined grid. The occupancy grid and the geometry learn nothing from images, so "
-    "they work here as they do on simulated drives, with one reservation: the filter finds the ground by following it "
-    "outward from the vehicle. Where parked cars or a fence hide the foot of a bank, it can lose the ground, and then "
-    "it takes the bank for an obstacle.</p>"
-)
+SCAN_MILLISECONDS = 1000 * LIDAR_PERIOD
+"""Time from one scan of KITTI's LIDAR to the next, ms."""
 
-SWITCHES = (
-    '<label class="pick">Zoom <select id="zoom"><option value="1" selected>1</option><option value="2">2</option>'
-    '<option value="4">4</option></select></label>'
-    '<button id="errors" type="button" aria-pressed="false">Errors</button>'
-)
-"""The switches of the grids: a closer look, and what is wrong where the truth is known."""
+COMPARED = " The package's occupancy grid names the unknown cells of the truth, so that both runs have the same truth."
 
 
-@dataclass(frozen=True, eq=False)
-class Summary:
-    """What the page says of the drive as a whole.
+class Panel(NamedTuple):
+    """A bird's-eye panel.
 
     Parameters
     ----------
-    title : str
-        The drive's name.
-    spec : GridSpec
-        The grid.
-    camera : Camera
-        The camera at the size of the drive's images.
-    network_size : (int, int)
-        Height and width of the image that the network sees, pixels.
-    classes : sequence of (str, (int, int, int))
-        Names and colours of the classes that occur.
-    metrics : dict of str to dict of str to float
-        Value of each metric, 0..1, by the metric's name and the row of the table.
-    labelled : int
-        Number of frames with truth. When it is 0, the page shows no metrics and says what to expect.
-    milliseconds : dict of str to float
-        Median time of each stage per frame, ms.
-    comparison : Comparison, optional
-        Which stages come from a student's file, when a second run with them is shown beside the package's own.
-    your_milliseconds : dict of str to float
-        Median time of each stage in that run, ms.
-    story : StoryData, optional
-        What all stories of cells have in common; without it, the page tells none.
-    choice : str
-        Which frames of the drive are shown, as `ChosenFrames.told` says it.
-    broken : str
-        What could not be read, so that the page ends before it; empty when all could.
+    name : str
+        Name of its raster among the images of a `FrameView`.
+    title, symbol : str
+        The first words of its caption, and its symbol in Fig. 2, if any.
+    see : str
+        What to look for, as HTML.
     """
 
+    name: str
     title: str
-    spec: GridSpec
-    camera: Camera
-    network_size: tuple[int, int]
-    classes: Sequence[tuple[str, tuple[int, int, int]]]
-    metrics: dict[str, dict[str, float]]
-    labelled: int
-    milliseconds: dict[str, float]
-    comparison: Comparison | None = None
-    your_milliseconds: dict[str, float] = field(default_factory=dict)
-    story: StoryData | None = None
-    choice: str = ""
-    broken: str = ""
+    symbol: str
+    see: str
 
 
-def page_html(summary: Summary, frames: Sequence[FrameView]) -> str:
+def page_html(
+    record: Record,
+    title: str,
+    camera: Camera,
+    network_size: tuple[int, int],
+    story: dict[str, object] | None = None,
+    choice: str = "",
+    broken: str = "",
+) -> str:
     """Write the page.
 
     Parameters
     ----------
-    summary : Summary
-        What the page says of the drive as a whole.
-    frames : sequence of FrameView
-        The frames to show, at least one.
+    record : Record
+        What was recorded of the drive; at least one frame. Without truth the page shows no metrics, and says what to
+        expect.
+    title : str
+        The drive's name.
+    camera : Camera
+        The camera at the size of the drive's images.
+    network_size : (int, int)
+        Height and width of the image that the network sees, pixels.
+    story : dict of str to object, optional
+        `story_data`; without it, the page tells no stories of cells.
+    choice : str
+        Which frames of the drive are shown, as `ChosenFrames.told` says it.
+    broken : str
+        What could not be read, so that the page ends before it; empty when all could.
 
     Returns
     -------
     str
         HTML that refers to nothing outside itself.
     """
-    first, ramp = frames[0], depth_colours(np.geomspace(*DEPTH_RANGE, 9))
-    near, far = DEPTH_RANGE
-    shared = PanelFrame(summary.spec, summary.camera, first)
-    return Template(_resource("page.html")).substitute(
-        title=escape(f"semgrid_edu: {summary.title}"),
+    first, (near, far), comparison = record.views[0], DEPTH_RANGE, record.comparison
+    panels = [Panel(name, **words) for name, words in tomllib.loads(_resource("captions.toml")).items()]
+    shown = [panel for panel in panels if panel.name != "truth" or record.labelled]
+    whose = " The stories are about the package's own stages." if comparison else ""
+    return _filled(
+        "page.html",
+        title=escape(f"semgrid_edu: {title}"),
         style=_resource("page.css"),
-        script="\n".join(map(_resource, ("page.js", "story.js", "panel.js") if summary.story else ("page.js",))),
-        panel=_panel(summary) if summary.story else "",
-        switches=SWITCHES if summary.story else "",
-        column=column_svg(summary.camera),
-        story=_json(summary.story and asdict(summary.story)),
-        lead=_lead(summary, len(frames)),
-        notice=_broken(summary.broken) + ("" if summary.labelled else NOTICE),
-        last=len(frames) - 1,
+        script="\n".join(map(_resource, ("page.js", "story.js", "panel.js") if story else ("page.js",))),
+        panel=_filled("panel.html", whose=whose) if story else "",
+        switches=_resource("switches.html") if story else "",
+        column=_column_svg(camera),
+        story=_json(story),
+        lead=_lead(record, title, choice),
+        notice=_broken(broken) + ("" if record.labelled else _resource("notice.html")),
+        last=len(record.views) - 1,
         clock=escape(first.clock),
-        longest=max(len(frame.clock) for frame in frames),  # so that the slider keeps its length while it is moved
+        longest=max(len(frame.clock) for frame in record.views),  # so that the slider keeps its length
         **{name: first.images[name] for name in ("photo", "points", "scores")},
         **{f"{name}_text": escape(first.texts[name]) for name in ("points", "scores")},
         near=f"{near:g}",
         far=f"{far:g}",
-        ramp=",".join(f"rgb{tuple(colour)}" for colour in ramp.tolist()),
-        network_size="{1} × {0} pixels".format(*summary.network_size),
-        your_scores=your_scores_html(first, summary.camera, summary.comparison),
-        grids=panels_html(shared, bool(summary.labelled), summary.comparison),
+        ramp=",".join(f"rgb{tuple(colour)}" for colour in depth_colours(np.geomspace(near, far, 9)).tolist()),
+        network_size="{1} × {0} pixels".format(*network_size),
+        your_scores=_your_scores(first, camera, comparison),
+        grids="\n".join(_single_or_pair(panel, record, camera) for panel in shown),
         states=_swatches(zip(STATE_NAMES, STATE_COLOURS, strict=True)),
-        classes=_swatches(summary.classes),
-        metrics=metrics_table(summary.metrics, summary.labelled, summary.comparison) if summary.labelled else "",
-        times=times_table(summary.milliseconds, summary.your_milliseconds, summary.comparison),
-        frames=_json([vars(frame) for frame in frames]),
+        classes=_swatches(record.classes()),
+        metrics=_metrics(record) if record.labelled else "",
+        times=_times(record),
+        frames=_json([vars(frame) for frame in record.views]),
+    )
+
+
+def _single_or_pair(panel: Panel, record: Record, camera: Camera) -> str:
+    """Return a panel as a figure; in a comparison, the package's and the student's in a pair if they can differ."""
+    comparison = record.comparison
+    if comparison is None or panel.name not in comparison.changed:
+        return _figure(panel, record, camera)
+    package = panel._replace(title=f"{panel.title}, the package's")
+    title, symbol = f"{panel.title}, {comparison.file}", panel.symbol.removesuffix(" after the CRF")
+    yours = Panel(YOURS + panel.name, title, symbol, comparison.made_with(panel.name))
+    return f'<div class="pair">{_figure(package, record, camera)}{_figure(yours, record, camera)}</div>'
+
+
+def _figure(panel: Panel, record: Record, camera: Camera) -> str:
+    first = record.views[0]
+    raster, text = first.images.get(panel.name, ""), escape(first.texts.get(panel.name, ""))
+    svg = grid_svg(panel.name, record.spec, camera, raster, text, arrows=panel.name in first.arrows)
+    hidden = " hidden" if panel.name in first.images else ""
+    missing = f'<p class="note" data-missing="{panel.name}"{hidden}>Nobody labelled this frame.</p>'
+    symbol = f" <i>{panel.symbol}</i>" if panel.symbol else ""
+    return f"<figure>{svg}{missing}<figcaption><b>{escape(panel.title)}</b>{symbol} — {panel.see}</figcaption></figure>"
+
+
+def _column_svg(camera: Camera) -> str:
+    """Return an empty layer over an image, in which the script draws the points above a cell (eq. (1))."""
+    height, width = camera.size
+    return f'<svg data-column viewBox="-0.5 -0.5 {width} {height}" aria-hidden="true"></svg>'
+
+
+def _your_scores(first: FrameView, camera: Camera, comparison: Comparison | None) -> str:
+    """Return the figure of the image scores of a student's own network; empty when the package's made the scores."""
+    if comparison is None or "scores" not in comparison.changed:
+        return ""
+    name = f"{YOURS}scores"
+    image, text = first.images[name], escape(first.texts[name])
+    return (
+        f'\n<figure>\n<div class="stack"><img data-image="photo" src="{first.images["photo"]}" alt="">'
+        f'<img data-image="{name}" data-text="{name}" src="{image}" alt="{text}">{_column_svg(camera)}</div>\n'
+        f"<figcaption><b>Image scores, {escape(comparison.file)}</b> <i>s</i> — {comparison.made_with('scores')}"
+        "</figcaption>\n</figure>"
     )
 
 
@@ -136,24 +157,60 @@ def _broken(error: str) -> str:
     return notice.format(escape(error)) if error else ""
 
 
-def _lead(summary: Summary, n_frames: int) -> str:
-    spec = summary.spec
-    size = f"{spec.x_max - spec.x_min:g}&nbsp;m long and {spec.y_max - spec.y_min:g}&nbsp;m wide"
-    return (
-        f"{summary.comparison.lead() + ' ' if summary.comparison else ''}"
-        f"Here are {n_frames} frames of the drive <b>{escape(summary.title)}</b>{summary.choice}, sent through every "
-        "stage of the method. A Bayes filter turns the laser scans into a grid of what is free, what stands still and "
-        "what moves. A network gives each pixel of the camera image a score for each class. Planes above the ground "
-        "carry these scores into the same grid, where a second network fuses them with the occupancy. The result is a "
-        "map, "
-        f"{size}, of what stands where. Move the slider, press play, or use the arrow keys; click a cell, and "
-        "the page tells how it got its class."
+def _lead(record: Record, title: str, choice: str) -> str:
+    spec = record.spec
+    return _filled(
+        "lead.html",
+        comparison=f"{record.comparison.lead()} " if record.comparison else "",
+        n_frames=len(record.views),
+        title=escape(title),
+        choice=choice,
+        length=f"{spec.x_max - spec.x_min:g}",
+        width=f"{spec.y_max - spec.y_min:g}",
     )
 
 
-def _panel(summary: Summary) -> str:
-    whose = " The stories are about the package's own stages." if summary.comparison else ""
-    return Template(_resource("panel.html")).substitute(whose=whose)
+def _metrics(record: Record) -> str:
+    """Return the table of metrics, in per cent."""
+    metrics = record.metrics()
+    head = "".join(f"<th>{escape(column)}</th>" for column in metrics)
+    cells = {row: [f"<td>{100 * values[row]:.1f}</td>" for values in metrics.values()] for row in metrics["FmIoU"]}
+    rows = "".join(f"<tr><th>{_breakable(row)}</th>{''.join(values)}</tr>" for row, values in cells.items())
+    compared = COMPARED if record.comparison else ""
+    return _filled("metrics.html", labelled=record.labelled, compared=compared, head=head, rows=rows)
+
+
+def _times(record: Record) -> str:
+    """Return the table of the stages' times beside the LIDAR's period."""
+    runs, comparison = [record.milliseconds()], record.comparison
+    heads, replaced = ["ms"], ()
+    if comparison:
+        runs, replaced = [*runs, record.milliseconds(YOURS)], comparison.stages
+        heads = ["the package's, ms", f"{_breakable(comparison.file)}, ms"]
+    rows = [
+        _time_row(symbols, f"{words}; replaced by <b>{stage}</b>" if stage in replaced else words, runs, stage)
+        for stage, (symbols, words) in STAGE_WORDS.items()
+    ]
+    totals = [{"all": sum(run.values())} for run in runs]
+    return _filled(
+        "times.html",
+        period=f"{SCAN_MILLISECONDS:g}",
+        upper=" The upper bar is the package's." if comparison else "",
+        heads="".join(f"<th>{head}</th>" for head in heads),
+        rows="".join(rows) + _time_row("", "all stages", totals, "all", kind="total"),
+    )
+
+
+def _time_row(symbols: str, words: str, runs: list[dict[str, float]], stage: str, kind: str = "stage") -> str:
+    values = [run[stage] for run in runs]
+    numbers = "".join(f"<td>{value:.1f}</td>" for value in values)
+    bars = "".join(f'<span style="width:{min(100.0, 100 * v / SCAN_MILLISECONDS):.1f}%"></span>' for v in values)
+    return f'<tr class="{kind}"><th><i>{symbols}</i></th><th>{words}</th>{numbers}<td class="share">{bars}</td></tr>'
+
+
+def _breakable(text: str) -> str:
+    """Escape a text in which a long name of a file may go on in the next line after each underscore."""
+    return escape(text).replace("_", "_<wbr>")
 
 
 def _json(data: object) -> str:
@@ -163,6 +220,10 @@ def _json(data: object) -> str:
 
 def _swatches(colours: Iterable[tuple[str, tuple[int, int, int]]]) -> str:
     return "".join(f'<span style="--swatch:rgb{tuple(rgb)}">{escape(name)}</span>' for name, rgb in colours)
+
+
+def _filled(name: str, **words: object) -> str:
+    return Template(_resource(name)).substitute(words)
 
 
 def _resource(name: str) -> str:

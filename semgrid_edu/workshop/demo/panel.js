@@ -8,6 +8,7 @@ const hover = document.getElementById("hover");
 const grids = [...document.querySelectorAll("svg[data-grid]")];
 const stateNames = ["free", "static", "dynamic", "unknown"];
 const SVG = document.querySelector("svg").namespaceURI;
+const places = unpack(story.grid, story.places_layout, story.places); // what holds in all frames
 const unpacked = new Map(); // number of a frame -> its reader, or the promise of it
 const decoded = new Map(); // pictures of the shown frame -> their colours, or the promise of them
 let anchor = null; // the cell that was chosen, and the frame in which it was
@@ -21,7 +22,7 @@ const place = ([x, y]) => `${x.toFixed(2)} m ahead, ${Math.abs(y).toFixed(2)} m 
 
 function readerOf(k) {
   if (!frames[k].details) return Promise.resolve(null);
-  if (!unpacked.has(k)) unpacked.set(k, unpack(frames[k].details).then((bytes) => reader(story, bytes)));
+  if (!unpacked.has(k)) unpacked.set(k, unpack(story.grid, story.layout, frames[k].details));
   return unpacked.get(k);
 }
 
@@ -36,8 +37,9 @@ function choose(cell) { anchor = { frame: shown(), cell }; tell(shown()); }
 async function tell(k) {
   const mine = ++turn;
   if (anchor === null) return;
-  const cell = cellIn(k);
-  mark(cell);
+  const cell = cellIn(k), everywhere = await places;
+  if (mine !== turn) return;
+  mark(cell, everywhere);
   const read = await readerOf(k);
   if (mine !== turn) return;
   if (cell < 0 || read === null) {
@@ -51,17 +53,17 @@ async function tell(k) {
   const past = [];
   for (let i = Math.max(0, k - 9); i <= k; i++) {
     const then = await readerOf(i), at = cellThen(story.grid, frames[i].pose, frames[k].pose, cell);
-    if (then) past.push({ time: frames[i].time, states: at < 0 ? [0, 0, 0, 1] : states(then, "shown", at) });
+    if (then) past.push({ time: frames[i].time, states: at < 0 ? [0, 0, 0, 1] : states(story, then, "shown", at) });
   }
   if (mine !== turn) return;
-  const pulls = timer === null ? weights(story, read, cell) : null; // too slow for every frame of a drive that plays
+  const pulls = timer === null ? strongest(story, read, cell) : null; // too restless while the drive plays
   const [label, rival, refined] = read("classes", cell);
   const unfolded = telling.querySelector("details")?.open ?? false;
   where.textContent = `${place(centre(story.grid, cell))}: ${story.names[refined]}.`;
-  const said = frames[k].scanned ? scanStory(cell, read) : "<p>This frame has no scan, so the filter only predicts.</p>";
+  const said = frames[k].scanned ? scanStory(cell, read, everywhere) : "<p>This frame has no scan, so the filter only predicts.</p>";
   telling.innerHTML = [heading(cell, read), said, stateStory(cell, read, past), partStory(cell, read, label, rival), crfStory(cell, read, pulls, [label, rival, refined])].join("");
   telling.querySelector("details").open = unfolded;
-  if (pulls) drawPulls(cell, strongest(read, pulls, refined, 5));
+  if (pulls) drawPulls(cell, pulls);
 }
 
 function heading(cell, read) {
@@ -72,9 +74,9 @@ function heading(cell, read) {
 
 function swatch(label) { return `<span class="class" style="--swatch:${rgb(story.colours.classes[label])}">${escaped(story.names[label])}</span>`; }
 
-function scanStory(cell, read) {
+function scanStory(cell, read, everywhere) {
   const [obstacles] = read("obstacles", cell), [ground] = read("ground", cell), [reach] = read("reach", cell);
-  const distance = Math.hypot(...centre(story.grid, cell)), sees = (reach * story.steps.reach).toFixed(1);
+  const distance = wide(everywhere, "distance", cell)[0] * story.steps.distance, sees = (reach * story.steps.reach).toFixed(1);
   const count = (n, what) => `${n === 255 ? "255 or more" : n} ${what} return${n === 1 ? "" : "s"}`;
   const beam = reach ? `The beam through the cell's centre sees ${sees} m far; the cell is ${distance.toFixed(1)} m away.` : "Nothing came back in the beam through the cell's centre.";
   const verdict = {
@@ -89,7 +91,7 @@ function scanStory(cell, read) {
 function stateStory(cell, read, past) {
   const words = { move: "moved", predict: "predicted", update: "updated", resample: "resampled", shown: "<b>shown</b>" };
   const row = (text, values) => `<tr><th scope="row">${text}</th>${values.map((p) => `<td>${percent(p)}</td>`).join("")}<td class="bands">${bands(values)}</td></tr>`;
-  const rows = Object.entries(words).map(([name, text]) => row(text, states(read, name, cell)));
+  const rows = Object.entries(words).map(([name, text]) => row(text, states(story, read, name, cell)));
   const since = past.map((then) => row(`${then.time.toFixed(1)} s`, then.states));
   const head = `<thead><tr><th></th>${stateNames.map((name) => `<th scope="col">${name}</th>`).join("")}<th></th></tr></thead>`;
   return `<h3>Its four states</h3><p>The filter's map moves with the vehicle, predicts, is updated with the scan, and draws its particles again. The grid shows the prediction updated with the returns of exactly this cell; the map's cell may lie half a cell beside it.</p>
@@ -101,13 +103,13 @@ function bands(values) {
 }
 
 function partStory(cell, read, label, rival) {
-  const of = parts(story, read, cell), image = sum(of.planes), occupancy = sum(of.occupancy);
+  const of = parts(story, read, cell), score = of.totals.at(-1);
   const heights = story.heights.map((h) => `${h.toFixed(1)} m`), order = of.scores.map((_, i) => i).sort((a, b) => Math.abs(of.scores[b]) - Math.abs(of.scores[a]));
-  const ratio = Number(Math.exp(of.score).toPrecision(2)), often = ratio > 1e6 ? "more than a million" : ratio.toLocaleString("en");
+  const often = of.times > 1e6 ? "more than a million" : of.times.toLocaleString("en");
   const byClass = order.slice(0, 8);
   return `<h3>Why ${escaped(story.names[label])} and not ${escaped(story.names[rival])}?</h3>
-<p>In the semantic grid ${swatch(label)} is about ${often} times as probable as ${swatch(rival)}: its fused score is higher by ${of.score.toFixed(1)}. Gradient times input splits this difference:</p>
-${bars(["image, on the planes", "occupancy", "constants", "sum"], [image, occupancy, of.rest, of.score])}
+<p>In the semantic grid ${swatch(label)} is about ${often} times as probable as ${swatch(rival)}: its fused score is higher by ${score.toFixed(1)}. Gradient times input splits this difference:</p>
+${bars(["image, on the planes", "occupancy", "constants", "sum"], of.totals)}
 <p>The constants are biases and normalisations that the open ReLUs let pass: no input has a share in them. Image and occupancy count in all cells around that the network looks at. A part isn't what would change if its input were missing, and parts that cancel may be much larger than their sum. Below, each table has its own scale.</p>
 <div class="two"><div><h4>Image, by class of its scores</h4>${bars(byClass.map((i) => escaped(story.names[i])), byClass.map((i) => of.scores[i]))}<h4>Occupancy, by state</h4>${bars(stateNames, of.occupancy)}</div>
 <div><h4>Image, by height of the plane</h4>${bars([...heights].reverse(), [...of.planes].reverse())}</div></div>`;
@@ -124,9 +126,9 @@ function bars(names, values) {
 function crfStory(cell, read, pulls, [label, rival, refined]) {
   const before = read("before", cell), after = read("after", cell), shownClasses = [[label, 0], [rival, 1]];
   if (refined !== label && refined !== rival) shownClasses.push([refined, 2]);
-  const total = pulls ? messages(story, read, pulls) : null;
-  const rows = shownClasses.map(([c, i]) => `<tr><th scope="row">${swatch(c)}</th><td>${percent(before[i] / 255)}</td><td>${total ? signed(total[c]) : ""}</td><td>${percent(after[i] / 255)}</td></tr>`);
-  const near = pulls ? strongest(read, pulls, refined, 5).map(({ cell: j, pull }) => `<li>${place(centre(story.grid, j))}: ${signed(pull)}</li>`) : [];
+  const added = messages(story, read, cell);
+  const rows = shownClasses.map(([c, i]) => `<tr><th scope="row">${swatch(c)}</th><td>${percent(before[i] / 255)}</td><td>${pulls ? signed(added[i]) : ""}</td><td>${percent(after[i] / 255)}</td></tr>`);
+  const near = (pulls ?? []).map(({ cell: j, pull }) => `<li>${place(centre(story.grid, j))}: ${signed(pull)}</li>`);
   const changed = refined === label ? "The CRF leaves the class as it is." : `The CRF turns ${swatch(label)} into ${swatch(refined)}.`;
   return `<h3>What the neighbours say</h3><p>${changed} In its last update the neighbours add this to the logarithm of each probability:</p>
 <table><thead><tr><th></th><th scope="col">before</th><th scope="col">neighbours</th><th scope="col">after</th></tr></thead><tbody>${rows.join("")}</tbody></table>
@@ -134,15 +136,15 @@ ${pulls ? `<p>They pull most towards ${swatch(refined)} (lines in the refined gr
 }
 
 // Marks: a square around the cell in every grid, and its points of equation (1) in every image.
-function mark(cell) {
+function mark(cell, everywhere) {
   const { grid } = story, [x, y] = cell < 0 ? [0, 0] : centre(grid, cell);
   for (const group of document.querySelectorAll("[data-marks]")) {
     group.replaceChildren();
     if (cell >= 0) group.append(shape("rect", { class: "mark", x: -y - grid.cell / 2, y: -x - grid.cell / 2, width: grid.cell, height: grid.cell }), shape("circle", { class: "ring", cx: -y, cy: -x, r: 0.4 + 1.2 / Number(zoom.value) }));
   }
   for (const layer of document.querySelectorAll("[data-column]")) {
-    const seen = cell < 0 ? [] : pixels(story, cell).filter((point) => point.visible);
-    layer.replaceChildren(...seen.map(({ u, v, height }, i) => shape("circle", { cx: u, cy: v, r: story.camera.size[1] / (i ? 260 : 160), class: i ? "point" : "point lowest" })));
+    const seen = cell < 0 ? [] : pixels(story, everywhere, cell).filter((point) => point);
+    layer.replaceChildren(...seen.map(([u, v], i) => shape("circle", { cx: u, cy: v, r: story.width / (i ? 260 : 160), class: i ? "point" : "point lowest" })));
   }
   zoomGrids();
 }
@@ -217,7 +219,7 @@ async function nameAt(name, cell) {
   const k = shown();
   if (name === "occupancy") {
     const read = await readerOf(k);
-    return read ? states(read, "shown", cell).map((p, i) => `${stateNames[i]} ${percent(p)}`).join(", ") : "";
+    return read ? states(story, read, "shown", cell).map((p, i) => `${stateNames[i]} ${percent(p)}`).join(", ") : "";
   }
   if (name === "your_occupancy" || !frames[k].images[name]) return "";
   const { data } = await colours(frames[k].images[name]);

@@ -1,6 +1,6 @@
 """What the demo records while a drive runs: encoded frames, confusion matrices and times."""
 
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,14 +10,13 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS, confusion_matrix, semantic_cells
 from semgrid_edu.networks import SemanticGridNet
-from semgrid_edu.occupancy import State
+from semgrid_edu.occupancy import PlanarMotion, State
 from semgrid_edu.pipeline import STAGES, FrameResult
 from semgrid_edu.plotting import occupancy_colours
 from semgrid_edu.plotting.images import visible_points
+from semgrid_edu.workshop.demo import pictures
 from semgrid_edu.workshop.demo.comparison import MADE_BY, Comparison
-from semgrid_edu.workshop.demo.details import frame_details, packed
-from semgrid_edu.workshop.demo.grids import arrows_path
-from semgrid_edu.workshop.demo.rasters import classes_uri, photo_uri, points_layer, raster_uri, scores_layer
+from semgrid_edu.workshop.demo.details import frame_details
 
 YOURS = "your_"
 """Prefix of the names of pictures that are made with a student's stages."""
@@ -43,10 +42,10 @@ class FrameView:
         Velocities as an SVG path, for each occupancy grid among the images.
     time : float
         Time of the frame, seconds.
-    pose : list of float
-        T_world_from_lidar, row by row.
+    pose : (float, float, float)
+        Where the vehicle stands, seen from above: x, y (m) and yaw (rad) in the grid frame of the first shown frame.
     details : str
-        What the story of a cell is told from (`demo.details`); empty for frames whose stories the page leaves out.
+        `frame_details`, packed; empty for frames whose stories the page leaves out.
     scanned : bool
         Whether the frame has a scan; without one, the filter only predicts.
     """
@@ -56,7 +55,7 @@ class FrameView:
     texts: dict[str, str]
     arrows: dict[str, str]
     time: float = 0.0
-    pose: list[float] = field(default_factory=list)
+    pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
     details: str = ""
     scanned: bool = True
 
@@ -88,8 +87,8 @@ class Record:
         Number of frames with truth so far.
     liveliest : (FrameResult, FrameResult or None), or None
         The results of the shown frame with the most moving cells.
-    layout : dict of str to int
-        Names of the maps in `FrameView.details`, in their order, and how many there are of each.
+    layout : dict of str to list of int
+        `StoryMaps.layout` of the views' details.
     """
 
     def __init__(
@@ -107,11 +106,12 @@ class Record:
         self.labelled = 0
         self.liveliest: tuple[FrameResult, FrameResult | None] | None = None
         self._number = shown[0] if shown else 0
+        self._first_pose: NDArray | None = None
+        self._pictures = {"": tuple(MADE_BY), YOURS: comparison.changed if comparison else ()}
         self._rows = _rows(comparison)
         self._confusion = {name: np.zeros((len(label_set),) * 2, np.int64) for name in self._rows.values()}
         self._occurs = np.zeros(256, bool)
-        self._seconds: list[list[float]] = []
-        self._your_seconds: list[list[float]] = []
+        self._seconds: dict[str, list[list[float]]] = {"": [], YOURS: []}
 
     def add(self, package: FrameResult, yours: FrameResult | None = None) -> None:
         """Record the next frame.
@@ -124,25 +124,34 @@ class Record:
         yours : FrameResult, optional
             Its result with a student's stages.
         """
-        maps = {name: _best(getattr(package, name)) for name in ESTIMATES}
-        self._seconds.append([package.seconds[stage] for stage in STAGES])
-        if yours is not None:
-            maps |= {YOURS + name: _best(getattr(yours, name)) for name in ESTIMATES if name in self.comparison.changed}
-            self._your_seconds.append([yours.seconds[stage] for stage in STAGES])
-        if package.frame.labels is not None:
-            maps["truth"] = grid_truth(package.frame.labels, package.belief.probability, self.spec)
-            self._count(maps)
+        runs = {"": package} if yours is None else {"": package, YOURS: yours}
+        maps = {}
+        for prefix, result in runs.items():
+            self._seconds[prefix].append([result.seconds[stage] for stage in STAGES])
+            names = [name for name in ESTIMATES if name in self._pictures[prefix]]
+            maps |= {prefix + name: _best(getattr(result, name)) for name in names}
+        labels = package.frame.labels
+        if labels is not None:
+            maps["truth"] = grid_truth(labels, package.belief.probability, self.spec)
+            self.labelled += 1
+            for name, confusion in self._confusion.items():
+                confusion += confusion_matrix(maps["truth"], maps[name], len(self.label_set))
         if self.shown is None or self._number in self.shown:
-            self._show(package, yours, maps)
+            self._show(runs, maps)
         self._number += 1
 
-    def milliseconds(self) -> dict[str, float]:
-        """Return the median time of each of the package's own stages; the first frames also load compiled code."""
-        return _medians(self._seconds)
+    def milliseconds(self, prefix: str = "") -> dict[str, float]:
+        """Return the median time of each stage; a median, because the first frames also load compiled code.
 
-    def your_milliseconds(self) -> dict[str, float]:
-        """Return the median time of each stage with a student's stages; empty when there are none."""
-        return _medians(self._your_seconds) if self._your_seconds else {}
+        Parameters
+        ----------
+        prefix : str
+            Whose stages: empty for the package's, `YOURS` for a student's. Without such a run nothing is returned.
+        """
+        if not self._seconds[prefix]:
+            return {}
+        medians = 1000 * np.median(self._seconds[prefix], axis=0)
+        return dict(zip(STAGES, medians.tolist(), strict=True))
 
     def metrics(self) -> dict[str, dict[str, float]]:
         """Return each of `METRICS`, 0..1, by cells and estimate."""
@@ -156,51 +165,51 @@ class Record:
         both = zip(self.label_set.names, self.label_set.rgb, strict=True)
         return [entry for entry, occurs in zip(both, self._occurs, strict=False) if occurs]
 
-    def _count(self, maps: dict[str, NDArray]) -> None:
-        self.labelled += 1
-        for name, confusion in self._confusion.items():
-            confusion += confusion_matrix(maps["truth"], maps[name], len(self.label_set))
-
-    def _show(self, package: FrameResult, yours: FrameResult | None, maps: dict[str, NDArray]) -> None:
-        frame = package.frame
+    def _show(self, runs: dict[str, FrameResult], maps: dict[str, NDArray]) -> None:
+        package = runs[""]
         if self.liveliest is None or _moving(package) > _moving(self.liveliest[0]):
-            self.liveliest = package, yours
-        returns = f"Camera image with the {len(visible_points(frame)[1])} LIDAR returns that the camera sees."
-        images = {"photo": photo_uri(frame.image), "points": raster_uri(points_layer(frame))}
-        pose, details = frame.T_world_from_lidar.ravel().tolist(), self._details(package, maps.get("truth"))
-        scanned = len(frame.points) > 0
-        clock = f"frame {self._number}, {frame.time:.1f} s" + ("" if scanned else ", no scan: predicted")
-        view = FrameView(clock, images, {"points": returns}, {}, frame.time, pose, details, scanned)
-        self._draw(view, package, tuple(MADE_BY))
-        if yours is not None:
-            self._draw(view, yours, self.comparison.changed, YOURS)
+            self.liveliest = package, runs.get(YOURS)
+        view = self._view(package, self._details(package, maps.get("truth")))
+        for prefix, result in runs.items():
+            self._draw(view, result, prefix)
         for name, labels in maps.items():
             self._occurs[np.unique(labels)] = True
-            view.images[name] = classes_uri(labels, self.label_set)
+            view.images[name] = pictures.classes_uri(labels, self.label_set)
             view.texts[name] = f"{self._whose(name)}Map of classes seen from above: {_shares(labels, self.label_set)}."
         self.views.append(view)
+
+    def _view(self, result: FrameResult, details: str) -> FrameView:
+        """Return a view with what the sensors gave, and none of the stages' pictures yet."""
+        frame, scanned = result.frame, len(result.frame.points) > 0
+        clock = f"frame {self._number}, {frame.time:.1f} s" + ("" if scanned else ", no scan: predicted")
+        images = {"photo": pictures.photo_uri(frame.image), "points": pictures.raster_uri(pictures.points_layer(frame))}
+        returns = f"Camera image with the {len(visible_points(frame)[1])} LIDAR returns that the camera sees."
+        if self._first_pose is None:
+            self._first_pose = frame.T_world_from_lidar
+        pose = astuple(PlanarMotion.from_poses(self._first_pose, frame.T_world_from_lidar))
+        return FrameView(clock, images, {"points": returns}, {}, frame.time, pose, details, scanned)
 
     def _details(self, package: FrameResult, truth: NDArray | None) -> str:
         """Return what the stories of the frame's cells are told from, if the page tells them."""
         if self.net is None or len(self.views) % self.stories:
             return ""
         maps = frame_details(package, self.net, truth)
-        self.layout = {name: len(part) for name, part in maps.items()}
-        return packed(maps)
+        self.layout = maps.layout()
+        return maps.packed()
 
-    def _draw(self, view: FrameView, result: FrameResult, wanted: tuple[str, ...], prefix: str = "") -> None:
-        """Add scores and occupancy grid of a result to a view."""
-        if "scores" in wanted:
+    def _draw(self, view: FrameView, result: FrameResult, prefix: str) -> None:
+        """Add scores and occupancy grid of a result to a view, where they can differ from the package's."""
+        if "scores" in self._pictures[prefix]:
             name, best = f"{prefix}scores", _best(result.scores)
             self._occurs[np.unique(best)] = True
-            view.images[name] = raster_uri(scores_layer(result.scores, self.label_set))
+            view.images[name] = pictures.raster_uri(pictures.scores_layer(result.scores, self.label_set))
             shares = _shares(best, self.label_set)
             view.texts[name] = f"{self._whose(name)}Camera image painted with classes: {shares}."
-        if "occupancy" in wanted:
+        if "occupancy" in self._pictures[prefix]:
             name, belief = f"{prefix}occupancy", result.belief
-            view.images[name] = raster_uri(occupancy_colours(belief.probability))
+            view.images[name] = pictures.raster_uri(occupancy_colours(belief.probability))
             view.texts[name] = f"{self._whose(name)}Occupancy grid seen from above: {_states(belief.probability)}."
-            view.arrows[name] = arrows_path(self.spec, belief.probability, belief.velocity)
+            view.arrows[name] = pictures.arrows_path(self.spec, belief.probability, belief.velocity)
 
     def _whose(self, name: str) -> str:
         return f"{self.comparison.file}: " if name.startswith(YOURS) else ""
@@ -211,15 +220,9 @@ def _rows(comparison: Comparison | None) -> dict[str, str]:
     if comparison is None:
         return {"network": "grid", "network + CRF": "refined"}
     words = {"grid": "semantic grid", "refined": "refined grid"}
+    yours = [name for name in ESTIMATES if name in comparison.changed]
     rows = {f"{words[name]}, the package's": name for name in ESTIMATES}
-    return rows | {
-        f"{words[name]}, {comparison.file}": YOURS + name for name in ESTIMATES if name in comparison.changed
-    }
-
-
-def _medians(seconds: list[list[float]]) -> dict[str, float]:
-    medians = 1000 * np.median(seconds, axis=0)
-    return dict(zip(STAGES, medians.tolist(), strict=True))
+    return rows | {f"{words[name]}, {comparison.file}": YOURS + name for name in yours}
 
 
 def _best(values: NDArray) -> NDArray[np.uint8]:

@@ -1,7 +1,4 @@
-"""The demo: run every stage over every frame of a drive, then write the page and its picture.
-
-Which frames of a drive the demo runs over, and which of them its page shows.
-"""
+"""The demo: run every stage over every frame of a drive, then write the page and its picture."""
 
 import re
 from collections.abc import Iterable
@@ -18,9 +15,9 @@ from semgrid_edu.networks import load_net
 from semgrid_edu.pipeline import FrameResult, Stages, load_stages, run_side_by_side
 from semgrid_edu.storage.files import write_text
 from semgrid_edu.workshop.demo.comparison import Comparison
-from semgrid_edu.workshop.demo.details import StoryData
+from semgrid_edu.workshop.demo.details import story_data
 from semgrid_edu.workshop.demo.overview import save_overview
-from semgrid_edu.workshop.demo.page import Summary, page_html
+from semgrid_edu.workshop.demo.page import page_html
 from semgrid_edu.workshop.demo.record import Record
 
 SHOWN = 40
@@ -53,10 +50,6 @@ class ChosenFrames(NamedTuple):
             FIRST:LAST or FIRST:LAST:STEP. Frames from FIRST up to the one before LAST are run, as Python slices a list,
             and one in STEP is shown. Each number may be left out. All frames by default, of which at most `SHOWN` are
             shown if there is no STEP.
-
-        Returns
-        -------
-        ChosenFrames
 
         Raises
         ------
@@ -98,7 +91,7 @@ class ChosenFrames(NamedTuple):
 
 
 STORIES = 200_000
-"""Most cells that have a story, in all frames together: one takes some 45 bytes of the page."""
+"""Most cells that have a story, in all frames together: one takes some 55 bytes of the page."""
 
 
 def write_demo(
@@ -150,24 +143,12 @@ def write_demo(
     record = Record(net.architecture.grid, label_set, chosen.shown, comparison, net, stories)
     results = run_side_by_side((drive[k] for k in chosen.run), own, *yours)
     broken = _record_all(tqdm(results, total=len(chosen.run), desc=drive.folder.name, unit="frame"), record)
-    summary = Summary(
-        title=drive.folder.name,
-        choice=chosen.told(len(drive)),
-        broken=str(broken or ""),
-        spec=record.spec,
-        camera=drive.camera,
-        network_size=net.architecture.image_size,
-        classes=record.classes(),
-        metrics=record.metrics(),
-        labelled=record.labelled,
-        milliseconds=record.milliseconds(),
-        comparison=comparison,
-        your_milliseconds=record.your_milliseconds(),
-        story=StoryData.of(net, drive.camera, record.layout),
-    )
-    save_overview(*record.liveliest, record.spec, label_set, Path(out) / "overview.png", comparison)
+    save_overview(record, Path(out) / "overview.png")
     page = Path(out) / "index.html"
-    write_text(page, page_html(summary, record.views))
+    story = story_data(net, drive.camera, record.layout)
+    words = {"choice": chosen.told(len(drive)), "broken": str(broken or "")}
+    html = page_html(record, drive.folder.name, drive.camera, net.architecture.image_size, story, **words)
+    write_text(page, html)
     if broken:
         raise DataError(broken.path, broken.args[1], f"{broken.args[2]}; {page} shows the frames before it") from broken
     return page

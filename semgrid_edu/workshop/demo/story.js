@@ -1,40 +1,56 @@
-// The numbers of one cell's story, computed from the maps of a frame. Nothing here touches the page, so tests run it alone.
+// Reads the numbers of one cell's story from the bytes that Python wrote, and finds cells. Nothing here touches the page, so tests run it alone.
 
-// Returns the bytes of a frame's maps, one map after the other.
-async function unpack(uri) {
-  const bytes = Uint8Array.from(atob(uri.slice(uri.indexOf(",") + 1)), (letter) => letter.charCodeAt(0));
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
+// Returns a function read(name, cell) -> the bytes of that name in a cell; cells are counted row by row.
+async function unpack(grid, layout, uri) {
+  const packed = Uint8Array.from(atob(uri.slice(uri.indexOf(",") + 1)), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
+  for (const [start, number, step, stride] of Object.values(layout))
+    if (stride === 1) // maps whose rows are differences to the row before
+      for (let map = 0; map < number; map++)
+        for (let i = start + map * step + grid.cols; i < start + (map + 1) * step; i++) bytes[i] += bytes[i - grid.cols];
+  return (name, cell) => {
+    const [start, number, step, stride] = layout[name];
+    return Array.from({ length: number }, (_, k) => bytes[start + k * step + cell * stride]);
+  };
 }
 
-// Returns a function read(name, cell) -> the bytes of the maps of that name in a cell; cells are counted row by row.
-function reader(story, bytes) {
-  const cells = story.grid.rows * story.grid.cols;
-  const starts = {};
-  let start = 0;
-  for (const [name, count] of Object.entries(story.layout)) { starts[name] = start; start += count * cells; }
-  return (name, cell) => Array.from({ length: story.layout[name] }, (_, k) => bytes[starts[name] + k * cells + cell]);
+// Numbers of two bytes: the high ones, then the low ones.
+function wide(read, name, cell) {
+  const bytes = read(name, cell), half = bytes.length / 2;
+  return Array.from({ length: half }, (_, k) => 256 * bytes[k] + bytes[half + k]);
 }
 
-// Free, static, dynamic, unknown: they sum to 1.
-function states(read, name, cell) {
-  const known = read(name, cell).map((byte) => byte / 255);
-  return [...known, Math.max(0, 1 - known[0] - known[1] - known[2])];
+// Free, static, dynamic, unknown after a step of the filter.
+function states(story, read, name, cell) {
+  const start = 4 * story.filter_steps.indexOf(name);
+  return read("states", cell).slice(start, start + 4).map((byte) => byte / 255);
 }
 
-// The parts of the difference of two scores. They sum to the score: rest holds the network's constants, and what rounding loses.
+// The parts of the difference of two scores, and how many times as probable the one class is as the other.
 function parts(story, read, cell) {
-  const step = story.steps.part, small = (name) => read(name, cell).map((byte) => byte - 128);
-  const large = read("large", cell), half = large.length / 2;
-  const [planes, scores] = [small("planes"), small("scores")];
-  const numbers = Array.from({ length: half }, (_, k) => 256 * large[k] + large[half + k] - 32768);
-  const [score, occupancy] = [numbers[half - 1], numbers.slice(0, half - 1)];
-  const rest = score - sum(planes) - sum(occupancy);
-  const scaled = (values) => values.map((value) => value * step);
-  return { score: score * step, planes: scaled(planes), scores: scaled(scores), occupancy: scaled(occupancy), rest: rest * step };
+  const scaled = (values, zero) => values.map((value) => (value - zero) * story.steps.part);
+  const totals = scaled(wide(read, "totals", cell), 32768), [digits, power] = read("times", cell);
+  return { planes: scaled(read("planes", cell), 128), scores: scaled(read("scores", cell), 128), occupancy: totals.slice(0, 4), totals: totals.slice(4), times: (digits * 10 ** power) / 10 };
 }
 
-function sum(values) { return values.reduce((total, value) => total + value, 0); }
+// What the neighbours add for label, rival and refined class.
+function messages(story, read, cell) { return read("messages", cell).map((byte) => byte * story.steps.message); }
+
+// The neighbours that pull most towards the refined class, the strongest first.
+function strongest(story, read, cell) {
+  const bytes = read("strongest", cell), number = bytes.length / 3;
+  return Array.from({ length: number }, (_, k) => {
+    const [rows, cols, pull] = [0, 1, 2].map((kind) => bytes[kind * number + k]);
+    return { cell: cell + (rows - 128) * story.grid.cols + cols - 128, pull: pull * story.steps.message };
+  });
+}
+
+// The pixel of each plane's point above a cell, from the lowest plane up; null where the camera doesn't see it.
+function pixels(story, places, cell) {
+  const found = wide(places, "pixels", cell), number = story.heights.length;
+  return story.heights.map((_, i) => (found[i] === 65535 ? null : [found[i], found[number + i]].map((value) => value * story.steps.pixel)));
+}
 
 // The centre of a cell: x forward, y left, metres.
 function centre(grid, cell) {
@@ -48,66 +64,9 @@ function cellAt(grid, x, y) {
   return row >= 0 && row < grid.rows && col >= 0 && col < grid.cols ? row * grid.cols + col : -1;
 }
 
-// The cell of an earlier frame that holds the centre of a cell of now, through both poses; -1 outside the grid.
-function cellThen(grid, poseThen, poseNow, cell) {
-  const [x, y] = centre(grid, cell), R = poseThen;
-  const d = [0, 1, 2].map((i) => poseNow[4 * i + 3] - poseThen[4 * i + 3]);
-  const column = (v) => [0, 1, 2].map((j) => R[j] * v[0] + R[4 + j] * v[1] + R[8 + j] * v[2]); // R^T v
-  const ahead = column([poseNow[0], poseNow[4], poseNow[8]]), shift = column(d);
-  const yaw = Math.atan2(ahead[1], ahead[0]), cos = Math.cos(yaw), sin = Math.sin(yaw);
-  return cellAt(grid, cos * x - sin * y + shift[0], sin * x + cos * y + shift[1]);
-}
-
-// Equation (1): the pixel of each plane's point above a cell, from the lowest plane up.
-function pixels(story, cell) {
-  const { K, T_camera_from_grid: T, size } = story.camera, [x, y] = centre(story.grid, cell);
-  return story.heights.map((height) => {
-    const [X, Y, Z] = [0, 4, 8].map((i) => T[i] * x + T[i + 1] * y + T[i + 2] * height + T[i + 3]);
-    const [u, v] = [0, 3].map((i) => (K[i] * X + K[i + 1] * Y + K[i + 2] * Z) / Z);
-    return { height, u, v, visible: Z > 0 && u >= 0 && v >= 0 && u <= size[1] - 1 && v <= size[0] - 1 };
-  });
-}
-
-// The bracket of equation (4) between a cell and each other cell of a window of four widths: a map from cell to weight.
-function weights(story, read, cell) {
-  const { grid, crf } = story, reach = Math.ceil(4 * crf.sigma_alpha), known = new Map();
-  const state = (i) => { if (!known.has(i)) known.set(i, states(read, "shown", i)); return known.get(i); };
-  const apart = (i, j) => [Math.floor(i / grid.cols) - Math.floor(j / grid.cols), (i % grid.cols) - (j % grid.cols)];
-  const bilateral = (i, j) => {
-    const [r, c] = apart(i, j), [a, b] = [state(i), state(j)];
-    const unlike = (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2 + (a[3] - b[3]) ** 2;
-    return Math.exp(-0.5 * ((r * r + c * c) / crf.sigma_alpha ** 2 + unlike / crf.sigma_beta ** 2));
-  };
-  const spatial = (i, j) => { const [r, c] = apart(i, j); return Math.exp((-0.5 * (r * r + c * c)) / crf.sigma_gamma ** 2); };
-  const symmetric = crf.normalization === "symmetric";
-  const degree = (i, kernel) => (symmetric ? sum(around(grid, i, reach).map((j) => kernel(i, j))) : 1);
-  const [own, ownSpatial] = [degree(cell, bilateral), degree(cell, spatial)];
-  const found = new Map();
-  for (const j of around(grid, cell, reach)) {
-    if (j === cell) continue;
-    const near = crf.w_bilateral * bilateral(cell, j), close = crf.w_spatial * spatial(cell, j);
-    if (near + close < 1e-6) continue; // too far or too different for its row sum to be worth computing
-    found.set(j, near / Math.sqrt(own * degree(j, bilateral)) + close / Math.sqrt(ownSpatial * degree(j, spatial)));
-  }
-  return found;
-}
-
-function around(grid, cell, reach) {
-  const row = Math.floor(cell / grid.cols), col = cell % grid.cols, cells = [];
-  for (let r = Math.max(0, row - reach); r <= Math.min(grid.rows - 1, row + reach); r++)
-    for (let c = Math.max(0, col - reach); c <= Math.min(grid.cols - 1, col + reach); c++) cells.push(r * grid.cols + c);
-  return cells;
-}
-
-// What the neighbours add to the logarithm of each class's probability: the sum over j of k_ij Q_j(l).
-function messages(story, read, weightOf) {
-  const total = story.names.map(() => 0);
-  for (const [j, weight] of weightOf) read("neighbours", j).forEach((byte, label) => { total[label] += (weight * byte) / 255; });
-  return total;
-}
-
-// The neighbours that pull most towards a class, the strongest first.
-function strongest(read, weightOf, label, number) {
-  const pulls = [...weightOf].map(([cell, weight]) => ({ cell, pull: (weight * read("neighbours", cell)[label]) / 255 }));
-  return pulls.sort((a, b) => b.pull - a.pull).slice(0, number);
+// The cell of another frame that holds the centre of a cell of now; -1 outside the grid. A pose is x, y and yaw of the vehicle on one plane.
+function cellThen(grid, [xThen, yThen, yawThen], [xNow, yNow, yawNow], cell) {
+  const turned = ([x, y], yaw) => [Math.cos(yaw) * x - Math.sin(yaw) * y, Math.sin(yaw) * x + Math.cos(yaw) * y];
+  const [x, y] = turned(centre(grid, cell), yawNow);
+  return cellAt(grid, ...turned([x + xNow - xThen, y + yNow - yThen], -yawThen));
 }

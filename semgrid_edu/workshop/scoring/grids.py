@@ -16,7 +16,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
 from semgrid_edu.networks import SemanticGridNet, unit_image
 from semgrid_edu.occupancy import N_STATES, State
-from semgrid_edu.pipeline.checks import Seam
+from semgrid_edu.pipeline.checks import StageCheck
 from semgrid_edu.planes import plane_pixels
 from semgrid_edu.workshop.scoring.counting import Grids
 
@@ -64,7 +64,7 @@ def network_grids(net: SemanticGridNet, frames: TrainingSet, refinements: Mappin
         log_g = learned_log_g(net, sample)
         found = {NETWORK: np.exp(log_g)}
         for name, refine in (refinements or {}).items():
-            found[f"{NETWORK} + {name}"], _ = Seam("refine", refine, k).call(
+            found[f"{NETWORK} + {name}"], _ = StageCheck("refine", refine, k).call(
                 log_g.shape, log_g, sample.occupancy.numpy()
             )
         return found

@@ -1,17 +1,121 @@
-"""Bird's-eye panels of the page: one SVG in metres around each raster, forward up."""
+"""Pictures inside the page, which needs no other file: rasters as data URIs, bird's-eye panels as SVG in metres."""
 
+import base64
+import io
 import math
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from semgrid_edu.camera import Camera, invert_rigid
+from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.plotting import velocity_arrows
+from semgrid_edu.labels import LabelSet
+from semgrid_edu.plotting import depth_colours, velocity_arrows
 from semgrid_edu.plotting.grids import ARROW_SECONDS
+from semgrid_edu.plotting.images import visible_points
+
+PHOTO_QUALITY = 72
+"""Quality of WebP, 0..100: the lowest at which leaves and lattice fences keep their texture."""
+
+DOTS_ACROSS = 414
+"""Number of LIDAR dots that fill the image's width side by side, so that each is 3 pixels wide on KITTI's images."""
+
+LEAST_OPACITY, MOST_OPACITY = 0.15, 0.8
+"""How strongly the least and the most certain class covers its pixel."""
 
 TICK = 10
 """Distance between the marks of an axis, metres."""
+
+
+def photo_uri(image: NDArray[np.uint8]) -> str:
+    """Return a photograph as the data URI of a WebP.
+
+    Parameters
+    ----------
+    image : (h, w, 3) uint8
+        RGB.
+    """
+    return _uri(Image.fromarray(image), "webp", quality=PHOTO_QUALITY, method=2)
+
+
+def raster_uri(raster: NDArray[np.uint8]) -> str:
+    """Return a raster as the data URI of a PNG, without loss.
+
+    Parameters
+    ----------
+    raster : (h, w, 3) or (h, w, 4) uint8
+        RGB or RGBA.
+    """
+    return _uri(Image.fromarray(raster), "png", optimize=True)
+
+
+def classes_uri(labels: NDArray[np.uint8], label_set: LabelSet) -> str:
+    """Return a map of classes as the data URI of a PNG.
+
+    Parameters
+    ----------
+    labels : (h, w) uint8
+        The class of each pixel or cell.
+    label_set : LabelSet
+        The classes, whose colours become the palette of the PNG.
+    """
+    image = Image.fromarray(labels).convert("P")
+    image.putpalette(label_set.colours(np.arange(256)).tobytes())
+    return _uri(image, "png", optimize=True)
+
+
+def _uri(image: Image.Image, kind: str, **options: object) -> str:
+    buffer = io.BytesIO()
+    image.save(buffer, kind, **options)
+    return f"data:image/{kind};base64,{base64.b64encode(buffer.getvalue()).decode()}"
+
+
+def points_layer(frame: Frame) -> NDArray[np.uint8]:
+    """Draw the LIDAR returns that the camera sees on a transparent picture of the image's size.
+
+    Parameters
+    ----------
+    frame : Frame
+        The frame; it has to have a camera.
+
+    Returns
+    -------
+    (h, w, 4) uint8
+        RGBA. Each return is a square around its pixel, and near returns cover far ones.
+    """
+    height, width = frame.camera.size
+    side = max(1, round(width / DOTS_ACROSS))
+    pixels, depth = visible_points(frame)
+    u, v = np.rint(pixels - (side - 1) / 2).astype(int).T[..., None] + side
+    dv, du = np.indices((side, side)).reshape(2, 1, -1)
+    layer = np.zeros((height + 2 * side, width + 2 * side, 4), np.uint8)
+    layer[v + dv, u + du, :3] = depth_colours(depth)[:, None]
+    layer[v + dv, u + du, 3] = 255
+    return layer[side:-side, side:-side]
+
+
+def scores_layer(scores: NDArray, label_set: LabelSet) -> NDArray[np.uint8]:
+    """Paint the best class of each pixel; the more certain the network is, the more opaque is the colour.
+
+    Parameters
+    ----------
+    scores : (C, h, w) float
+        s, the scores of each class, before the soft-max.
+    label_set : LabelSet
+        The classes, for their colours.
+
+    Returns
+    -------
+    (h, w, 4) uint8
+        RGBA.
+    """
+    excess = np.exp(scores - scores.max(axis=0))
+    certainty = 1 / excess.sum(axis=0)
+    opacity = LEAST_OPACITY + (MOST_OPACITY - LEAST_OPACITY) * certainty
+    alpha = np.rint(255 * opacity).astype(np.uint8)
+    return np.concatenate([label_set.colours(scores.argmax(axis=0)), alpha[..., None]], axis=-1)
 
 
 def grid_svg(name: str, spec: GridSpec, camera: Camera, raster: str, text: str, arrows: bool = False) -> str:
@@ -43,9 +147,8 @@ def grid_svg(name: str, spec: GridSpec, camera: Camera, raster: str, text: str, 
     left, top = -spec.y_max, -spec.x_max
     box = f'x="{left:g}" y="{top:g}" width="{width:g}" height="{height:g}"'
     href = f'href="{raster}"' if raster else ""
-    errors = (
-        f'<image data-errors="{name}" {box} preserveAspectRatio="none"/>' if name.endswith(("grid", "refined")) else ""
-    )
+    compared = name.endswith(("grid", "refined"))
+    errors = f'<image data-errors="{name}" {box} preserveAspectRatio="none"/>' if compared else ""
     paths = f'<path class="arrows" data-arrows="{name}" d=""/>' if arrows else ""
     return (
         f'<svg viewBox="{left - 6.8:g} {top - 1:g} {width + 7.8:g} {height + 7:g}" role="img" '
@@ -80,9 +183,8 @@ def arrows_path(spec: GridSpec, probability: NDArray, velocity: NDArray) -> str:
     length = np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
     back, side = -way / length, way[:, ::-1] * (1, -1) / length
     barbs = [end + 0.9 * back + sign * 0.5 * side for sign in (1, -1)]
-    return "".join(
-        f"M{_svg(a)}L{_svg(b)}M{_svg(c)}L{_svg(b)}L{_svg(d)}" for a, b, c, d in zip(start, end, *barbs, strict=True)
-    )
+    arrows = zip(*(map(_svg, points) for points in (start, end, *barbs)), strict=True)
+    return "".join(f"M{a}L{b}M{c}L{b}L{d}" for a, b, c, d in arrows)
 
 
 def _svg(xy: NDArray) -> str:

@@ -96,7 +96,7 @@ def test_what_is_right_passes_in_any_float_and_layout(frames):
 def test_what_a_stage_returns_is_refused_with_its_probable_cause(frames, stage, returned, message):
     with pytest.raises(StageError, match=message) as caught:
         next(run_pipeline(frames, stages_with(**{stage: lambda *_: returned})))
-    assert str(caught.value).startswith(f"{stage} (test_seams.py, line ")
+    assert str(caught.value).startswith(f"{stage} (test_checks.py, line ")
 
 
 @pytest.mark.parametrize(
@@ -113,7 +113,7 @@ def test_what_a_tracker_yields_is_refused_with_its_probable_cause(frames, yielde
         for _ in frames:
             yield yielded
 
-    with pytest.raises(StageError, match=rf"^track \(test_seams.py, line \d+\), frame 0: .*{message}"):
+    with pytest.raises(StageError, match=rf"^track \(test_checks.py, line \d+\), frame 0: .*{message}"):
         next(run_pipeline(frames, stages_with(track=track)))
 
 
@@ -137,7 +137,7 @@ def test_an_exception_is_chained_and_says_which_stage_and_frame(frames):
 
     line = refine.__code__.co_firstlineno
     message = (
-        rf"^refine \(test_seams.py, line {line}\), frame 1: .* KeyError: 'car' \(test_seams.py, line {line + 3}\)$"
+        rf"^refine \(test_checks.py, line {line}\), frame 1: .* KeyError: 'car' \(test_checks.py, line {line + 3}\)$"
     )
     with pytest.raises(StageError, match=message) as caught:
         list(run_pipeline(frames, stages_with(refine=refine)))
@@ -149,7 +149,7 @@ class TestTracker:
 
     @staticmethod
     def fails(frames, track, message):
-        with pytest.raises(StageError, match=rf"^track \(test_seams.py, line \d+\), {message}"):
+        with pytest.raises(StageError, match=rf"^track \(test_checks.py, line \d+\), {message}"):
             list(run_pipeline(frames, stages_with(track=track)))
 
     def test_that_reads_ahead(self, frames):
@@ -269,7 +269,7 @@ class TestFunctions:
 
     def test_are_found_where_they_are_written(self):
         line = evenly.__code__.co_firstlineno
-        assert where(evenly) == where(partial(evenly, spec=None)) == f"test_seams.py, line {line}"
+        assert where(evenly) == where(partial(evenly, spec=None)) == f"test_checks.py, line {line}"
         assert where(Stages()) == "an object of class Stages"
 
     def test_and_so_are_objects_that_can_be_called(self, frames):
@@ -278,7 +278,7 @@ class TestFunctions:
                 raise KeyError("car")
 
         line = Refine.__call__.__code__.co_firstlineno
-        message = rf"^refine \(test_seams.py, line {line}\), .* KeyError: 'car' \(test_seams.py, line {line + 1}\)$"
+        message = rf"^refine \(test_checks.py, line {line}\), .* KeyError: 'car' \(test_checks.py, line {line + 1}\)$"
         with pytest.raises(StageError, match=message):
             next(run_pipeline(frames, stages_with(refine=Refine())))
 

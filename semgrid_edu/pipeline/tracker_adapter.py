@@ -1,4 +1,4 @@
-"""A tracker that follows a drive: it takes the frames one at a time, and yields a belief for each."""
+"""A student's tracker or the package's own in step with the other stages: one frame in, one belief out."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -9,18 +9,17 @@ import numpy as np
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import N_STATES, Belief
-from semgrid_edu.pipeline.checks import Seam
+from semgrid_edu.pipeline.checks import StageCheck
 
 TAKES_TURNS = "a generator that takes a frame, yields its belief, and only then takes the next"
 
 _END = object()
 
 
-class Follower:
-    """Run a tracker in step with the other stages: it gets a frame only when they need its belief.
+class TrackerAdapter:
+    """Run a tracker in step with the other stages: hand it one frame at a time, and take one belief for each.
 
-    A tracker is a generator that reads the frames itself. This class hands it one frame at a time, and takes one belief
-    for each.
+    A tracker is a generator that reads the frames itself. Its methods raise `StageError`.
 
     Parameters
     ----------
@@ -35,7 +34,7 @@ class Follower:
         self._beliefs: Iterator | None = None
         self._waiting: Frame | None = None
         self._over = False
-        self._seam = Seam("track", track, 0)
+        self._check = StageCheck("track", track, 0)
 
     def belief(self, frame: Frame, number: int) -> tuple[Belief, float]:
         """Let the tracker take a frame, and return what it believes then.
@@ -54,42 +53,31 @@ class Follower:
             probabilities.
         seconds : float
             How long the tracker took.
-
-        Raises
-        ------
-        StageError
-            When the tracker doesn't yield one belief for each frame, or not four probabilities for each cell.
         """
-        seam = self._seam = replace(self._seam, frame=number)
-        self._waiting = frame if seam.own else replace(frame, points=frame.points.copy())
+        check = self._check = replace(self._check, frame=number)
+        self._waiting = frame if check.own else replace(frame, points=frame.points.copy())
         start = time.perf_counter()
         yielded = self._next()
         seconds = time.perf_counter() - start
         if yielded is _END:
-            raise seam.error("a belief for each frame", "the end: does it stop, or return, before the last frame?")
+            raise check.error("a belief for each frame", "the end: does it stop, or return, before the last frame?")
         if self._waiting is not None:
-            raise seam.error(TAKES_TURNS, "a belief before it took the frame: does it yield twice?")
+            raise check.error(TAKES_TURNS, "a belief before it took the frame: does it yield twice?")
         return self._checked(yielded), seconds
 
     def finish(self) -> None:
-        """Tell the tracker that there are no more frames.
-
-        Raises
-        ------
-        StageError
-            When it yields another belief.
-        """
+        """Tell the tracker that there are no more frames; another belief of it is refused."""
         self._over = True
         if self._beliefs is not None and self._next() is not _END:
-            raise self._seam.error("one belief for each frame", "another one after the last frame")
+            raise self._check.error("one belief for each frame", "another one after the last frame")
 
     def _next(self) -> object:
         """Return what the tracker yields next; `_END` when it has ended."""
-        with self._seam.blamed():
+        with self._check.blamed():
             if self._beliefs is None:
                 self._beliefs = self._track(self._frames(), self._spec)
             if not isinstance(self._beliefs, Iterator):
-                raise self._seam.error(TAKES_TURNS, f"{type(self._beliefs).__name__}: is the `yield` missing?")
+                raise self._check.error(TAKES_TURNS, f"{type(self._beliefs).__name__}: is the `yield` missing?")
             return next(self._beliefs, _END)
 
     def _frames(self) -> Iterator[Frame]:
@@ -97,7 +85,7 @@ class Follower:
         while not self._over:
             if self._waiting is None:
                 cause = "is the `yield` missing?" if self._beliefs is None else "does it make a list of them?"
-                raise self._seam.error(
+                raise self._check.error(
                     TAKES_TURNS, f"one that takes another frame before it yields this one's belief: {cause}"
                 )
             frame, self._waiting = self._waiting, None
@@ -108,8 +96,8 @@ class Follower:
         grid = self._spec.shape
         belief = yielded if isinstance(yielded, Belief) else _without_velocity(yielded, grid)
         shapes = {"probability": (N_STATES, *grid), "velocity": (2, *grid), "velocity_covariance": (2, 2, *grid)}
-        arrays = {name: self._seam.array(getattr(belief, name), shape) for name, shape in shapes.items()}
-        self._seam.probabilities(arrays["probability"], "state")
+        arrays = {name: self._check.array(getattr(belief, name), shape) for name, shape in shapes.items()}
+        self._check.probabilities(arrays["probability"], "states")
         return replace(belief, **arrays)
 
 
