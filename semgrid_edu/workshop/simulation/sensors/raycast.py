@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
-from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.workshop.simulation.things.materials import Material
@@ -178,9 +177,8 @@ class Hits:
     position: NDArray[np.float32]
 
 
-@njit(cache=True)
 def turned(rays: NDArray, rotation: NDArray) -> NDArray:
-    """Turn rays, with the same bits on any number of cores, which a call of BLAS doesn't promise.
+    """Turn rays, (N, 3), with the same bits on any number of cores, which a call of BLAS doesn't promise.
 
     Parameters
     ----------
@@ -188,14 +186,6 @@ def turned(rays: NDArray, rotation: NDArray) -> NDArray:
         Directions.
     rotation : (3, 3) float
         Rotation matrix.
-
-    Returns
-    -------
-    (N, 3) float
-        The turned directions, in the type of `rays`.
     """
-    out = np.empty_like(rays)
-    for i in range(len(rays)):
-        for c in range(3):
-            out[i, c] = rotation[c, 0] * rays[i, 0] + rotation[c, 1] * rays[i, 1] + rotation[c, 2] * rays[i, 2]
-    return out
+    x, y, z = rays.T[:, :, None]
+    return x * rotation[:, 0] + y * rotation[:, 1] + z * rotation[:, 2]

@@ -72,8 +72,7 @@ def _ground(tile, road, x, y, blur, out):
     if e < 0.0:
         mark = _asphalt(tile, road, s, d, blur, out)
         gutter = min(max((e + 0.35) / 0.35, 0.0), 1.0)
-        for c in range(3):
-            out[c] *= 1.0 - 0.3 * gutter
+        out *= 1.0 - 0.3 * gutter
         return Kind.LANE if mark else Kind.ROAD
     side = road.left if d > 0 else road.right
     if e < KERB_WIDTH or side.strip <= e < side.strip + side.walk:
@@ -110,8 +109,7 @@ def _surface(tile, material, p, n, blur, out):
         gain = 1.0 + 0.7 * (texture(tile, 50.0 * u + 20.0 * p[0], 5.0 * v) - 0.5) * fade
     elif material == Material.LEAF:
         gain = 1.0 + 1.1 * (texture(tile, 45.0 * (u + p[0]), 45.0 * v + 20.0 * p[1]) - 0.5) * fade
-    for c in range(3):
-        out[c] *= gain
+    out *= gain
 
 
 @njit(cache=True, fastmath=True)
@@ -173,8 +171,7 @@ def _shade(
         elif m == Material.METAL:
             _mirror(tile, ray, n, light, 20.0, 0.04, out)
         elif m == Material.LAMP:
-            for c in range(3):
-                out[c] += 0.45 * albedo[c]
+            out += 0.45 * albedo
         fog = 1.0 - np.exp(-haze * t[i])
         for c in range(3):
             out[c] = out[c] * (1.0 - fog) + fog * 0.92 * horizon[c]

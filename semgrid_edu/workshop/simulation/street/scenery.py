@@ -1,5 +1,7 @@
 """The scenery of a planned street: its ground, houses, fences, trees, lamps and signs."""
 
+from functools import partial
+
 import numpy as np
 
 from semgrid_edu.workshop.simulation.street import borders
@@ -93,40 +95,26 @@ def _suburb_house(rng: np.random.Generator) -> House:
     return House(rng.uniform(8, 12), rng.uniform(7.5, 10.5), int(rng.integers(1, 3)), roof, False, seed)
 
 
-def _town(builder: Builder, sign: int) -> None:
-    """Line one side with facades at the sidewalk, few of them with a gap between."""
-    rng, side, extent = builder.rng, builder.road.side(sign), builder.plan.extent
-    line, setback = side.strip + side.walk, rng.uniform(0.0, 0.4)
+def _house_row(builder: Builder, sign: int, town: bool) -> None:
+    """Line one side with facades at the sidewalk, or with houses in gardens behind fences and hedges."""
+    rng, side, extent, border = builder.rng, builder.road.side(sign), builder.plan.extent, builder.plan.border(sign)
+    line, setback = side.strip + side.walk, rng.uniform(0.0, 0.4) if town else rng.uniform(3.5, 8.0)
     s = extent.start + rng.uniform(0, 8)
     while s < extent.end - 20:
-        house = _town_house(rng)
-        gap = 0.02 if rng.random() < 0.75 else rng.uniform(2, 6)
+        house = (_town_house if town else _suburb_house)(rng)
+        gap = rng.uniform(2.5, 9.0) if not town else 0.02 if rng.random() < 0.75 else rng.uniform(2, 6)
+        end = s + house.width + gap
         if not _meets_side_road(builder, s, s + house.width, sign, line + 0.8):
-            rng.uniform(0, 1.0)  # in a suburb, by how much the house stands back from the others
-            _house(builder, house, s + house.width / 2, sign * (side.edge + line + setback), _facing(sign))
-        if gap > 2 and rng.random() < 0.6:
+            front = side.edge + line + setback + rng.uniform(0, 1.0) * (not town)
+            _house(builder, house, s + house.width / 2, sign * front, _facing(sign))
+        if not town:
+            border = str(rng.choice([*furniture.FENCES, "hedge"])) if rng.random() < 0.15 else border
+            _border(builder, s, end, sign, side.edge + line + 0.35, border)
+            _garden(builder, s, end, sign, side.edge + line + 1.2, setback)
+        elif gap > 2 and rng.random() < 0.6:
             _tree(builder, s + house.width + gap / 2, sign * (side.edge + line + 3.0))
         s += house.width + gap
-    _second_row(builder, sign, side.edge + line + setback + 24)
-
-
-def _suburb(builder: Builder, sign: int) -> None:
-    """Line one side with houses in gardens behind fences and hedges."""
-    rng, side, extent = builder.rng, builder.road.side(sign), builder.plan.extent
-    line, setback = side.strip + side.walk, rng.uniform(3.5, 8.0)
-    border = builder.plan.border(sign)
-    s = extent.start + rng.uniform(0, 8)
-    while s < extent.end - 20:
-        house, gap = _suburb_house(rng), rng.uniform(2.5, 9.0)
-        if not _meets_side_road(builder, s, s + house.width, sign, line + 0.8):
-            front = side.edge + line + setback + rng.uniform(0, 1.0)
-            _house(builder, house, s + house.width / 2, sign * front, _facing(sign))
-        if rng.random() < 0.15:
-            border = str(rng.choice([*furniture.FENCES, "hedge"]))
-        _border(builder, s, s + house.width + gap, sign, side.edge + line + 0.35, border)
-        _garden(builder, s, s + house.width + gap, sign, side.edge + line + 1.2, setback)
-        s += house.width + gap
-    if rng.random() < 0.5:
+    if town or rng.random() < 0.5:
         _second_row(builder, sign, side.edge + line + setback + 24)
 
 
@@ -194,7 +182,12 @@ def _yard(builder: Builder, sign: int) -> None:
         _tree(builder, s + rng.uniform(0, 6), sign * (line + rng.uniform(6, 30)))
 
 
-_LINE_SIDE = {"town": _town, "suburb": _suburb, "park": _park, YARD: _yard}
+_LINE_SIDE = {
+    "town": partial(_house_row, town=True),
+    "suburb": partial(_house_row, town=False),
+    "park": _park,
+    YARD: _yard,
+}
 """What lines a side of each style: functions of the world and of the side, 1 for the left and -1 for the right one."""
 
 

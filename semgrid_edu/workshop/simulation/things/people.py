@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.workshop.simulation.things.cars import PAINTS
-from semgrid_edu.workshop.simulation.things.materials import Kind, Material
+from semgrid_edu.workshop.simulation.things.materials import PALETTES, Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, ball, merge, quads, tube
 
 _BLACK, _GREY = (0.02, 0.02, 0.02), (0.25, 0.25, 0.25)
@@ -58,13 +58,6 @@ def bicycle() -> Shape:
 _PHASES = 16
 _TOP, _TROUSERS, _SKIN_SLOT, _HAIR_SLOT, _SHOES = range(5)
 
-_CLOTHES = (
-    (0.05, 0.08, 0.25), (0.45, 0.05, 0.05), (0.6, 0.6, 0.58), (0.03, 0.03, 0.04),
-    (0.55, 0.4, 0.06), (0.07, 0.25, 0.12), (0.3, 0.12, 0.35), (0.25, 0.2, 0.15),
-)  # fmt: skip
-_SKIN = ((0.55, 0.33, 0.22), (0.4, 0.22, 0.13), (0.17, 0.09, 0.05), (0.62, 0.4, 0.29))
-_HAIR = ((0.02, 0.015, 0.01), (0.12, 0.06, 0.02), (0.35, 0.22, 0.08), (0.35, 0.34, 0.33))
-
 
 @dataclass(frozen=True)
 class Person:
@@ -96,9 +89,11 @@ class Person:
         rng : numpy.random.Generator
             Decides them.
         """
-        pick = lambda colours: colours[rng.integers(len(colours))]  # noqa: E731
-        top, trousers = pick(_CLOTHES), pick(_CLOTHES[:4] + _CLOTHES[7:])
-        return cls(rng.uniform(1.55, 1.92), top, trousers, pick(_SKIN), pick(_HAIR), pick(PAINTS))
+        clothes = PALETTES["clothes"]
+        choices = (clothes, clothes[:4] + clothes[7:], PALETTES["skin"], PALETTES["hair"], PAINTS)
+        top, trousers = (colours[rng.integers(len(colours))] for colours in choices[:2])
+        height = rng.uniform(1.55, 1.92)
+        return cls(height, top, trousers, *(colours[rng.integers(len(colours))] for colours in choices[2:]))
 
 
 def _blob(centre: ArrayLike, radii: tuple, slot: int, kind: Kind, detail: int = 1) -> Shape:
