@@ -109,7 +109,7 @@ def test_where_nothing_is_porous_nothing_is_drawn():
 
 
 def test_a_piece_of_mesh_stands_between_its_posts():
-    frame, wire = furniture.mesh_frame(2.5), furniture.mesh_sheet(2.5)
+    frame, wire = furniture.wire_fence(2.5)
     assert set(wire.material) == {Material.WIRE}
     assert wire.vertices[:, 0].min() == 0
     assert wire.vertices[:, 0].max() == pytest.approx(2.5)

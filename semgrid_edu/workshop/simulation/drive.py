@@ -1,6 +1,5 @@
 """One simulated drive: a world, the car that drives through it, and every frame that its sensors take."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,8 +94,8 @@ class SimulatedDrive:
         traffic = Traffic(builder, self.ego.trajectory, duration)
         (wishes.cast or fill_street)(traffic)
         self.moving, self.parked = traffic.moving, traffic.parked
-        self.static = RayMesh.of(builder.shapes, builder.instances)
-        self.porous = PorousMesh.of(builder.porous, builder.opacities) if builder.porous else None
+        self.static = RayMesh.of(*zip(*builder.solid, strict=True))
+        self.porous = PorousMesh.of(*zip(*builder.porous, strict=True)) if builder.porous else None
         self.static_footprints = footprint_table(builder.footprints)
         self.sensor_seed = rng.bit_generator.seed_seq.spawn(1)[0]
 
@@ -216,16 +215,6 @@ class SimulatedDrive:
         points = scan(self.instant(t), self.pose(t), self.rig.lidar, self.plan.road, self._noise(index, 1))
         nearest = t + float(self._noise(index, 2).uniform(-half, half)) if half else t
         return Frame(None, points, self.rig.camera, self.pose(nearest), t)
-
-    def frames(self, labelled: set[int]) -> Iterator[SimulatedFrame]:
-        """Take all frames, one after the other.
-
-        Parameters
-        ----------
-        labelled : set of int
-            Numbers of the frames whose bird's-eye truth is wanted.
-        """
-        yield from (self.frame(k, k in labelled) for k in range(self.n_frames))
 
     def _noise(self, *key: int) -> np.random.Generator:
         """Return the drive's own generator for a key, such as the number of a frame."""

@@ -147,8 +147,8 @@ def _write_files(
     for name in ("image_02/data", "velodyne_points/data", "oxts/data", "labels"):
         (folder / name).mkdir(parents=True)
     objects = {}
-    for k, frame in enumerate(simulated.frames(set(labelled))):
-        name = f"{k:010d}"
+    for k in range(simulated.n_frames):
+        name, frame = f"{k:010d}", simulated.frame(k, k in labelled)
         _save_png(folder / "image_02" / "data" / f"{name}.png", frame.picture.image)
         points = depth_scan(frame.picture.depth, simulated.rig.camera) if dense else frame.points
         (folder / "velodyne_points" / "data" / f"{name}.bin").write_bytes(points.tobytes())

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.workshop.simulation.sensors.instant import Instant
 from semgrid_edu.workshop.simulation.sensors.raycast import Hits
-from semgrid_edu.workshop.simulation.street.ground import KERB_WIDTH, lane_mark
+from semgrid_edu.workshop.simulation.street.ground import KERB_WIDTH, ground_kind, lane_mark
 from semgrid_edu.workshop.simulation.street.layout import Road, outside_asphalt, to_road
 from semgrid_edu.workshop.simulation.street.light import Light, noise_tile, sky_radiance, texture
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
@@ -68,18 +68,16 @@ def _grass(tile, x, y, blur, out):
 def _ground(tile, road, x, y, blur, out):
     """Write the albedo of the ground at (x, y); return its kind."""
     s, d = to_road(road, x, y)
-    e = outside_asphalt(road, s, d)
-    if e < 0.0:
+    e, kind = outside_asphalt(road, s, d), ground_kind(road, s, d)
+    if kind == Kind.ROAD:
         mark = _asphalt(tile, road, s, d, blur, out)
-        gutter = min(max((e + 0.35) / 0.35, 0.0), 1.0)
-        out *= 1.0 - 0.3 * gutter
-        return Kind.LANE if mark else Kind.ROAD
-    side = road.left if d > 0 else road.right
-    if e < KERB_WIDTH or side.strip <= e < side.strip + side.walk:
+        out *= 1.0 - 0.3 * min(max((e + 0.35) / 0.35, 0.0), 1.0)
+        return Kind.LANE if mark else kind
+    if kind == Kind.SIDEWALK:
         _paving(tile, s if abs(d) < 40.0 else d, e, e < KERB_WIDTH, blur, out)
-        return Kind.SIDEWALK
-    _grass(tile, x, y, blur, out)
-    return Kind.GRASS
+    else:
+        _grass(tile, x, y, blur, out)
+    return kind
 
 
 @njit(cache=True, fastmath=True)

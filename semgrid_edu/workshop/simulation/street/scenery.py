@@ -24,8 +24,7 @@ def build_scenery(plan: Plan, rng: np.random.Generator) -> Builder:
         Source of all that is drawn.
     """
     builder = Builder(plan, rng)
-    builder.shapes.append(ground_mesh(plan.road, plan.extent))
-    builder.instances.append(0)
+    builder.solid.append((ground_mesh(plan.road, plan.extent), 0))
     borders.stand_signals(builder)
     for sign, style in zip((1, -1), plan.styles, strict=True):
         borders.stand_lamps(builder, sign)
