@@ -114,16 +114,18 @@ def _house_row(builder: Builder, sign: int, town: bool) -> None:
             _tree(builder, s + house.width + gap / 2, sign * (side.edge + line + 3.0))
         s += house.width + gap
     if town or rng.random() < 0.5:
-        _second_row(builder, sign, side.edge + line + setback + 24)
+        _tall_houses(builder, sign, side.edge + line + setback + 24, (0, 10), 34.0, 10, 0.7)
 
 
-def _second_row(builder: Builder, sign: int, offset: float) -> None:
-    """Scatter taller houses behind the first row, so that gaps don't end in nothing."""
+def _tall_houses(
+    builder: Builder, sign: int, line: float, behind: tuple, step: float, along: float, share: float
+) -> None:
+    """Scatter houses of a town some metres `behind` a line along the road, so that gaps don't end in nothing."""
     rng, extent = builder.rng, builder.plan.extent
-    for s in np.arange(extent.start, extent.end, 34.0):
-        if rng.random() < 0.7:
-            house = _town_house(rng)
-            _house(builder, house, s + rng.uniform(0, 10), sign * (offset + rng.uniform(0, 10)), _facing(sign))
+    for s in np.arange(extent.start, extent.end, step):
+        if rng.random() < share:
+            house, s = _town_house(rng), s + rng.uniform(0, along)
+            _house(builder, house, s, sign * (line + rng.uniform(*behind)), _facing(sign))
 
 
 def _border(builder: Builder, s0: float, s1: float, sign: int, offset: float, style: str) -> None:
@@ -165,10 +167,7 @@ def _park(builder: Builder, sign: int) -> None:
         for _ in range(2):
             offset = line + rng.uniform(1.8, 26)
             (_tree if rng.random() < 0.62 else _bush)(builder, s + rng.uniform(0, 5), sign * offset)
-    for s in np.arange(extent.start, extent.end, 60.0):
-        if rng.random() < 0.5:
-            house = _town_house(rng)
-            _house(builder, house, s + rng.uniform(0, 30), sign * (line + rng.uniform(30, 40)), _facing(sign))
+    _tall_houses(builder, sign, line, (30, 40), 60.0, 30, 0.5)
 
 
 def _yard(builder: Builder, sign: int) -> None:

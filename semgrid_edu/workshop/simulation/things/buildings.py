@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,16 +59,6 @@ def _walls(house: House) -> list[tuple[NDArray, NDArray, float]]:
     return [(c, e / n, n) for c, e, n in zip(corners, edges, lengths, strict=True)]
 
 
-class _Style(NamedTuple):
-    """What all windows of a house share."""
-
-    spacing: float
-    size: tuple[float, float]
-    frame: tuple[float, float, float]
-    shutters: tuple[float, float, float] | None
-    sill: bool
-
-
 def _panel(corner, right, up, out: float, colour, material=Material.MATTE) -> Shape:
     """Hang rectangles on a wall, `out` metres in front of it."""
     normal = np.cross(right, up)
@@ -77,11 +66,11 @@ def _panel(corner, right, up, out: float, colour, material=Material.MATTE) -> Sh
     return quads(corner + out * normal, right, up, colour, material, Kind.BUILDING)
 
 
-def _windows(origin, along, length: float, sills: NDArray, style: _Style, rng: np.random.Generator) -> list[Shape]:
+def _windows(origin, along, length: float, sills: NDArray, style: tuple, rng: np.random.Generator) -> list[Shape]:
     """Hang a grid of windows on a wall: frame, two panes, sill, perhaps shutters."""
-    n = max(int((length - 0.8) / style.spacing), 1)
+    spacing, (w, h), frame, shutters, has_sill = style
+    n = max(int((length - 0.8) / spacing), 1)
     step = length / n
-    w, h = style.size
     x, z = (a.ravel() for a in np.meshgrid((np.arange(n) + 0.5) * step - w / 2, sills))
     keep = rng.random(len(x)) > 0.06
     x, z = x[keep], z[keep]
@@ -89,15 +78,15 @@ def _windows(origin, along, length: float, sills: NDArray, style: _Style, rng: n
     curtain = rng.random((len(x), 1))
     pane = np.where(curtain < 0.3, 0.25, 0.02) * np.array([1.0, 1.02, 1.06]) * (0.6 + 0.8 * curtain)
     edge = 0.08
-    parts = [_panel(corner, w * along, h * UP, 0.02, style.frame)]
+    parts = [_panel(corner, w * along, h * UP, 0.02, frame)]
     for k in range(2):
         inner = corner + (edge + k * (w / 2 - edge / 2 + 0.02)) * along + edge * UP
         parts.append(_panel(inner, (w / 2 - 1.25 * edge) * along, (h - 2 * edge) * UP, 0.04, pane, Material.GLASS))
-    if style.sill:
+    if has_sill:
         parts.append(_panel(corner - 0.1 * along - 0.12 * UP, (w + 0.2) * along, 0.12 * UP, 0.07, (0.45, 0.44, 0.42)))
-    if style.shutters:
+    if shutters:
         for shift in (-0.5 * w - 0.02, w + 0.02):
-            parts.append(_panel(corner + shift * along, 0.5 * w * along, h * UP, 0.05, style.shutters, Material.WOOD))
+            parts.append(_panel(corner + shift * along, 0.5 * w * along, h * UP, 0.05, shutters, Material.WOOD))
     return parts
 
 
@@ -185,13 +174,13 @@ def _balconies(house: House, rng: np.random.Generator) -> list[Shape]:
     return parts
 
 
-def _draw_style(house: House, rng: np.random.Generator) -> _Style:
-    """Draw what the windows of a house look like."""
+def _draw_style(house: House, rng: np.random.Generator) -> tuple:
+    """Draw what the windows of a house share: spacing, size, colours of frame and shutters, and whether they have sills."""
     frame = (0.72, 0.71, 0.68) if rng.random() < 0.75 else (0.12, 0.08, 0.06)
     shutters = PALETTES["doors"][rng.integers(4)] if house.roof == "gable" and rng.random() < 0.45 else None
     size = (rng.uniform(1.0, 1.5), rng.uniform(1.35, 1.7))
     spacing = rng.uniform(2.2, 3.2) + (0.8 if shutters else 0)
-    return _Style(spacing, size, frame, shutters, bool(rng.random() < 0.7))
+    return spacing, size, frame, shutters, rng.random() < 0.7
 
 
 def _body(house: House, wall, material: Material) -> list[Shape]:

@@ -158,14 +158,11 @@ def lamp(height: float) -> Shape:
         Height of the lamp above the ground, metres.
     """
     metal = partial(tube, colour=(0.24, 0.25, 0.25), material=Material.METAL, kind=Kind.POLE)
-    return merge(
-        [
-            metal((0, 0, -0.5), (0, 0, 1.2), (0.11, 0.10)),
-            metal((0, 0, 1.2), (0, 0, height - 0.4), (0.075, 0.055)),
-            metal((0, 0, height - 0.4), (0, 1.5, height), (0.05, 0.04)),
-            box((0, 1.7, height), (0.22, 0.7, 0.12), (0.3, 0.3, 0.29), Material.METAL, Kind.POLE),
-        ]
-    )
+    foot = metal((0, 0, -0.5), (0, 0, 1.2), (0.11, 0.10))
+    post = metal((0, 0, 1.2), (0, 0, height - 0.4), (0.075, 0.055))
+    arm = metal((0, 0, height - 0.4), (0, 1.5, height), (0.05, 0.04))
+    head = box((0, 1.7, height), (0.22, 0.7, 0.12), (0.3, 0.3, 0.29), Material.METAL, Kind.POLE)
+    return merge([foot, post, arm, head])
 
 
 @cache

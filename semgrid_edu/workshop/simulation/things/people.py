@@ -27,6 +27,8 @@ _FRAME = (
     ((0.36, 0, 0.98), _FRONT, 0.024),
 )
 """The tubes of a bicycle: where they begin and end, and their radius, metres."""
+_BARS = ((0.4, 0.28, 1.02, 0.018), (-0.08, 0.12, 0.32, 0.07))
+"""Handlebar and pedals: x, half the length along y, z and radius, metres."""
 
 
 def _wheel(x: float) -> list[Shape]:
@@ -42,17 +44,11 @@ def _wheel(x: float) -> list[Shape]:
 def bicycle() -> Shape:
     """Make a bicycle, 1.75 m long; its frame is of `Material.PAINT`, so that it can be recoloured."""
     metal = partial(tube, colour=_GREY, material=Material.METAL, kind=Kind.BICYCLE, sides=5)
-    return merge(
-        [
-            *_wheel(-0.53),
-            *_wheel(0.53),
-            *(tube(*measures, PAINTS[5], Material.PAINT, Kind.BICYCLE, 5) for measures in _FRAME),
-            metal((0.4, -0.28, 1.02), (0.4, 0.28, 1.02), 0.018),
-            ball((-0.24, 0, 0.93), (0.13, 0.08, 0.04), _BLACK, Material.RUBBER, Kind.BICYCLE),
-            metal((-0.08, -0.12, 0.32), (-0.08, 0.12, 0.32), 0.07),
-            quads([-0.55, 0.0, 0.7], [0.1, 0, 0], [0, 0.03, 0.04], (0.5, 0.02, 0.02), Material.RETRO, Kind.BICYCLE),
-        ]
-    )
+    frame = [tube(*measures, PAINTS[5], Material.PAINT, Kind.BICYCLE, 5) for measures in _FRAME]
+    bar, pedals = (metal((x, -y, z), (x, y, z), thick) for x, y, z, thick in _BARS)
+    saddle = ball((-0.24, 0, 0.93), (0.13, 0.08, 0.04), _BLACK, Material.RUBBER, Kind.BICYCLE)
+    light = quads([-0.55, 0.0, 0.7], [0.1, 0, 0], [0, 0.03, 0.04], (0.5, 0.02, 0.02), Material.RETRO, Kind.BICYCLE)
+    return merge([*_wheel(-0.53), *_wheel(0.53), *frame, bar, saddle, pedals, light])
 
 
 _PHASES = 16
