@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from semgrid_edu.workshop.simulation.sensors.instant import Instant
-from semgrid_edu.workshop.simulation.sensors.raycast import MISS, PorousMesh, RayMesh
+from semgrid_edu.workshop.simulation.sensors.raycast import MISS, Instant, PorousMesh, RayMesh
 from semgrid_edu.workshop.simulation.things import furniture
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, box, quads

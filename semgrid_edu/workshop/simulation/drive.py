@@ -9,9 +9,8 @@ from semgrid_edu.camera import transform_points
 from semgrid_edu.frame import LABEL_GRID, Frame
 from semgrid_edu.workshop.simulation.sensors.camera import Picture, take_picture
 from semgrid_edu.workshop.simulation.sensors.gps import Geodesy
-from semgrid_edu.workshop.simulation.sensors.instant import Instant
 from semgrid_edu.workshop.simulation.sensors.lidar import scan
-from semgrid_edu.workshop.simulation.sensors.raycast import PorousMesh, RayMesh
+from semgrid_edu.workshop.simulation.sensors.raycast import Instant, PorousMesh, RayMesh
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.sensors.truth import BirdseyeTruth, birdseye_kinds, visible_cells, world_cells
 from semgrid_edu.workshop.simulation.street.ego import Ego

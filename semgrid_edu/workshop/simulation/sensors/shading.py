@@ -4,8 +4,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.workshop.simulation.sensors.instant import Instant
-from semgrid_edu.workshop.simulation.sensors.raycast import Hits
+from semgrid_edu.workshop.simulation.sensors.raycast import Hits, Instant
 from semgrid_edu.workshop.simulation.street.ground import KERB_WIDTH, ground_kind, lane_mark
 from semgrid_edu.workshop.simulation.street.layout import Road, outside_asphalt, to_road
 from semgrid_edu.workshop.simulation.street.light import Light, noise_tile, sky_radiance, texture

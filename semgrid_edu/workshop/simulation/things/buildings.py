@@ -175,7 +175,7 @@ def _balconies(house: House, rng: np.random.Generator) -> list[Shape]:
 
 
 def _draw_style(house: House, rng: np.random.Generator) -> tuple:
-    """Draw what the windows of a house share: spacing, size, colours of frame and shutters, and whether they have sills."""
+    """Draw what the windows of a house share: spacing, size, colours of frame and shutters, whether they have sills."""
     frame = (0.72, 0.71, 0.68) if rng.random() < 0.75 else (0.12, 0.08, 0.06)
     shutters = PALETTES["doors"][rng.integers(4)] if house.roof == "gable" and rng.random() < 0.45 else None
     size = (rng.uniform(1.0, 1.5), rng.uniform(1.35, 1.7))
