@@ -63,6 +63,7 @@ def _discontinuities(triangle: NDArray, distance: NDArray, kind: NDArray, materi
 def _smooth(values, distance, step, radius, out):
     """Average sparse `values` (one every `step` pixels, -1 for none) over pixels at a similar distance."""
     height, width = distance.shape
+    # numba compiles the loop: which neighbours count depends on the distance of each pixel
     for r in range(height):
         for c in range(width):
             total, weight = 0.0, 0.0

@@ -135,6 +135,7 @@ def _shade(
     """Write the radiance (N, 3) and the kind (N,) of every hit."""
     sun, sun_colour, zenith, horizon, _, haze, _ = light
     n, albedo = np.empty(3, np.float32), np.empty(3, np.float32)
+    # numba compiles the loop: every material has its own branch, so that an array for each would cost more
     for i in range(len(t)):
         ray = rays[i]
         out = radiance[i]

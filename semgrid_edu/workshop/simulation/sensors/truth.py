@@ -114,6 +114,7 @@ def _visible(cells, kinds, which, footprints, road, T, K, pixel_kinds, depth, se
     A pixel has one depth for the whole patch of surface that it shows. So the tolerance grows with the patch.
     """
     f = K[0, 0]
+    # numba compiles the loop: most cells are decided by one pixel, so the search ends early
     for r in range(cells.shape[0]):
         for c in range(cells.shape[1]):
             x, y = cells[r, c]
