@@ -12,7 +12,7 @@ from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Belief, PlanarMotion, State
 from semgrid_edu.workshop.commands.main import run
-from semgrid_edu.workshop.simulation.street.actors import Actor
+from semgrid_edu.workshop.simulation.street.traffic import Actor
 from semgrid_edu.workshop.simulation.street.trajectories import Pace, Trajectory
 from semgrid_edu.workshop.simulation.things.materials import Kind
 from semgrid_edu.workshop.studies.filter.cell_truth import CellTruth

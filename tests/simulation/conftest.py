@@ -21,6 +21,12 @@ def junction_drive_again() -> SimulatedDrive:
 
 
 @pytest.fixture(scope="session")
+def crowded_drives() -> list[SimulatedDrive]:
+    """Three drives through towns full of people."""
+    return [SimulatedDrive(seed, 10, Wishes(density=1.0, styles=("town", "town"))) for seed in range(3)]
+
+
+@pytest.fixture(scope="session")
 def last_frame(junction_drive):
     """Its last frame, with bird's-eye truth."""
     return junction_drive.frame(9, labelled=True)

@@ -7,9 +7,8 @@ import pytest
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, project, rigid_transform, transform_points
 from semgrid_edu.workshop.simulation.sensors.camera import take_picture
-from semgrid_edu.workshop.simulation.sensors.instant import Instant
 from semgrid_edu.workshop.simulation.sensors.lidar import scan
-from semgrid_edu.workshop.simulation.sensors.raycast import RayMesh
+from semgrid_edu.workshop.simulation.sensors.raycast import Instant, RayMesh
 from semgrid_edu.workshop.simulation.sensors.rig import Lidar, Rig
 from semgrid_edu.workshop.simulation.street.layout import Road, Side
 from semgrid_edu.workshop.simulation.street.light import Light

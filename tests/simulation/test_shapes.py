@@ -49,24 +49,24 @@ def test_merging_keeps_every_triangle():
     assert np.array_equal(both.vertices[both.faces[-len(two.faces) :]], two.vertices[two.faces])
 
 
-@pytest.mark.parametrize("body", BODIES)
-def test_a_car_fills_its_box_and_stands_on_the_ground(body):
-    low, high = car(body).vertices.min(axis=0), car(body).vertices.max(axis=0)
-    length, width, height = car_size(body)
-    assert high[0] - low[0] == pytest.approx(length, abs=0.1)
-    assert high[1] - low[1] == pytest.approx(width, abs=0.3)
-    assert high[2] == pytest.approx(height, abs=0.01)
-    assert low[2] == pytest.approx(0.0, abs=0.01)
+def test_a_car_fills_its_box_and_stands_on_the_ground():
+    offenders = []
+    for body in BODIES:
+        low, high = car(body).vertices.min(axis=0), car(body).vertices.max(axis=0)
+        errors = [*(high - low - car_size(body))[:2], high[2] - car_size(body)[2], low[2]]
+        if np.any(np.abs(errors) > [0.1, 0.3, 0.01, 0.01]):
+            offenders.append((body, errors))
+    assert offenders == []
 
 
-@pytest.mark.parametrize("distance", [0.0, 0.4, 1.0])
-def test_people_stand_on_the_ground_at_their_height(distance):
+def test_people_stand_on_the_ground_at_their_height():
     person = Person.random(np.random.default_rng(0))
-    shape = walker(person, distance)
-    assert shape.vertices[:, 2].min() == pytest.approx(0.0, abs=0.05)
-    assert shape.vertices[:, 2].max() == pytest.approx(person.height, abs=0.06)
-    assert set(shape.kind) == {Kind.PEDESTRIAN}
-    assert set(rider(person, distance).kind) == {Kind.BICYCLE}
+    for distance in (0.0, 0.4, 1.0):
+        shape = walker(person, distance)
+        assert shape.vertices[:, 2].min() == pytest.approx(0.0, abs=0.05)
+        assert shape.vertices[:, 2].max() == pytest.approx(person.height, abs=0.06)
+        assert set(shape.kind) == {Kind.PEDESTRIAN}
+        assert set(rider(person, distance).kind) == {Kind.BICYCLE}
 
 
 def test_a_stride_repeats():

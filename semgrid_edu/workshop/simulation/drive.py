@@ -1,6 +1,5 @@
 """One simulated drive: a world, the car that drives through it, and every frame that its sensors take."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +9,8 @@ from semgrid_edu.camera import transform_points
 from semgrid_edu.frame import LABEL_GRID, Frame
 from semgrid_edu.workshop.simulation.sensors.camera import Picture, take_picture
 from semgrid_edu.workshop.simulation.sensors.gps import Geodesy
-from semgrid_edu.workshop.simulation.sensors.instant import Instant
 from semgrid_edu.workshop.simulation.sensors.lidar import scan
-from semgrid_edu.workshop.simulation.sensors.raycast import PorousMesh, RayMesh
+from semgrid_edu.workshop.simulation.sensors.raycast import Instant, PorousMesh, RayMesh
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.sensors.truth import BirdseyeTruth, birdseye_kinds, visible_cells, world_cells
 from semgrid_edu.workshop.simulation.street.ego import Ego
@@ -95,8 +93,8 @@ class SimulatedDrive:
         traffic = Traffic(builder, self.ego.trajectory, duration)
         (wishes.cast or fill_street)(traffic)
         self.moving, self.parked = traffic.moving, traffic.parked
-        self.static = RayMesh.of(builder.shapes, builder.instances)
-        self.porous = PorousMesh.of(builder.porous, builder.opacities) if builder.porous else None
+        self.static = RayMesh.of(*zip(*builder.solid, strict=True))
+        self.porous = PorousMesh.of(*zip(*builder.porous, strict=True)) if builder.porous else None
         self.static_footprints = footprint_table(builder.footprints)
         self.sensor_seed = rng.bit_generator.seed_seq.spawn(1)[0]
 
@@ -216,16 +214,6 @@ class SimulatedDrive:
         points = scan(self.instant(t), self.pose(t), self.rig.lidar, self.plan.road, self._noise(index, 1))
         nearest = t + float(self._noise(index, 2).uniform(-half, half)) if half else t
         return Frame(None, points, self.rig.camera, self.pose(nearest), t)
-
-    def frames(self, labelled: set[int]) -> Iterator[SimulatedFrame]:
-        """Take all frames, one after the other.
-
-        Parameters
-        ----------
-        labelled : set of int
-            Numbers of the frames whose bird's-eye truth is wanted.
-        """
-        yield from (self.frame(k, k in labelled) for k in range(self.n_frames))
 
     def _noise(self, *key: int) -> np.random.Generator:
         """Return the drive's own generator for a key, such as the number of a frame."""

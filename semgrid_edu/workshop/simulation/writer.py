@@ -1,6 +1,5 @@
 """Simulated drives on disk: KITTI's raw layout, each drive written whole or not at all."""
 
-import io
 import json
 import shutil
 import tempfile
@@ -112,10 +111,8 @@ def _write_times(folder: Path, n_frames: int) -> None:
 
 def _save_png(path: Path, pixels: NDArray) -> None:
     """Write a PNG, at a level of compression above which files hardly get smaller but take longer."""
-    buffer = io.BytesIO()
-    Image.fromarray(pixels).save(buffer, format="png", compress_level=4)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(buffer.getvalue())
+    Image.fromarray(pixels).save(path, compress_level=4)
 
 
 def depth_to_png(depth: NDArray) -> NDArray[np.uint16]:
@@ -150,8 +147,8 @@ def _write_files(
     for name in ("image_02/data", "velodyne_points/data", "oxts/data", "labels"):
         (folder / name).mkdir(parents=True)
     objects = {}
-    for k, frame in enumerate(simulated.frames(set(labelled))):
-        name = f"{k:010d}"
+    for k in range(simulated.n_frames):
+        name, frame = f"{k:010d}", simulated.frame(k, k in labelled)
         _save_png(folder / "image_02" / "data" / f"{name}.png", frame.picture.image)
         points = depth_scan(frame.picture.depth, simulated.rig.camera) if dense else frame.points
         (folder / "velodyne_points" / "data" / f"{name}.bin").write_bytes(points.tobytes())
@@ -167,13 +164,9 @@ def _write_files(
 
 
 def write_drive(
-    root: Path,
-    drive: str,
-    simulated: SimulatedDrive,
-    labelled: Collection[int],
-    label_set: LabelSet = KITTI_14,
-    dense: bool = False,
-) -> Path:
+    root: Path, drive: str, simulated: SimulatedDrive, labelled: Collection[int],
+    label_set: LabelSet = KITTI_14, dense: bool = False,
+) -> Path:  # fmt: skip
     """Write a drive: images, points, oxts, timestamps, and labels of some frames.
 
     It grows in a hidden folder of its own, which gets the drive's name when the drive is whole. So a killed process

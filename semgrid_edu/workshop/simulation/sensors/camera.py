@@ -8,8 +8,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import transform_points
-from semgrid_edu.workshop.simulation.sensors.instant import Instant
-from semgrid_edu.workshop.simulation.sensors.raycast import Hits, turned
+from semgrid_edu.workshop.simulation.sensors.raycast import Hits, Instant, turned
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.sensors.shading import shade
 from semgrid_edu.workshop.simulation.street.layout import Road
@@ -64,6 +63,7 @@ def _discontinuities(triangle: NDArray, distance: NDArray, kind: NDArray, materi
 def _smooth(values, distance, step, radius, out):
     """Average sparse `values` (one every `step` pixels, -1 for none) over pixels at a similar distance."""
     height, width = distance.shape
+    # numba compiles the loop: which neighbours count depends on the distance of each pixel
     for r in range(height):
         for c in range(width):
             total, weight = 0.0, 0.0
@@ -89,11 +89,11 @@ def _open(
     away = normal[:, 0] * ray[:, 0] + normal[:, 1] * ray[:, 1] + normal[:, 2] * ray[:, 2] > 0
     facing = np.where(away, -1.0, 1.0)[:, None] * normal
     offset = 0.004 + 0.0006 * hits.distance[chosen, None].astype(np.float64)
-    starts = hits.position[chosen] + offset * (facing - ray)
+    starts = (hits.position[chosen] + offset * (facing - ray)).astype(np.float32)
     rays = (np.float32(axis) + along_normal * facing + spread * (luck - 0.5)).astype(np.float32)
     length = np.sqrt((rays**2).sum(axis=1, keepdims=True, dtype=np.float64))
     result = np.full(len(hits.distance), -1, np.float32)
-    result[chosen] = ~instant.blocked(starts, rays / length)
+    result[chosen] = ~instant.blocked(starts, (rays / length).astype(np.float32))
     return result
 
 

@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.workshop.simulation.sensors.instant import Instant
-from semgrid_edu.workshop.simulation.sensors.raycast import MISS, Hits, turned
+from semgrid_edu.workshop.simulation.sensors.raycast import MISS, Hits, Instant, turned
 from semgrid_edu.workshop.simulation.sensors.rig import Lidar
 from semgrid_edu.workshop.simulation.street.ground import ground_kinds
 from semgrid_edu.workshop.simulation.street.layout import Road

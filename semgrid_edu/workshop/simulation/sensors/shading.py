@@ -4,9 +4,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.workshop.simulation.sensors.instant import Instant
-from semgrid_edu.workshop.simulation.sensors.raycast import Hits
-from semgrid_edu.workshop.simulation.street.ground import KERB_WIDTH, lane_mark
+from semgrid_edu.workshop.simulation.sensors.raycast import Hits, Instant
+from semgrid_edu.workshop.simulation.street.ground import KERB_WIDTH, ground_kind, lane_mark
 from semgrid_edu.workshop.simulation.street.layout import Road, outside_asphalt, to_road
 from semgrid_edu.workshop.simulation.street.light import Light, noise_tile, sky_radiance, texture
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
@@ -68,19 +67,16 @@ def _grass(tile, x, y, blur, out):
 def _ground(tile, road, x, y, blur, out):
     """Write the albedo of the ground at (x, y); return its kind."""
     s, d = to_road(road, x, y)
-    e = outside_asphalt(road, s, d)
-    if e < 0.0:
+    e, kind = outside_asphalt(road, s, d), ground_kind(road, s, d)
+    if kind == Kind.ROAD:
         mark = _asphalt(tile, road, s, d, blur, out)
-        gutter = min(max((e + 0.35) / 0.35, 0.0), 1.0)
-        for c in range(3):
-            out[c] *= 1.0 - 0.3 * gutter
-        return Kind.LANE if mark else Kind.ROAD
-    side = road.left if d > 0 else road.right
-    if e < KERB_WIDTH or side.strip <= e < side.strip + side.walk:
+        out *= 1.0 - 0.3 * min(max((e + 0.35) / 0.35, 0.0), 1.0)
+        return Kind.LANE if mark else kind
+    if kind == Kind.SIDEWALK:
         _paving(tile, s if abs(d) < 40.0 else d, e, e < KERB_WIDTH, blur, out)
-        return Kind.SIDEWALK
-    _grass(tile, x, y, blur, out)
-    return Kind.GRASS
+    else:
+        _grass(tile, x, y, blur, out)
+    return kind
 
 
 @njit(cache=True, fastmath=True)
@@ -110,8 +106,7 @@ def _surface(tile, material, p, n, blur, out):
         gain = 1.0 + 0.7 * (texture(tile, 50.0 * u + 20.0 * p[0], 5.0 * v) - 0.5) * fade
     elif material == Material.LEAF:
         gain = 1.0 + 1.1 * (texture(tile, 45.0 * (u + p[0]), 45.0 * v + 20.0 * p[1]) - 0.5) * fade
-    for c in range(3):
-        out[c] *= gain
+    out *= gain
 
 
 @njit(cache=True, fastmath=True)
@@ -140,6 +135,7 @@ def _shade(
     """Write the radiance (N, 3) and the kind (N,) of every hit."""
     sun, sun_colour, zenith, horizon, _, haze, _ = light
     n, albedo = np.empty(3, np.float32), np.empty(3, np.float32)
+    # numba compiles the loop: every material has its own branch, so that an array for each would cost more
     for i in range(len(t)):
         ray = rays[i]
         out = radiance[i]
@@ -173,8 +169,7 @@ def _shade(
         elif m == Material.METAL:
             _mirror(tile, ray, n, light, 20.0, 0.04, out)
         elif m == Material.LAMP:
-            for c in range(3):
-                out[c] += 0.45 * albedo[c]
+            out += 0.45 * albedo
         fog = 1.0 - np.exp(-haze * t[i])
         for c in range(3):
             out[c] = out[c] * (1.0 - fog) + fog * 0.92 * horizon[c]

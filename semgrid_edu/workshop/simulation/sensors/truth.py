@@ -43,7 +43,7 @@ class BirdseyeTruth:
 
 
 def world_cells(T_world_from_lidar: NDArray, rig: Rig) -> NDArray[np.float64]:
-    """Return where in the world the cells of `LABEL_GRID` are.
+    """Return where in the world the centres of the cells of `LABEL_GRID` are, (710, 310, 2), metres.
 
     Parameters
     ----------
@@ -51,15 +51,10 @@ def world_cells(T_world_from_lidar: NDArray, rig: Rig) -> NDArray[np.float64]:
         Pose of the LIDAR, metres.
     rig : Rig
         Where the grid lies below the LIDAR.
-
-    Returns
-    -------
-    (710, 310, 2) float64
-        x and y of the centre of each cell, metres.
     """
     T = T_world_from_lidar @ np.linalg.inv(rig.T_grid_from_lidar)
-    centers = LABEL_GRID.centers()
-    return transform_points(T, np.concatenate([centers, np.zeros((*LABEL_GRID.shape, 1))], axis=-1))[..., :2]
+    on_plane = np.concatenate([LABEL_GRID.centers(), np.zeros((*LABEL_GRID.shape, 1))], axis=-1)
+    return transform_points(T, on_plane)[..., :2]
 
 
 def birdseye_kinds(cells: NDArray, footprints: NDArray, road: Road) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
@@ -83,10 +78,8 @@ def birdseye_kinds(cells: NDArray, footprints: NDArray, road: Road) -> tuple[NDA
     """
     which = np.full(cells.shape[:2], -1, np.int32)
     stamp(footprints, cells, LABEL_GRID.cell, which)
-    kinds = ground_kinds(road, cells.reshape(-1, 2)).reshape(which.shape)
-    standing = which >= 0
-    kinds[standing] = footprints[which[standing], 6].astype(np.uint8)
-    return kinds, which
+    ground = ground_kinds(road, cells.reshape(-1, 2)).reshape(which.shape)
+    return np.where(which >= 0, footprints[which, 6].astype(np.uint8), ground), which
 
 
 @njit(cache=True)
@@ -121,6 +114,7 @@ def _visible(cells, kinds, which, footprints, road, T, K, pixel_kinds, depth, se
     A pixel has one depth for the whole patch of surface that it shows. So the tolerance grows with the patch.
     """
     f = K[0, 0]
+    # numba compiles the loop: most cells are decided by one pixel, so the search ends early
     for r in range(cells.shape[0]):
         for c in range(cells.shape[1]):
             x, y = cells[r, c]

@@ -103,6 +103,12 @@ def _stand(builder: Builder, piece: Piece, kind: Kind, half: float, top: float, 
     return bool(foot)
 
 
+def _stand_fence(builder: Builder, piece: Piece, top: float, frame: Shape, sheet: Shape, opacity: float) -> None:
+    """Put a piece of wire mesh or a pane into the world, in its frame, unless its place is taken."""
+    if _stand(builder, piece, Kind.FENCE, _THIN_HALF, top, sheet, opacity):
+        builder.add(frame, *piece[:3])
+
+
 def wire_mesh(builder: Builder, s0: float, s1: float, d: float) -> None:
     """Run a fence of wire mesh: posts, a rail and a sheet of wire.
 
@@ -121,9 +127,7 @@ def wire_mesh(builder: Builder, s0: float, s1: float, d: float) -> None:
     rng = builder.rng
     opacity, step = rng.uniform(0.008, 0.02), rng.choice([2.0, 2.5, 3.0])
     for piece in _pieces(s0, s1, d, 2.5, step, rng):
-        sheet = furniture.mesh_sheet(piece[3])
-        if _stand(builder, piece, Kind.FENCE, _THIN_HALF, furniture.MESH_HEIGHT, sheet, opacity):
-            builder.add(furniture.mesh_frame(piece[3]), *piece[:3])
+        _stand_fence(builder, piece, furniture.MESH_HEIGHT, *furniture.wire_fence(piece[3]), opacity)
 
 
 def twig_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
@@ -167,9 +171,7 @@ def panes(builder: Builder, s0: float, s1: float, d: float) -> None:
     opacity, step = rng.uniform(0.05, 0.15), rng.uniform(1.3, 2.2)
     for piece in _pieces(s0, s1, d, 0.8, step, rng):
         if rng.random() > 0.1:
-            glass = furniture.pane(piece[3])
-            if _stand(builder, piece, Kind.FENCE, _THIN_HALF, furniture.PANE_HEIGHT, glass, opacity):
-                builder.add(furniture.pane_frame(piece[3]), *piece[:3])
+            _stand_fence(builder, piece, furniture.PANE_HEIGHT, *furniture.glass_pane(piece[3]), opacity)
 
 
 def post_row(builder: Builder, s0: float, s1: float, d: float) -> None:

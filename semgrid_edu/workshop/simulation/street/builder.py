@@ -27,14 +27,10 @@ class Builder:
 
     Attributes
     ----------
-    shapes : list of Shape
-        All that stands in the world so far, in its frame.
-    instances : list of int
-        For each shape the number of its object; 0 for scenery.
-    porous : list of Shape
-        What lets a part of the light through, in the frame of the world.
-    opacities : list of float
-        For each shape of `porous` its opacity, as `PorousMesh` takes it.
+    solid : list of (Shape, int)
+        All that stands in the world so far, in its frame, with the number of its object; 0 for scenery.
+    porous : list of (Shape, float)
+        What lets a part of the light through, with its opacity, as `PorousMesh` takes it.
     footprints : list of Footprint
         The ground that is taken.
     next_instance : int
@@ -43,10 +39,8 @@ class Builder:
 
     def __init__(self, plan: Plan, rng: np.random.Generator) -> None:
         self.plan, self.road, self.rng = plan, plan.road, rng
-        self.shapes: list[Shape] = []
-        self.instances: list[int] = []
-        self.porous: list[Shape] = []
-        self.opacities: list[float] = []
+        self.solid: list[tuple[Shape, int]] = []
+        self.porous: list[tuple[Shape, float]] = []
         self.footprints: list[Footprint] = []
         self.next_instance = 1
 
@@ -144,8 +138,7 @@ class Builder:
         scale : float
             Factor for its size.
         """
-        self.shapes.append(shape.placed(*self.place(s, d, yaw), scale))
-        self.instances.append(0)
+        self.solid.append((shape.placed(*self.place(s, d, yaw), scale), 0))
         if foot:
             self.footprints.append(foot)
 
@@ -161,8 +154,7 @@ class Builder:
         opacity : float
             As `PorousMesh` takes it.
         """
-        self.porous.append(shape.placed(*self.place(s, d, yaw)))
-        self.opacities.append(opacity)
+        self.porous.append((shape.placed(*self.place(s, d, yaw)), opacity))
 
     def try_post(self, shape: Shape, s: float, d: float, yaw: float, kind: Kind, radius: float, scale=1.0) -> None:
         """Put something on a round foot, unless the place is asphalt or taken.
@@ -182,8 +174,3 @@ class Builder:
         """
         if foot := self.spot(s, d, kind, radius, radius + 0.15, yaw):
             self.add(shape, s, d, yaw, foot, scale)
-
-    def number(self) -> int:
-        """Return a number that no other object has."""
-        self.next_instance += 1
-        return self.next_instance - 1

@@ -87,10 +87,5 @@ def rotation_matrix(roll: float, pitch: float, yaw: float) -> NDArray[np.float64
         Angles about the x, y and z axes, rad.
     """
     cr, sr, cp, sp, cy, sy = (f(a) for a in (roll, pitch, yaw) for f in (np.cos, np.sin))
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
+    ahead, left = (cy * cp, sy * cp, -sp), (cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr)
+    return np.column_stack([ahead, left, (cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr)])

@@ -73,6 +73,7 @@ def stamp(footprints: NDArray, xy: NDArray, cell: float, which: NDArray) -> None
     ex = (xy[0, 0] - xy[1, 0]) / cell
     ey = (xy[0, 0] - xy[0, 1]) / cell
     origin = xy[0, 0]
+    # numba compiles the loop: each footprint looks at the few cells around it, not at the whole grid
     for k in range(len(footprints)):
         f = footprints[k]
         dx, dy = f[0] - origin[0], f[1] - origin[1]

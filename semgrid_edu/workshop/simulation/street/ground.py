@@ -128,6 +128,7 @@ def ground_kinds(road: Road, xy: NDArray) -> NDArray[np.uint8]:
         Members of `Kind`.
     """
     kinds = np.empty(len(xy), np.uint8)
+    # numba compiles the loop: the functions of a place that it calls take one place at a time
     for i in range(len(xy)):
         s, d = to_road(road, xy[i, 0], xy[i, 1])
         kinds[i] = ground_kind(road, s, d)

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -104,30 +103,24 @@ class Plan:
         return self.borders[0 if sign > 0 else 1]
 
 
-class _Style(NamedTuple):
-    """What a style decides beside the asphalt; ranges are metres."""
-
-    strip: float  # chance of a strip of grass
-    walk: tuple[float, float]
-    bank_rise: tuple[float, float] | None = None
-
-
-_STYLES = {
-    "town": _Style(0.25, (2.6, 4.5)),
-    "suburb": _Style(0.5, (1.8, 2.6), (0.0, 0.25)),
-    "park": _Style(0.7, (1.6, 2.4), (0.35, 1.3)),
-    YARD: _Style(0.3, (1.2, 2.6)),
+_SIDES = {
+    "town": (0.25, (2.6, 4.5), None),
+    "suburb": (0.5, (1.8, 2.6), (0.0, 0.25)),
+    "park": (0.7, (1.6, 2.4), (0.35, 1.3)),
+    YARD: (0.3, (1.2, 2.6), None),
 }
+"""Of each style: how often grass parts the sidewalk from the kerb; the narrowest and the widest sidewalk, and the
+lowest and the highest bank behind it, metres."""
 
 
 def _side(style: str, lanes: int, lane: float, parking: bool, rng: np.random.Generator) -> Side:
     """Draw one side of the road."""
-    edge, measures = lanes * lane + (2.2 if parking else 0.35), _STYLES[style]
-    strip = rng.uniform(1.4, 2.6) if rng.random() < measures.strip else 0.0
-    walk = rng.uniform(*measures.walk)
+    edge, (often, widths, rises) = lanes * lane + (2.2 if parking else 0.35), _SIDES[style]
+    strip = rng.uniform(1.4, 2.6) if rng.random() < often else 0.0
+    walk = rng.uniform(*widths)
     if style == "park" and rng.random() < 0.4:
         strip, walk = 0.0, 0.0
-    rise = rng.uniform(*measures.bank_rise) if measures.bank_rise else 0.0
+    rise = rng.uniform(*rises) if rises else 0.0
     return Side(edge, strip, walk, rise, rng.uniform(2.5, 6.0))
 
 

@@ -1,5 +1,7 @@
 """The scenery of a planned street: its ground, houses, fences, trees, lamps and signs."""
 
+from functools import partial
+
 import numpy as np
 
 from semgrid_edu.workshop.simulation.street import borders
@@ -22,8 +24,7 @@ def build_scenery(plan: Plan, rng: np.random.Generator) -> Builder:
         Source of all that is drawn.
     """
     builder = Builder(plan, rng)
-    builder.shapes.append(ground_mesh(plan.road, plan.extent))
-    builder.instances.append(0)
+    builder.solid.append((ground_mesh(plan.road, plan.extent), 0))
     borders.stand_signals(builder)
     for sign, style in zip((1, -1), plan.styles, strict=True):
         borders.stand_lamps(builder, sign)
@@ -93,50 +94,38 @@ def _suburb_house(rng: np.random.Generator) -> House:
     return House(rng.uniform(8, 12), rng.uniform(7.5, 10.5), int(rng.integers(1, 3)), roof, False, seed)
 
 
-def _town(builder: Builder, sign: int) -> None:
-    """Line one side with facades at the sidewalk, few of them with a gap between."""
-    rng, side, extent = builder.rng, builder.road.side(sign), builder.plan.extent
-    line, setback = side.strip + side.walk, rng.uniform(0.0, 0.4)
+def _house_row(builder: Builder, sign: int, town: bool) -> None:
+    """Line one side with facades at the sidewalk, or with houses in gardens behind fences and hedges."""
+    rng, side, extent, border = builder.rng, builder.road.side(sign), builder.plan.extent, builder.plan.border(sign)
+    line, setback = side.strip + side.walk, rng.uniform(0.0, 0.4) if town else rng.uniform(3.5, 8.0)
     s = extent.start + rng.uniform(0, 8)
     while s < extent.end - 20:
-        house = _town_house(rng)
-        gap = 0.02 if rng.random() < 0.75 else rng.uniform(2, 6)
+        house = (_town_house if town else _suburb_house)(rng)
+        gap = rng.uniform(2.5, 9.0) if not town else 0.02 if rng.random() < 0.75 else rng.uniform(2, 6)
+        end = s + house.width + gap
         if not _meets_side_road(builder, s, s + house.width, sign, line + 0.8):
-            rng.uniform(0, 1.0)  # in a suburb, by how much the house stands back from the others
-            _house(builder, house, s + house.width / 2, sign * (side.edge + line + setback), _facing(sign))
-        if gap > 2 and rng.random() < 0.6:
+            front = side.edge + line + setback + rng.uniform(0, 1.0) * (not town)
+            _house(builder, house, s + house.width / 2, sign * front, _facing(sign))
+        if not town:
+            border = str(rng.choice([*furniture.FENCES, "hedge"])) if rng.random() < 0.15 else border
+            _border(builder, s, end, sign, side.edge + line + 0.35, border)
+            _garden(builder, s, end, sign, side.edge + line + 1.2, setback)
+        elif gap > 2 and rng.random() < 0.6:
             _tree(builder, s + house.width + gap / 2, sign * (side.edge + line + 3.0))
         s += house.width + gap
-    _second_row(builder, sign, side.edge + line + setback + 24)
+    if town or rng.random() < 0.5:
+        _tall_houses(builder, sign, side.edge + line + setback + 24, (0, 10), 34.0, 10, 0.7)
 
 
-def _suburb(builder: Builder, sign: int) -> None:
-    """Line one side with houses in gardens behind fences and hedges."""
-    rng, side, extent = builder.rng, builder.road.side(sign), builder.plan.extent
-    line, setback = side.strip + side.walk, rng.uniform(3.5, 8.0)
-    border = builder.plan.border(sign)
-    s = extent.start + rng.uniform(0, 8)
-    while s < extent.end - 20:
-        house, gap = _suburb_house(rng), rng.uniform(2.5, 9.0)
-        if not _meets_side_road(builder, s, s + house.width, sign, line + 0.8):
-            front = side.edge + line + setback + rng.uniform(0, 1.0)
-            _house(builder, house, s + house.width / 2, sign * front, _facing(sign))
-        if rng.random() < 0.15:
-            border = str(rng.choice([*furniture.FENCES, "hedge"]))
-        _border(builder, s, s + house.width + gap, sign, side.edge + line + 0.35, border)
-        _garden(builder, s, s + house.width + gap, sign, side.edge + line + 1.2, setback)
-        s += house.width + gap
-    if rng.random() < 0.5:
-        _second_row(builder, sign, side.edge + line + setback + 24)
-
-
-def _second_row(builder: Builder, sign: int, offset: float) -> None:
-    """Scatter taller houses behind the first row, so that gaps don't end in nothing."""
+def _tall_houses(
+    builder: Builder, sign: int, line: float, behind: tuple, step: float, along: float, share: float
+) -> None:
+    """Scatter houses of a town some metres `behind` a line along the road, so that gaps don't end in nothing."""
     rng, extent = builder.rng, builder.plan.extent
-    for s in np.arange(extent.start, extent.end, 34.0):
-        if rng.random() < 0.7:
-            house = _town_house(rng)
-            _house(builder, house, s + rng.uniform(0, 10), sign * (offset + rng.uniform(0, 10)), _facing(sign))
+    for s in np.arange(extent.start, extent.end, step):
+        if rng.random() < share:
+            house, s = _town_house(rng), s + rng.uniform(0, along)
+            _house(builder, house, s, sign * (line + rng.uniform(*behind)), _facing(sign))
 
 
 def _border(builder: Builder, s0: float, s1: float, sign: int, offset: float, style: str) -> None:
@@ -178,10 +167,7 @@ def _park(builder: Builder, sign: int) -> None:
         for _ in range(2):
             offset = line + rng.uniform(1.8, 26)
             (_tree if rng.random() < 0.62 else _bush)(builder, s + rng.uniform(0, 5), sign * offset)
-    for s in np.arange(extent.start, extent.end, 60.0):
-        if rng.random() < 0.5:
-            house = _town_house(rng)
-            _house(builder, house, s + rng.uniform(0, 30), sign * (line + rng.uniform(30, 40)), _facing(sign))
+    _tall_houses(builder, sign, line, (30, 40), 60.0, 30, 0.5)
 
 
 def _yard(builder: Builder, sign: int) -> None:
@@ -194,7 +180,12 @@ def _yard(builder: Builder, sign: int) -> None:
         _tree(builder, s + rng.uniform(0, 6), sign * (line + rng.uniform(6, 30)))
 
 
-_LINE_SIDE = {"town": _town, "suburb": _suburb, "park": _park, YARD: _yard}
+_LINE_SIDE = {
+    "town": partial(_house_row, town=True),
+    "suburb": partial(_house_row, town=False),
+    "park": _park,
+    YARD: _yard,
+}
 """What lines a side of each style: functions of the world and of the side, 1 for the left and -1 for the right one."""
 
 

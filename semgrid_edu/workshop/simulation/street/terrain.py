@@ -53,6 +53,7 @@ def _along(road: Road, extent: Extent) -> NDArray[np.float64]:
 def _vertices(road: Road, s: NDArray, d: NDArray) -> NDArray:
     """Return the mesh's vertices, (len(s), len(d), 3)."""
     out = np.empty((len(s), len(d), 3))
+    # numba compiles the loop: the functions of a place that it calls take one place at a time
     for i in range(len(s)):
         for j in range(len(d)):
             x, y, _ = to_world(road, s[i], d[j])

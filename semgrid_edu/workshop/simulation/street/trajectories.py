@@ -90,7 +90,7 @@ class Departure:
         return 0.5 * self.acceleration * rising**2 + self.mean * (since - rising)
 
     def speed(self, t: float) -> float:
-        """Return the speed at one instant, m/s. Parameters are those of `Pace.speed`."""
+        """Return the speed at one instant, m/s. Parameters are those of `Pace.distance`."""
         return min(self.acceleration * max(t - self.start, 0.0), self.mean)
 
 

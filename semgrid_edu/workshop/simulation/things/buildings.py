@@ -2,23 +2,14 @@
 
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.workshop.simulation.things import shapes
-from semgrid_edu.workshop.simulation.things.materials import Kind, Material
+from semgrid_edu.workshop.simulation.things.materials import PALETTES, Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import UP, Shape, merge, quads
 
-_PLASTER = (
-    (0.70, 0.64, 0.50), (0.72, 0.70, 0.66), (0.62, 0.45, 0.28), (0.55, 0.30, 0.22),
-    (0.66, 0.58, 0.34), (0.42, 0.46, 0.50), (0.50, 0.56, 0.44), (0.60, 0.52, 0.50),
-)  # fmt: skip
-_BRICK = ((0.30, 0.10, 0.06), (0.36, 0.16, 0.09), (0.24, 0.12, 0.08), (0.42, 0.30, 0.2))
-_TILES = ((0.28, 0.08, 0.05), (0.20, 0.07, 0.05), (0.09, 0.09, 0.10), (0.16, 0.10, 0.08), (0.33, 0.14, 0.08))
-_DOORS = ((0.10, 0.05, 0.03), (0.03, 0.10, 0.06), (0.25, 0.03, 0.03), (0.04, 0.06, 0.14), (0.5, 0.48, 0.44))
-_SHOPS = ((0.30, 0.03, 0.03), (0.03, 0.12, 0.22), (0.04, 0.16, 0.08), (0.45, 0.30, 0.04), (0.05, 0.05, 0.06))
 _DEEP = -2.5
 """How far walls reach into the ground, metres, so that no gap opens below them on a slope."""
 _box, _shape = partial(shapes.box, kind=Kind.BUILDING), partial(shapes.shape, kind=Kind.BUILDING)
@@ -55,6 +46,10 @@ class House:
         return 2.9 * self.storeys + 0.5
 
 
+def _pick(palette: str, rng: np.random.Generator) -> tuple[float, float, float]:
+    return PALETTES[palette][rng.integers(len(PALETTES[palette]))]
+
+
 def _walls(house: House) -> list[tuple[NDArray, NDArray, float]]:
     """Return origin, direction and length of the four walls, each going right as seen from outside; front first."""
     w, d = house.width / 2, house.depth
@@ -64,16 +59,6 @@ def _walls(house: House) -> list[tuple[NDArray, NDArray, float]]:
     return [(c, e / n, n) for c, e, n in zip(corners, edges, lengths, strict=True)]
 
 
-class _Style(NamedTuple):
-    """What all windows of a house share."""
-
-    spacing: float
-    size: tuple[float, float]
-    frame: tuple[float, float, float]
-    shutters: tuple[float, float, float] | None
-    sill: bool
-
-
 def _panel(corner, right, up, out: float, colour, material=Material.MATTE) -> Shape:
     """Hang rectangles on a wall, `out` metres in front of it."""
     normal = np.cross(right, up)
@@ -81,11 +66,11 @@ def _panel(corner, right, up, out: float, colour, material=Material.MATTE) -> Sh
     return quads(corner + out * normal, right, up, colour, material, Kind.BUILDING)
 
 
-def _windows(origin, along, length: float, sills: NDArray, style: _Style, rng: np.random.Generator) -> list[Shape]:
+def _windows(origin, along, length: float, sills: NDArray, style: tuple, rng: np.random.Generator) -> list[Shape]:
     """Hang a grid of windows on a wall: frame, two panes, sill, perhaps shutters."""
-    n = max(int((length - 0.8) / style.spacing), 1)
+    spacing, (w, h), frame, shutters, has_sill = style
+    n = max(int((length - 0.8) / spacing), 1)
     step = length / n
-    w, h = style.size
     x, z = (a.ravel() for a in np.meshgrid((np.arange(n) + 0.5) * step - w / 2, sills))
     keep = rng.random(len(x)) > 0.06
     x, z = x[keep], z[keep]
@@ -93,22 +78,22 @@ def _windows(origin, along, length: float, sills: NDArray, style: _Style, rng: n
     curtain = rng.random((len(x), 1))
     pane = np.where(curtain < 0.3, 0.25, 0.02) * np.array([1.0, 1.02, 1.06]) * (0.6 + 0.8 * curtain)
     edge = 0.08
-    parts = [_panel(corner, w * along, h * UP, 0.02, style.frame)]
+    parts = [_panel(corner, w * along, h * UP, 0.02, frame)]
     for k in range(2):
         inner = corner + (edge + k * (w / 2 - edge / 2 + 0.02)) * along + edge * UP
         parts.append(_panel(inner, (w / 2 - 1.25 * edge) * along, (h - 2 * edge) * UP, 0.04, pane, Material.GLASS))
-    if style.sill:
+    if has_sill:
         parts.append(_panel(corner - 0.1 * along - 0.12 * UP, (w + 0.2) * along, 0.12 * UP, 0.07, (0.45, 0.44, 0.42)))
-    if style.shutters:
+    if shutters:
         for shift in (-0.5 * w - 0.02, w + 0.02):
-            parts.append(_panel(corner + shift * along, 0.5 * w * along, h * UP, 0.05, style.shutters, Material.WOOD))
+            parts.append(_panel(corner + shift * along, 0.5 * w * along, h * UP, 0.05, shutters, Material.WOOD))
     return parts
 
 
 def _front_door(origin, along, length: float, rng: np.random.Generator) -> list[Shape]:
     """Hang a door with its frame, a step and a small canopy near the middle of the front."""
     at = origin + (length * rng.uniform(0.3, 0.6)) * along
-    colour = _DOORS[rng.integers(len(_DOORS))]
+    colour = _pick("doors", rng)
     out = np.cross(along, UP)
     return [
         _panel(at - 0.12 * along, 1.34 * along, 2.5 * UP, 0.06, (0.6, 0.58, 0.54)),
@@ -120,7 +105,7 @@ def _front_door(origin, along, length: float, rng: np.random.Generator) -> list[
 
 def _shop_front(origin, along, length: float, rng: np.random.Generator) -> list[Shape]:
     """Hang a shop's windows, door and sign board on the ground floor."""
-    colour = np.array(_SHOPS[rng.integers(len(_SHOPS))])
+    colour = np.array(_pick("shops", rng))
     n = max(int(length / 2.6), 1)
     step = (length - 0.8) / n
     corner = origin + (0.5 + np.arange(n) * step)[:, None] * along + 0.45 * UP
@@ -154,7 +139,7 @@ def _gable(house: House, tiles, wall, wall_material, rng: np.random.Generator) -
         )
         for flip in (np.ones(3), half_a_turn)
     ]
-    chimney = _box((0.5 * w, 0.6 * d, z + 0.9 * rise), (0.7, 0.6, 1.6), _BRICK[0], Material.BRICK)
+    chimney = _box((0.5 * w, 0.6 * d, z + 0.9 * rise), (0.7, 0.6, 1.6), PALETTES["brick"][0], Material.BRICK)
     return [*parts, chimney]
 
 
@@ -189,13 +174,13 @@ def _balconies(house: House, rng: np.random.Generator) -> list[Shape]:
     return parts
 
 
-def _draw_style(house: House, rng: np.random.Generator) -> _Style:
-    """Draw what the windows of a house look like."""
+def _draw_style(house: House, rng: np.random.Generator) -> tuple:
+    """Draw what the windows of a house share: spacing, size, colours of frame and shutters, whether they have sills."""
     frame = (0.72, 0.71, 0.68) if rng.random() < 0.75 else (0.12, 0.08, 0.06)
-    shutters = _DOORS[rng.integers(4)] if house.roof == "gable" and rng.random() < 0.45 else None
+    shutters = PALETTES["doors"][rng.integers(4)] if house.roof == "gable" and rng.random() < 0.45 else None
     size = (rng.uniform(1.0, 1.5), rng.uniform(1.35, 1.7))
     spacing = rng.uniform(2.2, 3.2) + (0.8 if shutters else 0)
-    return _Style(spacing, size, frame, shutters, bool(rng.random() < 0.7))
+    return spacing, size, frame, shutters, rng.random() < 0.7
 
 
 def _body(house: House, wall, material: Material) -> list[Shape]:
@@ -216,16 +201,15 @@ def build_house(house: House) -> Shape:
         Its plan; x along the front, y away from the street.
     """
     rng = np.random.default_rng([house.seed, 80])
-    palette, material = (_BRICK, Material.BRICK) if rng.random() < 0.3 else (_PLASTER, Material.PLASTER)
-    wall = np.array(palette[rng.integers(len(palette))]) * rng.uniform(0.8, 1.15, 3)
-    tiles = np.array(_TILES[rng.integers(len(_TILES))]) * rng.uniform(0.8, 1.2)
+    material = Material.BRICK if rng.random() < 0.3 else Material.PLASTER
+    wall = np.array(_pick(material.name.lower(), rng)) * rng.uniform(0.8, 1.15, 3)
+    tiles = np.array(_pick("tiles", rng)) * rng.uniform(0.8, 1.2)
     parts, style = _body(house, wall, material), _draw_style(house, rng)
     sills = 2.9 * np.arange(house.storeys) + 1.3
     front, *others = _walls(house)
     parts += _windows(*front, sills[1:] if house.shop else sills, style, rng)
     parts += (_shop_front if house.shop else _front_door)(*front, rng)
-    for wall_place in others:
-        parts += _windows(*wall_place, sills, style, rng)
+    parts += [window for side in others for window in _windows(*side, sills, style, rng)]
     if house.roof == "gable":
         parts += _gable(house, tiles, wall, material, rng)
     else:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from semgrid_edu.workshop.simulation.things import shapes
-from semgrid_edu.workshop.simulation.things.materials import Kind, Material
+from semgrid_edu.workshop.simulation.things.materials import PALETTES, Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, merge, shape
 
 
@@ -32,11 +32,7 @@ _TABLE = Path(__file__).with_name("cars.toml")
 _BODIES = {name: _Body(**body) for name, body in tomllib.loads(_TABLE.read_text(encoding="utf-8")).items()}
 BODIES = tuple(_BODIES)
 """The car bodies that `car` knows."""
-PAINTS = (
-    (0.62, 0.63, 0.63), (0.85, 0.85, 0.84), (0.30, 0.31, 0.33), (0.02, 0.02, 0.025),
-    (0.03, 0.06, 0.19), (0.35, 0.02, 0.02), (0.10, 0.11, 0.13), (0.05, 0.16, 0.10),
-    (0.42, 0.38, 0.28), (0.08, 0.20, 0.42), (0.55, 0.22, 0.03),
-)  # fmt: skip
+PAINTS = PALETTES["paint"]
 """Linear colours of car paint, the usual ones first."""
 _GLASS, _DARK, _TYRE = (0.025, 0.03, 0.035), (0.02, 0.02, 0.022), (0.025, 0.025, 0.025)
 _BUMPER, _PLATE = (0.04, 0.04, 0.04), (0.9, 0.9, 0.88)

@@ -55,8 +55,8 @@ def fence(style: str, length: float) -> Shape:
 
 
 @cache
-def mesh_frame(length: float) -> Shape:
-    """Make what is solid of a piece of wire mesh fence from the origin along x: a post at its start, a rail on top.
+def wire_fence(length: float) -> tuple[Shape, Shape]:
+    """Make a piece of wire mesh fence from the origin along x: post and rail, and the sheet of `Material.WIRE`.
 
     Parameters
     ----------
@@ -64,27 +64,18 @@ def mesh_frame(length: float) -> Shape:
         Distance to the next post, metres.
     """
     post = _fence_box((0, 0, MESH_HEIGHT / 2 - 0.3), (0.06, 0.06, MESH_HEIGHT + 0.7), _ZINC, Material.METAL)
-    return merge([post, _fence_box((length / 2, 0, MESH_HEIGHT - 0.02), (length, 0.03, 0.04), _ZINC, Material.METAL)])
+    rail = _fence_box((length / 2, 0, MESH_HEIGHT - 0.02), (length, 0.03, 0.04), _ZINC, Material.METAL)
+    wire = _fence_quads((0, 0, 0.05), (length, 0, 0), (0, 0, MESH_HEIGHT - 0.05), _ZINC, Material.WIRE)
+    return merge([post, rail]), wire
 
 
 @cache
-def mesh_sheet(length: float) -> Shape:
-    """Make the wire of `mesh_frame`, as a sheet of `Material.WIRE`. Parameters are those of `mesh_frame`."""
-    return _fence_quads((0, 0, 0.05), (length, 0, 0), (0, 0, MESH_HEIGHT - 0.05), _ZINC, Material.WIRE)
-
-
-@cache
-def pane_frame(length: float) -> Shape:
-    """Make what is solid of one pane: a post at its start, two rails. Parameters are those of `mesh_frame`."""
+def glass_pane(length: float) -> tuple[Shape, Shape]:
+    """Make a pane: post and two rails, and the sheet of `Material.PANE`. Parameters are those of `wire_fence`."""
     post = _fence_box((0, 0, PANE_HEIGHT / 2), (0.06, 0.06, PANE_HEIGHT + 0.2), _FRAME, Material.METAL)
     rails = [_fence_box((length / 2, 0, z), (length, 0.05, 0.06), _FRAME, Material.METAL) for z in (0.2, 2.05)]
-    return merge([post, *rails])
-
-
-@cache
-def pane(length: float) -> Shape:
-    """Make the glass of `pane_frame`, as a sheet of `Material.PANE`. Parameters are those of `mesh_frame`."""
-    return _fence_quads((0, 0, 0.23), (length, 0, 0), (0, 0, PANE_HEIGHT - 0.3), _FRAME, Material.PANE)
+    glass = _fence_quads((0, 0, 0.23), (length, 0, 0), (0, 0, PANE_HEIGHT - 0.3), _FRAME, Material.PANE)
+    return merge([post, *rails]), glass
 
 
 def porous_hedge(length: float, thickness: float, height: float) -> Shape:
@@ -167,14 +158,11 @@ def lamp(height: float) -> Shape:
         Height of the lamp above the ground, metres.
     """
     metal = partial(tube, colour=(0.24, 0.25, 0.25), material=Material.METAL, kind=Kind.POLE)
-    return merge(
-        [
-            metal((0, 0, -0.5), (0, 0, 1.2), (0.11, 0.10)),
-            metal((0, 0, 1.2), (0, 0, height - 0.4), (0.075, 0.055)),
-            metal((0, 0, height - 0.4), (0, 1.5, height), (0.05, 0.04)),
-            box((0, 1.7, height), (0.22, 0.7, 0.12), (0.3, 0.3, 0.29), Material.METAL, Kind.POLE),
-        ]
-    )
+    foot = metal((0, 0, -0.5), (0, 0, 1.2), (0.11, 0.10))
+    post = metal((0, 0, 1.2), (0, 0, height - 0.4), (0.075, 0.055))
+    arm = metal((0, 0, height - 0.4), (0, 1.5, height), (0.05, 0.04))
+    head = box((0, 1.7, height), (0.22, 0.7, 0.12), (0.3, 0.3, 0.29), Material.METAL, Kind.POLE)
+    return merge([foot, post, arm, head])
 
 
 @cache

@@ -1,6 +1,8 @@
 """What things are and what they are made of, and the class that each label set of section 4 gives them."""
 
+import tomllib
 from enum import IntEnum
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +56,12 @@ REFLECTANCE = np.array(
     [0.35, 0.25, 0.45, 0.35, 0.3, 0.4, 0.08, 0.3, 0.4, 0.25, 0.4, 0.3, 0.06, 0.7, 1.0, 0.4, 0.01, 0.4], dtype=np.float32
 )
 """Share of 905 nm light that each `Material` sends back (1: retroreflective plates and signs)."""
+
+PALETTES = {
+    name: tuple(map(tuple, colours))
+    for name, colours in tomllib.loads(Path(__file__).with_name("palettes.toml").read_text(encoding="utf-8")).items()
+}
+"""Linear colours of what comes in several, by what wears them."""
 
 _KITTI_NAMES = {"lane": "road", "sign": "signage", "pole": "signage"}
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.workshop.simulation.things.cars import PAINTS
-from semgrid_edu.workshop.simulation.things.materials import Kind, Material
+from semgrid_edu.workshop.simulation.things.materials import PALETTES, Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, ball, merge, quads, tube
 
 _BLACK, _GREY = (0.02, 0.02, 0.02), (0.25, 0.25, 0.25)
@@ -27,6 +27,8 @@ _FRAME = (
     ((0.36, 0, 0.98), _FRONT, 0.024),
 )
 """The tubes of a bicycle: where they begin and end, and their radius, metres."""
+_BARS = ((0.4, 0.28, 1.02, 0.018), (-0.08, 0.12, 0.32, 0.07))
+"""Handlebar and pedals: x, half the length along y, z and radius, metres."""
 
 
 def _wheel(x: float) -> list[Shape]:
@@ -42,28 +44,15 @@ def _wheel(x: float) -> list[Shape]:
 def bicycle() -> Shape:
     """Make a bicycle, 1.75 m long; its frame is of `Material.PAINT`, so that it can be recoloured."""
     metal = partial(tube, colour=_GREY, material=Material.METAL, kind=Kind.BICYCLE, sides=5)
-    return merge(
-        [
-            *_wheel(-0.53),
-            *_wheel(0.53),
-            *(tube(*measures, PAINTS[5], Material.PAINT, Kind.BICYCLE, 5) for measures in _FRAME),
-            metal((0.4, -0.28, 1.02), (0.4, 0.28, 1.02), 0.018),
-            ball((-0.24, 0, 0.93), (0.13, 0.08, 0.04), _BLACK, Material.RUBBER, Kind.BICYCLE),
-            metal((-0.08, -0.12, 0.32), (-0.08, 0.12, 0.32), 0.07),
-            quads([-0.55, 0.0, 0.7], [0.1, 0, 0], [0, 0.03, 0.04], (0.5, 0.02, 0.02), Material.RETRO, Kind.BICYCLE),
-        ]
-    )
+    frame = [tube(*measures, PAINTS[5], Material.PAINT, Kind.BICYCLE, 5) for measures in _FRAME]
+    bar, pedals = (metal((x, -y, z), (x, y, z), thick) for x, y, z, thick in _BARS)
+    saddle = ball((-0.24, 0, 0.93), (0.13, 0.08, 0.04), _BLACK, Material.RUBBER, Kind.BICYCLE)
+    light = quads([-0.55, 0.0, 0.7], [0.1, 0, 0], [0, 0.03, 0.04], (0.5, 0.02, 0.02), Material.RETRO, Kind.BICYCLE)
+    return merge([*_wheel(-0.53), *_wheel(0.53), *frame, bar, saddle, pedals, light])
 
 
 _PHASES = 16
 _TOP, _TROUSERS, _SKIN_SLOT, _HAIR_SLOT, _SHOES = range(5)
-
-_CLOTHES = (
-    (0.05, 0.08, 0.25), (0.45, 0.05, 0.05), (0.6, 0.6, 0.58), (0.03, 0.03, 0.04),
-    (0.55, 0.4, 0.06), (0.07, 0.25, 0.12), (0.3, 0.12, 0.35), (0.25, 0.2, 0.15),
-)  # fmt: skip
-_SKIN = ((0.55, 0.33, 0.22), (0.4, 0.22, 0.13), (0.17, 0.09, 0.05), (0.62, 0.4, 0.29))
-_HAIR = ((0.02, 0.015, 0.01), (0.12, 0.06, 0.02), (0.35, 0.22, 0.08), (0.35, 0.34, 0.33))
 
 
 @dataclass(frozen=True)
@@ -96,9 +85,11 @@ class Person:
         rng : numpy.random.Generator
             Decides them.
         """
-        pick = lambda colours: colours[rng.integers(len(colours))]  # noqa: E731
-        top, trousers = pick(_CLOTHES), pick(_CLOTHES[:4] + _CLOTHES[7:])
-        return cls(rng.uniform(1.55, 1.92), top, trousers, pick(_SKIN), pick(_HAIR), pick(PAINTS))
+        clothes = PALETTES["clothes"]
+        choices = (clothes, clothes[:4] + clothes[7:], PALETTES["skin"], PALETTES["hair"], PAINTS)
+        top, trousers = (colours[rng.integers(len(colours))] for colours in choices[:2])
+        height = rng.uniform(1.55, 1.92)
+        return cls(height, top, trousers, *(colours[rng.integers(len(colours))] for colours in choices[2:]))
 
 
 def _blob(centre: ArrayLike, radii: tuple, slot: int, kind: Kind, detail: int = 1) -> Shape:

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import cache, partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,19 +14,14 @@ _leaves = partial(shapes.shape, material=Material.LEAF, kind=Kind.PLANT)
 _bark = partial(shapes.tube, material=Material.BARK, kind=Kind.PLANT)
 
 
-class _Species(NamedTuple):
-    bark: tuple[float, float, float]
-    leaf: tuple[float, float, float]
-    trunk: float  # radius, metres
-    crown: tuple[float, float, float] | None = None  # half its extent sideways and upwards, and its height, metres
-
-
 _SPECIES = {
-    "broad": _Species((0.11, 0.08, 0.06), (0.09, 0.17, 0.03), 0.19, (1.5, 1.3, 4.9)),
-    "tall": _Species((0.10, 0.08, 0.06), (0.07, 0.15, 0.035), 0.17, (0.85, 3.0, 6.2)),
-    "birch": _Species((0.5, 0.49, 0.45), (0.16, 0.24, 0.05), 0.11, (1.1, 1.3, 5.0)),
-    "conifer": _Species((0.1, 0.06, 0.04), (0.03, 0.085, 0.035), 0.15),
+    "broad": ((0.11, 0.08, 0.06), (0.09, 0.17, 0.03), 0.19, (1.5, 1.3, 4.9)),
+    "tall": ((0.10, 0.08, 0.06), (0.07, 0.15, 0.035), 0.17, (0.85, 3.0, 6.2)),
+    "birch": ((0.5, 0.49, 0.45), (0.16, 0.24, 0.05), 0.11, (1.1, 1.3, 5.0)),
+    "conifer": ((0.1, 0.06, 0.04), (0.03, 0.085, 0.035), 0.15, None),
 }
+"""Of each species: colours of bark and leaves; radius of the trunk, metres; and of a crown of blobs half its extent
+sideways and upwards, and its height, metres."""
 TREES = tuple(_SPECIES)
 """The species that `tree` knows."""
 

@@ -9,7 +9,7 @@ from semgrid_edu.frame import blocks
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import State
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
-from semgrid_edu.workshop.simulation.street.actors import MOVING_SPEED
+from semgrid_edu.workshop.simulation.street.traffic import MOVING_SPEED
 from semgrid_edu.workshop.simulation.things.materials import Kind
 
 FLAT = (Kind.ROAD, Kind.LANE, Kind.SIDEWALK, Kind.GRASS)

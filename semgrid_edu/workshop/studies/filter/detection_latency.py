@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.occupancy import State
 from semgrid_edu.workshop.simulation.drive import PERIOD
-from semgrid_edu.workshop.simulation.street.actors import Actor
+from semgrid_edu.workshop.simulation.street.traffic import Actor
 from semgrid_edu.workshop.simulation.things.materials import Kind
 from semgrid_edu.workshop.studies.filter.scenes import KnownScene
 

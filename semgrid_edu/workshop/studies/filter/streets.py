@@ -12,7 +12,7 @@ from semgrid_edu.occupancy import Belief, Cmcdot, CmcdotParams, SensorModel, Sta
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
 from semgrid_edu.workshop.simulation.drive import PERIOD
 from semgrid_edu.workshop.simulation.named_streets import FRAMES, TEST_STREETS, named_street
-from semgrid_edu.workshop.simulation.street.actors import Actor
+from semgrid_edu.workshop.simulation.street.traffic import Actor
 from semgrid_edu.workshop.simulation.things.materials import Kind
 from semgrid_edu.workshop.studies.filter.cell_scores import FAR, NEAR, SCENERY, SETTLED_AFTER, share
 from semgrid_edu.workshop.studies.filter.detection_latency import DetectionLatency
