@@ -76,6 +76,15 @@ def test_the_reader_makes_a_training_set(tmp_path, monkeypatch):
     assert {KITTI_14.index("road"), KITTI_14.index("building")} < set(frames[1].truth.unique().tolist())
 
 
+def test_the_resampling_tracks_a_drive(written):
+    frames, spec = sample_drive()[:2], GridSpec.compact()
+    own, again = ([b.probability for b in written["track_by_independent_draws"](frames, spec)] for _ in range(2))
+    usual = [belief.probability for belief in track_drive(frames, spec)]
+    assert np.array_equal(own, again)
+    assert not np.array_equal(own, usual)
+    assert np.abs(np.subtract(own, usual)).mean() < 0.02
+
+
 def test_the_backbone_is_a_segmenter(written):
     net = written["TwoLayers"](n_classes=5, seed=1)
     assert net(torch.rand(2, 3, 12, 20)).shape == (2, 5, 12, 20)
