@@ -12,7 +12,7 @@ from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import HDL64E, Lidar, Rig
 from semgrid_edu.workshop.studies.filter.cell_scores import BANKS, CellScores, Estimate, share
-from semgrid_edu.workshop.studies.filter.scenes import GRIDS, check_request, known_scenes, made_by
+from semgrid_edu.workshop.studies.filter.scenes import GRIDS, check_request, known_scenes, simulated_by
 
 LIDARS = {
     "HDL-64E": HDL64E,
@@ -63,7 +63,7 @@ def compare_filters(
     return {
         "scores": scores,
         "states": [state.name for state in State],
-        **made_by("occupancy", seed, drives, frames, grids, began),
+        **simulated_by("occupancy", seed, drives, frames, grids, began),
     }
 
 

@@ -16,7 +16,7 @@ from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import PlanarMotion, SensorModel, State, scan_evidence
 from semgrid_edu.occupancy.planar_motion import MAX_YAW, look_up, map_around
-from semgrid_edu.storage.provenance import versions
+from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.studies.filter.cell_truth import CellTruth, true_cells
 
@@ -48,10 +48,10 @@ def check_request(seed: int, drives: int, frames: int, grids: tuple[str, ...]) -
         raise ArgumentError("drives, frames", "at least one", f"{drives}, {frames}")
 
 
-def made_by(
+def simulated_by(
     experiment: str, seed: int, drives: int, frames: int, grids: tuple[str, ...], began: datetime
 ) -> dict[str, object]:
-    """Return what made a result, to be kept with it.
+    """Return what made a result on simulated drives, see `made_by`.
 
     Parameters
     ----------
@@ -68,15 +68,10 @@ def made_by(
         Numbers of drives and frames, command, seed, date, minutes and versions; JSON can hold it.
     """
     one_grid = f" --grid {grids[0]}" if len(grids) == 1 else ""
-    return {
-        "drives": drives,
-        "frames": frames,
-        "command": f"semgrid-edu reproduce {experiment} --seed {seed} --drives {drives}{one_grid}",
-        "seed": seed,
-        "date": f"{began:%Y-%m-%d}",
-        "minutes": round((datetime.now(UTC) - began).total_seconds() / 60, 1),
-        "versions": versions("numpy", "scipy", "numba", "embreex", "trimesh"),
-    }
+    command = f"semgrid-edu reproduce {experiment} --seed {seed} --drives {drives}{one_grid}"
+    minutes = round((datetime.now(UTC) - began).total_seconds() / 60, 1)
+    made = made_by(command, "numpy", "scipy", "numba", "embreex", "trimesh")
+    return {"drives": drives, "frames": frames, "seed": seed, "minutes": minutes, **made}
 
 
 LEFT_SINCE = 10

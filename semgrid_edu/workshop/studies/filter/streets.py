@@ -22,7 +22,7 @@ from semgrid_edu.workshop.studies.filter.scenes import (
     check_request,
     hit_cells,
     known_scenes,
-    made_by,
+    simulated_by,
 )
 
 LEAST_DYNAMIC = 0.3
@@ -196,7 +196,7 @@ def measure_streets(
     scores = {
         grid: {street: _score(seed, drives, frames, grid, street, params) for street in streets} for grid in grids
     }
-    return {"scores": scores, **made_by("streets", seed, drives, frames, grids, began)}
+    return {"scores": scores, **simulated_by("streets", seed, drives, frames, grids, began)}
 
 
 def _score(seed: int, drives: int, frames: int, grid: str, street: str, params: CmcdotParams) -> dict[str, object]:
