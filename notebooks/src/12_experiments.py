@@ -820,11 +820,11 @@ assert clear(reduced["class accuracy"])
 assert clear(balanced["pixel accuracy"])
 
 # %% [markdown]
-# **Wrong calibration, distance, and sureness.** Three more questions. What if the camera looks elsewhere than we think?
+# **Wrong calibration, distance, and confidence.** Three more questions. What if the camera looks elsewhere than we think?
 # How far ahead may one believe the map? And are its probabilities worth their name?
 #
 # For the last one, sort all cells by how sure the network is of its class, and look in each group how many are right
-# (by true labels). By hand: 50 cells at 60 % sureness, of which 25 are right; 30 at 80 %, 21 right; 20 at 95 %, 19
+# (by true labels). By hand: 50 cells at 60 % confidence, of which 25 are right; 30 at 80 %, 21 right; 20 at 95 %, 19
 # right. The gaps are 0.1, 0.1 and 0. Weighted by the cells: $0.5 \cdot 0.1 + 0.3 \cdot 0.1 + 0.2 \cdot 0 = 0.08$. This
 # is the **expected calibration error**,
 #

@@ -31,7 +31,7 @@ def _found_by_processes(monkeypatch):
 
 def test_an_error_in_a_process_is_that_of_the_run(tmp_path):
     run = SharedNote("weak", fails_without="help")
-    assert "status 1" in run_one(run, tmp_path, processes=2).error
+    assert "status 1" in run_one(run, tmp_path, processes=2)
     assert "RuntimeError: no help" in (run.folder(tmp_path) / OUTPUT).read_text()
     assert not run.has_ended(tmp_path)
 
@@ -50,7 +50,7 @@ def test_processes_end_with_the_one_that_started_them(tmp_path):
 
 def test_other_runs_take_one_process(tmp_path):
     run = Note("a")
-    assert run_one(run, tmp_path, processes=2).error is None
+    assert run_one(run, tmp_path, processes=2) is None
     assert "processes" not in run.record(tmp_path)
 
 

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import NamedTuple
 
 from tqdm.auto import tqdm
 
@@ -103,26 +102,11 @@ def _error(future: Future) -> str | None:
     """Return what went wrong in a run, or with the process that did it."""
     error = future.exception()
     if error is None:
-        return future.result().error
+        return future.result()
     return f"the process of the run ended: {type(error).__name__}: {error}"
 
 
-class Outcome(NamedTuple):
-    """How a run ended.
-
-    Parameters
-    ----------
-    seconds : float
-        How long it took this time.
-    error : str or None
-        The traceback of what went wrong; None when all went well. It is text, so that it passes between processes.
-    """
-
-    seconds: float
-    error: str | None
-
-
-def run_one(run: Run, root: str | Path, device: str = "cpu", processes: int = 1) -> Outcome:
+def run_one(run: Run, root: str | Path, device: str = "cpu", processes: int = 1) -> str | None:
     """Do one run; this is what every process and every machine of a cluster is asked to do.
 
     Parameters
@@ -138,12 +122,13 @@ def run_one(run: Run, root: str | Path, device: str = "cpu", processes: int = 1)
 
     Returns
     -------
-    Outcome
-        An error is returned, not raised, and stands in the run's `output.txt` too.
+    str or None
+        The traceback of what went wrong; None when all went well. It is text, so that it passes between processes, and
+        stands in the run's `output.txt` too.
     """
-    began, processes = time.perf_counter(), processes if run.is_training else 1
     if run.has_ended(root):
-        return Outcome(0.0, None)
+        return None
+    began, processes = time.perf_counter(), processes if run.is_training else 1
     with _ONE_AT_A_TIME, few_threads():
         try:
             claim_folder(run, root)
@@ -154,8 +139,8 @@ def run_one(run: Run, root: str | Path, device: str = "cpu", processes: int = 1)
                     run.work(Path(root), device)
             _record_end(run, root, device, processes, time.perf_counter() - began)
         except Exception:
-            return Outcome(time.perf_counter() - began, traceback.format_exc())
-    return Outcome(time.perf_counter() - began, None)
+            return traceback.format_exc()
+    return None
 
 
 def claim_folder(run: Run, root: str | Path) -> None:

@@ -35,7 +35,7 @@ class FrameConfusions:
     counts: dict[str, NDArray[np.int64]]
 
     def of(self, method: str, truth: str, band: str | None = None) -> "FrameConfusions":
-        """Return how often `count_grids` counted one method against one truth.
+        """Return the counts of one method against one truth, under the method's name.
 
         Parameters
         ----------
@@ -45,11 +45,6 @@ class FrameConfusions:
             The labels that it is compared with, "true" or "lidar".
         band : str, optional
             One of `distance_band_names`; all distances when left out.
-
-        Returns
-        -------
-        FrameConfusions
-            With one key, `method`.
         """
         keys = [confusion_key(method, truth, one) for one in ([band] if band else distance_band_names())]
         return FrameConfusions(self.drives, {method: sum(self.counts[key] for key in keys)})
@@ -102,7 +97,7 @@ def confusion_key(method: str, truth: str, band: str) -> str:
 
 
 def drive_confusions(counts: NDArray, drives: Sequence[str]) -> NDArray[np.int64]:
-    """Sum confusion matrices over the frames of each drive.
+    """Sum confusion matrices over the frames of each drive: (V, C, C), in the order of the drives' first frames.
 
     Parameters
     ----------
@@ -110,16 +105,6 @@ def drive_confusions(counts: NDArray, drives: Sequence[str]) -> NDArray[np.int64
         One matrix per frame.
     drives : sequence of F str
         The drive of each frame.
-
-    Returns
-    -------
-    (V, C, C) int64
-        One matrix per drive, in the order of the drives' first frames.
-
-    Raises
-    ------
-    ArgumentError
-        When there aren't as many drives as frames.
 
     Examples
     --------
@@ -136,7 +121,7 @@ def drive_confusions(counts: NDArray, drives: Sequence[str]) -> NDArray[np.int64
 
 
 def seed_confusions(runs: Sequence[FrameConfusions], method: str) -> NDArray[np.int64]:
-    """Stack the drives' matrices of the same method, trained with several seeds.
+    """Stack the drives' matrices of several seeds, (S, V, C, C), as `drive_interval` takes them.
 
     Parameters
     ----------
@@ -144,16 +129,6 @@ def seed_confusions(runs: Sequence[FrameConfusions], method: str) -> NDArray[np.
         One per seed, on the same frames.
     method : str
         A method that all of them have.
-
-    Returns
-    -------
-    (S, V, C, C) int64
-        What `drive_interval` and `paired_interval` take.
-
-    Raises
-    ------
-    ArgumentError
-        When there is no run, or two of them have other frames.
     """
     if len({run.drives for run in runs}) != 1:
         raise ArgumentError("runs", "one or more runs on the same frames", f"{len(runs)} runs, not all on the same")
@@ -168,12 +143,7 @@ def save_confusions(path: str | Path, confusions: FrameConfusions) -> None:
     path : path-like
         The .npz file to write; its folder is made when missing.
     confusions : FrameConfusions
-        What to write.
-
-    Raises
-    ------
-    ArgumentError
-        When a method is called "drives".
+        What to write; no method may be called "drives".
     """
     if DRIVES in confusions.counts:
         raise ArgumentError("confusions", f"methods with another name than {DRIVES!r}", list(confusions.counts))

@@ -22,7 +22,10 @@ Methods that share work, such as a network with and without the CRF, come from o
 
 
 def distance_bands(spec: GridSpec, edges: Sequence[float]) -> NDArray[np.int64]:
-    """Return the band of distance that each cell lies in.
+    """Return the number of the band of distance that each cell lies in, (H, W).
+
+    The distance is the horizontal one from the LIDAR to the cell's centre. What lies before the first edge is in the
+    first band, what lies beyond the last one in the last.
 
     Parameters
     ----------
@@ -30,12 +33,6 @@ def distance_bands(spec: GridSpec, edges: Sequence[float]) -> NDArray[np.int64]:
         The grid.
     edges : sequence of B + 1 float
         Where the bands begin and end, metres, from near to far.
-
-    Returns
-    -------
-    (H, W) int64
-        Number of the band, 0 to B - 1, by the horizontal distance from the LIDAR to the cell's centre. What lies before
-        the first edge is in the first band, what lies beyond the last one in the last.
     """
     return np.digitize(np.hypot(*np.moveaxis(spec.centers(), -1, 0)), edges[1:-1])
 
@@ -68,11 +65,6 @@ def count_grids(grids: Grids, frames: TrainingSet) -> GridCounts:
         Makes the grids of a frame, such as `network_grids(net, frames)` or `lambda k: {"majority class": majority}`.
     frames : TrainingSet
         The frames: their "truth", which is that of the LIDAR when it differs from the "true" one, and their drives.
-
-    Returns
-    -------
-    GridCounts
-        The methods have the names that `grids` gives them.
 
     Raises
     ------

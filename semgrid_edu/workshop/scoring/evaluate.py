@@ -99,7 +99,7 @@ def count_methods(
     segmenters: Mapping[str, nn.Module],
     refine: Refine | None = None,
 ) -> GridCounts:
-    """Count the grids of a network and of the baselines, on any frames that can be trained on.
+    """Count the grids of a network, refined or not, and of the baselines, on any frames that can be trained on.
 
     Parameters
     ----------
@@ -111,11 +111,6 @@ def count_methods(
         Image networks by name, i -> s, whose labels geometry carries to the grid, see `carried_grids`.
     refine : callable, optional
         Refines the network's grids, as in `evaluate`.
-
-    Returns
-    -------
-    GridCounts
-        For "network", "network + ..." and the baselines of `baseline_grids`.
     """
     learned = network_grids(net, test, {_name(refine): refine or Stages.of(net).refine})
     baselines = baseline_grids(training, test, segmenters)
@@ -151,7 +146,7 @@ def scores_of_counts(counted: GridCounts, test: TrainingSet) -> dict[str, object
 
 
 def intervals(compared: FrameConfusions, label_set: LabelSet) -> Intervals:
-    """Return the confidence intervals of all scores, over drives.
+    """Return the confidence intervals of all scores, each for this one network, or baseline, on new drives.
 
     Parameters
     ----------
@@ -159,11 +154,6 @@ def intervals(compared: FrameConfusions, label_set: LabelSet) -> Intervals:
         Confusion matrices of the frames of two drives or more, by method.
     label_set : LabelSet
         The classes, of which it says which are semantic.
-
-    Returns
-    -------
-    Intervals
-        From `all_metrics`: each is for this one network, or baseline, on new drives.
     """
     return {
         method: {
@@ -183,11 +173,6 @@ def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:
         Confusion matrix of each method.
     label_set : LabelSet
         The classes, of which it says which are semantic.
-
-    Returns
-    -------
-    Scores
-        Values from 0 to 1.
     """
     return {
         method: {

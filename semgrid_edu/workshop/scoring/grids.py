@@ -182,17 +182,14 @@ def carried_grids(
 
 
 def majority_class(truths: NDArray) -> NDArray[np.uint8]:
-    """Return the most frequent class of each cell: what one knows without looking.
+    """Return the most frequent class of each cell, (H, W): what one knows without looking.
+
+    Of equally frequent classes it is the first. A cell that was never labelled takes the most frequent class of all.
 
     Parameters
     ----------
     truths : (N, H, W) uint8
         Grids of a training set, KITTI-14; 255 where unlabelled.
-
-    Returns
-    -------
-    (H, W) uint8
-        Of equally frequent classes the first; the most frequent of all cells where a cell was never labelled.
     """
     counts = np.stack([(truths == c).sum(axis=0) for c in range(len(KITTI_14))])
     overall = counts.sum(axis=(1, 2)).argmax()
@@ -235,17 +232,14 @@ def classes_of_states(by_state: NDArray, occupancy: NDArray) -> NDArray[np.uint8
 def ground_pixels(spec: GridSpec, camera: Camera) -> NDArray[np.int64]:
     """Return the pixel that sees the ground at the centre of each cell: equation (1) for plane 0, to the nearest pixel.
 
+    Pixels (H, W) are numbered as row * w + column; -1 where the ground isn't in the image.
+
     Parameters
     ----------
     spec : GridSpec
         The grid, (H, W) cells.
     camera : Camera
         The camera at the size of the label image, (h, w) pixels.
-
-    Returns
-    -------
-    (H, W) int64
-        Pixel as row * w + column; -1 where the ground isn't in the image.
     """
     (pixels,), (visible,) = plane_pixels(spec, [0.0], camera)
     places = np.full(spec.shape, NOT_SEEN)

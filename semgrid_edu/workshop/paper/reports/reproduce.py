@@ -14,7 +14,7 @@ from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS, Experime
 from semgrid_edu.workshop.paper.reports.results import write_result
 from semgrid_edu.workshop.paper.runs.scales import Scale, scale_named
 from semgrid_edu.workshop.scheduler.execute import check_runs_folder, execute_plan
-from semgrid_edu.workshop.scheduler.plan import estimate, plan_table, with_needs
+from semgrid_edu.workshop.scheduler.plan import estimate, plan_hours, plan_table, with_needs
 from semgrid_edu.workshop.scheduler.runs import OUTPUT, Run
 
 
@@ -114,8 +114,8 @@ def _reproduced(request: Request, root: Path, echo: Callable[[str], None], plan_
     """Do what `reproduce` says, in a folder of runs that no other process writes to."""
     plan = request.plan()
     estimated = estimate(plan, root)
-    hours = estimated.hours(request.workers or usable_cores())
-    told = f"{len(estimated.seconds)} of {len(plan)} runs are left, about {60 * hours:.0f} minutes"
+    hours = plan_hours(estimated, request.workers or usable_cores())
+    told = f"{len(estimated)} of {len(plan)} runs are left, about {60 * hours:.0f} minutes"
     echo(f"{plan_table(plan, estimated)}\n\n{told}" + (" on this machine" if request.scheduler else ""))
     if plan_only:
         return ""

@@ -140,10 +140,6 @@ def runs_of_claims(scale: Scale, seeds: int) -> ClaimRuns:
         How large they are.
     seeds : int
         Number of seeds. Claims about Table 1 alone have its number of seeds, when that is larger.
-
-    Returns
-    -------
-    ClaimRuns
     """
     every, all_seeds = range(seeds), max(seeds, scale.table1_seeds if seeds == scale.seeds else seeds)
     networks = table1_runs(replace(scale, networks=tuple(NETWORKS)), all_seeds)

@@ -49,20 +49,17 @@ class DataRun(Run):
     ----------
     data : str
         Its name, a key of `RECIPE_OF`.
-    seed : int
-        Seed for its drives.
     """
 
     data: str
-    seed: int = 0
     kind: ClassVar[str] = "data"
     pace: ClassVar[str] = "simulate"
     trial_seconds: ClassVar[float] = 0.2
 
     @property
     def tag(self) -> str:
-        """Data set and seed."""
-        return self.data + (f"-seed{self.seed}" if self.seed else "")
+        """The data set."""
+        return self.data
 
     @property
     def steps(self) -> int:
@@ -71,7 +68,7 @@ class DataRun(Run):
 
     def work(self, root: Path, device: str) -> None:
         """Make the data set. Parameters are those of `Run.work`."""
-        make_from_recipe(RECIPE_OF[self.data], self.folder(root), self.seed, workers=1)
+        make_from_recipe(RECIPE_OF[self.data], self.folder(root), seed=0, workers=1)
 
     def dataset_dir(self, root: str | Path) -> Path:
         """Return the folder of the data set itself. Parameters are those of `Run.folder`."""
