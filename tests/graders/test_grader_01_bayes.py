@@ -565,11 +565,7 @@ def transition(appears, vanishes, dt, k=1000):
     return np.linalg.matrix_power(np.eye(2) + R * dt / k, k)"""
             + HALF_LIFE,
         ),
-        right(
-            "the exponential of the rates",
-            task="transition",
-            code=TRANSITION + HALF_LIFE.strip(),
-        ),
+        right("the exponential of the rates", task="transition", code=TRANSITION + HALF_LIFE.strip()),
         right(
             "very many short steps, and a search for the half-life",
             task="transition",

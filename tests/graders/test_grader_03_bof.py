@@ -642,10 +642,6 @@ def arrive(own, arrives):
     return after / after.sum(axis=0)""",
         ),
         mistake(
-            "a crash",
-            task="arrive",
-            loses=3,
-            says="IndexError",
-            code="def arrive(own, arrives):\n    return own[4]",
+            "a crash", task="arrive", loses=3, says="IndexError", code="def arrive(own, arrives):\n    return own[4]"
         ),
     )

@@ -270,13 +270,7 @@ def now_from_before(T_world_from_now, T_world_from_before):
             says="with the factors swapped, no neighbours cancel",
             code=frames(result="T_world_from_before @ now_from_world"),
         ),
-        mistake(
-            "minus t",
-            task="now-from-before",
-            loses=3,
-            says="it must be turned as well",
-            code=frames(shift="-t"),
-        ),
+        mistake("minus t", task="now-from-before", loses=3, says="it must be turned as well", code=frames(shift="-t")),
         mistake(
             "sign of the shift forgotten",
             task="now-from-before",
@@ -612,11 +606,7 @@ def lands_at(x, z, z_cam, delta):
             code=drawn(place="x * (z_cam - abs(delta)) / (z_cam - z)"),
         ),
         mistake(
-            "climbs, and yet meets",
-            task="lands-at",
-            loses=1,
-            says="behind the camera",
-            code=drawn(never="z == z_cam"),
+            "climbs, and yet meets", task="lands-at", loses=1, says="behind the camera", code=drawn(never="z == z_cam")
         ),
         mistake(
             "infinity",

@@ -301,11 +301,7 @@ def sample_plane(s, pixels, visible):
             code=plane().replace("return p", "return p.transpose(1, 2, 0)"),
         ),
         mistake(
-            "one class",
-            task="sample-plane",
-            loses=3,
-            says="expected one value a class and point",
-            code=plane() + "[0]",
+            "one class", task="sample-plane", loses=3, says="expected one value a class and point", code=plane() + "[0]"
         ),
         mistake(
             "last row and column left out",
@@ -314,13 +310,7 @@ def sample_plane(s, pixels, visible):
             says="point (2, 2) lies on the last pixel",
             code=plane(seen="visible[r, c] and pixels[r, c, 0] < w - 1 and pixels[r, c, 1] < h - 1"),
         ),
-        mistake(
-            "visible ignored",
-            task="sample-plane",
-            loses=1,
-            says="NaN times 0 is NaN",
-            code=plane(seen="True"),
-        ),
+        mistake("visible ignored", task="sample-plane", loses=1, says="NaN times 0 is NaN", code=plane(seen="True")),
         mistake(
             "weighed by visible",
             task="sample-plane",
@@ -442,11 +432,7 @@ def give_back(p_bar, pixels, visible, h, w):
             code=back("s_bar[:] += p_bar[k, r, c] * x"),
         ),
         mistake(
-            "u and v swapped",
-            task="give-back",
-            loses=2,
-            says="u counts columns, v counts rows",
-            code=back(uv="v, u"),
+            "u and v swapped", task="give-back", loses=2, says="u counts columns, v counts rows", code=back(uv="v, u")
         ),
         mistake(
             "all to the nearest pixel",
@@ -503,13 +489,7 @@ def slopes(s, u, v):
         return np.where(np.abs(t) < 1, -np.sign(t), 0)
     return k(dn) @ s @ k_slope(dm), k_slope(dn) @ s @ k(dm)""",
         ),
-        mistake(
-            "u and v swapped",
-            task="slopes",
-            loses=2,
-            says="the two are swapped",
-            code=slope(order="{1}, {0}"),
-        ),
+        mistake("u and v swapped", task="slopes", loses=2, says="the two are swapped", code=slope(order="{1}, {0}")),
         mistake(
             "sign turned",
             task="slopes",

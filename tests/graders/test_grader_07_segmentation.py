@@ -659,11 +659,7 @@ def max_pool(maps, kernel, stride):
             says="of equal numbers the one with the smaller index wins",
             code=pool().replace("window.argmax()", "window.size - 1 - window.ravel()[::-1].argmax()"),
         ),
-        right(
-            "nested lists",
-            task="pool",
-            code=pool(result="[pooled.tolist(), indices.tolist()]"),
-        ),
+        right("nested lists", task="pool", code=pool(result="[pooled.tolist(), indices.tolist()]")),
         mistake(
             "one index for all channels",
             task="pool",

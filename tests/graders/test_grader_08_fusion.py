@@ -132,9 +132,7 @@ def reduce_planes(planes, theta, beta):
             task="reduce-planes",
             loses=2,
             says="the bias is added with every plane",
-            code=reduction(
-                "(np.einsum('kcd,cdhw->kdhw', theta, planes) + beta[:, None, None, None]).sum(axis=1)",
-            ),
+            code=reduction("(np.einsum('kcd,cdhw->kdhw', theta, planes) + beta[:, None, None, None]).sum(axis=1)"),
         ),
         mistake(
             "mean instead of sum",
@@ -431,13 +429,7 @@ def balance(maps, n_classes):
             says="what is frequent must weigh less",
             code=balance(alpha="f[f > 0] / np.median(f[f > 0])"),
         ),
-        mistake(
-            "no median",
-            task="balance",
-            loses=2,
-            says="that is 1 / f",
-            code=balance(alpha="1 / f[f > 0]"),
-        ),
+        mistake("no median", task="balance", loses=2, says="that is 1 / f", code=balance(alpha="1 / f[f > 0]")),
         mistake(
             "frequencies returned",
             task="balance",
@@ -584,11 +576,7 @@ def weighted_loss(logits, truth, alpha):
             code=loss("-(w * of_truth).sum() / truth.size"),
         ),
         mistake(
-            "no weights",
-            task="weighted-loss",
-            loses=3,
-            says="the weights are missing",
-            code=loss("-of_truth.mean()"),
+            "no weights", task="weighted-loss", loses=3, says="the weights are missing", code=loss("-of_truth.mean()")
         ),
         mistake(
             "the sum",
@@ -646,13 +634,7 @@ def weighted_loss(logits, truth, alpha):
             says="there is no soft-max, or it runs down the rows",
             code=loss(log_g="logits - np.log(np.exp(logits).sum(axis=1, keepdims=True))"),
         ),
-        mistake(
-            "no soft-max",
-            task="weighted-loss",
-            loses=4,
-            says="there is no soft-max",
-            code=loss(log_g="logits"),
-        ),
+        mistake("no soft-max", task="weighted-loss", loses=4, says="there is no soft-max", code=loss(log_g="logits")),
         mistake(
             "255 as an index",
             task="weighted-loss",
@@ -775,11 +757,7 @@ def momentum_step(theta, delta, gradient, eta, kappa):
             code="def momentum_step(theta, delta, gradient, eta, kappa):\n    return theta, {'delta': delta}",
         ),
         mistake(
-            "uphill",
-            task="momentum-step",
-            loses=2,
-            says="the step goes uphill",
-            code=step(theta="theta + eta * new"),
+            "uphill", task="momentum-step", loses=2, says="the step goes uphill", code=step(theta="theta + eta * new")
         ),
         mistake(
             "dampening",
@@ -909,11 +887,7 @@ def cosine_rate(eta, step, steps):
             code=rate("(1 + np.cos(np.pi * step / 5)) / 2"),
         ),
         mistake(
-            "no 1 +",
-            task="cosine-rate",
-            loses=1,
-            says="it falls to -eta",
-            code=rate("np.cos(np.pi * step / steps)"),
+            "no 1 +", task="cosine-rate", loses=1, says="it falls to -eta", code=rate("np.cos(np.pi * step / steps)")
         ),
         mistake(
             "not halved",

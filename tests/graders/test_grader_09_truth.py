@@ -149,11 +149,7 @@ def depth_picture(points, K, size):
             code=depth(keep="np.fmin(depth[pixel], np.sqrt(X * X + Y * Y + Z * Z))"),
         ),
         mistake(
-            "behind the camera",
-            task="depth-picture",
-            loses=2,
-            says="look at the sign of Z",
-            code=depth(skip="Z == 0"),
+            "behind the camera", task="depth-picture", loses=2, says="look at the sign of Z", code=depth(skip="Z == 0")
         ),
         mistake(
             "cut off instead of rounded",
@@ -232,13 +228,7 @@ def count_votes(cells, classes, n_cells):
             says="What stands wins, be it one vote",
             code=votes(best="votes.argmax(axis=1)"),
         ),
-        mistake(
-            "sky votes",
-            task="count-votes",
-            loses=2,
-            says="cell 2 became sky",
-            code=votes(kept="label != 255"),
-        ),
+        mistake("sky votes", task="count-votes", loses=2, says="cell 2 became sky", code=votes(kept="label != 255")),
         mistake(
             "a cell without a vote is road",
             task="count-votes",
@@ -451,11 +441,7 @@ def fill_unknown(votes, o, near):
             code=unknown(near="(near != 255) & False"),
         ),
         mistake(
-            "255 stays",
-            task="fill-unknown",
-            loses=2,
-            says="cells are still 255",
-            code=unknown(near="state != UNKNOWN"),
+            "255 stays", task="fill-unknown", loses=2, says="cells are still 255", code=unknown(near="state != UNKNOWN")
         ),
         mistake(
             "the filter overrules votes",
@@ -534,13 +520,7 @@ def carry_window(points, moves, velocity, seconds, T_now_from_then):
             says="the car was left where it was",
             code=carry(way="0 * velocity[moves & known]"),
         ),
-        mistake(
-            "backward",
-            task="carry-window",
-            loses=3,
-            says="the car went backward",
-            code=carry(sign="-="),
-        ),
+        mistake("backward", task="carry-window", loses=3, says="the car went backward", code=carry(sign="-=")),
         mistake(
             "without time",
             task="carry-window",

@@ -350,11 +350,7 @@ def marginals(phi, k):
             code=summed(last="total.sum()"),
         ),
         mistake(
-            "dear is probable",
-            task="marginals",
-            loses=3,
-            says="exp(-E), not exp(E)",
-            code=summed(weight="np.exp(E)"),
+            "dear is probable", task="marginals", loses=3, says="exp(-E), not exp(E)", code=summed(weight="np.exp(E)")
         ),
         mistake(
             "pairs twice in the marginals",
@@ -364,11 +360,7 @@ def marginals(phi, k):
             code=summed("phi[x, cells].sum() + (k * (x[:, None] != x)).sum()"),
         ),
         mistake(
-            "no pairs",
-            task="marginals",
-            loses=3,
-            says="the pairs are missing",
-            code=summed("phi[x, cells].sum()"),
+            "no pairs", task="marginals", loses=3, says="the pairs are missing", code=summed("phi[x, cells].sum()")
         ),
         mistake(
             "mean field for marginals",

@@ -842,13 +842,7 @@ def refine(log_g, o):
             says="the widths of place are swapped",
             code=crf(features="np.hstack([place / 1.2, o.reshape(4, -1).T / 0.2])", width="3.2"),
         ),
-        mistake(
-            "one iteration",
-            task="refine",
-            loses=3,
-            says="one iteration isn't ten",
-            code=crf(rounds="1"),
-        ),
+        mistake("one iteration", task="refine", loses=3, says="one iteration isn't ten", code=crf(rounds="1")),
         mistake(
             "iterations added up",
             task="refine",
@@ -864,11 +858,7 @@ def refine(log_g, o):
             code=crf(cells="log_g.reshape(H * W, C)"),
         ),
         mistake(
-            "soft-max over cells",
-            task="refine",
-            loses=3,
-            says="the soft-max runs over classes",
-            code=crf(axis="0"),
+            "soft-max over cells", task="refine", loses=3, says="the soft-max runs over classes", code=crf(axis="0")
         ),
         mistake(
             "log Q returned",

@@ -184,13 +184,7 @@ def drive_scores(counts, drives):
             says="only one frame of drive a counts",
             code=pooled(chosen="name == drive and not total.any()"),
         ),
-        mistake(
-            "all drives summed",
-            task="drive-scores",
-            loses=2,
-            says="keep them apart",
-            code=pooled(chosen="True"),
-        ),
+        mistake("all drives summed", task="drive-scores", loses=2, says="keep them apart", code=pooled(chosen="True")),
         mistake(
             "an absent class is 0",
             task="drive-scores",
@@ -246,20 +240,8 @@ def judge(statements, seeds, drives):
         worst = 0
     return {1: "reproduced", 0: "cannot tell", -1: "not reproduced"}[worst]""",
         ),
-        mistake(
-            "few seeds forgotten",
-            task="judge",
-            loses=2,
-            says="2 seeds are too few",
-            code=rule(few="drives < 10"),
-        ),
-        mistake(
-            "few drives forgotten",
-            task="judge",
-            loses=2,
-            says="9 drives are too few",
-            code=rule(few="seeds < 3"),
-        ),
+        mistake("few seeds forgotten", task="judge", loses=2, says="2 seeds are too few", code=rule(few="drives < 10")),
+        mistake("few drives forgotten", task="judge", loses=2, says="9 drives are too few", code=rule(few="seeds < 3")),
         mistake(
             "three seeds are too few",
             task="judge",
@@ -383,13 +365,7 @@ def jackknife_interval(matrices, metric, level=0.95):
             says="V - 1 degrees of freedom, not V",
             code=jackknife(freedom="V"),
         ),
-        mistake(
-            "one side",
-            task="jackknife",
-            loses=3,
-            says="2.5 % on each side",
-            code=jackknife(quantile="level"),
-        ),
+        mistake("one side", task="jackknife", loses=3, says="2.5 % on each side", code=jackknife(quantile="level")),
         mistake(
             "standard error of what is left",
             task="jackknife",
@@ -433,11 +409,7 @@ def jackknife_interval(matrices, metric, level=0.95):
             code=jackknife(without="metric(m)", variance="w.var(ddof=1) / V"),
         ),
         mistake(
-            "root forgotten",
-            task="jackknife",
-            loses=3,
-            says="the root is missing",
-            code=jackknife(half="t * variance"),
+            "root forgotten", task="jackknife", loses=3, says="the root is missing", code=jackknife(half="t * variance")
         ),
         mistake(
             "mean of the drives' scores",
@@ -509,11 +481,7 @@ def paired_interval(a, b, metric, level=0.95):
     return d - half, d, d + half""",
         ),
         mistake(
-            "b - a",
-            task="paired",
-            loses=2,
-            says="a - b is asked for",
-            code=paired(middle="metric(B) - metric(A)"),
+            "b - a", task="paired", loses=2, says="a - b is asked for", code=paired(middle="metric(B) - metric(A)")
         ),
         mistake(
             "variances added",
@@ -523,11 +491,7 @@ def paired_interval(a, b, metric, level=0.95):
             code=separate("np.hypot(ha, hb)"),
         ),
         mistake(
-            "half-widths added",
-            task="paired",
-            loses=2,
-            says="you add the two half-widths",
-            code=separate("ha + hb"),
+            "half-widths added", task="paired", loses=2, says="you add the two half-widths", code=separate("ha + hb")
         ),
         mistake(
             "half-widths subtracted",
@@ -536,13 +500,7 @@ def paired_interval(a, b, metric, level=0.95):
             says="you subtract the two half-widths",
             code=separate("abs(ha - hb)"),
         ),
-        mistake(
-            "ends subtracted",
-            task="paired",
-            loses=2,
-            says="can't simply be subtracted",
-            code=separate("ha - hb"),
-        ),
+        mistake("ends subtracted", task="paired", loses=2, says="can't simply be subtracted", code=separate("ha - hb")),
         mistake(
             "mean of the drives' differences",
             task="paired",
@@ -556,8 +514,7 @@ def paired_interval(a, b, metric, level=0.95):
             loses=2,
             says="you use each drive's own difference",
             code=paired(
-                without="metric(x) - metric(y)",
-                half="stats.t.ppf((1 + level) / 2, V - 1) * w.std(ddof=1) / np.sqrt(V)",
+                without="metric(x) - metric(y)", half="stats.t.ppf((1 + level) / 2, V - 1) * w.std(ddof=1) / np.sqrt(V)"
             ),
         ),
         mistake(
@@ -621,11 +578,7 @@ def calibration_error(probability, truth, bins=10):
             code=ece(weight="1 / bins"),
         ),
         mistake(
-            "no weights",
-            task="calibration",
-            loses=3,
-            says="the gaps are added without weights",
-            code=ece(weight="1"),
+            "no weights", task="calibration", loses=3, says="the gaps are added without weights", code=ece(weight="1")
         ),
         mistake(
             "signs cancel, then the absolute value",

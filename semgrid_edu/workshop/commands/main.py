@@ -22,9 +22,7 @@ app.add_typer(reproduce, name="reproduce")
 
 
 @app.callback()
-def main(
-    cache: Annotated[Path | None, typer.Option(help="Where preprocessed data are kept.")] = None,
-) -> None:
+def main(cache: Annotated[Path | None, typer.Option(help="Where preprocessed data are kept.")] = None) -> None:
     """Probabilistic bird's-eye semantic perception, taught notebook by notebook.
 
     Without --cache each data set keeps its preprocessed data itself, so it can't be read-only.

@@ -38,11 +38,6 @@ class Equation:
     lecture: str | None = None
     exercise: str | None = None
 
-    @property
-    def functions(self) -> list[str]:
-        """The dotted names of its code, literal first."""
-        return [name for name in (self.literal, self.fast) if name]
-
 
 @dataclass(frozen=True)
 class StageModel:

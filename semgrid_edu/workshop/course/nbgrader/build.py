@@ -191,9 +191,7 @@ def point_links(text: str, lectures: str) -> str:
     return re.sub(r"\[([^\]]*)\]\(\.\./([^)]*)\)", lambda link: link.expand(new), text)
 
 
-def _write_unless_changed(
-    directory: Path, texts: dict[str, str], before: dict[str, str]
-) -> tuple[dict[str, str], list[str]]:
+def _write_unless_changed(directory: Path, texts: dict, before: dict) -> tuple[dict[str, str], list[str]]:
     """Write files, but not over one that was changed since the last time; return all digests, and what was kept."""
     digests, kept = {}, []
     for name, text in texts.items():

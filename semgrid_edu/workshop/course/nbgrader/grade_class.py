@@ -32,11 +32,7 @@ UNREADABLE = "unreadable"
 
 
 def grade_course(
-    course: Path,
-    settings: GradeSettings,
-    assignments: Sequence[str] = (),
-    again: bool = False,
-    workers: int = 1,
+    course: Path, settings: GradeSettings, assignments: Sequence[str] = (), again: bool = False, workers: int = 1
 ) -> Iterator[Graded]:
     """Grade what was handed in and isn't graded yet; interrupted, it goes on when it is called again.
 

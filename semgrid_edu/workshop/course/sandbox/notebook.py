@@ -31,6 +31,9 @@ MOST_PRINTED = 2000
 MOST_OUTPUT = 30_000_000
 """Characters that are kept of all outputs of a notebook."""
 
+PICTURES, BASE64 = ("image/png", "image/jpeg"), re.compile(r"[A-Za-z0-9+/=\s]*")
+"""The pictures that are kept, and how their data must look."""
+
 ENDS = (AnswerEndedError, AnswerTimeoutError)
 """The errors of an answer that ended its process, or had to be ended."""
 
@@ -224,12 +227,7 @@ def _as_outputs(reply: dict) -> list[NotebookNode]:
 
 def _harmless(shown: dict[str, str]) -> dict[str, str]:
     """Return text and pictures. HTML and SVG could hold scripts, which would run in the browser of who grades."""
-    pictures = ("image/png", "image/jpeg")
-    return {
-        kind: data
-        for kind, data in shown.items()
-        if kind == "text/plain" or (kind in pictures and re.fullmatch(r"[A-Za-z0-9+/=\s]*", data))
-    }
+    return {k: data for k, data in shown.items() if k == "text/plain" or (k in PICTURES and BASE64.fullmatch(data))}
 
 
 def _shortened(outputs: list[NotebookNode], room: int) -> tuple[list[NotebookNode], int]:

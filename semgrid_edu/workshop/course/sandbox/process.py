@@ -123,16 +123,13 @@ class StudentProcess:
         return [part for part in PARTS if part not in done]
 
     def _speak(self) -> None:
-        """Send what is to be sent, and receive a reply to each; None stands for a process that is no more.
-
-        A thread does it, because neither a full pipe nor a silent process may hold up the grader for ever.
-        """
+        """Send and receive in a thread: neither a full pipe nor a silent process may hold up the grader for ever."""
         while (data := self.sent.get()) is not None:
             try:
                 self.wire.send(data)
                 self.received.put(self.wire.receive())
             except (OSError, ValueError, MemoryError):
-                self.received.put(None)
+                self.received.put(None)  # the process is no more
 
     def _watch(self, most: int) -> None:
         """End the process when all its files together become too large, or too many."""
@@ -284,10 +281,7 @@ def _delete(folder: Path) -> None:
 
 
 def _inside(folder: Path, closed: list[str]) -> Iterator[os.DirEntry]:
-    """Yield all that is in a folder, each folder before what is in it; `closed` takes those that can't be opened.
-
-    Python's own walk fails in folders that are too deep.
-    """
+    """Yield all that is in a folder, however deep; `closed` takes the folders in it that can't be opened."""
     waiting = [str(folder)]
     while waiting:
         place = waiting.pop()
