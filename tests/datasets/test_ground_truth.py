@@ -203,7 +203,7 @@ def test_deskewing_uses_the_motion_between_the_frames():
         for policy in (BARE, TruthPolicy(deskew=True, cleanup="none"))
     ]
     assert [rows.tolist() for rows in found] == [[15], [14]]
-    with pytest.raises(ArgumentError, match="whose pose tells the motion"):
+    with pytest.raises(ArgumentError, match="whose pose shows the motion"):
         lidar_truth(frame, free, wide, TruthPolicy(deskew=True))
 
 

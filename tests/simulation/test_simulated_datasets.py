@@ -136,11 +136,11 @@ def group_alive(group: int) -> bool:
 def test_the_index_lists_the_labelled_frames(alone):
     index = load_index(alone)
     assert (index.name, index.label_set) == ("tiny", KITTI_14)
-    assert [(f.drive, f.frame) for f in index.splits["train"]] == [("0001", 1)]
-    assert [(f.drive, f.frame) for f in index.splits["test"]] == [("0002", 0)]
+    assert [(f.drive, f.frame) for f in index.splits["train"]] == [(("2026_01_01", "0001"), 1)]
+    assert [(f.drive, f.frame) for f in index.splits["test"]] == [(("2026_01_01", "0002"), 0)]
     for frames in index.splits.values():
         for labelled in frames:
-            assert KittiRawDrive(alone, labelled.date, labelled.drive)[labelled.frame].labels is not None
+            assert KittiRawDrive(alone, *labelled.drive)[labelled.frame].labels is not None
 
 
 def test_dense_points_lie_on_the_depth_image(tmp_path):
