@@ -54,7 +54,17 @@ def _command(experiment: str) -> Callable[..., None]:
     ) -> None:
         from semgrid_edu.workshop.paper.reports.reproduce import Request, reproduce
 
-        request = Request(experiment, scale, seeds, runs, out, workers, scheduler, device, processes)
+        request = Request(
+            experiment=experiment,
+            scale=scale,
+            runs=runs,
+            out=out,
+            seeds=seeds,
+            workers=workers,
+            scheduler=scheduler,
+            device=device,
+            processes=processes,
+        )
         problems = reproduce(request, typer.echo, plan)
         if problems:
             typer.echo(problems, err=True)
