@@ -39,8 +39,8 @@ from semgrid_edu.datasets.ground_truth import drive_truth, flawed_drive, gather_
 from semgrid_edu.datasets.readers.project_lidar import closest_returns
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.datasets.grid_truth import grid_truth
-from semgrid_edu.workshop.studies.ground_truth.truth_counts import BAND_EDGES, TruthCounts
-from semgrid_edu.workshop.studies.ground_truth.truth_policies import counts_of, simulated_drive
+from semgrid_edu.workshop.studies.ground_truth.counts import BAND_EDGES, TruthCounts, counts_of
+from semgrid_edu.workshop.studies.ground_truth.laboratory import simulated_drive
 from semgrid_edu.frame import Frame
 from semgrid_edu.graphical import d_separated
 from semgrid_edu.stage_models import LabelWorld, made_label_stage, wrong_label

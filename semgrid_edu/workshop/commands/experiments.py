@@ -110,8 +110,8 @@ def truth_policies(
     out: Annotated[Path, typer.Option(help="Takes each drive; the same command goes on.")] = Path("truth.json"),
 ) -> None:
     """Measure how wrong each way of making ground truth from LIDAR is, by class and distance (lecture 09)."""
-    from semgrid_edu.workshop.studies.ground_truth.truth_policies import truth_policies
-    from semgrid_edu.workshop.studies.ground_truth.truth_tables import truth_tables
+    from semgrid_edu.workshop.studies.ground_truth.counts import truth_tables
+    from semgrid_edu.workshop.studies.ground_truth.laboratory import truth_policies
 
     keep_result(out, lambda: truth_policies(out, seed, drives, grid, lidar), truth_tables)
 

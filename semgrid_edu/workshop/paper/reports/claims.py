@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
-from semgrid_edu.metrics import METRICS, class_accuracy, pixel_accuracy
+from semgrid_edu.metrics import METRICS, class_accuracy
 from semgrid_edu.workshop.paper.reports.verdicts import Statement
 from semgrid_edu.workshop.paper.runs.baseline_runs import GEOMETRY, OCCUPANCY_ALONE, TRUE_GEOMETRY
 from semgrid_edu.workshop.paper.runs.claim_runs import ClaimRuns
@@ -52,8 +52,8 @@ def _effect_of_crf(runs: ClaimRuns, root: Path) -> list[Statement]:
 def _with_crf(name: str, some: list[ScoreRun], root: Path) -> list[Statement]:
     with_crf, without = (by_seed(some, root, method, "lidar") for method in (WITH_CRF, NETWORK))
     return [
-        Statement(f"{name}, pixel accuracy: with CRF - without", compared(with_crf, without, pixel_accuracy)),
-        Statement(f"{name}, class accuracy: with CRF - without", compared(with_crf, without, class_accuracy), 0, False),
+        Statement(f"{name}, {metric}: with CRF - without", compared(with_crf, without, METRICS[metric]), 0, above)
+        for metric, above in (("pixel accuracy", True), ("class accuracy", False))
     ]
 
 

@@ -97,19 +97,19 @@ def _draw_reliability(ax: Axes, rows: list[dict]) -> None:
     ax.legend(loc="upper left")
 
 
-COLUMNS = {
-    "Figure 6": {
-        "truth": "labels made\nwith the LIDAR",
-        "true": "true labels",
-        "network": "SegNet",
-        "refined": "SegNet + CRF",
-    },
-    "Figure 7": {"true": "true labels", "network": "SegNet"},
+FIGURES: dict[str, tuple[LabelSet, dict[str, str]]] = {
+    "Figure 6": (
+        KITTI_14,
+        {
+            "truth": "labels made\nwith the LIDAR",
+            "true": "true labels",
+            "network": "SegNet",
+            "refined": "SegNet + CRF",
+        },
+    ),
+    "Figure 7": (SYNTHIA_10, {"true": "true labels", "network": "SegNet"}),
 }
-"""The grids of each figure, from left to right, and their titles."""
-
-LABEL_SET_OF = {"Figure 6": KITTI_14, "Figure 7": SYNTHIA_10}
-"""The classes of each figure."""
+"""The classes of each figure, and the titles of its grids from left to right."""
 
 
 def figures_picture(result: dict, root: Path) -> Figure:
@@ -126,11 +126,11 @@ def figures_picture(result: dict, root: Path) -> Figure:
     parts = figure.subfigures(2, 1)
     for part, (name, shown) in zip(parts, result["figures"].items(), strict=True):
         part.suptitle(name, x=0.02, ha="left")
-        _draw(part, read_arrays(root / shown["grids"]), COLUMNS[name], LABEL_SET_OF[name])
+        _draw(part, read_arrays(root / shown["grids"]), *FIGURES[name])
     return figure
 
 
-def _draw(part: SubFigure, grids: dict[str, NDArray], columns: dict[str, str], label_set: LabelSet) -> None:
+def _draw(part: SubFigure, grids: dict[str, NDArray], label_set: LabelSet, columns: dict[str, str]) -> None:
     """Draw the rows of one figure."""
     n_rows, spec = len(grids["frame"]), _spec_of(grids["true"].shape[1:])
     axes = part.subplots(n_rows, 1 + len(columns), width_ratios=[2.2] + [1] * len(columns), squeeze=False)
@@ -141,18 +141,10 @@ def _draw(part: SubFigure, grids: dict[str, NDArray], columns: dict[str, str], l
         for ax, (name, title) in zip(line[1:], columns.items(), strict=True):
             grid_labels(spec, grids[name][row], label_set, ax=ax, legend=False)
             ax.set_title(title if row == 0 else "", fontsize="medium")
-            _keep_outer_labels(ax, first=ax is line[1], last=row == n_rows - 1)
+            outer_left, lowest = ax is line[1], row == n_rows - 1  # only outer grids name their axes
+            ax.tick_params(labelleft=outer_left, labelbottom=lowest)
+            ax.set(xlabel=ax.get_xlabel() * lowest, ylabel=ax.get_ylabel() * outer_left)
     class_legend(axes[0, -1], label_set, grids["true"])
-
-
-def _keep_outer_labels(ax: Axes, first: bool, last: bool) -> None:
-    """Name the axes of a grid where no other grid stands to its left, or below it."""
-    if not first:
-        ax.set_ylabel("")
-        ax.tick_params(labelleft=False)
-    if not last:
-        ax.set_xlabel("")
-        ax.tick_params(labelbottom=False)
 
 
 def _spec_of(shape: tuple[int, int]) -> GridSpec:

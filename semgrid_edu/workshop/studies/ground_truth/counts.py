@@ -2,84 +2,19 @@
 
 Two things are known of each cell: what stands in it, and whether the camera sees it. A label is right when what it says
 stands there. A cell that the camera sees should have a label.
-
-The ways to make ground truth that the policy laboratory compares, and the errors in the data they start from (4).
 """
 
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.datasets.ground_truth import NO_FLAWS, TruthFlaws, TruthPolicy
-from semgrid_edu.datasets.ground_truth.policy import MOVERS
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LabelSet
-from semgrid_edu.workshop.scoring.distances import distance_bands
-
-REACH = 9
-"""Number of scans before, and after, the labelled one: 0.9 s. minikitti has as many before its labelled frames."""
-BEFORE, AROUND = f"{REACH} scans before", f"{REACH} before and after"
-OWN = TruthPolicy(REACH, REACH, "own", "carved", vote="majority")
-FLAWS = TruthFlaws()
-
-
-class Trial(NamedTuple):
-    """One way to make ground truth, and from what.
-
-    Parameters
-    ----------
-    policy : TruthPolicy
-        The way.
-    flaws : TruthFlaws
-        The errors of calibration, labels and scans.
-    """
-
-    policy: TruthPolicy = TruthPolicy()
-    flaws: TruthFlaws = FLAWS
-
-
-def _windows() -> dict[str, Trial]:
-    """Return the trials with several scans, so that most cells have many returns: their majority decides."""
-    before = TruthPolicy(past=REACH, vote="majority")
-    around = replace(before, future=REACH)
-    windows = {
-        BEFORE: before,
-        AROUND: around,
-        f"{AROUND}, own labels": replace(around, labels="own"),
-    }
-    return {
-        f"{name}, movers {movers}": Trial(replace(policy, movers=movers))
-        for name, policy in windows.items()
-        for movers in MOVERS
-    }
-
-
-TRIALS = {
-    "one scan (the paper)": Trial(),
-    "one scan, no clean-up": Trial(TruthPolicy(cleanup="none")),
-    "one scan, all classes spread alike": Trial(TruthPolicy(cleanup="spread")),
-    "one scan, de-skewed": Trial(TruthPolicy(deskew=True)),
-    "one scan, visible to LIDAR": Trial(TruthPolicy(visible_to="lidar")),
-    "one scan, visible to camera": Trial(TruthPolicy(visible_to="camera")),
-    "one scan, majority of returns": Trial(TruthPolicy(vote="majority")),
-    **_windows(),
-    f"{AROUND}, own labels, movers carved, no clean-up": Trial(replace(OWN, cleanup="none")),
-    f"{AROUND}, own labels, movers carved, what stands wins": Trial(replace(OWN, vote="standing")),
-    f"{AROUND}, own labels, movers carved, de-skewed": Trial(replace(OWN, deskew=True)),
-    f"{AROUND}, own labels, movers carved, visible to LIDAR": Trial(replace(OWN, visible_to="lidar")),
-    f"{AROUND}, own labels, movers carved, visible to camera": Trial(replace(OWN, visible_to="camera")),
-    "one scan, no errors in the data": Trial(flaws=NO_FLAWS),
-    "one scan, error of calibration alone": Trial(
-        flaws=replace(NO_FLAWS, rotation=FLAWS.rotation, translation=FLAWS.translation)
-    ),
-    "one scan, errors of labels alone": Trial(flaws=replace(FLAWS, rotation=0, translation=0, skewed=False)),
-    "one scan, skew alone": Trial(flaws=replace(NO_FLAWS, skewed=True)),
-}
-"""What is compared, by name. The last four show what each kind of error in the data does to the paper's way."""
-
+from semgrid_edu.workshop.scoring.distances import band_names, distance_bands
+from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
 
 BAND_EDGES = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 73.0)
 """Distances from the LIDAR at which the bands begin and end, metres; the grid's far corners are 72.7 m away."""
@@ -87,6 +22,8 @@ COUNTED = ("seen", "found", "missed", "labelled", "right", "hidden")
 """What is counted of each class c and each band: cells that the camera sees, in which c stands ("seen"), those of them
 that are labelled c ("found") and those without a label ("missed"); cells that are labelled c ("labelled"), those of
 them in which c stands ("right") and those that the camera doesn't see ("hidden")."""
+COLUMNS = ("found", "mistaken", "missed", "wrong", "hidden", "iou")
+"""Shares of `TruthCounts.shares`, in the order of the tables' columns."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,3 +116,82 @@ class TruthCounts:
                 "hidden": hidden / labelled,
                 "iou": found / (seen + labelled - hidden - found),
             }
+
+
+def counts_of(result: dict, name: str) -> TruthCounts:
+    """Return the counts of one trial.
+
+    Parameters
+    ----------
+    result : dict
+        From `truth_policies`, or from the JSON file that it was written to.
+    name : str
+        The name of the trial.
+
+    Raises
+    ------
+    ArgumentError
+        When the result has no such trial.
+    """
+    if name not in result["sums"]:
+        raise ArgumentError("name", f"one of {', '.join(result['sums'])}", repr(name))
+    return TruthCounts(np.array(result["sums"][name]))
+
+
+def policy_table(result: dict) -> str:
+    """Return one row per policy, over all classes and distances, per cent; "mean iou" is the mean over the classes.
+
+    Parameters
+    ----------
+    result : dict
+        From `truth_policies`, or from the JSON file that it was written to.
+    """
+    rows = [["per cent", *COLUMNS, "mean iou"]]
+    for name in result["sums"]:
+        counts = counts_of(result, name)
+        shares = counts.shares(axis=(0, 1)) | {"mean iou": np.nanmean(counts.shares(axis=0)["iou"])}
+        rows.append([name, *(_per_cent(shares[column]) for column in rows[0][1:])])
+    return markdown_table(rows)
+
+
+def class_table(result: dict, name: str) -> str:
+    """Return one row per class of one policy, over all distances, per cent.
+
+    Parameters
+    ----------
+    result : dict
+        From `truth_policies`, or from the JSON file that it was written to.
+    name : str
+        The name of the policy.
+    """
+    return _table(counts_of(result, name).shares(axis=0), result["classes"])
+
+
+def distance_table(result: dict, name: str) -> str:
+    """Return one row per band of distance of one policy, over all classes. Parameters are those of `class_table`."""
+    return _table(counts_of(result, name).shares(axis=1), band_names(result["bands"]))
+
+
+def _table(shares: dict[str, NDArray], names: Iterable[str]) -> str:
+    """Return one row per entry of the shares."""
+    rows = [[name, *(_per_cent(shares[column][k]) for column in COLUMNS)] for k, name in enumerate(names)]
+    return markdown_table([["per cent", *COLUMNS], *rows])
+
+
+def _per_cent(share: float) -> str:
+    return per_cent(None if np.isnan(share) else float(share))
+
+
+def truth_tables(result: dict) -> str:
+    """Return all policies, then classes and distances of the first one, each table under its title.
+
+    Parameters
+    ----------
+    result : dict
+        From `truth_policies`, or from the JSON file that it was written to.
+    """
+    first = next(iter(result["sums"]))
+    return (
+        f"{len(result['drives'])} drives\n\n{policy_table(result)}\n\n"
+        f"{first}, by class\n\n{class_table(result, first)}\n\n{first}, by distance\n\n{distance_table(result, first)}"
+    )
