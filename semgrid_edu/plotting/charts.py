@@ -35,10 +35,6 @@ def velocity_spread(velocity: NDArray, weight: NDArray, ax: Axes | None = None) 
     ax : Axes, optional
         Axes to draw into.
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ArgumentError
@@ -51,8 +47,7 @@ def velocity_spread(velocity: NDArray, weight: NDArray, ax: Axes | None = None) 
         raise ArgumentError("weight", "finite numbers >= 0, not all zero", weight)
     if not np.isfinite(velocity).all():
         raise ArgumentError("velocity", "finite numbers", velocity)
-    if ax is None:
-        _, ax = plt.subplots(figsize=(4, 4), layout="constrained")
+    ax = ax or plt.subplots(figsize=(4, 4), layout="constrained")[1]
     share = weight / weight.sum()
     area = 150 * min(1, 60 / len(share)) * share / share.max()
     ax.scatter(*velocity[:, ::-1].T, s=area, c=velocity_colours(velocity.T) / 255, alpha=0.7, linewidths=0)
@@ -76,10 +71,6 @@ def velocity_ellipse(mean: NDArray, covariance: NDArray, ax: Axes) -> Axes:
         Covariance of the velocity forward and to the left, m^2/s^2.
     ax : Axes
         Axes from `velocity_spread`: velocity to the left across, forward up.
-
-    Returns
-    -------
-    Axes
 
     Raises
     ------
@@ -110,10 +101,6 @@ def confusion(matrix: NDArray, names: Sequence[str], ax: Axes | None = None) -> 
     ax : Axes, optional
         Axes to draw into.
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ArgumentError
@@ -121,9 +108,8 @@ def confusion(matrix: NDArray, names: Sequence[str], ax: Axes | None = None) -> 
     """
     if np.shape(matrix) != (len(names), len(names)):
         raise ArgumentError("matrix", f"shape {(len(names),) * 2}, one row per name", f"shape {np.shape(matrix)}")
-    if ax is None:
-        side = 2.2 + 0.42 * len(names)
-        _, ax = plt.subplots(figsize=(side, side), layout="constrained")
+    side = 2.2 + 0.42 * len(names)
+    ax = ax or plt.subplots(figsize=(side, side), layout="constrained")[1]
     totals = np.sum(matrix, axis=1, keepdims=True)
     percent = np.divide(100.0 * np.asarray(matrix), totals, where=totals > 0, out=np.full(np.shape(matrix), np.nan))
     ax.imshow(percent, cmap="Blues", vmin=0, vmax=100)
@@ -154,10 +140,6 @@ def training_curves(logs: "TrainingLog | Mapping[str, TrainingLog]", ax: Axes | 
     ax : Axes, optional
         Axes to draw into.
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ArgumentError
@@ -169,8 +151,7 @@ def training_curves(logs: "TrainingLog | Mapping[str, TrainingLog]", ax: Axes | 
     for name, log in logs.items():
         if not np.any(np.isfinite(log.loss) & (log.loss > 0)):
             raise ArgumentError("logs", "a finite loss in each training run", f"none in {name or 'this one'}")
-    if ax is None:
-        _, ax = plt.subplots(figsize=(8, 4), layout="constrained")
+    ax = ax or plt.subplots(figsize=(8, 4), layout="constrained")[1]
     for number, (name, log) in enumerate(logs.items()):
         _curve(ax, log, name, f"C{number}")
     for stage, begin in _stages(next(iter(logs.values()))):

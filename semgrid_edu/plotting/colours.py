@@ -30,10 +30,6 @@ def class_legend(ax: Axes, label_set: LabelSet, labels: NDArray, **style: object
         Class numbers; 255 (unlabelled) gets no entry.
     **style
         Passed on to `Axes.legend`.
-
-    Returns
-    -------
-    Axes
     """
     occurring = [c for c in np.unique(labels) if c < len(label_set)]
     return colour_legend(ax, [label_set.names[c] for c in occurring], [label_set.rgb[c] for c in occurring], **style)
@@ -52,10 +48,6 @@ def colour_legend(ax: Axes, names: Sequence[str], rgb: Iterable[tuple[int, int, 
         The colours, 8-bit RGB, as many as names.
     **style
         Passed on to `Axes.legend`.
-
-    Returns
-    -------
-    Axes
     """
     placing = {"loc": "upper left", "bbox_to_anchor": (1.02, 1.0), "fontsize": "small", "frameon": False}
     ax.legend(handles=colour_patches(names, rgb), **(placing | style))

@@ -47,10 +47,6 @@ def velocity_wheel(
     legend : bool
         Whether to name the states and to show the wheel.
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ArgumentError
@@ -104,13 +100,8 @@ def particles(spec: GridSpec, particles: Particles, ax: Axes | None = None) -> A
         Particles in the frame of the grid; those outside aren't drawn.
     ax : Axes, optional
         Axes in which the grid has been drawn; a new, empty map when left out.
-
-    Returns
-    -------
-    Axes
     """
-    if ax is None:
-        ax = draw_map(spec, np.full((*spec.shape, 3), 255, np.uint8))
+    ax = ax or draw_map(spec, np.full((*spec.shape, 3), 255, np.uint8))
     inside = np.flatnonzero(spec.cells(particles.position)[2])
     shown = inside[:: max(1, -(-len(inside) // MAX_POINTS))]
     weight = particles.weight[shown] / max(particles.weight[shown].max(initial=0), np.finfo(np.float32).tiny)

@@ -34,10 +34,6 @@ def forest_plot(
     reference : float, optional
         Where to draw a vertical line, a share as the scores are: 0 for differences.
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ArgumentError

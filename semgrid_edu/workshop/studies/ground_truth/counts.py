@@ -57,10 +57,6 @@ class TruthCounts:
         label_set : LabelSet
             The classes.
 
-        Returns
-        -------
-        TruthCounts
-
         Raises
         ------
         ArgumentError

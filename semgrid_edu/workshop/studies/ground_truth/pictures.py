@@ -68,10 +68,6 @@ def truth_difference(spec: GridSpec, truth: NDArray, made: NDArray, label_set: L
     label_set : LabelSet
         The classes, for colours and names.
 
-    Returns
-    -------
-    Figure
-
     Raises
     ------
     ArgumentError
@@ -103,10 +99,6 @@ def truth_errors(counts: TruthCounts, edges: Sequence[float], label_set: LabelSe
         The classes, for colours and names.
     least : int
         Number of cells below which a share isn't drawn: it would be chance.
-
-    Returns
-    -------
-    Figure
 
     Raises
     ------
@@ -146,10 +138,6 @@ def policy_errors(result: Mapping, shares: Sequence[str] = ("mistaken", "missed"
         From `truth_policies`, or from its JSON file.
     shares : sequence of str
         Which shares of `TruthCounts.shares` to draw, one panel each.
-
-    Returns
-    -------
-    Figure
     """
     names = list(result["sums"])
     figure, axes = plt.subplots(

@@ -121,10 +121,6 @@ def ground_plane(points: NDArray, height: float) -> GroundPlane:
     height : float
         Height of the LIDAR above the ground as the calibration says, metres: where the search begins.
 
-    Returns
-    -------
-    GroundPlane
-
     Raises
     ------
     ArgumentError
