@@ -1,7 +1,4 @@
-"""Charts of numbers: a confusion matrix (paper, Table 3), and the loss over a training run (section 4.1).
-
-The spread of velocities: a distribution as points, its mean and its covariance as an ellipse (section 3.2).
-"""
+"""Charts of numbers: velocities (section 3.2), a confusion matrix (Table 3), the loss of a training run (4.1)."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -18,6 +15,10 @@ from semgrid_edu.plotting.colours import velocity_colours
 
 if TYPE_CHECKING:  # training loads torch
     from semgrid_edu.training.log import TrainingLog
+
+
+SMOOTHING = 50
+"""Number of steps that a running mean is taken over; of all steps in a stage that has fewer."""
 
 
 def velocity_spread(velocity: NDArray, weight: NDArray, ax: Axes | None = None) -> Axes:
@@ -121,10 +122,6 @@ def confusion(matrix: NDArray, names: Sequence[str], ax: Axes | None = None) -> 
     ax.set_yticks(range(len(names)), names)
     ax.set(xlabel="predicted", ylabel="truth [% of its row]")
     return ax
-
-
-SMOOTHING = 50
-"""Number of steps that a running mean is taken over; of all steps in a stage that has fewer."""
 
 
 def training_curves(logs: "TrainingLog | Mapping[str, TrainingLog]", ax: Axes | None = None) -> Axes:

@@ -144,10 +144,6 @@ def blend_labels(image: NDArray, labels: NDArray, label_set: LabelSet, opacity: 
     opacity : float
         Weight of the labels' colours, 0..1.
 
-    Returns
-    -------
-    (h, w, 3) uint8
-
     Raises
     ------
     ArgumentError

@@ -42,17 +42,12 @@ class LatticeFrame(NamedTuple):
 
 
 def vertex_places(vertices: Iterable[Vertex]) -> NDArray[np.float64]:
-    """Return where vertices lie in the plane of the two features.
+    """Return where vertices lie in the plane of the two features, (M, 2).
 
     Parameters
     ----------
     vertices : iterable of Vertex
         Three coordinates each, with a sum of zero.
-
-    Returns
-    -------
-    (M, 2) float64
-        Their features.
 
     Examples
     --------

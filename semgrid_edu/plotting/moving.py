@@ -57,26 +57,9 @@ def velocity_wheel(
 
 
 def wheel_colours(spec: GridSpec, probability: NDArray, velocity: NDArray) -> NDArray[np.uint8]:
-    """Paint an occupancy grid with the colours of `velocity_colours` in place of DYNAMIC's.
+    """Paint a grid with `velocity_colours` in place of DYNAMIC's, (H, W, 3).
 
-    Parameters
-    ----------
-    spec : GridSpec
-        The grid.
-    probability : (4, H, W) float
-        Probabilities of FREE, STATIC, DYNAMIC and UNKNOWN, which sum to 1 in each cell.
-    velocity : (2, H, W) float
-        Velocity over ground, along x and y of the grid frame, m/s; NaN where nothing moves.
-
-    Returns
-    -------
-    (H, W, 3) uint8
-        RGB.
-
-    Raises
-    ------
-    ArgumentError
-        When an array doesn't fit `spec`.
+    Parameters are those of `velocity_wheel`.
     """
     if np.shape(velocity) != (2, *spec.shape):
         raise ArgumentError("velocity", f"shape {(2, *spec.shape)}", f"shape {np.shape(velocity)}")
@@ -171,12 +154,9 @@ def _wheel_legend(ax: Axes) -> Axes:
 
 
 def wheel_picture() -> NDArray[np.uint8]:
-    """Paint the colour wheel of velocities with forward up: full speed on its rim, a quarter of it on the white ring.
+    """Paint the colour wheel of velocities, (101, 101, 4): RGB, and opacity, which is 0 outside the wheel.
 
-    Returns
-    -------
-    (101, 101, 4) uint8
-        RGB and opacity, which is 0 outside the wheel.
+    Forward is up; the rim has full speed, the white ring a quarter of it.
     """
     across = np.linspace(1, -1, 101)
     forward, left = np.meshgrid(across, across, indexing="ij")

@@ -1,4 +1,4 @@
-"""How wrong a made ground truth is: cells counted by class and distance, against what the simulator knows (section 4).
+"""How wrong labels made from LIDAR are: cells counted by class and distance, against the true street (section 4).
 
 Two things are known of each cell: what stands in it, and whether the camera sees it. A label is right when what it says
 stands there. A cell that the camera sees should have a label.
@@ -28,7 +28,7 @@ COLUMNS = ("found", "mistaken", "missed", "wrong", "hidden", "iou")
 
 @dataclass(frozen=True, eq=False)
 class TruthCounts:
-    """Cells of a made ground truth, counted by class and distance.
+    """Cells of a map of labels, counted by class and distance.
 
     Parameters
     ----------
@@ -40,14 +40,14 @@ class TruthCounts:
 
     @classmethod
     def of_frame(
-        cls, made: NDArray, truth: NDArray, standing: NDArray, spec: GridSpec, label_set: LabelSet
+        cls, labels: NDArray, truth: NDArray, standing: NDArray, spec: GridSpec, label_set: LabelSet
     ) -> "TruthCounts":
         """Count the cells of one frame.
 
         Parameters
         ----------
-        made : (H, W) int
-            The made ground truth.
+        labels : (H, W) int
+            The labels made from LIDAR.
         truth : (H, W) int
             From `grid_truth`: what stands in the cells that the camera sees, an unknown class elsewhere.
         standing : (H, W) int
@@ -62,22 +62,21 @@ class TruthCounts:
         ArgumentError
             When a map doesn't fit the grid.
         """
-        for name, grid in (("made", made), ("truth", truth), ("standing", standing)):
+        for name, grid in (("labels", labels), ("truth", truth), ("standing", standing)):
             if np.shape(grid) != spec.shape:
                 raise ArgumentError(name, f"shape {spec.shape}", f"shape {np.shape(grid)}")
         band, n = distance_bands(spec, BAND_EDGES), label_set.n_semantic
-        chosen = {
-            "seen": (truth, truth < n),
-            "found": (truth, (truth < n) & (made == truth)),
-            "missed": (truth, (truth < n) & (made >= n)),
-            "labelled": (made, made < n),
-            "right": (made, (made < n) & (made == standing)),
-            "hidden": (made, (made < n) & (truth >= n)),
-        }
+        chosen = (
+            (truth, truth < n),
+            (truth, (truth < n) & (labels == truth)),
+            (truth, (truth < n) & (labels >= n)),
+            (labels, labels < n),
+            (labels, (labels < n) & (labels == standing)),
+            (labels, (labels < n) & (truth >= n)),
+        )  # in the order of COUNTED
         cells = np.zeros((len(COUNTED), len(BAND_EDGES) - 1, n), np.int64)
-        for plane, name in enumerate(COUNTED):
-            classes, where = chosen[name]
-            np.add.at(cells[plane], (band[where], np.asarray(classes)[where]), 1)
+        for plane, (classes, where) in zip(cells, chosen, strict=True):
+            np.add.at(plane, (band[where], np.asarray(classes)[where]), 1)
         return cls(cells)
 
     def __add__(self, other: "TruthCounts") -> "TruthCounts":
