@@ -14,7 +14,7 @@ PANELS = {
     "kernel": "kernel error: against the exact kernel\nafter the same number of updates",
     "convergence": "convergence error:\nagainst the same kernel, converged",
 }
-"""The errors that `crf_error` tells apart, and what each compares."""
+"""The three errors of `crf_error`, and what each compares."""
 _MARKERS = "osD^vP*X"
 _FLOOR = 1e-7
 """Errors below are rounding errors of single precision, and drawn here."""

@@ -40,7 +40,7 @@ CALIBRATION_ERRORS = (
 """Errors in the calibration that the trained network is given when it is tested: degrees, metres."""
 
 FEW = 4
-"""The small training set has one in so many frames."""
+"""The small training set has one frame in four."""
 
 SECTIONS = {
     "variants": "Networks that are trained differently. Usual: SegNet, 20 planes 0.2 m apart, occupancy grid, "

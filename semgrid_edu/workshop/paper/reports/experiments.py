@@ -1,4 +1,4 @@
-"""The experiments of the paper, each with the runs that it needs and what it makes of them (section 4)."""
+"""The experiments of the paper, each with its runs and how its result is computed, written and drawn (section 4)."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -199,7 +199,7 @@ def _times(records: dict[str, dict]) -> dict:
 
 
 def result_markdown(result: dict, experiment: Experiment) -> str:
-    """Return a result as Markdown, with all that made it.
+    """Return a result as Markdown, with its command, its commits and what differs from the paper.
 
     Parameters
     ----------

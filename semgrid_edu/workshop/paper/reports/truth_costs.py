@@ -1,4 +1,4 @@
-"""What training costs on truth that is made in other ways: SegNet on the same seeds and test frames (section 4)."""
+"""What training on other kinds of ground truth costs: SegNet on the same seeds and test frames (section 4)."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
@@ -59,7 +59,7 @@ _MARKERS = "oXsD*v^<"
 
 
 def truths_of(scale: Scale) -> tuple[str, ...]:
-    """Return what networks learn from: the usual labels first, then the true ones, then those of other policies.
+    """Return what networks learn from: the usual labels first, then the true ones, then the labels of other policies.
 
     Parameters
     ----------

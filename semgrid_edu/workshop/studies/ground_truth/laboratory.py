@@ -102,14 +102,13 @@ def truth_policies(
     drives: int = 20,
     grid: str = "compact",
     lidar: str = "coarse",
-    trials: dict[str, Trial] = TRIALS,
 ) -> dict[str, object]:
     """Make the ground truth of simulated drives by every policy, and count how wrong it is.
 
     Parameters
     ----------
     log : path-like
-        Takes every drive as soon as it is done. If the file exists, drives that it holds aren't made again.
+        Takes every drive as soon as it is done. If the file exists, drives that it holds aren't simulated again.
     seed : int
         Seed for drives, errors and particles.
     drives : int
@@ -118,8 +117,6 @@ def truth_policies(
         "compact" or "paper".
     lidar : str
         "coarse" for the LIDAR of the simulated data sets, or "HDL-64E".
-    trials : dict of str to Trial
-        What to compare, by name.
 
     Returns
     -------
@@ -138,7 +135,7 @@ def truth_policies(
     check_request(seed, drives, 1, (grid,))
     if lidar not in LIDARS:
         raise ArgumentError("lidar", f"one of {', '.join(LIDARS)}", repr(lidar))
-    began, digest = datetime.now(UTC), hashlib.sha256(repr(trials).encode()).hexdigest()[:16]
+    began, digest = datetime.now(UTC), hashlib.sha256(repr(TRIALS).encode()).hexdigest()[:16]
     identity = {"seed": seed, "grid": grid, "lidar": lidar, "trials": digest}
     done, sums = read_parts(log, identity, "drives"), read_parts(log, identity, "sums", list)
     minutes = read_parts(log, identity, "minutes", float).get("of all drives", 0.0)
@@ -146,13 +143,13 @@ def truth_policies(
     for number in tqdm(range(first, first + drives), desc="truth policies", unit="drive"):
         if str(number) in done:
             continue
-        counts = score_trials(trials, GRIDS[grid], number, lidar)
+        counts = score_trials(TRIALS, GRIDS[grid], number, lidar)
         done[str(number)] = {name: one.cells.sum(axis=(1, 2)).tolist() for name, one in counts.items()}
         sums = {name: (one.cells + np.array(sums.get(name, 0))).tolist() for name, one in counts.items()}
         spent = minutes + (datetime.now(UTC) - began).total_seconds() / 60
         write_json(log, identity | {"drives": done, "sums": sums, "minutes": {"of all drives": round(spent, 2)}})
     return identity | {
-        "policies": {name: asdict(trial.policy) | {"errors": asdict(trial.flaws)} for name, trial in trials.items()},
+        "policies": {name: asdict(trial.policy) | {"errors": asdict(trial.flaws)} for name, trial in TRIALS.items()},
         "counted": list(COUNTED),
         "bands": list(BAND_EDGES),
         "classes": list(KITTI_14.names[: KITTI_14.n_semantic]),
@@ -245,5 +242,5 @@ def score_frame(
         flaws: [Moment(*pair) for pair in zip(flawed_drive(frames, flaws, seed), beliefs, strict=True)]
         for flaws in {trial.flaws for trial in trials.values()}
     }
-    made = {name: drive_truth(moments[flaws], k, spec, policy) for name, (policy, flaws) in trials.items()}
-    return {name: TruthCounts.of_frame(one, truth, standing, spec, labels.label_set) for name, one in made.items()}
+    found = {name: drive_truth(moments[flaws], k, spec, policy) for name, (policy, flaws) in trials.items()}
+    return {name: TruthCounts.of_frame(one, truth, standing, spec, labels.label_set) for name, one in found.items()}

@@ -1,4 +1,4 @@
-"""What every drive should pass before anything is made of it: time stamps, calibration, the ground, its own motion."""
+"""What every drive should pass before it is used: time stamps, calibration, the ground, its own motion."""
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
@@ -266,7 +266,7 @@ AXES: dict[str, Callable[[NDArray], NDArray]] = {
 
 
 def axes_errors(frames: Sequence[Frame], apart: int = 5) -> dict[str, float]:
-    """Lay scans over each other by the motion that the poses say, and by what mistakes with axes make of it.
+    """Lay scans over each other by the motion that the poses say, and by the motions that mistakes with axes make of it.
 
     Parameters
     ----------
