@@ -266,7 +266,7 @@ AXES: dict[str, Callable[[NDArray], NDArray]] = {
 
 
 def axes_errors(frames: Sequence[Frame], apart: int = 5) -> dict[str, float]:
-    """Lay scans over each other by the motion that the poses say, and by the motions that mistakes with axes make of it.
+    """Lay scans over each other by the motion of the poses, and by what mistakes with axes turn it into.
 
     Parameters
     ----------
