@@ -34,7 +34,7 @@ def accuracy_picture(result: dict) -> Figure:
     figure, axes = plt.subplots(1, len(METRICS), figsize=size, sharey=True, layout="constrained")
     for ax, metric in zip(axes, METRICS, strict=True):
         draw_scores(ax, {name: row["scores"]["lidar"]["all"][metric] for name, row in rows.items()})
-        papers = [100 * row["paper"][metric] for row in rows.values()]
+        papers = [100 * (row["paper"][metric] or np.nan) for row in rows.values()]
         ax.plot(papers, range(len(rows)), "X", color=PAPERS, label="the paper's", zorder=3)
         ax.set(title=metric, xlabel="per cent of all labelled cells" if metric != "FmIoU" else "per cent")
     axes[0].invert_yaxis()
