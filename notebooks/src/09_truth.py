@@ -39,13 +39,14 @@ from semgrid_edu.datasets.ground_truth import drive_truth, flawed_drive, gather_
 from semgrid_edu.datasets.readers.project_lidar import closest_returns
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.datasets.grid_truth import grid_truth
-from semgrid_edu.workshop.studies.ground_truth.truth_counts import BAND_EDGES, TruthCounts
-from semgrid_edu.workshop.studies.ground_truth.truth_policies import counts_of, simulated_drive
+from semgrid_edu.workshop.studies.ground_truth.counts import BAND_EDGES, TruthCounts, counts_of
+from semgrid_edu.workshop.studies.ground_truth.laboratory import simulated_drive
 from semgrid_edu.frame import Frame
 from semgrid_edu.graphical import d_separated
 from semgrid_edu.stage_models import LabelWorld, made_label_stage, wrong_label
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.workshop.studies.ground_truth.pictures import (
+    DIFFERENCES,
     difference_kinds,
     policy_errors,
     truth_difference,
@@ -820,7 +821,7 @@ real_like = [Moment(*pair) for pair in zip(flawed_drive(frames, TruthFlaws(), se
 def draw_policy(policy, ax, title=""):
     """Make the truth by a policy, draw where it differs from the true one, and write its shares below."""
     grid = drive_truth(real_like, NOW, spec, policy)
-    colours = np.array(list(plotting.truth.DIFFERENCES.values()), np.uint8)
+    colours = np.array(list(DIFFERENCES.values()), np.uint8)
     plotting.grids.draw_map(spec, colours[difference_kinds(truth, grid, N_SEMANTIC)], ax)
     shares = TruthCounts.of_frame(grid, truth, standing, spec, KITTI_14).shares(axis=(0, 1))
     ax.set(title=title, ylabel="")
@@ -857,7 +858,7 @@ fig, axes = plt.subplots(1, 4, figsize=(12.5, 5.4), layout="compressed", sharey=
 for ax, (title, policy) in zip(axes, four.items(), strict=True):
     draw_policy(policy, ax, title)
 axes[0].set_ylabel("x, forward [m]")
-plotting.legends.colour_legend(axes[-1], plotting.truth.DIFFERENCES, plotting.truth.DIFFERENCES.values())
+plotting.colours.colour_legend(axes[-1], DIFFERENCES, DIFFERENCES.values())
 plt.show()
 
 # %% [markdown]

@@ -835,7 +835,7 @@ by_hand = Reliability(np.array([0.6, 0.8, 0.95]), np.array([25 / 50, 21 / 30, 19
 gaps = np.abs(by_hand.accuracy - by_hand.confidence)
 assert np.isclose(expected_calibration_error(by_hand), (by_hand.cells * gaps).sum() / by_hand.cells.sum())
 print(f"by hand: {100 * expected_calibration_error(by_hand):.1f} points")
-for row in ablations["sureness"]:
+for row in ablations["confidence"]:
     errors = 100 * np.array(row["expected calibration error"])
     print(f"{row['what']:<24} {errors.mean():5.1f} points; seeds {', '.join(f'{e:.1f}' for e in errors)}")
 
@@ -858,7 +858,7 @@ def draw_calibration(ax):
 def draw_reliability(ax):
     """Draw how often each method is right when it is how sure, all seeds together."""
     ax.plot([0, 1], [0, 1], color="0.4", lw=0.8)
-    for row, mark in zip(ablations["sureness"], ("o-", "s--", "D:"), strict=True):
+    for row, mark in zip(ablations["confidence"], ("o-", "s--", "D:"), strict=True):
         cells, sure, found = (np.array([d[n] for d in row["diagrams"]]) for n in ("cells", "confidence", "accuracy"))
         some = cells.sum(axis=0) > 0
         ax.plot(
@@ -897,14 +897,14 @@ plt.show()
 # the CRF's default weights the 17 points become 29, with the searched ones 24, and all seeds say the same.
 
 # %% jupyter={"source_hidden": true}
-errors = np.array([row["expected calibration error"] for row in ablations["sureness"]])
+errors = np.array([row["expected calibration error"] for row in ablations["confidence"]])
 assert (errors[0] < errors[2]).all()
 assert (errors[2] < errors[1]).all()
 by_distance = [row["pixel accuracy"]["mean"] for row in ablations["distance"]]
 assert (np.diff(by_distance) < 0).all()
 assert np.diff(by_distance).argmin() == 3
 cells, sure = (
-    np.array([diagram[n] for diagram in ablations["sureness"][0]["diagrams"]]) for n in ("cells", "confidence")
+    np.array([diagram[n] for diagram in ablations["confidence"][0]["diagrams"]]) for n in ("cells", "confidence")
 )
 right = [by_labels["usual"][truth]["all"]["pixel accuracy"]["mean"] for truth in ("lidar", "true")]
 print(

@@ -48,21 +48,16 @@ from semgrid_edu.camera import project, transform_points
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.training_arrays import resize_image, resize_labels
 from semgrid_edu.datasets.samples import sample_drive, sample_image_stage, sample_weights
-from semgrid_edu.workshop.studies.new_drive.domain import agrees_with_lidar, match_colours, mean_histograms
+from semgrid_edu.workshop.studies.new_drive.domain import colour_distance, match_colours, mean_histograms
 from semgrid_edu.workshop.studies.new_drive.drive_checks import (
-    depth_edges, edge_contrast, ground_plane, sensor_delays, share_on_image, time_gaps,
-    with_scan,
+    AXES, axes_errors, depth_edges, edge_contrast, ground_plane, motion_between, overlay_error, sensor_delays,
+    share_on_image, standing_points, time_gaps, with_scan,
 )  # fmt: skip
-from semgrid_edu.workshop.studies.new_drive.ego_motion import (
-    AXES,
-    axes_errors,
-    motion_between,
-    overlay_error,
-    standing_points,
-)
-from semgrid_edu.workshop.studies.new_drive.faults import FAULTS, YAWS, camera_turned, colour_distance, drive_readings
-from semgrid_edu.workshop.studies.new_drive.moving_cars import moving_hits, sample_boxes
-from semgrid_edu.workshop.studies.new_drive.network_view import class_probabilities, network_numbers, training_images
+from semgrid_edu.workshop.studies.new_drive.faults import FAULTS, YAWS, camera_turned, drive_readings
+from semgrid_edu.workshop.studies.new_drive.network_view import (
+    agrees_with_lidar, class_probabilities, network_numbers, training_images,
+)  # fmt: skip
+from semgrid_edu.workshop.studies.new_drive.real_drive import moving_hits, sample_boxes
 
 # %% jupyter={"source_hidden": true}
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate, why_dependent

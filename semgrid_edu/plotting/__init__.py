@@ -20,8 +20,8 @@ from semgrid_edu.plotting.colours import (
 )
 from semgrid_edu.plotting.grids import grid_labels, grid_values, label_maps, occupancy, velocity, velocity_arrows
 from semgrid_edu.plotting.images import image_labels, image_values, plane_on_image, points_on_image
-from semgrid_edu.plotting.inference import coupling_errors, error_against_time, picks_a_side
-from semgrid_edu.plotting.lattice import LatticeFrame, draw_lattice_frame, draw_triangles, lattice_story, vertex_places
+from semgrid_edu.plotting.inference import coupling_errors, error_against_time
+from semgrid_edu.plotting.lattice import draw_lattice_frame, draw_triangles, lattice_story, vertex_places
 from semgrid_edu.plotting.lines import belief_history, probability_line, probability_lines, state_history
 from semgrid_edu.plotting.moving import animate_occupancy, particles, velocity_wheel
 from semgrid_edu.plotting.story import draw_cell_story as cell_story
@@ -38,7 +38,6 @@ __all__ = [
     "STATE_NAMES",
     "WHEEL_SPEED",
     "Animation",
-    "LatticeFrame",
     "animate",
     "animate_occupancy",
     "belief_history",
@@ -59,7 +58,6 @@ __all__ = [
     "occupancy",
     "occupancy_colours",
     "particles",
-    "picks_a_side",
     "plane_on_image",
     "points_on_image",
     "probability_line",

@@ -1,7 +1,4 @@
-"""Charts of numbers: a confusion matrix (paper, Table 3), and the loss over a training run (section 4.1).
-
-The spread of velocities: a distribution as points, its mean and its covariance as an ellipse (section 3.2).
-"""
+"""Charts of numbers: velocities (section 3.2), a confusion matrix (Table 3), the loss of a training run (4.1)."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -20,6 +17,10 @@ if TYPE_CHECKING:  # training loads torch
     from semgrid_edu.training.log import TrainingLog
 
 
+SMOOTHING = 50
+"""Number of steps that a running mean is taken over; of all steps in a stage that has fewer."""
+
+
 def velocity_spread(velocity: NDArray, weight: NDArray, ax: Axes | None = None) -> Axes:
     """Draw a distribution over velocities, such as that of one cell's particles.
 
@@ -35,10 +36,6 @@ def velocity_spread(velocity: NDArray, weight: NDArray, ax: Axes | None = None) 
     ax : Axes, optional
         Axes to draw into.
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ArgumentError
@@ -51,8 +48,7 @@ def velocity_spread(velocity: NDArray, weight: NDArray, ax: Axes | None = None) 
         raise ArgumentError("weight", "finite numbers >= 0, not all zero", weight)
     if not np.isfinite(velocity).all():
         raise ArgumentError("velocity", "finite numbers", velocity)
-    if ax is None:
-        _, ax = plt.subplots(figsize=(4, 4), layout="constrained")
+    ax = ax or plt.subplots(figsize=(4, 4), layout="constrained")[1]
     share = weight / weight.sum()
     area = 150 * min(1, 60 / len(share)) * share / share.max()
     ax.scatter(*velocity[:, ::-1].T, s=area, c=velocity_colours(velocity.T) / 255, alpha=0.7, linewidths=0)
@@ -76,10 +72,6 @@ def velocity_ellipse(mean: NDArray, covariance: NDArray, ax: Axes) -> Axes:
         Covariance of the velocity forward and to the left, m^2/s^2.
     ax : Axes
         Axes from `velocity_spread`: velocity to the left across, forward up.
-
-    Returns
-    -------
-    Axes
 
     Raises
     ------
@@ -110,10 +102,6 @@ def confusion(matrix: NDArray, names: Sequence[str], ax: Axes | None = None) -> 
     ax : Axes, optional
         Axes to draw into.
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ArgumentError
@@ -121,9 +109,8 @@ def confusion(matrix: NDArray, names: Sequence[str], ax: Axes | None = None) -> 
     """
     if np.shape(matrix) != (len(names), len(names)):
         raise ArgumentError("matrix", f"shape {(len(names),) * 2}, one row per name", f"shape {np.shape(matrix)}")
-    if ax is None:
-        side = 2.2 + 0.42 * len(names)
-        _, ax = plt.subplots(figsize=(side, side), layout="constrained")
+    side = 2.2 + 0.42 * len(names)
+    ax = ax or plt.subplots(figsize=(side, side), layout="constrained")[1]
     totals = np.sum(matrix, axis=1, keepdims=True)
     percent = np.divide(100.0 * np.asarray(matrix), totals, where=totals > 0, out=np.full(np.shape(matrix), np.nan))
     ax.imshow(percent, cmap="Blues", vmin=0, vmax=100)
@@ -135,10 +122,6 @@ def confusion(matrix: NDArray, names: Sequence[str], ax: Axes | None = None) -> 
     ax.set_yticks(range(len(names)), names)
     ax.set(xlabel="predicted", ylabel="truth [% of its row]")
     return ax
-
-
-SMOOTHING = 50
-"""Number of steps that a running mean is taken over; of all steps in a stage that has fewer."""
 
 
 def training_curves(logs: "TrainingLog | Mapping[str, TrainingLog]", ax: Axes | None = None) -> Axes:
@@ -154,10 +137,6 @@ def training_curves(logs: "TrainingLog | Mapping[str, TrainingLog]", ax: Axes | 
     ax : Axes, optional
         Axes to draw into.
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ArgumentError
@@ -169,8 +148,7 @@ def training_curves(logs: "TrainingLog | Mapping[str, TrainingLog]", ax: Axes | 
     for name, log in logs.items():
         if not np.any(np.isfinite(log.loss) & (log.loss > 0)):
             raise ArgumentError("logs", "a finite loss in each training run", f"none in {name or 'this one'}")
-    if ax is None:
-        _, ax = plt.subplots(figsize=(8, 4), layout="constrained")
+    ax = ax or plt.subplots(figsize=(8, 4), layout="constrained")[1]
     for number, (name, log) in enumerate(logs.items()):
         _curve(ax, log, name, f"C{number}")
     for stage, begin in _stages(next(iter(logs.values()))):

@@ -1,7 +1,4 @@
-"""Colours of occupancy states, velocities and depths; `labels` holds those of classes (paper, section 3.2).
-
-Legends: a patch of colour and a name for every class or state that a picture shows.
-"""
+"""Colours of occupancy states, velocities and depths, and legends of them (section 3.2); classes' are in `labels`."""
 
 from collections.abc import Iterable, Sequence
 from functools import cache
@@ -15,73 +12,6 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.occupancy import State
-
-
-def class_legend(ax: Axes, label_set: LabelSet, labels: NDArray, **style: object) -> Axes:
-    """Name the classes that occur in a map of labels.
-
-    Parameters
-    ----------
-    ax : Axes
-        Axes that get the legend, to the right of the picture.
-    label_set : LabelSet
-        The classes, for colours and names.
-    labels : (...) int
-        Class numbers; 255 (unlabelled) gets no entry.
-    **style
-        Passed on to `Axes.legend`.
-
-    Returns
-    -------
-    Axes
-    """
-    occurring = [c for c in np.unique(labels) if c < len(label_set)]
-    return colour_legend(ax, [label_set.names[c] for c in occurring], [label_set.rgb[c] for c in occurring], **style)
-
-
-def colour_legend(ax: Axes, names: Sequence[str], rgb: Iterable[tuple[int, int, int]], **style: object) -> Axes:
-    """Name colours, to the right of a picture.
-
-    Parameters
-    ----------
-    ax : Axes
-        Axes that get the legend.
-    names : sequence of str
-        What each colour means.
-    rgb : iterable of (int, int, int)
-        The colours, 8-bit RGB, as many as names.
-    **style
-        Passed on to `Axes.legend`.
-
-    Returns
-    -------
-    Axes
-    """
-    placing = {"loc": "upper left", "bbox_to_anchor": (1.02, 1.0), "fontsize": "small", "frameon": False}
-    ax.legend(handles=colour_patches(names, rgb), **(placing | style))
-    return ax
-
-
-def colour_patches(names: Sequence[str], rgb: Iterable[tuple[int, int, int]]) -> list[Patch]:
-    """Return the entries of a legend.
-
-    Parameters
-    ----------
-    names : sequence of str
-        What each colour means.
-    rgb : iterable of (int, int, int)
-        The colours, 8-bit RGB, as many as names.
-
-    Returns
-    -------
-    list of Patch
-        One patch per colour, labelled with its name.
-    """
-    return [
-        Patch(facecolor=np.divide(colour, 255), edgecolor="0.4", linewidth=0.5, label=name)
-        for name, colour in zip(names, rgb, strict=True)
-    ]
-
 
 STATE_NAMES = tuple(state.name.lower() for state in State)
 """The occupancy states in their order."""
@@ -196,3 +126,48 @@ def depth_colours(depth: NDArray) -> NDArray[np.uint8]:
     near, far = np.log(DEPTH_RANGE)
     share = (np.log(np.clip(depth, *DEPTH_RANGE)) - near) / (far - near)
     return _depth_palette()[np.rint(share * 255).astype(np.uint8)]
+
+
+def class_legend(ax: Axes, label_set: LabelSet, labels: NDArray, **style: object) -> Axes:
+    """Name the classes that occur in a map of labels, to the right of it.
+
+    Parameters
+    ----------
+    ax : Axes
+        Axes that get the legend.
+    label_set : LabelSet
+        The classes, for colours and names.
+    labels : (...) int
+        Class numbers; 255 (unlabelled) gets no entry.
+    **style
+        Passed on to `Axes.legend`.
+    """
+    occurring = [c for c in np.unique(labels) if c < len(label_set)]
+    return colour_legend(ax, [label_set.names[c] for c in occurring], [label_set.rgb[c] for c in occurring], **style)
+
+
+def colour_legend(ax: Axes, names: Sequence[str], rgb: Iterable[tuple[int, int, int]], **style: object) -> Axes:
+    """Name colours, to the right of a picture.
+
+    Parameters
+    ----------
+    ax : Axes
+        Axes that get the legend.
+    names : sequence of str
+        What each colour means.
+    rgb : iterable of (int, int, int)
+        The colours, 8-bit RGB, as many as names.
+    **style
+        Passed on to `Axes.legend`.
+    """
+    placing = {"loc": "upper left", "bbox_to_anchor": (1.02, 1.0), "fontsize": "small", "frameon": False}
+    ax.legend(handles=colour_patches(names, rgb), **(placing | style))
+    return ax
+
+
+def colour_patches(names: Sequence[str], rgb: Iterable[tuple[int, int, int]]) -> list[Patch]:
+    """Return the entries of a legend, a patch per colour. Parameters are those of `colour_legend`."""
+    return [
+        Patch(facecolor=np.divide(colour, 255), edgecolor="0.4", linewidth=0.5, label=name)
+        for name, colour in zip(names, rgb, strict=True)
+    ]

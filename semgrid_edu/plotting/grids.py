@@ -35,10 +35,6 @@ def occupancy(spec: GridSpec, probability: NDArray, ax: Axes | None = None, lege
     legend : bool
         Whether to name the states.
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ArgumentError
@@ -63,10 +59,6 @@ def velocity(spec: GridSpec, probability: NDArray, velocity: NDArray, ax: Axes) 
         Velocity over ground, along x and y of the grid frame, m/s; NaN where nothing moves.
     ax : Axes
         Axes in which the grid has been drawn.
-
-    Returns
-    -------
-    Axes
     """
     start, speed = velocity_arrows(spec, probability, velocity)
     (x, y), (vx, vy) = start.T, speed.T * ARROW_SECONDS
@@ -123,10 +115,6 @@ def grid_labels(
     legend : bool
         Whether to name the classes.
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ArgumentError
@@ -147,10 +135,6 @@ def label_maps(spec: GridSpec, maps: Mapping[str, NDArray], label_set: LabelSet)
         The class of each cell, by the title of the map, from left to right; 255 (unlabelled) is white.
     label_set : LabelSet
         The classes, for colours and names.
-
-    Returns
-    -------
-    Figure
 
     Raises
     ------
@@ -180,10 +164,6 @@ def grid_values(spec: GridSpec, values: NDArray, name: str, ax: Axes | None = No
     **style
         Passed on to `Axes.imshow` (`vmin`, `vmax`, `cmap`).
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ArgumentError
@@ -208,10 +188,6 @@ def draw_map(spec: GridSpec, raster: NDArray, ax: Axes | None = None, **style: o
     **style
         Passed on to `Axes.imshow`.
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ArgumentError
@@ -219,9 +195,9 @@ def draw_map(spec: GridSpec, raster: NDArray, ax: Axes | None = None, **style: o
     """
     if np.shape(raster)[:2] != spec.shape:
         raise ArgumentError("raster", f"the grid's shape {spec.shape}", f"shape {np.shape(raster)}")
-    if ax is None:
-        height, width = spec.shape
-        _, ax = plt.subplots(figsize=(4.2, np.clip(0.8 + 2.5 * height / width, 2.4, 6.4)), layout="compressed")
+    height, width = spec.shape
+    size = (4.2, np.clip(0.8 + 2.5 * height / width, 2.4, 6.4))
+    ax = ax or plt.subplots(figsize=size, layout="compressed")[1]
     extent = (spec.y_max, spec.y_min, spec.x_min, spec.x_max)
     ax.imshow(raster, extent=extent, origin="upper", interpolation="nearest", **style)
     ax.set(xlabel="y, to the left [m]", ylabel="x, forward [m]")

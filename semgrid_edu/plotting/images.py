@@ -29,18 +29,13 @@ def points_on_image(frame: Frame, ax: Axes | None = None, size: float = 3.0, col
     colour_bar : bool
         Whether to add a colour bar in metres.
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ArgumentError
         When the frame has no image.
     """
     ax = draw_image(frame.need_image(), ax)
-    pixels, depth = visible_points(frame)
-    return _draw_by_depth(pixels, depth, ax, size, colour_bar)
+    return _draw_by_depth(*visible_points(frame), ax, size, colour_bar)
 
 
 def plane_on_image(
@@ -62,10 +57,6 @@ def plane_on_image(
         Area of a point in the figure, points squared.
     colour_bar : bool
         Whether to add a colour bar in metres. The colours are those of `points_on_image`.
-
-    Returns
-    -------
-    Axes
 
     Raises
     ------
@@ -130,10 +121,6 @@ def image_labels(
     opacity : float
         Weight of the labels' colours: 0 shows the image alone, 1 the labels alone.
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ArgumentError
@@ -156,10 +143,6 @@ def blend_labels(image: NDArray, labels: NDArray, label_set: LabelSet, opacity: 
         The classes, for their colours.
     opacity : float
         Weight of the labels' colours, 0..1.
-
-    Returns
-    -------
-    (h, w, 3) uint8
 
     Raises
     ------
@@ -185,10 +168,6 @@ def image_values(values: NDArray, name: str, ax: Axes | None = None, **style: ob
         Axes to draw into.
     **style
         Passed on to `Axes.imshow` (`vmin`, `vmax`, `cmap`).
-
-    Returns
-    -------
-    Axes
     """
     ax = draw_image(values, ax, **style)
     ax.figure.colorbar(ax.images[-1], ax=ax, label=name, fraction=0.02, pad=0.01)
@@ -206,13 +185,8 @@ def draw_image(image: NDArray, ax: Axes | None = None, **style: object) -> Axes:
         Axes to draw into.
     **style
         Passed on to `Axes.imshow`.
-
-    Returns
-    -------
-    Axes
     """
-    if ax is None:
-        _, ax = plt.subplots(figsize=(10, 3.2), layout="constrained")
+    ax = ax or plt.subplots(figsize=(10, 3.2), layout="constrained")[1]
     ax.imshow(image, **style)
     ax.set(xticks=[], yticks=[])
     ax.spines[:].set_visible(False)

@@ -14,7 +14,7 @@ PANELS = {
     "kernel": "kernel error: against the exact kernel\nafter the same number of updates",
     "convergence": "convergence error:\nagainst the same kernel, converged",
 }
-"""The errors that `crf_error` tells apart, and what each compares."""
+"""The three errors of `crf_error`, and what each compares."""
 _MARKERS = "osD^vP*X"
 _FLOOR = 1e-7
 """Errors below are rounding errors of single precision, and drawn here."""
@@ -35,10 +35,6 @@ def error_against_time(result: Mapping, scene: str, of: str = "mean") -> Figure:
         One of the scenes of the result.
     of : str
         "mean" or "max" over the cells of the total variation, or "labels", the share of labels that differ.
-
-    Returns
-    -------
-    Figure
 
     Raises
     ------
@@ -80,21 +76,20 @@ def coupling_errors(result: Mapping) -> Figure:
     ----------
     result : mapping
         From `crf_coupling`, or from its JSON file.
-
-    Returns
-    -------
-    Figure
     """
-    cases = result["cases"]
-    size = (2.9 * len(cases), 5.6)
-    figure, axes = plt.subplots(
-        2, len(cases), figsize=size, sharex=True, sharey="row", squeeze=False, layout="constrained"
-    )
-    numbers = {way: number for number, way in enumerate(next(iter(cases.values()))["labels"])}
+    cases, couplings, band = result["cases"], result["couplings"], {"alpha": 0.1, "linewidth": 0}
+    shape = {"figsize": (2.9 * len(cases), 5.6), "sharex": True, "sharey": "row", "squeeze": False}
+    figure, axes = plt.subplots(2, len(cases), layout="constrained", **shape)
+    ways = next(iter(cases.values()))["labels"]
+    styles = {way: (f"C{number}", _MARKERS[number]) for number, way in enumerate(ways)}
     for column, (name, case) in zip(axes.T, cases.items(), strict=True):
         for ax, part in zip(column, ("variation", "labels"), strict=True):
             for way, errors in case[part].items():
-                _mean(ax, result["couplings"], 100 * np.asarray(errors), numbers[way], way, band=part == "variation")
+                percent, colour, marker = 100 * np.asarray(errors), *styles[way]
+                mean = percent.mean(axis=1)
+                ax.plot(couplings, mean, color=colour, marker=marker, markersize=4, linewidth=1.2, label=way)
+                if part == "variation":
+                    ax.fill_between(couplings, *np.quantile(percent, (0.25, 0.75), axis=1), color=colour, **band)
             ax.grid(alpha=0.3)
         column[0].set_title(name, loc="left", fontsize="medium")
         column[1].set_xlabel("coupling $w_1$")
@@ -102,46 +97,3 @@ def coupling_errors(result: Mapping) -> Figure:
     axes[1, 0].set_ylabel("labels unlike the most\nlikely labelling [% of cells]")
     figure.legend(*axes[1, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize="small")
     return figure
-
-
-def _mean(ax: Axes, x: Sequence[float], errors: np.ndarray, number: int, name: str, band: bool) -> None:
-    ax.plot(
-        x, errors.mean(axis=1), color=f"C{number}", marker=_MARKERS[number], markersize=4, linewidth=1.2, label=name
-    )
-    if band:
-        low, high = np.quantile(errors, (0.25, 0.75), axis=1)
-        ax.fill_between(x, low, high, color=f"C{number}", alpha=0.1, linewidth=0)
-
-
-def picks_a_side(symmetric: Mapping, ax: Axes | None = None) -> Axes:
-    """Draw what each way says of a cell that the exact marginal leaves undecided, against the coupling.
-
-    Solid lines: every cell leans a little towards class 0. Dashed ones: as little towards class 1.
-
-    Parameters
-    ----------
-    symmetric : mapping
-        The "symmetric" part of a result of `crf_coupling`, or what `symmetric_case` returns.
-    ax : Axes, optional
-        Axes to draw into.
-
-    Returns
-    -------
-    Axes
-    """
-    if ax is None:
-        _, ax = plt.subplots(figsize=(6.4, 3.8), layout="constrained")
-    both = symmetric["probability"]
-    solid = [way for way in both if not way.endswith(", other side")]
-    for number, way in enumerate(solid):
-        style = {"color": f"C{number}", "marker": _MARKERS[number], "markersize": 3, "linewidth": 1.4, "markevery": 4}
-        ax.plot(symmetric["couplings"], both[way], label=way, **style)
-        ax.plot(symmetric["couplings"], both[f"{way}, other side"], linestyle="--", **style)
-    height, width = symmetric["shape"]
-    tilt = symmetric["tilt"]
-    ax.set(ylim=(-0.03, 1.03), xlabel="coupling $w_1$", ylabel="probability of class 0 in the middle cell")
-    title = f"{height} x {width} cells, the network says {tilt:g} for class 0 (solid) or for class 1 (dashed) in each"
-    ax.set_title(title, loc="left", fontsize="medium")
-    ax.grid(alpha=0.3)
-    ax.legend(loc="upper left", fontsize="small")
-    return ax

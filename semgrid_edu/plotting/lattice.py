@@ -42,17 +42,12 @@ class LatticeFrame(NamedTuple):
 
 
 def vertex_places(vertices: Iterable[Vertex]) -> NDArray[np.float64]:
-    """Return where vertices lie in the plane of the two features.
+    """Return where vertices lie in the plane of the two features, (M, 2).
 
     Parameters
     ----------
     vertices : iterable of Vertex
         Three coordinates each, with a sum of zero.
-
-    Returns
-    -------
-    (M, 2) float64
-        Their features.
 
     Examples
     --------
@@ -73,10 +68,6 @@ def draw_triangles(low: ArrayLike, high: ArrayLike, ax: Axes) -> Axes:
         Two opposite corners of the rectangle.
     ax : Axes
         Axes to draw into.
-
-    Returns
-    -------
-    Axes
     """
     steps = vertex_places([tuple(step(SIZE, j)) for j in range(SIZE)])
     far = int(np.abs([low, high]).sum()) + 2
@@ -127,48 +118,34 @@ def lattice_story(features: NDArray, values: NDArray, between: int = 0) -> Itera
     LatticeFrame
         In the last one, each point has the weighted mean of the values around it.
     """
+    corners, shares = zip(*map(enclosing_simplex_literal, features @ elevation(SIZE - 1).T), strict=True)
+    at_points, all_corners = np.repeat(features, SIZE, axis=0), [c for corner in corners for c in corner]
+    at_corners, shares = vertex_places(all_corners), np.array(shares)
+
+    def journey(title: str, starts: NDArray, ends: NDArray, colours: NDArray) -> Iterator[LatticeFrame]:
+        for t in _parts(between):
+            yield LatticeFrame(title, (1 - t) * starts + t * ends, colours, shares.ravel())
+
     yield LatticeFrame("points, each with its value", features, values, np.ones(len(values)))
+    title = "splat: each point gives to its 3 corners"
     vertices = splat_literal(features, np.column_stack([values, np.ones(len(values))]))
-    yield from _journey("splat: each point gives to its 3 corners", features, dict.fromkeys(vertices), values, between)
-    yield _at_vertices("splat: each point gives to its 3 corners", vertices)
+    yield from journey(title, at_points, at_corners, np.repeat(values, SIZE))
+    yield _at_vertices(title, vertices)
     for direction in range(SIZE):
         before, vertices = vertices, blur_literal(vertices, direction)
         title = f"blur along direction {direction + 1} of 3"
         for t in _parts(between):
             yield _at_vertices(title, {v: (1 - t) * before[v] + t * vertices[v] for v in vertices})
         yield _at_vertices(title, vertices)
-    means = {vertex: value / weight for vertex, (value, weight) in vertices.items()}
-    yield from _journey("slice: each point takes from its 3 corners", features, means, None, between)
-    corners, shares = _simplices(features)
-    sums = np.array([share @ [vertices[c] for c in corner] for corner, share in zip(corners, shares, strict=True)])
     title = "slice: each point takes from its 3 corners"
+    found = np.array([vertices[c] for c in all_corners])
+    yield from journey(title, at_corners, at_points, found[:, 0] / found[:, 1])
+    sums = np.array([share @ at_its for share, at_its in zip(shares, found.reshape(-1, SIZE, 2), strict=True)])
     yield LatticeFrame(title, features, sums[:, 0] / sums[:, 1], np.ones(len(values)))
 
 
 def _parts(between: int) -> NDArray[np.float64]:
     return np.arange(1, between + 1) / (between + 1)
-
-
-def _simplices(features: NDArray) -> tuple[list[list[Vertex]], NDArray[np.float64]]:
-    """Return the corners and weights of all points."""
-    corners, shares = zip(*map(enclosing_simplex_literal, features @ elevation(SIZE - 1).T), strict=True)
-    return list(corners), np.array(shares)
-
-
-def _journey(
-    title: str, features: NDArray, means: dict[Vertex, float], values: NDArray | None, between: int
-) -> Iterator[LatticeFrame]:
-    """Yield marks on their way from points to corners; or from corners, which have `means`, when `values` is None."""
-    corners, shares = _simplices(features)
-    ends = np.array([vertex_places(corner) for corner in corners]).reshape(-1, 2)
-    starts = np.repeat(features, SIZE, axis=0)
-    if values is None:
-        starts, ends = ends, starts
-        colours = np.array([means[c] for corner in corners for c in corner])
-    else:
-        colours = np.repeat(values, SIZE)
-    for t in _parts(between):
-        yield LatticeFrame(title, (1 - t) * starts + t * ends, colours, shares.ravel())
 
 
 def _at_vertices(title: str, vertices: dict[Vertex, NDArray]) -> LatticeFrame:

@@ -40,10 +40,6 @@ def probability_line(
     truth : int, optional
         The right cell, which a triangle marks.
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ArgumentError
@@ -58,8 +54,7 @@ def probability_line(
         raise ArgumentError("names", f"one for each of {len(values)} cells", len(names))
     if truth is not None and not 0 <= truth < len(values):
         raise ArgumentError("truth", f"a cell from 0 to {len(values) - 1}", truth)
-    if ax is None:
-        _, ax = plt.subplots(figsize=(6, 1.8), layout="constrained")
+    ax = ax or plt.subplots(figsize=(6, 1.8), layout="constrained")[1]
     bars = ax.bar(range(len(values)), values, width=0.8, color="0.45")
     if len(values) <= MAX_NUMBERS:
         ax.bar_label(bars, [f"{value:.2f}" for value in values], fontsize="small")
@@ -84,10 +79,6 @@ def probability_lines(
         Names of the N cells; 0, 1, ... when left out.
     truth : int, optional
         The right cell, which a triangle marks in every line.
-
-    Returns
-    -------
-    Figure
 
     Raises
     ------
@@ -117,10 +108,6 @@ def belief_history(belief: NDArray, ax: Axes | None = None, truth: NDArray | Non
     truth : (T,) int, optional
         The right cell at each step, which a circle marks.
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ArgumentError
@@ -130,8 +117,7 @@ def belief_history(belief: NDArray, ax: Axes | None = None, truth: NDArray | Non
         raise ArgumentError("belief", "one row per step, shape (T, N)", f"shape {np.shape(belief)}")
     if truth is not None and np.shape(truth) != (len(belief),):
         raise ArgumentError("truth", f"one cell for each of {len(belief)} steps", f"shape {np.shape(truth)}")
-    if ax is None:
-        _, ax = plt.subplots(figsize=(6, 2.6), layout="constrained")
+    ax = ax or plt.subplots(figsize=(6, 2.6), layout="constrained")[1]
     ax.imshow(np.transpose(belief), cmap="Blues", vmin=0, vmax=1, origin="lower", aspect="auto")
     if truth is not None:
         ax.plot(np.arange(len(belief)), truth, "o", markersize=4, markerfacecolor="none", color="#d55e00")
@@ -151,10 +137,6 @@ def state_history(times: NDArray, probability: NDArray, ax: Axes | None = None) 
     ax : Axes, optional
         Axes to draw into.
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ArgumentError
@@ -164,8 +146,7 @@ def state_history(times: NDArray, probability: NDArray, ax: Axes | None = None) 
         raise ArgumentError("times", "two or more, ascending, shape (T,)", times)
     if np.shape(probability) != (4, len(times)):
         raise ArgumentError("probability", f"shape {(4, len(times))}", f"shape {np.shape(probability)}")
-    if ax is None:
-        _, ax = plt.subplots(figsize=(6, 2.2), layout="constrained")
+    ax = ax or plt.subplots(figsize=(6, 2.2), layout="constrained")[1]
     ax.stackplot(times, probability, colors=np.divide(STATE_COLOURS, 255), edgecolor="0.4", linewidth=0.5)
     ax.set(xlabel="time [s]", ylabel="probability", ylim=(0, 1), xlim=(times[0], times[-1]))
     return colour_legend(ax, STATE_NAMES, STATE_COLOURS)

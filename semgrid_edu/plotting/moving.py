@@ -47,10 +47,6 @@ def velocity_wheel(
     legend : bool
         Whether to name the states and to show the wheel.
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ArgumentError
@@ -61,26 +57,9 @@ def velocity_wheel(
 
 
 def wheel_colours(spec: GridSpec, probability: NDArray, velocity: NDArray) -> NDArray[np.uint8]:
-    """Paint an occupancy grid with the colours of `velocity_colours` in place of DYNAMIC's.
+    """Paint a grid with `velocity_colours` in place of DYNAMIC's, (H, W, 3).
 
-    Parameters
-    ----------
-    spec : GridSpec
-        The grid.
-    probability : (4, H, W) float
-        Probabilities of FREE, STATIC, DYNAMIC and UNKNOWN, which sum to 1 in each cell.
-    velocity : (2, H, W) float
-        Velocity over ground, along x and y of the grid frame, m/s; NaN where nothing moves.
-
-    Returns
-    -------
-    (H, W, 3) uint8
-        RGB.
-
-    Raises
-    ------
-    ArgumentError
-        When an array doesn't fit `spec`.
+    Parameters are those of `velocity_wheel`.
     """
     if np.shape(velocity) != (2, *spec.shape):
         raise ArgumentError("velocity", f"shape {(2, *spec.shape)}", f"shape {np.shape(velocity)}")
@@ -104,13 +83,8 @@ def particles(spec: GridSpec, particles: Particles, ax: Axes | None = None) -> A
         Particles in the frame of the grid; those outside aren't drawn.
     ax : Axes, optional
         Axes in which the grid has been drawn; a new, empty map when left out.
-
-    Returns
-    -------
-    Axes
     """
-    if ax is None:
-        ax = draw_map(spec, np.full((*spec.shape, 3), 255, np.uint8))
+    ax = ax or draw_map(spec, np.full((*spec.shape, 3), 255, np.uint8))
     inside = np.flatnonzero(spec.cells(particles.position)[2])
     shown = inside[:: max(1, -(-len(inside) // MAX_POINTS))]
     weight = particles.weight[shown] / max(particles.weight[shown].max(initial=0), np.finfo(np.float32).tiny)
@@ -180,12 +154,9 @@ def _wheel_legend(ax: Axes) -> Axes:
 
 
 def wheel_picture() -> NDArray[np.uint8]:
-    """Paint the colour wheel of velocities with forward up: full speed on its rim, a quarter of it on the white ring.
+    """Paint the colour wheel of velocities, (101, 101, 4): RGB, and opacity, which is 0 outside the wheel.
 
-    Returns
-    -------
-    (101, 101, 4) uint8
-        RGB and opacity, which is 0 outside the wheel.
+    Forward is up; the rim has full speed, the white ring a quarter of it.
     """
     across = np.linspace(1, -1, 101)
     forward, left = np.meshgrid(across, across, indexing="ij")

@@ -39,9 +39,8 @@ def draw_cell_story(story: "CellStory", image: NDArray | None = None) -> Figure:
         A new figure.
     """
     figure = plt.figure(figsize=(12, 5.2 if image is None else 8.4), layout="constrained")
-    parts = figure.subfigures(
-        1 if image is None else 2, 1, squeeze=False, height_ratios=[1] if image is None else [3, 5]
-    )
+    heights = [5] if image is None else [3, 5]
+    parts = figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)
     if image is not None:
         _draw_column(story, image, parts[0, 0].subplots())
     panels = parts[-1, 0].subplot_mosaic([["steps", "parts", "planes", "crf"], ["past", "classes", "planes", "crf"]])

@@ -5,8 +5,7 @@ import pytest
 
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.metrics import METRICS, pixel_accuracy
-from semgrid_edu.workshop.paper.reports.claim_statements import called, called_void
-from semgrid_edu.workshop.paper.reports.claims import CLAIMS
+from semgrid_edu.workshop.paper.reports.claims import CLAIMS, STATEMENTS, called, called_void
 from semgrid_edu.workshop.paper.reports.deviations import deviations
 from semgrid_edu.workshop.paper.reports.verdicts import Statement, verdict
 from semgrid_edu.workshop.paper.runs.other_runs import time_saved
@@ -43,8 +42,12 @@ def networks(**right):
     }
 
 
+def test_every_claim_has_its_statements():
+    assert list(CLAIMS) == list(STATEMENTS) == list(range(1, 10))
+
+
 def judge(number, runs, drives=DRIVES):
-    return verdict(CLAIMS[number].statements(runs, None), 3, drives)
+    return verdict(STATEMENTS[number](runs, None), 3, drives)
 
 
 SMOOTHED = {"segnet": ((0.9, 0.6), (0.93, 0.5)), "fcn": ((0.88, 0.58), (0.9, 0.5)), "deeplab": ((0.8, 0.5), (0.9, 0.3))}
@@ -78,7 +81,7 @@ def test_a_crf_that_smooths_reproduces_claims_2_and_3_and_one_that_does_nothing_
 def test_few_drives_or_seeds_are_too_small_to_tell():
     runs = SimpleNamespace(networks=networks(**SMOOTHED))
     assert judge(2, runs, drives=9) == "cannot tell (too small)"
-    assert verdict(CLAIMS[2].statements(runs, None), 2, DRIVES) == "cannot tell (too small)"
+    assert verdict(STATEMENTS[2](runs, None), 2, DRIVES) == "cannot tell (too small)"
 
 
 @pytest.mark.parametrize(

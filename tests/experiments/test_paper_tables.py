@@ -1,21 +1,22 @@
 import json
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from tiny_notes import Note
 
-from semgrid_edu.labels import KITTI_14, SYNTHIA_10
-from semgrid_edu.workshop.paper.reports.accuracy_tables import (
-    accuracy_markdown,
-    accuracy_rows,
-    crf_gains,
-    network_gains,
-)
-from semgrid_edu.workshop.paper.reports.confusion_table import confusion_markdown, confusion_result
+import semgrid_edu
+from semgrid_edu.labels import SYNTHIA_10
 from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS, Experiment
 from semgrid_edu.workshop.paper.reports.pictures import accuracy_picture, confusion_picture
-from semgrid_edu.workshop.paper.reports.results import write_result
+from semgrid_edu.workshop.paper.reports.reproduce import result_markdown, write_result
+from semgrid_edu.workshop.paper.reports.tables import (
+    accuracy_markdown,
+    accuracy_result,
+    confusion_markdown,
+    confusion_result,
+)
 from semgrid_edu.workshop.paper.runs.paper import TABLE_1_SCORES
 from semgrid_edu.workshop.paper.runs.scales import SCALES
 from semgrid_edu.workshop.paper.runs.score_runs import WITH_CRF
@@ -39,8 +40,7 @@ class Counted:
 @pytest.fixture
 def table1():
     runs = {name: [Counted(14, right), Counted(14, right + 2)] for name, right in (("segnet", 80), ("fcn", 70))}
-    gains = crf_gains(runs, None, KITTI_14) + network_gains(runs, None, KITTI_14)
-    return {"rows": accuracy_rows(runs, None, KITTI_14, TABLE_1_SCORES), "differences": gains}
+    return accuracy_result(runs, None, TABLE_1_SCORES)
 
 
 def test_rows_hold_mean_and_every_seed(table1):
@@ -84,15 +84,27 @@ def test_every_command_has_a_result():
     assert list(EXPERIMENTS) == ["table1", "table2", "table3", "claims", "ablations", "truth-costs", "figures"]
 
 
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_committed_results_give_the_committed_text(name):
+    folder = Path(semgrid_edu.__file__).parents[1] / "docs" / "results" / "reduced"
+    result = json.loads((folder / f"{name}.json").read_text())
+    assert result_markdown(result, EXPERIMENTS[name]) == (folder / f"{name}.md").read_text()
+
+
 def test_a_result_is_written_with_all_that_made_it(tmp_path):
     runs, scale = [Note("a"), Note("b", (Note("a"),))], SCALES["quick"]
     for run, own in zip(runs, ({"seconds": 60}, {"seconds": 120, "processes": 2}), strict=True):
         run.folder(tmp_path).mkdir()
         ended = {"commit": "abc", "date": "2026-01-01", **own}
         (run.folder(tmp_path) / "ended.json").write_text(json.dumps(ended))
-    draw = lambda *_: plt.figure()  # noqa: E731
-    work = (lambda _: 2, lambda *_: runs, lambda *_: {"x": 1}, lambda _: "of x", draw)
-    shown = Experiment("A table", "kitti", *work, deviations=("No frame was seen by day.",))
+    shown = Experiment(
+        title="A table",
+        runs=lambda *_: runs,
+        result=lambda *_: {"x": 1},
+        markdown=lambda _: "of x",
+        picture=lambda *_: plt.figure(),
+        deviations=("No frame was seen by day.",),
+    )
     text = write_result("table", shown, scale, 2, tmp_path, tmp_path / "out")
     content = json.loads((tmp_path / "out" / "table.json").read_text())
     assert content["x"] == 1

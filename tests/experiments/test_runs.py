@@ -188,7 +188,7 @@ def test_a_killed_plan_goes_on_with_the_same_bytes(trained, tmp_path):
 
 
 def test_two_commands_never_share_a_folder_of_runs(tmp_path):
-    request = Request("table3", "quick", None, tmp_path / "runs", tmp_path / "out", workers=1)
+    request = Request(experiment="table3", scale="quick", runs=tmp_path / "runs", out=tmp_path / "out", workers=1)
     with sole_writer(tmp_path / "runs"), pytest.raises(DataError, match="a folder that no other process writes to"):
         reproduce(request, lambda _: None)
 

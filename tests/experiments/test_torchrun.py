@@ -56,7 +56,7 @@ def test_other_runs_take_one_process(tmp_path):
 
 def test_a_plan_that_torchrun_starts_twice_is_refused(monkeypatch, tmp_path):
     monkeypatch.setenv("WORLD_SIZE", "2")
-    request = Request("table1", "quick", None, tmp_path / "runs", tmp_path / "out")
+    request = Request(experiment="table1", scale="quick", runs=tmp_path / "runs", out=tmp_path / "out")
     with pytest.raises(ArgumentError, match="--processes: expected 2"):
         reproduce(request, print)
     assert not (tmp_path / "runs").exists()

@@ -25,7 +25,7 @@ from semgrid_edu.workshop.paper.runs.score_runs import LABELS, LabelsRun
 from semgrid_edu.workshop.scheduler.execute import execute_plan
 from semgrid_edu.workshop.scheduler.plan import with_needs
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions
-from semgrid_edu.workshop.studies.ground_truth.truth_counts import TRIALS
+from semgrid_edu.workshop.studies.ground_truth.laboratory import TRIALS
 
 REDUCED = SCALES["reduced"]
 LABORATORY = {

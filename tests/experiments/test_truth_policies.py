@@ -16,9 +16,17 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.writer import write_calibration, write_drive
-from semgrid_edu.workshop.studies.ground_truth import truth_policies as laboratory
-from semgrid_edu.workshop.studies.ground_truth.truth_counts import BAND_EDGES, COUNTED, TRIALS, Trial, TruthCounts
-from semgrid_edu.workshop.studies.ground_truth.truth_tables import class_table, distance_table, policy_table
+from semgrid_edu.workshop.studies.ground_truth import laboratory
+from semgrid_edu.workshop.studies.ground_truth.counts import (
+    BAND_EDGES,
+    COUNTED,
+    TruthCounts,
+    class_table,
+    counts_of,
+    distance_table,
+    policy_table,
+)
+from semgrid_edu.workshop.studies.ground_truth.laboratory import TRIALS, Trial
 
 ROAD, WALK, CAR = (KITTI_14.index(name) for name in ("road", "sidewalk", "car"))
 FREE, HIDDEN = KITTI_14.index("unknown-free"), KITTI_14.index("unknown-unobserved")
@@ -143,7 +151,7 @@ class TestRun:
         again = laboratory.truth_policies(tmp_path / "parts.json", drives=4)
         assert asked[4:] == [700, 701, 702, 703]
         assert again | {"minutes": 0} == whole | {"minutes": 0}
-        paper = laboratory.counts_of(whole, "one scan (the paper)")
+        paper = counts_of(whole, "one scan (the paper)")
         np.testing.assert_array_equal(paper.cells, counts().cells * (1 + 2 + 3 + 4))
 
     def test_a_log_of_other_choices_is_refused(self, asked, tmp_path):
@@ -178,4 +186,4 @@ class TestRun:
     def test_an_unknown_trial_is_refused(self, asked, tmp_path):
         result = laboratory.truth_policies(tmp_path / "truth.json", drives=1)
         with pytest.raises(ArgumentError, match="name"):
-            laboratory.counts_of(result, "none")
+            counts_of(result, "none")

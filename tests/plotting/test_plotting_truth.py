@@ -7,6 +7,7 @@ import pytest
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
+from semgrid_edu.workshop.studies.ground_truth.counts import COUNTED, TruthCounts
 from semgrid_edu.workshop.studies.ground_truth.pictures import (
     DIFFERENCES,
     difference_kinds,
@@ -14,7 +15,6 @@ from semgrid_edu.workshop.studies.ground_truth.pictures import (
     truth_difference,
     truth_errors,
 )
-from semgrid_edu.workshop.studies.ground_truth.truth_counts import COUNTED, TruthCounts
 
 ROAD, CAR, FREE, STATIC = (KITTI_14.index(name) for name in ("road", "car", "unknown-free", "unknown-static"))
 TRUTH = np.array([[ROAD, ROAD, ROAD], [FREE, FREE, CAR]])

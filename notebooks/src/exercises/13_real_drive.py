@@ -25,7 +25,7 @@ import numpy as np
 from semgrid_edu.answers import answer_array
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.workshop.studies.new_drive.drive_checks import edge_contrast, ground_plane, time_gaps  # for task 5
-from semgrid_edu.workshop.studies.new_drive.ego_motion import motion_between, overlay_error
+from semgrid_edu.workshop.studies.new_drive.drive_checks import motion_between, overlay_error
 from semgrid_edu.workshop.studies.new_drive.faults import FAULTS
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does

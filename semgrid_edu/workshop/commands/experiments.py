@@ -110,8 +110,8 @@ def truth_policies(
     out: Annotated[Path, typer.Option(help="Takes each drive; the same command goes on.")] = Path("truth.json"),
 ) -> None:
     """Measure how wrong each way of making ground truth from LIDAR is, by class and distance (lecture 09)."""
-    from semgrid_edu.workshop.studies.ground_truth.truth_policies import truth_policies
-    from semgrid_edu.workshop.studies.ground_truth.truth_tables import truth_tables
+    from semgrid_edu.workshop.studies.ground_truth.counts import truth_tables
+    from semgrid_edu.workshop.studies.ground_truth.laboratory import truth_policies
 
     keep_result(out, lambda: truth_policies(out, seed, drives, grid, lidar), truth_tables)
 
@@ -184,7 +184,17 @@ def _command(experiment: str) -> Callable[..., None]:
     ) -> None:
         from semgrid_edu.workshop.paper.reports.reproduce import Request, reproduce
 
-        request = Request(experiment, scale, seeds, runs, out, workers, scheduler, device, processes)
+        request = Request(
+            experiment=experiment,
+            scale=scale,
+            runs=runs,
+            out=out,
+            seeds=seeds,
+            workers=workers,
+            scheduler=scheduler,
+            device=device,
+            processes=processes,
+        )
         problems = reproduce(request, typer.echo, plan)
         if problems:
             typer.echo(problems, err=True)

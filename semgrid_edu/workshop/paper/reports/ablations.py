@@ -1,7 +1,4 @@
-"""What the paper leaves open: one thing changed at a time, against the same seeds and drives (section 4).
-
-The ablations as Markdown (section 4).
-"""
+"""What the paper leaves open: one thing changed at a time, against the same seeds and drives (section 4)."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,76 +8,17 @@ import numpy as np
 from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import METRICS, pixel_accuracy
-from semgrid_edu.workshop.paper.reports.accuracy_tables import TRUTHS, comparison
+from semgrid_edu.workshop.paper.reports.tables import differences_by_truth, score_cells, scores_by_truth
+from semgrid_edu.workshop.paper.reports.truth_costs import learned_from
 from semgrid_edu.workshop.paper.runs.claim_runs import table1_runs
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
 from semgrid_edu.workshop.paper.runs.scales import Scale
-from semgrid_edu.workshop.paper.runs.score_runs import NETWORK, WITH_CRF, WITH_SEARCHED, ScoreRun, by_seed
+from semgrid_edu.workshop.paper.runs.score_runs import WITH_CRF, WITH_SEARCHED, ScoreRun, by_seed
 from semgrid_edu.workshop.paper.runs.variants import CalibrationError, Variant
 from semgrid_edu.workshop.scheduler.runs import Run
 from semgrid_edu.workshop.scoring.confusions import distance_band_names
-from semgrid_edu.workshop.scoring.score_with_interval import (
-    all_metrics,
-    markdown_table,
-    on_cells,
-    score_with_interval,
-    shown,
-)
-
-SECTIONS = {
-    "variants": "Networks that are trained differently. Usual: SegNet, 20 planes 0.2 m apart, occupancy grid, "
-    "reduction, balancing, labels made with the LIDAR.",
-    "calibration": "The usual network, tested with a wrong calibration: degrees of pitch (positive: believed to look "
-    "further down) and yaw (to the left), metres of height.",
-    "frames": "A quarter of the training frames, against all of them.",
-}
-"""What each list of rows shows."""
-
-
-def ablations_markdown(result: dict) -> str:
-    """Return the ablations as Markdown.
-
-    Parameters
-    ----------
-    result : dict
-        From `ablations`.
-
-    Returns
-    -------
-    str
-    """
-    parts = [f"## {words}\n\n{_rows(result[name])}" for name, words in SECTIONS.items()]
-    parts.append(
-        f"## Accuracy by distance, cells with a semantic class, true labels\n\n{_distance(result['distance'])}"
-    )
-    parts.append(f"## Expected calibration error, points\n\n{_calibration_table(result['sureness'])}")
-    return "\n\n".join(parts)
-
-
-def _rows(rows: list[dict]) -> str:
-    """Lay out scores by the true labels over all cells, and differences from the usual network, points."""
-    lines = [["", *METRICS, *(f"{name}, difference" for name in METRICS)]]
-    for row in rows:
-        scores, differences = (row[part]["true"]["all"] for part in ("scores", "differences"))
-        ours, gains = (
-            [shown(part[name], digits) for name in METRICS] for part, digits in ((scores, 1), (differences, 2))
-        )
-        lines.append([row["what"], *ours, *gains])
-    return markdown_table(lines)
-
-
-def _distance(rows: list[dict]) -> str:
-    lines = [["distance", "pixel accuracy"]]
-    return markdown_table(lines + [[row["what"], shown(row["pixel accuracy"])] for row in rows])
-
-
-def _calibration_table(rows: list[dict]) -> str:
-    lines = [["", "mean", "every seed"]]
-    for row in rows:
-        errors = 100 * np.array(row["expected calibration error"])
-        lines.append([row["what"], f"{errors.mean():.1f}", ", ".join(f"{error:.1f}" for error in errors)])
-    return markdown_table(lines)
-
+from semgrid_edu.workshop.scoring.grids import NETWORK
+from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, on_cells, score_with_interval, shown
 
 VARIANTS = {
     "1 plane": Variant(n_planes=1),
@@ -103,47 +41,51 @@ CALIBRATION_ERRORS = (
 """Errors in the calibration that the trained network is given when it is tested: degrees, metres."""
 
 FEW = 4
-"""The small training set has one in so many frames."""
+"""The small training set has one frame in four."""
 
-
-def usual_runs(scale: Scale, seeds: int) -> list[ScoreRun]:
-    """Return the runs of the usual network, which are SegNet's of Table 1. Parameters are those of `table1_runs`.
-
-    Returns
-    -------
-    list of ScoreRun
-        One per seed.
-    """
-    return table1_runs(scale, seeds)["segnet"]
+SECTIONS = {
+    "variants": "Networks that are trained differently. Usual: SegNet, 20 planes 0.2 m apart, occupancy grid, "
+    "reduction, balancing, labels made with the LIDAR.",
+    "calibration": "The usual network, tested with a wrong calibration: degrees of pitch (positive: believed to look "
+    "further down) and yaw (to the left), metres of height.",
+    "frames": "A quarter of the training frames, against all of them.",
+}
+"""The lists of rows that are compared with the usual network, and what each shows."""
 
 
 def variant_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
-    """Return the runs of the networks that differ from the usual one. Parameters are those of `table1_runs`.
+    """Return the runs of the networks that differ from the usual one, by what differs, one per seed.
 
-    Returns
-    -------
-    dict of str to list of ScoreRun
-        By what differs, one per seed.
+    Parameters
+    ----------
+    scale : Scale
+        How large they are.
+    seeds : int
+        Number of seeds.
     """
     found = {
         name: [scale.scored(scale.kitti, "segnet", seed, variant=variant, crf=False) for seed in range(seeds)]
         for name, variant in VARIANTS.items()
     }
-    found["learned from true labels"] = [
-        ScoreRun(scale.grid_stage(scale.kitti, "segnet", seed, truth="true"), usual.frames, crf=False)
-        for seed, usual in enumerate(usual_runs(scale, seeds))
-    ]
-    return found
+    return found | {"learned from true labels": learned_from("true", table1_runs(scale, seeds)["segnet"], scale)}
+
+
+def miscalibrated_runs(usual: Sequence[ScoreRun]) -> dict[str, list[ScoreRun]]:
+    """Return the runs of the usual network with wrong calibrations, by the error, one per seed.
+
+    Parameters
+    ----------
+    usual : sequence of ScoreRun
+        With the right calibration, one per seed.
+    """
+    return {
+        error.name.removeprefix("-"): [ScoreRun(run.network, run.frames, False, error) for run in usual]
+        for error in CALIBRATION_ERRORS
+    }
 
 
 def small_set_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
-    """Return the runs of the three networks of Table 1 on a part of the frames. Parameters are those of `table1_runs`.
-
-    Returns
-    -------
-    dict of str to list of ScoreRun
-        By image network one per seed.
-    """
+    """Return the runs of Table 1's networks on a part of the frames. Parameters are those of `variant_runs`."""
     n_frames = max(scale.frames_to_train // FEW, 6)
     return {
         segmenter: [scale.scored(scale.kitti, segmenter, seed, n_frames=n_frames, crf=False) for seed in range(seeds)]
@@ -151,30 +93,11 @@ def small_set_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
     }
 
 
-def miscalibrated_runs(scale: Scale, seeds: int) -> dict[CalibrationError, list[ScoreRun]]:
-    """Return the runs of the usual network with wrong calibrations. Parameters are those of `table1_runs`.
-
-    Returns
-    -------
-    dict of CalibrationError to list of ScoreRun
-        By error one per seed.
-    """
-    return {
-        error: [ScoreRun(usual.network, usual.frames, False, error) for usual in usual_runs(scale, seeds)]
-        for error in CALIBRATION_ERRORS
-    }
-
-
 def ablation_runs(scale: Scale, seeds: int) -> list[Run]:
-    """Return all runs of the ablations. Parameters are those of `table1_runs`.
-
-    Returns
-    -------
-    list of Run
-        The usual networks first; then what needs no other training run; then the variants.
-    """
-    others = (miscalibrated_runs(scale, seeds), variant_runs(scale, seeds), small_set_runs(scale, seeds))
-    return [*usual_runs(scale, seeds), *(run for found in others for runs in found.values() for run in runs)]
+    """Return all runs: the usual networks first, the variants last. Parameters are those of `variant_runs`."""
+    usual = table1_runs(scale, seeds)["segnet"]
+    others = (miscalibrated_runs(usual), variant_runs(scale, seeds), small_set_runs(scale, seeds))
+    return [*usual, *(run for found in others for runs in found.values() for run in runs)]
 
 
 def ablations(scale: Scale, seeds: int, root: Path) -> dict:
@@ -192,41 +115,33 @@ def ablations(scale: Scale, seeds: int, root: Path) -> dict:
     Returns
     -------
     dict
-        "variants", "calibration", "frames", "distance" and "sureness": lists of rows, each with what it is ("what")
+        "variants", "calibration", "frames", "distance" and "confidence": lists of rows, each with what it is ("what")
         and its scores.
     """
-    usual = usual_runs(scale, seeds)
+    every = table1_runs(scale, seeds)
+    usual = every["segnet"]
     networks = {"usual": usual} | variant_runs(scale, seeds)
-    wrong = miscalibrated_runs(scale, seeds)
+    small_sets = small_set_runs(scale, seeds).items()
     return {
         "variants": [_row(name, runs, usual, root) for name, runs in networks.items()],
-        "calibration": [_row(error.name.removeprefix("-"), runs, usual, root) for error, runs in wrong.items()],
-        "frames": _small_sets(scale, seeds, root),
+        "calibration": [_row(name, runs, usual, root) for name, runs in miscalibrated_runs(usual).items()],
+        "frames": [
+            _row(f"{NETWORKS[name]}, {runs[0].network.image_stage.n_frames} frames", runs, every[name], root)
+            for name, runs in small_sets
+        ],
         "distance": [_band(band, usual, root) for band in distance_band_names()],
-        "sureness": [_calibration(method, usual, root) for method in (NETWORK, WITH_CRF, WITH_SEARCHED)],
+        "confidence": [_calibration(method, usual, root) for method in (NETWORK, WITH_CRF, WITH_SEARCHED)],
     }
 
 
 def _row(what: str, runs: Sequence[ScoreRun], usual: Sequence[ScoreRun], root: Path) -> dict:
     """Return the scores of a variant and its differences from the usual network, by truth, cells and metric."""
-    scores = {truth: all_metrics(by_seed(runs, root, NETWORK, truth), KITTI_14) for truth in TRUTHS}
-    return {"what": what, "scores": scores, "differences": comparison(what, runs, usual, root, KITTI_14)["scores"]}
-
-
-def _small_sets(scale: Scale, seeds: int, root: Path) -> list[dict]:
-    """Return each network's scores with few frames, and what it loses against all of them."""
-    rows, every = [], table1_runs(scale, seeds)
-    for segmenter, few in small_set_runs(scale, seeds).items():
-        rows.append(
-            _row(f"{NETWORKS[segmenter]}, {few[0].network.image_stage.n_frames} frames", few, every[segmenter], root)
-        )
-    return rows
+    return {"what": what, "scores": scores_by_truth(runs, root), "differences": differences_by_truth(runs, usual, root)}
 
 
 def _band(band: str, usual: Sequence[ScoreRun], root: Path) -> dict:
     """Return the scores of the cells in a band of distance, by the true labels."""
-    found = by_seed(usual, root, NETWORK, "true", band)
-    kept = on_cells(found, "semantic", KITTI_14)
+    kept = on_cells(by_seed(usual, root, NETWORK, "true", band), "semantic", KITTI_14)
     return {"what": band, "cells": int(kept.sum()), "pixel accuracy": score_with_interval(kept, pixel_accuracy)}
 
 
@@ -238,3 +153,32 @@ def _calibration(method: str, usual: Sequence[ScoreRun], root: Path) -> dict:
         "expected calibration error": [expected_calibration_error(diagram) for diagram in diagrams],
         "diagrams": [{name: column.tolist() for name, column in diagram._asdict().items()} for diagram in diagrams],
     }
+
+
+def ablations_markdown(result: dict) -> str:
+    """Return the ablations as Markdown.
+
+    Parameters
+    ----------
+    result : dict
+        From `ablations`.
+    """
+    tables = {words: _beside_usual(result[name]) for name, words in SECTIONS.items()}
+    near = [[row["what"], shown(row["pixel accuracy"])] for row in result["distance"]]
+    tables["Accuracy by distance, cells with a semantic class, true labels"] = [["distance", "pixel accuracy"], *near]
+    sure = [_calibration_cells(row) for row in result["confidence"]]
+    tables["Expected calibration error, points"] = [["", "mean", "every seed"], *sure]
+    return "\n\n".join(f"## {words}\n\n{markdown_table(lines)}" for words, lines in tables.items())
+
+
+def _beside_usual(rows: list[dict]) -> list[list[str]]:
+    """Lay out scores by the true labels over all cells, and differences from the usual network, points."""
+    return [["", *METRICS, *(f"{name}, difference" for name in METRICS)]] + [
+        [row["what"], *score_cells(row["scores"]["true"]["all"]), *score_cells(row["differences"]["true"]["all"], 2)]
+        for row in rows
+    ]
+
+
+def _calibration_cells(row: dict) -> list[str]:
+    errors = 100 * np.array(row["expected calibration error"])
+    return [row["what"], f"{errors.mean():.1f}", ", ".join(f"{error:.1f}" for error in errors)]

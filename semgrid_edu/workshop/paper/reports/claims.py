@@ -1,100 +1,199 @@
-"""The paper's nine claims and what must hold for each, written down before the numbers were (section 4).
+"""What the paper's nine claims (`claims.toml`) say as statements about numbers, each with its number (section 4).
 
-Verdicts are found as `verdicts` says.
+Unless a statement says otherwise, scores are those of the networks of Table 1 without the CRF, against labels made with
+the LIDAR as in the paper.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import tomllib
+from collections.abc import Callable, Iterable
+from itertools import pairwise
 from pathlib import Path
 
-from semgrid_edu.workshop.paper.reports.claim_statements import (
-    effect_of_crf,
-    effect_of_distance,
-    effect_of_reduction,
-    effect_on_new_routes,
-    errors_on_perfect_data,
-    geometry_and_learning,
-    order_of_networks,
-    overturned_cars,
-    road_and_sidewalk,
-)
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.labels import KITTI_14, SYNTHIA_10
+from semgrid_edu.metrics import METRICS, class_accuracy
 from semgrid_edu.workshop.paper.reports.verdicts import Statement
 from semgrid_edu.workshop.paper.runs.claim_runs import ClaimRuns
+from semgrid_edu.workshop.paper.runs.other_runs import OVERTURNED, time_saved
+from semgrid_edu.workshop.paper.runs.paper import NETWORKS
+from semgrid_edu.workshop.paper.runs.score_runs import GEOMETRY, TRUE_GEOMETRY, WITH_CRF, CountingRun, ScoreRun, by_seed
+from semgrid_edu.workshop.scoring.grids import NETWORK, OCCUPANCY_ALONE
+from semgrid_edu.workshop.scoring.score_with_interval import compared, score_with_interval
+
+CLAIMS: dict[int, dict[str, str]] = {
+    int(number): texts for number, texts in tomllib.loads(Path(__file__).with_suffix(".toml").read_text()).items()
+}
+"""By number: what the paper says, in short ("claim"), and in words what must hold ("judged_by")."""
+
+MARGIN = 0.005
+"""Half a point: by less than that, a score counts as unchanged in claim 8."""
+
+Metric = Callable[[NDArray], float]
+"""Takes a confusion matrix (C, C), one row per true class; returns a share, or NaN where there is nothing to share."""
 
 
-@dataclass(frozen=True)
-class Claim:
-    """One claim of the paper.
+def _order_of_networks(runs: ClaimRuns, root: Path) -> list[Statement]:
+    found = {name: by_seed(some, root, NETWORK, "lidar") for name, some in runs.networks.items()}
+    return [
+        Statement(f"{metric}: {NETWORKS[a]} - {NETWORKS[b]}", compared(found[a], found[b], METRICS[metric]))
+        for a, b in pairwise(NETWORKS)
+        for metric in METRICS
+    ]
+
+
+def _effect_of_crf(runs: ClaimRuns, root: Path) -> list[Statement]:
+    return [one for name, some in runs.networks.items() for one in _with_crf(NETWORKS[name], some, root)]
+
+
+def _with_crf(name: str, some: list[ScoreRun], root: Path) -> list[Statement]:
+    with_crf, without = (by_seed(some, root, method, "lidar") for method in (WITH_CRF, NETWORK))
+    return [
+        Statement(f"{name}, {metric}: with CRF - without", compared(with_crf, without, METRICS[metric]), 0, above)
+        for metric, above in (("pixel accuracy", True), ("class accuracy", False))
+    ]
+
+
+def _errors_on_perfect_data(runs: ClaimRuns, root: Path) -> list[Statement]:
+    found = by_seed(runs.perfect, root, NETWORK, "true")
+    road, car, lane, pole = map(SYNTHIA_10.index, ("road", "car", "lane", "pole"))
+    numbers: dict[str, tuple[Metric, float]] = {
+        "share of errors on things that are called void": (called_void, 0.5),
+        "road called right, above the mean class": (lambda m: called(m, road, road) - class_accuracy(m), 0),
+        "car called right, above the mean class": (lambda m: called(m, car, car) - class_accuracy(m), 0),
+        "lane called lane - road called lane": (lambda m: called(m, lane, lane) - called(m, road, lane), 0),
+        "cells called pole over cells of poles": (lambda m: m[:, pole].sum() / m[pole].sum(), 1),
+    }
+    return [Statement(what, score_with_interval(found, metric), limit) for what, (metric, limit) in numbers.items()]
+
+
+def called(matrix: NDArray, truth: int, name: int) -> float:
+    """Return the share of a class's cells that are called so; NaN when there is no such cell.
 
     Parameters
     ----------
-    text : str
-        What the paper says, in short.
-    judged_by : str
-        The statements that must hold, in words.
-    statements : callable
-        (runs, folder of all runs) -> the same statements with their numbers.
+    matrix : (C, C) int
+        A confusion matrix.
+    truth, name : int
+        The true class, and what it is called.
+
+    Examples
+    --------
+    >>> called(np.array([[6, 2], [0, 0]]), truth=0, name=1)
+    0.25
     """
-
-    text: str
-    judged_by: str
-    statements: Callable[[ClaimRuns, Path], list[Statement]]
+    return _share(matrix[truth, name], matrix[truth].sum())
 
 
-CLAIMS = {
-    1: Claim(
-        "With few training images SegNet is better than FCN, and FCN than DeepLab v2.",
-        "each network of Table 1 is better than the next one in every metric.",
-        order_of_networks,
-    ),
-    2: Claim(
-        "The CRF raises pixel accuracy slightly and lowers class accuracy.",
-        "for each network of Table 1, the CRF adds pixel accuracy and costs class accuracy.",
-        effect_of_crf,
-    ),
-    3: Claim(
-        "The same holds on a second data set, with routes not seen in training.",
-        "claim 2 for SegNet, trained and tested on long routes, none of which is in both.",
-        effect_on_new_routes,
-    ),
-    4: Claim(
-        "On perfect data most errors are cells called void; road and car do well; lane markings are found surprisingly "
-        "often; poles come out larger than they are.",
-        "of the cells that are something and are called something else, more than half are called void; road and "
-        "car are called right more often than the mean class; lane markings are called lane more often than the "
-        "road beside them is; and more cells are called pole than are poles.",
-        errors_on_perfect_data,
-    ),
-    5: Claim(
-        "Closer objects are estimated better than distant ones.",
-        "of the cells with a semantic class (true labels), more are called right up to 20 m than from 20 to 40 m, "
-        "and there than beyond; and the same for the classes that stand.",
-        effect_of_distance,
-    ),
-    6: Claim(
-        "An upside-down car is still called a car, because the occupancy grid detects it.",
-        "more than half of the cells of cars that lie on their tops are called car, and more than by a network that"
-        " doesn't see the occupancy grid.",
-        overturned_cars,
-    ),
-    7: Claim(
-        "Road and sidewalk, both free in the occupancy grid, are told apart.",
-        "of the road's cells that are called road or sidewalk, more than half are called road; likewise for the "
-        "sidewalk; and the mean of both is higher than with what the occupancy grid alone can tell (true labels).",
-        road_and_sidewalk,
-    ),
-    8: Claim(
-        "The 1x1 reduction costs no accuracy and saves time.",
-        "with the 1x1 reduction each metric is at most half a point lower than without, and a frame takes less time.",
-        effect_of_reduction,
-    ),
-    9: Claim(
-        "Geometry alone suffers from errors of calibration and segmentation; learning the fusion repairs them.",
-        "image labels that are carried to the grid by geometry do better when they are true (errors of "
-        "segmentation), and worse with a calibration that is one degree off in pitch (errors of calibration); the "
-        "network does better than geometry with the network's labels, both with the right calibration and with the"
-        " wrong one (true labels of the grid).",
-        geometry_and_learning,
-    ),
+def called_void(matrix: NDArray) -> float:
+    """Return, of the cells that aren't void and are called wrong, the share that is called void.
+
+    Parameters
+    ----------
+    matrix : (10, 10) int
+        A confusion matrix of SYNTHIA-10, one row per true class.
+    """
+    things = matrix[1:]
+    return _share(things[:, SYNTHIA_10.index("void")].sum(), things.sum() - np.trace(matrix[1:, 1:]))
+
+
+def _share(part: float, whole: float) -> float:
+    return float(part / whole) if whole else np.nan
+
+
+def _effect_of_distance(runs: ClaimRuns, root: Path) -> list[Statement]:
+    near, middle, far = (
+        sum(by_seed(runs.usual, root, NETWORK, "true", band) for band in bands)
+        for bands in (("0-10 m", "10-20 m"), ("20-30 m", "30-40 m"), ("40-50 m", "50-60 m", "beyond 60 m"))
+    )
+    every = range(KITTI_14.n_semantic)
+    standing = [c for c in every if KITTI_14.names[c] not in KITTI_14.flat]
+    return [
+        Statement(f"{what} classes called right: {between}", compared(a, b, _right_of(classes)))
+        for what, classes in (("all", every), ("standing", standing))
+        for between, a, b in (("0-20 m - 20-40 m", near, middle), ("20-40 m - beyond", middle, far))
+    ]
+
+
+def _right_of(classes: Iterable[int]) -> Metric:
+    """Return the metric "share of these classes' cells that are called right"."""
+    rows = list(classes)
+    return lambda matrix: _share(np.diag(matrix)[rows].sum(), matrix[rows].sum())
+
+
+def _overturned_cars(runs: ClaimRuns, root: Path) -> list[Statement]:
+    car = KITTI_14.index("car")
+    with_grid, without = (by_seed(some, root, OVERTURNED, "true") for some in (runs.overturned, runs.overturned_blind))
+    right = _right_of([car])
+    return [
+        Statement("overturned cars called car", score_with_interval(with_grid, right), 0.5),
+        Statement("the same: with occupancy grid - without", compared(with_grid, without, right)),
+    ]
+
+
+def _road_and_sidewalk(runs: ClaimRuns, root: Path) -> list[Statement]:
+    network = by_seed(runs.usual, root, NETWORK, "true")
+    alone = by_seed(runs.baselines, root, OCCUPANCY_ALONE, "true")
+    return [
+        Statement(
+            "road called road, of those called either", score_with_interval(network, lambda m: _apart(m)[0]), 0.5
+        ),
+        Statement(
+            "sidewalk called sidewalk, of those called either",
+            score_with_interval(network, lambda m: _apart(m)[1]),
+            0.5,
+        ),
+        Statement(
+            "mean of both: network - occupancy alone", compared(network, alone, lambda m: float(_apart(m).mean()))
+        ),
+    ]
+
+
+def _apart(matrix: NDArray) -> NDArray[np.float64]:
+    """Return the shares of road and sidewalk that are called right, of their cells that are called either."""
+    either = [KITTI_14.index("road"), KITTI_14.index("sidewalk")]
+    some = matrix[np.ix_(either, either)]
+    return np.diag(some) / np.maximum(some.sum(axis=1), 1)
+
+
+def _effect_of_reduction(runs: ClaimRuns, root: Path) -> list[Statement]:
+    ours, whole = (by_seed(some, root, NETWORK, "lidar") for some in (runs.usual, runs.unreduced))
+    costs = [
+        Statement(f"{name}: with reduction - without", compared(ours, whole, metric), -MARGIN)
+        for name, metric in METRICS.items()
+    ]
+    return [*costs, Statement("share of the time saved", time_saved(runs.times.seconds_per_frame(root)))]
+
+
+def _geometry_and_learning(runs: ClaimRuns, root: Path) -> list[Statement]:
+    def true(some: list[CountingRun], method: str) -> NDArray[np.int64]:
+        return by_seed(some, root, method, "true")
+
+    network, off = true(runs.usual, NETWORK), true(runs.usual_off, NETWORK)
+    geometry, geometry_off = true(runs.baselines, GEOMETRY), true(runs.baselines_off, GEOMETRY)
+    pairs = {
+        "geometry: true image labels - the network's": (true(runs.baselines, TRUE_GEOMETRY), geometry),
+        "geometry: right calibration - wrong one": (geometry, geometry_off),
+        "network - geometry": (network, geometry),
+        "wrong calibration: network - geometry": (off, geometry_off),
+    }
+    return [
+        Statement(f"{name}, {what}", compared(a, b, METRICS[name]))
+        for what, (a, b) in pairs.items()
+        for name in ("pixel accuracy", "class accuracy")
+    ]
+
+
+STATEMENTS: dict[int, Callable[[ClaimRuns, Path], list[Statement]]] = {
+    1: _order_of_networks,
+    2: _effect_of_crf,
+    3: lambda runs, root: _with_crf(NETWORKS["segnet"], runs.new_routes, root),
+    4: _errors_on_perfect_data,
+    5: _effect_of_distance,
+    6: _overturned_cars,
+    7: _road_and_sidewalk,
+    8: _effect_of_reduction,
+    9: _geometry_and_learning,
 }
-"""The nine claims by number."""
+"""By claim: (the runs, which have ended; folder of all runs) -> its statements with their numbers."""

@@ -12,17 +12,12 @@ PAPER_FRAMES = {"kitti": (142, 110), "chroma": (146, 130), "synthia": None}
 
 
 def frame_counts(data: str) -> dict[str, tuple[int, int]]:
-    """Return the numbers of labelled frames and of drives of each split of a data set.
+    """Return by split the numbers of labelled frames and of drives of a data set.
 
     Parameters
     ----------
     data : str
         A key of `RECIPE_OF`.
-
-    Returns
-    -------
-    dict of str to (int, int)
-        By split.
     """
     counts: dict[str, tuple[int, int]] = {}
     for route in RECIPE_OF[data].routes:
@@ -40,21 +35,16 @@ def deviations(scale: Scale, field: str) -> list[str]:
         How large it is.
     field : str
         On which data: "kitti", "chroma" or "synthia".
-
-    Returns
-    -------
-    list of str
     """
-    return [*_data(scale, field), *_labels(field), *_networks(scale), *_training(scale)]
+    return [_data(scale, field), *_labels(field), *_networks(scale), _training(scale)]
 
 
-def _data(scale: Scale, field: str) -> list[str]:
-    data = getattr(scale, field)
-    counts = frame_counts(data)
-    ours = " and ".join(f"{frames} to {split} in {drives} drives" for split, (frames, drives) in counts.items())
-    paper = PAPER_FRAMES[field]
+def _data(scale: Scale, field: str) -> str:
+    data, paper = getattr(scale, field), PAPER_FRAMES[field]
+    counts = frame_counts(data).items()
+    ours = " and ".join(f"{frames} to {split} in {drives} drives" for split, (frames, drives) in counts)
     theirs = f" ({paper[0]} to train and {paper[1]} to test in the paper)" if paper else ""
-    return [f"Simulated streets, {data}, in place of {REPLACED[field]}: labelled frames {ours}{theirs}."]
+    return f"Simulated streets, {data}, in place of {REPLACED[field]}: labelled frames {ours}{theirs}."
 
 
 def _labels(field: str) -> list[str]:
@@ -68,22 +58,22 @@ def _labels(field: str) -> list[str]:
 
 
 def _networks(scale: Scale) -> list[str]:
-    usual, paper = architecture("segnet", scale.preset), architecture("segnet", "paper")
     if scale.preset == "paper":
         return []
-    sizes = " x ".join(map(str, usual.image_size)), " x ".join(map(str, PAPER_IMAGE))
+    usual, paper = architecture("segnet", scale.preset), architecture("segnet", "paper")
+    ours, theirs = (" x ".join(map(str, size)) for size in (usual.image_size, PAPER_IMAGE))
     return [
-        f"Compact networks of less than a million parameters, images of {sizes[0]} pixels ({sizes[1]} in the paper), "
+        f"Compact networks of less than a million parameters, images of {ours} pixels ({theirs} in the paper), "
         f"cells of {usual.grid.cell:g} m ({paper.grid.cell:g} m)."
     ]
 
 
-def _training(scale: Scale) -> list[str]:
-    return [
-        f"No ImageNet weights: the image network first learns from image labels, {scale.image_iterations} steps; "
-        f"then the whole network from grids, {scale.grid_iterations} steps (at most 2000 in the paper), with a "
-        "learning rate of 0.05 that falls along a cosine (0.001), class weights between 1/4 and 4 (no limits), and "
+def _training(scale: Scale) -> str:
+    first = f"No ImageNet weights: the image network first learns from image labels, {scale.image_iterations} steps"
+    if scale.preset != "compact":
+        return f"{first}."
+    return (
+        f"{first}; then the whole network from grids, {scale.grid_iterations} steps (at most 2000 in the paper), with "
+        "a learning rate of 0.05 that falls along a cosine (0.001), class weights between 1/4 and 4 (no limits), and "
         "jittered and mirrored images."
-        if scale.preset == "compact"
-        else f"No ImageNet weights: the image network first learns from image labels, {scale.image_iterations} steps."
-    ]
+    )

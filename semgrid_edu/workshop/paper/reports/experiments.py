@@ -1,4 +1,4 @@
-"""The experiments of the paper, each with the runs that it needs and what it makes of them (section 4)."""
+"""The experiments of the paper, each with its runs and how its result is computed, written and drawn (section 4)."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -6,45 +6,14 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from semgrid_edu.labels import KITTI_14
-from semgrid_edu.workshop.paper.reports.ablations import ablation_runs, ablations, ablations_markdown
-from semgrid_edu.workshop.paper.reports.accuracy_tables import (
-    accuracy_markdown,
-    accuracy_rows,
-    baseline_gains,
-    crf_gains,
-    network_gains,
-)
-from semgrid_edu.workshop.paper.reports.confusion_table import confusion_markdown, confusion_result
-from semgrid_edu.workshop.paper.reports.judging import claim_runs, claims_markdown, claims_picture, judge_claims
-from semgrid_edu.workshop.paper.reports.pictures import (
-    ablations_picture,
-    accuracy_picture,
-    confusion_picture,
-    figures_markdown,
-    figures_picture,
-)
-from semgrid_edu.workshop.paper.reports.truth_costs import (
-    truth_cost_runs,
-    truth_costs,
-    truth_costs_markdown,
-    truth_costs_picture,
-)
-from semgrid_edu.workshop.paper.runs.claim_runs import (
-    figure_runs,
-    shown_frames,
-    table1_baselines,
-    table1_runs,
-    table2_runs,
-    table3_runs,
-)
+from semgrid_edu.workshop.paper.reports import ablations, judging, pictures, tables, truth_costs
+from semgrid_edu.workshop.paper.runs import claim_runs
 from semgrid_edu.workshop.paper.runs.paper import TABLE_1_SCORES, TABLE_2_SCORES
 from semgrid_edu.workshop.paper.runs.scales import Scale
-from semgrid_edu.workshop.paper.runs.score_runs import ScoreRun
 from semgrid_edu.workshop.scheduler.runs import Run
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Experiment:
     """One table or list of the paper.
 
@@ -52,10 +21,6 @@ class Experiment:
     ----------
     title : str
         What it is called.
-    field : str
-        On which data: "kitti", "chroma" or "synthia", as `deviations` takes it.
-    seeds : callable
-        (scale) -> how many seeds it has by default.
     runs : callable
         (scale, number of seeds) -> the runs that it is computed from.
     result : callable
@@ -64,17 +29,21 @@ class Experiment:
         result -> Markdown.
     picture : callable
         (result, folder of all runs) -> Figure.
+    field : str
+        On which data: "kitti", "chroma" or "synthia", as `deviations` takes it.
+    seeds : callable
+        (scale) -> how many seeds it has by default.
     deviations : tuple of str
         In what it differs from the paper beside what all experiments on these data do, one sentence each.
     """
 
     title: str
-    field: str
-    seeds: Callable[[Scale], int]
     runs: Callable[[Scale, int], Sequence[Run]]
     result: Callable[[Scale, int, Path], dict]
     markdown: Callable[[dict], str]
     picture: Callable[[dict, Path], Figure]
+    field: str = "kitti"
+    seeds: Callable[[Scale], int] = lambda scale: scale.seeds
     deviations: tuple[str, ...] = ()
 
 
@@ -83,87 +52,69 @@ def _seed_by_seed(runs: Mapping[str, Sequence[Run]]) -> list[Run]:
     return [run for alike in zip(*runs.values(), strict=True) for run in alike]
 
 
-def _accuracies(runs: dict[str, list[ScoreRun]], root: Path, paper: dict) -> dict:
-    gains = crf_gains(runs, root, KITTI_14) + network_gains(runs, root, KITTI_14)
-    return {"rows": accuracy_rows(runs, root, KITTI_14, paper), "differences": gains}
-
-
-def _table1(scale: Scale, seeds: int, root: Path) -> dict:
-    """Return Table 1 with the differences from the baselines."""
-    runs, baselines = table1_runs(scale, seeds), table1_baselines(scale, seeds)
-    result = _accuracies(runs, root, TABLE_1_SCORES)
-    result["differences"] += baseline_gains(runs["segnet"], baselines, root, KITTI_14)
-    return result
-
-
 EXPERIMENTS = {
     "table1": Experiment(
-        "Table 1: image networks, with and without the CRF",
-        "kitti",
-        lambda scale: scale.table1_seeds,
-        lambda scale, seeds: _seed_by_seed(table1_runs(scale, seeds) | {"baselines": table1_baselines(scale, seeds)}),
-        _table1,
-        accuracy_markdown,
-        lambda result, _: accuracy_picture(result),
+        title="Table 1: image networks, with and without the CRF",
+        seeds=lambda scale: scale.table1_seeds,
+        runs=lambda *size: _seed_by_seed(
+            claim_runs.table1_runs(*size) | {"baselines": claim_runs.table1_baselines(*size)}
+        ),
+        result=lambda scale, seeds, root: tables.accuracy_result(
+            claim_runs.table1_runs(scale, seeds), root, TABLE_1_SCORES, claim_runs.table1_baselines(scale, seeds)
+        ),
+        markdown=tables.accuracy_markdown,
+        picture=lambda result, _: pictures.accuracy_picture(result),
     ),
     "table2": Experiment(
-        "Table 2: routes that were never driven in training",
-        "chroma",
-        lambda scale: scale.seeds,
-        lambda scale, seeds: _seed_by_seed(table2_runs(scale, seeds)),
-        lambda scale, seeds, root: _accuracies(table2_runs(scale, seeds), root, TABLE_2_SCORES),
-        accuracy_markdown,
-        lambda result, _: accuracy_picture(result),
+        title="Table 2: routes that were never driven in training",
+        field="chroma",
+        runs=lambda *size: _seed_by_seed(claim_runs.table2_runs(*size)),
+        result=lambda scale, seeds, root: tables.accuracy_result(
+            claim_runs.table2_runs(scale, seeds), root, TABLE_2_SCORES
+        ),
+        markdown=tables.accuracy_markdown,
+        picture=lambda result, _: pictures.accuracy_picture(result),
     ),
     "table3": Experiment(
-        "Table 3: confusion on data without any error",
-        "synthia",
-        lambda scale: scale.seeds,
-        table3_runs,
-        lambda scale, seeds, root: confusion_result(table3_runs(scale, seeds), root),
-        confusion_markdown,
-        lambda result, _: confusion_picture(result),
+        title="Table 3: confusion on data without any error",
+        field="synthia",
+        runs=claim_runs.table3_runs,
+        result=lambda scale, seeds, root: tables.confusion_result(claim_runs.table3_runs(scale, seeds), root),
+        markdown=tables.confusion_markdown,
+        picture=lambda result, _: pictures.confusion_picture(result),
     ),
     "claims": Experiment(
-        "The nine claims",
-        "kitti",
-        lambda scale: scale.seeds,
-        claim_runs,
-        judge_claims,
-        claims_markdown,
-        lambda result, _: claims_picture(result),
+        title="The nine claims",
+        runs=lambda *size: claim_runs.runs_of_claims(*size).all(),
+        result=judging.judge_claims,
+        markdown=judging.claims_markdown,
+        picture=lambda result, _: judging.claims_picture(result),
     ),
     "ablations": Experiment(
-        "Ablations",
-        "kitti",
-        lambda scale: scale.seeds,
-        ablation_runs,
-        ablations,
-        ablations_markdown,
-        lambda result, _: ablations_picture(result),
+        title="Ablations",
+        runs=ablations.ablation_runs,
+        result=ablations.ablations,
+        markdown=ablations.ablations_markdown,
+        picture=lambda result, _: pictures.ablations_picture(result),
     ),
     "truth-costs": Experiment(
-        "What training costs on truth that is made in other ways",
-        "kitti",
-        lambda scale: scale.seeds,
-        truth_cost_runs,
-        truth_costs,
-        truth_costs_markdown,
-        lambda result, _: truth_costs_picture(result),
-        (
+        title="What training costs on truth that is made in other ways",
+        runs=truth_costs.truth_cost_runs,
+        result=truth_costs.truth_costs,
+        markdown=truth_costs.truth_costs_markdown,
+        picture=lambda result, _: truth_costs.truth_costs_picture(result),
+        deviations=(
             "The paper learns from one kind of truth. Three choices of the policy laboratory aren't trained on: scans "
             "after the labelled one, and image labels for each scan, because the drives end with their one labelled "
             "frame; and the mask of what is visible to the LIDAR, which hardly changes the labels.",
         ),
     ),
     "figures": Experiment(
-        "Figures 6 and 7",
-        "kitti",
-        lambda scale: scale.seeds,
-        figure_runs,
-        shown_frames,
-        figures_markdown,
-        figures_picture,
+        title="Figures 6 and 7",
+        runs=claim_runs.figure_runs,
+        result=claim_runs.shown_frames,
+        markdown=pictures.figures_markdown,
+        picture=pictures.figures_picture,
     ),
 }
 """Every experiment by the name of its command."""

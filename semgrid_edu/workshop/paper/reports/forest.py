@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 import matplotlib.pyplot as plt
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from semgrid_edu.errors import ArgumentError
@@ -33,10 +34,6 @@ def forest_plot(
     reference : float, optional
         Where to draw a vertical line, a share as the scores are: 0 for differences.
 
-    Returns
-    -------
-    Axes
-
     Raises
     ------
     ArgumentError
@@ -53,17 +50,33 @@ def forest_plot(
         _, ax = plt.subplots(figsize=(8, 1.2 + 0.5 * len(rows)), layout="constrained")
     if reference is not None:
         ax.axvline(100 * reference, color="0.5", linewidth=1, linestyle="--", zorder=0)
+    draw_scores(ax, rows)
     for number, value in enumerate(rows.values()):
-        draw_score(ax, number, value)
         ax.annotate(shown(value), (1.02, number), xycoords=("axes fraction", "data"), va="center", fontsize="small")
-    ax.set_yticks(range(len(rows)), list(rows))
     ax.set(xlabel=label, ylim=(len(rows) - 0.4, -0.6))
     ax.tick_params(axis="y", length=0)
-    ax.grid(axis="x", alpha=0.3)
     ax.spines[["left", "right", "top"]].set_visible(False)
-    once = {text: drawn for drawn, text in zip(*ax.get_legend_handles_labels(), strict=True)}
-    ax.legend(once.values(), once, loc="lower right", bbox_to_anchor=(1, 1), ncols=3, frameon=False, fontsize="small")
+    legend = {"loc": "lower right", "bbox_to_anchor": (1, 1), "ncols": 3, "frameon": False, "fontsize": "small"}
+    ax.legend(*legend_entries(ax), **legend)
     return ax
+
+
+def draw_scores(ax: Axes, rows: Mapping[str, ScoreWithInterval], **style: object) -> None:
+    """Draw scores line by line, each with its name on the vertical axis; `style` is that of the names.
+
+    Parameters
+    ----------
+    ax : Axes
+        The chart.
+    rows : mapping of str to dict
+        Scores from `score_with_interval` or differences from `compared` by name; the first at 0, the next at 1.
+    **style
+        Passed on to `Axes.set_yticks`.
+    """
+    for place, value in enumerate(rows.values()):
+        draw_score(ax, place, value)
+    ax.set_yticks(range(len(rows)), list(rows), **style)
+    ax.grid(axis="x", alpha=0.3)
 
 
 def draw_score(ax: Axes, place: float, value: ScoreWithInterval) -> None:
@@ -88,3 +101,15 @@ def draw_score(ax: Axes, place: float, value: ScoreWithInterval) -> None:
     if len(seeds) > 1:
         places = [place + _SEED_DROP] * len(seeds)
         ax.plot(seeds, places, "o", color=SEED_COLOUR, markerfacecolor="none", markersize=5, label="one seed")
+
+
+def legend_entries(ax: Axes) -> tuple[list[Artist], list[str]]:
+    """Return the entries of a legend, each text once.
+
+    Parameters
+    ----------
+    ax : Axes
+        A chart on which many lines have the same label.
+    """
+    once = {text: drawn for drawn, text in zip(*ax.get_legend_handles_labels(), strict=True)}
+    return list(once.values()), list(once)

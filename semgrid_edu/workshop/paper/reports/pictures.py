@@ -1,7 +1,4 @@
-"""Pictures of the tables: the paper's values beside ours, with intervals and every seed (section 4).
-
-Figures 6 and 7: a few test frames, their labels, and what the network makes of them (sections 4.2 and 4.4).
-"""
+"""Pictures of the tables, the paper's values beside ours with intervals and every seed; Figures 6 and 7 (section 4)."""
 
 from pathlib import Path
 
@@ -16,23 +13,103 @@ from semgrid_edu.labels import KITTI_14, SYNTHIA_10, LabelSet
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.plotting import class_legend, confusion, grid_labels
 from semgrid_edu.storage.tensors import read_arrays
-from semgrid_edu.workshop.paper.reports.forest import draw_score
+from semgrid_edu.workshop.paper.reports.forest import draw_scores, legend_entries
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
 
-COLUMNS = {
-    "Figure 6": {
-        "truth": "labels made\nwith the LIDAR",
-        "true": "true labels",
-        "network": "SegNet",
-        "refined": "SegNet + CRF",
-    },
-    "Figure 7": {"true": "true labels", "network": "SegNet"},
-}
-"""The grids of each figure, from left to right, and their titles."""
+PAPERS = "#c0392b"
+"""The colour of the paper's values; their marker differs from ours too."""
 
-LABEL_SET_OF = {"Figure 6": KITTI_14, "Figure 7": SYNTHIA_10}
-"""The classes of each figure."""
+
+def accuracy_picture(result: dict) -> Figure:
+    """Draw Table 1 or 2: one panel per metric, one line per network, without and with the CRF.
+
+    Parameters
+    ----------
+    result : dict
+        From `accuracy_result`.
+    """
+    rows = {NETWORKS[row["network"]] + (" + CRF" if row["CRF"] else ""): row for row in result["rows"]}
+    size = (11, 1.6 + 0.45 * len(rows))
+    figure, axes = plt.subplots(1, len(METRICS), figsize=size, sharey=True, layout="constrained")
+    for ax, metric in zip(axes, METRICS, strict=True):
+        draw_scores(ax, {name: row["scores"]["lidar"]["all"][metric] for name, row in rows.items()})
+        papers = [100 * (row["paper"][metric] or np.nan) for row in rows.values()]
+        ax.plot(papers, range(len(rows)), "X", color=PAPERS, label="the paper's", zorder=3)
+        ax.set(title=metric, xlabel="per cent of all labelled cells" if metric != "FmIoU" else "per cent")
+    axes[0].invert_yaxis()
+    figure.legend(*legend_entries(axes[0]), loc="outside lower center", ncols=4)
+    return figure
+
+
+def confusion_picture(result: dict) -> Figure:
+    """Draw Table 3: our confusion matrix beside the paper's.
+
+    Parameters
+    ----------
+    result : dict
+        From `confusion_result`.
+    """
+    figure, axes = plt.subplots(1, 2, figsize=(13, 6.6), layout="constrained")
+    for ax, whose, title in zip(axes, ("ours", "paper"), ("ours, mean over the seeds", "the paper's"), strict=True):
+        shares = np.array(result[whose]["matrix"], dtype=np.float64)  # None becomes NaN
+        confusion(np.nan_to_num(shares), result["classes"], ax)
+        ax.set_title(title)
+    return figure
+
+
+def ablations_picture(result: dict) -> Figure:
+    """Draw the ablations: pixel accuracy of the variants, with wrong calibrations, by distance, and reliability.
+
+    Parameters
+    ----------
+    result : dict
+        From `ablations`.
+    """
+    figure, axes = plt.subplots(1, 4, figsize=(19, 6), layout="constrained")
+    charts = {
+        "trained differently": [row for row in result["variants"] if row["what"] != "usual"] + result["frames"],
+        "wrong calibration": result["calibration"],
+    }
+    for ax, (title, rows) in zip(axes, charts.items(), strict=False):
+        draw_scores(ax, {row["what"]: row["differences"]["true"]["all"]["pixel accuracy"] for row in rows})
+        ax.axvline(0, color="0.4", linewidth=0.8)
+        ax.set(title=title, xlabel="pixel accuracy: difference from usual, points")
+    draw_scores(axes[2], {row["what"]: row["pixel accuracy"] for row in result["distance"]})
+    axes[2].set(title="by distance", xlabel="pixel accuracy, per cent of cells with a semantic class")
+    for ax in axes[:3]:
+        ax.invert_yaxis()
+    _draw_reliability(axes[3], result["confidence"])
+    return figure
+
+
+def _draw_reliability(ax: Axes, rows: list[dict]) -> None:
+    """Draw the reliability diagram of each method, all seeds together."""
+    ax.plot([0, 1], [0, 1], color="0.4", linewidth=0.8)
+    for row, marker in zip(rows, "osD", strict=True):
+        cells, confidence, accuracy = (
+            np.array([diagram[name] for diagram in row["diagrams"]]) for name in ("cells", "confidence", "accuracy")
+        )
+        some = cells.sum(axis=0) > 0
+        mean, right = ((cells * part).sum(axis=0)[some] / cells.sum(axis=0)[some] for part in (confidence, accuracy))
+        ax.plot(mean, right, marker=marker, label=row["what"])
+    ax.set(title="reliability", xlabel="confidence: mean probability", ylabel="accuracy", xlim=(0, 1), ylim=(0, 1))
+    ax.legend(loc="upper left")
+
+
+FIGURES: dict[str, tuple[LabelSet, dict[str, str]]] = {
+    "Figure 6": (
+        KITTI_14,
+        {
+            "truth": "labels made\nwith the LIDAR",
+            "true": "true labels",
+            "network": "SegNet",
+            "refined": "SegNet + CRF",
+        },
+    ),
+    "Figure 7": (SYNTHIA_10, {"true": "true labels", "network": "SegNet"}),
+}
+"""The classes of each figure, and the titles of its grids from left to right."""
 
 
 def figures_picture(result: dict, root: Path) -> Figure:
@@ -44,20 +121,16 @@ def figures_picture(result: dict, root: Path) -> Figure:
         From `shown_frames`.
     root : Path
         The folder of all runs.
-
-    Returns
-    -------
-    Figure
     """
     figure = plt.figure(figsize=(13, 17), layout="constrained")
     parts = figure.subfigures(2, 1)
     for part, (name, shown) in zip(parts, result["figures"].items(), strict=True):
         part.suptitle(name, x=0.02, ha="left")
-        _draw(part, read_arrays(root / shown["grids"]), COLUMNS[name], LABEL_SET_OF[name])
+        _draw(part, read_arrays(root / shown["grids"]), *FIGURES[name])
     return figure
 
 
-def _draw(part: SubFigure, grids: dict[str, NDArray], columns: dict[str, str], label_set: LabelSet) -> None:
+def _draw(part: SubFigure, grids: dict[str, NDArray], label_set: LabelSet, columns: dict[str, str]) -> None:
     """Draw the rows of one figure."""
     n_rows, spec = len(grids["frame"]), _spec_of(grids["true"].shape[1:])
     axes = part.subplots(n_rows, 1 + len(columns), width_ratios=[2.2] + [1] * len(columns), squeeze=False)
@@ -68,18 +141,10 @@ def _draw(part: SubFigure, grids: dict[str, NDArray], columns: dict[str, str], l
         for ax, (name, title) in zip(line[1:], columns.items(), strict=True):
             grid_labels(spec, grids[name][row], label_set, ax=ax, legend=False)
             ax.set_title(title if row == 0 else "", fontsize="medium")
-            _keep_outer_labels(ax, first=ax is line[1], last=row == n_rows - 1)
+            outer_left, lowest = ax is line[1], row == n_rows - 1  # only outer grids name their axes
+            ax.tick_params(labelleft=outer_left, labelbottom=lowest)
+            ax.set(xlabel=ax.get_xlabel() * lowest, ylabel=ax.get_ylabel() * outer_left)
     class_legend(axes[0, -1], label_set, grids["true"])
-
-
-def _keep_outer_labels(ax: Axes, first: bool, last: bool) -> None:
-    """Name the axes of a grid where no other grid stands to its left, or below it."""
-    if not first:
-        ax.set_ylabel("")
-        ax.tick_params(labelleft=False)
-    if not last:
-        ax.set_xlabel("")
-        ax.tick_params(labelbottom=False)
 
 
 def _spec_of(shape: tuple[int, int]) -> GridSpec:
@@ -94,112 +159,7 @@ def figures_markdown(result: dict) -> str:
     ----------
     result : dict
         From `shown_frames`.
-
-    Returns
-    -------
-    str
     """
     rows = [[name, ", ".join(map(str, shown["frames"]))] for name, shown in result["figures"].items()]
-    return "Frames at fixed shares of the test split; nobody chose them.\n\n" + markdown_table(
-        [["", "test frames"], *rows]
-    )
-
-
-PAPERS = "#c0392b"
-"""The colour of the paper's values; their marker differs from ours too."""
-
-
-def accuracy_picture(result: dict) -> Figure:
-    """Draw Table 1 or 2: one panel per metric, one line per network, without and with the CRF.
-
-    Parameters
-    ----------
-    result : dict
-        Its "rows" are from `accuracy_rows`.
-
-    Returns
-    -------
-    Figure
-    """
-    rows = result["rows"]
-    names = [NETWORKS[row["network"]] + (" + CRF" if row["CRF"] else "") for row in rows]
-    size = (11, 1.6 + 0.45 * len(rows))
-    figure, axes = plt.subplots(1, len(METRICS), figsize=size, sharey=True, layout="constrained")
-    for ax, metric in zip(axes, METRICS, strict=True):
-        for place, row in enumerate(rows):
-            draw_score(ax, place, row["scores"]["lidar"]["all"][metric])
-            ax.plot(100 * (row["paper"][metric] or np.nan), place, "X", color=PAPERS, label="the paper's", zorder=3)
-        ax.set(title=metric, xlabel="per cent of all labelled cells" if metric != "FmIoU" else "per cent")
-        ax.grid(axis="x", alpha=0.3)
-    axes[0].set_yticks(range(len(rows)), names)
-    axes[0].invert_yaxis()
-    once = {text: drawn for drawn, text in zip(*axes[0].get_legend_handles_labels(), strict=True)}
-    figure.legend(once.values(), once, loc="outside lower center", ncols=4)
-    return figure
-
-
-def confusion_picture(result: dict) -> Figure:
-    """Draw Table 3: our confusion matrix beside the paper's.
-
-    Parameters
-    ----------
-    result : dict
-        From `confusion_result`.
-
-    Returns
-    -------
-    Figure
-    """
-    figure, axes = plt.subplots(1, 2, figsize=(13, 6.6), layout="constrained")
-    for ax, whose, title in zip(axes, ("ours", "paper"), ("ours, mean over the seeds", "the paper's"), strict=True):
-        shares = np.array([[np.nan if share is None else share for share in row] for row in result[whose]["matrix"]])
-        confusion(np.nan_to_num(shares), result["classes"], ax)
-        ax.set_title(title)
-    return figure
-
-
-def ablations_picture(result: dict) -> Figure:
-    """Draw the ablations: pixel accuracy of the variants, with wrong calibrations, by distance, and reliability.
-
-    Parameters
-    ----------
-    result : dict
-        From `ablations`.
-
-    Returns
-    -------
-    Figure
-    """
-    figure, axes = plt.subplots(1, 4, figsize=(19, 6), layout="constrained")
-    trained = [row for row in result["variants"] if row["what"] != "usual"] + result["frames"]
-    for ax, rows, title in zip(
-        axes, (trained, result["calibration"]), ("trained differently", "wrong calibration"), strict=False
-    ):
-        for place, row in enumerate(rows):
-            draw_score(ax, place, row["differences"]["true"]["all"]["pixel accuracy"])
-        ax.axvline(0, color="0.4", linewidth=0.8)
-        ax.set_yticks(range(len(rows)), [row["what"] for row in rows])
-        ax.set(title=title, xlabel="pixel accuracy: difference from usual, points")
-    for place, row in enumerate(result["distance"]):
-        draw_score(axes[2], place, row["pixel accuracy"])
-    axes[2].set_yticks(range(len(result["distance"])), [row["what"] for row in result["distance"]])
-    axes[2].set(title="by distance", xlabel="pixel accuracy, per cent of cells with a semantic class")
-    for ax in axes[:3]:
-        ax.invert_yaxis()
-        ax.grid(axis="x", alpha=0.3)
-    _draw_sureness(axes[3], result["sureness"])
-    return figure
-
-
-def _draw_sureness(ax: Axes, rows: list[dict]) -> None:
-    """Draw the reliability diagram of each method, all seeds together."""
-    ax.plot([0, 1], [0, 1], color="0.4", linewidth=0.8)
-    for row, marker in zip(rows, "osD", strict=True):
-        cells, confidence, accuracy = (
-            np.array([diagram[name] for diagram in row["diagrams"]]) for name in ("cells", "confidence", "accuracy")
-        )
-        some = cells.sum(axis=0) > 0
-        sure, right = ((cells * part).sum(axis=0)[some] / cells.sum(axis=0)[some] for part in (confidence, accuracy))
-        ax.plot(sure, right, marker=marker, label=row["what"])
-    ax.set(title="reliability", xlabel="how sure: mean probability", ylabel="how often right", xlim=(0, 1), ylim=(0, 1))
-    ax.legend(loc="upper left")
+    table = markdown_table([["", "test frames"], *rows])
+    return f"Frames at fixed shares of the test split; nobody chose them.\n\n{table}"

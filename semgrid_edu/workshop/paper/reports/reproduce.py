@@ -1,4 +1,4 @@
-"""From a request to results: the plan and its estimate, the runs, the tables (section 4)."""
+"""From a request to results on disk: the plan and its estimate, the runs, the tables (section 4)."""
 
 import os
 from collections.abc import Callable
@@ -6,19 +6,23 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
+import matplotlib.pyplot as plt
+
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.storage.files import atomic_path, write_json, write_text
 from semgrid_edu.storage.locking import sole_writer
+from semgrid_edu.storage.provenance import versions
 from semgrid_edu.storage.workplace import check_workers, usable_cores, workplace
 from semgrid_edu.training.devices import choose_device
+from semgrid_edu.workshop.paper.reports.deviations import deviations, frame_counts
 from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS, Experiment
-from semgrid_edu.workshop.paper.reports.results import write_result
 from semgrid_edu.workshop.paper.runs.scales import Scale, scale_named
 from semgrid_edu.workshop.scheduler.execute import check_runs_folder, execute_plan
 from semgrid_edu.workshop.scheduler.plan import estimate, plan_hours, plan_table, with_needs
 from semgrid_edu.workshop.scheduler.runs import OUTPUT, Run
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Request:
     """What a command of `semgrid-edu reproduce` was asked for.
 
@@ -28,12 +32,12 @@ class Request:
         A key of `EXPERIMENTS`, or "all".
     scale : str
         A key of `SCALES`.
-    seeds : int or None
-        Number of seeds; None for the scale's own.
     runs : Path
         The folder of all runs.
     out : Path
         The folder of the results.
+    seeds : int or None
+        Number of seeds; None for the scale's own.
     workers : int or None
         Runs at a time; None for one per core.
     scheduler : str or None
@@ -46,9 +50,9 @@ class Request:
 
     experiment: str
     scale: str
-    seeds: int | None
     runs: Path
     out: Path
+    seeds: int | None = None
     workers: int | None = None
     scheduler: str | None = None
     device: str = "cpu"
@@ -76,7 +80,7 @@ class Request:
 
 
 def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = False) -> str:
-    """Tell the plan, do the runs, and write the results.
+    """Show the plan, do the runs, and write the results.
 
     Parameters
     ----------
@@ -115,17 +119,98 @@ def _reproduced(request: Request, root: Path, echo: Callable[[str], None], plan_
     plan = request.plan()
     estimated = estimate(plan, root)
     hours = plan_hours(estimated, request.workers or usable_cores())
-    told = f"{len(estimated)} of {len(plan)} runs are left, about {60 * hours:.0f} minutes"
-    echo(f"{plan_table(plan, estimated)}\n\n{told}" + (" on this machine" if request.scheduler else ""))
+    left = f"{len(estimated)} of {len(plan)} runs are left, about {60 * hours:.0f} minutes"
+    echo(f"{plan_table(plan, estimated)}\n\n{left}" + (" on this machine" if request.scheduler else ""))
     if plan_only:
         return ""
     with workplace(request.workers, request.scheduler) as place:
         failed = execute_plan(plan, root, place, request.device, request.processes)
-    scale: Scale = scale_named(request.scale)
+    scale = scale_named(request.scale)
     for name, experiment in request.chosen.items():
         seeds = request.seeds_of(experiment)
         if not failed.keys() & set(with_needs(experiment.runs(scale, seeds))):
             echo(write_result(name, experiment, scale, seeds, root, request.out))
     return "\n".join(
         f"{run.name}: {error.strip().splitlines()[-1]} ({run.folder(root) / OUTPUT})" for run, error in failed.items()
+    )
+
+
+def write_result(name: str, experiment: Experiment, scale: Scale, seeds: int, root: Path, out: Path) -> str:
+    """Compute the result of an experiment whose runs have ended, and write its files.
+
+    The result depends on the runs alone: computed again, its files are the same byte for byte. How long the runs took
+    stands beside it, in a file of its own.
+
+    Parameters
+    ----------
+    name : str
+        The experiment's name, which its files have.
+    experiment : Experiment
+        The experiment.
+    scale : Scale
+        How large it is.
+    seeds : int
+        Number of seeds.
+    root : Path
+        The folder of all runs.
+    out : Path
+        Takes NAME.json, NAME.md, NAME.png and NAME_times.json.
+
+    Returns
+    -------
+    str
+        The Markdown.
+    """
+    records = {run.name: run.record(root) for run in with_needs(experiment.runs(scale, seeds))}
+    processes = max(record.get("processes", 1) for record in records.values())
+    command = f"semgrid-edu reproduce {name} --scale {scale.name} --seeds {seeds} --runs RUNS --out OUT"
+    made_by = {
+        "experiment": name,
+        "title": experiment.title,
+        "command": command + (f" --processes {processes}" if processes > 1 else ""),
+        "scale": scale.name,
+        "seeds": seeds,
+        "iterations": [scale.image_iterations, scale.grid_iterations],
+        "frames and drives": frame_counts(getattr(scale, experiment.field)),
+        "deviations": [*deviations(scale, experiment.field), *experiment.deviations],
+        "commits": sorted({str(record["commit"]) for record in records.values()}),
+        "versions": versions("numpy", "torch", "numba", "scipy"),
+    }
+    result = made_by | experiment.result(scale, seeds, root)
+    text = result_markdown(result, experiment)
+    write_json(out / f"{name}.json", result)
+    write_text(out / f"{name}.md", text)
+    write_json(out / f"{name}_times.json", _times(records))
+    figure = experiment.picture(result, root)
+    with atomic_path(out / f"{name}.png") as path:
+        figure.savefig(path, dpi=130)
+    plt.close(figure)
+    return text
+
+
+def _times(records: dict[str, dict]) -> dict:
+    """Return the hours of all runs, one after the other, the dates on which they ended, and the minutes of each."""
+    return {
+        "hours": round(sum(record["seconds"] for record in records.values()) / 3600, 2),
+        "dates": sorted({record["date"] for record in records.values()}),
+        "minutes": {name: round(record["seconds"] / 60, 1) for name, record in records.items()},
+    }
+
+
+def result_markdown(result: dict, experiment: Experiment) -> str:
+    """Return a result as Markdown, with its command, its commits and what differs from the paper.
+
+    Parameters
+    ----------
+    result : dict
+        What `write_result` writes as JSON.
+    experiment : Experiment
+        The experiment.
+    """
+    listed = "\n".join(f"- {line}" for line in result["deviations"])
+    return (
+        f"# {experiment.title}\n\nScale {result['scale']}, number of seeds: {result['seeds']}. Means over the seeds; "
+        "in brackets 95 % intervals over drives and seeds. Per cent.\n\n"
+        f"{experiment.markdown(result)}\n\nWhat differs from the paper:\n\n{listed}\n\n"
+        f"Made by `{result['command']}`, commit {', '.join(result['commits'])}.\n"
     )

@@ -13,7 +13,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.plotting.colours import class_legend, colour_legend
 from semgrid_edu.plotting.grids import draw_map, grid_labels
-from semgrid_edu.workshop.studies.ground_truth.truth_counts import TruthCounts
+from semgrid_edu.workshop.studies.ground_truth.counts import COUNTED, TruthCounts
 
 DIFFERENCES = {
     "no label in either": (240, 240, 240),
@@ -33,29 +33,26 @@ CHARTED = {
 _MARKERS = "osD^vP*Xhp"
 
 
-def difference_kinds(truth: NDArray, made: NDArray, n_semantic: int) -> NDArray[np.int64]:
-    """Tell in which way a made ground truth differs from the truth in each cell.
+def difference_kinds(truth: NDArray, labels: NDArray, n_semantic: int) -> NDArray[np.int64]:
+    """Return in which way labels differ from the truth in each cell: numbers of `DIFFERENCES`, (H, W).
+
+    Two different unknown classes are no difference.
 
     Parameters
     ----------
     truth : (H, W) int
         From `grid_truth`: what stands in the cells that the camera sees, an unknown class elsewhere.
-    made : (H, W) int
+    labels : (H, W) int
         From `lidar_truth`.
     n_semantic : int
         Number of semantic classes, which come first.
-
-    Returns
-    -------
-    (H, W) int64
-        Numbers of `DIFFERENCES`, in their order. Two different unknown classes are no difference.
     """
-    seen, labelled = np.asarray(truth) < n_semantic, np.asarray(made) < n_semantic
-    return np.select([seen & labelled & (truth == made), seen & labelled, seen, labelled], [1, 2, 3, 4], default=0)
+    seen, labelled = np.asarray(truth) < n_semantic, np.asarray(labels) < n_semantic
+    return np.select([seen & labelled & (truth == labels), seen & labelled, seen, labelled], [1, 2, 3, 4], default=0)
 
 
-def truth_difference(spec: GridSpec, truth: NDArray, made: NDArray, label_set: LabelSet) -> Figure:
-    """Draw the truth, a made ground truth, and where they differ, side by side.
+def truth_difference(spec: GridSpec, truth: NDArray, labels: NDArray, label_set: LabelSet) -> Figure:
+    """Draw the truth, labels made from LIDAR, and where they differ, side by side.
 
     Parameters
     ----------
@@ -63,14 +60,10 @@ def truth_difference(spec: GridSpec, truth: NDArray, made: NDArray, label_set: L
         The grid.
     truth : (H, W) int
         From `grid_truth`: what stands in the cells that the camera sees, an unknown class elsewhere.
-    made : (H, W) int
+    labels : (H, W) int
         From `lidar_truth`.
     label_set : LabelSet
         The classes, for colours and names.
-
-    Returns
-    -------
-    Figure
 
     Raises
     ------
@@ -78,10 +71,10 @@ def truth_difference(spec: GridSpec, truth: NDArray, made: NDArray, label_set: L
         When a map doesn't fit `spec`.
     """
     figure, axes = plt.subplots(1, 3, figsize=(12.5, 5.8), layout="compressed")
-    for ax, title, labels in ((axes[0], "truth", truth), (axes[1], "made from LIDAR and image labels", made)):
-        grid_labels(spec, labels, label_set, ax=ax, legend=False).set_title(title)
-    class_legend(axes[1], label_set, np.stack([truth, made]))
-    kinds = difference_kinds(truth, made, label_set.n_semantic)
+    grid_labels(spec, truth, label_set, axes[0], legend=False).set_title("truth")
+    grid_labels(spec, labels, label_set, axes[1], legend=False).set_title("made from LIDAR and image labels")
+    class_legend(axes[1], label_set, np.stack([truth, labels]))
+    kinds = difference_kinds(truth, labels, label_set.n_semantic)
     colours = np.array(list(DIFFERENCES.values()), np.uint8)
     draw_map(spec, colours[kinds], axes[2]).set_title("difference")
     shares = np.bincount(kinds.ravel(), minlength=len(DIFFERENCES)) / kinds.size
@@ -91,7 +84,7 @@ def truth_difference(spec: GridSpec, truth: NDArray, made: NDArray, label_set: L
 
 
 def truth_errors(counts: TruthCounts, edges: Sequence[float], label_set: LabelSet, least: int = 50) -> Figure:
-    """Draw the errors of a made ground truth against distance, one line per class, one panel per kind of error.
+    """Draw the errors of labels against distance, one line per class, one panel per kind of error.
 
     Parameters
     ----------
@@ -104,21 +97,17 @@ def truth_errors(counts: TruthCounts, edges: Sequence[float], label_set: LabelSe
     least : int
         Number of cells below which a share isn't drawn: it would be chance.
 
-    Returns
-    -------
-    Figure
-
     Raises
     ------
     ArgumentError
         When there are other bands than counts.
     """
-    planes = dict(zip(("seen", "labelled"), counts.cells[[0, 3]], strict=True))
-    if len(edges) != len(planes["seen"]) + 1:
-        raise ArgumentError("edges", f"{len(planes['seen']) + 1} distances", f"{len(edges)}")
+    seen, labelled = (counts.cells[COUNTED.index(name)] for name in ("seen", "labelled"))
+    if len(edges) != len(seen) + 1:
+        raise ArgumentError("edges", f"{len(seen) + 1} distances", f"{len(edges)}")
     figure, axes = plt.subplots(1, len(CHARTED), figsize=(11, 4.2), sharex=True, sharey=True, layout="constrained")
     for ax, (share, title) in zip(axes, CHARTED.items(), strict=True):
-        enough = planes["labelled" if share == "wrong" else "seen"] >= least
+        enough = (labelled if share == "wrong" else seen) >= least
         _class_lines(ax, np.where(enough, counts.shares()[share], np.nan), edges, label_set)
         ax.set(title=title, xlabel="distance from the LIDAR [m]", ylim=(0, 100))
         ax.grid(alpha=0.3)
@@ -146,29 +135,19 @@ def policy_errors(result: Mapping, shares: Sequence[str] = ("mistaken", "missed"
         From `truth_policies`, or from its JSON file.
     shares : sequence of str
         Which shares of `TruthCounts.shares` to draw, one panel each.
-
-    Returns
-    -------
-    Figure
     """
-    names = list(result["sums"])
-    figure, axes = plt.subplots(
-        1, len(shares), figsize=(4 + 2.6 * len(shares), 1.2 + 0.27 * len(names)), sharey=True, layout="constrained"
-    )
-    for ax, share in zip(np.atleast_1d(axes), shares, strict=True):
-        of_drives = np.array([[_share(drive[name], share) for name in names] for drive in result["drives"].values()])
-        whole = [_share(np.sum([drive[name] for drive in result["drives"].values()], axis=0), share) for name in names]
-        low, high = np.nanquantile(of_drives, [0.25, 0.75], axis=0)
-        ax.barh(names, 100 * np.array(whole), color="#8fa8c8", edgecolor="0.3", linewidth=0.5)
+    names, drives = list(result["sums"]), result["drives"].values()
+    counts = TruthCounts(np.moveaxis([[drive[name] for name in names] for drive in drives], -1, 0))
+    of_drives, whole = counts.shares(), counts.shares(axis=0)  # one row per drive; all drives together
+    size = (4 + 2.6 * len(shares), 1.2 + 0.27 * len(names))
+    figure, axes = plt.subplots(1, len(shares), figsize=size, sharey=True, layout="constrained", squeeze=False)
+    for ax, share in zip(axes[0], shares, strict=True):
+        low, high = np.nanquantile(of_drives[share], [0.25, 0.75], axis=0)
+        ax.barh(names, 100 * whole[share], color="#8fa8c8", edgecolor="0.3", linewidth=0.5)
         ax.hlines(names, 100 * low, 100 * high, color="0.15", linewidth=1)
         ax.set(title=CHARTED.get(share, share), xlabel="share of cells [%]", xlim=(0, None))
         ax.grid(axis="x", alpha=0.3)
-    np.atleast_1d(axes)[0].invert_yaxis()
-    text = f"bars: {len(result['drives'])} drives together; lines: first to third quartile of single drives"
+    axes[0, 0].invert_yaxis()
+    text = f"bars: {len(drives)} drives together; lines: first to third quartile of single drives"
     figure.suptitle(text, fontsize="medium")
     return figure
-
-
-def _share(counted: Sequence[int], share: str) -> float:
-    """Return one share of numbers that are added up already, in the order of `COUNTED`."""
-    return float(TruthCounts(np.reshape(counted, (-1, 1, 1))).shares(axis=(0, 1))[share])

@@ -1,25 +1,18 @@
-"""How far images are from those that a network learned from, and what a network makes of them without any truth."""
+"""The domain gap of images: how far their colours and edges are from the images that a network learned from."""
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_gradient_magnitude
-from scipy.special import entr
 
-from semgrid_edu.camera import project, transform_points
-from semgrid_edu.frame import Frame
-from semgrid_edu.labels import KITTI_14
-from semgrid_edu.workshop.studies.new_drive.drive_checks import LANE
-from semgrid_edu.workshop.studies.new_drive.ego_motion import TALL
+from semgrid_edu.metrics import total_variation
 
 BINS = 32
 """Number of bins of a histogram of brightness or of gradients."""
 STEEPEST = 80.0
 """Gradients above this, grey values per pixel, count as this."""
-FLAT_CLASSES = ("road", "sidewalk", "sky")
-"""Classes that a return from half a metre above the ground or more can't have."""
+COLOURS = ("red", "green", "blue")
 
 
 def image_histograms(image: NDArray) -> dict[str, NDArray[np.float64]]:
@@ -36,11 +29,10 @@ def image_histograms(image: NDArray) -> dict[str, NDArray[np.float64]]:
         Shares of the pixels, which sum to 1: "red", "green", "blue", and "edges", the gradient of the grey image.
     """
     grey = image.mean(axis=2)
+    found = {name: np.histogram(image[..., k], BINS, (0, 256))[0] for k, name in enumerate(COLOURS)}
     gradient = np.minimum(gaussian_gradient_magnitude(grey, 1), STEEPEST)
-    values = {name: image[..., k] for k, name in enumerate(("red", "green", "blue"))}
-    ranges = dict.fromkeys(values, (0, 256)) | {"edges": (0, STEEPEST)}
-    values["edges"] = gradient
-    return {name: np.histogram(values[name], BINS, ranges[name])[0] / grey.size for name in values}
+    found["edges"] = np.histogram(gradient, BINS, (0, STEEPEST))[0]
+    return {name: counts / grey.size for name, counts in found.items()}
 
 
 def image_statistics(image: NDArray) -> dict[str, float]:
@@ -66,25 +58,33 @@ def image_statistics(image: NDArray) -> dict[str, float]:
     }
 
 
-def mean_histograms(images: Sequence[NDArray]) -> dict[str, NDArray[np.float64]]:
-    """Return the mean of the histograms of several images.
+def mean_over(images: Sequence[NDArray], measure: Callable[[NDArray], dict]) -> dict:
+    """Return the means over several images of what is measured in each.
 
     Parameters
     ----------
     images : sequence of (h, w, 3) uint8
         RGB, at the size that the network sees.
-
-    Returns
-    -------
-    dict of str to (32,) float64
-        As `image_histograms`.
+    measure : callable
+        `image_histograms` or `image_statistics`.
     """
-    every = [image_histograms(image) for image in images]
+    every = [measure(image) for image in images]
     return {name: np.mean([one[name] for one in every], axis=0) for name in every[0]}
 
 
+def mean_histograms(images: Sequence[NDArray]) -> dict[str, NDArray[np.float64]]:
+    """Return the mean over several images of their `image_histograms`.
+
+    Parameters
+    ----------
+    images : sequence of (h, w, 3) uint8
+        RGB, at the size that the network sees.
+    """
+    return mean_over(images, image_histograms)
+
+
 def match_colours(image: NDArray, reference: NDArray) -> NDArray[np.uint8]:
-    """Give an image the histograms of other images, colour by colour; brighter pixels stay brighter.
+    """Give an image (h, w, 3) the histograms of other images, colour by colour; brighter pixels stay brighter.
 
     Parameters
     ----------
@@ -92,11 +92,6 @@ def match_colours(image: NDArray, reference: NDArray) -> NDArray[np.uint8]:
         RGB.
     reference : (..., 3) uint8
         Pixels whose histograms are taken.
-
-    Returns
-    -------
-    (h, w, 3) uint8
-        RGB.
     """
     matched = np.empty_like(image)
     for k in range(3):
@@ -105,62 +100,30 @@ def match_colours(image: NDArray, reference: NDArray) -> NDArray[np.uint8]:
     return matched
 
 
-def normalised_entropy(probability: NDArray) -> NDArray[np.float64]:
-    """Return the entropy of each distribution, as a share of the largest possible one.
+def colour_distance(a: dict[str, NDArray], b: dict[str, NDArray]) -> float:
+    """Return the mean over red, green and blue of the total variation of histograms, 0..1.
 
     Parameters
     ----------
-    probability : (C, ...) float
-        The distribution over the classes at each place.
+    a, b : dict of str to (32,) float
+        From `mean_histograms`.
+    """
+    return float(np.mean([total_variation(a[name], b[name]) for name in COLOURS]))
+
+
+def distances(images: Sequence[NDArray], known: Sequence[NDArray]) -> dict[str, float]:
+    """Return how far images are from those that a network learned from.
+
+    Parameters
+    ----------
+    images, known : sequence of (h, w, 3) uint8
+        RGB, at the size that the network sees.
 
     Returns
     -------
-    (...) float64
-        0 where one class is certain, 1 where all are equally probable.
+    dict of str to float
+        "colour distance" and "edge distance": total variation of the mean histograms, 0..1.
     """
-    return entr(probability.astype(np.float64)).sum(axis=0) / np.log(len(probability))
-
-
-class Agreement(NamedTuple):
-    """How often a network's pixels say what the LIDAR knows without any label.
-
-    Parameters
-    ----------
-    lane : float
-        Share of the returns from the ground of the vehicle's own lane whose pixel is called road.
-    standing : float
-        Share of the returns from things that stand up whose pixel is called something that stands up.
-    """
-
-    lane: float
-    standing: float
-
-
-def agrees_with_lidar(frame: Frame, labels: NDArray) -> Agreement:
-    """Compare labels of pixels with what the LIDAR knows: what is flat, and what stands up.
-
-    Parameters
-    ----------
-    frame : Frame
-        Its scan and its calibration are used.
-    labels : (h, w) int
-        A KITTI-14 class for each pixel, in any resolution of the image.
-
-    Returns
-    -------
-    Agreement
-        NaN where there is no return of a kind in the image.
-    """
-    camera = frame.camera.resized(labels.shape)
-    pixels, visible = project(transform_points(camera.T_camera_from_lidar, frame.points[:, :3]), camera)
-    x, y, height = frame.points_grid[visible, :3].T
-    u, v = np.rint(pixels[visible]).astype(int).T
-    said = labels[v, u]
-    lane = (np.abs(y) < LANE[2]) & (x < LANE[1]) & (np.abs(height) < 0.3)
-    standing = (height > TALL[0]) & (height < TALL[1])
-    upright = ~np.isin(said, [KITTI_14.index(name) for name in FLAT_CLASSES])
-    return Agreement(_mean(said[lane] == KITTI_14.index("road")), _mean(upright[standing]))
-
-
-def _mean(values: NDArray) -> float:
-    return float(values.mean()) if len(values) else float("nan")
+    seen, learned = mean_histograms(images), mean_histograms(known)
+    edges = float(total_variation(seen["edges"], learned["edges"]))
+    return {"colour distance": colour_distance(seen, learned), "edge distance": edges}

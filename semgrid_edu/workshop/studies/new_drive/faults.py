@@ -4,15 +4,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import rigid_transform, transform_points
 from semgrid_edu.frame import Frame
-from semgrid_edu.metrics import total_variation
-from semgrid_edu.workshop.studies.new_drive.domain import mean_histograms
-from semgrid_edu.workshop.studies.new_drive.drive_checks import edge_contrast, ground_plane, time_gaps, with_scan
-from semgrid_edu.workshop.studies.new_drive.ego_motion import AXES, axes_errors
+from semgrid_edu.workshop.studies.new_drive.domain import colour_distance, mean_histograms
+from semgrid_edu.workshop.studies.new_drive.drive_checks import (
+    AXES,
+    axes_errors,
+    edge_contrast,
+    ground_plane,
+    time_gaps,
+    with_scan,
+)
 
 TURN = 2.0
 """By how much a sensor is turned, degrees."""
@@ -20,6 +25,14 @@ LATE = 3
 """How many frames late a sensor's data are."""
 YAWS = np.arange(-3.0, 3.01, 0.25)
 """Turns of the camera that are tried, degrees."""
+
+Fault = Callable[[Sequence[Frame]], list[Frame]]
+"""Takes the frames of a drive, more than ten, and returns them with a fault."""
+
+
+def _turn(degrees: ArrayLike) -> NDArray[np.float64]:
+    """Return a turn about x, y and z, degrees, as (4, 4)."""
+    return rigid_transform(Rotation.from_rotvec(degrees, degrees=True).as_matrix(), np.zeros(3))
 
 
 def camera_turned(frame: Frame) -> Frame:
@@ -30,9 +43,8 @@ def camera_turned(frame: Frame) -> Frame:
     frame : Frame
         A frame.
     """
-    turn = rigid_transform(Rotation.from_rotvec([0, -TURN, 0], degrees=True).as_matrix(), np.zeros(3))
-    camera = replace(frame.camera, T_camera_from_lidar=turn @ frame.camera.T_camera_from_lidar)
-    return replace(frame, camera=camera)
+    turned = _turn([0, -TURN, 0]) @ frame.camera.T_camera_from_lidar
+    return replace(frame, camera=replace(frame.camera, T_camera_from_lidar=turned))
 
 
 def lidar_tilted(frame: Frame) -> Frame:
@@ -43,39 +55,36 @@ def lidar_tilted(frame: Frame) -> Frame:
     frame : Frame
         A frame.
     """
-    tilt = rigid_transform(Rotation.from_rotvec([0, TURN, 0], degrees=True).as_matrix(), np.zeros(3))
-    points = np.column_stack([transform_points(tilt, frame.points[:, :3]), frame.points[:, 3]])
-    return replace(frame, points=points)
+    tilted = transform_points(_turn([0, TURN, 0]), frame.points[:, :3])
+    return replace(frame, points=np.column_stack([tilted, frame.points[:, 3]]))
 
 
-def _pose_in(axes: str) -> Callable[[Frame], Frame]:
-    """Return a function that expresses the pose of a frame in wrong axes."""
-    return lambda frame: replace(frame, T_world_from_lidar=AXES[axes](frame.T_world_from_lidar))
-
-
-def _each(change: Callable[[Frame], Frame]) -> Callable[[Sequence[Frame]], list[Frame]]:
+def _each(change: Callable[[Frame], Frame]) -> Fault:
     return lambda frames: [change(frame) for frame in frames]
 
 
-def _late(*names: str) -> Callable[[Sequence[Frame]], list[Frame]]:
-    """Return a function that gives each frame what an earlier one has."""
-    return lambda frames: [
-        replace(now, **{name: getattr(then, name) for name in names})
-        for then, now in zip(frames[:-LATE], frames[LATE:], strict=True)
-    ]
+def _pose_in(axes: str) -> Fault:
+    """Return a fault that expresses the poses in wrong axes."""
+    return _each(lambda frame: replace(frame, T_world_from_lidar=AXES[axes](frame.T_world_from_lidar)))
 
 
-FAULTS: dict[str, Callable[[Sequence[Frame]], list[Frame]]] = {
+def _images_late(frames: Sequence[Frame]) -> list[Frame]:
+    """Give each frame the image of an earlier one."""
+    pairs = zip(frames[:-LATE], frames[LATE:], strict=True)
+    return [replace(now, image=before.image) for before, now in pairs]
+
+
+FAULTS: dict[str, Fault] = {
     "none": list,
     "two frames lost": lambda frames: [*frames[:7], *frames[9:]],
     "camera turned": _each(camera_turned),
-    "images late": _late("image"),
+    "images late": _images_late,
     "LIDAR tilted": _each(lidar_tilted),
-    "poses backwards": _each(_pose_in("backwards")),
-    "poses mirrored": _each(_pose_in("left and right swapped")),
+    "poses backwards": _pose_in("backwards"),
+    "poses mirrored": _pose_in("left and right swapped"),
     "red and blue swapped": _each(lambda frame: replace(frame, image=frame.need_image()[..., ::-1])),
 }
-"""Functions that take the frames of a drive, more than ten, and return them with a fault, by name."""
+"""Every fault by name."""
 
 
 def drive_readings(frames: Sequence[Frame], known: dict[str, NDArray], every: int = 4) -> dict[str, float]:
@@ -109,19 +118,3 @@ def drive_readings(frames: Sequence[Frame], known: dict[str, NDArray], every: in
         "motion": errors["as the poses say"] - min(errors.values()),
         "colours": colour_distance(seen, known),
     }
-
-
-def colour_distance(a: dict[str, NDArray], b: dict[str, NDArray]) -> float:
-    """Return how far the colours of two sets of images are apart.
-
-    Parameters
-    ----------
-    a, b : dict of str to (n,) float
-        From `mean_histograms`.
-
-    Returns
-    -------
-    float
-        The mean over red, green and blue of the total variation of the histograms, 0..1.
-    """
-    return float(np.mean([total_variation(a[name], b[name]) for name in ("red", "green", "blue")]))

@@ -1,6 +1,6 @@
 """Real drives through every check, beside the shipped drive: numbers only, never a picture (section 4)."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -10,28 +10,38 @@ from numpy.typing import NDArray
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.samples import sample_drive, sample_image_stage, sample_weights
 from semgrid_edu.datasets.training_arrays import resize_image
+from semgrid_edu.errors import DataError
 from semgrid_edu.frame import Frame
-from semgrid_edu.metrics import total_variation
+from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import load_net
-from semgrid_edu.occupancy import State
+from semgrid_edu.occupancy import Belief, State
 from semgrid_edu.pipeline import run_pipeline
 from semgrid_edu.storage.provenance import versions
+from semgrid_edu.storage.reading import read_json
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
-from semgrid_edu.workshop.studies.new_drive.domain import image_statistics, mean_histograms, normalised_entropy
-from semgrid_edu.workshop.studies.new_drive.drive_checks import ground_plane, sensor_delays, share_on_image, with_scan
-from semgrid_edu.workshop.studies.new_drive.ego_motion import axes_errors
-from semgrid_edu.workshop.studies.new_drive.faults import FAULTS, colour_distance, drive_readings
-from semgrid_edu.workshop.studies.new_drive.moving_cars import Boxes, moving_hits, read_boxes, sample_boxes
-from semgrid_edu.workshop.studies.new_drive.network_view import network_numbers, training_images
+from semgrid_edu.workshop.studies.filter.scenes import hit_cells
+from semgrid_edu.workshop.studies.new_drive.domain import distances, image_statistics, mean_histograms, mean_over
+from semgrid_edu.workshop.studies.new_drive.drive_checks import (
+    axes_errors,
+    ground_plane,
+    sensor_delays,
+    share_on_image,
+    with_scan,
+)
+from semgrid_edu.workshop.studies.new_drive.faults import FAULTS, drive_readings
+from semgrid_edu.workshop.studies.new_drive.network_view import network_numbers, normalised_entropy, training_images
 
 EVERY = 4
 """Images, ground and networks are measured in each frame of this number."""
 SETTLED = 10
 """Number of frames after which grids count: by then the filter has seen a second."""
 
+Boxes = dict[int, list[list[float]]]
+"""Boxes of moving cars by frame, each [x_min, x_max, y_min, y_max], metres in the grid frame."""
+
 
 def compare_drives(roots: Sequence[Path], date: str, drive: str) -> dict[str, object]:
-    """Put the shipped drive and real ones through every check.
+    """Put the shipped drive and real ones through every check, and return the numbers of each.
 
     Parameters
     ----------
@@ -57,7 +67,7 @@ def compare_drives(roots: Sequence[Path], date: str, drive: str) -> dict[str, ob
             name: {fault: drive_readings(make(one[:]), known) for fault, make in FAULTS.items()}
             for name, (one, _) in drives.items()
         },
-        "training images": among_training_images(),
+        "training images": _among_training_images(),
         "drive": f"{date}_drive_{drive}",
         "command": f"semgrid-edu reproduce real-drive --date {date} --drive {drive}" + " --kitti FOLDER" * len(roots),
         "seed": 0,
@@ -98,28 +108,18 @@ def measure_drive(drive: KittiRawDrive, boxes: Boxes) -> dict[str, object]:
         "on image": float(np.mean([share_on_image(frame.points, frame.camera) for frame in scanned])),
         "ground": dict(zip(("height", "pitch", "roll"), map(float, ground), strict=True)),
         "axes": axes_errors(scanned),
-        "images": distances(images, training_images()) | statistics_of(images),
+        "images": distances(images, training_images()) | _statistics(images),
         "image network": network_numbers(net, scanned[::EVERY]),
         "image network, colours matched": network_numbers(net, scanned[::EVERY], matched=True),
-        "grids": grid_numbers(frames, boxes),
+        "grids": _grid_numbers(frames, boxes),
     }
 
 
-def grid_numbers(frames: Sequence[Frame], boxes: Boxes) -> dict[str, object]:
+def _grid_numbers(frames: Sequence[Frame], boxes: Boxes) -> dict[str, object]:
     """Run the pipeline with the shipped network, and measure its grids without any truth but the boxes.
 
-    Parameters
-    ----------
-    frames : sequence of Frame
-        More than ten successive frames with images.
-    boxes : dict of int to list
-        Boxes of moving cars by frame; may be empty.
-
-    Returns
-    -------
-    dict
-        "states": share of the cells by their most likely state; "confidence" and "entropy" of the semantic grid;
-        "moving cells", how many cells of moving cars were hit, and "found", the share of them that is called DYNAMIC.
+    "states" are shares of the cells by their most likely state; "confidence" and "entropy" are those of the semantic
+    grid; "moving cells" is how many cells of moving cars were hit, and "found" the share of them called DYNAMIC.
     """
     net = load_net(sample_weights(), frames[0].camera)
     states, semantic, found = [], [], []
@@ -138,45 +138,15 @@ def grid_numbers(frames: Sequence[Frame], boxes: Boxes) -> dict[str, object]:
     }
 
 
-def distances(images: Sequence[NDArray], known: Sequence[NDArray]) -> dict[str, float]:
-    """Return how far images are from those that a network learned from.
-
-    Parameters
-    ----------
-    images, known : sequence of (h, w, 3) uint8
-        RGB, at the size that the network sees.
-
-    Returns
-    -------
-    dict of str to float
-        "colour distance" and "edge distance": total variation of the mean histograms, 0..1.
-    """
-    seen, learned = mean_histograms(images), mean_histograms(known)
-    edges = float(total_variation(seen["edges"], learned["edges"]))
-    return {"colour distance": colour_distance(seen, learned), "edge distance": edges}
-
-
-def statistics_of(images: Sequence[NDArray]) -> dict[str, float]:
-    """Return the means over several images of their `image_statistics`.
-
-    Parameters
-    ----------
-    images : sequence of (h, w, 3) uint8
-        RGB, at the size that the network sees.
-
-    Returns
-    -------
-    dict of str to float
-    """
-    every = [image_statistics(image) for image in images]
-    return {name: float(np.mean([one[name] for one in every])) for name in every[0]}
-
-
-def among_training_images() -> dict[str, object]:
+def _among_training_images() -> dict[str, object]:
     """Return how far each shipped training image is from the others, largest distance last, and their statistics."""
     images = training_images()
     each = [distances([images[k]], images[:k] + images[k + 1 :]) for k in range(len(images))]
-    return {name: sorted(one[name] for one in each) for name in each[0]} | statistics_of(images)
+    return {name: sorted(one[name] for one in each) for name in each[0]} | _statistics(images)
+
+
+def _statistics(images: Sequence[NDArray]) -> dict[str, float]:
+    return {name: float(mean) for name, mean in mean_over(images, image_statistics).items()}
 
 
 def real_drive_table(result: dict) -> str:
@@ -186,22 +156,81 @@ def real_drive_table(result: dict) -> str:
     ----------
     result : dict
         From `compare_drives`, or from the JSON file that it was written to.
-
-    Returns
-    -------
-    str
     """
-    columns = {name: dict(_flat(one)) for name, one in result["drives"].items()}
-    rows = [["", *columns]]
-    for key in next(iter(columns.values())):
-        rows.append([key, *("-" if one[key] is None else f"{one[key]:.4g}" for one in columns.values())])
-    return markdown_table(rows)
+    columns = [dict(_flat(one)) for one in result["drives"].values()]
+    rows = [[key, *("-" if one[key] is None else f"{one[key]:.4g}" for one in columns)] for key in columns[0]]
+    return markdown_table([["", *result["drives"]], *rows])
 
 
-def _flat(numbers: dict, before: str = ""):
+def _flat(numbers: dict, before: str = "") -> Iterator[tuple[str, float | None]]:
     """Yield every number with its whole name, such as "ground: height"."""
     for key, value in numbers.items():
         if isinstance(value, dict):
             yield from _flat(value, f"{before}{key}: ")
         else:
             yield before + key, value
+
+
+def read_boxes(path: Path) -> Boxes:
+    """Read boxes of moving cars; there are none when there is no such file.
+
+    Parameters
+    ----------
+    path : Path
+        JSON: for each name that begins with "car" the boxes by frame, [x_min, x_max, y_min, y_max, ...], metres.
+
+    Raises
+    ------
+    DataError
+        When the file holds something else.
+    """
+    cars = read_json(path) if path.exists() else {}
+    boxes: Boxes = {}
+    try:
+        for name, by_frame in cars.items():
+            for frame, box in by_frame.items() if name.startswith("car") else ():
+                x_min, x_max, y_min, y_max = map(float, box[:4])
+                boxes.setdefault(int(frame), []).append([x_min, x_max, y_min, y_max])
+    except (AttributeError, TypeError, ValueError) as error:
+        raise DataError(path, "boxes of moving cars by frame, four metres each", error) from error
+    return boxes
+
+
+def sample_boxes(drive: KittiRawDrive) -> Boxes:
+    """Return the boxes of the cars that move, as a simulated drive knows them.
+
+    Parameters
+    ----------
+    drive : KittiRawDrive
+        A simulated drive whose cars drive along the road.
+    """
+    known = read_json(drive.folder / "labels" / "objects.json")
+    boxes: Boxes = {}
+    for frame, things in known.items():
+        for thing in things:
+            if thing["moving"] and thing["class"] == "car":
+                (x, y, _), (length, width, _) = thing["centre"], thing["size"]
+                boxes.setdefault(int(frame), []).append([x - length / 2, x + length / 2, y - width / 2, y + width / 2])
+    return boxes
+
+
+def moving_hits(frame: Frame, belief: Belief, boxes: Iterable[Sequence[float]], spec: GridSpec) -> NDArray[np.bool_]:
+    """Return whether each cell of a moving car that is hit is more likely DYNAMIC than STATIC, (n,) bool.
+
+    Parameters
+    ----------
+    frame : Frame
+        The frame.
+    belief : Belief
+        The occupancy grid of this frame.
+    boxes : iterable of sequence of float
+        The moving cars' boxes in this frame, [x_min, x_max, y_min, y_max], metres.
+    spec : GridSpec
+        The grid.
+    """
+    x, y = np.moveaxis(spec.centers(), -1, 0)
+    hit, inside = hit_cells(frame.points_grid, spec), np.zeros(spec.shape, np.bool_)
+    for x_min, x_max, y_min, y_max in boxes:
+        inside |= (x > x_min) & (x < x_max) & (y > y_min) & (y < y_max)
+    moves = belief.probability[State.DYNAMIC] > belief.probability[State.STATIC]
+    return moves[hit & inside]

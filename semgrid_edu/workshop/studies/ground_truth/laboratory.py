@@ -6,15 +6,17 @@ Simulated drives are filtered by CMCDOT, their calibration, labels and scans get
 
 import hashlib
 from collections.abc import Iterable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.grid_truth import grid_truth
-from semgrid_edu.datasets.ground_truth import Moment, drive_truth, flawed_drive
+from semgrid_edu.datasets.ground_truth import NO_FLAWS, Moment, TruthFlaws, TruthPolicy, drive_truth, flawed_drive
+from semgrid_edu.datasets.ground_truth.policy import MOVERS
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
@@ -28,17 +30,70 @@ from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.things.materials import class_of_kind
 from semgrid_edu.workshop.studies.filter.occupancy import LIDARS
 from semgrid_edu.workshop.studies.filter.scenes import GRIDS, check_request
-from semgrid_edu.workshop.studies.ground_truth.truth_counts import (
-    BAND_EDGES,
-    COUNTED,
-    REACH,
-    TRIALS,
-    Trial,
-    TruthCounts,
-)
+from semgrid_edu.workshop.studies.ground_truth.counts import BAND_EDGES, COUNTED, TruthCounts
 
 HELD_OUT = 700
 """Seed of the first drive for seed 0; each further seed adds 1000."""
+REACH = 9
+"""Number of scans before, and after, the labelled one: 0.9 s. minikitti has as many before its labelled frames."""
+
+
+class Trial(NamedTuple):
+    """One way to make ground truth, and from what.
+
+    Parameters
+    ----------
+    policy : TruthPolicy
+        The way.
+    flaws : TruthFlaws
+        The errors of calibration, labels and scans.
+    """
+
+    policy: TruthPolicy = TruthPolicy()
+    flaws: TruthFlaws = TruthFlaws()
+
+
+_FLAWS = TruthFlaws()
+_BEFORE = TruthPolicy(past=REACH, vote="majority")  # with several scans, most cells have many returns
+_AROUND = replace(_BEFORE, future=REACH)
+_OWN = replace(_AROUND, labels="own", movers="carved")
+_WINDOWS = {
+    f"{REACH} scans before": _BEFORE,
+    f"{REACH} before and after": _AROUND,
+    f"{REACH} before and after, own labels": replace(_AROUND, labels="own"),
+}
+
+TRIALS = {
+    "one scan (the paper)": Trial(),
+    "one scan, no clean-up": Trial(TruthPolicy(cleanup="none")),
+    "one scan, all classes spread alike": Trial(TruthPolicy(cleanup="spread")),
+    "one scan, de-skewed": Trial(TruthPolicy(deskew=True)),
+    "one scan, visible to LIDAR": Trial(TruthPolicy(visible_to="lidar")),
+    "one scan, visible to camera": Trial(TruthPolicy(visible_to="camera")),
+    "one scan, majority of returns": Trial(TruthPolicy(vote="majority")),
+    **{
+        f"{name}, movers {movers}": Trial(replace(policy, movers=movers))
+        for name, policy in _WINDOWS.items()
+        for movers in MOVERS
+    },
+    **{
+        f"{REACH} before and after, own labels, movers carved, {change}": Trial(policy)
+        for change, policy in {
+            "no clean-up": replace(_OWN, cleanup="none"),
+            "what stands wins": replace(_OWN, vote="standing"),
+            "de-skewed": replace(_OWN, deskew=True),
+            "visible to LIDAR": replace(_OWN, visible_to="lidar"),
+            "visible to camera": replace(_OWN, visible_to="camera"),
+        }.items()
+    },
+    "one scan, no errors in the data": Trial(flaws=NO_FLAWS),
+    "one scan, error of calibration alone": Trial(
+        flaws=replace(NO_FLAWS, rotation=_FLAWS.rotation, translation=_FLAWS.translation)
+    ),
+    "one scan, errors of labels alone": Trial(flaws=replace(_FLAWS, rotation=0, translation=0, skewed=False)),
+    "one scan, skew alone": Trial(flaws=replace(NO_FLAWS, skewed=True)),
+}
+"""What is compared, by name. The last four show what each kind of error in the data does to the paper's way."""
 
 
 def truth_policies(
@@ -47,14 +102,13 @@ def truth_policies(
     drives: int = 20,
     grid: str = "compact",
     lidar: str = "coarse",
-    trials: dict[str, Trial] | None = None,
 ) -> dict[str, object]:
     """Make the ground truth of simulated drives by every policy, and count how wrong it is.
 
     Parameters
     ----------
     log : path-like
-        Takes every drive as soon as it is done. If the file exists, drives that it holds aren't made again.
+        Takes every drive as soon as it is done. If the file exists, drives that it holds aren't simulated again.
     seed : int
         Seed for drives, errors and particles.
     drives : int
@@ -63,8 +117,6 @@ def truth_policies(
         "compact" or "paper".
     lidar : str
         "coarse" for the LIDAR of the simulated data sets, or "HDL-64E".
-    trials : dict of str to Trial, optional
-        What to compare, by name; `TRIALS` when left out.
 
     Returns
     -------
@@ -83,46 +135,52 @@ def truth_policies(
     check_request(seed, drives, 1, (grid,))
     if lidar not in LIDARS:
         raise ArgumentError("lidar", f"one of {', '.join(LIDARS)}", repr(lidar))
-    trials, began = TRIALS if trials is None else trials, datetime.now(UTC)
-    identity = _identity(seed, grid, lidar, trials)
+    began, digest = datetime.now(UTC), hashlib.sha256(repr(TRIALS).encode()).hexdigest()[:16]
+    identity = {"seed": seed, "grid": grid, "lidar": lidar, "trials": digest}
     done, sums = resumable_json(log, identity, "drives"), resumable_json(log, identity, "sums", list)
     minutes = resumable_json(log, identity, "minutes", float).get("of all drives", 0.0)
-    with tqdm(total=drives, initial=len(done), desc="truth policies", unit="drive") as bar:
-        for number in range(HELD_OUT + 1000 * seed + len(done), HELD_OUT + 1000 * seed + drives):
-            counts = score_trials(trials, GRIDS[grid], number, lidar)
-            done[str(number)] = {name: one.cells.sum(axis=(1, 2)).tolist() for name, one in counts.items()}
-            for name, one in counts.items():
-                sums[name] = (one + TruthCounts(np.array(sums.get(name, 0)))).cells.tolist()
-            spent = minutes + (datetime.now(UTC) - began).total_seconds() / 60
-            write_json(log, identity | {"drives": done, "sums": sums, "minutes": {"of all drives": round(spent, 2)}})
-            bar.update()
-    choices = f"--grid {grid} --lidar {lidar}"
-    return {
-        **identity,
-        **_legend(trials),
+    first = HELD_OUT + 1000 * seed
+    for number in tqdm(range(first, first + drives), desc="truth policies", unit="drive"):
+        if str(number) in done:
+            continue
+        counts = score_trials(TRIALS, GRIDS[grid], number, lidar)
+        done[str(number)] = {name: one.cells.sum(axis=(1, 2)).tolist() for name, one in counts.items()}
+        sums = {name: (one.cells + np.array(sums.get(name, 0))).tolist() for name, one in counts.items()}
+        spent = minutes + (datetime.now(UTC) - began).total_seconds() / 60
+        write_json(log, identity | {"drives": done, "sums": sums, "minutes": {"of all drives": round(spent, 2)}})
+    return identity | {
+        "policies": {name: asdict(trial.policy) | {"errors": asdict(trial.flaws)} for name, trial in TRIALS.items()},
+        "counted": list(COUNTED),
+        "bands": list(BAND_EDGES),
+        "classes": list(KITTI_14.names[: KITTI_14.n_semantic]),
         "drives": done,
         "sums": sums,
         "minutes": resumable_json(log, identity, "minutes", float),
-        "command": f"semgrid-edu reproduce truth-policies --seed {seed} --drives {drives} {choices}",
+        "command": "semgrid-edu reproduce truth-policies "
+        f"--seed {seed} --drives {drives} --grid {grid} --lidar {lidar}",
         "date": f"{began:%Y-%m-%d}",
         "versions": versions("numpy", "scipy", "numba", "embreex", "trimesh"),
     }
 
 
-def _identity(seed: int, grid: str, lidar: str, trials: dict[str, Trial]) -> dict[str, object]:
-    """Return what makes the experiment, for the log to be compared with; all trials as one short number."""
-    digest = hashlib.sha256(repr(trials).encode()).hexdigest()[:16]
-    return {"seed": seed, "grid": grid, "lidar": lidar, "trials": digest}
+def score_trials(
+    trials: dict[str, Trial], spec: GridSpec, number: int, lidar: str = "coarse"
+) -> dict[str, TruthCounts]:
+    """Score every trial on one simulated drive, by name.
 
-
-def _legend(trials: dict[str, Trial]) -> dict[str, object]:
-    """Return what the numbers of a result stand for."""
-    return {
-        "policies": {name: asdict(trial.policy) | {"errors": asdict(trial.flaws)} for name, trial in trials.items()},
-        "counted": list(COUNTED),
-        "bands": list(BAND_EDGES),
-        "classes": list(KITTI_14.names[: KITTI_14.n_semantic]),
-    }
+    Parameters
+    ----------
+    trials : dict of str to Trial
+        What to score, by name.
+    spec : GridSpec
+        The grid.
+    number : int
+        Seed for the drive and for the errors in its data, which all trials share, and for the particles.
+    lidar : str
+        A key of `LIDARS`.
+    """
+    frames = simulated_drive(number, lidar)
+    return score_frame(trials, frames, len(frames) // 2, spec, number)
 
 
 def simulated_drive(number: int, lidar: str = "coarse", n_frames: int = 2 * REACH + 1) -> list[Frame]:
@@ -138,10 +196,6 @@ def simulated_drive(number: int, lidar: str = "coarse", n_frames: int = 2 * REAC
         A key of `LIDARS`.
     n_frames : int
         Number of frames, ten a second.
-
-    Returns
-    -------
-    list of Frame
     """
     drive = SimulatedDrive(number, n_frames, rig=Rig(lidar=LIDARS[lidar]))
     return [_labelled_frame(drive, k, birdseye=k == n_frames // 2) for k in range(n_frames)]
@@ -156,35 +210,10 @@ def _labelled_frame(drive: SimulatedDrive, k: int, birdseye: bool) -> Frame:
     return Frame(None, taken.points, drive.rig.camera, taken.T_world_from_lidar, k * PERIOD, labels)
 
 
-def score_trials(
-    trials: dict[str, Trial], spec: GridSpec, number: int, lidar: str = "coarse"
-) -> dict[str, TruthCounts]:
-    """Score every trial on one simulated drive.
-
-    Parameters
-    ----------
-    trials : dict of str to Trial
-        What to score, by name.
-    spec : GridSpec
-        The grid.
-    number : int
-        Seed for the drive and for the errors in its data, which all trials share, and for the particles.
-    lidar : str
-        A key of `LIDARS`.
-
-    Returns
-    -------
-    dict of str to TruthCounts
-        By name.
-    """
-    frames = simulated_drive(number, lidar)
-    return score_frame(trials, frames, len(frames) // 2, spec, number)
-
-
 def score_frame(
     trials: dict[str, Trial], frames: Iterable[Frame], k: int, spec: GridSpec, seed: int = 0
 ) -> dict[str, TruthCounts]:
-    """Score every trial on one labelled frame of any drive whose bird's-eye labels are true.
+    """Score every trial on one labelled frame of any drive whose bird's-eye labels are true, by name.
 
     Parameters
     ----------
@@ -198,11 +227,6 @@ def score_frame(
         The grid: the extent of `LABEL_GRID`, a multiple of its cell.
     seed : int
         Seed for the errors in the data and for the particles.
-
-    Returns
-    -------
-    dict of str to TruthCounts
-        By name.
 
     Raises
     ------
@@ -218,33 +242,5 @@ def score_frame(
         flaws: [Moment(*pair) for pair in zip(flawed_drive(frames, flaws, seed), beliefs, strict=True)]
         for flaws in {trial.flaws for trial in trials.values()}
     }
-    return {
-        name: TruthCounts.of_frame(
-            drive_truth(moments[flaws], k, spec, policy), truth, standing, spec, labels.label_set
-        )
-        for name, (policy, flaws) in trials.items()
-    }
-
-
-def counts_of(result: dict, name: str) -> TruthCounts:
-    """Return the counts of one trial of a result.
-
-    Parameters
-    ----------
-    result : dict
-        From `truth_policies`, or from the JSON file that it was written to.
-    name : str
-        The name of the trial.
-
-    Returns
-    -------
-    TruthCounts
-
-    Raises
-    ------
-    ArgumentError
-        When the result has no such trial.
-    """
-    if name not in result["sums"]:
-        raise ArgumentError("name", f"one of {', '.join(result['sums'])}", repr(name))
-    return TruthCounts(np.array(result["sums"][name]))
+    found = {name: drive_truth(moments[flaws], k, spec, policy) for name, (policy, flaws) in trials.items()}
+    return {name: TruthCounts.of_frame(one, truth, standing, spec, labels.label_set) for name, one in found.items()}

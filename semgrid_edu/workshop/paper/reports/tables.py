@@ -1,0 +1,243 @@
+"""Tables 1 to 3: every score beside the paper's, its differences, and the confusion matrix (sections 4.2 to 4.4)."""
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from semgrid_edu.labels import KITTI_14, SYNTHIA_10
+from semgrid_edu.metrics import METRICS
+from semgrid_edu.workshop.paper.runs.paper import NETWORKS, TABLE_3_CONFUSION, TABLE_3_SCORES
+from semgrid_edu.workshop.paper.runs.score_runs import BASELINES, WITH_CRF, BaselineRun, CountingRun, ScoreRun, by_seed
+from semgrid_edu.workshop.scoring.grids import NETWORK
+from semgrid_edu.workshop.scoring.score_with_interval import (
+    ScoreWithInterval,
+    all_metrics,
+    compared,
+    markdown_table,
+    on_cells,
+    per_cent,
+    score_with_interval,
+    shown,
+    shown_seeds,
+)
+
+TRUTHS = {"lidar": "labels made with the LIDAR, as in the paper", "true": "true labels"}
+"""What networks are scored against."""
+CELLS = {"all": "all labelled cells", "semantic": "cells with a semantic class"}
+"""On which cells."""
+
+
+def scores_by_truth(runs: Sequence[CountingRun], root: Path, method: str = NETWORK) -> dict[str, dict]:
+    """Return every metric of a method, by truth, cells and metric.
+
+    Parameters
+    ----------
+    runs : sequence of S CountingRun
+        One per seed.
+    root : Path
+        The folder of all runs.
+    method : str
+        One of the methods that the runs have scored.
+    """
+    return {truth: all_metrics(by_seed(runs, root, method, truth), KITTI_14) for truth in TRUTHS}
+
+
+def differences_by_truth(
+    a: Sequence[CountingRun], b: Sequence[CountingRun], root: Path, methods: tuple[str, str] = (NETWORK, NETWORK)
+) -> dict[str, dict]:
+    """Return a minus b in every metric, on the same seeds and drives, by truth, cells and metric.
+
+    Parameters
+    ----------
+    a, b : sequence of S CountingRun
+        One per seed.
+    root : Path
+        The folder of all runs.
+    methods : (str, str)
+        The method of a and that of b.
+    """
+    found: dict[str, dict] = {}
+    for truth in TRUTHS:
+        ours, theirs = (by_seed(runs, root, name, truth) for runs, name in zip((a, b), methods, strict=True))
+        found[truth] = {
+            cells: {
+                name: compared(on_cells(ours, cells, KITTI_14), on_cells(theirs, cells, KITTI_14), metric)
+                for name, metric in METRICS.items()
+            }
+            for cells in CELLS
+        }
+    return found
+
+
+def accuracy_result(
+    runs: Mapping[str, Sequence[ScoreRun]],
+    root: Path,
+    paper: Mapping[tuple[str, bool], dict],
+    baselines: Sequence[BaselineRun] = (),
+) -> dict[str, list[dict]]:
+    """Return Table 1 or 2.
+
+    Parameters
+    ----------
+    runs : mapping of str to sequence of S ScoreRun
+        By image network one per seed.
+    root : Path
+        The folder of all runs.
+    paper : mapping of (str, bool) to dict
+        The paper's scores by image network and whether the CRF is used.
+    baselines : sequence of S BaselineRun
+        The baselines of the same seeds, on the same frames, with which SegNet is compared; none when left out.
+
+    Returns
+    -------
+    dict
+        "rows", each image network without and with the CRF: "network", "CRF", the "paper"'s scores, our "scores" by
+        truth, cells and metric, and by truth the "confusion" matrix of all seeds. "differences": "what" is compared,
+        and the "scores", as `differences_by_truth` returns them.
+    """
+    gains = {
+        f"{NETWORKS[name]}: with CRF - without": differences_by_truth(scored, scored, root, (WITH_CRF, NETWORK))
+        for name, scored in runs.items()
+    }
+    gains |= {f"{NETWORKS[a]} - {NETWORKS[b]}": differences_by_truth(runs[a], runs[b], root) for a, b in pairwise(runs)}
+    if baselines:
+        gains |= {
+            f"{NETWORKS['segnet']} - {name}": differences_by_truth(runs["segnet"], baselines, root, (NETWORK, name))
+            for name in BASELINES
+        }
+    return {
+        "rows": [
+            {
+                "network": name,
+                "CRF": crf,
+                "paper": paper[name, crf],
+                "scores": scores_by_truth(scored, root, method),
+                "confusion": {t: by_seed(scored, root, method, t).sum(axis=(0, 1)).tolist() for t in TRUTHS},
+            }
+            for name, scored in runs.items()
+            for crf, method in ((False, NETWORK), (True, WITH_CRF))
+        ],
+        "differences": [{"what": what, "scores": found} for what, found in gains.items()],
+    }
+
+
+def accuracy_markdown(result: dict) -> str:
+    """Return Table 1 or 2 as Markdown.
+
+    Parameters
+    ----------
+    result : dict
+        From `accuracy_result`.
+    """
+    rows = result["rows"]
+    sections = [
+        f"Against {words}, {which}:\n\n{_beside_paper(rows, truth, cells)}"
+        for truth, words in TRUTHS.items()
+        for cells, which in CELLS.items()
+    ]
+    seeds = [[*_named(row), *map(shown_seeds, _metrics(row["scores"]["lidar"]["all"]))] for row in rows]
+    table = markdown_table([["network", "CRF", *METRICS], *seeds])
+    sections.append(f"Every seed, all labelled cells, labels made with the LIDAR:\n\n{table}")
+    for truth, words in TRUTHS.items():
+        gains = [[row["what"], *score_cells(row["scores"][truth]["all"], 2)] for row in result["differences"]]
+        sections.append(
+            f"Paired differences (same seeds, same drives), all labelled cells, against {words}, points:\n\n"
+            + markdown_table([["difference", *METRICS], *gains])
+        )
+    return "\n\n".join(sections)
+
+
+def score_cells(found: dict[str, ScoreWithInterval], digits: int = 1) -> list[str]:
+    """Return the cells of a table's row: every metric with its interval, per cent.
+
+    Parameters
+    ----------
+    found : dict of str to dict
+        By metric.
+    digits : int
+        Digits after the point.
+    """
+    return [shown(value, digits) for value in _metrics(found)]
+
+
+def _metrics(found: dict) -> list:
+    """Return what is known of each metric, in their order."""
+    return [found[name] for name in METRICS]
+
+
+def _named(row: dict) -> list[str]:
+    return [NETWORKS[row["network"]], "yes" if row["CRF"] else "no"]
+
+
+def _beside_paper(rows: list[dict], truth: str, cells: str) -> str:
+    """Lay out our scores, beside the paper's where labels and cells are those that the paper has."""
+    with_paper = truth == "lidar" and cells == "all"
+    lines = [["network", "CRF", *(f"{name}{part}" for name in METRICS for part in (", paper", "")[not with_paper :])]]
+    for row in rows:
+        line = _named(row)
+        for name in METRICS:
+            line += [per_cent(row["paper"][name])] * with_paper + [shown(row["scores"][truth][cells][name])]
+        lines.append(line)
+    return markdown_table(lines)
+
+
+def confusion_result(runs: Sequence[ScoreRun], root: Path) -> dict:
+    """Return our Table 3 beside the paper's.
+
+    Parameters
+    ----------
+    runs : sequence of S ScoreRun
+        One per seed.
+    root : Path
+        The folder of all runs.
+
+    Returns
+    -------
+    dict
+        "paper" and "ours": "scores" by metric, and the "matrix" in per cent of its rows; ours is the mean over the
+        seeds, None in the row of a class that doesn't occur. "confusion" counts the cells of all seeds.
+    """
+    found = by_seed(runs, root, NETWORK, "true")
+    counts = found.sum(axis=1)
+    with np.errstate(invalid="ignore"):  # NaN in the row of a class that doesn't occur
+        shares = np.mean(100 * counts / counts.sum(axis=2, keepdims=True), axis=0)
+    return {
+        "classes": list(SYNTHIA_10.names),
+        "paper": {"scores": TABLE_3_SCORES, "matrix": [list(row) for row in TABLE_3_CONFUSION]},
+        "ours": {
+            "scores": {name: score_with_interval(found, metric) for name, metric in METRICS.items()},
+            "matrix": [[None if np.isnan(share) else round(float(share), 2) for share in row] for row in shares],
+        },
+        "confusion": found.sum(axis=(0, 1)).tolist(),
+    }
+
+
+def confusion_markdown(result: dict) -> str:
+    """Return Table 3 as Markdown.
+
+    Parameters
+    ----------
+    result : dict
+        From `confusion_result`.
+    """
+    ours = result["ours"]["scores"]
+    table = markdown_table(
+        [
+            ["", *METRICS],
+            ["paper", *map(per_cent, _metrics(result["paper"]["scores"]))],
+            ["ours", *score_cells(ours)],
+            ["every seed", *map(shown_seeds, _metrics(ours))],
+        ]
+    )
+    matrices = [_matrix(result["classes"], result[whose]["matrix"]) for whose in ("ours", "paper")]
+    return (
+        f"{table}\n\nRow: truth, column: detected, per cent of the row; mean over the seeds.\n\n"
+        f"Ours:\n\n{matrices[0]}\n\nThe paper's:\n\n{matrices[1]}"
+    )
+
+
+def _matrix(names: list[str], matrix: list[list[float | None]]) -> str:
+    shares = (["-" if share is None else f"{share:.2f}" for share in row] for row in matrix)
+    return markdown_table([["", *names], *([name, *row] for name, row in zip(names, shares, strict=True))])

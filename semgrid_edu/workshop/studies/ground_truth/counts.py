@@ -1,0 +1,193 @@
+"""How wrong labels made from LIDAR are: cells counted by class and distance, against the true street (section 4).
+
+Two things are known of each cell: what stands in it, and whether the camera sees it. A label is right when what it says
+stands there. A cell that the camera sees should have a label.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import LabelSet
+from semgrid_edu.workshop.scoring.confusions import band_names
+from semgrid_edu.workshop.scoring.counting import distance_bands
+from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
+
+BAND_EDGES = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 73.0)
+"""Distances from the LIDAR at which the bands begin and end, metres; the grid's far corners are 72.7 m away."""
+COUNTED = ("seen", "found", "missed", "labelled", "right", "hidden")
+"""What is counted of each class c and each band: cells that the camera sees, in which c stands ("seen"), those of them
+that are labelled c ("found") and those without a label ("missed"); cells that are labelled c ("labelled"), those of
+them in which c stands ("right") and those that the camera doesn't see ("hidden")."""
+COLUMNS = ("found", "mistaken", "missed", "wrong", "hidden", "iou")
+"""Shares of `TruthCounts.shares`, in the order of the tables' columns."""
+
+
+@dataclass(frozen=True, eq=False)
+class TruthCounts:
+    """Cells of a map of labels, counted by class and distance.
+
+    Parameters
+    ----------
+    cells : (6, B, n_semantic) int64
+        Numbers of cells: one plane for each of `COUNTED`, one row per band of distance, one column per class.
+    """
+
+    cells: NDArray[np.int64]
+
+    @classmethod
+    def of_frame(
+        cls, labels: NDArray, truth: NDArray, standing: NDArray, spec: GridSpec, label_set: LabelSet
+    ) -> "TruthCounts":
+        """Count the cells of one frame.
+
+        Parameters
+        ----------
+        labels : (H, W) int
+            The labels made from LIDAR.
+        truth : (H, W) int
+            From `grid_truth`: what stands in the cells that the camera sees, an unknown class elsewhere.
+        standing : (H, W) int
+            What stands in each cell, seen or not; 255 where not even the simulator says.
+        spec : GridSpec
+            The grid.
+        label_set : LabelSet
+            The classes.
+
+        Raises
+        ------
+        ArgumentError
+            When a map doesn't fit the grid.
+        """
+        for name, grid in (("labels", labels), ("truth", truth), ("standing", standing)):
+            if np.shape(grid) != spec.shape:
+                raise ArgumentError(name, f"shape {spec.shape}", f"shape {np.shape(grid)}")
+        band, n = distance_bands(spec, BAND_EDGES), label_set.n_semantic
+        chosen = (
+            (truth, truth < n),
+            (truth, (truth < n) & (labels == truth)),
+            (truth, (truth < n) & (labels >= n)),
+            (labels, labels < n),
+            (labels, (labels < n) & (labels == standing)),
+            (labels, (labels < n) & (truth >= n)),
+        )  # in the order of COUNTED
+        cells = np.zeros((len(COUNTED), len(BAND_EDGES) - 1, n), np.int64)
+        for plane, (classes, where) in zip(cells, chosen, strict=True):
+            np.add.at(plane, (band[where], np.asarray(classes)[where]), 1)
+        return cls(cells)
+
+    def __add__(self, other: "TruthCounts") -> "TruthCounts":
+        """Return the counts of the frames of both."""
+        return TruthCounts(self.cells + other.cells)
+
+    def shares(self, axis: int | tuple[int, ...] | None = None) -> dict[str, NDArray[np.float64]]:
+        """Return what the counts say, as shares.
+
+        Parameters
+        ----------
+        axis : int or tuple of int, optional
+            What to add up first: 0 for the bands of distance, 1 for the classes, both for one number; nothing when
+            left out.
+
+        Returns
+        -------
+        dict of str to (...) float64
+            Shares from 0 to 1; NaN where there is nothing to share. "wrong": of the labelled cells, those in which
+            something else stands. "found", "mistaken" and "missed": of the cells that the camera sees, those with the
+            right label, with another label, and without a label. "hidden": of the labelled cells, those that the
+            camera doesn't see. "iou": intersection over union of both, among the cells that the camera sees.
+        """
+        added = () if axis is None else tuple(a + 1 for a in np.atleast_1d(axis))
+        seen, found, missed, labelled, right, hidden = self.cells.sum(axis=added).astype(np.float64)
+        with np.errstate(invalid="ignore"):
+            return {
+                "wrong": 1 - right / labelled,
+                "found": found / seen,
+                "mistaken": (seen - found - missed) / seen,
+                "missed": missed / seen,
+                "hidden": hidden / labelled,
+                "iou": found / (seen + labelled - hidden - found),
+            }
+
+
+def counts_of(result: dict, name: str) -> TruthCounts:
+    """Return the counts of one trial.
+
+    Parameters
+    ----------
+    result : dict
+        From `truth_policies`, or from the JSON file that it was written to.
+    name : str
+        The name of the trial.
+
+    Raises
+    ------
+    ArgumentError
+        When the result has no such trial.
+    """
+    if name not in result["sums"]:
+        raise ArgumentError("name", f"one of {', '.join(result['sums'])}", repr(name))
+    return TruthCounts(np.array(result["sums"][name]))
+
+
+def policy_table(result: dict) -> str:
+    """Return one row per policy, over all classes and distances, per cent; "mean iou" is the mean over the classes.
+
+    Parameters
+    ----------
+    result : dict
+        From `truth_policies`, or from the JSON file that it was written to.
+    """
+    rows = [["per cent", *COLUMNS, "mean iou"]]
+    for name in result["sums"]:
+        counts = counts_of(result, name)
+        shares = counts.shares(axis=(0, 1)) | {"mean iou": np.nanmean(counts.shares(axis=0)["iou"])}
+        rows.append([name, *(_per_cent(shares[column]) for column in rows[0][1:])])
+    return markdown_table(rows)
+
+
+def class_table(result: dict, name: str) -> str:
+    """Return one row per class of one policy, over all distances, per cent.
+
+    Parameters
+    ----------
+    result : dict
+        From `truth_policies`, or from the JSON file that it was written to.
+    name : str
+        The name of the policy.
+    """
+    return _table(counts_of(result, name).shares(axis=0), result["classes"])
+
+
+def distance_table(result: dict, name: str) -> str:
+    """Return one row per band of distance of one policy, over all classes. Parameters are those of `class_table`."""
+    return _table(counts_of(result, name).shares(axis=1), band_names(result["bands"]))
+
+
+def _table(shares: dict[str, NDArray], names: Iterable[str]) -> str:
+    """Return one row per entry of the shares."""
+    rows = [[name, *(_per_cent(shares[column][k]) for column in COLUMNS)] for k, name in enumerate(names)]
+    return markdown_table([["per cent", *COLUMNS], *rows])
+
+
+def _per_cent(share: float) -> str:
+    return per_cent(None if np.isnan(share) else float(share))
+
+
+def truth_tables(result: dict) -> str:
+    """Return all policies, then classes and distances of the first one, each table under its title.
+
+    Parameters
+    ----------
+    result : dict
+        From `truth_policies`, or from the JSON file that it was written to.
+    """
+    first = next(iter(result["sums"]))
+    return (
+        f"{len(result['drives'])} drives\n\n{policy_table(result)}\n\n"
+        f"{first}, by class\n\n{class_table(result, first)}\n\n{first}, by distance\n\n{distance_table(result, first)}"
+    )
