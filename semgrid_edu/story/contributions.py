@@ -1,4 +1,4 @@
-"""Which inputs of the fusion network made a class's score, in one cell or in all: gradient times input (section 3.4)."""
+"""Which inputs of the fusion network made a class's score, in one cell or all: gradient times input (section 3.4)."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
