@@ -1,7 +1,4 @@
-"""Which inputs of the fusion network made a class's score in one cell: gradient times input (paper, section 3.4).
-
-The parts of every class's score in every cell at once: one pass forward per plane, class and state (section 3.4).
-"""
+"""Which inputs of the fusion network made a class's score, in one cell or all: gradient times input (section 3.4)."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -16,6 +13,9 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.networks.backbones.conv_deconv import ConvDeconv
 from semgrid_edu.occupancy import N_STATES
+
+AT_ONCE = 8
+"""How many passes are made together: more would take more memory, and no less time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,10 +134,6 @@ def fusion_inputs(net: SemanticGridNet, scores: NDArray, occupancy: NDArray) -> 
     with torch.no_grad():
         planes = net.sampler(torch.tensor(np.asarray(scores, np.float32))[None])
     return planes, torch.tensor(np.asarray(occupancy, np.float32))[None]
-
-
-AT_ONCE = 8
-"""How many passes are made together: more would take more memory, and no less time."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from copy import deepcopy
 
 import numpy as np
@@ -374,3 +376,12 @@ def test_wrong_inputs_are_named():
         plane_heights(0)
     with pytest.raises(ArgumentError, match="spacing"):
         plane_heights(20, spacing=0.0)
+
+
+def test_neither_pixels_nor_graphs_need_torch_or_matplotlib():
+    """Lectures 01 to 05 start without them."""
+    program = (
+        "import sys, semgrid_edu.graphical; from semgrid_edu.planes import plane_pixels, sample_planes_naive; "
+        "assert not {'torch', 'matplotlib', 'scipy.stats'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=120)
