@@ -11,33 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def peak_megabytes(function: Callable, *arguments: Any) -> tuple[Any, float]:
-    """Call a function, and measure how much memory it holds at its worst moment.
-
-    Parameters
-    ----------
-    function : callable
-        The function. When it works in another process, as a student's answer does while it is graded, it has a method
-        `peak_megabytes` that measures there.
-    *arguments
-        What it is called with.
-
-    Returns
-    -------
-    result
-        What the function returns.
-    megabytes : float
-        The most that Python's own allocators, numpy's among them, held in 10^6 bytes beyond what they held before.
-    """
-    if hasattr(function, "peak_megabytes"):
-        return function.peak_megabytes(*arguments)
-    tracemalloc.start()
-    try:
-        return function(*arguments), tracemalloc.get_traced_memory()[1] / 1e6
-    finally:
-        tracemalloc.stop()
-
-
 def answer_array(result: Any, name: str = "it", dtype: type = float) -> NDArray:
     """Return the result of an answer as an array, or say in a sentence why it is none.
 
@@ -74,31 +47,6 @@ def answer_array(result: Any, name: str = "it", dtype: type = float) -> NDArray:
     raise AssertionError(f"{name} returned no array of numbers but a {kind} that holds something else{hint}")
 
 
-def answer_number(result: Any, name: str = "it") -> float:
-    """Return the result of an answer as one number, or say in a sentence why it is none.
-
-    Parameters
-    ----------
-    result : Any
-        What the answer returned: a number, or one number in an array or a list.
-    name : str
-        The subject of the sentence, as in `answer_array`.
-
-    Returns
-    -------
-    float
-        The number.
-
-    Raises
-    ------
-    AssertionError
-        When the result is None, no number, or more than one.
-    """
-    numbers = answer_array(result, name)
-    assert numbers.size == 1, f"{name} returned {numbers.size} numbers instead of one"
-    return numbers.item()
-
-
 def answer_arrays(result: Any, n_arrays: int, name: str = "it") -> list[NDArray]:
     """Return the result of an answer as several arrays, or say in a sentence why it is something else.
 
@@ -125,3 +73,55 @@ def answer_arrays(result: Any, n_arrays: int, name: str = "it") -> list[NDArray]
     found = len(result) if isinstance(result, tuple | list) else 1
     assert found == n_arrays, f"{name} must return {n_arrays} arrays, separated by commas; got {found}"
     return [answer_array(part, name) for part in result]
+
+
+def answer_number(result: Any, name: str = "it") -> float:
+    """Return the result of an answer as one number, or say in a sentence why it is none.
+
+    Parameters
+    ----------
+    result : Any
+        What the answer returned: a number, or one number in an array or a list.
+    name : str
+        The subject of the sentence, as in `answer_array`.
+
+    Returns
+    -------
+    float
+        The number.
+
+    Raises
+    ------
+    AssertionError
+        When the result is None, no number, or more than one.
+    """
+    numbers = answer_array(result, name)
+    assert numbers.size == 1, f"{name} returned {numbers.size} numbers instead of one"
+    return numbers.item()
+
+
+def peak_megabytes(function: Callable, *arguments: Any) -> tuple[Any, float]:
+    """Call a function, and measure how much memory it holds at its worst moment.
+
+    Parameters
+    ----------
+    function : callable
+        The function. When it works in another process, as a student's answer does while it is graded, it has a method
+        `peak_megabytes` that measures there.
+    *arguments
+        What it is called with.
+
+    Returns
+    -------
+    result
+        What the function returns.
+    megabytes : float
+        The most that Python's own allocators, numpy's among them, held in 10^6 bytes beyond what they held before.
+    """
+    if hasattr(function, "peak_megabytes"):
+        return function.peak_megabytes(*arguments)
+    tracemalloc.start()
+    try:
+        return function(*arguments), tracemalloc.get_traced_memory()[1] / 1e6
+    finally:
+        tracemalloc.stop()

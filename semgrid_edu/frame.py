@@ -64,29 +64,6 @@ class FrameLabels:
         return blocks(self.visible, spec).any(axis=-1)
 
 
-def blocks(fine: NDArray, spec: GridSpec) -> NDArray:
-    """Return the fine cells that each cell of a coarser grid consists of.
-
-    Parameters
-    ----------
-    fine : (710, 310) of any type
-        One value for each cell of `LABEL_GRID`.
-    spec : GridSpec
-        The coarser grid: the extent of `LABEL_GRID`, a multiple of its cell.
-
-    Returns
-    -------
-    (H, W, n) of the same type
-        The n fine values in each cell, row by row.
-    """
-    factor = round(spec.cell / LABEL_GRID.cell)
-    height, width = spec.shape
-    coarsening = GridSpec(spec.x_min, spec.x_max, spec.y_min, spec.y_max, LABEL_GRID.cell) == LABEL_GRID
-    if not coarsening or (height * factor, width * factor) != LABEL_GRID.shape:
-        raise ArgumentError("spec", f"a coarsening of {LABEL_GRID}", spec)
-    return fine.reshape(height, factor, width, factor).swapaxes(1, 2).reshape(height, width, -1)
-
-
 @dataclass(frozen=True, eq=False)
 class Frame:
     """One instant of a drive.
@@ -126,3 +103,26 @@ class Frame:
         """(N, 4) float32: the returns in the grid frame, so that z is the height above flat ground."""
         shift = np.array([0, 0, self.camera.lidar_height, 0], dtype=self.points.dtype)
         return self.points + shift
+
+
+def blocks(fine: NDArray, spec: GridSpec) -> NDArray:
+    """Return the fine cells that each cell of a coarser grid consists of.
+
+    Parameters
+    ----------
+    fine : (710, 310) of any type
+        One value for each cell of `LABEL_GRID`.
+    spec : GridSpec
+        The coarser grid: the extent of `LABEL_GRID`, a multiple of its cell.
+
+    Returns
+    -------
+    (H, W, n) of the same type
+        The n fine values in each cell, row by row.
+    """
+    factor = round(spec.cell / LABEL_GRID.cell)
+    height, width = spec.shape
+    coarsening = GridSpec(spec.x_min, spec.x_max, spec.y_min, spec.y_max, LABEL_GRID.cell) == LABEL_GRID
+    if not coarsening or (height * factor, width * factor) != LABEL_GRID.shape:
+        raise ArgumentError("spec", f"a coarsening of {LABEL_GRID}", spec)
+    return fine.reshape(height, factor, width, factor).swapaxes(1, 2).reshape(height, width, -1)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from semgrid_edu.occupancy.state import State
 
 FREE, STATIC, DYNAMIC, UNKNOWN = (int(state) for state in State)
+
 CERTAIN = 1 - 1e-3
 """The most that arriving particles may claim of a cell. It is below 1, so that a scan can still contradict them."""
 
@@ -138,34 +139,6 @@ def collide(mixed, newborn, going, stays, arrives, doubtful):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def clear_wakes(probability, left, hidden):
-    """Strike out that something stands where a moving thing has been, in cells of which the scan says nothing.
-
-    Parameters
-    ----------
-    probability : (4, H, W) float32
-        The four states given the scan.
-    left : (H, W) float32
-        Sum of the weights of the particles that have left each cell.
-    hidden : (H, W) bool
-        Whether the scan says nothing of the cell.
-
-    Returns
-    -------
-    (4, H, W) float32
-        In hidden cells, with a = min(left, CERTAIN) and s = P(STATIC): STATIC is (1 - a) s / (1 - a s), and FREE gets
-        what it loses. All other cells are as they were.
-    """
-    cleared = probability.copy()
-    for r in range(left.shape[0]):
-        for c in range(left.shape[1]):
-            static, gone = probability[STATIC, r, c], min(left[r, c], CERTAIN) if hidden[r, c] else 0.0
-            cleared[STATIC, r, c] = (1 - gone) * static / (1 - gone * static)
-            cleared[FREE, r, c] += static - cleared[STATIC, r, c]
-    return cleared
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def bayes(prior, occupied, free):
     """Multiply by the likelihoods and normalise: P(state | z) = P(z | state) P(state) / P(z).
 
@@ -200,6 +173,34 @@ def bayes(prior, occupied, free):
             posterior[UNKNOWN, r, c] = if_free * prior[UNKNOWN, r, c] if evidence > 0 else 1.0
             factor[r, c] = if_occupied
     return posterior, factor
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def clear_wakes(probability, left, hidden):
+    """Strike out that something stands where a moving thing has been, in cells of which the scan says nothing.
+
+    Parameters
+    ----------
+    probability : (4, H, W) float32
+        The four states given the scan.
+    left : (H, W) float32
+        Sum of the weights of the particles that have left each cell.
+    hidden : (H, W) bool
+        Whether the scan says nothing of the cell.
+
+    Returns
+    -------
+    (4, H, W) float32
+        In hidden cells, with a = min(left, CERTAIN) and s = P(STATIC): STATIC is (1 - a) s / (1 - a s), and FREE gets
+        what it loses. All other cells are as they were.
+    """
+    cleared = probability.copy()
+    for r in range(left.shape[0]):
+        for c in range(left.shape[1]):
+            static, gone = probability[STATIC, r, c], min(left[r, c], CERTAIN) if hidden[r, c] else 0.0
+            cleared[STATIC, r, c] = (1 - gone) * static / (1 - gone * static)
+            cleared[FREE, r, c] += static - cleared[STATIC, r, c]
+    return cleared
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -105,21 +105,6 @@ def update_log_odds(L: NDArray, evidence: Evidence, params: LogOddsParams) -> ND
     return np.clip(L + ratio.astype(L.dtype, copy=False), *bounds)
 
 
-def smear_area(p_occupied: NDArray, left: NDArray[np.bool_], spec: GridSpec) -> float:
-    """Measure the smear of something that has moved: the area, m^2, that it has left but is believed to occupy still.
-
-    Parameters
-    ----------
-    p_occupied : (H, W) float
-        P(occupied) of a log-odds grid, or P(STATIC) + P(DYNAMIC) of a `Belief`.
-    left : (H, W) bool
-        The cells in which the thing was once, and isn't any more.
-    spec : GridSpec
-        The grid of these cells.
-    """
-    return float(np.count_nonzero((p_occupied > 0.5) & left) * spec.cell**2)
-
-
 class LogOddsGrid:
     """The binary baseline: each cell is occupied or free, for ever.
 
@@ -164,3 +149,18 @@ class LogOddsGrid:
         before = look_up(moved[None], self._prior, self.map_spec, self.spec, seen.pose)[0]
         self._log_odds, self._pose = update_log_odds(moved, seen.on_map, self.params), seen.pose
         return probability(update_log_odds(before, seen.in_grid, self.params))
+
+
+def smear_area(p_occupied: NDArray, left: NDArray[np.bool_], spec: GridSpec) -> float:
+    """Measure the smear of something that has moved: the area, m^2, that it has left but is believed to occupy still.
+
+    Parameters
+    ----------
+    p_occupied : (H, W) float
+        P(occupied) of a log-odds grid, or P(STATIC) + P(DYNAMIC) of a `Belief`.
+    left : (H, W) bool
+        The cells in which the thing was once, and isn't any more.
+    spec : GridSpec
+        The grid of these cells.
+    """
+    return float(np.count_nonzero((p_occupied > 0.5) & left) * spec.cell**2)

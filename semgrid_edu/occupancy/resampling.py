@@ -51,50 +51,6 @@ class Resampling(Protocol):
         ...
 
 
-def draw_indices(resampling: Resampling, weight: NDArray, count: int, rng: np.random.Generator) -> NDArray:
-    """Ask a resampling for indices, and refuse an answer that isn't M indices from 0 to N - 1.
-
-    Parameters
-    ----------
-    resampling : Resampling
-        How to draw.
-    weight : (N,) float
-        The weights, not negative.
-    count : int
-        How many to draw, M.
-    rng : numpy.random.Generator
-        Source of random numbers.
-
-    Returns
-    -------
-    (M,) int64
-        What `resampling.draw` returned; none at all when the weights sum to 0.
-    """
-    if count == 0 or not weight.any():
-        return np.empty(0, np.int64)
-    drawn = np.asarray(resampling.draw(weight.astype(np.float64), count, rng))
-    found = f"shape {drawn.shape}, type {drawn.dtype}"
-    if drawn.shape == (count,) and drawn.dtype.kind in "iu":
-        if drawn.min() >= 0 and drawn.max() < len(weight):
-            return drawn.astype(np.int64, copy=False)
-        found = f"indices from {drawn.min()} to {drawn.max()}"
-    expected = f".draw(weight, count, rng) to return {count} whole numbers from 0 to {len(weight) - 1}"
-    raise ArgumentError(type(resampling).__name__, expected, found)
-
-
-def equal_weights(weight: NDArray, count: int) -> NDArray[np.float32]:
-    """Return equal weights, (M,), with the sum of others.
-
-    Parameters
-    ----------
-    weight : (...) float
-        The others.
-    count : int
-        How many, M.
-    """
-    return np.full(count, weight.sum(dtype=np.float64) / max(count, 1), np.float32)
-
-
 @dataclass(frozen=True)
 class SystematicResampling:
     """Equally spaced points on the weights laid end to end: one random number, and the least scatter (the default)."""
@@ -231,3 +187,47 @@ def draw_velocities(count: int, max_speed: float, rng: np.random.Generator) -> N
     speed = max_speed * rng.random(count, np.float32) ** 2
     heading = np.float32(2 * np.pi) * rng.random(count, np.float32)
     return np.stack([speed * np.cos(heading), speed * np.sin(heading)], axis=1)
+
+
+def draw_indices(resampling: Resampling, weight: NDArray, count: int, rng: np.random.Generator) -> NDArray:
+    """Ask a resampling for indices, and refuse an answer that isn't M indices from 0 to N - 1.
+
+    Parameters
+    ----------
+    resampling : Resampling
+        How to draw.
+    weight : (N,) float
+        The weights, not negative.
+    count : int
+        How many to draw, M.
+    rng : numpy.random.Generator
+        Source of random numbers.
+
+    Returns
+    -------
+    (M,) int64
+        What `resampling.draw` returned; none at all when the weights sum to 0.
+    """
+    if count == 0 or not weight.any():
+        return np.empty(0, np.int64)
+    drawn = np.asarray(resampling.draw(weight.astype(np.float64), count, rng))
+    found = f"shape {drawn.shape}, type {drawn.dtype}"
+    if drawn.shape == (count,) and drawn.dtype.kind in "iu":
+        if drawn.min() >= 0 and drawn.max() < len(weight):
+            return drawn.astype(np.int64, copy=False)
+        found = f"indices from {drawn.min()} to {drawn.max()}"
+    expected = f".draw(weight, count, rng) to return {count} whole numbers from 0 to {len(weight) - 1}"
+    raise ArgumentError(type(resampling).__name__, expected, found)
+
+
+def equal_weights(weight: NDArray, count: int) -> NDArray[np.float32]:
+    """Return equal weights, (M,), with the sum of others.
+
+    Parameters
+    ----------
+    weight : (...) float
+        The others.
+    count : int
+        How many, M.
+    """
+    return np.full(count, weight.sum(dtype=np.float64) / max(count, 1), np.float32)

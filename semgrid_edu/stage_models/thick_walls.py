@@ -24,6 +24,12 @@ from semgrid_edu.occupancy import (
 )
 from semgrid_edu.stage_models.beam import BINS_PER_CELL, BeamWorld, beam_likelihood
 
+CELL, NEAREST = 0.2, 3.0
+"""Side of the paper's cells, and distance from the LIDAR to the beginning of the row, metres."""
+
+PARAMS = LogOddsParams(prior=0.2, sensor=SensorModel(ground=None))
+"""The package's defaults on flat ground, with a prior by which most cells are free."""
+
 
 class BeamBeliefs(NamedTuple):
     """Exact inference beside an occupancy grid with the same sensor, after each of n ranges.
@@ -99,13 +105,6 @@ def occupied(belief: Factor) -> NDArray[np.float64]:
 def _apart(one: Factor, other: Factor) -> float:
     """Return the total variation of two distributions over the same variables."""
     return float(total_variation(one.table.ravel(), other.ordered(*one.names).table.ravel()))
-
-
-CELL, NEAREST = 0.2, 3.0
-"""Side of the paper's cells, and distance from the LIDAR to the beginning of the row, metres."""
-
-PARAMS = LogOddsParams(prior=0.2, sensor=SensorModel(ground=None))
-"""The package's defaults on flat ground, with a prior by which most cells are free."""
 
 
 def same_sensor(noise: float, params: LogOddsParams = PARAMS, n_cells: int = 8) -> BeamWorld:
