@@ -1,7 +1,4 @@
-"""What a student's answer returned, as the array that the tests compare.
-
-How much memory a function needs.
-"""
+"""What exercises ask of a student's answer: arrays or numbers that can be compared, and how much memory it needs."""
 
 import tracemalloc
 from collections.abc import Callable
@@ -42,7 +39,7 @@ def answer_array(result: Any, name: str = "it", dtype: type = float) -> NDArray:
     try:
         return np.array(result, dtype=dtype)
     except (TypeError, ValueError):
-        kind = type(result).__name__
+        kind = type(result).__name__  # raised below, so that the student sees one error and not numpy's as well
     hint = ": are its rows equally long?" if isinstance(result, list | tuple) else ""
     raise AssertionError(f"{name} returned no array of numbers but a {kind} that holds something else{hint}")
 

@@ -21,7 +21,7 @@ class ArgumentError(ValueError):
     """
 
     def __init__(self, name: str, expected: object, found: object) -> None:
-        super().__init__(name, expected, found)
+        super().__init__(name, expected, found)  # not the sentence, so that the error can be pickled
 
     def __str__(self) -> str:
         """Return all three in one sentence."""

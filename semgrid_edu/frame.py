@@ -77,8 +77,8 @@ class Frame:
     camera : Camera
         Calibration of the image, known even where there is no image.
     T_world_from_lidar : (4, 4) float64
-        Pose of the LIDAR, metres. The world is the frame of the IMU at the drive's first oxts packet, unless the reader
-        of a drive without oxts says otherwise.
+        Pose of the LIDAR, metres. The world is the frame of the IMU at the first oxts packet of the drive (a reading of
+        KITTI's GPS and IMU), unless the reader of a drive without oxts says otherwise.
     time : float
         Seconds since the first LIDAR scan of the drive.
     labels : FrameLabels or None

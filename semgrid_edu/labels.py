@@ -26,7 +26,8 @@ class LabelSet:
     n_semantic : int
         Number of semantic classes. They come first; the other classes say that it is unknown what a cell holds.
     flat : tuple of str
-        Names of the classes that lie on the ground, so that something else can stand on them.
+        Names of the classes that lie on the ground, so that something else can stand on them. `most_voted` prefers any
+        other class to these.
 
     Examples
     --------
@@ -143,7 +144,7 @@ SYNTHIA_10 = LabelSet(
     names=tuple(_SYNTHIA_COLOURS),
     rgb=tuple(_SYNTHIA_COLOURS.values()),
     n_semantic=10,
-    flat=("void", "road", "sidewalk", "vegetation", "lane"),
+    flat=("void", "road", "sidewalk", "vegetation", "lane"),  # anything outvotes void, as it does the ground
 )
 """The ten classes of the paper's Table 3, in its order."""
 

@@ -1,4 +1,4 @@
-"""The metrics (section 4.2): pixel accuracy, class accuracy, FmIoU over labelled cells; a distance of distributions."""
+"""The paper's metrics (section 4.2), each from a confusion matrix, and how far apart two distributions are."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -142,7 +142,7 @@ METRICS = {"pixel accuracy": pixel_accuracy, "class accuracy": class_accuracy, "
 
 
 def total_variation(p: ArrayLike, q: ArrayLike) -> NDArray[np.float64]:
-    """Return the distance of distributions, sum |p - q| / 2: the most by which they disagree about any event.
+    """Return how far two distributions are apart, sum |p - q| / 2: the most by which they disagree about any event.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Pictures of graphical models: circles are variables, arrows conditional distributions, black squares factors.
 
-matplotlib is imported where it is used: it takes half a second, and whoever only infers doesn't need it.
+matplotlib is imported only inside `draw`, because it takes half a second and inference doesn't need it.
 """
 
 from collections.abc import Iterable, Mapping

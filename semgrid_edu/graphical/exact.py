@@ -57,7 +57,7 @@ def enumerate_marginals(
     names = _wanted(model, names, given)
     count = prod(model.cardinalities.values())
     if count > MAX_ASSIGNMENTS:
-        raise ArgumentError("model", f"at most {MAX_ASSIGNMENTS:,} assignments to sum over; eliminate", f"{count:,}")
+        raise ArgumentError("model", f"at most {MAX_ASSIGNMENTS:,} assignments (`eliminate` takes more)", f"{count:,}")
     table = np.zeros([model.cardinalities[name] for name in names])
     for states in every_combination(*map(range, model.cardinalities.values())):
         assignment = dict(zip(model.names, states, strict=True))

@@ -148,7 +148,7 @@ class Factor:
         ArgumentError
             When all entries are 0: what is given can't happen under the model.
         """
-        table = self.rescaled()[0].table
+        table = self.rescaled()[0].table  # so that the sum of huge or tiny entries stays in range
         if not table.any():
             zeros = "only zeros: no assignment agrees with all factors and with what is given"
             raise ArgumentError(f"factor over {self.names}", "at least one positive entry to normalise by", zeros)

@@ -21,10 +21,10 @@ MARGIN = 0.45
 """How far a plate and the picture reach beyond the centres of nodes, at least."""
 
 LETTER = 0.12
-"""Width of a letter, roughly, in a figure of its own."""
+"""Width of a letter, roughly, at the scale of the figures that `draw` makes."""
 
 CLEARANCE = 0.4
-"""An edge that passes a node nearer than this seems to end there."""
+"""An edge that passes nearer than this to a node looks as if it ended there."""
 
 
 def in_rows(*rows: Sequence[str | None]) -> dict[str, Place]:
@@ -60,11 +60,7 @@ def automatic(model: GraphicalModel) -> dict[str, Place]:
     Parameters
     ----------
     model : GraphicalModel
-        In an undirected one each column holds the variables as many steps away from the first.
-
-    Returns
-    -------
-    dict of str to (float, float)
+        In an undirected one each column holds the variables that are equally many steps away from the first.
     """
     if model.parents is None:
         columns = in_rows(*_layers(_distances(model), model.neighbours))
@@ -75,7 +71,7 @@ def automatic(model: GraphicalModel) -> dict[str, Place]:
 
 
 def _depths(parents: Mapping[str, tuple[str, ...]]) -> dict[str, int]:
-    """Return how many arrows the longest path from above to each variable has."""
+    """Return for each variable the number of arrows on the longest path that leads down to it."""
     depth: dict[str, int] = {}
     for name in topological_order(parents):
         depth[name] = max((depth[above] + 1 for above in parents[name]), default=0)
@@ -96,7 +92,7 @@ def _distances(model: GraphicalModel) -> dict[str, int]:
 
 
 def _layers(depth: Mapping[str, int], linked: Mapping[str, Sequence[str]]) -> list[list[str]]:
-    """Group variables by depth; within a group each stands near the mean place of what it is linked to before."""
+    """Group variables by depth; within a group each stands near the mean place of its links in earlier groups."""
     layers: list[list[str]] = []
     place: dict[str, float] = {}
     for level in range(max(depth.values(), default=-1) + 1):
@@ -221,7 +217,7 @@ def half_width(text: str) -> float:
 
 
 def _box(text: str, names: tuple[str, ...], places, said, texts) -> tuple[np.ndarray, np.ndarray]:
-    """Return two corners of a plate: its text stands at the lower left, clear of arrows, those of its nodes inside."""
+    """Return two corners of a plate: room for its own text at the lower left, and for the equations of its nodes."""
     centres = np.array([places[name] for name in names])
     aside = max(MARGIN, *(half_width(said[name]) + 0.1 for name in names))
     left = max(aside, LETTER * _letters(text) + 0.15)

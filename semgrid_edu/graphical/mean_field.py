@@ -23,11 +23,11 @@ Independent = dict[str, NDArray[np.float64]]
 def mean_field_graph(
     model: GraphicalModel, given: Mapping[str, int] = NOTHING, iterations: int = 50, seed: int | None = None
 ) -> Beliefs:
-    """Improve one variable's distribution after the other, with all others held: q_i ~ exp(E[log factors]).
+    """Improve one variable's distribution after the other, with all others held.
 
-    A single update finds the best q_i, so the free energy never rises. It has several minima, and the start decides
-    which is found. Without a seed each variable starts from the factors over it alone (uniform without any), as the
-    CRF of the paper does. When these don't prefer a state, a symmetric model may stay at its symmetric start for ever,
+    The best q_i is proportional to exp(E[log factors]). An update takes it, so the free energy never rises. It has
+    several minima, and the start decides which is found. Without a seed each variable starts from the factors over it
+    alone (uniform without any), as the CRF of the paper does. When these don't prefer a state, a symmetric model may stay at its symmetric start for ever,
     although breaking the symmetry would lower the free energy; a seed starts from random distributions instead.
 
     A zero in a factor forbids a combination. The logarithm of zero is taken as the limit of ever larger penalties: an
@@ -100,7 +100,7 @@ def _best(model: GraphicalModel, q: Independent, name: str) -> NDArray[np.float6
         if name in factor.names:
             forbidden += _expected(factor.table == 0, factor, q, keep=name)
             log += _expected(_finite_log(factor.table), factor, q, keep=name)
-    # Where something is allowed, only that: a tolerance there would make the free energy infinite again.
+    # No tolerance where some states are allowed outright: it would let forbidden ones in, and F would be infinite.
     fewest = forbidden.min()
     allowed = forbidden <= fewest + (TOLERANCE if fewest > 0 else 0)
     return softmax(np.where(allowed, log, -np.inf))

@@ -213,10 +213,11 @@ def _message(
 
 
 def _from_factor(factor: Factor, heard: Mapping[str, NDArray], best: bool) -> NDArray[np.float64]:
-    """Return the table times what all variables but one say, summed over them, or the largest of it."""
+    """Return the table times what all variables but one say, with these summed out, or maximised out."""
     told = factor.table
     for axis, name in reversed(list(enumerate(factor.names))):
-        if name in heard:  # behind its axis at most that of the target is left, which takes its place
+        if name in heard:
+            # Of the later axes only the target's can be left. It moves here, and the axis to sum over becomes the last.
             told = told.swapaxes(axis, -1)
             told = _normalised((told * heard[name]).max(axis=-1) if best else told @ heard[name])
     return _normalised(told)

@@ -1,7 +1,7 @@
 """A graphical model: a product of factors; directed when each is the distribution of a child given its parents."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from graphlib import CycleError, TopologicalSorter
@@ -80,7 +80,8 @@ class GraphicalModel:
         """One label per factor, unique: "P(r | m1, m2)" or "f(x, y)"."""
         if self.parents is not None:
             owners = {frozenset(family): child for child, family in families(self.parents).items()}
-            return tuple(_conditional(owners[frozenset(factor.names)], self.parents) for factor in self.factors)
+            children = [owners[frozenset(factor.names)] for factor in self.factors]
+            return tuple(_conditional(child, self.parents[child]) for child in children)
         count: Counter[str] = Counter()
         labels = []
         for label in (f"f({', '.join(factor.names)})" for factor in self.factors):
@@ -191,13 +192,12 @@ def _check_conditional(factor: Factor, child: str, parents: tuple[str, ...]) -> 
     worst = np.unravel_index(np.argmax(abs(sums.table - 1)), sums.table.shape)
     if abs(sums.table[worst] - 1) > SUM_TOLERANCE:
         place = ", ".join(f"{name}={state}" for name, state in zip(parents, worst, strict=True))
-        name = f"P({child} | {', '.join(parents)})" if parents else f"P({child})"
         found = f"{sums.table[worst]:.6g}{' at ' * bool(place)}{place}: normalise over {child}"
-        raise ArgumentError(f"factor {name}", f"a sum of 1 over {child}", found)
+        raise ArgumentError(f"factor {_conditional(child, parents)}", f"a sum of 1 over {child}", found)
 
 
-def _conditional(child: str, parents: Mapping[str, Iterable[str]]) -> str:
-    return f"P({child} | {', '.join(parents[child])})" if parents[child] else f"P({child})"
+def _conditional(child: str, parents: Sequence[str]) -> str:
+    return f"P({child} | {', '.join(parents)})" if parents else f"P({child})"
 
 
 def families(parents: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:

@@ -1,4 +1,4 @@
-"""Nodes, edges and plates as daft draws them (https://docs.daft-pgm.org)."""
+"""Hand the arranged nodes, edges and plates to daft (https://docs.daft-pgm.org), which draws them."""
 
 from collections.abc import Collection
 

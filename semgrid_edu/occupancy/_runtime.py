@@ -1,4 +1,7 @@
-"""What `Cmcdot.step` asks of the machine: a second core, an undo after errors, memory that stays. No number changes."""
+"""What `Cmcdot.step` asks of the machine: a second core, an undo after errors, memory that stays.
+
+Nothing here changes a number.
+"""
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -48,6 +51,7 @@ def keep_memory() -> None:
 
     On Linux, glibc hands idle memory back to the system as soon as it is more than twice the largest buffer that was
     ever freed, and what a step frees often is. The system clears each page before it lends it again: up to 5 ms a step.
-    In a process that once freed a buffer of 25 MB, such as an image network's, up to 50 MB stay. So this frees one.
+    In a process that once freed a buffer of 25 MB, such as an image network's, up to 50 MB stay. So this function frees
+    a buffer of that size.
     """
     np.empty(3 * 2**23, np.uint8)

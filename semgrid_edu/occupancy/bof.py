@@ -63,6 +63,7 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -
     """
     check_shape("state", state.occupied, (len(params.lattice), *spec.shape))
     M = transition_matrix(params.world, dt)
+    # Mass changes its velocity, some of it stops, and what goes on is shifted.
     kept = (M[DYNAMIC, DYNAMIC] * _going_on(state, params, dt)).astype(np.float32)
     change = np.float32(params.lattice.change_probability(params.world.max_acceleration, dt))
     cells, remainder = whole_cells(state, spec, dt)
@@ -78,6 +79,7 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -
         total = arrives if cells[k].any() else stays
         total += occupied[k]
 
+    # What arrives in a cell meets what the cell holds.
     mixed, newborn = mix(state.probability, np.zeros(spec.shape, np.float32), going, M)
     reach = -origins(state.velocity, spec, params.world)
     came = [k for k in range(1, len(occupied)) if cells[k].any()]
@@ -126,7 +128,7 @@ def whole_cells(state: BofState, spec: GridSpec, dt: float) -> tuple[NDArray[np.
 
 
 def origins(velocity: NDArray, spec: GridSpec, world: WorldModel) -> NDArray[np.int64]:
-    """Return how far from here mass of each velocity was when it still took up another place.
+    """Return where mass of each velocity was, as seen from its cell, when it still took up another place.
 
     Parameters
     ----------
@@ -264,7 +266,11 @@ class Bof:
 
 
 def _doubt(mixed: NDArray, reach: NDArray[np.int64]) -> NDArray[np.float32]:
-    """Return which part of the mass of one velocity comes out of a wall and goes on along it, cell by cell."""
+    """Return which part of the mass of one velocity comes out of a wall and goes on along it, cell by cell.
+
+    `reach` is how far that velocity goes, in cells along x and y. A plane moved by it shows in each cell what is where
+    the mass came from; a plane moved by -reach shows what is where it goes.
+    """
     return _moved(mixed[STATIC], reach) * (1 - _moved(mixed[FREE] + mixed[DYNAMIC], -reach))
 
 

@@ -18,7 +18,7 @@ CERTAIN = 1 - 1e-3
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def renormalise(probability, claimed):
-    """Let its particles decide how much of a cell is DYNAMIC; the other states share the rest in their old proportions.
+    """Set P(DYNAMIC) to what the particles of a cell carry; the other states share the rest in their old proportions.
 
     Parameters
     ----------

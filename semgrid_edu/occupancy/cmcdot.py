@@ -33,7 +33,8 @@ class Cmcdot:
     seed : int or numpy.random.Generator
         Seed or source of all random numbers that the filter draws: the same seed gives the same bits.
     keep_steps : bool
-        Whether each belief also holds what the map held after each step (`Belief.steps`). Nothing else changes by it.
+        Whether each belief also holds what the map held after each step (`Belief.steps`). Apart from that, the
+            beliefs are the same.
 
     Examples
     --------
@@ -74,11 +75,10 @@ class Cmcdot:
             The scan's returns: x forward, y left, z above the ground on which the vehicle stands (m), in the grid
             frame of the vehicle now.
         motion : PlanarMotion
-            Motion of the vehicle since the last step, metres and radians. At the first step nothing has been seen yet
-            that it could move.
+            Motion of the vehicle since the last step, metres and radians. At the first step any motion will do, because
+            nothing has been seen yet.
         dt : float
-            Time since the last step, seconds. At the first step nothing is known yet that could change in that time:
-            the time between two scans will do.
+            Time since the last step, seconds; at the first step the time between two scans will do.
 
         Returns
         -------

@@ -192,7 +192,7 @@ def check_sensor(sensor: Sensor) -> None:
 
 
 def check_points(points: NDArray) -> NDArray:
-    """Return the points of a scan as an array of float32 or float64, or refuse them.
+    """Return the points of a scan as an array of float32 or float64; refuse anything but finite coordinates.
 
     Parameters
     ----------
@@ -219,33 +219,3 @@ def _all_finite(points):
     for i in range(len(points)):
         finite &= np.isfinite(points[i, 0]) & np.isfinite(points[i, 1]) & np.isfinite(points[i, 2])
     return finite
-
-
-@njit(cache=True, nogil=True)
-def without_own_returns(points: NDArray, vehicle: tuple[float, float, float, float], low: float) -> NDArray:
-    """Leave out the returns that come from the vehicle itself.
-
-    They would travel along with the vehicle for ever, and hide what is behind them.
-
-    Parameters
-    ----------
-    points : (N, 3+) float
-        Returns in the grid frame of the vehicle, metres.
-    vehicle : (float, float, float, float)
-        Outline of the vehicle: x_min, x_max, y_min, y_max in its grid frame, metres.
-    low : float
-        Returns inside the outline are left out from this height on, metres; lower ones come from the ground.
-
-    Returns
-    -------
-    (M, 3) float
-        x, y and z of the other returns, in their order.
-    """
-    x_min, x_max, y_min, y_max = vehicle
-    others, n = np.empty((len(points), 3), points.dtype), 0
-    for i in range(len(points)):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        if not (x_min < x < x_max and y_min < y < y_max and z >= low):
-            others[n, 0], others[n, 1], others[n, 2] = x, y, z
-            n += 1
-    return others[:n]

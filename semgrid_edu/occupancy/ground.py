@@ -110,7 +110,7 @@ def height_above_ground(points: NDArray, params: GroundParams) -> NDArray:
 def _lowest_returns(x, y, z, sector, sectors, bin_, bins):
     """Find the place of each return, sector * bins + bin; and at each place the lowest return and the greatest height.
 
-    Returns beyond the last bin count to it. Where no return is, the heights are infinite.
+    Returns beyond the last bin belong to it. Where there is no return, the heights are infinite.
     """
     place, distance = np.empty(len(x), np.int32), np.empty(sectors * bins)
     low, high = np.full(sectors * bins, np.inf, z.dtype), np.full(sectors * bins, -np.inf, z.dtype)
@@ -125,7 +125,10 @@ def _lowest_returns(x, y, z, sector, sectors, bin_, bins):
 
 @njit(cache=True, nogil=True)
 def _walk_all(distances, low, high, sectors, bin_, step, slope, rise, grade, gap):
-    """Walk all sectors: the height of the ground in each bin, and whether the sector holds returns."""
+    """Walk all sectors: the height of the ground in each bin, and whether the sector holds returns.
+
+    Each sector is walked as in `walk_sector`. The profile is filled on the way, up to the last place of ground.
+    """
     bins = len(low) // sectors
     profile, seen = np.empty((sectors, bins), np.float32), np.zeros(sectors, np.bool_)
     for s in range(sectors):

@@ -1,4 +1,4 @@
-"""Between the scrolling map and the vehicle: what a scan says of the map, and the belief that is handed out (3.2)."""
+"""From the scrolling map to the vehicle's cells: what a scan says of both, and the belief handed out (section 3.2)."""
 
 import math
 from typing import NamedTuple
@@ -118,6 +118,7 @@ def velocity_moments(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _moments(velocity, weight, cells, n_cells):
+    """Add up in double precision, and twice: the covariance from differences to the mean, which keep their digits."""
     first, second = np.zeros((n_cells, 3)), np.zeros((n_cells, 3))
     for i in range(len(cells)):
         c = cells[i]

@@ -1,4 +1,4 @@
-"""What many particles do at once: turn with the map, slow down, fly, add up in cells (section 3.2, steps 1 and 2).
+"""What many particles do at once: add up in cells, fly, slow down, turn with the map (section 3.2, steps 1 and 2).
 
 Loops that only compute take the pairs of coordinates (N, 2) end to end, as (2 N,): then the compiler knows how far
 apart the numbers lie, and does several particles at a time.
@@ -82,7 +82,7 @@ def scale_in_cells(weight: NDArray, cells: NDArray, factor: NDArray) -> NDArray[
 
 @njit(cache=True, nogil=True)
 def by_origin(before: NDArray, after: NDArray, n_cells: int) -> NDArray[np.int32]:
-    """Tell particles that have stayed in their cell from those that have come in: to the latter's cell add `n_cells`.
+    """Return the cell of each particle, plus `n_cells` if it has come in from another cell.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def cells_at(particles: Particles, cells: NDArray, spec: GridSpec, time: float, 
     time : float
         Seconds from now, negative for the past: a particle at x with velocity v is taken to be at x + v time.
     fewest : float
-        Number of cells that a particle covers at least; a slow one is given more time. When `time` is 0 it isn't.
+        Number of cells by which a particle moves at least: a slow one is given more than `time`, unless that is 0.
 
     Returns
     -------

@@ -1,4 +1,7 @@
-"""A scan in polar coordinates: how far each beam sees, and which cells it passes (paper, section 3.2, step 2)."""
+"""A scan in polar coordinates: how far each beam sees, and which cells it passes (paper, section 3.2, step 2).
+
+Loops over returns are compiled: they read each return once, and need no arrays for what is in between.
+"""
 
 import math
 

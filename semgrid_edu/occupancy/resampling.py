@@ -53,7 +53,7 @@ class Resampling(Protocol):
 
 @dataclass(frozen=True)
 class SystematicResampling:
-    """Equally spaced points on the weights laid end to end: one random number, and the least scatter (the default)."""
+    """Put equally spaced points on the weights laid end to end: one random number, and the least scatter."""
 
     def draw(self, weight: NDArray, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
         """Draw indices by `systematic_resample`. Parameters and result are those of `Resampling.draw`."""
@@ -89,7 +89,7 @@ def systematic_resample(weight, count, offset):
     array([1, 1, 1, 2])
     """
     total = 0.0
-    for w in weight:
+    for w in weight:  # in the same order as `below`, so that both end at the same number
         total += w
     cuts = (np.arange(count) + offset) / count * total
     chosen = np.empty(count, np.int64)
@@ -221,12 +221,12 @@ def draw_indices(resampling: Resampling, weight: NDArray, count: int, rng: np.ra
 
 
 def equal_weights(weight: NDArray, count: int) -> NDArray[np.float32]:
-    """Return equal weights, (M,), with the sum of others.
+    """Return equal weights, (M,), with the same sum as given ones.
 
     Parameters
     ----------
     weight : (...) float
-        The others.
+        The given weights.
     count : int
         How many, M.
     """

@@ -4,11 +4,12 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence import Evidence, check_points, without_own_returns
+from semgrid_edu.occupancy.evidence import Evidence, check_points
 from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.polar import beyond_reach, count_returns, fill_gaps, polar_profile, reach
@@ -164,6 +165,36 @@ def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray:
     if sensor.ground is not None:
         points[:, 2] = height_above_ground(points, sensor.ground)
     return points
+
+
+@njit(cache=True, nogil=True)
+def without_own_returns(points: NDArray, vehicle: tuple[float, float, float, float], low: float) -> NDArray:
+    """Leave out the returns that come from the vehicle itself.
+
+    They would travel along with the vehicle for ever, and hide what is behind them.
+
+    Parameters
+    ----------
+    points : (N, 3+) float
+        Returns in the grid frame of the vehicle, metres.
+    vehicle : (float, float, float, float)
+        Outline of the vehicle: x_min, x_max, y_min, y_max in its grid frame, metres.
+    low : float
+        Returns inside the outline are left out from this height on, metres; lower ones come from the ground.
+
+    Returns
+    -------
+    (M, 3) float
+        x, y and z of the other returns, in their order.
+    """
+    x_min, x_max, y_min, y_max = vehicle
+    others, n = np.empty((len(points), 3), points.dtype), 0
+    for i in range(len(points)):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        if not (x_min < x < x_max and y_min < y < y_max and z >= low):
+            others[n, 0], others[n, 1], others[n, 2] = x, y, z
+            n += 1
+    return others[:n]
 
 
 def likelihoods(obstacles: NDArray, free: NDArray, sensor: SensorModel) -> Evidence:

@@ -1,4 +1,4 @@
-"""What the filter believes of each cell, four states and a velocity; and what refuses values that can't be (3.2)."""
+"""What the filter believes of each cell, four states and a velocity, and checks of arguments (paper, section 3.2)."""
 
 import math
 from collections.abc import Callable

@@ -14,7 +14,7 @@ from semgrid_edu.occupancy.state import check_fields, check_part, not_negative, 
 
 Rates = tuple[tuple[float, ...], ...]
 AGES = 1e9
-"""Thirty years, in seconds: after as long nothing is remembered, and for longer times exp(R dt) would overflow."""
+"""Thirty years, in seconds. After so long nothing is remembered; for longer times exp(R dt) would overflow."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class WorldModel:
         of 0.5 m at 1 m/s. So where it was that long ago, it can't be any more. With 0 the filters look neither back nor
         ahead.
     clearing_cells : float
-        Number of cells that a thing covers at least before it counts as having left a place. One that is too slow for
+        Number of cells by which a thing has to move before it counts as having left a place. One that is too slow for
         this in `clearing_time` is followed for longer, because a thing shows in more cells than it fills: a pedestrian
         doesn't get out of two cells of 0.5 m in half a second.
     sensor : Sensor

@@ -70,7 +70,7 @@ def plane_pixels(spec: GridSpec, heights: ArrayLike, camera: Camera) -> tuple[ND
 
 
 def check_heights(heights: ArrayLike) -> NDArray[np.float64]:
-    """Return the heights of planes as an array; refuse all but one or more finite numbers.
+    """Return the heights of planes as an array; refuse an empty one, and numbers that aren't finite.
 
     Parameters
     ----------

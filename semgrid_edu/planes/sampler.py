@@ -170,8 +170,8 @@ class PlaneSampler(nn.Module):
         Returns
         -------
         (B, C, D, H, W) float
-            p, in the type of `scores`. In memory all scores of a cell lie together, (B, H, W, D, C), as the 1x1
-            convolution that follows likes it.
+            p, in the type of `scores`. In memory all scores of a cell lie together, (B, H, W, D, C), the order in
+            which the 1x1 convolution that follows reads them.
 
         Raises
         ------

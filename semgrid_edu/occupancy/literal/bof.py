@@ -1,4 +1,7 @@
-"""The BOF's prediction and update in plain numpy, velocity by velocity (Coue et al., IJRR 2006; section 3.2)."""
+"""The BOF's prediction and update in plain numpy, velocity by velocity (Coue et al., IJRR 2006; section 3.2).
+
+The last three functions are the rules that the BOF shares with CMCDOT.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
