@@ -27,8 +27,9 @@ def mean_field_graph(
 
     The best q_i is proportional to exp(E[log factors]). An update takes it, so the free energy never rises. It has
     several minima, and the start decides which is found. Without a seed each variable starts from the factors over it
-    alone (uniform without any), as the CRF of the paper does. When these don't prefer a state, a symmetric model may stay at its symmetric start for ever,
-    although breaking the symmetry would lower the free energy; a seed starts from random distributions instead.
+    alone (uniform without any), as the CRF of the paper does. When these don't prefer a state, a symmetric model may
+    stay at its symmetric start for ever, although breaking the symmetry would lower the free energy; a seed starts from
+    random distributions instead.
 
     A zero in a factor forbids a combination. The logarithm of zero is taken as the limit of ever larger penalties: an
     update first minimises the expected number of forbidden combinations, and prefers only among the states left. As

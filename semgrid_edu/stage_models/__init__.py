@@ -1,4 +1,9 @@
-"""Each stage of the paper as a model of toy size, built from the functions that the pipeline itself calls."""
+"""Each stage of the paper as a model of toy size, built from the functions that the pipeline itself calls.
+
+In the order of the lectures: `line` (01); `log_odds_cell`, `beam`, `thick_walls` (02); `cells_in_a_row`, `joint_row`,
+`bof` (03); `cell`, `cmcdot`, `cmcdot_graph` (04); `ground_truth_label` (09); `crf` (10); and the whole, `system_world`
+and `system`. `stage_graph` holds what each of them builds: a model, its drawing, and the edges that are cut.
+"""
 
 from semgrid_edu.stage_models.beam import BeamWorld, beam_over_cells
 from semgrid_edu.stage_models.bof import bof_stage

@@ -185,7 +185,7 @@ def range_state(world: BeamWorld, z: float | None) -> int:
     if z is None:
         return len(bins)
     state = int(np.argmin(abs(bins - z)))
-    if not abs(bins[state] - z) <= 0.5:
+    if not abs(bins[state] - z) <= 0.5:  # NaN isn't either
         raise ArgumentError("z", f"a range from {bins[0]:g} to {bins[-1]:g} cells", z)
     return state
 

@@ -27,14 +27,14 @@ from semgrid_edu.occupancy import (
 from semgrid_edu.stage_models.log_odds_cell import check_scans
 from semgrid_edu.stage_models.stage_graph import StageGraph, binary, cut_edges, directed
 
-UNKNOWN = (0.0, 0.0, 0.0, 1.0)
+NEVER_SEEN = (0.0, 0.0, 0.0, 1.0)
 """The belief of a cell that no scan has seen: FREE, STATIC, DYNAMIC, UNKNOWN."""
 
 
 def one_cell(
-    scans: ArrayLike, dt: float = 0.1, world: WorldModel | None = None, start: Sequence[float] = UNKNOWN
+    scans: ArrayLike, dt: float = 0.1, world: WorldModel | None = None, start: Sequence[float] = NEVER_SEEN
 ) -> StageGraph:
-    """Build the chain of one cell of CMCDOT, which repeats three steps: predict, look, read the scan.
+    """Build the chain of one cell of CMCDOT, which repeats: predict the state, see the cell or not, read the scan.
 
     Between two scans the state changes by `transition_matrix`. v_t says whether scan t sees the cell. If it does,
     UNKNOWN turns into one of the other states as `first_sight` says, because UNKNOWN means that no scan has seen it.
@@ -139,7 +139,7 @@ class CellBeliefs(NamedTuple):
 
 
 def exact_cell(
-    scans: ArrayLike, dt: float = 0.1, world: WorldModel | None = None, start: Sequence[float] = UNKNOWN
+    scans: ArrayLike, dt: float = 0.1, world: WorldModel | None = None, start: Sequence[float] = NEVER_SEEN
 ) -> CellBeliefs:
     """Filter one cell by the forward messages of sum-product on its chain.
 
@@ -158,7 +158,7 @@ def exact_cell(
 
 
 def package_cell(
-    scans: ArrayLike, dt: float = 0.1, world: WorldModel | None = None, start: Sequence[float] = UNKNOWN
+    scans: ArrayLike, dt: float = 0.1, world: WorldModel | None = None, start: Sequence[float] = NEVER_SEEN
 ) -> CellBeliefs:
     """Filter one cell by the package's `predict` and `update`, without particles.
 

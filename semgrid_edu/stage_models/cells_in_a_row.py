@@ -61,9 +61,9 @@ class CellsInARow:
     first_sight : (float, float, float)
         What UNKNOWN cells turn out to be when they are first seen: FREE, STATIC and DYNAMIC, the last 0.
     clearing_time : float
-        How far back and ahead the filters look, seconds, as in `WorldModel`; exact inference doesn't need it. By
-        default that is five cells, so it makes no difference in a row of at most five. With `DT` it is the cell next
-        door, because `clearing_cells` is 0 here: everything that moves is equally fast.
+        How far back and ahead the filters look, seconds, as in `WorldModel`; exact inference doesn't need it. The
+        default reaches five cells far, so it makes no difference in a row of at most five. `DT` reaches the next cell.
+        (`clearing_cells` is 0 here, because everything that moves is equally fast.)
 
     Raises
     ------

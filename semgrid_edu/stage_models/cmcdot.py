@@ -1,4 +1,4 @@
-"""CMCDOT as a graphical model: cells of four states given what moves, and what moves sampled by particles.
+"""What sampling costs CMCDOT: its beliefs over a row of cells beside exact ones and BOF's (graph: `cmcdot_graph`).
 
 Given where the moving things are, each cell changes independently of the others, so only motion has to be sampled. That
 is the "conditional Monte Carlo" in the filter's name. The sampling error falls like N^-1/2 with the number N of

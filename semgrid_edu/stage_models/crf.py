@@ -26,6 +26,7 @@ from semgrid_edu.graphical.exact import max_product
 from semgrid_edu.graphical.mean_field import mean_field_graph
 from semgrid_edu.graphical.messages import sum_product
 from semgrid_edu.graphical.model import GraphicalModel
+from semgrid_edu.metrics import total_variation
 from semgrid_edu.occupancy import N_STATES, State
 from semgrid_edu.stage_models.stage_graph import StageGraph, cut_edges
 
@@ -154,7 +155,7 @@ class CouplingSweep:
         """(n,) for each approximate method: the largest total variation of a cell's distribution from the exact one."""
         exact = self.marginals["exact"]
         return {
-            method: np.abs(found - exact).sum(axis=1).max(axis=1) / 2
+            method: total_variation(found.swapaxes(1, 2), exact.swapaxes(1, 2)).max(axis=1)
             for method, found in self.marginals.items()
             if method != "exact"
         }

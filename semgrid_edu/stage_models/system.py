@@ -1,4 +1,4 @@
-"""The whole system as a graph, and what joint inference would gain over passing marginals forward (paper, Fig. 2).
+"""The whole system as a graph, and what joint inference would gain over passing marginals forward (paper, figure 2).
 
 In the drawing, the world stands above the sensors, and what the paper computes below them: l -> o, i -> s -> p,
 (p, o) -> g. Information flows down, never up, and from one instant to the next only inside o.
@@ -185,10 +185,11 @@ class SystemGain(NamedTuple):
     multiplied : Score
         The product of s and o in each cell, as if they were independent given the class: nothing is learned.
     cell_by_cell : Score
-        The best function of s and of the cell's own state probabilities in o: what a perfectly trained fusion gives
-        that doesn't look at neighbours.
+        The best function of s and of the cell's own state probabilities in o: what a perfectly trained fusion that
+        doesn't look at neighbours would give.
     neighbours : Score
-        The best function of s and of o in both cells: a perfectly trained fusion that sees the whole grid.
+        The best function of s and of o in both cells: what a perfectly trained fusion that sees the whole grid would
+        give.
     scans : Score
         The exact posterior given all scans and the last image: as if the filter had kept everything.
     joint : Score

@@ -1,4 +1,4 @@
-"""Walls in the package's own log-odds grid, against exact inference with the same sensor on one row of cells.
+"""How thick a wall becomes in a log-odds grid, against exact inference with the same sensor on one row of cells.
 
 Evidence cell by cell takes the cell of a return as occupied and the cells before it as free. When range or pose are off
 by half a cell, some returns of a wall fall into the cell behind it. Exact inference knows that one wall explains all of
