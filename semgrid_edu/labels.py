@@ -72,8 +72,8 @@ class LabelSet:
     def most_voted(self, votes: NDArray, otherwise: ArrayLike) -> NDArray[np.uint8]:
         """Return the class that each cell takes when several were seen in it.
 
-        What stands in a cell outvotes the ground below it, be it one vote for a thin pole against many for the road;
-        otherwise the most frequent class wins, and of equally frequent ones the first.
+        What stands in a cell outvotes the ground below it: one vote for a thin pole beats many for the road. Otherwise
+        the most frequent class wins; of equally frequent classes, the first.
 
         Parameters
         ----------

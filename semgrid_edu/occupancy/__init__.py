@@ -4,6 +4,9 @@ A `Sensor` turns each scan into `Evidence`; the package's own is `SensorModel`. 
 filter, each a pure function on a `FilterState`, and `cmcdot_literal` the same steps as a textbook would write them.
 `Cmcdot` runs the steps, and `track_drive` runs it over a drive. `LogOddsGrid` and `Bof` are the filters that came
 before it: the binary grid, and the exact filter on a lattice of velocities.
+
+In reading order: `state`, `planar_motion`; `evidence`, `polar`, `ground`, `sensor`; `log_odds`; `world`; `cellwise`,
+`particles`, `resampling`, `steps`; `local_belief`, `cmcdot`; `bof_state`, `bof`; and their twins in `literal`.
 """
 
 from semgrid_edu.occupancy.bof import Bof, bof_move, bof_predict, bof_update, bof_velocity

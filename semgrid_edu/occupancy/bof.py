@@ -137,7 +137,7 @@ def origins(velocity: NDArray, spec: GridSpec, world: WorldModel) -> NDArray[np.
     spec : GridSpec
         The cells.
     world : WorldModel
-        That was `clearing_time` ago, or for slow things as long as they need for `clearing_cells`.
+        How long ago: `clearing_time`, or for slow things the time that they need for `clearing_cells`.
 
     Returns
     -------

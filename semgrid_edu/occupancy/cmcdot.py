@@ -92,7 +92,7 @@ class Cmcdot:
             turn the scan into evidence, or the resampling doesn't return indices. The tracker then stays as it was.
         """
         shift, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
-        scan = observe, self.params.sensor, points_grid, pose, self.map_spec, self.spec
+        scan = observe, self.params.sensor, points_grid, pose, self.map_spec, self.spec  # called on another core below
         with undo_after_errors(self._rng), on_another_core(*scan) as seen:
             moved = move(self._state, self.map_spec, shift)
             predicted = predict(moved, self.map_spec, self.params, dt, self._rng)

@@ -214,7 +214,7 @@ def check_points(points: NDArray) -> NDArray:
 
 @njit(cache=True, nogil=True)
 def _all_finite(points):
-    """Tell whether every x, y and z is finite; numpy, which makes arrays of the answers, takes five times as long."""
+    """Tell whether every x, y and z is finite; numpy, which writes arrays of truth values, takes five times as long."""
     finite = True
     for i in range(len(points)):
         finite &= np.isfinite(points[i, 0]) & np.isfinite(points[i, 1]) & np.isfinite(points[i, 2])

@@ -86,9 +86,9 @@ def local_belief(
     probability = update(prior, spec, seen.in_grid, world).probability
     mean, covariance = velocity
     moments = np.concatenate([mean, covariance.reshape(4, *map_spec.shape)])
-    here = look_up(moments, np.full(6, np.nan, np.float32), map_spec, spec, seen.pose)
-    here[:, probability[State.DYNAMIC] == 0] = np.nan
-    return Belief(probability, *turn_moments(here[:2], here[2:].reshape(2, 2, *spec.shape), seen.pose))
+    moments = look_up(moments, np.full(6, np.nan, np.float32), map_spec, spec, seen.pose)
+    moments[:, probability[State.DYNAMIC] == 0] = np.nan
+    return Belief(probability, *turn_moments(moments[:2], moments[2:].reshape(2, 2, *spec.shape), seen.pose))
 
 
 def velocity_moments(

@@ -97,7 +97,7 @@ class FilterState:
         P(FREE), P(STATIC), P(DYNAMIC), P(UNKNOWN) of each cell of the map; they sum to 1. Both arrays are float64 in
         literal twins.
     particles : Particles
-        The dynamic mass of which velocities are known, more or less.
+        The dynamic mass whose velocity is estimated.
     newborn : (H, W) float32
         Dynamic mass that has just come into being and isn't carried by particles yet. `resample` draws them.
     """

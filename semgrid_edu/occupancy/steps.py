@@ -63,14 +63,14 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
     Some of their combinations can't be true, and are struck out of the joint distribution.
 
     - *It arrives, and the cell is STATIC.* Two solid things can't share a cell.
-    - *It comes out of a wall and goes on along it, and the cell hasn't been seen to be free.* Such a particle was in a
-      place that is STATIC now, `clearing_time` ago, and will be in one that is STATIC or UNKNOWN, as long from now;
-      slow ones are followed for `clearing_cells` both ways. It says no more than that the wall goes on, as walls do:
-      what comes into view beside a wall is the next piece of it. Somebody who sets off also comes out of a place where
-      something stood, but walks into free space; and the side of a long vehicle follows its front, which moves.
+    - *It comes out of a wall and goes on along it, and the cell hasn't been seen to be free.* A particle does so when
+      the place where it was `clearing_time` ago is STATIC now, and the place where it will be after `clearing_time` is
+      STATIC or UNKNOWN. (Slow particles are followed over `clearing_cells` instead.) Such an arrival may be nothing but
+      the next piece of the wall that comes into view. A pedestrian who sets off also comes out of a place where
+      something stood, but walks into free space; and where the side of a long vehicle comes from, the vehicle moves.
 
-    With s and d the cell's own static and dynamic probability, u the probability that it is UNKNOWN or has only been
-    left just now, and b the part of a that comes out of a wall and goes on along it, what is left is
+    Let s and d be the cell's own static and dynamic probability, u the probability that it is UNKNOWN or that something
+    has just left it, and b the part of a that comes out of a wall and goes on along it. What is left is
 
         P(DYNAMIC) = [a (1 - s) - b u + (1 - a) d] / (1 - a s - b u),   others = (1 - a) others / (1 - a s - b u)
 
@@ -120,10 +120,10 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
     STATIC and DYNAMIC share P(z | occupied), because one scan can't tell them apart. UNKNOWN means that no scan has
     said anything of the cell; as soon as one does, `initialise_unknown` shares its UNKNOWN mass among the others.
 
-    A scan says nothing about a hidden cell, but what moves does: one thing can't be in two places. Where a thing
-    was `clearing_time` ago (a slow one, `clearing_cells` ago) it isn't any more, so "it has come from there" and "it
-    stands there" are struck out together (`clear_wakes`). This is how a car that was taken for a standing one at first
-    takes that belief along when it goes.
+    A scan says nothing about a hidden cell, but what moves does: one thing can't be in two places. Where a thing was
+    `clearing_time` ago (a slow one, `clearing_cells` ago) it isn't any more. So "it has come from there" can't be true
+    together with "it stands there", and is struck out (`clear_wakes`). In this way the place of a car that was believed
+    to be standing becomes free when the car drives off.
 
     Parameters
     ----------

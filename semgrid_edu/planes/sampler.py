@@ -185,7 +185,7 @@ class PlaneSampler(nn.Module):
         return self._operator_for(len(scores))(scores)
 
     def _operator_for(self, n_images: int) -> PlaneOperator:
-        """Return the operator for so many images at once, the last batch's where it fits."""
+        """Return the operator for this many images at once: that of the last batch, if it was as large."""
         if n_images == 1:
             return self.operator
         if self._of_batch.n_images != n_images:

@@ -59,7 +59,7 @@ def cmcdot_stage(world: CellsInARow = FROM_BOTH_SIDES, cell: int = 2) -> StageGr
     -------
     StageGraph
         Variables x0, x1 (`ELSEWHERE`, then `PLACES`), o1 (1: comes out of a wall and goes on along it), c0, c1
-        (`State`), one1 (1: nothing arrives where something stands, nor along a wall where nobody has looked) and z1
+        (`State`), one1 (1: nothing arrives where something stands, nor along a wall where no scan has seen) and z1
         (0: pass, 1: hit).
 
     Raises

@@ -155,14 +155,14 @@ def package_row(
     return np.array(history)
 
 
-def draw_ranges(world: BeamWorld, occupied: Sequence[int], scans: int, rng: np.random.Generator) -> list[float | None]:
+def draw_ranges(world: BeamWorld, stands: Sequence[int], scans: int, rng: np.random.Generator) -> list[float | None]:
     """Draw ranges of a known row from the forward model.
 
     Parameters
     ----------
     world : BeamWorld
         The cells, one at each range, and how the beam is reflected and measured.
-    occupied : (K,) int
+    stands : (K,) int
         1 where something stands, 0 elsewhere.
     scans : int
         Number of ranges.
@@ -174,7 +174,7 @@ def draw_ranges(world: BeamWorld, occupied: Sequence[int], scans: int, rng: np.r
     list of float or None
         Ranges in cells, rounded to a tenth; None when nothing reflects.
     """
-    reflects = rng.random((scans, world.n_cells)) < np.where(occupied, world.hit, world.clutter)
+    reflects = rng.random((scans, world.n_cells)) < np.where(stands, world.hit, world.clutter)
     measured = reflects.argmax(axis=1) + world.noise * rng.normal(size=scans)
     measured = np.round(measured * BINS_PER_CELL) / BINS_PER_CELL
     return [float(z) if any_reflects else None for z, any_reflects in zip(measured, reflects.any(axis=1), strict=True)]
