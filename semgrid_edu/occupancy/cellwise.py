@@ -80,6 +80,7 @@ def mix(probability, newborn, going, M):
                 mixed[j, r, c] = others + from_dynamic * dynamic + from_unknown * probability[UNKNOWN, r, c]
     for r in range(newborn.shape[0]):
         for c in range(newborn.shape[1]):
+            # Of what particles carry and the matrix leaves DYNAMIC, a part goes on; the rest has stopped.
             carried = M[DYNAMIC, DYNAMIC] * (probability[DYNAMIC, r, c] - newborn[r, c])
             born[r, c] = mixed[DYNAMIC, r, c]
             mixed[DYNAMIC, r, c] += going[r, c]

@@ -121,9 +121,9 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
     said anything of the cell; as soon as one does, `initialise_unknown` shares its UNKNOWN mass among the others.
 
     A scan says nothing about a hidden cell, but what moves does: one thing can't be in two places. Where a thing was
-    `clearing_time` ago (a slow one, `clearing_cells` ago) it isn't any more. So "it has come from there" can't be true
-    together with "it stands there", and is struck out (`clear_wakes`). In this way the place of a car that was believed
-    to be standing becomes free when the car drives off.
+    `clearing_time` ago (or, if it is slow, `clearing_cells` back) it isn't any more. So "it has come from there" and
+    "it stands there" can't both be true, and this combination is struck out (`clear_wakes`). In this way the place of a
+    car that was believed to be standing becomes free when the car drives off.
 
     Parameters
     ----------

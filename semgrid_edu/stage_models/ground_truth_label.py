@@ -1,9 +1,9 @@
-"""Errors that several returns share, in two models: the pose of a scan, the calibration behind a label (lecture 09).
+"""Errors that several returns share, in two models: the pose of a scan, the calibration behind a label (section 4).
 
 The first model is a scan. Several rings of a LIDAR hit a wall in the same scan, so a wrong pose shifts all their
 returns together. Evidence cell by cell takes these returns as independent, up to `SensorModel.max_returns` of them.
 The second model is a cell of the ground truth, which gets its label by a vote of returns. A wrong calibration gives the
-wrong pixels to all of them (paper, section 4).
+wrong pixels to all of them (lecture 09).
 """
 
 from dataclasses import dataclass, replace
