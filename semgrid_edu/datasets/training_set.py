@@ -10,11 +10,10 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets.cached_labels import cached_labels
 from semgrid_edu.datasets.index import INDEX_FILE, DatasetIndex, load_index
 from semgrid_edu.datasets.label_policies import LidarTruth
 from semgrid_edu.datasets.training_arrays import SEED, ArrayRecipe
-from semgrid_edu.datasets.training_cache import LabelledDrives, cached_arrays
+from semgrid_edu.datasets.training_cache import LabelledDrives, cached_arrays, cached_labels
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture

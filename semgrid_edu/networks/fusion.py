@@ -120,12 +120,23 @@ def _reduction(n_scores: int, n_planes: int, n_reduced: int | None) -> nn.Module
 class PlaneConvolution(nn.Conv3d):
     """The 1x1 convolution of all D x C planes: on (B, C, D, H, W), a D x 1 x 1 kernel.
 
-    It is computed as the product of matrices that it is, one row per cell. The planes lie in memory like this already,
-    so that nothing is copied.
+    It is computed as a product of two matrices, with one row of D x C scores per cell. The planes already lie in memory
+    in this order, so nothing is copied.
     """
 
     def forward(self, planes: Tensor) -> Tensor:
-        """Return the (B, n_reduced, 1, H, W) reduced planes."""
+        """Reduce the planes.
+
+        Parameters
+        ----------
+        planes : (B, C, D, H, W) float
+            p, the image's scores on the planes.
+
+        Returns
+        -------
+        (B, n_reduced, 1, H, W) float
+            Weighted sums over C and D.
+        """
         cells = planes.permute(0, 3, 4, 2, 1).flatten(3)
         weight = self.weight.flatten(2).transpose(1, 2).flatten(1)
         return F.linear(cells, weight, self.bias).permute(0, 3, 1, 2).unsqueeze(2)

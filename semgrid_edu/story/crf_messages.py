@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.crf import CrfParams, SeparableGaussian, WindowedGaussian, mean_field, unary_from_probability
+from semgrid_edu.crf.kernel import gaussian
 from semgrid_edu.errors import ArgumentError
 
 REACH = 4
@@ -178,7 +179,8 @@ def strongest_neighbours(
     pull, which = np.zeros((number, *labels.shape), np.float32), np.zeros((number, *labels.shape), np.int64)
     for k, step in enumerate(steps[1:], start=1):
         close_j, alike_j, near_j, beside_j, Q_j = (_shifted(maps, reach, step) for maps in padded)
-        weights = alike * alike_j * _gaussian(close, close_j) + beside * beside_j * _gaussian(near, near_j)
+        bilateral, spatial = (gaussian(np.square(a - b).sum(axis=0)) for a, b in ((close, close_j), (near, near_j)))
+        weights = alike * alike_j * bilateral + beside * beside_j * spatial
         _insert(pull, which, weights * np.take_along_axis(Q_j, labels[None], axis=0)[0], k)
     return np.moveaxis(np.array(steps)[which], -1, 0), pull
 
@@ -189,17 +191,13 @@ def _kernels(o: NDArray, params: CrfParams) -> tuple[WindowedGaussian, Separable
     return WindowedGaussian.build(o, params), spatial
 
 
-def _gaussian(one: NDArray, other: NDArray) -> NDArray:
-    return np.exp(-0.5 * ((one - other) ** 2).sum(axis=0))
-
-
 def _padded(maps: NDArray, reach: int) -> NDArray:
     """Put zeros around maps (..., H, W): cells beyond the border have no weight."""
     return np.pad(maps, [(0, 0)] * (maps.ndim - 2) + [(reach, reach)] * 2)
 
 
 def _shifted(padded: NDArray, reach: int, step: tuple[int, int]) -> NDArray:
-    """Return for each cell of padded maps what stands so many rows and columns further on."""
+    """Return padded maps shifted by `step`, rows and columns: each cell gets what lies that far further on."""
     rows, cols = (slice(reach + by, size - reach + by) for by, size in zip(step, padded.shape[-2:], strict=True))
     return padded[..., rows, cols]
 

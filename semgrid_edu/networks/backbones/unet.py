@@ -19,15 +19,13 @@ class UNet(Segmenter):
     it by a learnt up-convolution and appends the encoder's map of that size as further channels (the skip connection).
     A 1x1 convolution scores the classes.
 
+    The other Parameters are those of `Segmenter`.
+
     Parameters
     ----------
-    n_classes : int
-        C, the number of classes that are scored.
     preset : str
         "paper" has the published widths, 64 to 1024, and 31,044,366 parameters for 14 classes; "compact" is an
         eighth as wide.
-    seed : int
-        Seed for the initial weights.
 
     Notes
     -----
@@ -50,10 +48,10 @@ class UNet(Segmenter):
     def build(self, n_classes: int, widths: tuple[int, ...]) -> None:
         """Make encoder, up-convolutions, decoder (its finest stage first) and the final 1x1 convolution.
 
+        The other Parameters are those of `Segmenter.build`.
+
         Parameters
         ----------
-        n_classes : int
-            C, the number of classes that are scored.
         widths : (S,) int
             Number of channels in each stage.
         """
