@@ -21,6 +21,9 @@ from semgrid_edu.occupancy import CmcdotParams
 from semgrid_edu.storage.provenance import FILE_NAME, write_provenance
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
 
+FRAMES = "frames.safetensors"
+"""Name of the file that holds an excerpt."""
+
 
 class Sample(NamedTuple):
     """One labelled frame, as a network takes it.
@@ -154,10 +157,6 @@ def _shared_camera(drives: LabelledDrives) -> Camera:
             expected = f"the calibration of {first.name}, because one network serves both"
             raise DataError(drive.name, expected, "another")
     return camera
-
-
-FRAMES = "frames.safetensors"
-"""Name of the file that holds an excerpt."""
 
 
 def write_excerpt(dataset_dir: str | Path, n_frames: int, folder: str | Path) -> None:

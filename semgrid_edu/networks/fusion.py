@@ -102,21 +102,6 @@ class FusionNet(nn.Module):
         return torch.cat([reduced.squeeze(2), occupancy], dim=1)
 
 
-def _unknown_everywhere(occupancy: Tensor) -> Tensor:
-    """Return the occupancy grids of a scan without a single beam, in the shape of these."""
-    unknown = torch.zeros_like(occupancy)
-    unknown[:, State.UNKNOWN] = 1
-    return unknown
-
-
-def _reduction(n_scores: int, n_planes: int, n_reduced: int | None) -> nn.Module:
-    """Return what takes (B, C, D, H, W) to (B, n_reduced, 1, H, W); without a number to (B, C x D, 1, H, W)."""
-    if n_reduced is None:
-        return nn.Sequential(nn.Flatten(1, 2), nn.Unflatten(1, (n_scores * n_planes, 1)))
-    convolution = PlaneConvolution(n_scores, n_reduced, (n_planes, 1, 1))
-    return nn.Sequential(convolution, nn.BatchNorm3d(n_reduced), nn.ReLU(inplace=True))
-
-
 class PlaneConvolution(nn.Conv3d):
     """The 1x1 convolution of all D x C planes: on (B, C, D, H, W), a D x 1 x 1 kernel.
 
@@ -140,3 +125,18 @@ class PlaneConvolution(nn.Conv3d):
         cells = planes.permute(0, 3, 4, 2, 1).flatten(3)
         weight = self.weight.flatten(2).transpose(1, 2).flatten(1)
         return F.linear(cells, weight, self.bias).permute(0, 3, 1, 2).unsqueeze(2)
+
+
+def _unknown_everywhere(occupancy: Tensor) -> Tensor:
+    """Return the occupancy grids of a scan without a single beam, in the shape of these."""
+    unknown = torch.zeros_like(occupancy)
+    unknown[:, State.UNKNOWN] = 1
+    return unknown
+
+
+def _reduction(n_scores: int, n_planes: int, n_reduced: int | None) -> nn.Module:
+    """Return what takes (B, C, D, H, W) to (B, n_reduced, 1, H, W); without a number to (B, C x D, 1, H, W)."""
+    if n_reduced is None:
+        return nn.Sequential(nn.Flatten(1, 2), nn.Unflatten(1, (n_scores * n_planes, 1)))
+    convolution = PlaneConvolution(n_scores, n_reduced, (n_planes, 1, 1))
+    return nn.Sequential(convolution, nn.BatchNorm3d(n_reduced), nn.ReLU(inplace=True))

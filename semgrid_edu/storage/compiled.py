@@ -9,6 +9,12 @@ CACHE_VARIABLE = "SEMGRID_EDU_CACHE"
 """The environment variable that names a folder for what is made of data sets; `semgrid-edu --cache` sets it, and worker
 processes inherit it."""
 
+PACKAGE = Path(__file__).parents[1]
+"""The folder of the package, in which numba keeps what it compiles if it can."""
+
+VARIABLE = "NUMBA_CACHE_DIR"
+"""The environment variable that names numba's cache folder."""
+
 
 def cache_folder(dataset_dir: Path) -> Path:
     """Return the folder for what is made of a data set.
@@ -26,13 +32,6 @@ def cache_folder(dataset_dir: Path) -> Path:
     """
     chosen = os.environ.get(CACHE_VARIABLE)
     return Path(chosen) if chosen else dataset_dir / "cache"
-
-
-PACKAGE = Path(__file__).parents[1]
-"""The folder of the package, in which numba keeps what it compiles if it can."""
-
-VARIABLE = "NUMBA_CACHE_DIR"
-"""The environment variable that names numba's cache folder."""
 
 
 def keep_compiled_functions() -> str:

@@ -13,29 +13,6 @@ from semgrid_edu.storage.reading import read_json
 PACKAGE = Path(__file__).resolve().parents[1]
 """The folder of the package."""
 
-
-def shipped_folder(name: str) -> Path:
-    """Return where a shipped folder is.
-
-    Parameters
-    ----------
-    name : str
-        Its name in a clone, such as "data_samples". A wheel holds only the parts that pyproject.toml names.
-
-    Returns
-    -------
-    Path
-        The folder inside the package where there is one, as in a wheel; else the one beside the package.
-
-    Examples
-    --------
-    >>> (shipped_folder("data_samples") / "sample").is_dir()
-    True
-    """
-    inside = PACKAGE / name
-    return inside if inside.is_dir() else PACKAGE.parent / name
-
-
 FILE_NAME = "provenance.json"
 
 
@@ -121,22 +98,6 @@ def write_provenance(folder: str | Path, command: str, seed: int, packages: tupl
     )
 
 
-def short_path(weights: str | Path) -> str:
-    """Return the last two parts of a path to weights: the folder, which names the network, and the file.
-
-    Parameters
-    ----------
-    weights : path-like
-        The file.
-
-    Returns
-    -------
-    str
-        Such as "segnet_compact/weights.safetensors".
-    """
-    return "/".join(Path(weights).resolve().parts[-2:])
-
-
 def provenance_problems(folder: str | Path) -> list[str]:
     """Compare the files of a folder with its `provenance.json`.
 
@@ -159,6 +120,44 @@ def provenance_problems(folder: str | Path) -> list[str]:
     changed = sorted(name for name in expected.keys() | found.keys() if expected.get(name) != found.get(name))
     how = {name: "changed" if name in expected else f"not in {FILE_NAME}" for name in found}
     return [f"{folder / name}: {how.get(name, 'missing')}" for name in changed]
+
+
+def shipped_folder(name: str) -> Path:
+    """Return where a shipped folder is.
+
+    Parameters
+    ----------
+    name : str
+        Its name in a clone, such as "data_samples". A wheel holds only the parts that pyproject.toml names.
+
+    Returns
+    -------
+    Path
+        The folder inside the package where there is one, as in a wheel; else the one beside the package.
+
+    Examples
+    --------
+    >>> (shipped_folder("data_samples") / "sample").is_dir()
+    True
+    """
+    inside = PACKAGE / name
+    return inside if inside.is_dir() else PACKAGE.parent / name
+
+
+def short_path(weights: str | Path) -> str:
+    """Return the last two parts of a path to weights: the folder, which names the network, and the file.
+
+    Parameters
+    ----------
+    weights : path-like
+        The file.
+
+    Returns
+    -------
+    str
+        Such as "segnet_compact/weights.safetensors".
+    """
+    return "/".join(Path(weights).resolve().parts[-2:])
 
 
 def _checksums(folder: Path) -> dict[str, str]:

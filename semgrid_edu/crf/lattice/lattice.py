@@ -153,6 +153,8 @@ def _scaled(slices, splats, points, scale):
     return scaled_slices, scaled_splats
 
 
+# Threads share out vertices or points; each of these is summed by one thread, in one order, so their number changes
+# nothing.
 @njit(cache=True, parallel=True, fastmath=FAST)
 def _splat(values, starts, points, weights, out):
     """Sum at each vertex what its points add, (M + 1, K); the last row stays zero, for missing neighbours."""

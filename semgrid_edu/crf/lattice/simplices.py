@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from semgrid_edu.crf.lattice.arithmetic import HALF
 
 FORTH, BACK = 0, 1
+"""Index of the vertex one step forward, and of the one a step back, on the second axis of `neighbours`."""
 
 
 def elevation(d: int) -> NDArray[np.float64]:
@@ -55,6 +56,7 @@ def peak(d: int) -> float:
     return (4 * np.pi / 3) ** (d / 2) * np.sqrt(d + 1)
 
 
+# `enclosing_simplex_literal` for one point after the other: compiled, no step needs an array over all points.
 @njit(cache=True, parallel=True)
 def enclosing_simplices(elevated):
     """Find the simplex around each point.

@@ -11,6 +11,12 @@ CLEARANCE = 2.5
 """Metres above the lowest point of a cell from which on a point hangs over what stands there: the top of a vehicle,
 up to which `SensorModel` counts returns as obstacles too."""
 
+LIDAR_ROW_STEP, LIDAR_COL_STEP = 4, 2
+"""Every fourth row and every second column makes a depth image about as sparse as a LIDAR scan."""
+
+DEPTH_RANGE = 80.0
+"""Metres up to which a depth image is used: what a LIDAR reaches on most surfaces."""
+
 
 def birdseye_votes(
     points_grid: NDArray, classes: NDArray[np.uint8], spec: GridSpec, label_set: LabelSet
@@ -46,13 +52,6 @@ def birdseye_votes(
     votes = np.zeros((len(label_set), lowest.size), dtype=np.int64)
     np.add.at(votes, (classes[below], cells[below]), 1)
     return label_set.most_voted(votes.reshape(len(label_set), *spec.shape), otherwise=IGNORE)
-
-
-LIDAR_ROW_STEP, LIDAR_COL_STEP = 4, 2
-"""Every fourth row and every second column makes a depth image about as sparse as a LIDAR scan."""
-
-DEPTH_RANGE = 80.0
-"""Metres up to which a depth image is used: what a LIDAR reaches on most surfaces."""
 
 
 def points_from_depth(

@@ -21,6 +21,25 @@ RETURN = 16
 FASTEST = 100.0
 """Metres a second that no car drives."""
 
+_UNSYNCED = (
+    "unsynchronised drives (_extract), whose images are neither rectified nor taken together with the scans: fetch the "
+    "archives whose names end in _sync"
+)
+
+LAYOUTS = {
+    "*/*_drive_*_extract": _UNSYNCED,
+    "*_drive_*_extract": _UNSYNCED,
+    "*_drive_*_sync": "the drives of one day: give the folder above it, which holds the dates",
+    "velodyne_points": "one drive: give the folder two levels above it, which holds the dates",
+    "*/*/*_drive_*_sync": "a folder above the one that holds the dates: give that one",
+    "sequences/*/velodyne": "KITTI odometry or SemanticKITTI: SemanticKittiSequence reads it, from Python",
+    "sequences/*/image_2": "KITTI odometry: fetch its scans too, or the raw drives",
+    "training/velodyne": "KITTI tracking or object detection: KittiTrackingRun reads tracking, from Python",
+    "data_3d_raw": "KITTI-360, which keeps calibration and times in other files: it has no reader here",
+    "v1.0-*": "nuScenes, which keeps scans and calibration in other files: it has no reader here",
+}
+"""What is mistaken for KITTI's raw layout and what to do, by a path in it for `Path.glob`; the surest sign first."""
+
 
 def short_scans(paths: Iterable[Path]) -> list[str]:
     """Name the scans that were probably cut short: much smaller than the drive's median scan, or all but empty.
@@ -74,26 +93,6 @@ def jumps(packets: Mapping[Path, NDArray], seconds: NDArray) -> list[str]:
         for path, far, step, wrong in zip(list(packets)[1:], metres, steps, too_far, strict=True)
         if wrong
     ]
-
-
-_UNSYNCED = (
-    "unsynchronised drives (_extract), whose images are neither rectified nor taken together with the scans: fetch the "
-    "archives whose names end in _sync"
-)
-
-LAYOUTS = {
-    "*/*_drive_*_extract": _UNSYNCED,
-    "*_drive_*_extract": _UNSYNCED,
-    "*_drive_*_sync": "the drives of one day: give the folder above it, which holds the dates",
-    "velodyne_points": "one drive: give the folder two levels above it, which holds the dates",
-    "*/*/*_drive_*_sync": "a folder above the one that holds the dates: give that one",
-    "sequences/*/velodyne": "KITTI odometry or SemanticKITTI: SemanticKittiSequence reads it, from Python",
-    "sequences/*/image_2": "KITTI odometry: fetch its scans too, or the raw drives",
-    "training/velodyne": "KITTI tracking or object detection: KittiTrackingRun reads tracking, from Python",
-    "data_3d_raw": "KITTI-360, which keeps calibration and times in other files: it has no reader here",
-    "v1.0-*": "nuScenes, which keeps scans and calibration in other files: it has no reader here",
-}
-"""What is mistaken for KITTI's raw layout and what to do, by a path in it for `Path.glob`; the surest sign first."""
 
 
 def what_is(folder: Path) -> str:

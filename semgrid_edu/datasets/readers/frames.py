@@ -22,31 +22,6 @@ LIDAR_RANGE = 250.0
 """Largest coordinate of a return, metres. KITTI's HDL-64E sees 120 m, so what lies twice as far is no measurement."""
 
 
-def read_scan(path: Path) -> NDArray[np.float32]:
-    """Read the returns of one scan.
-
-    Parameters
-    ----------
-    path : Path
-        A file of little-endian floats, four for each return.
-
-    Returns
-    -------
-    (N, 4) float32
-        x forward, y left, z up in the LIDAR frame (metres), and reflectance.
-    """
-    content = read_bytes(path)
-    if len(content) % 16:
-        raise DataError(path, "points of 4 x 4 bytes", f"{len(content)} bytes, {len(content) % 16} too many")
-    points = np.frombuffer(content, dtype="<f4").reshape(-1, 4).astype(np.float32)
-    strange = ~(np.abs(points[:, :3]) <= LIDAR_RANGE).all(axis=1) | ~np.isfinite(points[:, 3])
-    if strange.any():
-        first = strange.argmax()
-        expected = f"finite coordinates within {LIDAR_RANGE:g} m and a finite reflectance"
-        raise DataError(path, expected, f"{points[first].tolist()} at point {first}")
-    return points
-
-
 class LabelledDrive(Protocol):
     """What training and scoring ask of a drive: frames, and the truth of some of them.
 
@@ -143,6 +118,31 @@ class FrameSequence(Sequence[Frame]):
     @abstractmethod
     def _frame(self, k: int) -> Frame:
         """Read frame k, 0 <= k < len(self)."""
+
+
+def read_scan(path: Path) -> NDArray[np.float32]:
+    """Read the returns of one scan.
+
+    Parameters
+    ----------
+    path : Path
+        A file of little-endian floats, four for each return.
+
+    Returns
+    -------
+    (N, 4) float32
+        x forward, y left, z up in the LIDAR frame (metres), and reflectance.
+    """
+    content = read_bytes(path)
+    if len(content) % 16:
+        raise DataError(path, "points of 4 x 4 bytes", f"{len(content)} bytes, {len(content) % 16} too many")
+    points = np.frombuffer(content, dtype="<f4").reshape(-1, 4).astype(np.float32)
+    strange = ~(np.abs(points[:, :3]) <= LIDAR_RANGE).all(axis=1) | ~np.isfinite(points[:, 3])
+    if strange.any():
+        first = strange.argmax()
+        expected = f"finite coordinates within {LIDAR_RANGE:g} m and a finite reflectance"
+        raise DataError(path, expected, f"{points[first].tolist()} at point {first}")
+    return points
 
 
 def count_frames(folder: Path, what: str, suffix: str) -> int:

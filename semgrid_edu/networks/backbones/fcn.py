@@ -28,9 +28,9 @@ class Fcn(Segmenter):
     Notes
     -----
     Three things differ from the publication. Convolutions are padded to keep the size, whereas the publication pads
-    the image by 100 pixels and crops by offsets. Pooling rounds up in both, so every size works, and maps are
-    cropped only at their lower and right ends. Score layers start random, not at zero, so that the first step already
-    teaches the encoder. There is no dropout, because it would draw from a global generator.
+    the image by 100 pixels and crops by offsets. (Pooling rounds up in both, so every size of image works; here maps
+    are cropped only at their lower and right ends.) Score layers start random, not at zero, so that the first step
+    already teaches the encoder. There is no dropout, because it would draw from a global generator.
 
     References
     ----------

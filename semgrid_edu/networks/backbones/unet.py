@@ -31,7 +31,7 @@ class UNet(Segmenter):
     -----
     This is the padded variant: convolutions keep the size, so the encoder's maps fit without cropping and the scores
     have the size of the image, whereas the publication loses 92 pixels on each side. Each 3x3 convolution is followed
-    by batch normalisation, as in SegNet; the publication has none. It has dropout, which is left out here because it
+    by batch normalisation, as in SegNet; the publication has none. The publication's dropout is left out, because it
     would draw from a global generator. Where a map has an odd side, the last row or column of the up-convolution is
     its bias alone.
 
