@@ -97,7 +97,7 @@ class CrfLayer(nn.Module):
         return len(self.label_costs)
 
     def description(self) -> dict[str, object]:
-        """Return what `load_crf` builds the layer from, for JSON: normalisation and all arguments but `params`, by name."""
+        """Return what `load_crf` needs, for JSON: the normalisation and all arguments but `params`, by name."""
         names = ("normalization", "n_classes", "radius", "iterations")
         return {name: getattr(self, name) for name in names} | {"learn_compatibility": self.label_costs.requires_grad}
 

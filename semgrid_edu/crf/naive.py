@@ -28,9 +28,9 @@ def mean_field_naive(
         Q_i(l) = exp(-phi_u(l) - sum_{j != i} k_ij (1 - Q_j(l))) / Z_i
 
     All cells are updated at once, from Q_i(l) = exp(-phi_u(l)) / Z_i on, as in Kraehenbuehl and Koltun 2011, algorithm
-    1. They take the right-hand side as the new Q_i; here log Q_i moves only a part of the way to it, see `damping`. Then
-    no update raises the free energy. Without damping, two cells that strongly attract each other, each decided for
-    another label, swap their labels for ever.
+    1. They take the right-hand side as the new Q_i; here log Q_i moves only a part of the way to it, see `damping`.
+    Then no update raises the free energy. Without damping, two cells that strongly attract each other, each decided
+    for another label, swap their labels for ever.
 
     Parameters
     ----------

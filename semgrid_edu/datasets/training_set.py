@@ -1,4 +1,4 @@
-"""The training set: image, occupancy grid and truth of each labelled frame of a split, or of a few (section 4.1)."""
+"""The training set: image, occupancy grid and truth of each labelled frame of a split; excerpts of it (section 4.1)."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -50,8 +50,7 @@ class TrainingSet(Dataset[Sample]):
     """The labelled frames of a split.
 
     The first use runs the occupancy filter over every drive up to its labelled frames and keeps the result in `cache/`
-    of the data set, see `cached_arrays`. Later uses map it from disk, until data, recipe or code change. Whatever is a
-    training set can be trained on (`train`) and scored.
+    of the data set, see `cached_arrays`. Later uses map it from disk, until data, recipe or code change.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where things are kept that can be made anew: what is made of a data set, and the functions that numba compiles."""
+"""Folders for what can be made anew: arrays that are made of a data set, and functions that numba compiles."""
 
 import os
 import sys

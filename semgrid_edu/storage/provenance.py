@@ -1,4 +1,4 @@
-"""Provenance: how a result was made, and checksums that show whether it was changed; where shipped results lie."""
+"""Provenance: how a result was made, checksums that show whether it was changed, and where shipped folders lie."""
 
 import platform
 import subprocess
@@ -14,6 +14,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 """The folder of the package."""
 
 FILE_NAME = "provenance.json"
+"""Name of the file in a folder of results that says how they were made."""
 
 
 def versions(*packages: str) -> dict[str, str]:
@@ -38,7 +39,7 @@ def versions(*packages: str) -> dict[str, str]:
 
 
 def made_by(command: str, *packages: str) -> dict[str, object]:
-    """Return what a result says of its making: the command that repeats it, today's date, and versions.
+    """Return how a result was made: the command that repeats it, today's date, and versions.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Checkpoints: a training run that was killed goes on as if it hadn't been (paper, section 4.1)."""
+"""Checkpoints, from which a training run that was killed goes on as if it hadn't been (paper, section 4.1)."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,7 @@
-"""Points with classes seen from above; a depth image as such points, as sparse as a LIDAR's if wished (section 4)."""
+"""From labelled points to bird's-eye classes, and from a depth image to such points (section 4).
+
+The readers of data sets whose truth isn't given from above use both: SYNTHIA has depth images, SemanticKITTI has scans.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,7 +60,7 @@ def birdseye_votes(
 def points_from_depth(
     depth: NDArray, camera: Camera, row_step: int = 1, col_step: int = 1
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """Carry the pixels of a depth image that lie within `DEPTH_RANGE` back to space.
+    """Return the points in space that the pixels of a depth image show, up to `DEPTH_RANGE`.
 
     Parameters
     ----------

@@ -10,16 +10,16 @@ from semgrid_edu.datasets.readers.oxts import mercator_pose, mercator_scale
 from semgrid_edu.errors import DataError
 
 SHORT_SCAN = 0.6
-"""Share of the size of a drive's median scan below which a scan was probably cut short: sound ones differ less."""
+"""A scan smaller than this share of the drive's median scan was probably cut short: sound ones differ less."""
 
 FEWEST_RETURNS = 100
-"""Number of returns that the scan of any street has, even that of a LIDAR with 16 beams."""
+"""Any scan of a street has this many returns, even that of a LIDAR with 16 beams."""
 
 RETURN = 16
 """Bytes of a return on disk: four floats."""
 
 FASTEST = 100.0
-"""Metres a second that no car drives."""
+"""Metres per second. No car drives faster."""
 
 _UNSYNCED = (
     "unsynchronised drives (_extract), whose images are neither rectified nor taken together with the scans: fetch the "
@@ -38,7 +38,7 @@ LAYOUTS = {
     "data_3d_raw": "KITTI-360, which keeps calibration and times in other files: it has no reader here",
     "v1.0-*": "nuScenes, which keeps scans and calibration in other files: it has no reader here",
 }
-"""What is mistaken for KITTI's raw layout and what to do, by a path in it for `Path.glob`; the surest sign first."""
+"""What is mistaken for KITTI's raw layout, and what to do, by a pattern for `Path.glob`; the surest sign first."""
 
 
 def short_scans(paths: Iterable[Path]) -> list[str]:
@@ -67,7 +67,7 @@ def short_scans(paths: Iterable[Path]) -> list[str]:
 
 
 def jumps(packets: Mapping[Path, NDArray], seconds: NDArray) -> list[str]:
-    """Name the packets that no car can have got to since the packet before.
+    """Name the packets whose place no car can have reached since the packet before.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def jumps(packets: Mapping[Path, NDArray], seconds: NDArray) -> list[str]:
 
 
 def what_is(folder: Path) -> str:
-    """Say what a folder is that holds no drives in KITTI's raw layout where they are looked for.
+    """Say what a folder looks like in which no drives in KITTI's raw layout were found, and what to do.
 
     Parameters
     ----------
@@ -106,6 +106,6 @@ def what_is(folder: Path) -> str:
     Returns
     -------
     str
-        What it looks like and what to do, one of the advices of `LAYOUTS`; empty when it looks like none of them.
+        One of the texts of `LAYOUTS`; empty when it looks like none of them.
     """
     return next((advice for pattern, advice in LAYOUTS.items() if any(folder.glob(pattern))), "")

@@ -61,6 +61,9 @@ class LabelledDrive(Protocol):
     def files(self) -> list[Path]:
         """Return the files that the frames are read from: when one changes, what was made of the drive is stale."""
 
+    def doubts(self) -> list[str]:
+        """List what is doubtful about the drive, as far as it can be seen without reading the frames."""
+
 
 class FrameSequence(Sequence[Frame]):
     """The frames of a drive. Each is read, and checked, when it is asked for.
@@ -112,7 +115,7 @@ class FrameSequence(Sequence[Frame]):
         return [path for path in self.folder.rglob("*.*") if path.is_file()]
 
     def doubts(self) -> list[str]:
-        """List what is doubtful, as far as it can be seen without reading the frames; a reader may know something."""
+        """List nothing. A reader that knows what may be doubtful about its drives overrides this."""
         return []
 
     @abstractmethod
@@ -146,7 +149,7 @@ def read_scan(path: Path) -> NDArray[np.float32]:
 
 
 def count_frames(folder: Path, what: str, suffix: str) -> int:
-    """Return how many frames a drive has whose files are numbered with six digits, such as 000000.png.
+    """Count the frames of a drive whose files are numbered with six digits, such as 000000.png.
 
     Parameters
     ----------
@@ -187,12 +190,12 @@ def visible_labels(labels: FrameLabels, spec: GridSpec) -> NDArray[np.uint8]:
 
 
 def nothing_known(label_set: LabelSet, image_size: tuple[int, int]) -> FrameLabels:
-    """Return labels that say nothing, in which a reader replaces what its data set knows.
+    """Return labels that say nothing; a reader then replaces the fields that its data set knows.
 
     Parameters
     ----------
     label_set : LabelSet
-        The classes of what is replaced.
+        The classes of the fields that are replaced.
     image_size : (int, int)
         Height and width of the image, pixels.
 

@@ -1,4 +1,4 @@
-"""KITTI's times, and poses from its GPS and inertial packets (OXTS) by the Mercator projection (section 4)."""
+"""KITTI's timestamps, and poses from its GPS and inertial packets (OXTS) by the Mercator projection (section 4)."""
 
 import re
 from pathlib import Path

@@ -68,7 +68,7 @@ GROUND_RANGE = 20.0
 """Metres ahead. Road in the first image that is closer shows how high the camera stands."""
 
 STANDING, MOSTLY = 0.05, 0.9
-"""A camera that moves less far than this (metres a frame) stands; one that drives goes this share of its way ahead."""
+"""Metres a frame below which a camera stands; the share of a step that a driving camera goes ahead (median)."""
 
 _CAMERA_FROM_LIDAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 """From axes that point forward, left and up to the axes of a camera."""
