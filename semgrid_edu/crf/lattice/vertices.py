@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from semgrid_edu.crf.lattice.simplices import BACK, FORTH
+from semgrid_edu.crf.lattice.simplices import BACKWARD, FORWARD
 from semgrid_edu.errors import ArgumentError
 
 MOST_DIMENSIONS = 8
@@ -193,8 +193,8 @@ def _find_neighbours(keys, slots, units):
         for direction in range(size):
             found = slots[_slot(_forward(keys[v], remainder, direction, units), keys, slots)]
             if found >= 0:
-                neighbours[direction, FORTH, v] = found
-                neighbours[direction, BACK, found] = v
+                neighbours[direction, FORWARD, v] = found
+                neighbours[direction, BACKWARD, found] = v
     return neighbours
 
 
