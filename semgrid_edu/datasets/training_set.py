@@ -18,7 +18,7 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture
 from semgrid_edu.occupancy import CmcdotParams
-from semgrid_edu.storage.provenance import FILE_NAME, write_provenance
+from semgrid_edu.storage.provenance import PROVENANCE, write_provenance
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
 
 FRAMES = "frames.safetensors"
@@ -193,8 +193,8 @@ def _check_place(folder: Path, dataset_dir: Path) -> None:
     here, there = folder.resolve(), dataset_dir.resolve()
     if here.is_relative_to(there) or there.is_relative_to(here) or (folder / INDEX_FILE).exists():
         raise DataError(folder, f"a folder apart from the data set {dataset_dir}", "one that holds it or is part of it")
-    if (folder / FILE_NAME).exists() and not (folder / FRAMES).exists():
-        raise DataError(folder, "an empty folder, or an earlier excerpt", f"the {FILE_NAME} of something else")
+    if (folder / PROVENANCE).exists() and not (folder / FRAMES).exists():
+        raise DataError(folder, "an empty folder, or an earlier excerpt", f"the {PROVENANCE} of something else")
 
 
 def read_excerpt(folder: str | Path) -> list[Sample]:

@@ -12,7 +12,7 @@ processes inherit it."""
 PACKAGE = Path(__file__).parents[1]
 """The folder of the package, in which numba keeps what it compiles if it can."""
 
-VARIABLE = "NUMBA_CACHE_DIR"
+NUMBA_VARIABLE = "NUMBA_CACHE_DIR"
 """The environment variable that names numba's cache folder."""
 
 
@@ -45,10 +45,10 @@ def keep_compiled_functions() -> str:
     str
         One line for the user; empty when numba finds a place by itself.
     """
-    chosen = [Path(os.environ[VARIABLE])] if os.environ.get(VARIABLE) else []
+    chosen = [Path(os.environ[NUMBA_VARIABLE])] if os.environ.get(NUMBA_VARIABLE) else []
     if any(map(takes_files, [*chosen, *_usual_folders()])):
         return ""
-    os.environ[VARIABLE] = folder = str(_own_folder())
+    os.environ[NUMBA_VARIABLE] = folder = str(_own_folder())
     return f"neither the package nor your cache folder can be written to; compiled functions are kept in {folder}"
 
 

@@ -13,7 +13,7 @@ from semgrid_edu.storage.reading import read_json
 PACKAGE = Path(__file__).resolve().parents[1]
 """The folder of the package."""
 
-FILE_NAME = "provenance.json"
+PROVENANCE = "provenance.json"
 """Name of the file in a folder of results that says how they were made."""
 
 
@@ -94,7 +94,7 @@ def write_provenance(folder: str | Path, command: str, seed: int, packages: tupl
     """
     folder = Path(folder)
     write_json(
-        folder / FILE_NAME,
+        folder / PROVENANCE,
         {"command": command, "seed": seed, "versions": versions(*packages), **details, "sha256": _checksums(folder)},
     )
 
@@ -113,13 +113,13 @@ def provenance_problems(folder: str | Path) -> list[str]:
         One line for each file that is missing, changed or not recorded; empty when all is as it was made.
     """
     folder = Path(folder)
-    record = folder / FILE_NAME
+    record = folder / PROVENANCE
     expected = read_json(record).get("sha256")
     if not isinstance(expected, dict):
         raise DataError(record, "a provenance file with checksums by file name", repr(expected)[:200])
     found = _checksums(folder)
     changed = sorted(name for name in expected.keys() | found.keys() if expected.get(name) != found.get(name))
-    how = {name: "changed" if name in expected else f"not in {FILE_NAME}" for name in found}
+    how = {name: "changed" if name in expected else f"not in {PROVENANCE}" for name in found}
     return [f"{folder / name}: {how.get(name, 'missing')}" for name in changed]
 
 
@@ -163,7 +163,7 @@ def short_path(weights: str | Path) -> str:
 
 def _checksums(folder: Path) -> dict[str, str]:
     files = {path.relative_to(folder): path for path in sorted(folder.rglob("*")) if path.is_file()}
-    left_out = (FILE_NAME, "cache")
+    left_out = (PROVENANCE, "cache")
     return {
         name.as_posix(): sha256(path)
         for name, path in files.items()

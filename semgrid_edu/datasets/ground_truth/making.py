@@ -63,7 +63,8 @@ def lidar_truth(
 
     Each pixel that a return falls on takes the depth of that return, or of the closest if there are several. So it has
     a place in space, and its label goes to the cell there. Then gaps are closed, and what has no label is unknown-free,
-    -static, -dynamic or -unobserved by its most probable occupancy state. (In the paper a human corrects the result as well.)
+    -static, -dynamic or -unobserved by its most probable occupancy state. (In the paper a human also corrects the
+    result.)
 
     Parameters
     ----------
