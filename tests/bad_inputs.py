@@ -691,7 +691,7 @@ EXPERIMENTS = (
     Row(
         "another search's trials",
         SEARCH,
-        "log.json: expected the trials",
+        "log.json: expected trials of the search",
         text("log.json", '{"trials": [], "seed": 0}'),
     ),
     Row(

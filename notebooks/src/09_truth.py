@@ -43,7 +43,7 @@ from semgrid_edu.workshop.studies.ground_truth.counts import BAND_EDGES, TruthCo
 from semgrid_edu.workshop.studies.ground_truth.laboratory import simulated_drive
 from semgrid_edu.frame import Frame
 from semgrid_edu.graphical import d_separated
-from semgrid_edu.stage_models import LabelWorld, made_label_stage, wrong_label
+from semgrid_edu.stage_models import LabelWorld, lidar_label_stage, wrong_label
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.workshop.studies.ground_truth.pictures import (
     DIFFERENCES,
@@ -98,7 +98,7 @@ plt.show()
 # returns that were measured in it.
 
 # %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph: what stands in the cell and the calibration point to the image labels of three returns; image label and depth point to what each return brings; those and the occupancy state point to the label"
-graph = made_label_stage()
+graph = lidar_label_stage()
 _, ax = plt.subplots(figsize=(9.5, 4.6), layout="constrained")
 graph.draw(ax, highlight=("c", "y"))
 plt.show()

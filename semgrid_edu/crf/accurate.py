@@ -1,6 +1,6 @@
 """Mean field with nearly exact kernels on grids too large for a matrix of all pairs (eq. (3), (4)).
 
-The bilateral kernel of eq. (4), pair by pair: each cell with all cells of a window around it, compiled.
+The bilateral kernel is computed pair by pair, between each cell and all cells of a window around it, by compiled loops.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,8 +19,84 @@ from semgrid_edu.crf.spatial import SeparableGaussian
 
 RADIUS = 4.0
 """Reach of the window, in widths `sigma_alpha`: cells further up, down, left or right are left out."""
+
 _SHARPEST = np.float32(1e15)
 """The largest 1 / sigma_beta: its square still is a float32, and equal states stay equal."""
+
+
+def mean_field_accurate(
+    unary: ArrayLike,
+    values: ArrayLike,
+    params: CrfParams,
+    iterations: int = 10,
+    tolerance: float = 0.0,
+    radius: float = RADIUS,
+) -> NDArray[np.float32]:
+    """Approximate the CRF's marginals by mean field with nearly exact kernels: the updates of `mean_field_naive`.
+
+    Where `mean_field` asks the permutohedral lattice, this function computes the bilateral kernel pair by pair, in a
+    window around each cell (`WindowedGaussian`, which says what the window can cost). The time grows with the number
+    of cells times that of cells in a window, the memory with the number of cells alone.
+    The other Parameters are those of `mean_field_naive`, and so are errors, but the grid may be of any size.
+
+    Parameters
+    ----------
+    radius : float
+        Reach of the bilateral window in widths `sigma_alpha`; infinite for all pairs, exact but for rounding.
+
+    Returns
+    -------
+    (C, H, W) float32
+        Q, the distribution over classes in each cell; the same bits whatever the number of threads.
+    """
+    unary, values = check_inputs(unary, values)
+    check_stop(iterations, tolerance)
+    spatial = SeparableGaussian.build(unary.shape[1:], params.sigma_gamma, params.w_spatial, params.normalization)
+    updates = filtered_updates(unary, (WindowedGaussian.build(values, params, radius), spatial))
+    return settled(updates, iterations, tolerance)
+
+
+class Kernel(Protocol):
+    """A kernel of eq. (4) as a filter, such as `SeparableGaussian`, `WindowedGaussian` and `PermutohedralLattice`.
+
+    Parameters
+    ----------
+    diagonal : (N,) float32
+        k_ii, the share of its own value that each cell gets back.
+    """
+
+    diagonal: NDArray[np.float32]
+
+    def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return sum_j k_ij values_j, the cell itself included; one row per cell, (N, K)."""
+
+
+def filtered_updates(unary: NDArray, kernels: Sequence[Kernel]) -> Iterator[NDArray[np.float32]]:
+    """Yield Q at first and after each update, without end, as `mean_field_updates` does, with filters for the sums.
+
+    The cost of disagreeing differs from the negative reward of agreeing only by a constant that is the same for all
+    classes, which the soft-max cancels. Filters include the cell itself, which is no pair, so its part is subtracted.
+
+    Parameters
+    ----------
+    unary : (C, H, W) float
+        phi_u; inf where a class is impossible.
+    kernels : sequence of Kernel
+        The kernels of eq. (4), with their weights and normalisation; one is enough to try it alone.
+
+    Yields
+    ------
+    (C, H, W) float32
+        Q, the distribution over classes in each cell.
+    """
+    phi, own = above_best(unary).astype(np.float32), sum(kernel.diagonal for kernel in kernels)
+
+    def disagreement(Q: NDArray[np.float32]) -> NDArray[np.float32]:
+        cells = np.ascontiguousarray(Q.T)
+        return own * Q - sum(kernel(cells) for kernel in kernels).T
+
+    for Q in all_updates(phi, disagreement, damping(own)):
+        yield Q.reshape(unary.shape)
 
 
 @dataclass(frozen=True)
@@ -31,8 +107,8 @@ class WindowedGaussian:
     the number of pairs. What is left out is small. A pair outside the window has less than exp(-radius^2 / 2) of the
     weight of a cell with itself, 0.00034 at the default radius of 4. Where all cells have the same state, all pairs
     outside together have 0.00013 of a cell's row sum. That share can only be larger where a cell differs from its
-    surroundings and is like cells beyond the window. Even then they sum to at most 2 pi sigma_alpha^2 * 0.00013 for
-    widths of at least a cell: at a width of 8 cells, 0.05 of what the cell has for itself.
+    surroundings and is like cells beyond the window. Even then, for widths of at least a cell, the pairs outside sum to
+    at most 2 pi sigma_alpha^2 * 0.00013: at a width of 8 cells, 0.05 of the weight of the cell with itself.
 
     Parameters
     ----------
@@ -127,78 +203,3 @@ def _add(weights, values, total):
     """Add weighted values."""
     for c in range(len(total)):
         total[c] += weights[c] * values[c]
-
-
-class Kernel(Protocol):
-    """A kernel of eq. (4) as a filter: `SeparableGaussian`, `WindowedGaussian` and `PermutohedralLattice` are such.
-
-    Parameters
-    ----------
-    diagonal : (N,) float32
-        k_ii, the share of its own value that each cell gets back.
-    """
-
-    diagonal: NDArray[np.float32]
-
-    def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return sum_j k_ij values_j, the cell itself included; one row per cell, (N, K)."""
-
-
-def mean_field_accurate(
-    unary: ArrayLike,
-    values: ArrayLike,
-    params: CrfParams,
-    iterations: int = 10,
-    tolerance: float = 0.0,
-    radius: float = RADIUS,
-) -> NDArray[np.float32]:
-    """Approximate the CRF's marginals by mean field with nearly exact kernels: the updates of `mean_field_naive`.
-
-    Where `mean_field` asks the permutohedral lattice, this function computes the bilateral kernel pair by pair, in a
-    window around each cell (`WindowedGaussian`, which says what the window can cost). The time grows with the number
-    of cells times that of cells in a window, the memory with the number of cells alone.
-    The other Parameters are those of `mean_field_naive`, and so are errors, but the grid may be of any size.
-
-    Parameters
-    ----------
-    radius : float
-        Reach of the bilateral window in widths `sigma_alpha`; infinite for all pairs, exact but for rounding.
-
-    Returns
-    -------
-    (C, H, W) float32
-        Q, the distribution over classes in each cell; the same bits whatever the number of threads.
-    """
-    unary, values = check_inputs(unary, values)
-    check_stop(iterations, tolerance)
-    spatial = SeparableGaussian.build(unary.shape[1:], params.sigma_gamma, params.w_spatial, params.normalization)
-    updates = filtered_updates(unary, (WindowedGaussian.build(values, params, radius), spatial))
-    return settled(updates, iterations, tolerance)
-
-
-def filtered_updates(unary: NDArray, kernels: Sequence[Kernel]) -> Iterator[NDArray[np.float32]]:
-    """Yield Q at first and after each update, without end, as `mean_field_updates` does, with filters for the sums.
-
-    The cost of disagreeing differs from the negative reward of agreeing only by a number that is the same for all
-    classes, which the soft-max cancels; and filters include the cell itself, which is no pair.
-
-    Parameters
-    ----------
-    unary : (C, H, W) float
-        phi_u; inf where a class is impossible.
-    kernels : sequence of Kernel
-        The kernels of eq. (4), with their weights and normalisation; one is enough to try it alone.
-
-    Yields
-    ------
-    (C, H, W) float32
-        Q, the distribution over classes in each cell.
-    """
-    phi, own = above_best(unary).astype(np.float32), sum(kernel.diagonal for kernel in kernels)
-
-    def disagreement(Q: NDArray[np.float32]) -> NDArray[np.float32]:
-        cells = np.ascontiguousarray(Q.T)
-        return own * Q - sum(kernel(cells) for kernel in kernels).T
-
-    for Q in all_updates(phi, disagreement, damping(own)):
-        yield Q.reshape(unary.shape)

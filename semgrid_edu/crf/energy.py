@@ -83,8 +83,8 @@ def free_energy(Q: ArrayLike, unary: ArrayLike, values: ArrayLike, params: CrfPa
 
     Examples
     --------
-    Two cells that don't care, each undecided between two classes. Without pairs F is -log Z = -2 log 2. A pair weight
-    of w2 exp(-1/2) adds itself half the time:
+    Two cells without unary costs, each undecided between two classes. Without the pair term F is -log Z = -2 log 2.
+    The two cells disagree half of the time, so the pair term adds half of its weight, w2 exp(-1/2) = 0.607:
 
     >>> values, undecided = np.full((4, 1, 2), 0.25), np.full((2, 1, 2), 0.5)
     >>> params = CrfParams(w_bilateral=0, w_spatial=1, sigma_gamma=1, normalization="none")

@@ -12,10 +12,10 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import Factor, GraphicalModel, eliminate, log_total, max_product
 
 MAX_ENERGY = 700
-"""exp(-745) is 0. If the best labelling of all had no probability, all would look impossible."""
+"""The largest energy of the best labelling: exp(-745) is 0, so beyond it every labelling would look impossible."""
 
 MAX_LABELLINGS = 10**7
-"""Every cell is coupled to every other, so no order of elimination avoids a table of all labellings."""
+"""The largest number of labellings: as every cell is coupled to every other, elimination needs a table of them all."""
 
 
 def crf_model(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> GraphicalModel:

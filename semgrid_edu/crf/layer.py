@@ -97,7 +97,7 @@ class CrfLayer(nn.Module):
         return len(self.label_costs)
 
     def description(self) -> dict[str, object]:
-        """Return the normalisation and all arguments of the constructor but `params`, by name; JSON can hold them."""
+        """Return what `load_crf` needs, for JSON: the normalisation and all arguments but `params`, by name."""
         names = ("normalization", "n_classes", "radius", "iterations")
         return {name: getattr(self, name) for name in names} | {"learn_compatibility": self.label_costs.requires_grad}
 
@@ -204,7 +204,7 @@ def step_size(pairs: Pairs, compatibility: Tensor) -> Tensor:
         p_i, above 0 and at most 1.
     """
     n_classes = len(compatibility)
-    differences = torch.eye(n_classes).to(compatibility) - 1 / n_classes  # takes the mean off
+    differences = torch.eye(n_classes).to(compatibility) - 1 / n_classes  # subtracts the mean
     eigenvalues = torch.linalg.eigvalsh(differences @ compatibility @ differences)
     rows = pairs.sums(torch.ones_like(pairs.own))
     return 1 / (1 + (eigenvalues[0].neg().relu() * pairs.own + eigenvalues[-1].relu() * rows) / 2)

@@ -19,40 +19,6 @@ _ZERO_SUM_STATES = np.array([[1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1]]) / 
 this basis keep every distance between the states of two cells."""
 
 
-def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice:
-    """Build the first kernel of eq. (4), on place and occupancy, including its weight and normalisation.
-
-    Parameters
-    ----------
-    values : (4, H, W) float
-        o_i, the occupancy probabilities of each cell: they sum to one.
-    params : CrfParams
-        Weight, widths and normalisation.
-
-    Returns
-    -------
-    PermutohedralLattice
-        A lattice around H W points in five dimensions: two for the place, three for the state.
-
-    Raises
-    ------
-    ArgumentError
-        When states differ by, or the grid measures, more widths than the lattice can count: some 3,000 together.
-    """
-    place = np.indices(values.shape[1:]) / max(params.sigma_alpha, NARROWEST)
-    state = np.einsum("ks,shw->khw", _ZERO_SUM_STATES, values) / params.sigma_beta
-    features = np.concatenate([place, state]) * (params.w_bilateral > 0)  # a kernel without weight can have any
-    try:
-        lattice = PermutohedralLattice.build(features.reshape(5, -1).T)
-    except ArgumentError as error:
-        found = f"{params.sigma_beta:g} and {params.sigma_alpha:g}: the lattice can't count so many widths"
-        raise ArgumentError("params", "sigma_beta above 1e-3, or a larger sigma_alpha", found) from error
-    degree = np.ones(values[0].size)
-    if params.normalization == "symmetric":
-        degree = lattice(np.ones((values[0].size, 1), np.float32))[:, 0]
-    return lattice.scaled(np.sqrt(params.w_bilateral / degree))
-
-
 def mean_field(
     unary: ArrayLike, values: ArrayLike, params: CrfParams, iterations: int = 10, tolerance: float = 0.0
 ) -> NDArray[np.float32]:
@@ -116,6 +82,41 @@ def iterate(
     return Q
 
 
+def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice:
+    """Build the first kernel of eq. (4), on place and occupancy, including its weight and normalisation.
+
+    Parameters
+    ----------
+    values : (4, H, W) float
+        o_i, the occupancy probabilities of each cell: they sum to one.
+    params : CrfParams
+        Weight, widths and normalisation.
+
+    Returns
+    -------
+    PermutohedralLattice
+        A lattice around H W points in five dimensions: two for the place, three for the state.
+
+    Raises
+    ------
+    ArgumentError
+        When states differ by, or the grid measures, more widths than the lattice can count: some 3,000 together.
+    """
+    place = np.indices(values.shape[1:]) / max(params.sigma_alpha, NARROWEST)
+    state = np.einsum("ks,shw->khw", _ZERO_SUM_STATES, values) / params.sigma_beta
+    features = np.concatenate([place, state]) * (params.w_bilateral > 0)  # a kernel without weight can have any
+    try:
+        lattice = PermutohedralLattice.build(features.reshape(5, -1).T)
+    except ArgumentError as error:
+        found = f"{params.sigma_beta:g} and {params.sigma_alpha:g}: the lattice can't count so many widths"
+        raise ArgumentError("params", "sigma_beta above 1e-3, or a larger sigma_alpha", found) from error
+    degree = np.ones(values[0].size)
+    if params.normalization == "symmetric":
+        degree = lattice(np.ones((values[0].size, 1), np.float32))[:, 0]
+    return lattice.scaled(np.sqrt(params.w_bilateral / degree))
+
+
+# The twin of `above_best` in one pass: at the paper's size 0.2 ms on one core, where numpy's passes take 0.8 ms.
 @njit(cache=True, parallel=True)
 def _above_best(unary):
     """Return how far each cost lies above that of the cell's best class, as float32 and at most `NEVER`."""
@@ -138,8 +139,8 @@ def _above_best(unary):
 def _update(rewards, phi, own, part, logits, Q, cells):
     """Update all cells, and return the largest change of a probability; `cells` gets a copy of Q in the filters' order.
 
-    The reward of a cell contains what it says itself; this is subtracted. Its log Q, known up to one number, goes part
-    of the way to the reward minus the unary term.
+    The reward of a cell contains the cell's own part, which is subtracted. Its log Q, up to a constant, goes a part
+    of the way to the reward minus the unary term, see `mean_field_update`.
     """
     n_classes, height, width = phi.shape
     lanes, change = cells.shape[1], np.zeros(height, np.float32)
@@ -157,6 +158,7 @@ def _update(rewards, phi, own, part, logits, Q, cells):
     return change.max()
 
 
+# A row of the filters holds each cell's classes side by side: these two carry one class out of it and back.
 @njit(cache=True, inline="always")
 def _take_lane(row, lane, lanes, out):
     for c in range(len(out)):
@@ -199,7 +201,7 @@ def _softmax(logits, r, out):
 
 @njit(cache=True, fastmath=FAST, inline="always")
 def _replace(old, new, largest):
-    """Overwrite old numbers; each largest change is kept."""
+    """Overwrite old numbers, and keep the largest change of each cell."""
     for c in range(len(old)):
         largest[c] = max(largest[c], abs(new[c] - old[c]))
         old[c] = new[c]

@@ -28,9 +28,9 @@ def mean_field_naive(
         Q_i(l) = exp(-phi_u(l) - sum_{j != i} k_ij (1 - Q_j(l))) / Z_i
 
     All cells are updated at once, from Q_i(l) = exp(-phi_u(l)) / Z_i on, as in Kraehenbuehl and Koltun 2011, algorithm
-    1. But where they take the right-hand side as the new Q_i, log Q_i moves only the part `damping` of the way to it.
-    Then no update raises the free energy. Without it, two cells that strongly attract each other, each decided for
-    another label, swap their labels for ever.
+    1. They take the right-hand side as the new Q_i; here log Q_i moves only a part of the way to it, see `damping`.
+    Then no update raises the free energy. Without damping, two cells that strongly attract each other, each decided
+    for another label, swap their labels for ever.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def mean_field_updates(unary: ArrayLike, values: ArrayLike, params: CrfParams) -
 
 
 def mean_field_update(log_Q: Any, phi: Any, disagreement: Any, part: Any = 1.0) -> Any:
-    """Return log Q_i(l) after an update, but for a number in each cell that the soft-max takes off again.
+    """Return log Q_i(l) after an update, up to a constant in each cell, which the soft-max cancels.
 
         log Q_i(l) <- (1 - p_i) log Q_i(l) + p_i (-phi_i(l) - sum_{j != i} k_ij (1 - Q_j(l)))
 
@@ -98,7 +98,7 @@ def mean_field_update(log_Q: Any, phi: Any, disagreement: Any, part: Any = 1.0) 
     log_Q, phi : (C, ...) float array or Tensor
         log Q and the unary term of one or many cells.
     disagreement : (C, ...) float array or Tensor
-        The sum over all other cells, of which a number that is the same for all classes may be missing.
+        The sum over all other cells, up to a constant that is the same for all classes.
     part : (...) float array or Tensor
         p_i, see `damping`; 1 when no other cell moves at the same time.
 
@@ -137,7 +137,7 @@ def all_updates(
 
 
 def above_best(unary: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Return how far each cost lies above that of the cell's best class: the unary term but for a number in each cell.
+    """Return how far each cost lies above that of the cell's best class: the unary term up to a constant.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def above_best(unary: NDArray[np.floating]) -> NDArray[np.floating]:
 
 
 def settled(updates: Iterator[NDArray], iterations: int, tolerance: float) -> NDArray:
-    """Take updates until their number is reached or nothing changes any more.
+    """Take updates until their number is reached, or one changes no probability by more than the tolerance.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def settled(updates: Iterator[NDArray], iterations: int, tolerance: float) -> ND
 def damping(own: NDArray) -> NDArray:
     """Return how far an update of all cells at once may go, so that it can't raise the free energy.
 
-    With k_ii what a kernel says of a cell and itself (`gram_matrix`), the free energy is
+    With k_ii the weight of a cell with itself (the diagonal of `gram_matrix`), the free energy is
 
         F(Q) = sum_i Q_i . phi_i - 1/2 sum_ij k_ij Q_i . Q_j + 1/2 sum_i k_ii |Q_i|^2 - H(Q) + constant
 

@@ -16,9 +16,9 @@ class PairWindow:
     """All pairs of cells of a grid that are at most `radius` rows and `radius` columns apart, each pair once.
 
     The pairs are sorted by their offset (rows, columns): P offsets, and for each of them one number per cell, which
-    belongs to that cell and the one an offset further on. In memory, as many empty columns follow each row as an offset
-    can have. So the cells of the whole grid form one long line of L numbers, on which an offset is a shift, and what is
-    shifted beyond the end of a row meets an empty cell.
+    belongs to that cell and the one an offset further on. In memory, each row is followed by as many empty columns as
+    the largest offset has. So the cells of the whole grid form one long line of L numbers, on which an offset is a
+    shift, and a cell that is shifted beyond the end of its row meets an empty cell.
 
     Parameters
     ----------

@@ -10,11 +10,11 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.occupancy import N_STATES
 
 LARGEST_WEIGHT = 1e30
-"""The largest weight of a kernel: the fast mean field computes in float32, whose largest number is 3e38."""
+"""The largest weight of a kernel, because the fast mean field computes in float32, whose largest number is 3e38."""
 
 NARROWEST = 0.15
-"""Width of a kernel, cells. At this width neighbours lie 6.7 widths apart, out of the lattice's reach; the Gaussian is
-2e-10 there. So narrower kernels couple nobody either, and filters may take this width for theirs."""
+"""The narrowest kernel that the filters compute, cells. At this width neighbours lie 6.7 widths apart, beyond the reach
+of the lattice, where the Gaussian is 2e-10. A narrower kernel couples no cells either, so filters take this width."""
 
 PAPER_CELL = 0.2
 """Side of a cell in the paper, metres (section 4.1)."""

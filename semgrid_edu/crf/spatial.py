@@ -74,7 +74,8 @@ class SeparableGaussian:
             One row per cell, cells counted row by row; `out` is overwritten.
         """
         grid, filtered = (array.reshape(len(self.row_scale), -1) for array in (values, out))
-        # Rows beyond the grid, and a distance beyond the last, have no weight. A tap of 0 would count twice.
+        # Zeros give rows beyond the grid no weight, and make the number of taps even. The tap at distance 0 is halved,
+        # because the loops add it twice, forward and backward.
         taps = np.append(self.taps, np.zeros(len(self.taps) % 2, np.float32))
         taps[0] /= 2
         row_scale = np.pad(self.row_scale, len(taps))
@@ -93,7 +94,7 @@ def _row_sums(size: int, sigma: float) -> NDArray[np.float64]:
 def _convolve(values, lanes, taps, row_scale, column_scale, out):
     """Convolve (H, W K) values, K per cell: add up rows, then what lies left and right in the sum.
 
-    There is an even number of taps, and the first is half of what it should be, since it is taken forward and backward.
+    The number of taps is even, and the first one is half of what it should be, since it is added forward and backward.
     """
     length, margin = values.shape[1], (len(taps) - 1) * lanes
     for r in prange(len(values)):
@@ -106,7 +107,7 @@ def _convolve(values, lanes, taps, row_scale, column_scale, out):
         out[r] *= column_scale
 
 
-# Two taps, and so four rows, at a time: the sum is read and written less often.
+# Two taps, so four rows, at a time: thus the sum is read and written half as often.
 @njit(cache=True, fastmath=FAST, inline="always")
 def _add_rows(values, r, taps, row_scale, total):
     """Add up rows around row r; rows beyond the grid have scale 0."""

@@ -11,7 +11,7 @@ from semgrid_edu.labels import IGNORE, KITTI_14, SYNTHIA_10, UNKNOWN_OF_STATE, L
 
 
 def grid_truth(labels: FrameLabels, belief_probability: NDArray, spec: GridSpec) -> NDArray[np.uint8]:
-    """Return the class that each cell should take.
+    """Return the true class of each cell, such as a network learns from.
 
     A cell that the camera sees takes the class of what stands there; the others take theirs from `fill_unlabelled`.
 

@@ -1,6 +1,7 @@
 """Labels of cells that are made from image labels and LIDAR: the policies that have names, and what makes them (4).
 
-`cached_labels` keeps them until the code behind this module changes, so nothing stands here that doesn't make them.
+`cached_labels` keeps the labels until the code of this module, or of what it imports, changes. So only what makes
+labels stands here.
 """
 
 from collections.abc import Sequence
@@ -16,8 +17,8 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.occupancy import track_drive
 
 ACCUMULATED = TruthPolicy(past=9, vote="majority")
-"""The labelled scan and the nine before it, all labelled by the one labelled image, as in KITTI: the scan is the last
-of 0.9 s, and most cells have many returns, whose majority decides."""
+"""The labelled scan and the nine before it, which began 0.9 s earlier, all labelled by the one labelled image, as in
+KITTI. Most cells then have many returns, so that a majority can decide."""
 
 POLICIES = {
     "lidar": TruthPolicy(),
@@ -73,7 +74,7 @@ def drive_labels(
     truth : LidarTruth
         How to make them.
     number : int
-        Tells the drive from the others of its split, so that the errors in its labels are its own.
+        Number of the drive in its split, so that each drive gets errors of its own.
 
     Returns
     -------

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.storage.provenance import FILE_NAME, provenance_problems, shipped_folder
+from semgrid_edu.storage.provenance import PROVENANCE, provenance_problems, shipped_folder
 
 if TYPE_CHECKING:
     from semgrid_edu.datasets.training_set import Sample
@@ -93,5 +93,5 @@ def samples_problems(folder: Path | None = None) -> list[str]:
     folders = (path for path in folder.iterdir() if path.is_dir()) if folder.is_dir() else ()
     samples = sorted(path for path in folders if not path.name.startswith("."))
     if not samples:
-        raise DataError(folder, f"folders of samples, each with a {FILE_NAME}", "none")
+        raise DataError(folder, f"folders of samples, each with a {PROVENANCE}", "none")
     return [problem for sample in samples for problem in provenance_problems(sample)]

@@ -1,6 +1,7 @@
 """The arrays that a network learns from: images with fewer pixels, occupancy, and the truth of each cell (section 4.1).
 
-`training_cache` keeps them until the code behind this module changes, so nothing stands here that doesn't make them.
+`cached_arrays` keeps them until the code of this module, or of what it imports, changes. So only what makes arrays
+stands here.
 """
 
 from collections.abc import Sequence

@@ -1,20 +1,27 @@
-"""The arrays that a network learns from, made once per data set, kept beside it and mapped from disk (section 4.1)."""
+"""What a network learns from, made once per data set and kept beside it: arrays, and labels from LIDAR (section 4).
+
+`cached_arrays` keeps images, occupancy and the data set's own truth; `cached_labels` keeps truth to put in its place.
+"""
 
 import hashlib
 import inspect
+import json
 import os
 import shutil
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
-from semgrid_edu.datasets import training_arrays
+from semgrid_edu.datasets import label_policies, training_arrays
 from semgrid_edu.datasets.index import DatasetIndex
+from semgrid_edu.datasets.label_policies import LidarTruth, drive_labels
 from semgrid_edu.datasets.readers.frames import LabelledDrive
 from semgrid_edu.datasets.training_arrays import ArrayRecipe, drive_arrays
 from semgrid_edu.errors import ArgumentError, DataError
@@ -22,6 +29,7 @@ from semgrid_edu.storage.code_hash import code_hash
 from semgrid_edu.storage.compiled import cache_folder
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.reading import read_json
+from semgrid_edu.storage.tensors import read_tensors, write_tensors
 from semgrid_edu.storage.workplace import worker_pool
 
 WORKERS = 2
@@ -29,6 +37,9 @@ WORKERS = 2
 
 RAGGED = ("return_pixels", "return_cells")
 """Arrays whose length differs from frame to frame: they lie end to end, and `return_ends` says where each ends."""
+
+GRIDS_KEY = "truth"
+"""Name of the tensor in a file of labels."""
 
 LabelledDrives = Sequence[tuple[LabelledDrive, list[int]]]
 """The drives of a split, each with the numbers of its labelled frames, from `DatasetIndex.drives`."""
@@ -72,6 +83,39 @@ def cached_arrays(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> dict[
         frames = in_each_drive(drive_arrays, [(*drive, recipe) for drive in drives], f"{index.name}, {split}")
         _write_arrays(_pack(frames), recipe, folder)
     return _map_arrays(folder)
+
+
+def cached_labels(drives: LabelledDrives, recipe: ArrayRecipe, truth: LidarTruth, folder: Path) -> NDArray[np.uint8]:
+    """Return labels of cells that are made from image labels and LIDAR, for a split's labelled frames, on first use.
+
+    Parameters
+    ----------
+    drives : sequence of (LabelledDrive, list of int)
+        The drives of the split, and the numbers of their labelled frames.
+    recipe : ArrayRecipe
+        Grid and occupancy filter.
+    truth : LidarTruth
+        How to make the labels.
+    folder : Path
+        Where `cached_arrays` keeps the arrays of these drives and this recipe. Its name stands for data, recipe, reader
+        and filter; the name of the file that is kept in it stands for `truth` and for the code that makes labels.
+
+    Returns
+    -------
+    (N, H, W) uint8
+        By drive.
+    """
+    key = f"{truth!r} {code_hash([Path(label_policies.__file__)])}"
+    path = folder / f"labels-{hashlib.sha256(key.encode()).hexdigest()[:16]}.safetensors"
+    if not path.exists():
+        jobs = [(*drive, recipe, truth, number) for number, drive in enumerate(drives)]
+        grids = in_each_drive(drive_labels, jobs, f"{folder.name}: labels from LIDAR")
+        tensors = {GRIDS_KEY: torch.from_numpy(np.stack(grids))}
+        write_tensors(path, tensors, {"truth": json.dumps(asdict(truth), sort_keys=True)})
+    _, tensors = read_tensors(path)
+    if GRIDS_KEY not in tensors:
+        raise DataError(path, f"the tensor {GRIDS_KEY} (delete the file to make it anew)", ", ".join(tensors) or "none")
+    return tensors[GRIDS_KEY].numpy()
 
 
 def in_each_drive(make: Callable[..., list], jobs: Sequence[tuple], what: str) -> list:

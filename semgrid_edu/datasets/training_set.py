@@ -1,4 +1,4 @@
-"""The training set: image, occupancy grid and truth of each labelled frame of a split, or of a few (section 4.1)."""
+"""The training set: image, occupancy grid and truth of each labelled frame of a split; excerpts of it (section 4.1)."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -10,17 +10,19 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets.cached_labels import cached_labels
 from semgrid_edu.datasets.index import INDEX_FILE, DatasetIndex, load_index
 from semgrid_edu.datasets.label_policies import LidarTruth
 from semgrid_edu.datasets.training_arrays import SEED, ArrayRecipe
-from semgrid_edu.datasets.training_cache import LabelledDrives, cached_arrays
+from semgrid_edu.datasets.training_cache import LabelledDrives, cached_arrays, cached_labels
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture
 from semgrid_edu.occupancy import CmcdotParams
-from semgrid_edu.storage.provenance import FILE_NAME, write_provenance
+from semgrid_edu.storage.provenance import PROVENANCE, write_provenance
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
+
+FRAMES = "frames.safetensors"
+"""Name of the file that holds an excerpt."""
 
 
 class Sample(NamedTuple):
@@ -48,8 +50,7 @@ class TrainingSet(Dataset[Sample]):
     """The labelled frames of a split.
 
     The first use runs the occupancy filter over every drive up to its labelled frames and keeps the result in `cache/`
-    of the data set, see `cached_arrays`. Later uses map it from disk, until data, recipe or code change. Whatever is a
-    training set can be trained on (`train`) and scored.
+    of the data set, see `cached_arrays`. Later uses map it from disk, until data, recipe or code change.
 
     Parameters
     ----------
@@ -157,10 +158,6 @@ def _shared_camera(drives: LabelledDrives) -> Camera:
     return camera
 
 
-FRAMES = "frames.safetensors"
-"""Name of the file that holds an excerpt."""
-
-
 def write_excerpt(dataset_dir: str | Path, n_frames: int, folder: str | Path) -> None:
     """Keep a few labelled frames of a data set's split "train", evenly spread over it.
 
@@ -196,8 +193,8 @@ def _check_place(folder: Path, dataset_dir: Path) -> None:
     here, there = folder.resolve(), dataset_dir.resolve()
     if here.is_relative_to(there) or there.is_relative_to(here) or (folder / INDEX_FILE).exists():
         raise DataError(folder, f"a folder apart from the data set {dataset_dir}", "one that holds it or is part of it")
-    if (folder / FILE_NAME).exists() and not (folder / FRAMES).exists():
-        raise DataError(folder, "an empty folder, or an earlier excerpt", f"the {FILE_NAME} of something else")
+    if (folder / PROVENANCE).exists() and not (folder / FRAMES).exists():
+        raise DataError(folder, "an empty folder, or an earlier excerpt", f"the {PROVENANCE} of something else")
 
 
 def read_excerpt(folder: str | Path) -> list[Sample]:

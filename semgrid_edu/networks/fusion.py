@@ -102,6 +102,31 @@ class FusionNet(nn.Module):
         return torch.cat([reduced.squeeze(2), occupancy], dim=1)
 
 
+class PlaneConvolution(nn.Conv3d):
+    """The 1x1 convolution of all D x C planes: on (B, C, D, H, W), a D x 1 x 1 kernel.
+
+    It is computed as a product of two matrices, with one row of D x C scores per cell. The planes already lie in memory
+    in this order, so nothing is copied.
+    """
+
+    def forward(self, planes: Tensor) -> Tensor:
+        """Reduce the planes.
+
+        Parameters
+        ----------
+        planes : (B, C, D, H, W) float
+            p, the image's scores on the planes.
+
+        Returns
+        -------
+        (B, n_reduced, 1, H, W) float
+            Weighted sums over C and D.
+        """
+        cells = planes.permute(0, 3, 4, 2, 1).flatten(3)
+        weight = self.weight.flatten(2).transpose(1, 2).flatten(1)
+        return F.linear(cells, weight, self.bias).permute(0, 3, 1, 2).unsqueeze(2)
+
+
 def _unknown_everywhere(occupancy: Tensor) -> Tensor:
     """Return the occupancy grids of a scan without a single beam, in the shape of these."""
     unknown = torch.zeros_like(occupancy)
@@ -115,17 +140,3 @@ def _reduction(n_scores: int, n_planes: int, n_reduced: int | None) -> nn.Module
         return nn.Sequential(nn.Flatten(1, 2), nn.Unflatten(1, (n_scores * n_planes, 1)))
     convolution = PlaneConvolution(n_scores, n_reduced, (n_planes, 1, 1))
     return nn.Sequential(convolution, nn.BatchNorm3d(n_reduced), nn.ReLU(inplace=True))
-
-
-class PlaneConvolution(nn.Conv3d):
-    """The 1x1 convolution of all D x C planes: on (B, C, D, H, W), a D x 1 x 1 kernel.
-
-    It is computed as the product of matrices that it is, one row per cell. The planes lie in memory like this already,
-    so that nothing is copied.
-    """
-
-    def forward(self, planes: Tensor) -> Tensor:
-        """Return the (B, n_reduced, 1, H, W) reduced planes."""
-        cells = planes.permute(0, 3, 4, 2, 1).flatten(3)
-        weight = self.weight.flatten(2).transpose(1, 2).flatten(1)
-        return F.linear(cells, weight, self.bias).permute(0, 3, 1, 2).unsqueeze(2)

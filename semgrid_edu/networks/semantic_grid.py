@@ -133,7 +133,7 @@ class SemanticGridNet(nn.Module):
 
 
 def _flip(x: Tensor, mirrored: bool) -> Tensor:
-    """Return images or grids with left and right exchanged if they are to be mirrored, as they are otherwise."""
+    """Exchange left and right of images or grids if `mirrored`; otherwise return them unchanged."""
     return x.flip(-1) if mirrored else x
 
 

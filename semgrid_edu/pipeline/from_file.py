@@ -10,6 +10,7 @@ from semgrid_edu.pipeline.hints import in_short
 from semgrid_edu.pipeline.stages import STAGES, Stages
 
 NAMES = ", ".join(STAGES)
+"""The names of the stages, for messages."""
 
 
 def load_stages(path: str | Path) -> Stages:

@@ -88,13 +88,15 @@ def kind_of(value: object) -> str:
 def shape_hint(found: tuple[int, ...], expected: tuple[int, ...]) -> str:
     """Return the probable cause of a wrong shape as the end of a sentence, with its colon; "" without a guess.
 
-    >>> shape_hint((355, 155, 14), (14, 355, 155))
-    ': is the class axis last? np.moveaxis(x, -1, 0) moves it to the front'
-
     Parameters
     ----------
     found, expected : tuple of int
         The shape of what a stage returned, and the shape that it should have.
+
+    Examples
+    --------
+    >>> shape_hint((355, 155, 14), (14, 355, 155))
+    ': is the class axis last? np.moveaxis(x, -1, 0) moves it to the front'
     """
     axis = {2: "velocity", N_STATES: "state"}.get(expected[0], "class")
     if found == (*expected[1:], expected[0]):

@@ -154,7 +154,7 @@ def _complete(
 
 
 class FrameRunner:
-    """Run one or several sets of stages on a frame; a call that several sets have in common is made only once.
+    """Run one or several sets of stages on one frame, and make a call that several sets share only once.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A student's tracker or the package's own in step with the other stages: one frame in, one belief out."""
+"""Keep a tracker, a student's or the package's own, in step with the other stages: one frame in, one belief out."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -12,8 +12,10 @@ from semgrid_edu.occupancy import N_STATES, Belief
 from semgrid_edu.pipeline.checks import StageCheck
 
 TAKES_TURNS = "a generator that takes a frame, yields its belief, and only then takes the next"
+"""What a tracker has to be, for messages."""
 
 _END = object()
+"""What `_next` returns when the tracker has ended; a tracker could yield None."""
 
 
 class TrackerAdapter:

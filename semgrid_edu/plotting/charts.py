@@ -16,9 +16,8 @@ from semgrid_edu.plotting.colours import velocity_colours
 if TYPE_CHECKING:  # training loads torch
     from semgrid_edu.training.log import TrainingLog
 
-
 SMOOTHING = 50
-"""Number of steps that a running mean is taken over; of all steps in a stage that has fewer."""
+"""Number of steps that a running mean is taken over; a stage with fewer steps takes all of them."""
 
 
 def velocity_spread(velocity: NDArray, weight: NDArray, ax: Axes | None = None) -> Axes:

@@ -15,15 +15,18 @@ PANELS = {
     "convergence": "convergence error:\nagainst the same kernel, converged",
 }
 """The three errors of `crf_error`, and what each compares."""
+
 _MARKERS = "osD^vP*X"
+
 _FLOOR = 1e-7
-"""Errors below are rounding errors of single precision, and drawn here."""
+"""Errors below this are rounding errors of single precision, and are drawn at it."""
+
 _NUMBERED = (1, 10, 100)
 """Numbers of updates that are written beside the points."""
 
 
 def error_against_time(result: Mapping, scene: str, of: str = "mean") -> Figure:
-    """Draw what each way of running mean field takes and how far it is off, in three panels that share their axes.
+    """Draw time and error of each way of running mean field, in three panels that share their axes.
 
     A line is one way; its points are numbers of updates.
 

@@ -111,7 +111,7 @@ def lattice_story(features: NDArray, values: NDArray, between: int = 0) -> Itera
     values : (N,) float
         The value of each point, 0 to 1.
     between : int
-        How many pictures to put between each two steps, so that marks are seen to move.
+        How many pictures to put between two steps, so that the marks move in an animation.
 
     Yields
     ------

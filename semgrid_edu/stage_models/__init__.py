@@ -13,7 +13,7 @@ from semgrid_edu.stage_models.crf import crf_stage
 from semgrid_edu.stage_models.ground_truth_label import (
     LabelWorld,
     count_rings,
-    made_label_stage,
+    lidar_label_stage,
     scan_with_pose_error,
     wrong_label,
 )
@@ -38,7 +38,7 @@ __all__ = [
     "count_rings",
     "crf_stage",
     "exact_cell",
-    "made_label_stage",
+    "lidar_label_stage",
     "one_cell",
     "one_log_odds_cell",
     "package_cell",

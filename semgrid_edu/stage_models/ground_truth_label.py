@@ -174,7 +174,7 @@ class LabelWorld:
         check_fields(self, "majority or standing", lambda vote: vote in ("majority", "standing"), "vote")
 
 
-def made_label_stage(world: LabelWorld | None = None) -> StageGraph:
+def lidar_label_stage(world: LabelWorld | None = None) -> StageGraph:
     """Build the directed model of how one cell gets its label.
 
     Parameters
@@ -224,7 +224,7 @@ def wrong_label(world: LabelWorld, content: int | None = None) -> float:
     float
         By exact inference. A cell without a label isn't wrong.
     """
-    joint = eliminate(made_label_stage(world).model, ("m", "y")).table
+    joint = eliminate(lidar_label_stage(world).model, ("m", "y")).table
     joint = joint / joint.sum(axis=1, keepdims=True)
     wrong = joint[0, 1], joint[1, 0]
     return float(np.mean(wrong) if content is None else wrong[content])

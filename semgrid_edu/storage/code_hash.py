@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def code_hash(modules: Iterable[Path], root: Path = ROOT) -> str:
-    """Hash what modules do, and all that they import of the package. Comments and docstrings don't count.
+    """Hash the code of modules and of all that they import from the package, without comments and docstrings.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def code_hash(modules: Iterable[Path], root: Path = ROOT) -> str:
     Returns
     -------
     str
-        SHA-256, hexadecimal. It is another one under a Python whose syntax trees are printed otherwise.
+        SHA-256, hexadecimal. It differs under a version of Python that prints syntax trees differently.
     """
     code = sorted(map(ast.dump, import_closure(modules, root).values()))
     return hashlib.sha256("\n".join(code).encode()).hexdigest()
@@ -32,7 +32,7 @@ def import_closure(modules: Iterable[Path], root: Path = ROOT) -> dict[Path, ast
     """Follow the import statements of modules, and of what they import, through the package.
 
     A name that a package passes on in its `__init__.py` leads to the module that defines it, so that one function of
-    `semgrid_edu.occupancy` doesn't bring all of its modules. What other packages are imported isn't followed.
+    `semgrid_edu.occupancy` doesn't bring all of its modules. Imports of other packages aren't followed.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def _imported(tree: ast.Module, root: Path) -> Iterator[Path]:
 
 
 def _origin(module: str, name: str, root: Path) -> Path | None:
-    """Return the file that a name comes from which is imported from a module; None outside of the package."""
+    """Return the file that defines a name which is imported from a module; None outside of the package."""
     place = root.joinpath(*module.split("."))
     init = place / "__init__.py"
     for path in (place / f"{name}.py", place / name / "__init__.py", place.with_suffix(".py")):

@@ -1,4 +1,4 @@
-"""Where things are kept that can be made anew: what is made of a data set, and the functions that numba compiles."""
+"""Folders for what can be made anew: arrays that are made of a data set, and functions that numba compiles."""
 
 import os
 import sys
@@ -8,6 +8,12 @@ from pathlib import Path
 CACHE_VARIABLE = "SEMGRID_EDU_CACHE"
 """The environment variable that names a folder for what is made of data sets; `semgrid-edu --cache` sets it, and worker
 processes inherit it."""
+
+PACKAGE = Path(__file__).parents[1]
+"""The folder of the package, in which numba keeps what it compiles if it can."""
+
+NUMBA_VARIABLE = "NUMBA_CACHE_DIR"
+"""The environment variable that names numba's cache folder."""
 
 
 def cache_folder(dataset_dir: Path) -> Path:
@@ -28,13 +34,6 @@ def cache_folder(dataset_dir: Path) -> Path:
     return Path(chosen) if chosen else dataset_dir / "cache"
 
 
-PACKAGE = Path(__file__).parents[1]
-"""The folder of the package, in which numba keeps what it compiles if it can."""
-
-VARIABLE = "NUMBA_CACHE_DIR"
-"""The environment variable that names numba's cache folder."""
-
-
 def keep_compiled_functions() -> str:
     """Give numba a folder in the system's temporary one, if it could keep compiled functions nowhere else.
 
@@ -46,10 +45,10 @@ def keep_compiled_functions() -> str:
     str
         One line for the user; empty when numba finds a place by itself.
     """
-    chosen = [Path(os.environ[VARIABLE])] if os.environ.get(VARIABLE) else []
+    chosen = [Path(os.environ[NUMBA_VARIABLE])] if os.environ.get(NUMBA_VARIABLE) else []
     if any(map(takes_files, [*chosen, *_usual_folders()])):
         return ""
-    os.environ[VARIABLE] = folder = str(_own_folder())
+    os.environ[NUMBA_VARIABLE] = folder = str(_own_folder())
     return f"neither the package nor your cache folder can be written to; compiled functions are kept in {folder}"
 
 

@@ -13,6 +13,12 @@ from tqdm.auto import tqdm
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import named_errors, write_text
 
+CHUNK = 2**16
+"""Bytes that are read at once. When a connection breaks off, at most one such piece is lost."""
+
+_BROKEN = (requests.ConnectionError, requests.Timeout, requests.exceptions.ChunkedEncodingError)
+"""What `requests` raises when a connection can't be made or breaks off; a server's own fault (5xx) counts as that."""
+
 
 def unpack_zip(archive: Path, folder: Path, top: str) -> None:
     """Unpack an archive.
@@ -68,13 +74,6 @@ def _move(source: Path, target: Path) -> None:
     else:
         target.parent.mkdir(parents=True, exist_ok=True)
         source.replace(target)
-
-
-CHUNK = 2**16
-"""Bytes that are read at once. When a connection breaks off, at most one such piece is lost."""
-
-_BROKEN = (requests.ConnectionError, requests.Timeout, requests.exceptions.ChunkedEncodingError)
-"""What `requests` raises when a connection can't be made or breaks off; a server's own fault (5xx) counts as that."""
 
 
 class ResumingDownloader:

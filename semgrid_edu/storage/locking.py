@@ -1,4 +1,4 @@
-"""One writer at a time: a lock on a folder, which the system gives free when its process ends, however it ends."""
+"""One writer at a time: a lock on a folder, which the system releases when its process ends, however it ends."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -9,7 +9,7 @@ from filelock import FileLock, Timeout
 from semgrid_edu.errors import DataError
 
 LOCK = ".lock"
-"""Name of the file that is locked. It is empty, and only a kill leaves it, which doesn't matter."""
+"""Name of the file that is locked. It is empty; a process that is killed leaves it behind, which does no harm."""
 
 PATIENCE = 1.0
 """Seconds to wait for a lock: when a command is killed, the processes that it had started end a moment later."""

@@ -1,4 +1,4 @@
-"""Provenance: how a result was made, and checksums that show whether it was changed; where shipped results lie."""
+"""Provenance: how a result was made, checksums that show whether it was changed, and where shipped folders lie."""
 
 import platform
 import subprocess
@@ -13,30 +13,8 @@ from semgrid_edu.storage.reading import read_json
 PACKAGE = Path(__file__).resolve().parents[1]
 """The folder of the package."""
 
-
-def shipped_folder(name: str) -> Path:
-    """Return where a shipped folder is.
-
-    Parameters
-    ----------
-    name : str
-        Its name in a clone, such as "data_samples". A wheel holds only the parts that pyproject.toml names.
-
-    Returns
-    -------
-    Path
-        The folder inside the package where there is one, as in a wheel; else the one beside the package.
-
-    Examples
-    --------
-    >>> (shipped_folder("data_samples") / "sample").is_dir()
-    True
-    """
-    inside = PACKAGE / name
-    return inside if inside.is_dir() else PACKAGE.parent / name
-
-
-FILE_NAME = "provenance.json"
+PROVENANCE = "provenance.json"
+"""Name of the file in a folder of results that says how they were made."""
 
 
 def versions(*packages: str) -> dict[str, str]:
@@ -61,7 +39,7 @@ def versions(*packages: str) -> dict[str, str]:
 
 
 def made_by(command: str, *packages: str) -> dict[str, object]:
-    """Return what a result says of its making: the command that repeats it, today's date, and versions.
+    """Return how a result was made: the command that repeats it, today's date, and versions.
 
     Parameters
     ----------
@@ -116,9 +94,55 @@ def write_provenance(folder: str | Path, command: str, seed: int, packages: tupl
     """
     folder = Path(folder)
     write_json(
-        folder / FILE_NAME,
+        folder / PROVENANCE,
         {"command": command, "seed": seed, "versions": versions(*packages), **details, "sha256": _checksums(folder)},
     )
+
+
+def provenance_problems(folder: str | Path) -> list[str]:
+    """Compare the files of a folder with its `provenance.json`.
+
+    Parameters
+    ----------
+    folder : path-like
+        A folder with a `provenance.json`.
+
+    Returns
+    -------
+    list of str
+        One line for each file that is missing, changed or not recorded; empty when all is as it was made.
+    """
+    folder = Path(folder)
+    record = folder / PROVENANCE
+    expected = read_json(record).get("sha256")
+    if not isinstance(expected, dict):
+        raise DataError(record, "a provenance file with checksums by file name", repr(expected)[:200])
+    found = _checksums(folder)
+    changed = sorted(name for name in expected.keys() | found.keys() if expected.get(name) != found.get(name))
+    how = {name: "changed" if name in expected else f"not in {PROVENANCE}" for name in found}
+    return [f"{folder / name}: {how.get(name, 'missing')}" for name in changed]
+
+
+def shipped_folder(name: str) -> Path:
+    """Return where a shipped folder is.
+
+    Parameters
+    ----------
+    name : str
+        Its name in a clone, such as "data_samples". A wheel holds only the parts that pyproject.toml names.
+
+    Returns
+    -------
+    Path
+        The folder inside the package where there is one, as in a wheel; else the one beside the package.
+
+    Examples
+    --------
+    >>> (shipped_folder("data_samples") / "sample").is_dir()
+    True
+    """
+    inside = PACKAGE / name
+    return inside if inside.is_dir() else PACKAGE.parent / name
 
 
 def short_path(weights: str | Path) -> str:
@@ -137,33 +161,9 @@ def short_path(weights: str | Path) -> str:
     return "/".join(Path(weights).resolve().parts[-2:])
 
 
-def provenance_problems(folder: str | Path) -> list[str]:
-    """Compare the files of a folder with its `provenance.json`.
-
-    Parameters
-    ----------
-    folder : path-like
-        A folder with a `provenance.json`.
-
-    Returns
-    -------
-    list of str
-        One line for each file that is missing, changed or not recorded; empty when all is as it was made.
-    """
-    folder = Path(folder)
-    record = folder / FILE_NAME
-    expected = read_json(record).get("sha256")
-    if not isinstance(expected, dict):
-        raise DataError(record, "a provenance file with checksums by file name", repr(expected)[:200])
-    found = _checksums(folder)
-    changed = sorted(name for name in expected.keys() | found.keys() if expected.get(name) != found.get(name))
-    how = {name: "changed" if name in expected else f"not in {FILE_NAME}" for name in found}
-    return [f"{folder / name}: {how.get(name, 'missing')}" for name in changed]
-
-
 def _checksums(folder: Path) -> dict[str, str]:
     files = {path.relative_to(folder): path for path in sorted(folder.rglob("*")) if path.is_file()}
-    left_out = (FILE_NAME, "cache")
+    left_out = (PROVENANCE, "cache")
     return {
         name.as_posix(): sha256(path)
         for name, path in files.items()

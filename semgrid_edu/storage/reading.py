@@ -12,7 +12,7 @@ from PIL import Image
 from semgrid_edu.errors import DataError
 
 PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
-"""The chunk that ends every PNG; decoders don't miss it in a file that was cut short."""
+"""The chunk that ends every PNG. Decoders don't notice when it is missing, so a file that was cut short would pass."""
 
 
 def read_bytes(path: Path) -> bytes:
@@ -164,18 +164,18 @@ def _sixteen_bits(content: bytes) -> NDArray[np.uint16]:
 
 
 def resumable_json(log: str | Path, identity: dict[str, object], key: str, kind: type = dict) -> dict[str, Any]:
-    """Return the parts that are done of a result, which an experiment keeps while it runs to go on after a break.
+    """Return the finished parts of a result that an experiment writes while it runs, to go on from after a break.
 
     Parameters
     ----------
     log : path-like
         The file of a result, finished or not; it may be missing.
     identity : dict
-        What makes the experiment, such as its seed: the file must say the same. JSON must give it back as it is.
+        What distinguishes the experiment, such as its seed: the file must say the same. It has to survive JSON.
     key : str
-        Under which the file keeps its parts.
+        Name under which the file keeps the parts.
     kind : type
-        What every part is.
+        The type of every part.
 
     Returns
     -------

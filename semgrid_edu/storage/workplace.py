@@ -52,7 +52,7 @@ def _end_with_parent() -> None:
 
 @dataclass(frozen=True)
 class Workplace:
-    """What does the work, and how much of it at a time.
+    """What runs tasks, and how many at a time.
 
     Parameters
     ----------

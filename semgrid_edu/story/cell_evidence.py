@@ -32,8 +32,8 @@ class ScanMaps:
     occupied, free : (H, W) float32
         P(z | occupied) and P(z | free) of `Scan.evidence`; equal where the scan says nothing.
     verdict : (H, W) int
-        What the scan says, as an index of `VERDICTS`: nothing; the beam passes the cell from end to end; the ground was
-        seen in it; or an obstacle was hit, which overrules all else.
+        What the scan says, as an index of `VERDICTS`. "silent": nothing. "passed": the beam passes the cell from end to
+        end. "ground": the ground was seen in it. "hit": an obstacle was hit, which overrules the others.
     """
 
     points: NDArray[np.floating]

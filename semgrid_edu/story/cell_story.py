@@ -94,7 +94,7 @@ def cell_story(
     sensor: SensorModel | None = None,
     crf: CrfParams | None = None,
 ) -> CellStory:
-    """Tell what each stage did to one cell of a frame.
+    """Explain what each stage did to one cell of a frame.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def cell_story(
     net : SemanticGridNet
         The network that made the result, in evaluation mode.
     past : sequence of FrameResult
-        The results of earlier frames in the order of time; the last nine of them are told.
+        The results of earlier frames in the order of time; the history shows the last nine of them.
     sensor : SensorModel, optional
         The filter's sensor model, when it wasn't the default one.
     crf : CrfParams, optional
@@ -115,7 +115,7 @@ def cell_story(
     Returns
     -------
     CellStory
-        The parts of all stages.
+        What each stage did, from the scan to the CRF.
 
     Raises
     ------

@@ -15,7 +15,7 @@ from semgrid_edu.networks.backbones.conv_deconv import ConvDeconv
 from semgrid_edu.occupancy import N_STATES
 
 AT_ONCE = 8
-"""How many passes are made together: more would take more memory, and no less time."""
+"""How many passes are made together: more would take more memory, and as much time."""
 
 
 @dataclass(frozen=True, eq=False)

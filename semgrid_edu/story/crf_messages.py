@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.crf import CrfParams, SeparableGaussian, WindowedGaussian, mean_field, unary_from_probability
+from semgrid_edu.crf.accurate import RADIUS
+from semgrid_edu.crf.kernel import gaussian
 from semgrid_edu.errors import ArgumentError
-
-REACH = 4
-"""Neighbours are looked for up to this many widths sigma_alpha away, the window of `WindowedGaussian`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +149,7 @@ def neighbour_messages(Q: NDArray, o: NDArray, params: CrfParams) -> NDArray[np.
 def strongest_neighbours(
     Q: NDArray, labels: NDArray, o: NDArray, params: CrfParams, number: int = 5
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    """Return `NeighbourPull.strongest` of every cell at once.
+    """Return `NeighbourPull.strongest` of every cell at once, among the neighbours in the window of `WindowedGaussian`.
 
     Parameters
     ----------
@@ -169,16 +168,17 @@ def strongest_neighbours(
         k_ij Q_j(l) of each.
     """
     place = np.indices(labels.shape, dtype=np.float32)
-    near, close = place / params.sigma_gamma, np.concatenate([place / params.sigma_alpha, o / params.sigma_beta])
+    features = np.concatenate([place / params.sigma_alpha, o / params.sigma_beta]), place / params.sigma_gamma
     # k_ij of a kernel is exp(-|f_i - f_j|^2 / 2) times a factor of i and one of j, whose squares are its diagonal.
-    alike, beside = (np.sqrt(kernel.diagonal).reshape(labels.shape) for kernel in _kernels(o, params))
-    reach = int(np.ceil(REACH * params.sigma_alpha))
-    padded = [_padded(maps, reach) for maps in (close, alike, near, beside, Q)]
+    factors = [np.sqrt(kernel.diagonal).reshape(labels.shape) for kernel in _kernels(o, params)]
+    reach = int(np.ceil(RADIUS * params.sigma_alpha))
+    padded = [_padded(maps, reach) for maps in (*features, *factors, Q)]
     steps = sorted(product(range(-reach, reach + 1), repeat=2), key=np.linalg.norm)
     pull, which = np.zeros((number, *labels.shape), np.float32), np.zeros((number, *labels.shape), np.int64)
     for k, step in enumerate(steps[1:], start=1):
-        close_j, alike_j, near_j, beside_j, Q_j = (_shifted(maps, reach, step) for maps in padded)
-        weights = alike * alike_j * _gaussian(close, close_j) + beside * beside_j * _gaussian(near, near_j)
+        *others, Q_j = (_shifted(maps, reach, step) for maps in padded)
+        kernels = zip(features, others[:2], factors, others[2:], strict=True)
+        weights = sum(a * a_j * gaussian(np.square(f - f_j).sum(axis=0)) for f, f_j, a, a_j in kernels)
         _insert(pull, which, weights * np.take_along_axis(Q_j, labels[None], axis=0)[0], k)
     return np.moveaxis(np.array(steps)[which], -1, 0), pull
 
@@ -189,17 +189,13 @@ def _kernels(o: NDArray, params: CrfParams) -> tuple[WindowedGaussian, Separable
     return WindowedGaussian.build(o, params), spatial
 
 
-def _gaussian(one: NDArray, other: NDArray) -> NDArray:
-    return np.exp(-0.5 * ((one - other) ** 2).sum(axis=0))
-
-
 def _padded(maps: NDArray, reach: int) -> NDArray:
     """Put zeros around maps (..., H, W): cells beyond the border have no weight."""
     return np.pad(maps, [(0, 0)] * (maps.ndim - 2) + [(reach, reach)] * 2)
 
 
 def _shifted(padded: NDArray, reach: int, step: tuple[int, int]) -> NDArray:
-    """Return for each cell of padded maps what stands so many rows and columns further on."""
+    """Return padded maps shifted by `step`, rows and columns: each cell gets what lies that far further on."""
     rows, cols = (slice(reach + by, size - reach + by) for by, size in zip(step, padded.shape[-2:], strict=True))
     return padded[..., rows, cols]
 

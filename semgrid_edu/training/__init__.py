@@ -1,6 +1,7 @@
 """Learning the weights: batches, loss, loop, checkpoints, devices and processes (paper, section 4.1)."""
 
-from semgrid_edu.training.loop import CHECKPOINT, train
+from semgrid_edu.training.checkpoint import CHECKPOINT
+from semgrid_edu.training.loop import train
 from semgrid_edu.training.loss import Objective, median_frequency_weights, weighted_cross_entropy
 from semgrid_edu.training.params import TrainingParams
 

@@ -129,14 +129,7 @@ def image_scores(net: SemanticGridNet, batch: Batch) -> Tensor:
 
 
 def grid_logits(net: SemanticGridNet, batch: Batch) -> Tensor:
-    """Return the semantic grid of a batch before the soft-max.
-
-    Parameters
-    ----------
-    net : SemanticGridNet
-        The network, on the device of the batch.
-    batch : Batch
-        B frames.
+    """Return the semantic grid of a batch before the soft-max. Parameters are those of `image_scores`.
 
     Returns
     -------

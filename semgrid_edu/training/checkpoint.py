@@ -1,4 +1,4 @@
-"""Checkpoints: a training run that was killed goes on as if it hadn't been (paper, section 4.1)."""
+"""Checkpoints, from which a training run that was killed goes on as if it hadn't been (paper, section 4.1)."""
 
 import json
 from pathlib import Path
@@ -10,7 +10,7 @@ from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.networks import WEIGHTS
 from semgrid_edu.networks.weights import check_tensors
-from semgrid_edu.storage.provenance import FILE_NAME as PROVENANCE
+from semgrid_edu.storage.provenance import PROVENANCE
 from semgrid_edu.storage.reading import parse_json
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
 from semgrid_edu.training.log import LOG

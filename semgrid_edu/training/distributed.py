@@ -102,7 +102,7 @@ def process_total(x: Tensor) -> Tensor:
 
 
 def shared_mean(losses: Tensor, weights: Tensor) -> Tensor:
-    """Return this process's part of a weighted mean over all processes: the mean of the parts is the whole's mean.
+    """Return this process's part of a weighted mean: the mean of all processes' parts is the mean of the whole batch.
 
     Taking the mean over processes is what `DistributedDataParallel` does with gradients. With one process the part is
     the mean, losses / weights.

@@ -59,6 +59,49 @@ class TrainingLog(NamedTuple):
     loss: NDArray[np.float64]
 
 
+def begin_log(path: Path, start: int) -> None:
+    """Begin a log, or continue one from the step `start` on; later steps, which no checkpoint holds, are dropped.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write.
+    start : int
+        Number of the first step to come.
+
+    Raises
+    ------
+    DataError
+        When a step before `start` is missing, or its line isn't one of a log; the message gives the number of the line.
+    """
+    lines = [HEADER]
+    if start:
+        lines = _lines(path)[: start + 1] if path.is_file() else []
+        if len(lines) <= start or not lines[-1].endswith("\n"):
+            raise DataError(path, f"the {start} steps that the checkpoint continues", max(len(lines) - 1, 0) or "none")
+        _steps(path, lines)
+    write_text(path, "".join(lines))
+
+
+def append_step(path: Path, step: Step) -> None:
+    """Add a line to a log; it is in the file at once, so that a running training run can be watched.
+
+    Parameters
+    ----------
+    path : Path
+        The file to add to.
+    step : Step
+        The step that has just been done.
+
+    Raises
+    ------
+    OSError
+        When the file can't be written, for example on a full disk; the error names the file.
+    """
+    with named_errors(path), path.open("a", encoding="utf-8", newline="\n") as log:
+        log.write(f"{step.iteration},{step.stage},{step.learning_rate:.6g},{step.loss:.6g}\n")
+
+
 def read_log(path: str | Path) -> TrainingLog:
     """Read the log of a training run, finished or not.
 
@@ -107,46 +150,3 @@ def _step(path: Path, number: int, line: str) -> Step:
         return Step(int(iteration), stage, float(learning_rate), float(loss))
     except ValueError:
         raise DataError(path, f"{HEADER.strip()} in line {number}", repr(line)) from None
-
-
-def begin_log(path: Path, start: int) -> None:
-    """Begin a log, or continue one from the step `start` on; later steps, which no checkpoint holds, are dropped.
-
-    Parameters
-    ----------
-    path : Path
-        The file to write.
-    start : int
-        Number of the first step to come.
-
-    Raises
-    ------
-    DataError
-        When a step before `start` is missing, or its line isn't one of a log; the message gives the number of the line.
-    """
-    lines = [HEADER]
-    if start:
-        lines = _lines(path)[: start + 1] if path.is_file() else []
-        if len(lines) <= start or not lines[-1].endswith("\n"):
-            raise DataError(path, f"the {start} steps that the checkpoint continues", max(len(lines) - 1, 0) or "none")
-        _steps(path, lines)
-    write_text(path, "".join(lines))
-
-
-def append_step(path: Path, step: Step) -> None:
-    """Add a line to a log; it is in the file at once, so that a running training run can be watched.
-
-    Parameters
-    ----------
-    path : Path
-        The file to add to.
-    step : Step
-        The step that has just been done.
-
-    Raises
-    ------
-    OSError
-        When the file can't be written, for example on a full disk; the error names the file.
-    """
-    with named_errors(path), path.open("a", encoding="utf-8", newline="\n") as log:
-        log.write(f"{step.iteration},{step.stage},{step.learning_rate:.6g},{step.loss:.6g}\n")

@@ -116,8 +116,8 @@ def descend(
     learner : Module
         What learns, on its device.
     objective : callable
-        Name of a stage that begins -> a module: batch -> the two sums whose quotient is the loss, as `Objective`
-        returns them.
+        Called with the name of each stage when it begins. Returns a module: batch -> the two sums whose quotient is the
+        loss, as `Objective` returns them.
     batch : callable
         Number of a step -> what the objective takes, on the same device.
     save : callable
@@ -190,7 +190,7 @@ def _check_finite(step: Step, learning_rate: float) -> None:
 
 
 def _objective(net: SemanticGridNet, stage: str, alpha: Tensor, end_to_end: bool) -> nn.Module:
-    """Return the objective of a stage that begins, after stopping the weights that don't learn in it."""
+    """Return the objective of a stage when it begins, and freeze the weights that don't learn in it."""
     net.train()
     if stage == "grid" and not end_to_end:
         net.segmenter.eval().requires_grad_(False)

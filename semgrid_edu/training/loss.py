@@ -26,7 +26,8 @@ def class_frequencies(maps: Iterable[NDArray], n_classes: int) -> NDArray[np.flo
     Parameters
     ----------
     maps : iterable of (...) int
-        Grids or images of classes. Unlabelled cells, 255, count neither in the upper nor in the lower number.
+        Grids or images of classes. Unlabelled cells, 255, count neither in the numerator nor in the
+        denominator.
     n_classes : int
         C, the number of classes.
 
@@ -173,10 +174,10 @@ def _check_loss_inputs(scores: NDArray, truth: NDArray, alpha: NDArray) -> None:
 
 
 def cross_entropy_sums(scores: Tensor, truth: Tensor, alpha: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the upper and the lower sum of `weighted_cross_entropy`, fast and differentiable (section 4.1).
+    """Return numerator and denominator of `weighted_cross_entropy`, fast and differentiable (section 4.1).
 
-    The loss is their quotient. They are handed out apart because a batch can be shared among processes: its loss is
-    the quotient of the sums over all of them.
+    They are returned separately because a batch can be shared among processes: its loss is the quotient of the sums
+    over all of them.
 
     Parameters
     ----------

@@ -13,8 +13,10 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture, build_net, load_imagenet
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import write_provenance
+from semgrid_edu.training.checkpoint import CHECKPOINT
 from semgrid_edu.training.distributed import first_process_first, process_group, rank, world_size
-from semgrid_edu.training.loop import CHECKPOINT, TrainingParams, train
+from semgrid_edu.training.loop import train
+from semgrid_edu.training.params import TrainingParams
 
 PAPER_IMAGE = (375, 1242)
 """Height and width of KITTI's images, pixels; the paper's networks see them at this size."""

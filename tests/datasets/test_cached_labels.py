@@ -7,7 +7,7 @@ import pytest
 import torch
 from tiny_drive import DATE, write_tiny_dataset
 
-from semgrid_edu.datasets import KittiRawDrive, cached_labels, training_cache
+from semgrid_edu.datasets import KittiRawDrive, training_cache
 from semgrid_edu.datasets.ground_truth import NO_FLAWS, TruthFlaws, TruthPolicy, lidar_truth
 from semgrid_edu.datasets.label_policies import LidarTruth
 from semgrid_edu.datasets.training_set import TrainingSet
@@ -50,7 +50,7 @@ def test_the_truth_is_made_and_the_rest_stays(root):
 
 def test_it_is_made_once(root, monkeypatch):
     first = training(root, EXACT).arrays["truth"]
-    monkeypatch.setattr(cached_labels, "in_each_drive", None)
+    monkeypatch.setattr(training_cache, "in_each_drive", None)
     np.testing.assert_array_equal(training(root, EXACT).arrays["truth"], first)
     for other in (
         replace(EXACT, seed=1),

@@ -6,15 +6,15 @@ import stat
 import pytest
 
 from semgrid_edu.storage import compiled
-from semgrid_edu.storage.compiled import VARIABLE, keep_compiled_functions
+from semgrid_edu.storage.compiled import NUMBA_VARIABLE, keep_compiled_functions
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "getuid"), reason="this system has other rights to files")
 
 
 @pytest.fixture(autouse=True)
 def nothing_set(monkeypatch, tmp_path):
-    monkeypatch.setenv(VARIABLE, "")
-    monkeypatch.delenv(VARIABLE)
+    monkeypatch.setenv(NUMBA_VARIABLE, "")
+    monkeypatch.delenv(NUMBA_VARIABLE)
     monkeypatch.setattr(compiled.tempfile, "gettempdir", lambda: str(tmp_path))
     monkeypatch.setattr(compiled.tempfile, "mkdtemp", lambda prefix: str(tmp_path / f"{prefix}other"))
 
@@ -22,7 +22,7 @@ def nothing_set(monkeypatch, tmp_path):
 def test_a_folder_that_takes_files_is_left_to_numba(tmp_path, monkeypatch):
     monkeypatch.setattr(compiled, "PACKAGE", tmp_path / "package")
     assert keep_compiled_functions() == ""
-    assert VARIABLE not in os.environ
+    assert NUMBA_VARIABLE not in os.environ
 
 
 def test_without_any_a_folder_of_the_user_alone_is_named_in_one_line(tmp_path, monkeypatch):
@@ -32,7 +32,7 @@ def test_without_any_a_folder_of_the_user_alone_is_named_in_one_line(tmp_path, m
     folder = tmp_path / f"semgrid_edu-{os.getuid()}"
     assert str(folder) in said
     assert "\n" not in said
-    assert os.environ[VARIABLE] == str(folder)
+    assert os.environ[NUMBA_VARIABLE] == str(folder)
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
 
 
@@ -42,4 +42,4 @@ def test_a_folder_that_others_can_write_to_is_not_used(tmp_path, monkeypatch):
     folder.mkdir()
     folder.chmod(0o777)
     keep_compiled_functions()
-    assert os.environ[VARIABLE] == str(tmp_path / "semgrid_edu-other")
+    assert os.environ[NUMBA_VARIABLE] == str(tmp_path / "semgrid_edu-other")

@@ -6,7 +6,7 @@ import pytest
 
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import atomic_path, sha256, write_text
-from semgrid_edu.storage.provenance import FILE_NAME, provenance_problems, write_provenance
+from semgrid_edu.storage.provenance import PROVENANCE, provenance_problems, write_provenance
 
 
 def test_a_failed_write_leaves_the_old_file_and_no_litter(tmp_path):
@@ -39,7 +39,7 @@ def recorded(tmp_path):
 
 def test_untouched_files_have_no_problems(recorded):
     assert provenance_problems(recorded) == []
-    record = json.loads((recorded / FILE_NAME).read_text())
+    record = json.loads((recorded / PROVENANCE).read_text())
     assert record["command"] == "semgrid-edu data make"
     assert set(record["versions"]) == {"python", "semgrid_edu", "numpy"}
 
@@ -69,6 +69,6 @@ def test_changed_missing_and_added_files_are_each_named(recorded):
 @pytest.mark.parametrize("content", [None, "", "[]", "{}"])
 def test_a_folder_without_a_readable_record_is_an_error(tmp_path, content):
     if content is not None:
-        write_text(tmp_path / FILE_NAME, content)
-    with pytest.raises(DataError, match=FILE_NAME):
+        write_text(tmp_path / PROVENANCE, content)
+    with pytest.raises(DataError, match=PROVENANCE):
         provenance_problems(tmp_path)

@@ -16,7 +16,7 @@ CLOSE = 0.02
 """How far the logarithm of a sum may be from 0; probabilities kept as float16, or raised by 1e-3 each, are nearer."""
 
 UNITS = {100: "per cent", 255: "255ths"}
-"""Sums of probabilities that aren't given as parts of one."""
+"""What probabilities sum to that are given as percentages or grey levels."""
 
 
 def unary_fault(unary: NDArray) -> Finding | None:

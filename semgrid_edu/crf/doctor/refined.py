@@ -10,7 +10,7 @@ from scipy.special import softmax
 from semgrid_edu.crf.doctor.finding import Finding, finding
 
 FEW = 100
-"""Cells. The grids that are computed by hand may well get one label."""
+"""Cells. A grid smaller than this, such as one computed by hand, may well get a single label."""
 
 
 def refined_fault(refined: NDArray, phi: NDArray) -> Finding | None:

@@ -130,10 +130,8 @@ def oriented_unary(unary: NDArray, grid: tuple[int, int] | None) -> Mended:
     if order is None:
         yield finding("grids differ", shape=unary.shape, grid=grid)
         return None
-    right, name = (
-        np.transpose(unary, order),
-        "rows and columns swapped" if order[0] == 0 else "classes on the wrong axis",
-    )
+    right = np.transpose(unary, order)
+    name = "rows and columns swapped" if order[0] == 0 else "classes on the wrong axis"
     yield finding(name, shape=unary.shape, right=right.shape, order=order)
     return right
 

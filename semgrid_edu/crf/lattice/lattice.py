@@ -135,8 +135,8 @@ class PermutohedralLattice:
         """
         blurred, other = np.zeros((2, len(self.starts), values.shape[1]), np.float32)
         _splat(values, self.starts, self.points, self.splats, blurred)
-        for forth, back in self.neighbours:
-            _blur(blurred, forth, back, other)
+        for forward, backward in self.neighbours:
+            _blur(blurred, forward, backward, other)
             blurred, other = other, blurred
         return blurred
 
@@ -153,6 +153,8 @@ def _scaled(slices, splats, points, scale):
     return scaled_slices, scaled_splats
 
 
+# Threads share out vertices or points; each of these is summed by one thread, in one order, so their number changes
+# nothing.
 @njit(cache=True, parallel=True, fastmath=FAST)
 def _splat(values, starts, points, weights, out):
     """Sum at each vertex what its points add, (M + 1, K); the last row stays zero, for missing neighbours."""
@@ -163,11 +165,11 @@ def _splat(values, starts, points, weights, out):
 
 
 @njit(cache=True, parallel=True, fastmath=FAST)
-def _blur(values, forth, back, out):
+def _blur(values, forward, backward, out):
     """Blur (M + 1, K) values along one direction with (1/4, 1/2, 1/4), given each vertex's two neighbours."""
-    for v in prange(len(forth)):
+    for v in prange(len(forward)):
         for k in range(values.shape[1]):
-            out[v, k] = HALF * (values[v, k] + HALF * (values[forth[v], k] + values[back[v], k]))
+            out[v, k] = HALF * (values[v, k] + HALF * (values[forward[v], k] + values[backward[v], k]))
 
 
 @njit(cache=True, parallel=True, fastmath=FAST)

@@ -40,7 +40,7 @@ def enclosing_simplex_literal(elevated: ArrayLike) -> tuple[list[Vertex], NDArra
     elevated = np.asarray(elevated, dtype=np.float64)
     size = len(elevated)
     origin = size * np.rint(elevated / size).astype(int)
-    excess = origin.sum() // size  # rounding has left the hyperplane by so many steps of `size`
+    excess = origin.sum() // size  # by how many steps of `size` rounding has left the hyperplane
     order = np.argsort(-(elevated - origin), kind="stable")  # the largest residual first
     if excess > 0:
         origin[order[size - excess :]] -= size  # these were rounded up the farthest

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from semgrid_edu.crf.lattice.arithmetic import HALF
 
-FORTH, BACK = 0, 1
+FORWARD, BACKWARD = 0, 1
+"""Index of the vertex one step forward, and of the one a step back, on the second axis of `neighbours`."""
 
 
 def elevation(d: int) -> NDArray[np.float64]:
@@ -55,6 +56,7 @@ def peak(d: int) -> float:
     return (4 * np.pi / 3) ** (d / 2) * np.sqrt(d + 1)
 
 
+# `enclosing_simplex_literal` for one point after the other: compiled, no step needs an array over all points.
 @njit(cache=True, parallel=True)
 def enclosing_simplices(elevated):
     """Find the simplex around each point.
@@ -128,23 +130,24 @@ def responses(simplices, ranks, neighbours):
         From the corner of the row to that of the column.
     """
     n_simplices, size = simplices.shape
-    alive = survivors(neighbours, FORTH), survivors(neighbours, BACK)
+    alive = survivors(neighbours, FORWARD), survivors(neighbours, BACKWARD)
     response = np.zeros((n_simplices, size, size), np.float32)
     for s in prange(n_simplices):
         direction = np.empty(2 * size, np.int32)  # twice, since corner 0 follows corner d
         for j in range(size):
             direction[ranks[s, j]] = direction[ranks[s, j] + size] = j
         for a in range(size):
-            forth, back, weight = alive[FORTH][simplices[s, a]], alive[BACK][simplices[s, a]], np.float32(0.5) ** size
+            forward, backward = alive[FORWARD][simplices[s, a]], alive[BACKWARD][simplices[s, a]]
+            weight = np.float32(0.5) ** size
             response[s, a, a] += weight  # no step at all
-            above, below, steps_forth, steps_back = a, a, 0, 0
+            above, below, steps_forward, steps_backward = a, a, 0, 0
             for steps in range(1, size + 1):
                 above, below = (above + 1 if above < size - 1 else 0), (below - 1 if below > 0 else size - 1)
-                steps_forth |= 1 << direction[2 * size - a - steps]
-                steps_back |= 1 << direction[size - a + steps - 1]
+                steps_forward |= 1 << direction[2 * size - a - steps]
+                steps_backward |= 1 << direction[size - a + steps - 1]
                 weight *= HALF
-                response[s, a, above] += weight * forth[steps_forth]
-                response[s, a, below] += weight * back[steps_back]
+                response[s, a, above] += weight * forward[steps_forward]
+                response[s, a, below] += weight * backward[steps_backward]
     return response
 
 
@@ -157,7 +160,7 @@ def survivors(neighbours, sign):
     neighbours : (d + 1, 2, M) int32
         The vertices one step forward and back along each direction; M where there is none.
     sign : int
-        `FORTH` or `BACK`: steps forward or back.
+        `FORWARD` or `BACKWARD`: steps forward or back.
 
     Returns
     -------

@@ -11,11 +11,11 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from semgrid_edu.crf.lattice.simplices import BACK, FORTH
+from semgrid_edu.crf.lattice.simplices import BACKWARD, FORWARD
 from semgrid_edu.errors import ArgumentError
 
 MOST_DIMENSIONS = 8
-"""Of points: `survivors` holds 2^9 answers for each vertex."""
+"""The largest number of features of a point: with 8, `survivors` holds 2^9 answers for each vertex."""
 
 
 class Vertices(NamedTuple):
@@ -74,7 +74,7 @@ def _fields(origins: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.i
     The last coordinate has no field: it follows from the others, since all of them sum to zero.
     """
     size = origins.shape[1]
-    # Of a corner q_j is up to 1 smaller than of the origin, and of a neighbour by 1 smaller or larger than that.
+    # A corner has q_j up to 1 smaller than the origin, and its neighbours 1 smaller or larger than that.
     lowest, highest = _extent(origins)
     lowest, highest = lowest[:-1] // size - 2, highest[:-1] // size + 1
     bits = np.array([size - 1, *(highest - lowest).tolist()])
@@ -118,9 +118,11 @@ def _capacity(most):
 
 @njit(cache=True, inline="always")
 def _hash(key):
+    """Scatter keys that differ by little: multiply by 2^64 / golden ratio, and take the upper bits (Knuth)."""
     return np.int64((np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(32))
 
 
+# Point by point and on one core, because each new simplex gets the next number.
 @njit(cache=True)
 def _number_simplices(keys, orders):
     """Return the number of each point's simplex, and one point of each simplex, from the integers of `_pack`."""
@@ -191,8 +193,8 @@ def _find_neighbours(keys, slots, units):
         for direction in range(size):
             found = slots[_slot(_forward(keys[v], remainder, direction, units), keys, slots)]
             if found >= 0:
-                neighbours[direction, FORTH, v] = found
-                neighbours[direction, BACK, found] = v
+                neighbours[direction, FORWARD, v] = found
+                neighbours[direction, BACKWARD, found] = v
     return neighbours
 
 

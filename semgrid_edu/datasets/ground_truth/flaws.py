@@ -53,7 +53,7 @@ class TruthFlaws:
     skewed: bool = True
 
     def __post_init__(self) -> None:
-        """Refuse what no error can be."""
+        """Refuse sizes that are negative or infinite, and a probability above 1."""
         for name in ("rotation", "translation", "outline", "small", "missed"):
             value = getattr(self, name)
             if not 0 <= value < np.inf or (name == "missed" and value > 1):

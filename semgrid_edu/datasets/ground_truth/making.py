@@ -61,9 +61,10 @@ def lidar_truth(
 ) -> NDArray[np.uint8]:
     """Make the ground truth of a frame from its image labels, as the paper does.
 
-    Each pixel that a return falls on takes the depth of that return, of several the closest. So it has a place in
-    space, and its label goes to the cell there. Then gaps are closed, and what has no label is unknown-free, -static,
-    -dynamic or -unobserved by its most probable occupancy state. (In the paper a human corrects the result as well.)
+    Each pixel that a return falls on takes the depth of that return, or of the closest if there are several. So it has
+    a place in space, and its label goes to the cell there. Then gaps are closed, and what has no label is unknown-free,
+    -static, -dynamic or -unobserved by its most probable occupancy state. (In the paper a human also corrects the
+    result.)
 
     Parameters
     ----------

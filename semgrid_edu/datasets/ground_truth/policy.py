@@ -23,7 +23,7 @@ class TruthPolicy:
     labels : str
         Which image labels the returns of these other scans. "present": that of the labelled frame, so that one labelled
         image is enough, as in KITTI, where one image in ten has labels. What the camera doesn't see at that instant
-        takes the label of what hides it, unless a return of that lies on the same pixel. "own": the image of the scan's
+        takes the label of what hides it, unless that has a return on the same pixel. "own": the image of the scan's
         own instant, so that all frames of the window need labels.
     movers : str
         What happens to returns from moving things in these other scans. "smeared": nothing, so that they stay where

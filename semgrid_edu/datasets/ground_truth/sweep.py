@@ -52,7 +52,7 @@ def ego_velocity(frame: Frame, other: Frame) -> EgoVelocity:
 def sweep_times(points: NDArray) -> NDArray[np.float64]:
     """Return when each return was measured, if the scanner turns clockwise and looks ahead when the image is taken.
 
-    So do KITTI's (Geiger et al., 2013: the scanner triggers the cameras when it faces forward).
+    KITTI's scanner does (Geiger et al., 2013: it triggers the cameras when it faces forward).
 
     Parameters
     ----------
@@ -74,10 +74,10 @@ def sweep_times(points: NDArray) -> NDArray[np.float64]:
 
 
 def deskew_scan(points: NDArray, velocity: EgoVelocity) -> NDArray:
-    """Give all returns of a scan in the frame of the LIDAR at the instant of the image.
+    """Move all returns of a scan to the frame that the LIDAR had at the instant of the image.
 
     In t seconds the vehicle moves by v t and turns by w t, so a return p becomes R(w t) p + v t. What moves by itself
-    stays bent: its motion isn't known.
+    stays skewed: its motion isn't known.
 
     Parameters
     ----------
@@ -98,9 +98,9 @@ def deskew_scan(points: NDArray, velocity: EgoVelocity) -> NDArray:
 
 
 def skew_scan(points: NDArray, velocity: EgoVelocity) -> NDArray:
-    """Bend a scan that was taken at one instant as if a scanner on a moving vehicle had recorded it.
+    """Skew a scan that was taken at one instant, as if a scanner on a moving vehicle had recorded it.
 
-    The inverse of `deskew_scan` but for a small error: the time of a return is that of its direction before bending.
+    The inverse of `deskew_scan` but for a small error: a return gets the time of its direction before it is skewed.
 
     Parameters
     ----------

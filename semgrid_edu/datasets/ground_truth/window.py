@@ -108,7 +108,7 @@ def _with_classes(frame: Frame, points: NDArray[np.float32]) -> NDArray[np.float
 
 
 def _scan(frames: list[Frame], k: int, deskew: bool) -> NDArray[np.float32]:
-    """Return the scan of a frame, de-skewed if so wished, by its motion since the frame before or to the one after."""
+    """Return the scan of a frame; de-skewed, if asked for, by the motion since the frame before or to the one after."""
     if not deskew:
         return frames[k].points
     if len(frames) < 2:

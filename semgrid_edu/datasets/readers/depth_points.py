@@ -1,4 +1,7 @@
-"""Points with classes seen from above; a depth image as such points, as sparse as a LIDAR's if wished (section 4)."""
+"""From labelled points to bird's-eye classes, and from a depth image to such points (section 4).
+
+The readers of data sets whose truth isn't given from above use both: SYNTHIA has depth images, SemanticKITTI has scans.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +13,12 @@ from semgrid_edu.labels import IGNORE, LabelSet
 CLEARANCE = 2.5
 """Metres above the lowest point of a cell from which on a point hangs over what stands there: the top of a vehicle,
 up to which `SensorModel` counts returns as obstacles too."""
+
+LIDAR_ROW_STEP, LIDAR_COL_STEP = 4, 2
+"""Every fourth row and every second column makes a depth image about as sparse as a LIDAR scan."""
+
+DEPTH_RANGE = 80.0
+"""Metres up to which a depth image is used: what a LIDAR reaches on most surfaces."""
 
 
 def birdseye_votes(
@@ -48,17 +57,10 @@ def birdseye_votes(
     return label_set.most_voted(votes.reshape(len(label_set), *spec.shape), otherwise=IGNORE)
 
 
-LIDAR_ROW_STEP, LIDAR_COL_STEP = 4, 2
-"""Every fourth row and every second column makes a depth image about as sparse as a LIDAR scan."""
-
-DEPTH_RANGE = 80.0
-"""Metres up to which a depth image is used: what a LIDAR reaches on most surfaces."""
-
-
 def points_from_depth(
     depth: NDArray, camera: Camera, row_step: int = 1, col_step: int = 1
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """Carry the pixels of a depth image that lie within `DEPTH_RANGE` back to space.
+    """Return the points in space that the pixels of a depth image show, up to `DEPTH_RANGE`.
 
     Parameters
     ----------

@@ -10,16 +10,35 @@ from semgrid_edu.datasets.readers.oxts import mercator_pose, mercator_scale
 from semgrid_edu.errors import DataError
 
 SHORT_SCAN = 0.6
-"""Share of the size of a drive's median scan below which a scan was probably cut short: sound ones differ less."""
+"""A scan smaller than this share of the drive's median scan was probably cut short: sound ones differ less."""
 
 FEWEST_RETURNS = 100
-"""Number of returns that the scan of any street has, even that of a LIDAR with 16 beams."""
+"""Any scan of a street has this many returns, even that of a LIDAR with 16 beams."""
 
 RETURN = 16
 """Bytes of a return on disk: four floats."""
 
 FASTEST = 100.0
-"""Metres a second that no car drives."""
+"""Metres per second. No car drives faster."""
+
+_UNSYNCED = (
+    "unsynchronised drives (_extract), whose images are neither rectified nor taken together with the scans: fetch the "
+    "archives whose names end in _sync"
+)
+
+LAYOUTS = {
+    "*/*_drive_*_extract": _UNSYNCED,
+    "*_drive_*_extract": _UNSYNCED,
+    "*_drive_*_sync": "the drives of one day: give the folder above it, which holds the dates",
+    "velodyne_points": "one drive: give the folder two levels above it, which holds the dates",
+    "*/*/*_drive_*_sync": "a folder above the one that holds the dates: give that one",
+    "sequences/*/velodyne": "KITTI odometry or SemanticKITTI: SemanticKittiSequence reads it, from Python",
+    "sequences/*/image_2": "KITTI odometry: fetch its scans too, or the raw drives",
+    "training/velodyne": "KITTI tracking or object detection: KittiTrackingRun reads tracking, from Python",
+    "data_3d_raw": "KITTI-360, which keeps calibration and times in other files: it has no reader here",
+    "v1.0-*": "nuScenes, which keeps scans and calibration in other files: it has no reader here",
+}
+"""What is mistaken for KITTI's raw layout, and what to do, by a pattern for `Path.glob`; the surest sign first."""
 
 
 def short_scans(paths: Iterable[Path]) -> list[str]:
@@ -48,7 +67,7 @@ def short_scans(paths: Iterable[Path]) -> list[str]:
 
 
 def jumps(packets: Mapping[Path, NDArray], seconds: NDArray) -> list[str]:
-    """Name the packets that no car can have got to since the packet before.
+    """Name the packets whose place no car can have reached since the packet before.
 
     Parameters
     ----------
@@ -76,28 +95,8 @@ def jumps(packets: Mapping[Path, NDArray], seconds: NDArray) -> list[str]:
     ]
 
 
-_UNSYNCED = (
-    "unsynchronised drives (_extract), whose images are neither rectified nor taken together with the scans: fetch the "
-    "archives whose names end in _sync"
-)
-
-LAYOUTS = {
-    "*/*_drive_*_extract": _UNSYNCED,
-    "*_drive_*_extract": _UNSYNCED,
-    "*_drive_*_sync": "the drives of one day: give the folder above it, which holds the dates",
-    "velodyne_points": "one drive: give the folder two levels above it, which holds the dates",
-    "*/*/*_drive_*_sync": "a folder above the one that holds the dates: give that one",
-    "sequences/*/velodyne": "KITTI odometry or SemanticKITTI: SemanticKittiSequence reads it, from Python",
-    "sequences/*/image_2": "KITTI odometry: fetch its scans too, or the raw drives",
-    "training/velodyne": "KITTI tracking or object detection: KittiTrackingRun reads tracking, from Python",
-    "data_3d_raw": "KITTI-360, which keeps calibration and times in other files: it has no reader here",
-    "v1.0-*": "nuScenes, which keeps scans and calibration in other files: it has no reader here",
-}
-"""What is mistaken for KITTI's raw layout and what to do, by a path in it for `Path.glob`; the surest sign first."""
-
-
 def what_is(folder: Path) -> str:
-    """Say what a folder is that holds no drives in KITTI's raw layout where they are looked for.
+    """Say what a folder looks like in which no drives in KITTI's raw layout were found, and what to do.
 
     Parameters
     ----------
@@ -107,6 +106,6 @@ def what_is(folder: Path) -> str:
     Returns
     -------
     str
-        What it looks like and what to do, one of the advices of `LAYOUTS`; empty when it looks like none of them.
+        One of the texts of `LAYOUTS`; empty when it looks like none of them.
     """
     return next((advice for pattern, advice in LAYOUTS.items() if any(folder.glob(pattern))), "")

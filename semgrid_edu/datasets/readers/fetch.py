@@ -26,14 +26,14 @@ _CALIBRATION = ("calib_cam_to_cam.txt", "calib_velo_to_cam.txt", "calib_imu_to_v
 
 
 def fetch_kitti(folder: str | Path, drive: str, source: str = KITTI_SOURCE) -> KittiRawDrive:
-    """Get a drive and the calibration of its day, unless they are there.
+    """Fetch a drive and the calibration of its day, unless they are on disk already.
 
     Archives go to the folder archives and may be deleted afterwards. An archive that lies there already is unpacked
     without any network. A download that breaks off goes on when the function is called again.
 
     KITTI publishes no checksums. So the first archive of a name is trusted, once every file in it has passed the
     archive's own checksums, and its SHA-256 is written to archives/registry.txt. From then on an archive of this name
-    must have it. Write a checksum there that you know from elsewhere, and it holds from the first download on.
+    must have it. If you know a checksum from elsewhere, write it there, and it is checked from the first download on.
 
     Parameters
     ----------

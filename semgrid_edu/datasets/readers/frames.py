@@ -22,31 +22,6 @@ LIDAR_RANGE = 250.0
 """Largest coordinate of a return, metres. KITTI's HDL-64E sees 120 m, so what lies twice as far is no measurement."""
 
 
-def read_scan(path: Path) -> NDArray[np.float32]:
-    """Read the returns of one scan.
-
-    Parameters
-    ----------
-    path : Path
-        A file of little-endian floats, four for each return.
-
-    Returns
-    -------
-    (N, 4) float32
-        x forward, y left, z up in the LIDAR frame (metres), and reflectance.
-    """
-    content = read_bytes(path)
-    if len(content) % 16:
-        raise DataError(path, "points of 4 x 4 bytes", f"{len(content)} bytes, {len(content) % 16} too many")
-    points = np.frombuffer(content, dtype="<f4").reshape(-1, 4).astype(np.float32)
-    strange = ~(np.abs(points[:, :3]) <= LIDAR_RANGE).all(axis=1) | ~np.isfinite(points[:, 3])
-    if strange.any():
-        first = strange.argmax()
-        expected = f"finite coordinates within {LIDAR_RANGE:g} m and a finite reflectance"
-        raise DataError(path, expected, f"{points[first].tolist()} at point {first}")
-    return points
-
-
 class LabelledDrive(Protocol):
     """What training and scoring ask of a drive: frames, and the truth of some of them.
 
@@ -85,6 +60,9 @@ class LabelledDrive(Protocol):
 
     def files(self) -> list[Path]:
         """Return the files that the frames are read from: when one changes, what was made of the drive is stale."""
+
+    def doubts(self) -> list[str]:
+        """List what is doubtful about the drive, as far as it can be seen without reading the frames."""
 
 
 class FrameSequence(Sequence[Frame]):
@@ -137,7 +115,7 @@ class FrameSequence(Sequence[Frame]):
         return [path for path in self.folder.rglob("*.*") if path.is_file()]
 
     def doubts(self) -> list[str]:
-        """List what is doubtful, as far as it can be seen without reading the frames; a reader may know something."""
+        """List nothing. A reader that knows what may be doubtful about its drives overrides this."""
         return []
 
     @abstractmethod
@@ -145,8 +123,33 @@ class FrameSequence(Sequence[Frame]):
         """Read frame k, 0 <= k < len(self)."""
 
 
+def read_scan(path: Path) -> NDArray[np.float32]:
+    """Read the returns of one scan.
+
+    Parameters
+    ----------
+    path : Path
+        A file of little-endian floats, four for each return.
+
+    Returns
+    -------
+    (N, 4) float32
+        x forward, y left, z up in the LIDAR frame (metres), and reflectance.
+    """
+    content = read_bytes(path)
+    if len(content) % 16:
+        raise DataError(path, "points of 4 x 4 bytes", f"{len(content)} bytes, {len(content) % 16} too many")
+    points = np.frombuffer(content, dtype="<f4").reshape(-1, 4).astype(np.float32)
+    strange = ~(np.abs(points[:, :3]) <= LIDAR_RANGE).all(axis=1) | ~np.isfinite(points[:, 3])
+    if strange.any():
+        first = strange.argmax()
+        expected = f"finite coordinates within {LIDAR_RANGE:g} m and a finite reflectance"
+        raise DataError(path, expected, f"{points[first].tolist()} at point {first}")
+    return points
+
+
 def count_frames(folder: Path, what: str, suffix: str) -> int:
-    """Return how many frames a drive has whose files are numbered with six digits, such as 000000.png.
+    """Count the frames of a drive whose files are numbered with six digits, such as 000000.png.
 
     Parameters
     ----------
@@ -187,12 +190,12 @@ def visible_labels(labels: FrameLabels, spec: GridSpec) -> NDArray[np.uint8]:
 
 
 def nothing_known(label_set: LabelSet, image_size: tuple[int, int]) -> FrameLabels:
-    """Return labels that say nothing, in which a reader replaces what its data set knows.
+    """Return labels that say nothing; a reader then replaces the fields that its data set knows.
 
     Parameters
     ----------
     label_set : LabelSet
-        The classes of what is replaced.
+        The classes of the fields that are replaced.
     image_size : (int, int)
         Height and width of the image, pixels.
 

@@ -154,8 +154,8 @@ class KittiRawDrive(FrameSequence):
         Returns
         -------
         list of str
-            One line for each scan that is missing between others or was probably cut short, and for each pose that no
-            car can have got to since the one before; it names the file.
+            One line, which names the file, for each scan that is missing between others or was probably cut short, and
+            for each pose that no car can have reached since the one before.
         """
         scans, packets, known = [self._file("velodyne_points", k, ".bin") for k in range(len(self))], {}, []
         for k in range(len(self)):

@@ -1,4 +1,4 @@
-"""KITTI's times, and poses from its GPS and inertial packets (OXTS) by the Mercator projection (section 4)."""
+"""KITTI's timestamps, and poses from its GPS and inertial packets (OXTS) by the Mercator projection (section 4)."""
 
 import re
 from pathlib import Path
@@ -12,6 +12,13 @@ from semgrid_edu.errors import DataError
 from semgrid_edu.storage.reading import parse_numbers, read_text
 
 _STAMP = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{9}")
+
+
+EARTH_RADIUS = 6378137.0
+"""Radius of the Earth at the equator, metres (WGS 84), as the KITTI development kit takes it."""
+
+PACKET_FIELDS = 30
+"""How many numbers a packet has; dataformat.txt of a drive names them."""
 
 
 def read_timestamps(path: Path, n_frames: int) -> NDArray[np.datetime64]:
@@ -51,13 +58,6 @@ def _parse(path: Path, number: int, line: str) -> np.datetime64:
     except ValueError:
         pass
     raise DataError(path, "times like 2011-09-26 13:10:51.168593664", f"{line!r} in line {number}")
-
-
-EARTH_RADIUS = 6378137.0
-"""Radius of the Earth at the equator, metres (WGS 84), as the KITTI development kit takes it."""
-
-PACKET_FIELDS = 30
-"""How many numbers a packet has; dataformat.txt of a drive names them."""
 
 
 def read_packet(path: Path) -> NDArray[np.float64]:

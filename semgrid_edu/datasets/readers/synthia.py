@@ -58,6 +58,21 @@ SYNTHIA_CLASSES = ClassTable(
 SYNTHIA_CAMERA_AXES = np.diag([1.0, -1.0, -1.0])
 """(3, 3): from this package's camera axes (x right, y down, z ahead) to the axes of SYNTHIA's poses."""
 
+VIEW = "Stereo_Left/Omni_F"
+"""The camera that is read."""
+
+SYNTHIA_PERIOD = 0.2
+"""Seconds between frames: the readme says 5 a second."""
+
+GROUND_RANGE = 20.0
+"""Metres ahead. Road in the first image that is closer shows how high the camera stands."""
+
+STANDING, MOSTLY = 0.05, 0.9
+"""Metres a frame below which a camera stands; the share of a step that a driving camera goes ahead (median)."""
+
+_CAMERA_FROM_LIDAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+"""From axes that point forward, left and up to the axes of a camera."""
+
 
 def read_synthia_labels(path: Path, size: tuple[int, int] | None) -> NDArray[np.uint8]:
     """Read the class of each pixel.
@@ -135,22 +150,6 @@ def read_synthia_pose(path: Path) -> NDArray[np.float64]:
         raise DataError(path, "16 numbers, every fourth of which is 0, 0, 0, 1", numbers.tolist())
     T = numbers.reshape(4, 4).T
     return rigid_transform(check_rotation(path, T[:3, :3], "the pose") @ SYNTHIA_CAMERA_AXES, T[:3, 3])
-
-
-VIEW = "Stereo_Left/Omni_F"
-"""The camera that is read."""
-
-SYNTHIA_PERIOD = 0.2
-"""Seconds between frames: the readme says 5 a second."""
-
-GROUND_RANGE = 20.0
-"""Metres ahead. Road in the first image that is closer shows how high the camera stands."""
-
-STANDING, MOSTLY = 0.05, 0.9
-"""A camera that moves less far than this (metres a frame) stands; one that drives goes this share of its way ahead."""
-
-_CAMERA_FROM_LIDAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
-"""From axes that point forward, left and up to the axes of a camera."""
 
 
 class SynthiaSequence(FrameSequence):

@@ -1,4 +1,8 @@
-"""The conv-deconv network: down by max-pooling, up by the indices it kept (paper, sections 3.1 and 3.4, Fig. 5)."""
+"""The conv-deconv network: down by max-pooling, up by the indices it kept (paper, sections 3.1 and 3.4, Fig. 5).
+
+The image network SegNet and the fusion network are both built from it. Below it stands how every network of the
+package draws its first weights from a seed.
+"""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -103,7 +107,7 @@ def _layers(channels: list[int], plain_end: bool = False) -> list[nn.Module]:
 
 @contextmanager
 def fresh_weights(net: nn.Module, seed: int) -> Iterator[None]:
-    """Make layers inside the block, and their weights depend on the seed alone.
+    """Let the first weights of the layers that are made in the block depend on the seed alone.
 
     PyTorch's layers draw their first weights from the global generator of the CPU when they are made. In the block
     that generator starts from the seed; after it, it is as it was before. Then `initialise` draws the convolutions'

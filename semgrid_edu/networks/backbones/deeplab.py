@@ -19,17 +19,15 @@ class DeepLab(Segmenter):
     map side by side, each with its own reach, and their scores are summed. Bilinear interpolation takes the sum to the
     size of the image.
 
+    The other Parameters are those of `Segmenter`.
+
     Parameters
     ----------
-    n_classes : int
-        C, the number of classes that are scored.
     preset : str
         "paper" is ResNet-101 with rates 6, 12, 18, 24. "compact" has the same stages, narrow and shallow, a third of
         the rates, and a quarter of the summed scores (see the notes). Its rates are smaller because it sees images
         scaled down to about a quarter: the map has 12 rows of cells, and a kernel of rate 12 would have only
         one of its three rows inside the map.
-    seed : int
-        Seed for the initial weights.
 
     Notes
     -----
@@ -52,10 +50,10 @@ class DeepLab(Segmenter):
     def build(self, n_classes: int, width: int, depths: tuple[int, ...], rates: tuple[int, ...], scale: float) -> None:
         """Make the ResNet and one classifier per rate.
 
+        The other Parameters are those of `Segmenter.build`.
+
         Parameters
         ----------
-        n_classes : int
-            C, the number of classes that are scored.
         width : int
             Number of channels of the ResNet's stem.
         depths : (4,) int

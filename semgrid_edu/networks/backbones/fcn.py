@@ -17,22 +17,20 @@ class Fcn(Segmenter):
     scores of pool4 at 1/16, upsampled twofold again and added to those of pool3 at 1/8, and upsampled eightfold to
     the image: hence "8s". Upsampling is bilinear and fixed, as in the authors' released networks.
 
+    The other Parameters are those of `Segmenter`.
+
     Parameters
     ----------
-    n_classes : int
-        C, the number of classes that are scored.
     preset : str
         "paper" is VGG16 with 4096 channels in conv6 and conv7; "compact" has the same layers, narrow, with batch
         normalisation, without which a network this deep hardly learns from random weights.
-    seed : int
-        Seed for the initial weights.
 
     Notes
     -----
     Three things differ from the publication. Convolutions are padded to keep the size, whereas the publication pads
-    the image by 100 pixels and crops by offsets. Pooling rounds up in both, so every size works, and maps are
-    cropped only at their lower and right ends. Score layers start random, not at zero, so that the first step already
-    teaches the encoder. There is no dropout, because it would draw from a global generator.
+    the image by 100 pixels and crops by offsets. (Pooling rounds up in both, so every size of image works; here maps
+    are cropped only at their lower and right ends.) Score layers start random, not at zero, so that the first step
+    already teaches the encoder. There is no dropout, because it would draw from a global generator.
 
     References
     ----------
@@ -48,10 +46,10 @@ class Fcn(Segmenter):
     def build(self, n_classes: int, widths: tuple[int, ...], hidden: int, batch_norm: bool) -> None:
         """Make VGG16, the hidden layers and the three score layers.
 
+        The other Parameters are those of `Segmenter.build`.
+
         Parameters
         ----------
-        n_classes : int
-            C, the number of classes that are scored.
         widths : (5,) int
             Number of channels in each stage of VGG16.
         hidden : int

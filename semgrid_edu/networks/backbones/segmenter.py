@@ -9,6 +9,10 @@ from torch import Tensor, nn
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks.backbones.conv_deconv import fresh_weights
 
+IMAGENET_MEAN, IMAGENET_STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
+"""Mean and standard deviation of red, green and blue over ImageNet's images, 0..1: weights learnt on ImageNet expect
+inputs that are normalised by them."""
+
 
 def unit_image(image: Tensor) -> Tensor:
     """Scale the bytes of an image to 0..1.
@@ -36,11 +40,6 @@ def unit_image(image: Tensor) -> Tensor:
     if image.dtype != torch.uint8:
         raise ArgumentError("image", "bytes, 0..255, torch.uint8", image.dtype)
     return image / 255
-
-
-IMAGENET_MEAN, IMAGENET_STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
-"""Mean and standard deviation of red, green and blue over ImageNet's images, 0..1: weights learnt on ImageNet expect
-inputs that are normalised by them."""
 
 
 class Segmenter(nn.Module, ABC):

@@ -17,16 +17,14 @@ class SegNet(Segmenter):
     mirrors the encoder: each of its stages puts the values back to these places, then convolves. The last convolution
     gives the scores. `ConvDeconv` is this network; SegNet gives it three channels of an image.
 
+    The other Parameters are those of `Segmenter`.
+
     Parameters
     ----------
-    n_classes : int
-        C, the number of classes that are scored.
     preset : str
         "paper" has VGG16's thirteen convolutions on the way down and thirteen on the way up; "compact" is the same,
         narrow and shallow enough for two cores. Both have two convolutions at full resolution: after unpooling
         three pixels in four are empty, and a single convolution leaves them speckled.
-    seed : int
-        Seed for the initial weights.
 
     References
     ----------
@@ -43,10 +41,10 @@ class SegNet(Segmenter):
     def build(self, n_classes: int, widths: tuple[int, ...], depths: tuple[int, ...]) -> None:
         """Make the encoder and its mirror image, see `ConvDeconv`.
 
+        The other Parameters are those of `Segmenter.build`.
+
         Parameters
         ----------
-        n_classes : int
-            C, the number of classes that are scored.
         widths : (S,) int
             Number of channels in each stage.
         depths : (S,) int

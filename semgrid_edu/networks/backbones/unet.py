@@ -19,21 +19,19 @@ class UNet(Segmenter):
     it by a learnt up-convolution and appends the encoder's map of that size as further channels (the skip connection).
     A 1x1 convolution scores the classes.
 
+    The other Parameters are those of `Segmenter`.
+
     Parameters
     ----------
-    n_classes : int
-        C, the number of classes that are scored.
     preset : str
         "paper" has the published widths, 64 to 1024, and 31,044,366 parameters for 14 classes; "compact" is an
         eighth as wide.
-    seed : int
-        Seed for the initial weights.
 
     Notes
     -----
     This is the padded variant: convolutions keep the size, so the encoder's maps fit without cropping and the scores
     have the size of the image, whereas the publication loses 92 pixels on each side. Each 3x3 convolution is followed
-    by batch normalisation, as in SegNet; the publication has none. It has dropout, which is left out here because it
+    by batch normalisation, as in SegNet; the publication has none. The publication's dropout is left out, because it
     would draw from a global generator. Where a map has an odd side, the last row or column of the up-convolution is
     its bias alone.
 
@@ -50,10 +48,10 @@ class UNet(Segmenter):
     def build(self, n_classes: int, widths: tuple[int, ...]) -> None:
         """Make encoder, up-convolutions, decoder (its finest stage first) and the final 1x1 convolution.
 
+        The other Parameters are those of `Segmenter.build`.
+
         Parameters
         ----------
-        n_classes : int
-            C, the number of classes that are scored.
         widths : (S,) int
             Number of channels in each stage.
         """

@@ -15,7 +15,7 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.networks import load_net
 from semgrid_edu.storage.files import sha256, write_json
-from semgrid_edu.storage.provenance import FILE_NAME, made_by, short_path
+from semgrid_edu.storage.provenance import PROVENANCE, made_by, short_path
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.workshop.scoring.evaluate import scores, scores_table
 from semgrid_edu.workshop.studies.crf.crf_scores import (
@@ -248,7 +248,7 @@ def _identity(validation_dir: str | Path, dataset_dir: str | Path, weights: str 
     named = {
         name: {"name": load_index(folder).name, "sha256": sha256(folder / INDEX_FILE)} for name, folder in data.items()
     }
-    record = Path(weights).with_name(FILE_NAME)
+    record = Path(weights).with_name(PROVENANCE)
     trained_on = read_json(record).get("dataset") if record.exists() else None
     used = {"file": short_path(weights), "sha256": sha256(weights), "trained on": trained_on}
     return named | {"weights": used, "seed": seed}

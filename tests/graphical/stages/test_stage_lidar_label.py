@@ -6,7 +6,7 @@ from scipy.stats import binom
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.stage_models import LabelWorld, made_label_stage, wrong_label
+from semgrid_edu.stage_models import LabelWorld, lidar_label_stage, wrong_label
 from semgrid_edu.stage_models.ground_truth_label import MADE
 
 
@@ -31,14 +31,14 @@ def test_where_what_stands_wins_one_wrong_return_makes_road_a_car(content, wrong
 
 
 def test_given_what_stands_there_returns_depend_on_each_other_through_the_calibration():
-    model = made_label_stage().model
+    model = lidar_label_stage().model
     assert not d_separated(model, "x1", "x2", given=("m",))
     assert d_separated(model, "x1", "x2", given=("m", "c"))
     assert d_separated(model, "o", "x1", given=("m",))
 
 
 def test_a_cell_without_a_vote_is_unknown_by_its_state():
-    lost = eliminate(made_label_stage(LabelWorld(2, lost=1.0)).model, ("o", "y")).table
+    lost = eliminate(lidar_label_stage(LabelWorld(2, lost=1.0)).model, ("o", "y")).table
     for state, name in enumerate(("free", "static", "dynamic", "unobserved")):
         found = lost[state] / lost[state].sum()
         assert found[MADE.index(KITTI_14.index(f"unknown-{name}"))] == pytest.approx(1)
