@@ -154,7 +154,9 @@ def runs_of_claims(scale: Scale, seeds: int) -> ClaimRuns:
     return ClaimRuns(
         networks=networks,
         new_routes=[ScoreRun(scale.grid_stage(scale.chroma, "segnet", seed), routes) for seed in every],
-        perfect=[ScoreRun(scale.grid_stage(scale.synthia, "segnet", seed, "true"), perfect, crf=False) for seed in every],
+        perfect=[
+            ScoreRun(scale.grid_stage(scale.synthia, "segnet", seed, "true"), perfect, crf=False) for seed in every
+        ],
         overturned=[OverturnedRun(run.network, lying) for run in usual],
         overturned_blind=[OverturnedRun(run.network, lying) for run in blind],
         unreduced=unreduced,
