@@ -37,8 +37,8 @@ SEARCHED = {
     "deeplab": (1.2656, CrfParams(1.32, 2.36, 18.7, 0.873, 0.957)),
 }
 """For each image network the temperature and the CRF's parameters that `semgrid-edu search-crf` chose for pixel
-accuracy on validation drives, with the shipped network of that kind (docs/results/crf_search*.json). A network for which
-nothing was searched is scored without them."""
+accuracy on validation drives, with the shipped network of that kind (docs/results/crf_search*.json). A network for
+which nothing was searched is scored without them."""
 
 GEOMETRY, TRUE_GEOMETRY, FLAT_GROUND = "geometry", "geometry with true image labels", "flat ground"
 """Image labels carried by the LIDAR's depth with gaps closed, from the image network and true ones; and image labels
