@@ -64,7 +64,7 @@ def variant_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
         Number of seeds.
     """
     found = {
-        name: [scale.scored(scale.kitti, "segnet", seed, variant=variant, crf=False) for seed in range(seeds)]
+        name: scale.scored(scale.kitti, "segnet", seeds, variant=variant, crf=False)
         for name, variant in VARIANTS.items()
     }
     return found | {"learned from true labels": learned_from("true", table1_runs(scale, seeds)["segnet"], scale)}
@@ -88,8 +88,7 @@ def small_set_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
     """Return the runs of Table 1's networks on a part of the frames. Parameters are those of `variant_runs`."""
     n_frames = max(scale.frames_to_train // FEW, 6)
     return {
-        segmenter: [scale.scored(scale.kitti, segmenter, seed, n_frames=n_frames, crf=False) for seed in range(seeds)]
-        for segmenter in NETWORKS
+        segmenter: scale.scored(scale.kitti, segmenter, seeds, n_frames=n_frames, crf=False) for segmenter in NETWORKS
     }
 
 

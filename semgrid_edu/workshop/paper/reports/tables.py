@@ -112,7 +112,7 @@ def accuracy_result(
             {
                 "network": name,
                 "CRF": crf,
-                "paper": paper[name, crf],
+                "paper": paper.get((name, crf), dict.fromkeys(METRICS)),
                 "scores": scores_by_truth(scored, root, method),
                 "confusion": {t: by_seed(scored, root, method, t).sum(axis=(0, 1)).tolist() for t in TRUTHS},
             }

@@ -25,7 +25,7 @@ def table1_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
     seeds : int
         Number of seeds.
     """
-    return {name: [scale.scored(scale.kitti, name, seed) for seed in range(seeds)] for name in scale.networks}
+    return {name: scale.scored(scale.kitti, name, seeds) for name in scale.networks}
 
 
 def table1_baselines(scale: Scale, seeds: int) -> list[BaselineRun]:
@@ -38,7 +38,7 @@ def table2_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
 
     Parameters and result are those of `table1_runs`.
     """
-    return {"segnet": [scale.scored(scale.chroma, "segnet", seed) for seed in range(seeds)]}
+    return {"segnet": scale.scored(scale.chroma, "segnet", seeds)}
 
 
 def table3_runs(scale: Scale, seeds: int) -> list[ScoreRun]:
@@ -46,7 +46,7 @@ def table3_runs(scale: Scale, seeds: int) -> list[ScoreRun]:
 
     Parameters are those of `table1_runs`.
     """
-    return [scale.scored(scale.synthia, "segnet", seed, "true", crf=False) for seed in range(seeds)]
+    return scale.scored(scale.synthia, "segnet", seeds, "true", crf=False)
 
 
 def figure_runs(scale: Scale, seeds: int) -> list[FigureRun]:
@@ -60,8 +60,8 @@ def figure_runs(scale: Scale, seeds: int) -> list[FigureRun]:
         Not used: pictures are of one network.
     """
     data = {scale.kitti: "lidar", scale.synthia: "true"}
-    scored = [scale.scored(name, "segnet", 0, truth) for name, truth in data.items()]
-    return [FigureRun(run.network, run.frames) for run in scored]
+    scored = [scale.scored(name, "segnet", 1, truth) for name, truth in data.items()]
+    return [FigureRun(run.network, run.frames) for (run,) in scored]
 
 
 def shown_frames(scale: Scale, seeds: int, root: Path) -> dict:
@@ -145,7 +145,7 @@ def runs_of_claims(scale: Scale, seeds: int) -> ClaimRuns:
     networks = table1_runs(replace(scale, networks=tuple(NETWORKS)), all_seeds)
     usual = networks["segnet"][:seeds]
     blind, unreduced = (
-        [scale.scored(scale.kitti, "segnet", seed, variant=variant, crf=False) for seed in every]
+        scale.scored(scale.kitti, "segnet", seeds, variant=variant, crf=False)
         for variant in (Variant(occupancy=False), Variant(reduces=False))
     )
     routes = scale.arrays(scale.chroma_routes, "test", "lidar")
