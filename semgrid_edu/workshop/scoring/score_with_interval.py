@@ -61,8 +61,8 @@ def on_cells(confusions: NDArray, cells: str, label_set: LabelSet) -> NDArray[np
 
     Parameters
     ----------
-    confusions : (S, V, C, C) int
-        By seed and drive, see `drive_interval`.
+    confusions : (..., C, C) int
+        One matrix or several, such as those by seed and drive.
     cells : str
         "all", or "semantic" for those whose truth is a semantic class.
     label_set : LabelSet
@@ -70,34 +70,35 @@ def on_cells(confusions: NDArray, cells: str, label_set: LabelSet) -> NDArray[np
 
     Returns
     -------
-    (S, V, C, C) int
+    (..., C, C) int
     """
     if cells == "all":
         return confusions
-    flat = confusions.reshape(-1, *confusions.shape[2:])
+    flat = confusions.reshape(-1, *confusions.shape[-2:])
     return np.stack([semantic_cells(matrix, label_set) for matrix in flat]).reshape(confusions.shape)
 
 
-def all_metrics(confusions: NDArray, label_set: LabelSet) -> dict[str, dict[str, ScoreWithInterval]]:
-    """Return every metric over all cells and over those with a semantic class.
+def every_metric(
+    score: Callable[..., object], label_set: LabelSet, *confusions: NDArray
+) -> dict[str, dict[str, object]]:
+    """Return a score by every metric, over all cells and over those with a semantic class.
 
     Parameters
     ----------
-    confusions : (S, V, C, C) int
-        By seed and drive, see `drive_interval`.
+    score : callable
+        Takes the confusion matrices and a metric: `score_with_interval` or, for two methods, `compared`.
     label_set : LabelSet
         The classes.
+    *confusions : (..., C, C) int
+        What `score` takes before the metric.
 
     Returns
     -------
     dict
         By cells, "all" or "semantic", and by metric.
     """
-    kept = {cells: on_cells(confusions, cells, label_set) for cells in ("all", "semantic")}
-    return {
-        cells: {name: score_with_interval(matrices, metric) for name, metric in METRICS.items()}
-        for cells, matrices in kept.items()
-    }
+    kept = {cells: [on_cells(one, cells, label_set) for one in confusions] for cells in ("all", "semantic")}
+    return {cells: {name: score(*some, metric) for name, metric in METRICS.items()} for cells, some in kept.items()}
 
 
 def shown(value: ScoreWithInterval, digits: int = 1) -> str:

@@ -7,8 +7,8 @@ import numpy as np
 
 from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.metrics import METRICS, pixel_accuracy
-from semgrid_edu.workshop.paper.reports.tables import differences_by_truth, score_cells, scores_by_truth
+from semgrid_edu.metrics import pixel_accuracy
+from semgrid_edu.workshop.paper.reports.tables import beside_usual, beside_usual_table
 from semgrid_edu.workshop.paper.reports.truth_costs import learned_from
 from semgrid_edu.workshop.paper.runs.claim_runs import table1_runs
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
@@ -135,7 +135,7 @@ def ablations(scale: Scale, seeds: int, root: Path) -> dict:
 
 def _row(what: str, runs: Sequence[ScoreRun], usual: Sequence[ScoreRun], root: Path) -> dict:
     """Return the scores of a variant and its differences from the usual network, by truth, cells and metric."""
-    return {"what": what, "scores": scores_by_truth(runs, root), "differences": differences_by_truth(runs, usual, root)}
+    return {"what": what, **beside_usual(runs, usual, root)}
 
 
 def _band(band: str, usual: Sequence[ScoreRun], root: Path) -> dict:
@@ -162,20 +162,13 @@ def ablations_markdown(result: dict) -> str:
     result : dict
         From `ablations`.
     """
-    tables = {words: _beside_usual(result[name]) for name, words in SECTIONS.items()}
+    rows = {words: {row["what"]: row for row in result[name]} for name, words in SECTIONS.items()}
+    tables = {words: beside_usual_table("", some, "true", "all") for words, some in rows.items()}
     near = [[row["what"], shown(row["pixel accuracy"])] for row in result["distance"]]
     tables["Accuracy by distance, cells with a semantic class, true labels"] = [["distance", "pixel accuracy"], *near]
     sure = [_calibration_cells(row) for row in result["confidence"]]
     tables["Expected calibration error, points"] = [["", "mean", "every seed"], *sure]
     return "\n\n".join(f"## {words}\n\n{markdown_table(lines)}" for words, lines in tables.items())
-
-
-def _beside_usual(rows: list[dict]) -> list[list[str]]:
-    """Lay out scores by the true labels over all cells, and differences from the usual network, points."""
-    return [["", *METRICS, *(f"{name}, difference" for name in METRICS)]] + [
-        [row["what"], *score_cells(row["scores"]["true"]["all"]), *score_cells(row["differences"]["true"]["all"], 2)]
-        for row in rows
-    ]
 
 
 def _calibration_cells(row: dict) -> list[str]:
