@@ -32,7 +32,7 @@ class Run(ABC):
     is_training : bool
         Whether it is a training run, so that several processes can share its batches (`process_group`).
     trial_seconds : float
-        Seconds that a step took on one core when this was written.
+        Seconds that a step probably takes, for the estimate of a plan: on one core when this was written.
     """
 
     is_training = False
@@ -46,10 +46,6 @@ class Run(ABC):
     def needs(self) -> tuple["Run", ...]:
         """The runs that must have ended before this one starts: by default those among its fields."""
         return tuple(value for field in fields(self) if isinstance(value := getattr(self, field.name), Run))
-
-    def probe(self) -> float:
-        """Return the seconds that a step probably takes, for the estimate of a plan."""
-        return self.trial_seconds
 
     @abstractmethod
     def work(self, root: Path, device: str) -> None:

@@ -116,12 +116,8 @@ def shown(value: ScoreWithInterval, digits: int = 1) -> str:
     >>> shown({"mean": 0.824, "low": 0.812, "high": 0.836, "seeds": [0.824]})
     '82.4 (81.2 to 83.6)'
     """
-    if value["mean"] is None:
-        return "-"
-    mean = f"{100 * value['mean']:.{digits}f}"
-    if value["low"] is None:
-        return mean
-    return f"{mean} ({100 * value['low']:.{digits}f} to {100 * value['high']:.{digits}f})"
+    mean, low, high = (per_cent(value[name], digits) for name in ("mean", "low", "high"))
+    return mean if value["low"] is None else f"{mean} ({low} to {high})"
 
 
 def shown_seeds(value: ScoreWithInterval, digits: int = 1) -> str:
@@ -129,21 +125,23 @@ def shown_seeds(value: ScoreWithInterval, digits: int = 1) -> str:
 
     Parameters are those of `shown`.
     """
-    seeds = ["-" if one is None else f"{100 * one:.{digits}f}" for one in value["seeds"]]
+    seeds = [per_cent(one, digits) for one in value["seeds"]]
     if len(seeds) <= SHOWN_SEEDS:
         return ", ".join(seeds)
     return f"{min(seeds, key=float)} to {max(seeds, key=float)} ({len(seeds)} seeds)"
 
 
-def per_cent(value: float | None) -> str:
+def per_cent(value: float | None, digits: int = 1) -> str:
     """Write a share in per cent.
 
     Parameters
     ----------
     value : float or None
         A share, 0..1; None for a share of nothing.
+    digits : int
+        Digits after the point.
     """
-    return "-" if value is None else f"{100 * value:.1f}"
+    return "-" if value is None else f"{100 * value:.{digits}f}"
 
 
 def markdown_table(rows: list[list[str]]) -> str:

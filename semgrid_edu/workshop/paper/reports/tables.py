@@ -44,21 +44,20 @@ def scores_by_truth(runs: Sequence[CountingRun], root: Path, method: str = NETWO
 
 
 def differences_by_truth(
-    a: Sequence[CountingRun], b: Sequence[CountingRun], root: Path, methods: tuple[str, str] = (NETWORK, NETWORK)
+    root: Path, a: Sequence[CountingRun], b: Sequence[CountingRun], of_a: str = NETWORK, of_b: str = NETWORK
 ) -> dict[str, dict]:
     """Return a minus b in every metric, on the same seeds and drives, by truth, cells and metric.
 
     Parameters
     ----------
-    a, b : sequence of S CountingRun
-        One per seed.
     root : Path
         The folder of all runs.
-    methods : (str, str)
+    a, b : sequence of S CountingRun
+        One per seed.
+    of_a, of_b : str
         The method of a and that of b.
     """
-    pairs = list(zip((a, b), methods, strict=True))
-    counts = {truth: [by_seed(runs, root, method, truth) for runs, method in pairs] for truth in TRUTHS}
+    counts = {truth: (by_seed(a, root, of_a, truth), by_seed(b, root, of_b, truth)) for truth in TRUTHS}
     return {truth: every_metric(compared, KITTI_14, *both) for truth, both in counts.items()}
 
 
@@ -72,7 +71,7 @@ def beside_usual(runs: Sequence[CountingRun], usual: Sequence[CountingRun], root
     root : Path
         The folder of all runs.
     """
-    return {"scores": scores_by_truth(runs, root), "differences": differences_by_truth(runs, usual, root)}
+    return {"scores": scores_by_truth(runs, root), "differences": differences_by_truth(root, runs, usual)}
 
 
 def beside_usual_table(head: str, rows: Mapping[str, dict], truth: str, cells: str) -> list[list[str]]:
@@ -119,16 +118,10 @@ def accuracy_result(
         truth, cells and metric, and by truth the "confusion" matrix of all seeds. "differences": "what" is compared,
         and the "scores", as `differences_by_truth` returns them.
     """
-    gains = {
-        f"{NETWORKS[name]}: with CRF - without": differences_by_truth(scored, scored, root, (WITH_CRF, NETWORK))
-        for name, scored in runs.items()
-    }
-    gains |= {f"{NETWORKS[a]} - {NETWORKS[b]}": differences_by_truth(runs[a], runs[b], root) for a, b in pairwise(runs)}
+    pairs = {f"{NETWORKS[name]}: with CRF - without": (some, some, WITH_CRF) for name, some in runs.items()}
+    pairs |= {f"{NETWORKS[a]} - {NETWORKS[b]}": (runs[a], runs[b]) for a, b in pairwise(runs)}
     if baselines:
-        gains |= {
-            f"{NETWORKS['segnet']} - {name}": differences_by_truth(runs["segnet"], baselines, root, (NETWORK, name))
-            for name in BASELINES
-        }
+        pairs |= {f"{NETWORKS['segnet']} - {name}": (runs["segnet"], baselines, NETWORK, name) for name in BASELINES}
     return {
         "rows": [
             {
@@ -141,7 +134,7 @@ def accuracy_result(
             for name, scored in runs.items()
             for crf, method in ((False, NETWORK), (True, WITH_CRF))
         ],
-        "differences": [{"what": what, "scores": found} for what, found in gains.items()],
+        "differences": [{"what": what, "scores": differences_by_truth(root, *pair)} for what, pair in pairs.items()],
     }
 
 

@@ -95,7 +95,7 @@ def learned_from(truth: str, usual: Sequence[ScoreRun], scale: Scale) -> list[Sc
     scale : Scale
         How large they are.
     """
-    networks = (scale.grid_stage(scale.kitti, "segnet", seed, truth) for seed in range(len(usual)))
+    networks = [scale.grid_stage(scale.kitti, "segnet", seed, truth) for seed in range(len(usual))]
     return [ScoreRun(network, one.frames, crf=False) for network, one in zip(networks, usual, strict=True)]
 
 

@@ -36,10 +36,7 @@ class TrainingRun(Run):
 
     is_training = True
     steps = property(lambda self: self.iterations)
-
-    def probe(self) -> float:
-        """Return the seconds of a training step on this machine's CPU, from a short trial."""
-        return _seconds_per_step(self.architecture, self.params, self.kind)
+    trial_seconds = property(lambda self: _seconds_per_step(self.architecture, self.params, self.kind))
 
     @abstractmethod
     def net(self, root: Path, camera: Camera) -> SemanticGridNet:
