@@ -42,10 +42,13 @@ def here(monkeypatch):
     monkeypatch.setattr(reports, "workplace", lambda *_: nullcontext(place))
 
 
+def table1(scale, folder):
+    return reports.Request(experiment="table1", scale=scale, seeds=1, runs=folder / "runs", out=folder / "out")
+
+
 def test_table_1_compares_it_with_the_papers_networks(tmp_path):
-    request = reports.Request("table1", "tiny+one-layer", 1, tmp_path / "runs", tmp_path / "out")
     told = []
-    assert reports.reproduce(request, told.append) == ""
+    assert reports.reproduce(table1("tiny+one-layer", tmp_path), told.append) == ""
     result = json.loads((tmp_path / "out" / "table1.json").read_text())
     assert "--scale tiny+one-layer" in result["command"]
     assert [row["network"] for row in result["rows"]] == ["segnet"] * 2 + ["one-layer"] * 2
@@ -64,5 +67,5 @@ def test_what_is_not_registered_is_refused_before_anything_runs(tmp_path):
     with pytest.raises(
         ArgumentError, match=r"--scale: expected after a plus one of segnet, .*, one-layer, found 'vit'"
     ):
-        reports.reproduce(reports.Request("table1", "quick+vit", 1, tmp_path / "runs", tmp_path / "out"), print)
+        reports.reproduce(table1("quick+vit", tmp_path), print)
     assert scale_named("tiny+one-layer+segnet").networks == ("segnet", "one-layer")

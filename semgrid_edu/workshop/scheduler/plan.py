@@ -62,7 +62,7 @@ def estimate(runs: list[Run], root: str | Path) -> dict[Run, float]:
             left.append(run)
     for run in left:
         if run.pace not in paces:
-            paces[run.pace] = [run.probe()]
+            paces[run.pace] = [run.trial_seconds]
     return {run: sum(paces[run.pace]) / len(paces[run.pace]) * run.steps for run in left}
 
 

@@ -4,7 +4,6 @@ import json
 from abc import ABC, abstractmethod
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import ClassVar
 
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.reading import read_json
@@ -24,20 +23,19 @@ class Run(ABC):
     ----------
     kind : str
         What such runs do, in one word: the first part of their folder's name.
+    tag : str
+        What tells the run from others of its kind: the rest of its folder's name.
+    steps : int
+        How many steps its work has; all take about the same time.
+    pace : str
+        What the time of a step depends on: runs of the same pace take the same time per step.
     is_training : bool
         Whether it is a training run, so that several processes can share its batches (`process_group`).
     trial_seconds : float
-        Seconds that a step took on one core when this was written.
+        Seconds that a step probably takes, for the estimate of a plan: on one core when this was written.
     """
 
-    kind: ClassVar[str]
-    is_training: ClassVar[bool] = False
-    trial_seconds: ClassVar[float]
-
-    @property
-    @abstractmethod
-    def tag(self) -> str:
-        """What tells the run from others of its kind: the rest of its folder's name."""
+    is_training = False
 
     @property
     def name(self) -> str:
@@ -48,20 +46,6 @@ class Run(ABC):
     def needs(self) -> tuple["Run", ...]:
         """The runs that must have ended before this one starts: by default those among its fields."""
         return tuple(value for field in fields(self) if isinstance(value := getattr(self, field.name), Run))
-
-    @property
-    @abstractmethod
-    def steps(self) -> int:
-        """How many steps its work has; all take about the same time."""
-
-    @property
-    @abstractmethod
-    def pace(self) -> str:
-        """What the time of a step depends on: runs of the same pace take the same time per step."""
-
-    def probe(self) -> float:
-        """Return the seconds that a step probably takes, for the estimate of a plan."""
-        return self.trial_seconds
 
     @abstractmethod
     def work(self, root: Path, device: str) -> None:

@@ -1,7 +1,6 @@
 """The trained network compared with simple baselines, on frames kept for testing (sections 4.2 and 4.3)."""
 
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from pathlib import Path
 
 from numpy.typing import NDArray
@@ -10,15 +9,16 @@ from torch import nn
 from semgrid_edu.datasets.training_arrays import SEED
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.labels import LabelSet
-from semgrid_edu.metrics import METRICS, semantic_cells
+from semgrid_edu.metrics import METRICS
 from semgrid_edu.networks import IMAGE_STAGE, SemanticGridNet, load_net
 from semgrid_edu.pipeline import Stages
 from semgrid_edu.storage.files import sha256
-from semgrid_edu.storage.provenance import versions
+from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions, save_confusions
 from semgrid_edu.workshop.scoring.counting import GridCounts, count_grids, truths_of_frames
 from semgrid_edu.workshop.scoring.grids import Refine, baseline_grids, network_grids
-from semgrid_edu.workshop.scoring.score_with_interval import all_metrics, markdown_table, per_cent
+from semgrid_edu.workshop.scoring.score_with_interval import every_metric, markdown_table, per_cent, score_with_interval
+from semgrid_edu.workshop.scoring.statistics import Metric
 
 Scores = dict[str, dict[str, dict[str, float]]]
 """Values of the metrics, 0..1: by method, by cells ("all" or "semantic"), by metric."""
@@ -74,10 +74,8 @@ def evaluate(
     return scores_of_counts(counted, test) | {
         "frames": {"train": len(training), "test": len(test)},
         "weights": {"file": Path(weights).name, "sha256": sha256(weights)},
-        "command": _command(Path(dataset_dir).name, Path(weights).name, refine),
         "seed": SEED,
-        "date": f"{datetime.now(UTC):%Y-%m-%d}",
-        "versions": versions("numpy", "torch", "numba"),
+        **made_by(_command(Path(dataset_dir).name, Path(weights).name, refine), "numpy", "torch", "numba"),
     }
 
 
@@ -155,13 +153,12 @@ def intervals(compared: FrameConfusions, label_set: LabelSet) -> Intervals:
     label_set : LabelSet
         The classes, of which it says which are semantic.
     """
-    return {
-        method: {
-            cells: {name: [value["low"], value["mean"], value["high"]] for name, value in by_metric.items()}
-            for cells, by_metric in all_metrics(compared.by_drive(method)[None], label_set).items()
-        }
-        for method in compared.counts
-    }
+
+    def ends(confusions: NDArray, metric: Metric) -> list[float | None]:
+        value = score_with_interval(confusions, metric)
+        return [value["low"], value["mean"], value["high"]]
+
+    return {method: every_metric(ends, label_set, compared.by_drive(method)[None]) for method in compared.counts}
 
 
 def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:
@@ -175,10 +172,7 @@ def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:
         The classes, of which it says which are semantic.
     """
     return {
-        method: {
-            cells: {name: metric(matrix) for name, metric in METRICS.items()}
-            for cells, matrix in (("all", confusion), ("semantic", semantic_cells(confusion, label_set)))
-        }
+        method: every_metric(lambda matrix, metric: metric(matrix), label_set, confusion)
         for method, confusion in confusions.items()
     }
 

@@ -61,8 +61,8 @@ def on_cells(confusions: NDArray, cells: str, label_set: LabelSet) -> NDArray[np
 
     Parameters
     ----------
-    confusions : (S, V, C, C) int
-        By seed and drive, see `drive_interval`.
+    confusions : (..., C, C) int
+        One matrix or several, such as those by seed and drive.
     cells : str
         "all", or "semantic" for those whose truth is a semantic class.
     label_set : LabelSet
@@ -70,34 +70,35 @@ def on_cells(confusions: NDArray, cells: str, label_set: LabelSet) -> NDArray[np
 
     Returns
     -------
-    (S, V, C, C) int
+    (..., C, C) int
     """
     if cells == "all":
         return confusions
-    flat = confusions.reshape(-1, *confusions.shape[2:])
+    flat = confusions.reshape(-1, *confusions.shape[-2:])
     return np.stack([semantic_cells(matrix, label_set) for matrix in flat]).reshape(confusions.shape)
 
 
-def all_metrics(confusions: NDArray, label_set: LabelSet) -> dict[str, dict[str, ScoreWithInterval]]:
-    """Return every metric over all cells and over those with a semantic class.
+def every_metric(
+    score: Callable[..., object], label_set: LabelSet, *confusions: NDArray
+) -> dict[str, dict[str, object]]:
+    """Return a score by every metric, over all cells and over those with a semantic class.
 
     Parameters
     ----------
-    confusions : (S, V, C, C) int
-        By seed and drive, see `drive_interval`.
+    score : callable
+        Takes the confusion matrices and a metric: `score_with_interval` or, for two methods, `compared`.
     label_set : LabelSet
         The classes.
+    *confusions : (..., C, C) int
+        What `score` takes before the metric.
 
     Returns
     -------
     dict
         By cells, "all" or "semantic", and by metric.
     """
-    kept = {cells: on_cells(confusions, cells, label_set) for cells in ("all", "semantic")}
-    return {
-        cells: {name: score_with_interval(matrices, metric) for name, metric in METRICS.items()}
-        for cells, matrices in kept.items()
-    }
+    kept = {cells: [on_cells(one, cells, label_set) for one in confusions] for cells in ("all", "semantic")}
+    return {cells: {name: score(*some, metric) for name, metric in METRICS.items()} for cells, some in kept.items()}
 
 
 def shown(value: ScoreWithInterval, digits: int = 1) -> str:
@@ -115,12 +116,8 @@ def shown(value: ScoreWithInterval, digits: int = 1) -> str:
     >>> shown({"mean": 0.824, "low": 0.812, "high": 0.836, "seeds": [0.824]})
     '82.4 (81.2 to 83.6)'
     """
-    if value["mean"] is None:
-        return "-"
-    mean = f"{100 * value['mean']:.{digits}f}"
-    if value["low"] is None:
-        return mean
-    return f"{mean} ({100 * value['low']:.{digits}f} to {100 * value['high']:.{digits}f})"
+    mean, low, high = (per_cent(value[name], digits) for name in ("mean", "low", "high"))
+    return mean if value["low"] is None else f"{mean} ({low} to {high})"
 
 
 def shown_seeds(value: ScoreWithInterval, digits: int = 1) -> str:
@@ -128,21 +125,23 @@ def shown_seeds(value: ScoreWithInterval, digits: int = 1) -> str:
 
     Parameters are those of `shown`.
     """
-    seeds = ["-" if one is None else f"{100 * one:.{digits}f}" for one in value["seeds"]]
+    seeds = [per_cent(one, digits) for one in value["seeds"]]
     if len(seeds) <= SHOWN_SEEDS:
         return ", ".join(seeds)
     return f"{min(seeds, key=float)} to {max(seeds, key=float)} ({len(seeds)} seeds)"
 
 
-def per_cent(value: float | None) -> str:
+def per_cent(value: float | None, digits: int = 1) -> str:
     """Write a share in per cent.
 
     Parameters
     ----------
     value : float or None
         A share, 0..1; None for a share of nothing.
+    digits : int
+        Digits after the point.
     """
-    return "-" if value is None else f"{100 * value:.1f}"
+    return "-" if value is None else f"{100 * value:.{digits}f}"
 
 
 def markdown_table(rows: list[list[str]]) -> str:

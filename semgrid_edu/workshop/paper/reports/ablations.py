@@ -1,14 +1,16 @@
 """What the paper leaves open: one thing changed at a time, against the same seeds and drives (section 4)."""
 
 from collections.abc import Sequence
+from functools import partial
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.metrics import METRICS, pixel_accuracy
-from semgrid_edu.workshop.paper.reports.tables import differences_by_truth, score_cells, scores_by_truth
+from semgrid_edu.metrics import pixel_accuracy
+from semgrid_edu.workshop.paper.reports.tables import beside_usual, beside_usual_table
 from semgrid_edu.workshop.paper.reports.truth_costs import learned_from
 from semgrid_edu.workshop.paper.runs.claim_runs import table1_runs
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
@@ -53,8 +55,8 @@ SECTIONS = {
 """The lists of rows that are compared with the usual network, and what each shows."""
 
 
-def variant_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
-    """Return the runs of the networks that differ from the usual one, by what differs, one per seed.
+def ablated_runs(scale: Scale, seeds: int) -> dict[str, dict[str, tuple[list[ScoreRun], list[ScoreRun]]]]:
+    """Return the runs of each row, and the usual ones that they are compared with, one per seed.
 
     Parameters
     ----------
@@ -62,42 +64,34 @@ def variant_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
         How large they are.
     seeds : int
         Number of seeds.
+
+    Returns
+    -------
+    dict
+        By key of `SECTIONS` and by what the row is.
     """
-    found = {
-        name: [scale.scored(scale.kitti, "segnet", seed, variant=variant, crf=False) for seed in range(seeds)]
-        for name, variant in VARIANTS.items()
-    }
-    return found | {"learned from true labels": learned_from("true", table1_runs(scale, seeds)["segnet"], scale)}
-
-
-def miscalibrated_runs(usual: Sequence[ScoreRun]) -> dict[str, list[ScoreRun]]:
-    """Return the runs of the usual network with wrong calibrations, by the error, one per seed.
-
-    Parameters
-    ----------
-    usual : sequence of ScoreRun
-        With the right calibration, one per seed.
-    """
-    return {
+    every, n_frames = table1_runs(scale, seeds), max(scale.frames_to_train // FEW, 6)
+    usual, scored = every["segnet"], partial(scale.scored, scale.kitti, crf=False)
+    variants = {"usual": usual}
+    variants |= {name: scored("segnet", seeds, variant=variant) for name, variant in VARIANTS.items()}
+    variants |= {"learned from true labels": learned_from("true", usual, scale)}
+    errors = {
         error.name.removeprefix("-"): [ScoreRun(run.network, run.frames, False, error) for run in usual]
         for error in CALIBRATION_ERRORS
     }
-
-
-def small_set_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
-    """Return the runs of Table 1's networks on a part of the frames. Parameters are those of `variant_runs`."""
-    n_frames = max(scale.frames_to_train // FEW, 6)
+    small = {name: scored(name, seeds, n_frames=n_frames) for name in NETWORKS}
     return {
-        segmenter: [scale.scored(scale.kitti, segmenter, seed, n_frames=n_frames, crf=False) for seed in range(seeds)]
-        for segmenter in NETWORKS
+        "variants": {what: (runs, usual) for what, runs in variants.items()},
+        "calibration": {what: (runs, usual) for what, runs in errors.items()},
+        "frames": {f"{NETWORKS[name]}, {n_frames} frames": (runs, every[name]) for name, runs in small.items()},
     }
 
 
 def ablation_runs(scale: Scale, seeds: int) -> list[Run]:
-    """Return all runs: the usual networks first, the variants last. Parameters are those of `variant_runs`."""
-    usual = table1_runs(scale, seeds)["segnet"]
-    others = (miscalibrated_runs(usual), variant_runs(scale, seeds), small_set_runs(scale, seeds))
-    return [*usual, *(run for found in others for runs in found.values() for run in runs)]
+    """Return all runs: the usual networks first, then what trains nothing. Parameters are those of `ablated_runs`."""
+    rows, usual = ablated_runs(scale, seeds), table1_runs(scale, seeds)["segnet"]
+    lists = (runs for name in ("calibration", "variants", "frames") for runs, _ in rows[name].values())
+    return [*usual, *chain(*lists)]
 
 
 def ablations(scale: Scale, seeds: int, root: Path) -> dict:
@@ -118,25 +112,14 @@ def ablations(scale: Scale, seeds: int, root: Path) -> dict:
         "variants", "calibration", "frames", "distance" and "confidence": lists of rows, each with what it is ("what")
         and its scores.
     """
-    every = table1_runs(scale, seeds)
-    usual = every["segnet"]
-    networks = {"usual": usual} | variant_runs(scale, seeds)
-    small_sets = small_set_runs(scale, seeds).items()
-    return {
-        "variants": [_row(name, runs, usual, root) for name, runs in networks.items()],
-        "calibration": [_row(name, runs, usual, root) for name, runs in miscalibrated_runs(usual).items()],
-        "frames": [
-            _row(f"{NETWORKS[name]}, {runs[0].network.image_stage.n_frames} frames", runs, every[name], root)
-            for name, runs in small_sets
-        ],
-        "distance": [_band(band, usual, root) for band in distance_band_names()],
-        "confidence": [_calibration(method, usual, root) for method in (NETWORK, WITH_CRF, WITH_SEARCHED)],
+    usual = table1_runs(scale, seeds)["segnet"]
+    found: dict[str, list[dict]] = {
+        name: [{"what": what, **beside_usual(*pair, root)} for what, pair in rows.items()]
+        for name, rows in ablated_runs(scale, seeds).items()
     }
-
-
-def _row(what: str, runs: Sequence[ScoreRun], usual: Sequence[ScoreRun], root: Path) -> dict:
-    """Return the scores of a variant and its differences from the usual network, by truth, cells and metric."""
-    return {"what": what, "scores": scores_by_truth(runs, root), "differences": differences_by_truth(runs, usual, root)}
+    found["distance"] = [_band(band, usual, root) for band in distance_band_names()]
+    found["confidence"] = [_calibration(method, usual, root) for method in (NETWORK, WITH_CRF, WITH_SEARCHED)]
+    return found
 
 
 def _band(band: str, usual: Sequence[ScoreRun], root: Path) -> dict:
@@ -163,20 +146,13 @@ def ablations_markdown(result: dict) -> str:
     result : dict
         From `ablations`.
     """
-    tables = {words: _beside_usual(result[name]) for name, words in SECTIONS.items()}
+    rows = {words: {row["what"]: row for row in result[name]} for name, words in SECTIONS.items()}
+    tables = {words: beside_usual_table("", some, "true", "all") for words, some in rows.items()}
     near = [[row["what"], shown(row["pixel accuracy"])] for row in result["distance"]]
     tables["Accuracy by distance, cells with a semantic class, true labels"] = [["distance", "pixel accuracy"], *near]
     sure = [_calibration_cells(row) for row in result["confidence"]]
     tables["Expected calibration error, points"] = [["", "mean", "every seed"], *sure]
     return "\n\n".join(f"## {words}\n\n{markdown_table(lines)}" for words, lines in tables.items())
-
-
-def _beside_usual(rows: list[dict]) -> list[list[str]]:
-    """Lay out scores by the true labels over all cells, and differences from the usual network, points."""
-    return [["", *METRICS, *(f"{name}, difference" for name in METRICS)]] + [
-        [row["what"], *score_cells(row["scores"]["true"]["all"]), *score_cells(row["differences"]["true"]["all"], 2)]
-        for row in rows
-    ]
 
 
 def _calibration_cells(row: dict) -> list[str]:

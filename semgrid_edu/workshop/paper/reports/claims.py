@@ -5,9 +5,10 @@ the LIDAR as in the paper.
 """
 
 import tomllib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +16,12 @@ from numpy.typing import NDArray
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.metrics import METRICS, class_accuracy
 from semgrid_edu.workshop.paper.reports.verdicts import Statement
-from semgrid_edu.workshop.paper.runs.claim_runs import ClaimRuns
 from semgrid_edu.workshop.paper.runs.other_runs import OVERTURNED, time_saved
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
 from semgrid_edu.workshop.paper.runs.score_runs import GEOMETRY, TRUE_GEOMETRY, WITH_CRF, CountingRun, ScoreRun, by_seed
 from semgrid_edu.workshop.scoring.grids import NETWORK, OCCUPANCY_ALONE
 from semgrid_edu.workshop.scoring.score_with_interval import compared, score_with_interval
+from semgrid_edu.workshop.scoring.statistics import Metric
 
 CLAIMS: dict[int, dict[str, str]] = {
     int(number): texts for number, texts in tomllib.loads(Path(__file__).with_suffix(".toml").read_text()).items()
@@ -30,11 +31,13 @@ CLAIMS: dict[int, dict[str, str]] = {
 MARGIN = 0.005
 """Half a point: by less than that, a score counts as unchanged in claim 8."""
 
-Metric = Callable[[NDArray], float]
-"""Takes a confusion matrix (C, C), one row per true class; returns a share, or NaN where there is nothing to share."""
+
+def _true(some: Sequence[CountingRun], root: Path, method: str = NETWORK) -> NDArray[np.int64]:
+    """Return what was counted against the true labels."""
+    return by_seed(some, root, method, "true")
 
 
-def _order_of_networks(runs: ClaimRuns, root: Path) -> list[Statement]:
+def _order_of_networks(runs: SimpleNamespace, root: Path) -> list[Statement]:
     found = {name: by_seed(some, root, NETWORK, "lidar") for name, some in runs.networks.items()}
     return [
         Statement(f"{metric}: {NETWORKS[a]} - {NETWORKS[b]}", compared(found[a], found[b], METRICS[metric]))
@@ -43,7 +46,7 @@ def _order_of_networks(runs: ClaimRuns, root: Path) -> list[Statement]:
     ]
 
 
-def _effect_of_crf(runs: ClaimRuns, root: Path) -> list[Statement]:
+def _effect_of_crf(runs: SimpleNamespace, root: Path) -> list[Statement]:
     return [one for name, some in runs.networks.items() for one in _with_crf(NETWORKS[name], some, root)]
 
 
@@ -55,10 +58,10 @@ def _with_crf(name: str, some: list[ScoreRun], root: Path) -> list[Statement]:
     ]
 
 
-def _errors_on_perfect_data(runs: ClaimRuns, root: Path) -> list[Statement]:
-    found = by_seed(runs.perfect, root, NETWORK, "true")
+def _errors_on_perfect_data(runs: SimpleNamespace, root: Path) -> list[Statement]:
+    found = _true(runs.perfect, root)
     road, car, lane, pole = map(SYNTHIA_10.index, ("road", "car", "lane", "pole"))
-    numbers: dict[str, tuple[Metric, float]] = {
+    numbers = {
         "share of errors on things that are called void": (called_void, 0.5),
         "road called right, above the mean class": (lambda m: called(m, road, road) - class_accuracy(m), 0),
         "car called right, above the mean class": (lambda m: called(m, car, car) - class_accuracy(m), 0),
@@ -102,51 +105,42 @@ def _share(part: float, whole: float) -> float:
     return float(part / whole) if whole else np.nan
 
 
-def _effect_of_distance(runs: ClaimRuns, root: Path) -> list[Statement]:
+def _effect_of_distance(runs: SimpleNamespace, root: Path) -> list[Statement]:
     near, middle, far = (
         sum(by_seed(runs.usual, root, NETWORK, "true", band) for band in bands)
         for bands in (("0-10 m", "10-20 m"), ("20-30 m", "30-40 m"), ("40-50 m", "50-60 m", "beyond 60 m"))
     )
     every = range(KITTI_14.n_semantic)
-    standing = [c for c in every if KITTI_14.names[c] not in KITTI_14.flat]
+    kinds = {"all": every, "standing": [c for c in every if KITTI_14.names[c] not in KITTI_14.flat]}
     return [
         Statement(f"{what} classes called right: {between}", compared(a, b, _right_of(classes)))
-        for what, classes in (("all", every), ("standing", standing))
+        for what, classes in kinds.items()
         for between, a, b in (("0-20 m - 20-40 m", near, middle), ("20-40 m - beyond", middle, far))
     ]
 
 
-def _right_of(classes: Iterable[int]) -> Metric:
+def _right_of(classes: Sequence[int]) -> Metric:
     """Return the metric "share of these classes' cells that are called right"."""
-    rows = list(classes)
-    return lambda matrix: _share(np.diag(matrix)[rows].sum(), matrix[rows].sum())
+    return lambda matrix: _share(np.diag(matrix)[classes].sum(), matrix[classes].sum())
 
 
-def _overturned_cars(runs: ClaimRuns, root: Path) -> list[Statement]:
-    car = KITTI_14.index("car")
+def _overturned_cars(runs: SimpleNamespace, root: Path) -> list[Statement]:
     with_grid, without = (by_seed(some, root, OVERTURNED, "true") for some in (runs.overturned, runs.overturned_blind))
-    right = _right_of([car])
+    right = _right_of([KITTI_14.index("car")])
     return [
         Statement("overturned cars called car", score_with_interval(with_grid, right), 0.5),
         Statement("the same: with occupancy grid - without", compared(with_grid, without, right)),
     ]
 
 
-def _road_and_sidewalk(runs: ClaimRuns, root: Path) -> list[Statement]:
-    network = by_seed(runs.usual, root, NETWORK, "true")
-    alone = by_seed(runs.baselines, root, OCCUPANCY_ALONE, "true")
+def _road_and_sidewalk(runs: SimpleNamespace, root: Path) -> list[Statement]:
+    network, alone = _true(runs.usual, root), _true(runs.baselines, root, OCCUPANCY_ALONE)
+    shares = {"road": lambda matrix: _apart(matrix)[0], "sidewalk": lambda matrix: _apart(matrix)[1]}
+    either = {f"{name} called {name}, of those called either": metric for name, metric in shares.items()}
+    together = compared(network, alone, lambda matrix: float(_apart(matrix).mean()))
     return [
-        Statement(
-            "road called road, of those called either", score_with_interval(network, lambda m: _apart(m)[0]), 0.5
-        ),
-        Statement(
-            "sidewalk called sidewalk, of those called either",
-            score_with_interval(network, lambda m: _apart(m)[1]),
-            0.5,
-        ),
-        Statement(
-            "mean of both: network - occupancy alone", compared(network, alone, lambda m: float(_apart(m).mean()))
-        ),
+        *(Statement(what, score_with_interval(network, metric), 0.5) for what, metric in either.items()),
+        Statement("mean of both: network - occupancy alone", together),
     ]
 
 
@@ -157,23 +151,20 @@ def _apart(matrix: NDArray) -> NDArray[np.float64]:
     return np.diag(some) / np.maximum(some.sum(axis=1), 1)
 
 
-def _effect_of_reduction(runs: ClaimRuns, root: Path) -> list[Statement]:
+def _effect_of_reduction(runs: SimpleNamespace, root: Path) -> list[Statement]:
     ours, whole = (by_seed(some, root, NETWORK, "lidar") for some in (runs.usual, runs.unreduced))
     costs = [
         Statement(f"{name}: with reduction - without", compared(ours, whole, metric), -MARGIN)
         for name, metric in METRICS.items()
     ]
-    return [*costs, Statement("share of the time saved", time_saved(runs.times.seconds_per_frame(root)))]
+    return [*costs, Statement("share of the time saved", time_saved(runs.times[0].seconds_per_frame(root)))]
 
 
-def _geometry_and_learning(runs: ClaimRuns, root: Path) -> list[Statement]:
-    def true(some: list[CountingRun], method: str) -> NDArray[np.int64]:
-        return by_seed(some, root, method, "true")
-
-    network, off = true(runs.usual, NETWORK), true(runs.usual_off, NETWORK)
-    geometry, geometry_off = true(runs.baselines, GEOMETRY), true(runs.baselines_off, GEOMETRY)
+def _geometry_and_learning(runs: SimpleNamespace, root: Path) -> list[Statement]:
+    network, off = _true(runs.usual, root), _true(runs.usual_off, root)
+    geometry, geometry_off = _true(runs.baselines, root, GEOMETRY), _true(runs.baselines_off, root, GEOMETRY)
     pairs = {
-        "geometry: true image labels - the network's": (true(runs.baselines, TRUE_GEOMETRY), geometry),
+        "geometry: true image labels - the network's": (_true(runs.baselines, root, TRUE_GEOMETRY), geometry),
         "geometry: right calibration - wrong one": (geometry, geometry_off),
         "network - geometry": (network, geometry),
         "wrong calibration: network - geometry": (off, geometry_off),
@@ -185,7 +176,7 @@ def _geometry_and_learning(runs: ClaimRuns, root: Path) -> list[Statement]:
     ]
 
 
-STATEMENTS: dict[int, Callable[[ClaimRuns, Path], list[Statement]]] = {
+STATEMENTS: dict[int, Callable[[SimpleNamespace, Path], list[Statement]]] = {
     1: _order_of_networks,
     2: _effect_of_crf,
     3: lambda runs, root: _with_crf(NETWORKS["segnet"], runs.new_routes, root),
@@ -196,4 +187,4 @@ STATEMENTS: dict[int, Callable[[ClaimRuns, Path], list[Statement]]] = {
     8: _effect_of_reduction,
     9: _geometry_and_learning,
 }
-"""By claim: (the runs, which have ended; folder of all runs) -> its statements with their numbers."""
+"""By claim: (`runs_of_claims`, which have ended; folder of all runs) -> its statements with their numbers."""

@@ -19,11 +19,10 @@ def frame_counts(data: str) -> dict[str, tuple[int, int]]:
     data : str
         A key of `RECIPE_OF`.
     """
-    counts: dict[str, tuple[int, int]] = {}
+    labelled: dict[str, list[int]] = {}
     for route in RECIPE_OF[data].routes:
-        frames, drives = counts.get(route.split, (0, 0))
-        counts[route.split] = frames + len(route.labelled), drives + 1
-    return counts
+        labelled.setdefault(route.split, []).append(len(route.labelled))
+    return {split: (sum(frames), len(frames)) for split, frames in labelled.items()}
 
 
 def deviations(scale: Scale, field: str) -> list[str]:

@@ -6,14 +6,16 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from semgrid_edu.workshop.paper.reports import ablations, judging, pictures, tables, truth_costs
+from semgrid_edu.workshop.paper.reports import pictures, tables, truth_costs
+from semgrid_edu.workshop.paper.reports.ablations import ablation_runs, ablations, ablations_markdown
+from semgrid_edu.workshop.paper.reports.judging import claims_markdown, claims_picture, judge_claims
 from semgrid_edu.workshop.paper.runs import claim_runs
 from semgrid_edu.workshop.paper.runs.paper import TABLE_1_SCORES, TABLE_2_SCORES
 from semgrid_edu.workshop.paper.runs.scales import Scale
 from semgrid_edu.workshop.scheduler.runs import Run
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Experiment:
     """One table or list of the paper.
 
@@ -54,55 +56,47 @@ def _seed_by_seed(runs: Mapping[str, Sequence[Run]]) -> list[Run]:
 
 EXPERIMENTS = {
     "table1": Experiment(
-        title="Table 1: image networks, with and without the CRF",
-        seeds=lambda scale: scale.table1_seeds,
-        runs=lambda *size: _seed_by_seed(
-            claim_runs.table1_runs(*size) | {"baselines": claim_runs.table1_baselines(*size)}
-        ),
-        result=lambda scale, seeds, root: tables.accuracy_result(
+        "Table 1: image networks, with and without the CRF",
+        lambda *size: _seed_by_seed(claim_runs.table1_runs(*size) | {"baselines": claim_runs.table1_baselines(*size)}),
+        lambda scale, seeds, root: tables.accuracy_result(
             claim_runs.table1_runs(scale, seeds), root, TABLE_1_SCORES, claim_runs.table1_baselines(scale, seeds)
         ),
-        markdown=tables.accuracy_markdown,
-        picture=lambda result, _: pictures.accuracy_picture(result),
+        tables.accuracy_markdown,
+        lambda result, _: pictures.accuracy_picture(result),
+        seeds=lambda scale: scale.table1_seeds,
     ),
     "table2": Experiment(
-        title="Table 2: routes that were never driven in training",
-        field="chroma",
-        runs=lambda *size: _seed_by_seed(claim_runs.table2_runs(*size)),
-        result=lambda scale, seeds, root: tables.accuracy_result(
-            claim_runs.table2_runs(scale, seeds), root, TABLE_2_SCORES
-        ),
-        markdown=tables.accuracy_markdown,
-        picture=lambda result, _: pictures.accuracy_picture(result),
+        "Table 2: routes that were never driven in training",
+        lambda *size: _seed_by_seed(claim_runs.table2_runs(*size)),
+        lambda scale, seeds, root: tables.accuracy_result(claim_runs.table2_runs(scale, seeds), root, TABLE_2_SCORES),
+        tables.accuracy_markdown,
+        lambda result, _: pictures.accuracy_picture(result),
+        "chroma",
     ),
     "table3": Experiment(
-        title="Table 3: confusion on data without any error",
-        field="synthia",
-        runs=claim_runs.table3_runs,
-        result=lambda scale, seeds, root: tables.confusion_result(claim_runs.table3_runs(scale, seeds), root),
-        markdown=tables.confusion_markdown,
-        picture=lambda result, _: pictures.confusion_picture(result),
+        "Table 3: confusion on data without any error",
+        claim_runs.table3_runs,
+        lambda scale, seeds, root: tables.confusion_result(claim_runs.table3_runs(scale, seeds), root),
+        tables.confusion_markdown,
+        lambda result, _: pictures.confusion_picture(result),
+        "synthia",
     ),
     "claims": Experiment(
-        title="The nine claims",
-        runs=lambda *size: claim_runs.runs_of_claims(*size).all(),
-        result=judging.judge_claims,
-        markdown=judging.claims_markdown,
-        picture=lambda result, _: judging.claims_picture(result),
+        "The nine claims",
+        claim_runs.claims_plan,
+        judge_claims,
+        claims_markdown,
+        lambda result, _: claims_picture(result),
     ),
     "ablations": Experiment(
-        title="Ablations",
-        runs=ablations.ablation_runs,
-        result=ablations.ablations,
-        markdown=ablations.ablations_markdown,
-        picture=lambda result, _: pictures.ablations_picture(result),
+        "Ablations", ablation_runs, ablations, ablations_markdown, lambda result, _: pictures.ablations_picture(result)
     ),
     "truth-costs": Experiment(
-        title="What training costs on truth that is made in other ways",
-        runs=truth_costs.truth_cost_runs,
-        result=truth_costs.truth_costs,
-        markdown=truth_costs.truth_costs_markdown,
-        picture=lambda result, _: truth_costs.truth_costs_picture(result),
+        "What training costs on truth that is made in other ways",
+        truth_costs.truth_cost_runs,
+        truth_costs.truth_costs,
+        truth_costs.truth_costs_markdown,
+        lambda result, _: truth_costs.truth_costs_picture(result),
         deviations=(
             "The paper learns from one kind of truth. Three choices of the policy laboratory aren't trained on: scans "
             "after the labelled one, and image labels for each scan, because the drives end with their one labelled "
@@ -110,11 +104,11 @@ EXPERIMENTS = {
         ),
     ),
     "figures": Experiment(
-        title="Figures 6 and 7",
-        runs=claim_runs.figure_runs,
-        result=claim_runs.shown_frames,
-        markdown=pictures.figures_markdown,
-        picture=pictures.figures_picture,
+        "Figures 6 and 7",
+        claim_runs.figure_runs,
+        claim_runs.shown_frames,
+        pictures.figures_markdown,
+        pictures.figures_picture,
     ),
 }
 """Every experiment by the name of its command."""

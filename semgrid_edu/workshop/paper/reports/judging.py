@@ -82,11 +82,8 @@ def claims_picture(result: dict) -> Figure:
     result : dict
         From `judge_claims`.
     """
-    rows = {
-        f"{number}: {one['what']}": _from_limit(one)
-        for number, claim in result["claims"].items()
-        for one in claim["statements"]
-    }
+    claims = result["claims"].items()
+    rows = {f"{number}: {one['what']}": _from_limit(one) for number, claim in claims for one in claim["statements"]}
     figure, ax = plt.subplots(figsize=(10, 1.5 + 0.28 * len(rows)), layout="constrained")
     draw_scores(ax, rows, fontsize="small")
     ax.axvline(0, color="0.4", linewidth=0.8)
@@ -99,8 +96,6 @@ def claims_picture(result: dict) -> Figure:
 def _from_limit(statement: dict) -> ScoreWithInterval:
     """Return how far a statement's number lies on the claimed side of its limit."""
     sign, value = 1 if statement["above"] else -1, statement["value"]
-    ends = [value[name] for name in ("low", "mean", "high")][::sign]
-    low, mean, high, *seeds = (
-        None if part is None else sign * (part - statement["limit"]) for part in (*ends, *value["seeds"])
-    )
+    parts = [*(value[name] for name in ("low", "mean", "high")[::sign]), *value["seeds"]]
+    low, mean, high, *seeds = (None if part is None else sign * (part - statement["limit"]) for part in parts)
     return {"mean": mean, "low": low, "high": high, "seeds": seeds}

@@ -67,10 +67,8 @@ def ablations_picture(result: dict) -> Figure:
         From `ablations`.
     """
     figure, axes = plt.subplots(1, 4, figsize=(19, 6), layout="constrained")
-    charts = {
-        "trained differently": [row for row in result["variants"] if row["what"] != "usual"] + result["frames"],
-        "wrong calibration": result["calibration"],
-    }
+    others = [row for row in result["variants"] if row["what"] != "usual"]
+    charts = {"trained differently": others + result["frames"], "wrong calibration": result["calibration"]}
     for ax, (title, rows) in zip(axes, charts.items(), strict=False):
         draw_scores(ax, {row["what"]: row["differences"]["true"]["all"]["pixel accuracy"] for row in rows})
         ax.axvline(0, color="0.4", linewidth=0.8)
@@ -97,17 +95,12 @@ def _draw_reliability(ax: Axes, rows: list[dict]) -> None:
     ax.legend(loc="upper left")
 
 
+TITLES = {"true": "true labels", "network": "SegNet"}
+"""The titles of the grids that both figures show."""
+
 FIGURES: dict[str, tuple[LabelSet, dict[str, str]]] = {
-    "Figure 6": (
-        KITTI_14,
-        {
-            "truth": "labels made\nwith the LIDAR",
-            "true": "true labels",
-            "network": "SegNet",
-            "refined": "SegNet + CRF",
-        },
-    ),
-    "Figure 7": (SYNTHIA_10, {"true": "true labels", "network": "SegNet"}),
+    "Figure 6": (KITTI_14, {"truth": "labels made\nwith the LIDAR", **TITLES, "refined": "SegNet + CRF"}),
+    "Figure 7": (SYNTHIA_10, TITLES),
 }
 """The classes of each figure, and the titles of its grids from left to right."""
 

@@ -63,20 +63,20 @@ class Request:
         """The experiments that were asked for, by name."""
         return EXPERIMENTS if self.experiment == "all" else {self.experiment: EXPERIMENTS[self.experiment]}
 
-    def seeds_of(self, experiment: Experiment) -> int:
-        """Return the number of seeds of an experiment.
+    def size(self, experiment: Experiment) -> tuple[Scale, int]:
+        """Return the scale and the number of seeds of an experiment.
 
         Parameters
         ----------
         experiment : Experiment
             One of `chosen`.
         """
-        return self.seeds or experiment.seeds(scale_named(self.scale))
+        scale = scale_named(self.scale)
+        return scale, self.seeds or experiment.seeds(scale)
 
     def plan(self) -> list[Run]:
         """Return the runs of all experiments, each after those that it needs."""
-        scale = scale_named(self.scale)
-        return with_needs(run for one in self.chosen.values() for run in one.runs(scale, self.seeds_of(one)))
+        return with_needs(run for one in self.chosen.values() for run in one.runs(*self.size(one)))
 
 
 def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = False) -> str:
@@ -125,11 +125,10 @@ def _reproduced(request: Request, root: Path, echo: Callable[[str], None], plan_
         return ""
     with workplace(request.workers, request.scheduler) as place:
         failed = execute_plan(plan, root, place, request.device, request.processes)
-    scale = scale_named(request.scale)
     for name, experiment in request.chosen.items():
-        seeds = request.seeds_of(experiment)
-        if not failed.keys() & set(with_needs(experiment.runs(scale, seeds))):
-            echo(write_result(name, experiment, scale, seeds, root, request.out))
+        size = request.size(experiment)
+        if failed.keys().isdisjoint(with_needs(experiment.runs(*size))):
+            echo(write_result(name, experiment, *size, root, request.out))
     return "\n".join(
         f"{run.name}: {error.strip().splitlines()[-1]} ({run.folder(root) / OUTPUT})" for run, error in failed.items()
     )

@@ -13,10 +13,9 @@ from semgrid_edu.workshop.paper.runs.score_runs import BASELINES, WITH_CRF, Base
 from semgrid_edu.workshop.scoring.grids import NETWORK
 from semgrid_edu.workshop.scoring.score_with_interval import (
     ScoreWithInterval,
-    all_metrics,
     compared,
+    every_metric,
     markdown_table,
-    on_cells,
     per_cent,
     score_with_interval,
     shown,
@@ -41,34 +40,56 @@ def scores_by_truth(runs: Sequence[CountingRun], root: Path, method: str = NETWO
     method : str
         One of the methods that the runs have scored.
     """
-    return {truth: all_metrics(by_seed(runs, root, method, truth), KITTI_14) for truth in TRUTHS}
+    return {truth: every_metric(score_with_interval, KITTI_14, by_seed(runs, root, method, truth)) for truth in TRUTHS}
 
 
 def differences_by_truth(
-    a: Sequence[CountingRun], b: Sequence[CountingRun], root: Path, methods: tuple[str, str] = (NETWORK, NETWORK)
+    root: Path, a: Sequence[CountingRun], b: Sequence[CountingRun], of_a: str = NETWORK, of_b: str = NETWORK
 ) -> dict[str, dict]:
     """Return a minus b in every metric, on the same seeds and drives, by truth, cells and metric.
 
     Parameters
     ----------
+    root : Path
+        The folder of all runs.
     a, b : sequence of S CountingRun
+        One per seed.
+    of_a, of_b : str
+        The method of a and that of b.
+    """
+    counts = {truth: (by_seed(a, root, of_a, truth), by_seed(b, root, of_b, truth)) for truth in TRUTHS}
+    return {truth: every_metric(compared, KITTI_14, *both) for truth, both in counts.items()}
+
+
+def beside_usual(runs: Sequence[CountingRun], usual: Sequence[CountingRun], root: Path) -> dict[str, dict]:
+    """Return the "scores" of networks, and their "differences" from the usual ones.
+
+    Parameters
+    ----------
+    runs, usual : sequence of S CountingRun
         One per seed.
     root : Path
         The folder of all runs.
-    methods : (str, str)
-        The method of a and that of b.
     """
-    found: dict[str, dict] = {}
-    for truth in TRUTHS:
-        ours, theirs = (by_seed(runs, root, name, truth) for runs, name in zip((a, b), methods, strict=True))
-        found[truth] = {
-            cells: {
-                name: compared(on_cells(ours, cells, KITTI_14), on_cells(theirs, cells, KITTI_14), metric)
-                for name, metric in METRICS.items()
-            }
-            for cells in CELLS
-        }
-    return found
+    return {"scores": scores_by_truth(runs, root), "differences": differences_by_truth(root, runs, usual)}
+
+
+def beside_usual_table(head: str, rows: Mapping[str, dict], truth: str, cells: str) -> list[list[str]]:
+    """Lay out scores, and differences from the usual networks in points.
+
+    Parameters
+    ----------
+    head : str
+        The head of the first column.
+    rows : mapping of str to dict
+        By name what `beside_usual` returned.
+    truth, cells : str
+        What they are scored against, and on which cells: keys of `TRUTHS` and `CELLS`.
+    """
+    return [[head, *METRICS, *(f"{name}, difference" for name in METRICS)]] + [
+        [name, *score_cells(row["scores"][truth][cells]), *score_cells(row["differences"][truth][cells], 2)]
+        for name, row in rows.items()
+    ]
 
 
 def accuracy_result(
@@ -97,29 +118,23 @@ def accuracy_result(
         truth, cells and metric, and by truth the "confusion" matrix of all seeds. "differences": "what" is compared,
         and the "scores", as `differences_by_truth` returns them.
     """
-    gains = {
-        f"{NETWORKS[name]}: with CRF - without": differences_by_truth(scored, scored, root, (WITH_CRF, NETWORK))
-        for name, scored in runs.items()
-    }
-    gains |= {f"{NETWORKS[a]} - {NETWORKS[b]}": differences_by_truth(runs[a], runs[b], root) for a, b in pairwise(runs)}
+    pairs = {f"{NETWORKS[name]}: with CRF - without": (some, some, WITH_CRF) for name, some in runs.items()}
+    pairs |= {f"{NETWORKS[a]} - {NETWORKS[b]}": (runs[a], runs[b]) for a, b in pairwise(runs)}
     if baselines:
-        gains |= {
-            f"{NETWORKS['segnet']} - {name}": differences_by_truth(runs["segnet"], baselines, root, (NETWORK, name))
-            for name in BASELINES
-        }
+        pairs |= {f"{NETWORKS['segnet']} - {name}": (runs["segnet"], baselines, NETWORK, name) for name in BASELINES}
     return {
         "rows": [
             {
                 "network": name,
                 "CRF": crf,
-                "paper": paper[name, crf],
+                "paper": paper.get((name, crf), dict.fromkeys(METRICS)),
                 "scores": scores_by_truth(scored, root, method),
                 "confusion": {t: by_seed(scored, root, method, t).sum(axis=(0, 1)).tolist() for t in TRUTHS},
             }
             for name, scored in runs.items()
             for crf, method in ((False, NETWORK), (True, WITH_CRF))
         ],
-        "differences": [{"what": what, "scores": found} for what, found in gains.items()],
+        "differences": [{"what": what, "scores": differences_by_truth(root, *pair)} for what, pair in pairs.items()],
     }
 
 
@@ -223,19 +238,15 @@ def confusion_markdown(result: dict) -> str:
         From `confusion_result`.
     """
     ours = result["ours"]["scores"]
-    table = markdown_table(
-        [
-            ["", *METRICS],
-            ["paper", *map(per_cent, _metrics(result["paper"]["scores"]))],
-            ["ours", *score_cells(ours)],
-            ["every seed", *map(shown_seeds, _metrics(ours))],
-        ]
-    )
-    matrices = [_matrix(result["classes"], result[whose]["matrix"]) for whose in ("ours", "paper")]
-    return (
-        f"{table}\n\nRow: truth, column: detected, per cent of the row; mean over the seeds.\n\n"
-        f"Ours:\n\n{matrices[0]}\n\nThe paper's:\n\n{matrices[1]}"
-    )
+    rows = {"": METRICS, "paper": map(per_cent, _metrics(result["paper"]["scores"])), "ours": score_cells(ours)}
+    rows["every seed"] = map(shown_seeds, _metrics(ours))
+    sections = [
+        markdown_table([[name, *cells] for name, cells in rows.items()]),
+        "Row: truth, column: detected, per cent of the row; mean over the seeds.",
+        *("Ours:", _matrix(result["classes"], result["ours"]["matrix"])),
+        *("The paper's:", _matrix(result["classes"], result["paper"]["matrix"])),
+    ]
+    return "\n\n".join(sections)
 
 
 def _matrix(names: list[str], matrix: list[list[float | None]]) -> str:

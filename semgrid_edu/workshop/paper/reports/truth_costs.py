@@ -13,7 +13,7 @@ from semgrid_edu.datasets.label_policies import POLICIES
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import METRICS, class_iou, pixel_accuracy
 from semgrid_edu.workshop.paper.reports.forest import forest_plot
-from semgrid_edu.workshop.paper.reports.tables import TRUTHS, differences_by_truth, score_cells, scores_by_truth
+from semgrid_edu.workshop.paper.reports.tables import TRUTHS, beside_usual, beside_usual_table
 from semgrid_edu.workshop.paper.runs.claim_runs import table1_runs
 from semgrid_edu.workshop.paper.runs.scales import Scale
 from semgrid_edu.workshop.paper.runs.score_runs import LABELS, LabelsRun, ScoreRun, by_seed
@@ -22,8 +22,8 @@ from semgrid_edu.workshop.scoring.confusions import distance_band_names
 from semgrid_edu.workshop.scoring.grids import NETWORK
 from semgrid_edu.workshop.scoring.score_with_interval import (
     ScoreWithInterval,
-    all_metrics,
     compared,
+    every_metric,
     markdown_table,
     on_cells,
     per_cent,
@@ -95,7 +95,7 @@ def learned_from(truth: str, usual: Sequence[ScoreRun], scale: Scale) -> list[Sc
     scale : Scale
         How large they are.
     """
-    networks = (scale.grid_stage(scale.kitti, "segnet", seed, truth) for seed in range(len(usual)))
+    networks = [scale.grid_stage(scale.kitti, "segnet", seed, truth) for seed in range(len(usual))]
     return [ScoreRun(network, one.frames, crf=False) for network, one in zip(networks, usual, strict=True)]
 
 
@@ -152,20 +152,15 @@ def _row(truth: str, runs: dict[str, list[ScoreRun]], labels: LabelsRun, root: P
             on_cells(by_seed(some, root, method, "true", band), "semantic", KITTI_14)
             for some, method in (([labels], LABELS), (networks, NETWORK), (usual, NETWORK))
         )
-        difference = compared(ours, theirs, metric)
-        return {
-            "labels": score_with_interval(of_labels, metric),
-            "networks": score_with_interval(ours, metric),
-            "difference": difference,
-        }
+        found = {"labels": score_with_interval(of_labels, metric), "networks": score_with_interval(ours, metric)}
+        return found | {"difference": compared(ours, theirs, metric)}
 
     return {
         "truth": truth,
         "policy": asdict(POLICIES[truth]) if truth in POLICIES else None,
         "changed": 1 - pixel_accuracy(like_usual),
-        "labels": all_metrics(by_seed([labels], root, LABELS, "true"), KITTI_14),
-        "scores": scores_by_truth(networks, root),
-        "differences": differences_by_truth(networks, usual, root),
+        "labels": every_metric(score_with_interval, KITTI_14, by_seed([labels], root, LABELS, "true")),
+        **beside_usual(networks, usual, root),
         "classes": {
             name: part(lambda matrix, c=c: class_iou(matrix)[c])
             for c, name in enumerate(KITTI_14.names[: KITTI_14.n_semantic])
@@ -182,44 +177,40 @@ def truth_costs_markdown(result: dict) -> str:
     result : dict
         From `truth_costs`.
     """
-    rows = result["rows"]
+    rows = {LEARNED_FROM[row["truth"]]: row for row in result["rows"]}
     tables = {"The labels, on the training frames, against the true ones": _labels(rows)}
-    for against, words in TRUTHS.items():
-        for cells, which in CELLS.items():
-            title = f"The networks, on the test frames, against {words}, {which}"
-            tables[title] = _networks(rows, against, cells)
-    for part, words in PARTS.items():
-        tables[f"{words}; differences of the networks in points"] = _parts(rows, part)
+    tables |= {
+        f"The networks, on the test frames, against {words}, {which}": _networks(rows, against, cells)
+        for against, words in TRUTHS.items()
+        for cells, which in CELLS.items()
+    }
+    tables |= {f"{words}; differences of the networks in points": _parts(rows, part) for part, words in PARTS.items()}
     head = (
         "SegNet, the same image stages, seeds and test frames; only the labels of the grids differ that it learns from."
     )
     return "\n\n".join([head, *(f"## {title}\n\n{markdown_table(lines)}" for title, lines in tables.items())])
 
 
-def _labels(rows: list[dict]) -> list[list[str]]:
+def _labels(rows: dict[str, dict]) -> list[list[str]]:
     """Lay out how right the labels are."""
-    lines = [["labels", "other than usual", "right, all cells", "right, cells with a semantic class"]]
-    for row in rows:
-        right = (shown(row["labels"][cells]["pixel accuracy"]) for cells in CELLS)
-        lines.append([LEARNED_FROM[row["truth"]], per_cent(row["changed"]), *right])
-    return lines
+    return [["labels", "other than usual", "right, all cells", "right, cells with a semantic class"]] + [
+        [name, per_cent(row["changed"]), *(shown(row["labels"][cells]["pixel accuracy"]) for cells in CELLS)]
+        for name, row in rows.items()
+    ]
 
 
-def _networks(rows: list[dict], against: str, cells: str) -> list[list[str]]:
+def _networks(rows: dict[str, dict], against: str, cells: str) -> list[list[str]]:
     """Lay out the networks' scores, and their differences from the usual networks, points."""
-    lines = [["learned from", *METRICS, *(f"{name}, difference" for name in METRICS)]]
-    for row in rows:
-        gains = score_cells(row["differences"][against][cells], 2) if row is not rows[0] else [""] * len(METRICS)
-        lines.append([LEARNED_FROM[row["truth"]], *score_cells(row["scores"][against][cells]), *gains])
-    return lines
+    head, usual, *others = beside_usual_table("learned from", rows, against, cells)
+    return [head, usual[: 1 + len(METRICS)] + [""] * len(METRICS), *others]
 
 
-def _parts(rows: list[dict], part: str) -> list[list[str]]:
+def _parts(rows: dict[str, dict], part: str) -> list[list[str]]:
     """Lay out one line per class or band: the usual labels and networks, and what the others change."""
-    usual, *others = rows
-    lines = [["", "usual labels", "usual networks", *(LEARNED_FROM[row["truth"]] for row in others)]]
+    (_, usual), *others = rows.items()
+    lines = [["", "usual labels", "usual networks", *(name for name, _ in others)]]
     for name, found in usual[part].items():
-        changes = (shown(row[part][name]["difference"]) for row in others)
+        changes = (shown(row[part][name]["difference"]) for _, row in others)
         lines.append([name, shown(found["labels"]), shown(found["networks"]), *changes])
     return lines
 

@@ -1,1 +1,1 @@
-"""The runs of the paper's experiments: data, training, scores, and what else its tables and claims need."""
+"""The paper's experiments as units of work: data, training, scores, times and figures."""

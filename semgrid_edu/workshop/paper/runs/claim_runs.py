@@ -1,8 +1,9 @@
 """The runs of Tables 1 to 3 and of the figures, and those that the claims are judged by (sections 4.2 to 4.4)."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
+from types import SimpleNamespace
 
 from semgrid_edu.workshop.paper.runs.other_runs import GRIDS, FigureRun, OverturnedRun, TimeRun
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
@@ -25,7 +26,7 @@ def table1_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
     seeds : int
         Number of seeds.
     """
-    return {name: [scale.scored(scale.kitti, name, seed) for seed in range(seeds)] for name in scale.networks}
+    return {name: scale.scored(scale.kitti, name, seeds) for name in scale.networks}
 
 
 def table1_baselines(scale: Scale, seeds: int) -> list[BaselineRun]:
@@ -38,7 +39,7 @@ def table2_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
 
     Parameters and result are those of `table1_runs`.
     """
-    return {"segnet": [scale.scored(scale.chroma, "segnet", seed) for seed in range(seeds)]}
+    return {"segnet": scale.scored(scale.chroma, "segnet", seeds)}
 
 
 def table3_runs(scale: Scale, seeds: int) -> list[ScoreRun]:
@@ -46,7 +47,7 @@ def table3_runs(scale: Scale, seeds: int) -> list[ScoreRun]:
 
     Parameters are those of `table1_runs`.
     """
-    return [scale.scored(scale.synthia, "segnet", seed, "true", crf=False) for seed in range(seeds)]
+    return scale.scored(scale.synthia, "segnet", seeds, "true", crf=False)
 
 
 def figure_runs(scale: Scale, seeds: int) -> list[FigureRun]:
@@ -60,8 +61,8 @@ def figure_runs(scale: Scale, seeds: int) -> list[FigureRun]:
         Not used: pictures are of one network.
     """
     data = {scale.kitti: "lidar", scale.synthia: "true"}
-    scored = [scale.scored(name, "segnet", 0, truth) for name, truth in data.items()]
-    return [FigureRun(run.network, run.frames) for run in scored]
+    scored = [scale.scored(name, "segnet", 1, truth) for name, truth in data.items()]
+    return [FigureRun(run.network, run.frames) for (run,) in scored]
 
 
 def shown_frames(scale: Scale, seeds: int, root: Path) -> dict:
@@ -84,55 +85,14 @@ def shown_frames(scale: Scale, seeds: int, root: Path) -> dict:
     return {"figures": {name: {"frames": frames[name], "grids": f"{run.name}/{GRIDS}"} for name, run in runs.items()}}
 
 
-@dataclass(frozen=True)
-class ClaimRuns:
-    """All runs of the claims, one per seed in each list.
-
-    Parameters
-    ----------
-    networks : dict of str to list of ScoreRun
-        The networks of Table 1 by name.
-    new_routes : list of ScoreRun
-        Table 2's networks on routes that nobody has driven in training.
-    perfect : list of ScoreRun
-        Table 3's networks on such routes, with data without any error.
-    overturned, overturned_blind : list of OverturnedRun
-        Cars on their tops: the usual network, and one that doesn't see the occupancy grid.
-    unreduced : list of ScoreRun
-        Networks without the 1x1 reduction.
-    times : TimeRun
-        The time of the usual network and of one without reduction.
-    baselines, baselines_off : list of BaselineRun
-        What learns no fusion, with the right calibration and with the wrong one.
-    usual_off : list of ScoreRun
-        The usual network with the wrong calibration.
-    """
-
-    networks: dict[str, list[ScoreRun]]
-    new_routes: list[ScoreRun]
-    perfect: list[ScoreRun]
-    overturned: list[OverturnedRun]
-    overturned_blind: list[OverturnedRun]
-    unreduced: list[ScoreRun]
-    times: TimeRun
-    baselines: list[BaselineRun]
-    baselines_off: list[BaselineRun]
-    usual_off: list[ScoreRun]
-
-    @property
-    def usual(self) -> list[ScoreRun]:
-        """The usual network, SegNet of Table 1, with the seeds that the variants have."""
-        return self.networks["segnet"][: len(self.unreduced)]
-
-    def all(self) -> list[Run]:
-        """Return all runs."""
-        found = [getattr(self, field.name) for field in fields(self)]
-        lists = [chain(*part.values()) if isinstance(part, dict) else part for part in found]
-        return [run for part in lists for run in ([part] if isinstance(part, Run) else part)]
+def claims_plan(scale: Scale, seeds: int) -> list[Run]:
+    """Return all runs of the claims. Parameters are those of `runs_of_claims`."""
+    parts = vars(runs_of_claims(scale, seeds)).values()
+    return [run for part in parts for run in (chain(*part.values()) if isinstance(part, dict) else part)]
 
 
-def runs_of_claims(scale: Scale, seeds: int) -> ClaimRuns:
-    """Return the runs of the claims.
+def runs_of_claims(scale: Scale, seeds: int) -> SimpleNamespace:
+    """Return the runs of the claims, one per seed in each list.
 
     Parameters
     ----------
@@ -140,19 +100,30 @@ def runs_of_claims(scale: Scale, seeds: int) -> ClaimRuns:
         How large they are.
     seeds : int
         Number of seeds. Claims about Table 1 alone have its number of seeds, when that is larger.
+
+    Returns
+    -------
+    SimpleNamespace
+        "networks", those of Table 1 by name, and of these the "usual" one, SegNet, with as many seeds as all others;
+        "new_routes", Table 2's network on routes that nobody has driven in training; "perfect", Table 3's on such
+        routes, with data without any error; "overturned" and "overturned_blind", cars on their tops: the usual network,
+        and one that doesn't see the occupancy grid; "unreduced", without the 1x1 reduction; "times", of the usual
+        network and of that one; "baselines", what learns no fusion; "baselines_off" and "usual_off", with the wrong
+        calibration.
     """
     every, all_seeds = range(seeds), max(seeds, scale.table1_seeds if seeds == scale.seeds else seeds)
     networks = table1_runs(replace(scale, networks=tuple(NETWORKS)), all_seeds)
     usual = networks["segnet"][:seeds]
     blind, unreduced = (
-        [scale.scored(scale.kitti, "segnet", seed, variant=variant, crf=False) for seed in every]
+        scale.scored(scale.kitti, "segnet", seeds, variant=variant, crf=False)
         for variant in (Variant(occupancy=False), Variant(reduces=False))
     )
     routes = scale.arrays(scale.chroma_routes, "test", "lidar")
     perfect = scale.arrays(scale.synthia_routes, "test", "true")
     lying = scale.arrays(scale.overturned, "test", "true")
-    return ClaimRuns(
+    return SimpleNamespace(
         networks=networks,
+        usual=usual,
         new_routes=[ScoreRun(scale.grid_stage(scale.chroma, "segnet", seed), routes) for seed in every],
         perfect=[
             ScoreRun(scale.grid_stage(scale.synthia, "segnet", seed, "true"), perfect, crf=False) for seed in every
@@ -160,7 +131,7 @@ def runs_of_claims(scale: Scale, seeds: int) -> ClaimRuns:
         overturned=[OverturnedRun(run.network, lying) for run in usual],
         overturned_blind=[OverturnedRun(run.network, lying) for run in blind],
         unreduced=unreduced,
-        times=TimeRun(usual[0].network, unreduced[0].network, usual[0].frames),
+        times=[TimeRun(usual[0].network, unreduced[0].network, usual[0].frames)],
         baselines=[BaselineRun(run.network, run.frames) for run in usual],
         baselines_off=[BaselineRun(run.network, run.frames, WRONG_CALIBRATION) for run in usual],
         usual_off=[ScoreRun(run.network, run.frames, crf=False, calibration=WRONG_CALIBRATION) for run in usual],

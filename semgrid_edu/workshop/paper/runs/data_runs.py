@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
 
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.training.run import architecture, chosen_truth
@@ -52,23 +51,14 @@ class DataRun(Run):
     """
 
     data: str
-    kind: ClassVar[str] = "data"
-    pace: ClassVar[str] = "simulate"
-    trial_seconds: ClassVar[float] = 0.2
-
-    @property
-    def tag(self) -> str:
-        """The data set."""
-        return self.data
-
-    @property
-    def steps(self) -> int:
-        """Number of frames, of which each is simulated."""
-        return sum(route.n_frames for route in RECIPE_OF[self.data].routes)
+    kind, pace, trial_seconds = "data", "simulate", 0.2
+    tag = property(lambda self: self.data)
+    recipe = property(lambda self: RECIPE_OF[self.data])
+    steps = property(lambda self: sum(route.n_frames for route in self.recipe.routes))
 
     def work(self, root: Path, device: str) -> None:
         """Make the data set. Parameters are those of `Run.work`."""
-        make_from_recipe(RECIPE_OF[self.data], self.folder(root), seed=0, workers=1)
+        make_from_recipe(self.recipe, self.folder(root), seed=0, workers=1)
 
     def dataset_dir(self, root: str | Path) -> Path:
         """Return the folder of the data set itself. Parameters are those of `Run.folder`."""
@@ -78,6 +68,9 @@ class DataRun(Run):
 @dataclass(frozen=True)
 class ArraysRun(Run):
     """Make the arrays of a split, which networks learn from and are scored on: images, occupancy grids, truth.
+
+    The occupancy filter runs over all frames of the split; `n_labelled` of them have a truth. The arrays themselves lie
+    in the cache of the data set.
 
     Parameters
     ----------
@@ -96,32 +89,14 @@ class ArraysRun(Run):
     split: str
     truth: str = "true"
     preset: str = "compact"
-    kind: ClassVar[str] = "arrays"
-
-    @property
-    def tag(self) -> str:
-        """Data set, split, labels and preset. The arrays themselves lie in the cache of the data set."""
-        parts = [self.data.tag, self.split, self.truth]
-        return "-".join(parts + [self.preset] * (self.preset != "compact"))
-
-    @property
-    def steps(self) -> int:
-        """Number of frames of the split, over which the occupancy filter runs."""
-        return sum(route.n_frames for route in RECIPE_OF[self.data.data].routes if route.split == self.split)
-
-    @property
-    def n_labelled(self) -> int:
-        """Number of labelled frames, which `frames` returns."""
-        return sum(len(route.labelled) for route in RECIPE_OF[self.data.data].routes if route.split == self.split)
-
-    @property
-    def pace(self) -> str:
-        """It depends on the size of the grid."""
-        return f"arrays {self.preset}"
-
-    def probe(self) -> float:
-        """Return the seconds that a frame took on one core when this was written."""
-        return 0.1 if self.preset == "compact" else 0.5
+    kind = "arrays"
+    size = property(lambda self: f"-{self.preset}" * (self.preset != "compact"))
+    tag = property(lambda self: f"{self.data.tag}-{self.split}-{self.truth}{self.size}")
+    pace = property(lambda self: f"arrays {self.preset}")
+    trial_seconds = property(lambda self: 0.1 if self.preset == "compact" else 0.5)
+    routes = property(lambda self: [route for route in self.data.recipe.routes if route.split == self.split])
+    steps = property(lambda self: sum(route.n_frames for route in self.routes))
+    n_labelled = property(lambda self: sum(len(route.labelled) for route in self.routes))
 
     def work(self, root: Path, device: str) -> None:
         """Make the arrays. Parameters are those of `Run.work`."""

@@ -4,7 +4,6 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import torch
@@ -46,8 +45,7 @@ GRIDS, SHOWN = "grids.npz", (1 / 6, 1 / 2, 5 / 6)
 class OverturnedRun(NetworkRun):
     """Count what a network calls the cells of overturned cars (section 4.4)."""
 
-    kind: ClassVar[str] = "overturned"
-    trial_seconds: ClassVar[float] = 0.15
+    kind, trial_seconds = "overturned", 0.15
 
     def work(self, root: Path, device: str) -> None:
         """Count. Parameters are those of `Run.work`."""
@@ -108,19 +106,9 @@ class TimeRun(Run):
     first: GridStageRun
     second: GridStageRun
     frames: ArraysRun
-    kind: ClassVar[str] = "times"
-    steps: ClassVar[int] = 2 * ROUNDS * FRAMES_EACH
-    trial_seconds: ClassVar[float] = 0.1
-
-    @property
-    def tag(self) -> str:
-        """The first network, and in what the second differs."""
-        return f"{self.first.tag}-and{self.second.variant.name}"
-
-    @property
-    def pace(self) -> str:
-        """It depends on the size of the networks."""
-        return f"time {self.frames.preset}"
+    kind, steps, trial_seconds = "times", 2 * ROUNDS * FRAMES_EACH, 0.1
+    tag = property(lambda self: f"{self.first.tag}-and{self.second.variant.name}")
+    pace = property(lambda self: f"time {self.frames.preset}")
 
     def work(self, root: Path, device: str) -> None:
         """Time both. Parameters are those of `Run.work`."""
@@ -173,9 +161,7 @@ def time_saved(rounds: NDArray) -> ScoreWithInterval:
 class FigureRun(NetworkRun):
     """Keep images, truth and grids of a few test frames to look at, for Figures 6 and 7 (sections 4.2 and 4.4)."""
 
-    kind: ClassVar[str] = "figure"
-    steps: ClassVar[int] = len(SHOWN)
-    trial_seconds: ClassVar[float] = 1.0
+    kind, steps, trial_seconds = "figure", len(SHOWN), 1.0
 
     def work(self, root: Path, device: str) -> None:
         """Make the grids. Parameters are those of `Run.work`."""

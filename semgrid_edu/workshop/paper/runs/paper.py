@@ -11,14 +11,6 @@ class _Names(dict):
         return network
 
 
-class _Scores(dict):
-    """The paper's scores by image network and whether the CRF is used; None for other networks."""
-
-    def __missing__(self, row: tuple[str, bool]) -> dict[str, None]:
-        """Return the row of a network that the paper doesn't have."""
-        return dict.fromkeys(METRICS)
-
-
 NETWORKS = _Names(segnet="SegNet", fcn="FCN", deeplab="DeepLab v2")
 """The image networks by the names of the paper, in the order of Table 1."""
 
@@ -28,16 +20,14 @@ def _shares(*per_cent: float) -> dict[str, float]:
     return {name: value / 100 for name, value in zip(METRICS, per_cent, strict=True)}
 
 
-TABLE_1_SCORES = _Scores(
-    {
-        ("segnet", False): _shares(81.1, 49.4, 69.8),
-        ("segnet", True): _shares(81.2, 45.6, 69.6),
-        ("fcn", False): _shares(79.8, 47.5, 68.6),
-        ("fcn", True): _shares(80.0, 43.7, 68.2),
-        ("deeplab", False): _shares(76.2, 36.9, 63.1),
-        ("deeplab", True): _shares(76.9, 34.6, 63.3),
-    }
-)
+TABLE_1_SCORES = {
+    ("segnet", False): _shares(81.1, 49.4, 69.8),
+    ("segnet", True): _shares(81.2, 45.6, 69.6),
+    ("fcn", False): _shares(79.8, 47.5, 68.6),
+    ("fcn", True): _shares(80.0, 43.7, 68.2),
+    ("deeplab", False): _shares(76.2, 36.9, 63.1),
+    ("deeplab", True): _shares(76.9, 34.6, 63.3),
+}
 """Table 1, on KITTI: by image network and whether the CRF refines its grids."""
 
 TABLE_2_SCORES = {

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from semgrid_edu.datasets.label_policies import POLICIES
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import SEGMENTERS
-from semgrid_edu.workshop.paper.runs.data_runs import RECIPE_OF, ArraysRun, DataRun
+from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun, DataRun
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
 from semgrid_edu.workshop.paper.runs.score_runs import ScoreRun
 from semgrid_edu.workshop.paper.runs.training_runs import GridStageRun, ImageStageRun
@@ -56,7 +56,7 @@ class Scale:
     @property
     def frames_to_train(self) -> int:
         """Number of labelled frames that Table 1's networks learn from."""
-        return sum(len(route.labelled) for route in RECIPE_OF[self.kitti].routes if route.split == "train")
+        return self.arrays(self.kitti, "train", "true").n_labelled
 
     def grid_stage(
         self,
@@ -90,21 +90,23 @@ class Scale:
         return GridStageRun(image_stage, self.arrays(data, "train", truth), self.grid_iterations, variant)
 
     def scored(
-        self, data: str, segmenter: str, seed: int, truth: str = "lidar", *, crf: bool = True, **network: object
-    ) -> ScoreRun:
-        """Return the run that scores a network on the test frames of the data that it learned from.
+        self, data: str, segmenter: str, seeds: int, truth: str = "lidar", *, crf: bool = True, **network: object
+    ) -> list[ScoreRun]:
+        """Return the runs that score networks on the test frames of the data that they learned from, one per seed.
 
         Parameters
         ----------
-        data, segmenter, seed, truth
+        data, segmenter, truth
             The network, as `Scale.grid_stage` takes it.
+        seeds : int
+            Number of seeds.
         crf : bool
             Whether the CRF is scored as well.
         **network
             In what else the network differs: `variant` and `n_frames` of `Scale.grid_stage`.
         """
-        trained = self.grid_stage(data, segmenter, seed, truth, **network)
-        return ScoreRun(trained, self.arrays(data, "test", truth), crf)
+        trained = (self.grid_stage(data, segmenter, seed, truth, **network) for seed in range(seeds))
+        return [ScoreRun(one, self.arrays(data, "test", truth), crf) for one in trained]
 
     def arrays(self, data: str, split: str, truth: str) -> ArraysRun:
         """Return the run that makes the arrays of a split. Parameters are those of `ArraysRun`."""

@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,21 +157,14 @@ class ScoreRun(CountingRun, NetworkRun):
 
     crf: bool = True
     calibration: CalibrationError = EXACT
-    kind: ClassVar[str] = "score"
+    kind = "score"
+    pace = property(lambda self: f"score {self.segmenter} {self.frames.preset}" + " with CRF" * self.crf)
+    trial_seconds = property(lambda self: (0.8 if self.crf else 0.15) * (1 if self.frames.preset == "compact" else 10))
 
     @property
     def tag(self) -> str:
         """Network, frames, calibration, and whether the CRF is scored."""
         return f"{super().tag}{self.calibration.name}" + "-crf" * self.crf
-
-    @property
-    def pace(self) -> str:
-        """It depends on the network, and the CRF takes the most time."""
-        return f"score {self.network.image_stage.segmenter} {self.frames.preset}" + " with CRF" * self.crf
-
-    def probe(self) -> float:
-        """Return the seconds that a frame took on one core when this was written."""
-        return (0.8 if self.crf else 0.15) * (1 if self.frames.preset == "compact" else 10)
 
     def grids(self, root: Path, frames: TrainingSet) -> Grids:
         """Return the network's grids. Parameters are those of `CountingRun.grids`."""
@@ -182,10 +174,9 @@ class ScoreRun(CountingRun, NetworkRun):
     def _refinements(self, cell: float) -> dict[str, Refine]:
         """Return the CRF with default parameters, and with searched ones if there are any."""
         found = {"CRF": partial(_refined, 1.0, CrfParams.for_cells(cell))}
-        segmenter = self.network.image_stage.segmenter
-        if segmenter in SEARCHED:
-            return found | {"searched CRF": partial(_refined, *SEARCHED[segmenter])}
-        print(f"No CRF parameters were searched for {segmenter}, so {WITH_SEARCHED!r} is left out.")
+        if self.segmenter in SEARCHED:
+            return found | {"searched CRF": partial(_refined, *SEARCHED[self.segmenter])}
+        print(f"No CRF parameters were searched for {self.segmenter}, so {WITH_SEARCHED!r} is left out.")
         return found
 
 
@@ -207,8 +198,8 @@ class BaselineRun(CountingRun, NetworkRun):
     """
 
     calibration: CalibrationError = EXACT
-    kind: ClassVar[str] = "baselines"
-    trial_seconds: ClassVar[float] = 0.2
+    kind, trial_seconds = "baselines", 0.2
+    pace = property(lambda self: f"baselines {self.segmenter} {self.frames.preset}")
 
     @property
     def tag(self) -> str:
@@ -221,11 +212,6 @@ class BaselineRun(CountingRun, NetworkRun):
     def needs(self) -> tuple[Run, ...]:
         """The image network, and the frames of both splits."""
         return self.network.image_stage, self.network.arrays, self.frames
-
-    @property
-    def pace(self) -> str:
-        """It depends on the image network."""
-        return f"baselines {self.network.image_stage.segmenter} {self.frames.preset}"
 
     def grids(self, root: Path, frames: TrainingSet) -> Grids:
         """Return the grids of the baselines. Parameters are those of `CountingRun.grids`."""
@@ -265,16 +251,12 @@ class LabelsRun(CountingRun):
 
     labels: ArraysRun
     usual: ArraysRun
-    kind: ClassVar[str] = "labels"
-
+    kind = "labels"
     frames = property(lambda self: self.usual)
     steps = property(lambda self: self.labels.n_labelled)
     tag = property(lambda self: self.labels.tag)
     pace = property(lambda self: f"labels {self.labels.preset}")
-
-    def probe(self) -> float:
-        """Return the seconds that a frame took on one core when this was written."""
-        return 0.01 if self.labels.preset == "compact" else 0.1
+    trial_seconds = property(lambda self: 0.01 if self.labels.preset == "compact" else 0.1)
 
     def grids(self, root: Path, frames: TrainingSet) -> Grids:
         """Return the labels. Parameters are those of `CountingRun.grids`."""

@@ -5,7 +5,6 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import torch
@@ -22,7 +21,7 @@ from semgrid_edu.training.batches import Batch
 from semgrid_edu.training.distributed import first_process_first, process_group
 from semgrid_edu.training.loop import learn
 from semgrid_edu.training.run import architecture, training_params
-from semgrid_edu.workshop.paper.runs.data_runs import RECIPE_OF, ArraysRun
+from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun
 from semgrid_edu.workshop.paper.runs.variants import USUAL, Variant
 from semgrid_edu.workshop.scheduler.runs import Run
 from semgrid_edu.workshop.scheduler.torchrun import few_threads
@@ -35,16 +34,9 @@ TIMED_STEPS = 2
 class TrainingRun(Run):
     """A run that trains a network on `arrays`, one step per iteration, as `architecture` and `params` say."""
 
-    is_training: ClassVar[bool] = True
-
-    @property
-    def steps(self) -> int:
-        """Number of training steps."""
-        return self.iterations
-
-    def probe(self) -> float:
-        """Return the seconds of a training step on this machine's CPU, from a short trial."""
-        return _seconds_per_step(self.architecture, self.params, self.kind)
+    is_training = True
+    steps = property(lambda self: self.iterations)
+    trial_seconds = property(lambda self: _seconds_per_step(self.architecture, self.params, self.kind))
 
     @abstractmethod
     def net(self, root: Path, camera: Camera) -> SemanticGridNet:
@@ -114,30 +106,21 @@ class ImageStageRun(TrainingRun):
     seed: int = 0
     iterations: int = 500
     n_frames: int | None = None
-    kind: ClassVar[str] = "image"
-
-    @property
-    def tag(self) -> str:
-        """What it learns from, and how."""
-        return f"{self.label}-{self.iterations}-seed{self.seed}"
+    kind = "image"
+    tag = property(lambda self: f"{self.label}-{self.iterations}-seed{self.seed}")
+    pace = property(lambda self: f"image {self.segmenter} {self.arrays.preset}")
 
     @property
     def label(self) -> str:
         """What the names of the runs after it say of it: data set, network, number of frames."""
-        parts = [self.arrays.data.tag, self.segmenter]
-        parts += [self.arrays.preset] * (self.arrays.preset != "compact")
-        return "-".join(parts + [f"{self.n_frames}frames"] * (self.n_frames is not None))
-
-    @property
-    def pace(self) -> str:
-        """It depends on the network."""
-        return f"image {self.segmenter} {self.arrays.preset}"
+        fewer = "" if self.n_frames is None else f"-{self.n_frames}frames"
+        return f"{self.arrays.data.tag}-{self.segmenter}{self.arrays.size}{fewer}"
 
     @property
     def architecture(self) -> Architecture:
         """The whole network, of which the image network learns."""
         usual = architecture(self.segmenter, self.arrays.preset)
-        return replace(usual, label_set=RECIPE_OF[self.arrays.data.data].label_set)
+        return replace(usual, label_set=self.arrays.data.recipe.label_set)
 
     @property
     def params(self) -> TrainingParams:
@@ -183,7 +166,10 @@ class GridStageRun(TrainingRun):
     arrays: ArraysRun
     iterations: int = 500
     variant: Variant = USUAL
-    kind: ClassVar[str] = "grid"
+    kind = "grid"
+    pace = property(lambda self: f"grid {self.image_stage.segmenter} {self.arrays.preset}{self.variant.name}")
+    seed = property(lambda self: self.image_stage.seed)
+    chosen = property(lambda self: self.image_stage.chosen)  # the frames that its image network learned from
 
     @property
     def tag(self) -> str:
@@ -191,16 +177,6 @@ class GridStageRun(TrainingRun):
         first = self.image_stage
         label = f"{first.label}-{self.arrays.truth}{self.variant.name}"
         return f"{label}-{first.iterations}+{self.iterations}-seed{self.seed}"
-
-    @property
-    def seed(self) -> int:
-        """The seed of its image network."""
-        return self.image_stage.seed
-
-    @property
-    def pace(self) -> str:
-        """It depends on the network and the variant."""
-        return f"grid {self.image_stage.segmenter} {self.arrays.preset}{self.variant.name}"
 
     @property
     def architecture(self) -> Architecture:
@@ -219,13 +195,9 @@ class GridStageRun(TrainingRun):
         net = build_net(self.architecture, camera, self.seed)
         # The file is that of the usual network; of its weights, those of the image network fit every variant.
         _, tensors = read_tensors(self.image_stage.folder(root) / WEIGHTS)
-        learnt = {name: part for name, part in tensors.items() if name.startswith("segmenter.")}
-        net.segmenter.load_state_dict({name.removeprefix("segmenter."): part for name, part in learnt.items()})
+        parts = {name.partition("."): part for name, part in tensors.items()}
+        net.segmenter.load_state_dict({rest: part for (whose, _, rest), part in parts.items() if whose == "segmenter"})
         return net
-
-    def chosen(self, frames: TrainingSet) -> Sequence[Sample]:
-        """Return the frames that its image network learned from. Parameters are those of `ImageStageRun.chosen`."""
-        return self.image_stage.chosen(frames)
 
 
 @dataclass(frozen=True)
@@ -243,17 +215,7 @@ class NetworkRun(Run):
     network: GridStageRun
     frames: ArraysRun
 
-    @property
-    def tag(self) -> str:
-        """Network and frames."""
-        return f"{self.network.tag}-on-{self.frames.tag}"
-
-    @property
-    def steps(self) -> int:
-        """Number of frames."""
-        return self.frames.n_labelled
-
-    @property
-    def pace(self) -> str:
-        """It depends on the size of the network."""
-        return f"{self.kind} {self.frames.preset}"
+    tag = property(lambda self: f"{self.network.tag}-on-{self.frames.tag}")
+    steps = property(lambda self: self.frames.n_labelled)
+    pace = property(lambda self: f"{self.kind} {self.frames.preset}")
+    segmenter = property(lambda self: self.network.image_stage.segmenter)

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import asdict
-from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -15,7 +14,7 @@ from semgrid_edu.datasets.samples import sample_drive, sample_frames
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.metrics import confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import SEGMENTERS, Architecture, SemanticGridNet, build_net, unit_image
-from semgrid_edu.storage.provenance import versions
+from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.training.log import LOG, read_log
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
@@ -55,17 +54,14 @@ def overfit(seed: int = 0) -> OverfitResult:
     dict
         "networks": for each image network what `learn_by_heart` returns; and all that made them. JSON can hold it.
     """
-    began = datetime.now(UTC)
     frames, camera = sample_frames()[:FRAMES], sample_drive().camera
     nets = {name: build_net(Architecture(name), camera, seed) for name in SEGMENTERS}
     return {
         "networks": {name: learn_by_heart(net, frames, PARAMS, seed) for name, net in nets.items()},
         "frames": len(frames),
         "params": asdict(PARAMS),
-        "command": f"semgrid-edu reproduce overfit --seed {seed}",
         "seed": seed,
-        "date": f"{began:%Y-%m-%d}",
-        "versions": versions("torch", "numpy"),
+        **made_by(f"semgrid-edu reproduce overfit --seed {seed}", "torch", "numpy"),
     }
 
 
@@ -97,8 +93,7 @@ def learn_by_heart(net: SemanticGridNet, frames: Sequence[Sample], params: Train
         "iterations": len(loss),
         "losses": [*loss[:-1:LOSS_EVERY].tolist(), float(loss[-1])],
         "pixel accuracy": {
-            "evaluation": network_accuracy(net, frames, training=False),
-            "training": network_accuracy(net, frames, training=True),
+            mode: network_accuracy(net, frames, training=mode == "training") for mode in ("evaluation", "training")
         },
         "minutes": round((perf_counter() - began) / 60, 1),
     }

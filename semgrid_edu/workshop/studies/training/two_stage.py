@@ -1,7 +1,6 @@
 """End-to-end training against training in two stages, in which the image network is frozen (paper, section 4.1)."""
 
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.metrics import METRICS, confusion_matrix
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, load_net
 from semgrid_edu.storage.files import sha256
-from semgrid_edu.storage.provenance import versions
+from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training import CHECKPOINT, TrainingParams
 from semgrid_edu.training.run import train_network
 from semgrid_edu.workshop.scoring.evaluate import Scores, scores
@@ -50,25 +49,23 @@ def compare_training(
         all that made them. JSON can hold it.
     """
     params, test = params or TrainingParams(), TrainingSet(dataset_dir, "test")
-    folders = {method: [Path(runs) / f"{method}-{seed}" for seed in range(n_seeds)] for method in METHODS}
-    for seed in range(n_seeds):
-        for method in METHODS:
-            folder, chosen = folders[method][seed], replace(params, end_to_end=method == "end-to-end")
-            if not (folder / WEIGHTS).exists():
-                train_network(dataset_dir, folder, "segnet", chosen, seed, (folder / CHECKPOINT).exists())
-    trained = [folder for of_seed in zip(*folders.values(), strict=True) for folder in of_seed]
+    trained = {(seed, method): Path(runs) / f"{method}-{seed}" for seed in range(n_seeds) for method in METHODS}
+    for (seed, method), folder in trained.items():
+        if not (folder / WEIGHTS).exists():
+            chosen = replace(params, end_to_end=method == "end-to-end")
+            train_network(dataset_dir, folder, "segnet", chosen, seed, (folder / CHECKPOINT).exists())
+    scored: dict[str, list[Scores]] = {method: [] for method in METHODS}
+    for (_, method), folder in trained.items():
+        scored[method].append(score_grid_and_image(load_net(folder / WEIGHTS, test.camera), test))
     return {
-        "scores": {
-            method: [score_grid_and_image(load_net(folder / WEIGHTS, test.camera), test) for folder in of_method]
-            for method, of_method in folders.items()
-        },
+        "scores": scored,
         "frames": len(test),
-        "weights": {folder.name: sha256(folder / WEIGHTS) for folder in trained},
-        "image stages": {folder.name: sha256(folder / IMAGE_STAGE) for folder in trained},
-        "command": f"semgrid-edu reproduce two-stage --data {Path(dataset_dir).name} --seeds {n_seeds}",
+        "weights": {folder.name: sha256(folder / WEIGHTS) for folder in trained.values()},
+        "image stages": {folder.name: sha256(folder / IMAGE_STAGE) for folder in trained.values()},
         "iterations": [params.image_iterations, params.grid_iterations],
-        "date": f"{datetime.now(UTC):%Y-%m-%d}",
-        "versions": versions("numpy", "torch"),
+        **made_by(
+            f"semgrid-edu reproduce two-stage --data {Path(dataset_dir).name} --seeds {n_seeds}", "numpy", "torch"
+        ),
     }
 
 
