@@ -1,13 +1,12 @@
 """What things are and what they are made of, and the class that each label set of section 4 gives them."""
 
-import tomllib
 from enum import IntEnum
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.labels import IGNORE, LabelSet
+from semgrid_edu.workshop.simulation.tables import read_table
 
 
 class Kind(IntEnum):
@@ -28,41 +27,13 @@ class Kind(IntEnum):
     SKY = 12
 
 
-class Material(IntEnum):
-    """What a surface is made of: decides its texture, its gloss and its LIDAR reflectance."""
-
-    MATTE = 0
-    GROUND = 1
-    PLASTER = 2
-    BRICK = 3
-    TILES = 4
-    WOOD = 5
-    GLASS = 6
-    PAINT = 7
-    METAL = 8
-    BARK = 9
-    LEAF = 10
-    CLOTH = 11
-    RUBBER = 12
-    LAMP = 13
-    RETRO = 14
-    # these three stop only a part of the rays, by chance
-    WIRE = 15
-    PANE = 16
-    TWIGS = 17
-
-
-REFLECTANCE = np.array(
-    [0.35, 0.25, 0.45, 0.35, 0.3, 0.4, 0.08, 0.3, 0.4, 0.25, 0.4, 0.3, 0.06, 0.7, 1.0, 0.4, 0.01, 0.4], dtype=np.float32
-)
+_TABLES = read_table("things/materials")
+Material = IntEnum("Material", tuple(_TABLES["reflectance"]), start=0, module=__name__)
+"""What a surface is made of: decides its texture, its gloss and its LIDAR reflectance."""
+REFLECTANCE = np.array(tuple(_TABLES["reflectance"].values()), np.float32)
 """Share of 905 nm light that each `Material` sends back (1: retroreflective plates and signs)."""
-
-PALETTES = {
-    name: tuple(map(tuple, colours))
-    for name, colours in tomllib.loads(Path(__file__).with_name("palettes.toml").read_text(encoding="utf-8")).items()
-}
+PALETTES = {name: tuple(map(tuple, colours)) for name, colours in _TABLES["palettes"].items()}
 """Linear colours of what comes in several, by what wears them."""
-
 _KITTI_NAMES = {"lane": "road", "sign": "signage", "pole": "signage"}
 
 
