@@ -1,5 +1,6 @@
 """Simulated data sets in place of those of section 4, and the sample drive: made in parallel, resumed after a stop."""
 
+from collections.abc import Iterator
 from concurrent.futures import as_completed
 from dataclasses import dataclass
 from functools import partial
@@ -173,8 +174,8 @@ def make_from_recipe(
         writer.remove_unfinished(root / writer.DATE)
         missing = [drive for drive in routes if not drive_folder(root, writer.DATE, drive).exists()]
         missing.sort(key=lambda drive: -routes[drive].n_frames)
-        with tqdm(total=len(routes), initial=len(routes) - len(missing), desc=recipe.name, unit="drive") as bar:
-            _run(partial(_make_drive, recipe, root, seed), missing, workers, scheduler, bar)
+        made = _run(partial(_make_drive, recipe, root, seed), missing, workers, scheduler)
+        list(tqdm(made, recipe.name, len(routes), initial=len(routes) - len(missing), unit="drive"))
         for drive, route in routes.items():
             writer.check_complete(drive_folder(root, writer.DATE, drive), route.n_frames, route.labelled)
         index = _index(recipe, routes, seed)
@@ -196,17 +197,14 @@ def _claim(root: Path, marker: dict) -> None:
         write_json(path, marker)
 
 
-def _run(make: partial, drives: list[str], workers: int, scheduler: str | None, bar: tqdm) -> None:
-    """Make drives in processes (in this one when one is enough), and count them on the bar."""
+def _run(make: partial, drives: list[str], workers: int, scheduler: str | None) -> Iterator[None]:
+    """Make drives in processes (in this one when one is enough), and yield after each."""
     if not scheduler and (workers == 1 or len(drives) < 2):
-        for drive in drives:
-            make(drive)
-            bar.update()
+        yield from map(make, drives)
         return
     with workplace(None if scheduler else workers, scheduler) as place:
         for future in as_completed([place.executor.submit(make, drive) for drive in drives]):
-            future.result()
-            bar.update()
+            yield future.result()
 
 
 def _make_drive(recipe: DatasetRecipe, root: Path, seed: int, drive: str) -> None:

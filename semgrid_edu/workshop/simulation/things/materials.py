@@ -8,33 +8,15 @@ from numpy.typing import NDArray
 from semgrid_edu.labels import IGNORE, LabelSet
 from semgrid_edu.workshop.simulation.tables import read_table
 
-
-class Kind(IntEnum):
-    """What a surface belongs to: finer than either label set, so that both can be derived."""
-
-    ROAD = 0
-    LANE = 1
-    SIDEWALK = 2
-    GRASS = 3
-    PLANT = 4
-    CAR = 5
-    PEDESTRIAN = 6
-    BICYCLE = 7
-    BUILDING = 8
-    SIGN = 9
-    POLE = 10
-    FENCE = 11
-    SKY = 12
-
-
 _TABLES = read_table("things/materials")
+Kind = IntEnum("Kind", tuple(_TABLES["classes"]), start=0, module=__name__)
+"""What a surface belongs to: finer than either label set, so that both can be derived."""
 Material = IntEnum("Material", tuple(_TABLES["reflectance"]), start=0, module=__name__)
 """What a surface is made of: decides its texture, its gloss and its LIDAR reflectance."""
 REFLECTANCE = np.array(tuple(_TABLES["reflectance"].values()), np.float32)
 """Share of 905 nm light that each `Material` sends back (1: retroreflective plates and signs)."""
 PALETTES = {name: tuple(map(tuple, colours)) for name, colours in _TABLES["palettes"].items()}
 """Linear colours of what comes in several, by what wears them."""
-_KITTI_NAMES = {"lane": "road", "sign": "signage", "pole": "signage"}
 
 
 def class_of_kind(label_set: LabelSet) -> NDArray[np.uint8]:
@@ -54,8 +36,6 @@ def class_of_kind(label_set: LabelSet) -> NDArray[np.uint8]:
         A table to index with kinds; 255 (unlabelled) stays 255.
     """
     table = np.full(256, IGNORE, dtype=np.uint8)
-    for kind in Kind:
-        name = "vegetation" if kind in (Kind.GRASS, Kind.PLANT) else kind.name.lower()
-        candidates = (name, _KITTI_NAMES.get(name), "void")
-        table[kind] = label_set.index(next(c for c in candidates if c in label_set.names))
+    for kind, names in zip(Kind, _TABLES["classes"].values(), strict=True):
+        table[kind] = label_set.index(next(name for name in (*names, "void") if name in label_set.names))
     return table
