@@ -57,11 +57,8 @@ def _grass(tile, x, y, blur, out):
     tuft = texture(tile, 6.0 * x, 6.0 * y + 13.0) - 0.5
     dry = texture(tile, 0.8 * x + 7.0, 0.8 * y)
     light = 1.0 + 0.8 * blade + 0.6 * tuft
-    out[0], out[1], out[2] = (
-        (0.075 + 0.09 * dry * dry) * light,
-        (0.135 + 0.03 * dry) * light,
-        (0.035 + 0.02 * dry) * light,
-    )
+    red, green, blue = 0.075 + 0.09 * dry * dry, 0.135 + 0.03 * dry, 0.035 + 0.02 * dry
+    out[0], out[1], out[2] = red * light, green * light, blue * light
 
 
 @njit(cache=True, fastmath=True)

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from semgrid_edu.workshop.simulation.tables import named_rows, read_table
 from semgrid_edu.workshop.simulation.things.materials import PALETTES, Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, box, merge, shape, tube
+from semgrid_edu.workshop.simulation.things.tables import named_rows, read_table
 
 _TABLES = read_table("things/cars")
 _BODIES = named_rows(_TABLES["bodies"])

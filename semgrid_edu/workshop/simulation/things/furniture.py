@@ -5,18 +5,18 @@ from functools import cache, partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from semgrid_edu.workshop.simulation.tables import named_rows, read_table
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, ball, box, merge, quads, shape, tube
+from semgrid_edu.workshop.simulation.things.tables import named_rows, read_table
 
 _STONE, _GREY, _ZINC = (0.36, 0.34, 0.31), (0.42, 0.43, 0.44), (0.33, 0.35, 0.35)
-_FRAME, _TWIGS = (0.16, 0.17, 0.18), (0.05, 0.11, 0.028)
+_TWIGS = (0.05, 0.11, 0.028)
 _TABLES = read_table("things/furniture")
 _FENCES, _FACES = named_rows(_TABLES["fences"]), _TABLES["signs"]
 FENCES = (*_FENCES, "wall")
 """The fences that `fence` knows."""
-MESH_HEIGHT, PANE_HEIGHT = 1.95, 2.1
-"""Heights of a fence of wire mesh and of a row of panes, metres."""
+SHEETS = named_rows(_TABLES["sheets"])
+"""The fences that `sheet_fence` knows."""
 _fence_box, _fence_quads = partial(box, kind=Kind.FENCE), partial(quads, kind=Kind.FENCE)
 
 
@@ -53,27 +53,26 @@ def fence(style: str, length: float) -> Shape:
 
 
 @cache
-def wire_fence(length: float) -> tuple[Shape, Shape]:
-    """Make a piece of wire mesh fence from the origin along x: post and rail, and the sheet of `Material.WIRE`.
+def sheet_fence(style: str, length: float) -> tuple[Shape, Shape]:
+    """Make a piece of a fence that lets light through, from the origin along x.
 
     Parameters
     ----------
+    style : str
+        One of `SHEETS`.
     length : float
-        Distance to the next post, metres.
+        Its length, metres.
+
+    Returns
+    -------
+    frame, sheet : Shape
+        The post at the origin with the rails, and what a part of the light passes.
     """
-    post = _fence_box((0, 0, MESH_HEIGHT / 2 - 0.3), (0.06, 0.06, MESH_HEIGHT + 0.7), _ZINC, Material.METAL)
-    rail = _fence_box((length / 2, 0, MESH_HEIGHT - 0.02), (length, 0.03, 0.04), _ZINC, Material.METAL)
-    wire = _fence_quads((0, 0, 0.05), (length, 0, 0), (0, 0, MESH_HEIGHT - 0.05), _ZINC, Material.WIRE)
-    return merge([post, rail]), wire
-
-
-@cache
-def glass_pane(length: float) -> tuple[Shape, Shape]:
-    """Make a pane: post and two rails, and the sheet of `Material.PANE`. Parameters are those of `wire_fence`."""
-    post = _fence_box((0, 0, PANE_HEIGHT / 2), (0.06, 0.06, PANE_HEIGHT + 0.2), _FRAME, Material.METAL)
-    rails = [_fence_box((length / 2, 0, z), (length, 0.05, 0.06), _FRAME, Material.METAL) for z in (0.2, 2.05)]
-    glass = _fence_quads((0, 0, 0.23), (length, 0, 0), (0, 0, PANE_HEIGHT - 0.3), _FRAME, Material.PANE)
-    return merge([post, *rails]), glass
+    its, look = SHEETS[style], (SHEETS[style].colour, Material.METAL)
+    post = _fence_box((0, 0, its.post[0]), (0.06, 0.06, its.post[1]), *look)
+    rails = [_fence_box((length / 2, 0, z), (length, wide, high), *look) for z, wide, high in its.rails]
+    sheet = _fence_quads((0, 0, its.sheet[0]), (length, 0, 0), (0, 0, its.sheet[1]), its.colour, Material[its.material])
+    return merge([post, *rails]), sheet
 
 
 def porous_hedge(length: float, thickness: float, height: float) -> Shape:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.labels import IGNORE, LabelSet
-from semgrid_edu.workshop.simulation.tables import read_table
+from semgrid_edu.workshop.simulation.things.tables import read_table
 
 _TABLES = read_table("things/materials")
 Kind = IntEnum("Kind", tuple(_TABLES["classes"]), start=0, module=__name__)
@@ -15,7 +15,7 @@ Material = IntEnum("Material", tuple(_TABLES["reflectance"]), start=0, module=__
 """What a surface is made of: decides its texture, its gloss and its LIDAR reflectance."""
 REFLECTANCE = np.array(tuple(_TABLES["reflectance"].values()), np.float32)
 """Share of 905 nm light that each `Material` sends back (1: retroreflective plates and signs)."""
-PALETTES = {name: tuple(map(tuple, colours)) for name, colours in _TABLES["palettes"].items()}
+PALETTES = _TABLES["palettes"]
 """Linear colours of what comes in several, by what wears them."""
 
 

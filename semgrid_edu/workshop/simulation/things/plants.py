@@ -6,10 +6,10 @@ from functools import cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.workshop.simulation.tables import named_rows, read_table
 from semgrid_edu.workshop.simulation.things import shapes
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, merge
+from semgrid_edu.workshop.simulation.things.tables import named_rows, read_table
 
 _leaves = partial(shapes.shape, material=Material.LEAF, kind=Kind.PLANT)
 _bark = partial(shapes.tube, material=Material.BARK, kind=Kind.PLANT)

@@ -6,14 +6,20 @@ from types import SimpleNamespace
 
 
 def read_table(name: str) -> dict:
-    """Read one of the simulator's tables.
+    """Read one of the simulator's tables; its lists become tuples.
 
     Parameters
     ----------
     name : str
-        The file's path below this folder, without its suffix.
+        The file's path below the folder of the simulator, without its suffix.
     """
-    return tomllib.loads((Path(__file__).parent / f"{name}.toml").read_text(encoding="utf-8"))
+    return _frozen(tomllib.loads((Path(__file__).parents[1] / f"{name}.toml").read_text(encoding="utf-8")))
+
+
+def _frozen(value: object) -> object:
+    if isinstance(value, dict):
+        return {name: _frozen(part) for name, part in value.items()}
+    return tuple(map(_frozen, value)) if isinstance(value, list) else value
 
 
 def named_rows(table: dict[str, dict]) -> dict[str, SimpleNamespace]:
