@@ -21,14 +21,9 @@ DT = 0.125
 lattice move as its probability does."""
 STEPS = 6
 """Number of steps."""
-PARAMS = occupancy.BofParams(
-    occupancy.VelocityLattice(max_speed=8.0, spacing=4.0),
-    occupancy.WorldModel(
-        rates=((0.0, 0.02, 0.0, 0.3), (0.02, 0.0, 0.0, 0.1), (0.1, 0.1, 0.0, 0.5), (0.0, 0.0, 0.0, 0.0)),
-        first_sight=(0.85, 0.15, 0.0),
-        max_acceleration=0.0,
-    ),
-)
+_RATES = ((0.0, 0.02, 0.0, 0.3), (0.02, 0.0, 0.0, 0.1), (0.1, 0.1, 0.0, 0.5), (0.0, 0.0, 0.0, 0.0))
+_WORLD = occupancy.WorldModel(_RATES, first_sight=(0.85, 0.15, 0.0), max_acceleration=0.0)
+PARAMS = occupancy.BofParams(occupancy.VelocityLattice(max_speed=8.0, spacing=4.0), _WORLD)
 """The default world, except that nothing accelerates or is born: such velocities wouldn't lie on the lattice."""
 WORTH_COMPARING = 0.1
 """Cells are compared where the BOF's dynamic probability is above this; elsewhere a mean velocity says little."""

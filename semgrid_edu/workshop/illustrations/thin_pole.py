@@ -206,15 +206,12 @@ class PoleNet(nn.Module):
 
     def _down_and_up(self, x: Tensor) -> Tensor:
         full, half, quarter, stay, to_half, to_full, score = self.layers
-        seen = []
-        for encode in (full, half):
-            before = encode(x)
-            x, indices = F.max_pool2d(before, 2, return_indices=True)
-            seen.append((before, indices))
-        x = stay(quarter(x))
-        for decode, (before, indices) in zip((to_half, to_full), reversed(seen), strict=True):
-            x = decode(_double(self.mechanism, x, before, indices))
-        return score(x)
+        first = full(x)
+        x, where_first = F.max_pool2d(first, 2, return_indices=True)
+        second = half(x)
+        x, where_second = F.max_pool2d(second, 2, return_indices=True)
+        x = to_half(_double(self.mechanism, stay(quarter(x)), second, where_second))
+        return score(to_full(_double(self.mechanism, x, first, where_first)))
 
 
 def _layer(n_in: int, n_out: int, stride: int, rate: int) -> nn.Sequential:
