@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import PlanarMotion
 from semgrid_edu.workshop.illustrations.blur import SCHEMES, measure_blur, winding_road
 
-WORLD = GridSpec(-5, 17, -6, 10, 0.2)
-FEW = {"spec": WORLD, "drops": 8}
+FEW = {"drops": 8}
 
 
 def test_a_scrolling_map_that_doesnt_turn_keeps_everything():

@@ -58,9 +58,7 @@ def winding_road(steps: int = 50, turn: float = 0.013) -> list[PlanarMotion]:
     return [PlanarMotion(float(dx), 0.0, turn) for dx in np.linspace(0.2, 0.5, steps)]
 
 
-def measure_blur(
-    scheme: str, motions: Sequence[PlanarMotion], spec: GridSpec = WORLD, drops: int = 20, seed: int = 0
-) -> Blur:
+def measure_blur(scheme: str, motions: Sequence[PlanarMotion], drops: int = 20, seed: int = 0) -> Blur:
     """Move a map of a world that stands still along with a vehicle, and measure how it blurs.
 
     The map forgets nothing and sees nothing, so it changes only because its cells move. It holds a chequerboard and,
@@ -73,9 +71,7 @@ def measure_blur(
         weighted by how near they are. "nearest": in each step, every cell takes the value of the old cell that its
         centre lies in. "scrolling": as `Cmcdot` moves its maps, by whole cells, and turned once per `MAX_YAW`.
     motions : sequence of PlanarMotion
-        Motions of the vehicle, T of them.
-    spec : GridSpec
-        The cells of the map. Some of the cells at the start must stay in the map at every step.
+        Motions of the vehicle, T of them; some of the cells at the start must stay in the map at every step.
     drops : int
         Number of drops.
     seed : int
@@ -96,52 +92,50 @@ def measure_blur(
         raise ArgumentError("scheme", " or ".join(SCHEMES), scheme)
     if not motions or drops < 1:
         raise ArgumentError("motions, drops", "at least one of each", f"{len(motions)}, {drops}")
-    held = _always_held(spec, motions)
+    held = _always_held(motions)
     row, col = np.random.default_rng(seed).permutation(np.argwhere(held))[:drops].T
-    fields = np.zeros((len(row) + 1, *spec.shape), np.float32)
+    fields = np.zeros((len(row) + 1, *WORLD.shape), np.float32)
     fields[np.arange(len(row)), row, col] = 1
-    fields[-1] = np.floor(spec.centers() / SQUARE).sum(axis=-1) % 2
-    start, rest, T_start_from_map = spec.centers()[row, col], PlanarMotion(), PlanarMotion()
+    fields[-1] = np.floor(WORLD.centers() / SQUARE).sum(axis=-1) % 2
+    start, rest, T_start_from_map = WORLD.centers()[row, col], PlanarMotion(), PlanarMotion()
     measured = []
     for motion in motions:
         pose = rest.then(motion)
-        moved, rest = scroll(pose, spec.cell, MAX_YAW) if scheme == "scrolling" else (pose, PlanarMotion())
-        fields = _carry(scheme, fields, spec, moved)
+        moved, rest = scroll(pose, WORLD.cell, MAX_YAW) if scheme == "scrolling" else (pose, PlanarMotion())
+        fields = _carry(scheme, fields, moved)
         T_start_from_map = T_start_from_map.then(moved)
-        measured.append(_measure(fields, spec, T_start_from_map, start, held))
+        measured.append(_measure(fields, T_start_from_map, start, held))
     return Blur(*np.array(measured).T)
 
 
-def _always_held(spec: GridSpec, motions: Sequence[PlanarMotion]) -> NDArray[np.bool_]:
+def _always_held(motions: Sequence[PlanarMotion]) -> NDArray[np.bool_]:
     """Return which cells of the first map stay in the map, `MARGIN` metres or more from its borders, (H, W)."""
-    held, pose = np.ones(spec.shape, bool), PlanarMotion()
+    held, pose = np.ones(WORLD.shape, bool), PlanarMotion()
+    low, high = (WORLD.x_min, WORLD.y_min), (WORLD.x_max, WORLD.y_max)
     for motion in [PlanarMotion(), *motions]:
         pose = pose.then(motion)
-        x, y = np.moveaxis(pose.to_now(spec.centers()), -1, 0)
-        held &= (x > spec.x_min + MARGIN) & (x < spec.x_max - MARGIN)
-        held &= (y > spec.y_min + MARGIN) & (y < spec.y_max - MARGIN)
+        place = pose.to_now(WORLD.centers())
+        held &= ((place > np.add(low, MARGIN)) & (place < np.subtract(high, MARGIN))).all(axis=-1)
     if not held.any():
-        raise ArgumentError("motions", "motions that leave some of the map in it", f"{pose} in {spec}")
+        raise ArgumentError("motions", "motions that leave some of the map in it", f"{pose} in {WORLD}")
     return held
 
 
-def _carry(scheme: str, fields: NDArray[np.float32], spec: GridSpec, moved: PlanarMotion) -> NDArray[np.float32]:
+def _carry(scheme: str, fields: NDArray[np.float32], moved: PlanarMotion) -> NDArray[np.float32]:
     """Express fields (K, H, W) in the frame whose pose is `moved`; what enters is 0."""
     if scheme != "bilinear":
-        return look_up(fields, np.zeros(len(fields), np.float32), spec, spec, moved)
-    index = ((spec.x_max, spec.y_max) - moved.to_previous(spec.centers())) / spec.cell - 0.5
+        return look_up(fields, np.zeros(len(fields), np.float32), WORLD, WORLD, moved)
+    index = ((WORLD.x_max, WORLD.y_max) - moved.to_previous(WORLD.centers())) / WORLD.cell - 0.5
     return np.stack([map_coordinates(field, np.moveaxis(index, -1, 0), order=1) for field in fields])
 
 
-def _measure(
-    fields: NDArray[np.float32], spec: GridSpec, T_start_from_map: PlanarMotion, start: NDArray, held: NDArray[np.bool_]
-) -> tuple[float, float, float]:
+def _measure(fields: NDArray, T_start_from_map: PlanarMotion, start: NDArray, held: NDArray) -> tuple[float, ...]:
     """Return entropy, share that left its cell, and displacement of what is in the fields."""
-    place = T_start_from_map.to_previous(spec.centers())
-    rows, cols, inside = spec.cells(place.reshape(-1, 2))
+    place = T_start_from_map.to_previous(WORLD.centers())
+    rows, cols, inside = WORLD.cells(place.reshape(-1, 2))
     grey = fields[-1].ravel()[inside & held[rows, cols]]
     entropy = (entr(grey) + entr(1 - grey)).mean() / np.log(2)
-    ink, (rows, cols, _) = fields[:-1], spec.cells(T_start_from_map.to_now(start))
+    ink, (rows, cols, _) = fields[:-1], WORLD.cells(T_start_from_map.to_now(start))
     stayed = ink[np.arange(len(ink)), rows, cols].sum() / ink.sum()
     distance2 = ((place - start[:, None, None]) ** 2).sum(axis=-1)
     return entropy, 1 - stayed, np.sqrt((ink * distance2).sum() / ink.sum())

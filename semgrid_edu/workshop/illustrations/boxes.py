@@ -42,17 +42,10 @@ class Box(NamedTuple):
 
 
 def scan_boxes(
-    boxes: list[Box],
-    x: float = 0.0,
-    y: float = 0.0,
-    yaw: float = 0.0,
-    columns: int = 300,
-    rings: int = 64,
-    field: float = 180.0,
-    noise: float = 0.0,
-    rng: np.random.Generator | None = None,
-    farthest: float = 70.0,
-) -> NDArray[np.float32]:
+    boxes: list[Box], x: float = 0.0, y: float = 0.0, yaw: float = 0.0,
+    columns: int = 300, rings: int = 64, field: float = 180.0,
+    noise: float = 0.0, rng: np.random.Generator | None = None, farthest: float = 70.0,
+) -> NDArray[np.float32]:  # fmt: skip
     """Scan boxes on flat ground: each ray ends where it first hits something.
 
     Parameters

@@ -6,25 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu import occupancy
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import (
-    BofParams,
-    BofState,
-    CmcdotParams,
-    Evidence,
-    FilterState,
-    Particles,
-    SensorModel,
-    State,
-    VelocityLattice,
-    WorldModel,
-    bof_predict,
-    bof_update,
-    bof_velocity,
-    predict,
-    resample,
-    update,
-)
+from semgrid_edu.occupancy import State
 from semgrid_edu.occupancy.local_belief import velocity_moments
 from semgrid_edu.occupancy.particles import cells_of
 from semgrid_edu.occupancy.sensor import likelihoods
@@ -37,14 +21,9 @@ DT = 0.125
 lattice move as its probability does."""
 STEPS = 6
 """Number of steps."""
-PARAMS = BofParams(
-    VelocityLattice(max_speed=8.0, spacing=4.0),
-    WorldModel(
-        rates=((0.0, 0.02, 0.0, 0.3), (0.02, 0.0, 0.0, 0.1), (0.1, 0.1, 0.0, 0.5), (0.0, 0.0, 0.0, 0.0)),
-        first_sight=(0.85, 0.15, 0.0),
-        max_acceleration=0.0,
-    ),
-)
+_RATES = ((0.0, 0.02, 0.0, 0.3), (0.02, 0.0, 0.0, 0.1), (0.1, 0.1, 0.0, 0.5), (0.0, 0.0, 0.0, 0.0))
+_WORLD = occupancy.WorldModel(_RATES, first_sight=(0.85, 0.15, 0.0), max_acceleration=0.0)
+PARAMS = occupancy.BofParams(occupancy.VelocityLattice(max_speed=8.0, spacing=4.0), _WORLD)
 """The default world, except that nothing accelerates or is born: such velocities wouldn't lie on the lattice."""
 WORTH_COMPARING = 0.1
 """Cells are compared where the BOF's dynamic probability is above this; elsewhere a mean velocity says little."""
@@ -123,7 +102,7 @@ def passing_cars(step: int) -> list[Box]:
     return [Box.around(3 + travelled, -1, 2, 1, 1.5), Box.around(13 - travelled, 1, 2, 1, 1.5)]
 
 
-def evidence_of_boxes(boxes: list[Box]) -> Evidence:
+def evidence_of_boxes(boxes: list[Box]) -> occupancy.Evidence:
     """Return the evidence of a scan that hits each cell of the boxes once, and passes through every other cell.
 
     Parameters
@@ -137,7 +116,7 @@ def evidence_of_boxes(boxes: list[Box]) -> Evidence:
         P(z | occupied) and P(z | free) over `SPEC`.
     """
     hit = np.any([cells_in(box, SPEC) for box in boxes], axis=0)
-    return likelihoods(hit.astype(int), ~hit, SensorModel())
+    return likelihoods(hit.astype(int), ~hit, occupancy.SensorModel())
 
 
 def first_belief() -> NDArray[np.float64]:
@@ -166,10 +145,11 @@ def run_bof() -> Iterator[tuple[NDArray, NDArray]]:
     occupied = belief[State.DYNAMIC] * lattice.prior[:, None, None].astype(np.float32)
     occupied[0] = belief[State.STATIC]
     remainder = np.zeros((len(lattice), 2))
-    state = BofState(belief[State.FREE], belief[State.UNKNOWN], occupied, lattice.velocities, remainder)
+    state = occupancy.BofState(belief[State.FREE], belief[State.UNKNOWN], occupied, lattice.velocities, remainder)
     for step in range(1, STEPS + 1):
-        state = bof_update(bof_predict(state, SPEC, PARAMS, DT), SPEC, evidence_of_boxes(passing_cars(step)), PARAMS)
-        yield state.probability[State.DYNAMIC], bof_velocity(state)[0]
+        predicted = occupancy.bof_predict(state, SPEC, PARAMS, DT)
+        state = occupancy.bof_update(predicted, SPEC, evidence_of_boxes(passing_cars(step)), PARAMS)
+        yield state.probability[State.DYNAMIC], occupancy.bof_velocity(state)[0]
 
 
 def run_cmcdot(number: int, seed: int) -> Iterator[tuple[NDArray, NDArray]]:
@@ -189,17 +169,17 @@ def run_cmcdot(number: int, seed: int) -> Iterator[tuple[NDArray, NDArray]]:
     velocity : (2, H, W) float
         Mean velocity, m/s; NaN without dynamic mass.
     """
-    rng, spending = np.random.default_rng(seed), CmcdotParams(n_particles=number, birth_share=NO_BIRTHS)
+    rng, spending = np.random.default_rng(seed), occupancy.CmcdotParams(n_particles=number, birth_share=NO_BIRTHS)
     state = _first_particles(number, rng)
     for step in range(1, STEPS + 1):
-        predicted = predict(state, SPEC, PARAMS.world, DT, rng)
-        updated = update(predicted, SPEC, evidence_of_boxes(passing_cars(step)), PARAMS.world)
-        state = resample(updated, SPEC, spending, rng)
+        predicted = occupancy.predict(state, SPEC, PARAMS.world, DT, rng)
+        updated = occupancy.update(predicted, SPEC, evidence_of_boxes(passing_cars(step)), PARAMS.world)
+        state = occupancy.resample(updated, SPEC, spending, rng)
         cells = cells_of(state.particles.position, SPEC)
         yield state.probability[State.DYNAMIC], velocity_moments(state.particles, cells, SPEC.shape)[0]
 
 
-def _first_particles(number: int, rng: np.random.Generator) -> FilterState:
+def _first_particles(number: int, rng: np.random.Generator) -> occupancy.FilterState:
     """Spread particles over the cells where something moves, with velocities from the lattice's prior."""
     belief = first_belief().astype(np.float32)
     dynamic = belief[State.DYNAMIC].ravel()
@@ -208,8 +188,8 @@ def _first_particles(number: int, rng: np.random.Generator) -> FilterState:
     velocity = PARAMS.lattice.velocities[rng.choice(len(PARAMS.lattice), number, p=PARAMS.lattice.prior)]
     weight = dynamic[cells] / np.bincount(cells, minlength=dynamic.size)[cells]
     position = (SPEC.x_max, SPEC.y_max) - corner * SPEC.cell
-    particles = Particles(*(a.astype(np.float32) for a in (position, velocity, weight)))
-    return FilterState(belief, particles, np.zeros(SPEC.shape, np.float32))
+    particles = occupancy.Particles(*(a.astype(np.float32) for a in (position, velocity, weight)))
+    return occupancy.FilterState(belief, particles, np.zeros(SPEC.shape, np.float32))
 
 
 def _squared_errors(exact: tuple[NDArray, NDArray], sampled: tuple[NDArray, NDArray]) -> tuple[float, float]:

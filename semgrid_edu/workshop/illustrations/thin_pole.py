@@ -76,22 +76,28 @@ def apply_mechanism(image: ArrayLike, mechanism: str) -> NDArray[np.float64]:
 def _apply_pooling(x: Tensor, mechanism: str) -> Tensor:
     half, where_half = F.max_pool2d(x, 2, return_indices=True)
     quarter, where_quarter = F.max_pool2d(half, 2, return_indices=True)
-    if mechanism == "indices":
-        return F.max_unpool2d(F.max_unpool2d(quarter, where_quarter, 2), where_half, 2)
-    if mechanism == "nearest":
-        return F.interpolate(quarter, scale_factor=4)
     if mechanism == "bilinear":
         return enlarge(quarter, 4, x.shape[2:])
-    return (enlarge(enlarge(quarter, 2, half.shape[2:]) + half, 2, x.shape[2:]) + x) / 3
+    whole = _double(mechanism, _double(mechanism, quarter, half, where_quarter), x, where_half)
+    return whole / 3 if mechanism == "skips" else whole
+
+
+def _double(mechanism: str, x: Tensor, before: Tensor, indices: Tensor) -> Tensor:
+    """Double a map's size; `before` and `indices` are those of the pooling that halved it."""
+    if mechanism == "indices":
+        return F.max_unpool2d(x, indices, 2)
+    if mechanism == "nearest":
+        return F.interpolate(x, scale_factor=2)
+    larger = enlarge(x, 2, before.shape[2:])
+    return larger + before if mechanism == "skips" else larger
 
 
 def _apply_kernels(x: Tensor, mechanism: str) -> Tensor:
     binomial = torch.tensor([1, 2, 1], dtype=x.dtype) / 4
     kernel = torch.outer(binomial, binomial)[None, None]
-    if mechanism == "strided":
-        twice = F.conv2d(F.conv2d(x, kernel, stride=2, padding=1), kernel, stride=2, padding=1)
-        return interpolate(twice, 4, x.shape[2:])
-    return F.conv2d(F.conv2d(x, kernel, padding=1), kernel, padding=2, dilation=2)
+    stride, rate = (2, 1) if mechanism == "strided" else (1, 2)
+    twice = F.conv2d(F.conv2d(x, kernel, None, stride, 1), kernel, None, stride, rate, rate)
+    return interpolate(twice, 4, x.shape[2:]) if mechanism == "strided" else twice
 
 
 def place_and_width(profile: ArrayLike) -> tuple[float, int]:
@@ -181,7 +187,7 @@ class PoleNet(nn.Module):
         rates = RATES if mechanism == "atrous" else (1,) * 7
         channels = (1, *(WIDTH,) * 6, 2)
         with fresh_weights(self, seed):
-            self.layers = nn.ModuleList(map(_layer, channels[:-1], channels[1:], strides, rates))
+            self.layers = nn.Sequential(*map(_layer, channels[:-1], channels[1:], strides, rates))
             self.layers[-1] = self.layers[-1][0]
 
     def forward(self, image: Tensor) -> Tensor:
@@ -195,30 +201,17 @@ class PoleNet(nn.Module):
         x = image.contiguous(memory_format=torch.channels_last)
         if self.mechanism not in ("strided", "atrous"):
             return self._down_and_up(x)
-        for layer in self.layers:
-            x = layer(x)
+        x = self.layers(x)
         return interpolate(x, 4, image.shape[2:]) if self.mechanism == "strided" else x
 
     def _down_and_up(self, x: Tensor) -> Tensor:
         full, half, quarter, stay, to_half, to_full, score = self.layers
-        seen = []
-        for encode in (full, half):
-            before = encode(x)
-            x, indices = F.max_pool2d(before, 2, return_indices=True)
-            seen.append((before, indices))
-        x = stay(quarter(x))
-        for decode, (before, indices) in zip((to_half, to_full), reversed(seen), strict=True):
-            x = decode(self._up(x, before, indices))
-        return score(x)
-
-    def _up(self, x: Tensor, before: Tensor, indices: Tensor) -> Tensor:
-        """Double a map's size; `before` and `indices` are those of the pooling that halved it."""
-        if self.mechanism == "indices":
-            return F.max_unpool2d(x, indices, 2)
-        if self.mechanism == "nearest":
-            return F.interpolate(x, scale_factor=2)
-        larger = enlarge(x, 2, before.shape[2:])
-        return larger + before if self.mechanism == "skips" else larger
+        first = full(x)
+        x, where_first = F.max_pool2d(first, 2, return_indices=True)
+        second = half(x)
+        x, where_second = F.max_pool2d(second, 2, return_indices=True)
+        x = to_half(_double(self.mechanism, stay(quarter(x)), second, where_second))
+        return score(to_full(_double(self.mechanism, x, first, where_first)))
 
 
 def _layer(n_in: int, n_out: int, stride: int, rate: int) -> nn.Sequential:

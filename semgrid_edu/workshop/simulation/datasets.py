@@ -1,8 +1,10 @@
 """Simulated data sets in place of those of section 4, and the sample drive: made in parallel, resumed after a stop."""
 
+from collections.abc import Iterator
 from concurrent.futures import as_completed
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +24,7 @@ from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.named_streets import SAMPLE_WISHES
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.street.plan import ANY, Wishes
+from semgrid_edu.workshop.simulation.things.tables import read_table
 
 FORMAT = 1
 """Raised whenever the simulator changes what a seed gives, so that old and new drives don't mix in one folder."""
@@ -76,28 +79,14 @@ class DatasetRecipe:
     dense: bool = False
 
 
-def _long(split: str, n_frames: int, speed: float, layout: str) -> Route:
-    """Return a route with labels on every frame, fast enough to see much."""
-    return Route(split, n_frames, True, Wishes(layout=layout, speed=speed))
+def _recipe(name: str, row: dict) -> DatasetRecipe:
+    """Return what a row of `recipes.toml` says."""
+    routes = (([Route(**route, wishes=Wishes(**wishes))] * times) for times, route, wishes in row["routes"])
+    return DatasetRecipe(name, row["label_set"], tuple(chain.from_iterable(routes)), row.get("dense", False))
 
 
-_MINIKITTI = (*[Route("train", 10, False)] * 142, *[Route("test", 10, False)] * 110)
-_MINICHROMA = (
-    _long("train", 49, 11.0, "junction"),
-    _long("train", 49, 9.0, "bend"),
-    _long("train", 48, 12.0, "straight"),
-    _long("test", 65, 10.0, "junction"),
-    _long("test", 65, 9.0, "bend"),
-)
-_MINISYNTHIA = (_long("train", 60, 10.0, "junction"), _long("test", 60, 10.0, "junction"))
-_RECIPES = (
-    DatasetRecipe("minikitti", "KITTI-14", _MINIKITTI),
-    DatasetRecipe("minichroma", "KITTI-14", _MINICHROMA),
-    DatasetRecipe("minisynthia", "SYNTHIA-10", _MINISYNTHIA, dense=True),
-    DatasetRecipe("validation", "KITTI-14", (Route("validation", 10, False),) * 72),
-    DatasetRecipe("sample", "KITTI-14", (Route("drive", 20, True, SAMPLE_WISHES),)),
-)
-RECIPES = {recipe.name: recipe for recipe in _RECIPES}
+RECIPES = {name: _recipe(name, row) for name, row in read_table("recipes").items()}
+RECIPES["sample"] = DatasetRecipe("sample", "KITTI-14", (Route("drive", 20, True, SAMPLE_WISHES),))
 """Numbers of frames as in the paper: KITTI 142 + 110 labelled frames, INRIA-Chroma 146 + 130 in 3 + 2 routes.
 "validation" has drives like minikitti's, half as many as its training split, for parameters that are chosen when the
 network is trained already. The name of a data set is part of its seed, so no seed gives a drive of minikitti."""
@@ -173,8 +162,8 @@ def make_from_recipe(
         writer.remove_unfinished(root / writer.DATE)
         missing = [drive for drive in routes if not drive_folder(root, writer.DATE, drive).exists()]
         missing.sort(key=lambda drive: -routes[drive].n_frames)
-        with tqdm(total=len(routes), initial=len(routes) - len(missing), desc=recipe.name, unit="drive") as bar:
-            _run(partial(_make_drive, recipe, root, seed), missing, workers, scheduler, bar)
+        made = _run(partial(_make_drive, recipe, root, seed), missing, workers, scheduler)
+        list(tqdm(made, recipe.name, len(routes), initial=len(routes) - len(missing), unit="drive"))
         for drive, route in routes.items():
             writer.check_complete(drive_folder(root, writer.DATE, drive), route.n_frames, route.labelled)
         index = _index(recipe, routes, seed)
@@ -196,17 +185,14 @@ def _claim(root: Path, marker: dict) -> None:
         write_json(path, marker)
 
 
-def _run(make: partial, drives: list[str], workers: int, scheduler: str | None, bar: tqdm) -> None:
-    """Make drives in processes (in this one when one is enough), and count them on the bar."""
+def _run(make: partial, drives: list[str], workers: int, scheduler: str | None) -> Iterator[None]:
+    """Make drives in processes (in this one when one is enough), and yield after each."""
     if not scheduler and (workers == 1 or len(drives) < 2):
-        for drive in drives:
-            make(drive)
-            bar.update()
+        yield from map(make, drives)
         return
     with workplace(None if scheduler else workers, scheduler) as place:
         for future in as_completed([place.executor.submit(make, drive) for drive in drives]):
-            future.result()
-            bar.update()
+            yield future.result()
 
 
 def _make_drive(recipe: DatasetRecipe, root: Path, seed: int, drive: str) -> None:

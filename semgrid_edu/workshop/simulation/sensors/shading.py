@@ -28,8 +28,7 @@ def _asphalt(tile, road, s, d, blur, out):
         grey *= 1.0 - 0.5 * fade
     mark = lane_mark(road, s, d, blur)
     worn = mark * (0.72 + 0.45 * (texture(tile, 9.0 * s, 9.0 * d) - 0.35))
-    out[0] = grey * (1 - worn) + 0.62 * worn
-    out[1] = grey * (1 - worn) + 0.62 * worn
+    out[0] = out[1] = grey * (1 - worn) + 0.62 * worn
     out[2] = grey * 1.03 * (1 - worn) + 0.6 * worn
     return mark > 0.5
 
@@ -58,9 +57,8 @@ def _grass(tile, x, y, blur, out):
     tuft = texture(tile, 6.0 * x, 6.0 * y + 13.0) - 0.5
     dry = texture(tile, 0.8 * x + 7.0, 0.8 * y)
     light = 1.0 + 0.8 * blade + 0.6 * tuft
-    out[0] = (0.075 + 0.09 * dry * dry) * light
-    out[1] = (0.135 + 0.03 * dry) * light
-    out[2] = (0.035 + 0.02 * dry) * light
+    red, green, blue = 0.075 + 0.09 * dry * dry, 0.135 + 0.03 * dry, 0.035 + 0.02 * dry
+    out[0], out[1], out[2] = red * light, green * light, blue * light
 
 
 @njit(cache=True, fastmath=True)

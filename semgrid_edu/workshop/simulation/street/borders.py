@@ -103,9 +103,10 @@ def _stand(builder: Builder, piece: Piece, kind: Kind, half: float, top: float, 
     return bool(foot)
 
 
-def _stand_fence(builder: Builder, piece: Piece, top: float, frame: Shape, sheet: Shape, opacity: float) -> None:
+def _stand_fence(builder: Builder, piece: Piece, style: str, opacity: float) -> None:
     """Put a piece of wire mesh or a pane into the world, in its frame, unless its place is taken."""
-    if _stand(builder, piece, Kind.FENCE, _THIN_HALF, top, sheet, opacity):
+    frame, sheet = furniture.sheet_fence(style, piece[3])
+    if _stand(builder, piece, Kind.FENCE, _THIN_HALF, furniture.SHEETS[style].height, sheet, opacity):
         builder.add(frame, *piece[:3])
 
 
@@ -127,7 +128,7 @@ def wire_mesh(builder: Builder, s0: float, s1: float, d: float) -> None:
     rng = builder.rng
     opacity, step = rng.uniform(0.008, 0.02), rng.choice([2.0, 2.5, 3.0])
     for piece in _pieces(s0, s1, d, 2.5, step, rng):
-        _stand_fence(builder, piece, furniture.MESH_HEIGHT, *furniture.wire_fence(piece[3]), opacity)
+        _stand_fence(builder, piece, "wire", opacity)
 
 
 def twig_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
@@ -171,7 +172,7 @@ def panes(builder: Builder, s0: float, s1: float, d: float) -> None:
     opacity, step = rng.uniform(0.05, 0.15), rng.uniform(1.3, 2.2)
     for piece in _pieces(s0, s1, d, 0.8, step, rng):
         if rng.random() > 0.1:
-            _stand_fence(builder, piece, furniture.PANE_HEIGHT, *furniture.glass_pane(piece[3]), opacity)
+            _stand_fence(builder, piece, "pane", opacity)
 
 
 def post_row(builder: Builder, s0: float, s1: float, d: float) -> None:

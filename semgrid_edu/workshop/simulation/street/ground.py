@@ -61,17 +61,13 @@ def _stripe(distance: float, half: float, blur: float) -> float:
 
 
 @njit(cache=True)
-def _junction_mark(road: Road, s: float, d: float, blur: float) -> float:
+def _junction_mark(road: Road, s: float, d: float, away: float, blur: float) -> float:
     """Return the paint of zebra crossings and stop lines around the junction."""
-    away = abs(s - road.junction) - road.side_half - road.corner
     if road.zebra and 0.5 <= away <= 3.7:
         return _stripe((d % 1.0) - 0.5, 0.25, blur)
-    approach = road.junction - s
-    ours = approach > 0 and -road.lanes_right * road.lane < d < -0.15
-    theirs = approach < 0 and 0.15 < d < road.lanes_left * road.lane
-    if ours or theirs:
-        return _stripe(away - 4.7, 0.2, blur)
-    return 0.0
+    ours = s < road.junction and -road.lanes_right * road.lane < d < -0.15
+    theirs = s > road.junction and 0.15 < d < road.lanes_left * road.lane
+    return _stripe(away - 4.7, 0.2, blur) if ours or theirs else 0.0
 
 
 @njit(cache=True)
@@ -86,22 +82,18 @@ def lane_mark(road: Road, s: float, d: float, blur: float) -> float:
     blur : float
         Width of the patch of ground around the place, metres; at least 1 cm is taken.
     """
-    blur = max(blur, 0.01)
-    if road.side_half > 0.0:
-        away = abs(s - road.junction) - road.side_half - road.corner
-        beyond = d > road.left.edge or d < -road.right.edge
-        if away < 0.0 or beyond:
-            middle = beyond and away < 0.0 and (abs(d) % 6.0) < 3.0 and abs(d) > 12.0
-            return _stripe(s - road.junction, 0.06, blur) if middle else 0.0
-        if away < 6.0:
-            return _junction_mark(road, s, d, blur)
-    if d > road.left.edge or d < -road.right.edge:
+    blur, away = max(blur, 0.01), abs(s - road.junction) - road.side_half - road.corner
+    lanes, edge = (road.lanes_left, road.left.edge) if d > 0 else (road.lanes_right, road.right.edge)
+    beyond, dash = abs(d) > edge, (s % 9.0) < 3.0
+    if road.side_half > 0.0 and (away < 0.0 or beyond):
+        middle = beyond and away < 0.0 and (abs(d) % 6.0) < 3.0 and abs(d) > 12.0
+        return _stripe(s - road.junction, 0.06, blur) if middle else 0.0
+    if road.side_half > 0.0 and away < 6.0:
+        return _junction_mark(road, s, d, away, blur)
+    if beyond:
         return 0.0
-    dash = (s % 9.0) < 3.0
     if abs(d) < 0.5:
         return _stripe(d, 0.07, blur) if dash or not road.dashed else 0.0
-    lanes = road.lanes_left if d > 0 else road.lanes_right
-    edge = road.left.edge if d > 0 else road.right.edge
     index = round(abs(d) / road.lane)
     offset = abs(d) - index * road.lane
     if index < lanes:

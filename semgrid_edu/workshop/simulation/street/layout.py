@@ -97,7 +97,7 @@ class Road(NamedTuple):
 
     def leaves(self, sign: int) -> bool:
         """Return whether the side road leaves on one side. Parameters are those of `Road.side`."""
-        return self.side_left if sign > 0 else self.side_right
+        return self.side_half > 0 and (self.side_left if sign > 0 else self.side_right)
 
 
 @njit(cache=True)

@@ -9,6 +9,7 @@ from semgrid_edu.workshop.simulation.street.layout import Road, Side
 from semgrid_edu.workshop.simulation.street.light import Light
 from semgrid_edu.workshop.simulation.street.terrain import Extent
 from semgrid_edu.workshop.simulation.things.furniture import FENCES
+from semgrid_edu.workshop.simulation.things.tables import read_table
 
 BORDERS = (*FENCES, "hedge", "none")
 """What may run along the gardens of a suburb."""
@@ -103,14 +104,7 @@ class Plan:
         return self.borders[0 if sign > 0 else 1]
 
 
-_SIDES = {
-    "town": (0.25, (2.6, 4.5), None),
-    "suburb": (0.5, (1.8, 2.6), (0.0, 0.25)),
-    "park": (0.7, (1.6, 2.4), (0.35, 1.3)),
-    YARD: (0.3, (1.2, 2.6), None),
-}
-"""Of each style: how often grass parts the sidewalk from the kerb; the narrowest and the widest sidewalk, and the
-lowest and the highest bank behind it, metres."""
+_SIDES = read_table("streets")["sides"]  # how it may look beside the road in each style
 
 
 def _side(style: str, lanes: int, lane: float, parking: bool, rng: np.random.Generator) -> Side:
@@ -163,8 +157,7 @@ def draw_plan(rng: np.random.Generator, length: float, wishes: Wishes) -> Plan:
     borders = wishes.borders or tuple(map(str, rng.choice(BORDERS, 2, p=[0.2, 0.16, 0.16, 0.12, 0.24, 0.12])))
     parking = wishes.parking or tuple(bool(p) for p in rng.random(2) < 0.5)
     road = _road(rng, length, layout, lanes, styles, parking)
-    season = rng.choice(3, p=[0.55, 0.3, 0.15])
-    foliage = [(1.0, 1.0, 1.0), (1.35, 1.25, 0.9), (2.2, 1.05, 0.7)][season]
+    foliage = [(1.0, 1.0, 1.0), (1.35, 1.25, 0.9), (2.2, 1.05, 0.7)][rng.choice(3, p=[0.55, 0.3, 0.15])]
     light = wishes.light or Light.random(rng)
     drawn = float(rng.uniform(0.15, 1.0))
     density = drawn if wishes.density is None else wishes.density

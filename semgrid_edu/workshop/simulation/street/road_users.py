@@ -20,13 +20,8 @@ def fill_street(traffic: Traffic) -> None:
     traffic : Traffic
         Takes them; it knows the street and the plan.
     """
-    park_cars(traffic)
-    _park_bicycles(traffic)
-    _lanes(traffic)
-    if traffic.road.side_half:
-        _cross_traffic(traffic)
-    _cyclists(traffic)
-    _pedestrians(traffic)
+    for fill in (park_cars, _park_bicycles, _lanes, _cross_traffic, _cyclists, _pedestrians):
+        fill(traffic)
 
 
 def park_cars(traffic: Traffic) -> None:

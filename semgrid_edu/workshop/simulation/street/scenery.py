@@ -31,8 +31,7 @@ def build_scenery(plan: Plan, rng: np.random.Generator) -> Builder:
         _street_trees(builder, sign)
         _LINE_SIDE[style](builder, sign)
         borders.stand_signs(builder, sign)
-    if plan.road.side_half:
-        _side_street(builder)
+    _side_street(builder)
     _horizon(builder)
     return builder
 
@@ -46,7 +45,7 @@ def _meets_side_road(builder: Builder, s0: float, s1: float, sign: int, margin: 
     """Return whether the stretch s0..s1 meets the side road and its sidewalks."""
     road = builder.road
     reach = road.side_half + margin
-    return bool(road.side_half and road.leaves(sign)) and road.junction - reach < s1 and s0 < road.junction + reach
+    return road.leaves(sign) and road.junction - reach < s1 and s0 < road.junction + reach
 
 
 def _tree(builder: Builder, s: float, d: float, species: str | None = None) -> None:

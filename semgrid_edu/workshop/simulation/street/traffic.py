@@ -6,15 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.camera import transform_points
+from semgrid_edu.workshop.simulation.street import footprints
 from semgrid_edu.workshop.simulation.street.builder import OVERHEAD, Builder
-from semgrid_edu.workshop.simulation.street.footprints import (
-    ROUND,
-    ROUNDED,
-    SQUARE,
-    Footprint,
-    collides,
-    footprint_table,
-)
 from semgrid_edu.workshop.simulation.street.layout import Road
 from semgrid_edu.workshop.simulation.street.trajectories import Pace, Trajectory
 from semgrid_edu.workshop.simulation.things.cars import BODIES, PAINTS, car, car_size
@@ -80,13 +73,13 @@ class Actor:
             body = body.overturned(self.size[2])
         return body.placed(*self.trajectory.pose(road, t))
 
-    def footprint(self, road: Road, t: float) -> Footprint:
+    def footprint(self, road: Road, t: float) -> footprints.Footprint:
         """Return the ground that it covers at one instant. Parameters are those of `Actor.shape`."""
         (x, y, _), yaw = self.trajectory.pose(road, t)
-        exponent = {Kind.CAR: ROUNDED, Kind.PEDESTRIAN: ROUND}.get(self.kind, SQUARE)
+        exponent = {Kind.CAR: footprints.ROUNDED, Kind.PEDESTRIAN: footprints.ROUND}.get(self.kind, footprints.SQUARE)
         length, width, height = self.size
         half, top = (length / 2, width / 2), min(height, OVERHEAD)
-        return Footprint(x, y, *half, yaw, exponent, int(self.kind), self.instance, top)
+        return footprints.Footprint(x, y, *half, yaw, exponent, int(self.kind), self.instance, top)
 
     def middle(self, road: Road, t: float) -> NDArray[np.float64]:
         """Return the middle of its box in the world, (3,), metres. Parameters are those of `Actor.shape`."""
@@ -160,7 +153,7 @@ class Traffic:
         self._times = np.linspace(0, duration, 6 if duration < 2 else 25)
         ego_actor = Actor(0, Kind.CAR, EGO_SIZE, ego, ("sedan", PAINTS[0]))
         self._taken = [[ego_actor.footprint(self.road, t)] for t in self._times]
-        self._static = footprint_table(builder.footprints)
+        self._static = footprints.footprint_table(builder.footprints)
 
     def add(self, kind: Kind, size: Size, trajectory: Trajectory, look: Look, margin: float = 0.25) -> bool:
         """Let a road user take part in the drive, and return True, unless it would run into something.
@@ -180,9 +173,10 @@ class Traffic:
         """
         actor = Actor(self.builder.next_instance, kind, size, trajectory, look, float(self.rng.uniform(0, 3)))
         feet = [actor.footprint(self.road, t) for t in self._times]
-        for foot, taken in zip(feet, self._taken, strict=True):
-            if collides(foot, taken, margin) or collides(foot, self._static, 0.05):
-                return False
+        near = footprints.collides
+        pairs = zip(feet, self._taken, strict=True)
+        if any(near(foot, taken, margin) or near(foot, self._static, 0.05) for foot, taken in pairs):
+            return False
         self.builder.next_instance += 1
         self.moving.append(actor)
         for foot, taken in zip(feet, self._taken, strict=True):
@@ -203,14 +197,13 @@ class Traffic:
         """
         actor = Actor(self.builder.next_instance, kind, size, trajectory, look, overturned=overturned)
         foot = actor.footprint(self.road, 0.0)
-        moving = (collides(foot, taken, 0.2) for taken in self._taken)
-        if collides(foot, self._static, 0.1) or any(moving):
+        if any(footprints.collides(foot, *other) for other in ((self._static, 0.1), *((t, 0.2) for t in self._taken))):
             return False
         self.parked.append(actor)
         self.builder.next_instance += 1
         self.builder.solid.append((actor.shape(self.road, 0.0), actor.instance))
         self.builder.footprints.append(foot)
-        self._static = footprint_table(self.builder.footprints)
+        self._static = footprints.footprint_table(self.builder.footprints)
         return True
 
     def paint(self) -> tuple[float, float, float]:

@@ -7,20 +7,16 @@ from numpy.typing import ArrayLike
 
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, ball, box, merge, quads, shape, tube
+from semgrid_edu.workshop.simulation.things.tables import named_rows, read_table
 
-_WOOD, _STEEL, _STONE = (0.26, 0.16, 0.09), (0.05, 0.09, 0.06), (0.36, 0.34, 0.31)
-_BLACK, _ZINC, _FRAME, _TWIGS = (0.06, 0.06, 0.06), (0.33, 0.35, 0.35), (0.16, 0.17, 0.18), (0.05, 0.11, 0.028)
-_GREY = (0.42, 0.43, 0.44)
-_FENCES = {
-    "planks": (1.35, _WOOD, Material.WOOD, (0.15, 0.11, 0.12, (0.30, 0.19, 0.11))),
-    "bars": (1.4, _BLACK, Material.METAL, (0.13, 0.025, 0.1, _BLACK)),
-    "mesh": (1.8, _STEEL, Material.METAL, (0.1, 0.016, 0.05, _STEEL)),
-}
-"""Of each fence: height, colour of the posts, material; and of its slats: step, width, lower end, colour."""
+_STONE, _GREY, _ZINC = (0.36, 0.34, 0.31), (0.42, 0.43, 0.44), (0.33, 0.35, 0.35)
+_TWIGS = (0.05, 0.11, 0.028)
+_TABLES = read_table("things/furniture")
+_FENCES, _FACES = named_rows(_TABLES["fences"]), _TABLES["signs"]
 FENCES = (*_FENCES, "wall")
 """The fences that `fence` knows."""
-MESH_HEIGHT, PANE_HEIGHT = 1.95, 2.1
-"""Heights of a fence of wire mesh and of a row of panes, metres."""
+SHEETS = named_rows(_TABLES["sheets"])
+"""The fences that `sheet_fence` knows."""
 _fence_box, _fence_quads = partial(box, kind=Kind.FENCE), partial(quads, kind=Kind.FENCE)
 
 
@@ -39,43 +35,44 @@ def fence(style: str, length: float) -> Shape:
     if style == "wall":
         cap = _fence_box((middle, 0, 1.0), (length, 0.34, 0.1), (0.45, 0.43, 0.4), Material.PLASTER)
         return merge([_fence_box((middle, 0, 0.1), (length, 0.25, 1.8), _STONE, Material.BRICK), cap])
-    height, colour, material, (step, width, low, slat_colour) = _FENCES[style]
+    its = _FENCES[style]
+    look = its.colour, Material[its.material]
     parts = [
-        _fence_box((x, 0.03, height / 2 - 0.4), (0.09, 0.09, height + 0.9), colour, material)
+        _fence_box((x, 0.03, its.height / 2 - 0.4), (0.09, 0.09, its.height + 0.9), *look)
         for x in np.linspace(0.0, length, max(round(length / 2.5), 1) + 1)
     ]
     if style == "mesh":
-        z = np.arange(0.1, height, 0.2)
-        parts.append(_fence_quads(np.stack([0 * z, 0 * z, z], 1), [length, 0, 0], [0, 0, 0.02], colour, material))
+        z = np.arange(0.1, its.height, 0.2)
+        parts.append(_fence_quads(np.stack([0 * z, 0 * z, z], 1), [length, 0, 0], [0, 0, 0.02], *look))
     else:
-        parts += [_fence_box((middle, 0.03, z), (length, 0.04, 0.07), colour, material) for z in (0.3, 0.92 * height)]
-    x = np.arange(step / 2, length, step)
-    corner = np.stack([x - width / 2, 0 * x, 0 * x + low], axis=1)
-    return merge([*parts, _fence_quads(corner, [width, 0, 0], [0, 0, height - low], slat_colour, material)])
+        parts += [_fence_box((middle, 0.03, z), (length, 0.04, 0.07), *look) for z in (0.3, 0.92 * its.height)]
+    x = np.arange(its.step / 2, length, its.step)
+    corner = np.stack([x - its.width / 2, 0 * x, 0 * x + its.low], axis=1)
+    slats = _fence_quads(corner, [its.width, 0, 0], [0, 0, its.height - its.low], its.slats, look[1])
+    return merge([*parts, slats])
 
 
 @cache
-def wire_fence(length: float) -> tuple[Shape, Shape]:
-    """Make a piece of wire mesh fence from the origin along x: post and rail, and the sheet of `Material.WIRE`.
+def sheet_fence(style: str, length: float) -> tuple[Shape, Shape]:
+    """Make a piece of a fence that lets light through, from the origin along x.
 
     Parameters
     ----------
+    style : str
+        One of `SHEETS`.
     length : float
-        Distance to the next post, metres.
+        Its length, metres.
+
+    Returns
+    -------
+    frame, sheet : Shape
+        The post at the origin with the rails, and what a part of the light passes.
     """
-    post = _fence_box((0, 0, MESH_HEIGHT / 2 - 0.3), (0.06, 0.06, MESH_HEIGHT + 0.7), _ZINC, Material.METAL)
-    rail = _fence_box((length / 2, 0, MESH_HEIGHT - 0.02), (length, 0.03, 0.04), _ZINC, Material.METAL)
-    wire = _fence_quads((0, 0, 0.05), (length, 0, 0), (0, 0, MESH_HEIGHT - 0.05), _ZINC, Material.WIRE)
-    return merge([post, rail]), wire
-
-
-@cache
-def glass_pane(length: float) -> tuple[Shape, Shape]:
-    """Make a pane: post and two rails, and the sheet of `Material.PANE`. Parameters are those of `wire_fence`."""
-    post = _fence_box((0, 0, PANE_HEIGHT / 2), (0.06, 0.06, PANE_HEIGHT + 0.2), _FRAME, Material.METAL)
-    rails = [_fence_box((length / 2, 0, z), (length, 0.05, 0.06), _FRAME, Material.METAL) for z in (0.2, 2.05)]
-    glass = _fence_quads((0, 0, 0.23), (length, 0, 0), (0, 0, PANE_HEIGHT - 0.3), _FRAME, Material.PANE)
-    return merge([post, *rails]), glass
+    its, look = SHEETS[style], (SHEETS[style].colour, Material.METAL)
+    post = _fence_box((0, 0, its.post[0]), (0.06, 0.06, its.post[1]), *look)
+    rails = [_fence_box((length / 2, 0, z), (length, wide, high), *look) for z, wide, high in its.rails]
+    sheet = _fence_quads((0, 0, its.sheet[0]), (length, 0, 0), (0, 0, its.sheet[1]), its.colour, Material[its.material])
+    return merge([post, *rails]), sheet
 
 
 def porous_hedge(length: float, thickness: float, height: float) -> Shape:
@@ -109,26 +106,13 @@ def _plate(corners: ArrayLike, colour, x: float, material=Material.RETRO) -> Sha
     return shape(vertices, [[0, i, i + 1] for i in range(1, n - 1)], colour, material, Kind.SIGN)
 
 
-def _polygon(n: int, radius: float, turn: float = 0.0) -> np.ndarray:
-    angle = turn + 2 * np.pi * np.arange(n) / n
-    return np.stack([-radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+def _corners(face: dict) -> np.ndarray:
+    """Return the corners of a face of a sign, about the middle of the sign."""
+    n, radius, turn = face.get("regular", (0, 0, 0))
+    angle = np.radians(turn) + 2 * np.pi * np.arange(n) / max(n, 1)
+    return face.get("corners") or np.stack([-radius * np.cos(angle), radius * np.sin(angle)], axis=1)
 
 
-def _rectangle(left: float, right: float, half_height: float) -> np.ndarray:
-    h = half_height
-    return np.array([[left, -h], [left, h], [right, h], [right, -h]])
-
-
-_RED, _WHITE, _BLUE, _YELLOW = (0.55, 0.01, 0.015), (0.85, 0.85, 0.83), (0.01, 0.06, 0.4), (0.8, 0.5, 0.01)
-_FACES = {
-    "limit": [(_polygon(16, 0.32), _RED), (_polygon(16, 0.25), _WHITE), (_polygon(4, 0.12), (0.05, 0.05, 0.05))],
-    "no-entry": [(_polygon(16, 0.32), _RED), (_rectangle(-0.22, 0.22, 0.06), _WHITE)],
-    "priority": [(_polygon(4, 0.4, np.pi / 2), _WHITE), (_polygon(4, 0.3, np.pi / 2), _YELLOW)],
-    "warning": [(_polygon(3, 0.46, np.pi / 2), _RED), (_polygon(3, 0.3, np.pi / 2), _WHITE)],
-    "stop": [(_polygon(8, 0.34, np.pi / 8), _WHITE), (_polygon(8, 0.31, np.pi / 8), _RED)],
-    "parking": [(_polygon(4, 0.43, np.pi / 4), _BLUE), ([(-0.08, -0.2), (-0.08, 0.2), (0.1, 0.2), (0.1, 0)], _WHITE)],
-    "direction": [(_rectangle(-0.6, 0.6, 0.22), _YELLOW), (_rectangle(-0.5, 0.3, 0.06), (0.03, 0.03, 0.03))],
-}
 SIGNS = tuple(_FACES)
 """The traffic signs that `sign` knows."""
 
@@ -142,7 +126,7 @@ def sign(name: str) -> Shape:
     name : str
         One of `SIGNS`.
     """
-    faces = [(np.add(corners, (0, 2.4)), colour) for corners, colour in _FACES[name]]
+    faces = [(np.add(_corners(face), (0, 2.4)), face["colour"]) for face in _FACES[name]]
     pole = tube((0, 0, -0.5), (0, 0, 2.75), 0.035, _GREY, Material.METAL, Kind.POLE)
     back = _plate(faces[0][0][::-1], (0.3, 0.3, 0.3), -0.04, Material.METAL)
     return merge([pole, back, *(_plate(*face, -0.05 - 0.008 * i) for i, face in enumerate(faces))])

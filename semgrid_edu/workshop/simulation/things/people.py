@@ -14,21 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from semgrid_edu.workshop.simulation.things.cars import PAINTS
 from semgrid_edu.workshop.simulation.things.materials import PALETTES, Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, ball, merge, quads, tube
+from semgrid_edu.workshop.simulation.things.tables import read_table
 
 _BLACK, _GREY = (0.02, 0.02, 0.02), (0.25, 0.25, 0.25)
-_CRANK, _SADDLE, _HEAD = (-0.08, 0, 0.32), (-0.22, 0, 0.9), (0.38, 0, 0.85)
-_REAR, _FRONT = (-0.53, 0, 0.35), (0.53, 0, 0.35)
-_FRAME = (
-    (_CRANK, _SADDLE, 0.024),
-    (_CRANK, _HEAD, 0.024),
-    ((-0.2, 0, 0.83), _HEAD, 0.024),
-    (_CRANK, _REAR, 0.015),
-    ((-0.2, 0, 0.83), _REAR, 0.015),
-    ((0.36, 0, 0.98), _FRONT, 0.024),
-)
-"""The tubes of a bicycle: where they begin and end, and their radius, metres."""
-_BARS = ((0.4, 0.28, 1.02, 0.018), (-0.08, 0.12, 0.32, 0.07))
-"""Handlebar and pedals: x, half the length along y, z and radius, metres."""
+_BICYCLE = read_table("things/bicycle")
 
 
 def _wheel(x: float) -> list[Shape]:
@@ -44,8 +33,8 @@ def _wheel(x: float) -> list[Shape]:
 def bicycle() -> Shape:
     """Make a bicycle, 1.75 m long; its frame is of `Material.PAINT`, so that it can be recoloured."""
     metal = partial(tube, colour=_GREY, material=Material.METAL, kind=Kind.BICYCLE, sides=5)
-    frame = [tube(*measures, PAINTS[5], Material.PAINT, Kind.BICYCLE, 5) for measures in _FRAME]
-    bar, pedals = (metal((x, -y, z), (x, y, z), thick) for x, y, z, thick in _BARS)
+    frame = [tube(*measures, PAINTS[5], Material.PAINT, Kind.BICYCLE, 5) for measures in _BICYCLE["frame"]]
+    bar, pedals = (metal((x, -y, z), (x, y, z), thick) for x, y, z, thick in _BICYCLE["bars"])
     saddle = ball((-0.24, 0, 0.93), (0.13, 0.08, 0.04), _BLACK, Material.RUBBER, Kind.BICYCLE)
     light = quads([-0.55, 0.0, 0.7], [0.1, 0, 0], [0, 0.03, 0.04], (0.5, 0.02, 0.02), Material.RETRO, Kind.BICYCLE)
     return merge([*_wheel(-0.53), *_wheel(0.53), *frame, bar, saddle, pedals, light])

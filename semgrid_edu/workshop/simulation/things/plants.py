@@ -9,19 +9,13 @@ from numpy.typing import NDArray
 from semgrid_edu.workshop.simulation.things import shapes
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, merge
+from semgrid_edu.workshop.simulation.things.tables import named_rows, read_table
 
 _leaves = partial(shapes.shape, material=Material.LEAF, kind=Kind.PLANT)
 _bark = partial(shapes.tube, material=Material.BARK, kind=Kind.PLANT)
 
 
-_SPECIES = {
-    "broad": ((0.11, 0.08, 0.06), (0.09, 0.17, 0.03), 0.19, (1.5, 1.3, 4.9)),
-    "tall": ((0.10, 0.08, 0.06), (0.07, 0.15, 0.035), 0.17, (0.85, 3.0, 6.2)),
-    "birch": ((0.5, 0.49, 0.45), (0.16, 0.24, 0.05), 0.11, (1.1, 1.3, 5.0)),
-    "conifer": ((0.1, 0.06, 0.04), (0.03, 0.085, 0.035), 0.15, None),
-}
-"""Of each species: colours of bark and leaves; radius of the trunk, metres; and of a crown of blobs half its extent
-sideways and upwards, and its height, metres."""
+_SPECIES = named_rows(read_table("things/plants"))
 TREES = tuple(_SPECIES)
 """The species that `tree` knows."""
 
@@ -80,16 +74,14 @@ def tree(species: str, variant: int, n_leaves: int = 1500) -> Shape:
         Triangles of foliage; trees far away need fewer.
     """
     rng = np.random.default_rng([TREES.index(species), variant, 77])
-    bark, green, thick, crown = _SPECIES[species]
-    leaf = 0.24 * (1500 / n_leaves) ** 0.5
-    trunk = _bark((0, 0, -0.8), (0, 0, 4.2), (thick * 1.2, thick * 0.6), bark, sides=9)
-    if crown is None:
-        return merge([_cone(n_leaves, leaf, green, rng), trunk])
-    sideways, upwards, height = crown
-    centre = rng.uniform(-1, 1, (7, 3)) * [sideways, sideways, upwards] + [0, 0, height]
+    its, size = _SPECIES[species], 0.24 * (1500 / n_leaves) ** 0.5
+    trunk = _bark((0, 0, -0.8), (0, 0, 4.2), (its.trunk * 1.2, its.trunk * 0.6), its.bark, sides=9)
+    if not its.crown:
+        return merge([_cone(n_leaves, size, its.leaf, rng), trunk])
+    centre = rng.uniform(-1, 1, (7, 3)) * its.crown + [0, 0, its.height]
     radii = rng.uniform(0.95, 1.55, (7, 1)) * [1, 1, 0.85]
-    foliage, fork = _crown(centre, radii, n_leaves, leaf, green, rng), (thick * 0.5, thick * 0.25)
-    forks = [_bark((0, 0, 2.4), (*rng.uniform(-1.2, 1.2, 2), 4.6), fork, bark, sides=5) for _ in range(3)]
+    foliage, fork = _crown(centre, radii, n_leaves, size, its.leaf, rng), (its.trunk * 0.5, its.trunk * 0.25)
+    forks = [_bark((0, 0, 2.4), (*rng.uniform(-1.2, 1.2, 2), 4.6), fork, its.bark, sides=5) for _ in range(3)]
     return merge([foliage, trunk, *forks])
 
 
