@@ -6,7 +6,7 @@ the *convergence error* compares it with the same kernel when nothing changes an
 drive, on the compact grid and on crops of the paper's.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -27,7 +27,7 @@ from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.storage.reading import resumable_json
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
-from semgrid_edu.workshop.studies.crf.nystrom import mean_field_low_rank
+from semgrid_edu.workshop.studies.crf.other_ways import mean_field_low_rank
 
 ITERATIONS = (1, 2, 3, 5, 10, 20, 50, 100)
 """Numbers of updates at which each way is timed and compared."""
@@ -140,7 +140,7 @@ def crf_ways(seed: int = 0) -> dict[str, Way]:
     }
 
 
-def crf_error(log: str | Path, seed: int = 0, scenes: Mapping[str, Sequence[CrfProblem]] | None = None) -> dict:
+def crf_error(log: str | Path, seed: int = 0) -> dict:
     """Measure error and time of every way on every scene.
 
     Parameters
@@ -149,8 +149,6 @@ def crf_error(log: str | Path, seed: int = 0, scenes: Mapping[str, Sequence[CrfP
         Takes each scene as soon as it is done. If the file exists, scenes that it holds aren't measured again.
     seed : int
         Seed for the particles of the filter and for the landmarks.
-    scenes : mapping of str to sequence of CrfProblem, optional
-        What to measure on; `crf_scenes` when left out.
 
     Returns
     -------
@@ -168,7 +166,7 @@ def crf_error(log: str | Path, seed: int = 0, scenes: Mapping[str, Sequence[CrfP
         raise ArgumentError("seed", "a whole number from 0 up", seed)
     identity = {"seed": seed, "iterations": list(ITERATIONS)}
     done = resumable_json(log, identity, "scenes")
-    for name, problems in (scenes or crf_scenes(seed)).items():
+    for name, problems in crf_scenes(seed).items():
         if name not in done:
             done[name] = measure_scene(problems, seed, name)
             write_json(log, identity | {"scenes": done})
