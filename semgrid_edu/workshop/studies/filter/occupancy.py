@@ -14,10 +14,7 @@ from semgrid_edu.workshop.simulation.sensors.rig import HDL64E, Lidar, Rig
 from semgrid_edu.workshop.studies.filter.cell_scores import BANKS, CellScores, Estimate, share
 from semgrid_edu.workshop.studies.filter.scenes import GRIDS, check_request, known_scenes, simulated_by
 
-LIDARS = {
-    "HDL-64E": HDL64E,
-    "coarse": Lidar(),
-}
+LIDARS = {"HDL-64E": HDL64E, "coarse": Lidar()}
 """The real scanner at 10 Hz, and that of the simulated data sets, which looks ahead with a fifth of its columns."""
 FRAMES = 30
 """Number of frames of a drive, 3 s."""

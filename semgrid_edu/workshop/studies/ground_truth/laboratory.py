@@ -97,11 +97,7 @@ TRIALS = {
 
 
 def truth_policies(
-    log: str | Path,
-    seed: int = 0,
-    drives: int = 20,
-    grid: str = "compact",
-    lidar: str = "coarse",
+    log: str | Path, seed: int = 0, drives: int = 20, grid: str = "compact", lidar: str = "coarse"
 ) -> dict[str, object]:
     """Make the ground truth of simulated drives by every policy, and count how wrong it is.
 
