@@ -14,8 +14,7 @@ from semgrid_edu.workshop.simulation.named_streets import KITTI_RIG, named_stree
 from semgrid_edu.workshop.simulation.sensors.raycast import RayMesh
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.things.materials import Kind
-from semgrid_edu.workshop.studies.filter.cell_truth import true_cells
-from semgrid_edu.workshop.studies.filter.scenes import KnownScene, SceneHistory
+from semgrid_edu.workshop.studies.filter.scenes import KnownScene, SceneHistory, true_cells
 from semgrid_edu.workshop.studies.filter.streets import StreetScores
 
 BEFORE = CmcdotParams(clearing_time=0.0, first_sight=(0.93, 0.067, 0.003))

@@ -10,8 +10,7 @@ from semgrid_edu.occupancy import Belief, PlanarMotion, SensorModel, State
 from semgrid_edu.workshop.illustrations.boxes import Box, cells_in, scan_boxes
 from semgrid_edu.workshop.simulation.things.materials import Kind
 from semgrid_edu.workshop.studies.filter.cell_scores import CellScores, Estimate, hit_cell_groups
-from semgrid_edu.workshop.studies.filter.cell_truth import CellTruth, pool_truth
-from semgrid_edu.workshop.studies.filter.scenes import KnownScene, SceneHistory
+from semgrid_edu.workshop.studies.filter.scenes import CellTruth, KnownScene, SceneHistory, pool_truth
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 ROW = GridSpec(0, 1, 0, 5, 1)

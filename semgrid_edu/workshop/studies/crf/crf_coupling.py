@@ -37,13 +37,9 @@ Inference = Callable[[NDArray, NDArray, CrfParams], NDArray]
 """Takes unary, values and params, and returns a distribution over the classes in each cell, (C, H, W)."""
 
 
-def _settled(unary: NDArray, values: NDArray, params: CrfParams) -> NDArray:
-    return mean_field_naive(unary, values, params, iterations=10_000, tolerance=1e-9)
-
-
 WAYS: Mapping[str, Inference] = {
     "mean field, 10 updates": mean_field_naive,
-    "mean field, converged": _settled,
+    "mean field, converged": partial(mean_field_naive, iterations=10_000, tolerance=1e-9),
     "fast mean field, 10 updates": mean_field,
     "loopy sum-product": potts_messages,
     "loopy max-product": partial(potts_messages, best=True),

@@ -31,6 +31,8 @@ from semgrid_edu.workshop.studies.crf.other_ways import mean_field_low_rank
 
 ITERATIONS = (1, 2, 3, 5, 10, 20, 50, 100)
 """Numbers of updates at which each way is timed and compared."""
+REFERENCE = "naive"
+"""The way with the exact kernel."""
 MOST, TOLERANCE = 1000, 1e-5
 """Mean field has converged when no update changes a probability by more than the tolerance, or after 1000 updates."""
 RANKS = (64, 256, 512)
@@ -124,7 +126,7 @@ def crops(problem: CrfProblem) -> list[CrfProblem]:
 
 
 def crf_ways(seed: int = 0) -> dict[str, Way]:
-    """Return every way to run mean field, by name, the one with the exact kernel first.
+    """Return every way to run mean field, by name.
 
     Parameters
     ----------
@@ -132,7 +134,7 @@ def crf_ways(seed: int = 0) -> dict[str, Way]:
         Seed for the landmarks of the low-rank kernels.
     """
     return {
-        "naive": mean_field_naive,
+        REFERENCE: mean_field_naive,
         "all pairs": partial(mean_field_accurate, radius=np.inf),
         "accurate": mean_field_accurate,
         "lattice": mean_field,
@@ -195,14 +197,12 @@ def measure_scene(problems: Sequence[CrfProblem], seed: int = 0, name: str = "")
         the "seconds", and the "total", "kernel" and "convergence" errors, a list each, as long as `ITERATIONS`.
         Errors come from `distance`. "settled", a list of one, is the kernel error when both have converged.
     """
-    ways, found = crf_ways(seed), []
-    for problem in problems:
-        runs = {way: _run(infer, problem) for way, infer in tqdm(ways.items(), desc=name, unit="way")}
-        exact = next(iter(runs.values()))
-        found.append({way: _errors(run, exact) for way, run in runs.items()})
-    merged = {way: _merged([one[way] for one in found]) for way in ways}
-    shape = list(problems[0].unary.shape)
-    return {"shape": shape, "grids": len(problems), "reference": next(iter(ways)), "ways": merged}
+    ways = crf_ways(seed)
+    every = [
+        {way: _run(infer, problem) for way, infer in tqdm(ways.items(), desc=name, unit="way")} for problem in problems
+    ]
+    merged = {way: _merged([_errors(runs[way], runs[REFERENCE]) for runs in every]) for way in ways}
+    return {"shape": list(problems[0].unary.shape), "grids": len(problems), "reference": REFERENCE, "ways": merged}
 
 
 def distance(found: NDArray, reference: NDArray) -> dict[str, float]:

@@ -8,16 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
-from semgrid_edu.crf import (
-    CrfParams,
-    at_temperature,
-    expected_calibration_error,
-    mean_field,
-    negative_log_likelihood,
-    reliability,
-    unary_from_log_probability,
-)
-from semgrid_edu.datasets.index import DatasetIndex, load_index
+from semgrid_edu.crf import CrfParams, mean_field, unary_from_log_probability
+from semgrid_edu.crf.temperature import at_temperature, expected_calibration_error, negative_log_likelihood, reliability
+from semgrid_edu.datasets.index import INDEX_FILE, DatasetIndex, load_index
 from semgrid_edu.datasets.readers.kitti_raw import drive_folder
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import DataError
@@ -201,6 +194,17 @@ def calibration(outputs: GridOutputs) -> dict[str, object]:
     columns = {name: column.tolist() for name, column in diagram._asdict().items()}
     nll = negative_log_likelihood(outputs.columns, outputs.truth)
     return {"NLL": nll, "ECE": expected_calibration_error(diagram), "reliability": columns}
+
+
+def named_data(folder: str | Path) -> dict[str, str]:
+    """Return the "name" of a data set and the "sha256" of its index.
+
+    Parameters
+    ----------
+    folder : path-like
+        The data set.
+    """
+    return {"name": load_index(folder).name, "sha256": sha256(Path(folder) / INDEX_FILE)}
 
 
 def refuse_known_drives(validation_dir: str | Path, dataset_dir: str | Path) -> None:

@@ -22,14 +22,7 @@ from semgrid_edu.storage.provenance import made_by, short_path, write_provenance
 from semgrid_edu.training import CHECKPOINT, TrainingParams
 from semgrid_edu.training.crf import CRF_TRAINING, train_crf
 from semgrid_edu.workshop.scoring.evaluate import scores_table
-from semgrid_edu.workshop.studies.crf.crf_scores import (
-    GridOutputs,
-    gains_text,
-    grid_outputs,
-    refined_grids,
-    refuse_known_drives,
-    scores_by_method,
-)
+from semgrid_edu.workshop.studies.crf import crf_scores
 
 MEAN_FIELD_UPDATES = 5
 """Updates that a learnt CRF makes, in training and afterwards: Zheng et al. 2015 trained with as many."""
@@ -113,7 +106,7 @@ def train_crf_on(
         When a file is missing or damaged, or the folder holds a run that would be overwritten.
     """
     began, frames = datetime.now(UTC), TrainingSet(dataset_dir, variant.split)
-    outputs = grid_outputs(load_net(weights, frames.camera), frames)
+    outputs = crf_scores.grid_outputs(load_net(weights, frames.camera), frames)
     layer = _untrained(frames, variant.label_costs)
     params = replace(params, weight_limit=variant.weight_limit)
     train_crf(layer, *outputs, folder, params, seed, resume)
@@ -181,27 +174,24 @@ def compare_learned_crfs(
     DataError
         When a file is missing or damaged, or a drive of "validation" is one of "train" or "test".
     """
-    refuse_known_drives(validation_dir, dataset_dir)
-    data, layers = {"train": Path(dataset_dir), "validation": Path(validation_dir)}, {}
+    crf_scores.refuse_known_drives(validation_dir, dataset_dir)
+    data, layers = {"train": dataset_dir, "validation": validation_dir}, {}
     for variant in VARIANTS:
         folder = Path(runs) / variant.folder
         if not (folder / WEIGHTS).exists():
             resume = (folder / CHECKPOINT).exists()
             train_crf_on(data[variant.split], weights, folder, variant, params=params, seed=seed, resume=resume)
         layers[variant.name] = load_crf(folder / WEIGHTS)
-    names = {split: folder.resolve().name for split, folder in data.items()}
+    named = {split: crf_scores.named_data(folder) for split, folder in data.items()}
+    used = f"--data {named['train']['name']} --validation {named['validation']['name']} --weights {short_path(weights)}"
     return scores_on_test(dataset_dir, weights, layers) | {
         "learnt": {name: learnt_values(layer) for name, layer in layers.items()},
         "params": asdict(params),
         "mean field updates": MEAN_FIELD_UPDATES,
-        "data": {split: {"name": names[split], "sha256": sha256(path / INDEX_FILE)} for split, path in data.items()},
+        "data": named,
         "weights": {"file": short_path(weights), "sha256": sha256(weights)},
         "seed": seed,
-        **made_by(
-            f"semgrid-edu reproduce learned-crf --data {names['train']} --validation {names['validation']} "
-            f"--weights {short_path(weights)} --seed {seed}",
-            *("numpy", "torch", "numba"),
-        ),
+        **made_by(f"semgrid-edu reproduce learned-crf {used} --seed {seed}", "numpy", "torch", "numba"),
     }
 
 
@@ -223,19 +213,19 @@ def scores_on_test(dataset_dir: str | Path, weights: str | Path, layers: Mapping
         From `scores_by_method`, with the names of the "classes".
     """
     test = TrainingSet(dataset_dir, "test")
-    outputs = grid_outputs(load_net(weights, test.camera), test)
+    outputs = crf_scores.grid_outputs(load_net(weights, test.camera), test)
 
     def grids() -> Iterator[tuple[str, NDArray]]:
-        yield "network", refined_grids(outputs, None)
-        yield "network + CRF", refined_grids(outputs, CrfParams.for_cells(test.spec.cell))
+        yield "network", crf_scores.refined_grids(outputs, None)
+        yield "network + CRF", crf_scores.refined_grids(outputs, CrfParams.for_cells(test.spec.cell))
         for name, layer in {"untrained layer": _untrained(test), **layers}.items():
             yield name, layer_grids(layer, outputs)
 
-    return scores_by_method(grids(), outputs, test) | {"classes": list(test.label_set.names)}
+    return crf_scores.scores_by_method(grids(), outputs, test) | {"classes": list(test.label_set.names)}
 
 
 @torch.inference_mode()
-def layer_grids(layer: CrfLayer, outputs: GridOutputs) -> NDArray[np.float32]:
+def layer_grids(layer: CrfLayer, outputs: crf_scores.GridOutputs) -> NDArray[np.float32]:
     """Refine every grid by a layer.
 
     Parameters
@@ -286,7 +276,7 @@ def learned_crf_table(result: dict) -> str:
     str
         Scores in per cent; gains over the network without CRF in points, with 95 % intervals over test drives.
     """
-    lines = [scores_table(result["scores"]), "", gains_text(result["gains"]), ""]
+    lines = [scores_table(result["scores"]), "", crf_scores.gains_text(result["gains"]), ""]
     for method, learnt in result["learnt"].items():
         named = (f"{name} {value:.3g}" for name, value in learnt.items() if name != "compatibility")
         lines.append(f"{method}: {', '.join(named)}")

@@ -69,7 +69,7 @@ def visit_labellings(
 
 
 def _all_energies(phi: NDArray, weights: NDArray) -> NDArray[np.float64]:
-    """Return the energy of every labelling, one axis per cell: what each cell adds to all labellings of those before."""
+    """Return the energy of every labelling, one axis per cell: each cell adds to that of all labellings before it."""
     classes, energy = phi.shape[1], np.zeros(())
     differ = 1 - np.eye(classes)
     for i, added in enumerate(phi):

@@ -6,14 +6,17 @@ from datetime import UTC, datetime
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Bof, Cmcdot, LogOddsGrid, PlanarMotion, SensorModel, State
+from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import HDL64E, Lidar, Rig
 from semgrid_edu.workshop.studies.filter.cell_scores import BANKS, CellScores, Estimate, share
-from semgrid_edu.workshop.studies.filter.scenes import GRIDS, check_request, known_scenes, simulated_by
+from semgrid_edu.workshop.studies.filter.scenes import known_scenes
 
+GRIDS = {"paper": GridSpec.paper(), "compact": GridSpec.compact()}
 LIDARS = {"HDL-64E": HDL64E, "coarse": Lidar()}
 """The real scanner at 10 Hz, and that of the simulated data sets, which looks ahead with a fifth of its columns."""
 FRAMES = 30
@@ -21,6 +24,57 @@ FRAMES = 30
 HELD_OUT = 100
 """Seed of the first drive for seed 0; each further seed adds 1000. Parameters were chosen on drives before this one."""
 METHODS = ("log-odds", "BOF", "CMCDOT")
+
+
+def check_request(seed: int, drives: int, frames: int, grids: tuple[str, ...]) -> None:
+    """Refuse what can't be run, before the work starts.
+
+    Parameters
+    ----------
+    seed : int
+        Seed for the drives and for the particles.
+    drives, frames : int
+        Number of drives, and number of frames of each.
+    grids : tuple of str
+        Keys of `GRIDS`.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such grid, the seed is negative, or there is nothing to do.
+    """
+    if not grids or not set(grids) <= set(GRIDS):
+        raise ArgumentError("grid", " or ".join(GRIDS), ", ".join(grids) or "none")
+    if seed < 0:
+        raise ArgumentError("seed", "a whole number from 0 up", seed)
+    if min(drives, frames) < 1:
+        raise ArgumentError("drives, frames", "at least one", f"{drives}, {frames}")
+
+
+def simulated_by(
+    experiment: str, seed: int, drives: int, frames: int, grids: tuple[str, ...], began: datetime
+) -> dict[str, object]:
+    """Return what made a result on simulated drives, see `made_by`.
+
+    Parameters
+    ----------
+    experiment : str
+        The command after `semgrid-edu reproduce`.
+    seed, drives, frames, grids
+        What was asked, as `check_request` takes it.
+    began : datetime
+        When the work started, UTC.
+
+    Returns
+    -------
+    dict
+        Numbers of drives and frames, command, seed, date, minutes and versions; JSON can hold it.
+    """
+    one_grid = f" --grid {grids[0]}" if len(grids) == 1 else ""
+    command = f"semgrid-edu reproduce {experiment} --seed {seed} --drives {drives}{one_grid}"
+    minutes = round((datetime.now(UTC) - began).total_seconds() / 60, 1)
+    made = made_by(command, "numpy", "scipy", "numba", "embreex", "trimesh")
+    return {"drives": drives, "frames": frames, "seed": seed, "minutes": minutes, **made}
 
 
 def compare_filters(
@@ -56,9 +110,8 @@ def compare_filters(
     """
     began = datetime.now(UTC)
     check_request(seed, drives, frames, grids)
-    scores = {lidar: {grid: _score(seed, drives, frames, lidar, grid) for grid in grids} for lidar in LIDARS}
     return {
-        "scores": scores,
+        "scores": {lidar: {grid: _score(seed, drives, frames, lidar, grid) for grid in grids} for lidar in LIDARS},
         "states": [state.name for state in State],
         **simulated_by("occupancy", seed, drives, frames, grids, began),
     }
