@@ -15,7 +15,7 @@ from semgrid_edu.workshop.commands.main import run
 from semgrid_edu.workshop.studies.crf import crf_coupling as study
 from semgrid_edu.workshop.studies.crf.other_ways import potts_messages, visit_labellings
 
-QUICK = {"GRIDS": [(1, 2), (2, 2)], "CLASSES": [2], "COUPLINGS": [0.0, 2.0], "FINE": [0.0, 1.0]}
+QUICK = {"GRIDS": [(1, 2), (2, 2)], "CLASSES": [2], "COUPLINGS": [0.0, 2.0]}
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -93,11 +93,11 @@ def test_what_is_done_is_not_measured_again_and_another_log_is_refused(result, m
 
 
 def test_mean_field_picks_a_side_where_the_exact_marginal_stays_undecided():
-    found = study.symmetric_case([0.5, 4.0])["probability"]
-    for side, sure in (("", 0.99), (", other side", 0.01)):
-        exact, settled = found[f"exact{side}"], found[f"mean field, converged{side}"]
-        np.testing.assert_allclose([*exact, settled[0]], 0.5, atol=0.01)
-        assert settled[1] == pytest.approx(sure, abs=0.01)
+    for p, sure in ((0.501, 0.99), (0.499, 0.01)):
+        for coupling, side in ((0.5, 0.5), (4.0, sure)):
+            crf = two_classes(np.full((3, 3), p)), all_free((3, 3)), coupled(coupling)
+            assert visit_labellings(*crf)[0][0, 1, 1] == pytest.approx(0.5, abs=0.01)
+            assert study.WAYS["mean field, converged"](*crf)[0, 1, 1] == pytest.approx(side, abs=0.01)
     undecided, _ = visit_labellings(two_classes(np.full((3, 3), 0.5)), all_free((3, 3)), coupled(4.0))
     np.testing.assert_allclose(undecided, 0.5, atol=1e-12)
 

@@ -16,7 +16,7 @@ from tqdm.auto import tqdm
 
 from semgrid_edu.crf import CrfParams, mean_field, mean_field_naive, unary_from_probability
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.stage_models.crf import all_free, coupled, two_classes
+from semgrid_edu.stage_models.crf import coupled
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.storage.reading import resumable_json
@@ -25,14 +25,10 @@ from semgrid_edu.workshop.studies.crf.other_ways import potts_messages, visit_la
 
 COUPLINGS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
 """From no pairs to the default weights."""
-FINE = tuple(k / 8 for k in range(33))
-"""The same range for the symmetric case."""
 GRIDS = ((3, 3), (4, 4))
 """Rows and columns."""
 CLASSES = (2, 3)
 """Numbers of classes."""
-TILT = 0.501
-"""Probability of class 0 in every cell of the symmetric case: as good as undecided."""
 Inference = Callable[[NDArray, NDArray, CrfParams], NDArray]
 """Takes unary, values and params, and returns a distribution over the classes in each cell, (C, H, W)."""
 
@@ -50,7 +46,7 @@ ONLY_LABELS = ("loopy max-product",)
 
 
 def crf_coupling(log: str | Path, seed: int = 0, draws: int = 20) -> dict:
-    """Compare every way with exact inference on random tiny grids, coupling by coupling, and in a symmetric case.
+    """Compare every way with exact inference on random tiny grids, coupling by coupling.
 
     Parameters
     ----------
@@ -64,8 +60,7 @@ def crf_coupling(log: str | Path, seed: int = 0, draws: int = 20) -> dict:
     Returns
     -------
     dict
-        "cases": by name from `measure_coupling`; "symmetric": from `symmetric_case`; with seed, command and
-        versions. JSON can hold it.
+        "cases": by name from `measure_coupling`; with seed, command and versions. JSON can hold it.
 
     Raises
     ------
@@ -78,17 +73,14 @@ def crf_coupling(log: str | Path, seed: int = 0, draws: int = 20) -> dict:
         name, value = ("seed", seed) if seed < 0 else ("draws", draws)
         raise ArgumentError(name, "a whole number from 0 up, and at least one draw", value)
     identity = {"seed": seed, "draws": draws, "couplings": list(COUPLINGS)}
+    command = f"semgrid-edu reproduce crf-coupling --seed {seed} --draws {draws}"
     done = resumable_json(log, identity, "cases")
     for (height, width), n in product(GRIDS, CLASSES):
         name = f"{height} x {width} cells, {n} classes"
         if name not in done:
             done[name] = measure_coupling((n, height, width), COUPLINGS, draws, seed, name)
             write_json(log, identity | {"cases": done})
-    return identity | {
-        "cases": done,
-        "symmetric": symmetric_case(FINE),
-        **made_by(f"semgrid-edu reproduce crf-coupling --seed {seed} --draws {draws}", "numpy", "scipy", "numba"),
-    }
+    return identity | {"cases": done, **made_by(command, "numpy", "scipy", "numba")}
 
 
 def random_crf(shape: tuple[int, int, int], seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -152,32 +144,6 @@ def measure_coupling(
         part: {way: np.reshape(errors, (-1, draws)).tolist() for way, errors in by_way.items()}
         for part, by_way in (("variation", variation), ("labels", labels))
     }
-
-
-def symmetric_case(couplings: Sequence[float]) -> dict:
-    """Let 3 x 3 cells be free and (almost) undecided between two classes, and watch which of them each way takes.
-
-    If `TILT` were exactly 1/2, the exact marginals are 1/2 by symmetry, at every coupling.
-
-    Parameters
-    ----------
-    couplings : sequence of float
-        Weights w1.
-
-    Returns
-    -------
-    dict
-        "shape" (H, W); "tilt"; "couplings" (n,); "probability": for each way the probability of class 0 in the middle
-        cell, (n,), with "exact" first, and as "mean field, other side" and so on with the tilt towards class 1.
-    """
-    shape, values = (3, 3), all_free((3, 3))
-    ways: dict[str, Inference] = {"exact": lambda *crf: visit_labellings(*crf)[0]}
-    ways |= {way: WAYS[way] for way in ("mean field, 10 updates", "mean field, converged", "loopy sum-product")}
-    probability = {}
-    for (side, p), (way, infer) in product({"": TILT, ", other side": 1 - TILT}.items(), ways.items()):
-        found = [infer(two_classes(np.full(shape, p)), values, coupled(coupling)) for coupling in couplings]
-        probability[way + side] = [float(Q[0, 1, 1]) for Q in found]
-    return {"shape": list(shape), "tilt": TILT, "couplings": list(couplings), "probability": probability}
 
 
 def crf_coupling_tables(result: dict) -> str:

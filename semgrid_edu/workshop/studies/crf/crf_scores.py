@@ -20,7 +20,7 @@ from semgrid_edu.storage.files import sha256
 from semgrid_edu.workshop.scoring.confusions import drive_confusions
 from semgrid_edu.workshop.scoring.evaluate import scores
 from semgrid_edu.workshop.scoring.grids import learned_log_g
-from semgrid_edu.workshop.scoring.statistics import paired_interval
+from semgrid_edu.workshop.scoring.score_with_interval import compared
 
 
 class GridOutputs(NamedTuple):
@@ -261,12 +261,11 @@ def gains_by_metric(a: NDArray, b: NDArray) -> dict[str, list[float | None]]:
     Returns
     -------
     dict of str to [low, gain, high]
-        By metric, with the 95 % interval of `paired_interval`. There is one network, so the interval is for that one,
+        By metric, with the 95 % interval of `compared`. There is one network, so the interval is for that one,
         on new drives. One drive alone gives no interval: then low and high are None.
     """
-    if len(a) == 1:
-        return {name: [None, metric(a[0]) - metric(b[0]), None] for name, metric in METRICS.items()}
-    return {name: list(paired_interval(a[None], b[None], metric)) for name, metric in METRICS.items()}
+    gains = {name: compared(a[None], b[None], metric) for name, metric in METRICS.items()}
+    return {name: [gain["low"], gain["mean"], gain["high"]] for name, gain in gains.items()}
 
 
 def gains_text(gains: dict[str, dict[str, list[float | None]]]) -> str:

@@ -88,12 +88,12 @@ def objective_values(trials: Sequence[Trial], unrefined: dict) -> NDArray[np.flo
     return np.stack([pixel, by_class, np.where(lost >= 0, pixel, lost)], axis=1)
 
 
-def read_trials(log: str | Path, identity: dict) -> list[Trial]:
+def read_trials(log: Path, identity: dict) -> list[Trial]:
     """Return the trials of a search that was begun, or an empty list.
 
     Parameters
     ----------
-    log : path-like
+    log : Path
         The file that `search_crf` writes, which may be missing.
     identity : dict
         What makes the search: its data, weights and seed.
@@ -107,7 +107,7 @@ def read_trials(log: str | Path, identity: dict) -> list[Trial]:
     DataError
         When the file is something else, or the log of another search.
     """
-    content = read_json(log) if Path(log).exists() else identity | {"trials": []}
+    content = read_json(log) if log.exists() else identity | {"trials": []}
     found, trials = {name: content.get(name) for name in identity}, content.get("trials")
     if not isinstance(trials, list):
         raise DataError(log, "the trials of a search, or no file", f"something else: {repr(content)[:200]}")
@@ -117,13 +117,7 @@ def read_trials(log: str | Path, identity: dict) -> list[Trial]:
 
 
 def search_crf(
-    validation_dir: str | Path,
-    dataset_dir: str | Path,
-    weights: str | Path,
-    log: str | Path,
-    *,
-    seed: int = 0,
-    n_trials: int = 200,
+    validation_dir: Path, dataset_dir: Path, weights: Path, log: Path, *, seed: int = 0, n_trials: int = 200
 ) -> dict[str, object]:
     """Calibrate a network, search the CRF's parameters, and score what was chosen on the test split.
 
@@ -138,13 +132,13 @@ def search_crf(
 
     Parameters
     ----------
-    validation_dir : path-like
+    validation_dir : Path
         A data set with the split "validation".
-    dataset_dir : path-like
+    dataset_dir : Path
         The data set that the network was trained on, such as data/minikitti, with the splits "train" and "test".
-    weights : path-like
+    weights : Path
         A network trained on the split "train".
-    log : path-like
+    log : Path
         Takes every trial as soon as it has ended, as JSON. If the file holds trials of the same search, they aren't
         repeated.
     seed : int
@@ -229,10 +223,10 @@ def search_table(result: dict) -> str:
     return "\n".join(lines)
 
 
-def _identity(validation_dir: str | Path, dataset_dir: str | Path, weights: str | Path, seed: int) -> dict:
+def _identity(validation_dir: Path, dataset_dir: Path, weights: Path, seed: int) -> dict:
     """Return what makes the search: data by the SHA-256 of their index, weights, seed."""
     data = {"validation": crf_scores.named_data(validation_dir), "dataset": crf_scores.named_data(dataset_dir)}
-    record = Path(weights).with_name(FILE_NAME)
+    record = weights.with_name(FILE_NAME)
     trained_on = read_json(record).get("dataset") if record.exists() else None
     used = {"file": short_path(weights), "sha256": sha256(weights), "trained on": trained_on}
     return data | {"weights": used, "seed": seed}

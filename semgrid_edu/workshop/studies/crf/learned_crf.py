@@ -68,14 +68,7 @@ VARIANTS = tuple(
 
 
 def train_crf_on(
-    dataset_dir: str | Path,
-    weights: str | Path,
-    folder: str | Path,
-    variant: CrfVariant,
-    *,
-    params: TrainingParams = CRF_TRAINING,
-    seed: int = 0,
-    resume: bool = False,
+    dataset_dir: Path, weights: Path, folder: Path, variant: CrfVariant, params: TrainingParams, seed: int, resume: bool
 ) -> None:
     """Train a CRF on the grids that a network makes of the frames of a split, and write its provenance.
 
@@ -83,11 +76,11 @@ def train_crf_on(
 
     Parameters
     ----------
-    dataset_dir : path-like
+    dataset_dir : Path
         A data set with the split of the variant.
-    weights : path-like
+    weights : Path
         The network.
-    folder : path-like
+    folder : Path
         Where to write the files of `train_crf`, and `provenance.json`.
     variant : CrfVariant
         Where it learns, what learns, and with which loss.
@@ -110,7 +103,7 @@ def train_crf_on(
     layer = _untrained(frames, variant.label_costs)
     params = replace(params, weight_limit=variant.weight_limit)
     train_crf(layer, *outputs, folder, params, seed, resume)
-    data, out = (Path(path).resolve().name for path in (dataset_dir, folder))
+    data, out = (path.resolve().name for path in (dataset_dir, folder))
     costs = " --label-costs" if variant.label_costs else ""
     write_provenance(
         folder,
@@ -124,7 +117,7 @@ def train_crf_on(
         # JSON has no infinity.
         params={name: str(value) if value == math.inf else value for name, value in asdict(params).items()},
         crf=layer.description(),
-        dataset=sha256(Path(dataset_dir) / INDEX_FILE),
+        dataset=sha256(dataset_dir / INDEX_FILE),
         network=sha256(weights),
     )
 
@@ -136,11 +129,10 @@ def _untrained(frames: TrainingSet, label_costs: bool = False) -> CrfLayer:
 
 
 def compare_learned_crfs(
-    dataset_dir: str | Path,
-    validation_dir: str | Path,
-    weights: str | Path,
-    runs: str | Path,
-    *,
+    dataset: Path,
+    validation: Path,
+    weights: Path,
+    runs: Path,
     params: TrainingParams = CRF_TRAINING,
     seed: int = 0,
 ) -> dict[str, object]:
@@ -148,13 +140,13 @@ def compare_learned_crfs(
 
     Parameters
     ----------
-    dataset_dir : path-like
+    dataset : Path
         The data set that the network was trained on, with the splits "train" and "test".
-    validation_dir : path-like
+    validation : Path
         A data set with the split "validation", drives that the network has never seen.
-    weights : path-like
+    weights : Path
         The network.
-    runs : path-like
+    runs : Path
         Takes one folder per training run. A run that has ended isn't repeated, and one that was interrupted is
         resumed.
     params : TrainingParams
@@ -174,17 +166,17 @@ def compare_learned_crfs(
     DataError
         When a file is missing or damaged, or a drive of "validation" is one of "train" or "test".
     """
-    crf_scores.refuse_known_drives(validation_dir, dataset_dir)
-    data, layers = {"train": dataset_dir, "validation": validation_dir}, {}
+    crf_scores.refuse_known_drives(validation, dataset)
+    data, layers = {"train": dataset, "validation": validation}, {}
     for variant in VARIANTS:
-        folder = Path(runs) / variant.folder
+        folder = runs / variant.folder
         if not (folder / WEIGHTS).exists():
             resume = (folder / CHECKPOINT).exists()
-            train_crf_on(data[variant.split], weights, folder, variant, params=params, seed=seed, resume=resume)
+            train_crf_on(data[variant.split], weights, folder, variant, params, seed, resume)
         layers[variant.name] = load_crf(folder / WEIGHTS)
     named = {split: crf_scores.named_data(folder) for split, folder in data.items()}
     used = f"--data {named['train']['name']} --validation {named['validation']['name']} --weights {short_path(weights)}"
-    return scores_on_test(dataset_dir, weights, layers) | {
+    return scores_on_test(dataset, weights, layers) | {
         "learnt": {name: learnt_values(layer) for name, layer in layers.items()},
         "params": asdict(params),
         "mean field updates": MEAN_FIELD_UPDATES,
@@ -195,14 +187,14 @@ def compare_learned_crfs(
     }
 
 
-def scores_on_test(dataset_dir: str | Path, weights: str | Path, layers: Mapping[str, CrfLayer]) -> dict[str, object]:
+def scores_on_test(dataset: Path, weights: Path, layers: Mapping[str, CrfLayer]) -> dict[str, object]:
     """Score the network, the default CRF and trained ones on the test split.
 
     Parameters
     ----------
-    dataset_dir : path-like
+    dataset_dir : Path
         A data set with the split "test".
-    weights : path-like
+    weights : Path
         The network.
     layers : dict of str to CrfLayer
         The trained CRFs by name.
