@@ -129,12 +129,7 @@ def _untrained(frames: TrainingSet, label_costs: bool = False) -> CrfLayer:
 
 
 def compare_learned_crfs(
-    dataset: Path,
-    validation: Path,
-    weights: Path,
-    runs: Path,
-    params: TrainingParams = CRF_TRAINING,
-    seed: int = 0,
+    dataset: Path, validation: Path, weights: Path, runs: Path, params: TrainingParams = CRF_TRAINING, seed: int = 0
 ) -> dict[str, object]:
     """Learn a CRF in each of the ways of `VARIANTS`, and score all of them on the test split.
 
@@ -192,7 +187,7 @@ def scores_on_test(dataset: Path, weights: Path, layers: Mapping[str, CrfLayer])
 
     Parameters
     ----------
-    dataset_dir : Path
+    dataset : Path
         A data set with the split "test".
     weights : Path
         The network.
@@ -204,7 +199,7 @@ def scores_on_test(dataset: Path, weights: Path, layers: Mapping[str, CrfLayer])
     dict
         From `scores_by_method`, with the names of the "classes".
     """
-    test = TrainingSet(dataset_dir, "test")
+    test = TrainingSet(dataset, "test")
     outputs = crf_scores.grid_outputs(load_net(weights, test.camera), test)
 
     def grids() -> Iterator[tuple[str, NDArray]]:
