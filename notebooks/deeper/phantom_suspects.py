@@ -8,7 +8,7 @@ from unittest.mock import patch
 import numpy as np
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import Cmcdot, CmcdotParams, SensorModel, cellwise
+from semgrid_edu.occupancy import Cmcdot, CmcdotParams, cellwise
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.named_streets import KITTI_RIG, named_street
 from semgrid_edu.workshop.simulation.sensors.raycast import RayMesh
@@ -95,7 +95,7 @@ def scenes_of(street: str, number: int, spec: GridSpec, suspect: Suspect) -> tup
     drive = named_street(street, number, rig=suspect.rig)
     if suspect.change:
         suspect.change(drive)
-    past = SceneHistory(spec, SensorModel())
+    past = SceneHistory(spec)
     return drive, [past.add(drive.scan(k), true_cells(drive, k * PERIOD, spec)) for k in range(drive.n_frames)]
 
 

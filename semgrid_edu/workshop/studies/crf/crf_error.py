@@ -172,10 +172,8 @@ def crf_error(log: str | Path, seed: int = 0) -> dict:
         if name not in done:
             done[name] = measure_scene(problems, seed, name)
             write_json(log, identity | {"scenes": done})
-    return identity | {
-        "scenes": done,
-        **made_by(f"semgrid-edu reproduce crf-error --seed {seed}", "numpy", "scipy", "numba", "torch"),
-    }
+    made = made_by(f"semgrid-edu reproduce crf-error --seed {seed}", "numpy", "scipy", "numba", "torch")
+    return identity | {"scenes": done, **made}
 
 
 def measure_scene(problems: Sequence[CrfProblem], seed: int = 0, name: str = "") -> dict:
@@ -257,11 +255,10 @@ def _merged(found: Sequence[dict]) -> dict:
     def over_grids(same: Sequence[dict]) -> dict:
         return {of: float((np.max if of == "max" else np.mean)([one[of] for one in same])) for of in same[0]}
 
-    merged = {
-        error: [over_grids(same) for same in zip(*(one[error] for one in found), strict=True)]
-        for error in (*ERRORS, "settled")
-    }
-    return {"seconds": np.mean([one["seconds"] for one in found], axis=0).tolist()} | merged
+    merged = {"seconds": np.mean([one["seconds"] for one in found], axis=0).tolist()}
+    for error in (*ERRORS, "settled"):
+        merged[error] = [over_grids(same) for same in zip(*(one[error] for one in found), strict=True)]
+    return merged
 
 
 def crf_error_tables(result: dict, iterations: int = 10) -> str:
@@ -286,7 +283,6 @@ def crf_error_tables(result: dict, iterations: int = 10) -> str:
             errors = [f"{100 * found[e][k][of]:.4f}" for of in ("mean", "labels") for e in ERRORS]
             rows.append([way, f"{1000 * found['seconds'][k]:.1f}", *errors])
         grid = " x ".join(map(str, scene["shape"][1:]))
-        tables.append(
-            f"{name}, {grid} cells, {iterations} updates, against {scene['reference']}\n\n{markdown_table(rows)}"
-        )
+        title = f"{name}, {grid} cells, {iterations} updates, against {scene['reference']}"
+        tables.append(f"{title}\n\n{markdown_table(rows)}")
     return "\n\n".join(tables)

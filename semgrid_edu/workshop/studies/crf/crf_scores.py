@@ -110,9 +110,7 @@ def refined_confusions(outputs: GridOutputs, refined: NDArray) -> NDArray[np.int
     return np.stack([confusion_matrix(truth, predicted, refined.shape[1]) for truth, predicted in pairs])
 
 
-def scores_by_method(
-    grids: Iterable[tuple[str, NDArray]], outputs: GridOutputs, frames: TrainingSet
-) -> dict[str, object]:
+def scores_by_method(grids: Iterable[tuple[str, NDArray]], outputs: GridOutputs, frames: TrainingSet) -> dict:
     """Score what several methods make of the same frames.
 
     Parameters
@@ -145,16 +143,14 @@ def scores_by_method(
     }
 
 
-def compare_on_test(
-    dataset_dir: str | Path, weights: str | Path, temperature: float, chosen: dict[str, CrfParams]
-) -> dict[str, object]:
+def compare_on_test(dataset_dir: Path, weights: Path, temperature: float, chosen: dict[str, CrfParams]) -> dict:
     """Score the network, the default CRF, and the chosen CRFs on the test split.
 
     Parameters
     ----------
-    dataset_dir : path-like
+    dataset_dir : Path
         A data set with the split "test".
-    weights : path-like
+    weights : Path
         The network.
     temperature : float
         T of the calibrated network.
@@ -172,9 +168,8 @@ def compare_on_test(
     methods = {"network": (network, None), "CRF": (network, default), "calibrated, CRF": (calibrated, default)}
     methods |= {f"calibrated, CRF for {objective}": (calibrated, params) for objective, params in chosen.items()}
     grids = ((name, refined_grids(outputs, params)) for name, (outputs, params) in methods.items())
-    return scores_by_method(grids, network, test) | {
-        "calibration": {"before": calibration(network), "after": calibration(calibrated)}
-    }
+    both = {"before": calibration(network), "after": calibration(calibrated)}
+    return scores_by_method(grids, network, test) | {"calibration": both}
 
 
 def calibration(outputs: GridOutputs) -> dict[str, object]:
@@ -196,27 +191,27 @@ def calibration(outputs: GridOutputs) -> dict[str, object]:
     return {"NLL": nll, "ECE": expected_calibration_error(diagram), "reliability": columns}
 
 
-def named_data(folder: str | Path) -> dict[str, str]:
+def named_data(folder: Path) -> dict[str, str]:
     """Return the "name" of a data set and the "sha256" of its index.
 
     Parameters
     ----------
-    folder : path-like
+    folder : Path
         The data set.
     """
-    return {"name": load_index(folder).name, "sha256": sha256(Path(folder) / INDEX_FILE)}
+    return {"name": load_index(folder).name, "sha256": sha256(folder / INDEX_FILE)}
 
 
-def refuse_known_drives(validation_dir: str | Path, dataset_dir: str | Path) -> None:
+def refuse_known_drives(validation_dir: Path, dataset_dir: Path) -> None:
     """Refuse validation drives that a network was trained on or will be tested on.
 
     Two drives are the same when their first scans are, byte for byte, whatever their numbers are.
 
     Parameters
     ----------
-    validation_dir : path-like
+    validation_dir : Path
         A data set with the split "validation".
-    dataset_dir : path-like
+    dataset_dir : Path
         The data set with the splits "train" and "test".
 
     Raises

@@ -20,6 +20,8 @@ from semgrid_edu.workshop.simulation.things.materials import Kind
 
 FLAT = (Kind.ROAD, Kind.LANE, Kind.SIDEWALK, Kind.GRASS)
 """The kinds of bare ground."""
+HIGHEST = 1.6
+"""Height above flat ground up to which returns count, metres."""
 LEFT_SINCE = 10
 """Number of frames, 1 s. Cells that something moving has left within them should be free now."""
 OUT_OF_VIEW = 3
@@ -128,7 +130,7 @@ class KnownScene:
     hit : (H, W) bool
         Cells that the scan hits, from `hit_cells`.
     observed : (H, W) bool
-        Cells about which this scan says something: P(z | occupied) and P(z | free) differ.
+        Cells about which this scan says something: P(z | occupied) and P(z | free) differ (`SensorModel`).
     never_seen : (H, W) bool
         Cells about which no scan of the drive has said anything so far, so that no filter can know them.
     left : (H, W) bool
@@ -147,9 +149,7 @@ class KnownScene:
     in_view: dict[int, int]
 
 
-def hit_cells(
-    points: NDArray, spec: GridSpec, least: int = 2, low: float = 0.3, high: float = 1.6
-) -> NDArray[np.bool_]:
+def hit_cells(points: NDArray, spec: GridSpec, least: int = 2, low: float = 0.3) -> NDArray[np.bool_]:
     """Return which cells hold enough returns from above the ground to be scored, (H, W).
 
     Parameters
@@ -160,18 +160,16 @@ def hit_cells(
         The grid.
     least : int
         Number of returns that a cell needs.
-    low, high : float
-        Heights above flat ground between which returns count, metres.
+    low : float
+        Height above flat ground from which on returns count, up to `HIGHEST`, metres.
     """
-    rows, cols, inside = spec.cells(points[(points[:, 2] >= low) & (points[:, 2] <= high)])
+    rows, cols, inside = spec.cells(points[(points[:, 2] >= low) & (points[:, 2] <= HIGHEST)])
     count = np.zeros(spec.shape, int)
     np.add.at(count, (rows[inside], cols[inside]), 1)
     return count >= least
 
 
-def known_scenes(
-    drive: SimulatedDrive, spec: GridSpec, sensor: SensorModel, name: str = "drive"
-) -> Iterator[KnownScene]:
+def known_scenes(drive: SimulatedDrive, spec: GridSpec, name: str = "drive") -> Iterator[KnownScene]:
     """Take the scans of a drive, one after the other, with their truth.
 
     Parameters
@@ -180,8 +178,6 @@ def known_scenes(
         The drive.
     spec : GridSpec
         The grid: the extent of `LABEL_GRID`, a multiple of its cell.
-    sensor : SensorModel
-        Decides about which cells a scan says something.
     name : str
         What the progress bar calls it.
 
@@ -189,7 +185,7 @@ def known_scenes(
     ------
     KnownScene
     """
-    past = SceneHistory(spec, sensor)
+    past = SceneHistory(spec)
     for k in tqdm(range(drive.n_frames), desc=name, unit="frame", leave=False):
         yield past.add(drive.scan(k), true_cells(drive, k * PERIOD, spec))
 
@@ -201,18 +197,13 @@ class SceneHistory:
     ----------
     spec : GridSpec
         The grid of the scenes.
-    sensor : SensorModel
-        Decides about which cells a scan says something.
     """
 
-    def __init__(self, spec: GridSpec, sensor: SensorModel) -> None:
-        self.spec, self.sensor = spec, sensor
+    def __init__(self, spec: GridSpec) -> None:
+        self.spec = spec
         self._around = map_around(spec, MAX_YAW)  # what the trackers remember of the grid's surroundings
-        self._poses: list[NDArray] = []
-        self._observed: list[NDArray] = []
-        self._dynamic: list[NDArray] = []
-        self._first_hit: dict[int, int] = {}
-        self._last_hit: dict[int, int] = {}
+        self._poses, self._observed, self._dynamic = [], [], []  # an array per frame
+        self._first_hit, self._last_hit = {}, {}  # frames by number of the object
 
     def add(self, frame: Frame, truth: CellTruth) -> KnownScene:
         """Make a scene of the next frame, and remember it.
@@ -224,7 +215,7 @@ class SceneHistory:
         truth : CellTruth
             What is true at that instant.
         """
-        evidence = scan_evidence(frame.points_grid, self._around, self.sensor)
+        evidence = scan_evidence(frame.points_grid, self._around, SensorModel())
         pose = frame.T_world_from_lidar
         motion = PlanarMotion.from_poses(self._poses[-1], pose) if self._poses else PlanarMotion()
         self._poses.append(pose)

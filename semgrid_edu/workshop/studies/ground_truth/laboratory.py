@@ -95,14 +95,12 @@ TRIALS = {
 """What is compared, by name. The last four show what each kind of error in the data does to the paper's way."""
 
 
-def truth_policies(
-    log: str | Path, seed: int = 0, drives: int = 20, grid: str = "compact", lidar: str = "coarse"
-) -> dict[str, object]:
+def truth_policies(log: Path, seed: int = 0, drives: int = 20, grid: str = "compact", lidar: str = "coarse") -> dict:
     """Make the ground truth of simulated drives by every policy, and count how wrong it is.
 
     Parameters
     ----------
-    log : path-like
+    log : Path
         Takes every drive as soon as it is done. If the file exists, drives that it holds aren't simulated again.
     seed : int
         Seed for drives, errors and particles.
@@ -154,9 +152,7 @@ def truth_policies(
     }
 
 
-def score_trials(
-    trials: dict[str, Trial], spec: GridSpec, number: int, lidar: str = "coarse"
-) -> dict[str, TruthCounts]:
+def score_trials(trials: dict[str, Trial], spec: GridSpec, number: int, lidar: str) -> dict[str, TruthCounts]:
     """Score every trial on one simulated drive, by name.
 
     Parameters

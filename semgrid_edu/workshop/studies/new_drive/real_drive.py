@@ -87,9 +87,7 @@ def measure_drive(drive: KittiRawDrive, boxes: Boxes) -> dict[str, object]:
     frames, net = drive[:], load_net(sample_image_stage(), drive.camera)
     scanned = checks.with_scan(frames)
     positions = np.array([frame.T_world_from_lidar[:3, 3] for frame in frames])
-    ground = np.mean(
-        [checks.ground_plane(frame.points, frame.camera.lidar_height) for frame in scanned[::EVERY]], axis=0
-    )
+    planes = [checks.ground_plane(frame.points, frame.camera.lidar_height) for frame in scanned[::EVERY]]
     images = [resize_image(frame.need_image(), net.architecture.image_size) for frame in frames[::EVERY]]
     return {
         "frames": len(frames),
@@ -100,7 +98,7 @@ def measure_drive(drive: KittiRawDrive, boxes: Boxes) -> dict[str, object]:
         "metres": float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum()),
         "returns": float(np.mean([len(frame.points) for frame in scanned])),
         "on image": float(np.mean([checks.share_on_image(frame.points, frame.camera) for frame in scanned])),
-        "ground": dict(zip(("height", "pitch", "roll"), map(float, ground), strict=True)),
+        "ground": dict(zip(("height", "pitch", "roll"), np.mean(planes, axis=0).tolist(), strict=True)),
         "axes": checks.axes_errors(scanned),
         "images": domain.distances(images, domain.training_images()) | _statistics(images),
         "image network": domain.network_numbers(net, scanned[::EVERY]),
@@ -125,8 +123,8 @@ def _grid_numbers(frames: Sequence[Frame], boxes: Boxes) -> dict[str, object]:
             found.append(moving_hits(result.frame, result.belief, boxes.get(k, []), net.architecture.grid))
     found = np.concatenate(found)
     return {
-        "states": dict(zip((state.name for state in State), map(float, np.mean(states, axis=0)), strict=True)),
-        **dict(zip(("confidence", "entropy"), map(float, np.mean(semantic, axis=0)), strict=True)),
+        "states": dict(zip((state.name for state in State), np.mean(states, axis=0).tolist(), strict=True)),
+        **dict(zip(("confidence", "entropy"), np.mean(semantic, axis=0).tolist(), strict=True)),
         "moving cells": len(found),
         "found": float(found.mean()) if len(found) else None,
     }
