@@ -8,14 +8,13 @@ from unittest.mock import patch
 import numpy as np
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import Cmcdot, CmcdotParams, SensorModel, cellwise
+from semgrid_edu.occupancy import Cmcdot, CmcdotParams, cellwise
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.named_streets import KITTI_RIG, named_street
 from semgrid_edu.workshop.simulation.sensors.raycast import RayMesh
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.things.materials import Kind
-from semgrid_edu.workshop.studies.filter.cell_truth import true_cells
-from semgrid_edu.workshop.studies.filter.scenes import KnownScene, SceneHistory
+from semgrid_edu.workshop.studies.filter.scenes import KnownScene, SceneHistory, true_cells
 from semgrid_edu.workshop.studies.filter.streets import StreetScores
 
 BEFORE = CmcdotParams(clearing_time=0.0, first_sight=(0.93, 0.067, 0.003))
@@ -96,7 +95,7 @@ def scenes_of(street: str, number: int, spec: GridSpec, suspect: Suspect) -> tup
     drive = named_street(street, number, rig=suspect.rig)
     if suspect.change:
         suspect.change(drive)
-    past = SceneHistory(spec, SensorModel())
+    past = SceneHistory(spec)
     return drive, [past.add(drive.scan(k), true_cells(drive, k * PERIOD, spec)) for k in range(drive.n_frames)]
 
 

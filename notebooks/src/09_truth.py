@@ -45,13 +45,7 @@ from semgrid_edu.frame import Frame
 from semgrid_edu.graphical import d_separated
 from semgrid_edu.stage_models import LabelWorld, lidar_label_stage, wrong_label
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.workshop.studies.ground_truth.pictures import (
-    DIFFERENCES,
-    difference_kinds,
-    policy_errors,
-    truth_difference,
-    truth_errors,
-)
+from truth_pictures import DIFFERENCES, difference_kinds, policy_errors, truth_difference, truth_errors  # beside this
 
 # %% jupyter={"source_hidden": true}
 from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE

@@ -48,15 +48,15 @@ from semgrid_edu.camera import project, transform_points
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.training_arrays import resize_image, resize_labels
 from semgrid_edu.datasets.samples import sample_drive, sample_image_stage, sample_weights
-from semgrid_edu.workshop.studies.new_drive.domain import colour_distance, match_colours, mean_histograms
+from semgrid_edu.workshop.studies.new_drive.domain import (
+    agrees_with_lidar, class_probabilities, colour_distance, match_colours, mean_histograms, network_numbers,
+    training_images,
+)  # fmt: skip
 from semgrid_edu.workshop.studies.new_drive.drive_checks import (
     AXES, axes_errors, depth_edges, edge_contrast, ground_plane, motion_between, overlay_error, sensor_delays,
     share_on_image, standing_points, time_gaps, with_scan,
 )  # fmt: skip
 from semgrid_edu.workshop.studies.new_drive.faults import FAULTS, YAWS, camera_turned, drive_readings
-from semgrid_edu.workshop.studies.new_drive.network_view import (
-    agrees_with_lidar, class_probabilities, network_numbers, training_images,
-)  # fmt: skip
 from semgrid_edu.workshop.studies.new_drive.real_drive import moving_hits, sample_boxes
 
 # %% jupyter={"source_hidden": true}

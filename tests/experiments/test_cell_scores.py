@@ -6,12 +6,11 @@ import pytest
 from semgrid_edu.camera import Camera
 from semgrid_edu.frame import LABEL_GRID, Frame
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import Belief, PlanarMotion, SensorModel, State
+from semgrid_edu.occupancy import Belief, PlanarMotion, State
 from semgrid_edu.workshop.illustrations.boxes import Box, cells_in, scan_boxes
 from semgrid_edu.workshop.simulation.things.materials import Kind
 from semgrid_edu.workshop.studies.filter.cell_scores import CellScores, Estimate, hit_cell_groups
-from semgrid_edu.workshop.studies.filter.cell_truth import CellTruth, pool_truth
-from semgrid_edu.workshop.studies.filter.scenes import KnownScene, SceneHistory
+from semgrid_edu.workshop.studies.filter.scenes import CellTruth, KnownScene, SceneHistory, pool_truth
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 ROW = GridSpec(0, 1, 0, 5, 1)
@@ -132,7 +131,7 @@ CELLS = GridSpec(0, 20, -5, 5, 0.5)
 
 def crossing(steps: int) -> list[KnownScene]:
     """Return the scenes of a box that crosses 10 m ahead to the left at 5 m/s, and hides what is behind it."""
-    past, seen = SceneHistory(CELLS, SensorModel()), []
+    past, seen = SceneHistory(CELLS), []
     for k in range(steps):
         box = Box.around(10.0, -4.0 + 0.5 * k, 1.0, 1.0, 1.6)
         points = scan_boxes([box, Box(16, 17, -5, 5, 2.0)], columns=720)

@@ -14,7 +14,7 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.workshop.commands.main import run
 from semgrid_edu.workshop.studies.crf import crf_error as study
 from semgrid_edu.workshop.studies.crf.crf_error import CROP, N_CROPS, CrfProblem, crops
-from semgrid_edu.workshop.studies.crf.nystrom import LowRankGaussian, mean_field_low_rank
+from semgrid_edu.workshop.studies.crf.other_ways import LowRankGaussian, mean_field_low_rank
 
 
 def problem(seed=0, shape=(6, 7)):
@@ -23,10 +23,18 @@ def problem(seed=0, shape=(6, 7)):
     return CrfProblem(unary, np.moveaxis(rng.dirichlet(np.ones(4), shape), -1, 0), CrfParams(sigma_alpha=2))
 
 
+@pytest.fixture(scope="module", autouse=True)
+def tiny():
+    """Two tiny grids in place of those of the shipped drive."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(study, "crf_scenes", lambda seed: {"tiny": [problem(0), problem(1)]})
+        yield
+
+
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):
     log = tmp_path_factory.mktemp("error") / "error.json"
-    found = study.crf_error(log, scenes={"tiny": [problem(0), problem(1)]})
+    found = study.crf_error(log)
     return log, json.loads(json.dumps(found))
 
 
@@ -60,9 +68,9 @@ def test_distance_by_hand():
 def test_a_scene_that_is_done_is_not_measured_again(result, monkeypatch):
     log, before = result
     monkeypatch.setattr(study, "measure_scene", lambda *_: pytest.fail("measured again"))
-    assert study.crf_error(log, scenes={"tiny": [problem()]})["scenes"] == before["scenes"]
+    assert study.crf_error(log)["scenes"] == before["scenes"]
     with pytest.raises(DataError, match="choose another file"):
-        study.crf_error(log, seed=1, scenes={"tiny": [problem()]})
+        study.crf_error(log, seed=1)
     with pytest.raises(ArgumentError, match="seed"):
         study.crf_error(log, seed=-1)
 
@@ -87,7 +95,7 @@ def test_with_every_cell_a_landmark_it_is_the_naive_one(normalization):
     spatial = gram_matrix(values, CrfParams(0, 1, 2, 0.3, 2, normalization))
     exact = gram_matrix(values, params) - spatial
     np.testing.assert_allclose(kernel(np.eye(42, dtype=np.float32)), exact, atol=1e-5)
-    found = mean_field_low_rank(unary, values, params, rank=1000)
+    found = mean_field_low_rank(unary, values, params, rank=1000, seed=0)
     np.testing.assert_allclose(found, mean_field_naive(unary, values, params), atol=1e-4)
 
 

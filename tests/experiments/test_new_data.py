@@ -18,11 +18,14 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.occupancy import track_drive
 from semgrid_edu.workshop.studies.new_drive.domain import (
+    agrees_with_lidar,
     colour_distance,
     image_histograms,
     image_statistics,
     match_colours,
     mean_histograms,
+    normalised_entropy,
+    training_images,
 )
 from semgrid_edu.workshop.studies.new_drive.drive_checks import (
     AXES,
@@ -37,7 +40,6 @@ from semgrid_edu.workshop.studies.new_drive.drive_checks import (
     time_gaps,
 )
 from semgrid_edu.workshop.studies.new_drive.faults import FAULTS, TURN, YAWS, drive_readings
-from semgrid_edu.workshop.studies.new_drive.network_view import agrees_with_lidar, normalised_entropy, training_images
 from semgrid_edu.workshop.studies.new_drive.real_drive import moving_hits, read_boxes, real_drive_table, sample_boxes
 
 COMMITTED = Path(semgrid_edu.__file__).parents[1] / "docs" / "results" / "real_drive.json"

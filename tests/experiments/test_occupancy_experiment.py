@@ -9,7 +9,7 @@ import pytest
 import semgrid_edu
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import Cmcdot, SensorModel
+from semgrid_edu.occupancy import Cmcdot
 from semgrid_edu.workshop.commands.main import run
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
@@ -45,7 +45,7 @@ def hits() -> dict:
     wishes = Wishes("straight", (1, 1), styles, borders, (True, True), speed=3.0, cast=people_and_parked_cars)
     drive = SimulatedDrive(0, 20, wishes, Rig(lidar=LIDARS["HDL-64E"]))
     tracker, scores = Cmcdot(GridSpec.paper(), seed=0), CellScores(GridSpec.paper())
-    for scene in known_scenes(drive, GridSpec.paper(), SensorModel()):
+    for scene in known_scenes(drive, GridSpec.paper()):
         belief = tracker.step(scene.frame.points_grid, scene.motion, PERIOD)
         scores.add(scene, Estimate.of_belief(belief))
     return scores.summary()["hit cells"]

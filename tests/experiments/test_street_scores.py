@@ -15,9 +15,8 @@ from semgrid_edu.workshop.commands.main import run
 from semgrid_edu.workshop.simulation.street.traffic import Actor
 from semgrid_edu.workshop.simulation.street.trajectories import Pace, Trajectory
 from semgrid_edu.workshop.simulation.things.materials import Kind
-from semgrid_edu.workshop.studies.filter.cell_truth import CellTruth
 from semgrid_edu.workshop.studies.filter.detection_latency import convoy_pairs
-from semgrid_edu.workshop.studies.filter.scenes import KnownScene
+from semgrid_edu.workshop.studies.filter.scenes import CellTruth, KnownScene
 from semgrid_edu.workshop.studies.filter.streets import StreetScores, measure_streets, streets_tables
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State

@@ -83,7 +83,7 @@ def crf_coupling(
     """Compare approximate with exact inference in the CRF on tiny grids, as the coupling grows (lecture 10)."""
     from semgrid_edu.workshop.studies.crf.crf_coupling import crf_coupling, crf_coupling_tables
 
-    keep_result(out, lambda: crf_coupling(out, seed=seed, draws=draws), crf_coupling_tables)
+    keep_result(out, lambda: crf_coupling(out, seed, draws), crf_coupling_tables)
 
 
 @reproduce.command()

@@ -131,7 +131,7 @@ def train_crf(
     tell(dataset_doubts(data, split) + weights_doubts(weights))
     params, variant = replace(CRF_TRAINING, grid_iterations=iterations), CrfVariant(split, label_costs, weight_limit)
     try:
-        train_crf_on(data, weights, out, variant, params=params, seed=seed, resume=resume)
+        train_crf_on(data, weights, out, variant, params, seed, resume)
     except KeyboardInterrupt:
         sys.exit(f"semgrid-edu: interrupted; {how_to_go_on(out)}")
 

@@ -16,36 +16,26 @@ from tqdm.auto import tqdm
 
 from semgrid_edu.crf import CrfParams, mean_field, mean_field_naive, unary_from_probability
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.stage_models.crf import all_free, coupled, two_classes
+from semgrid_edu.stage_models.crf import coupled
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.storage.reading import resumable_json
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
-from semgrid_edu.workshop.studies.crf.brute_force import potts_messages, visit_labellings
+from semgrid_edu.workshop.studies.crf.other_ways import potts_messages, visit_labellings
 
 COUPLINGS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
 """From no pairs to the default weights."""
-FINE = tuple(k / 8 for k in range(33))
-"""The same range for the symmetric case."""
 GRIDS = ((3, 3), (4, 4))
 """Rows and columns."""
 CLASSES = (2, 3)
 """Numbers of classes."""
-N_DRAWS = 20
-"""Number of random CRFs of each size."""
-TILT = 0.501
-"""Probability of class 0 in every cell of the symmetric case: as good as undecided."""
 Inference = Callable[[NDArray, NDArray, CrfParams], NDArray]
 """Takes unary, values and params, and returns a distribution over the classes in each cell, (C, H, W)."""
 
 
-def _settled(unary: NDArray, values: NDArray, params: CrfParams) -> NDArray:
-    return mean_field_naive(unary, values, params, iterations=10_000, tolerance=1e-9)
-
-
 WAYS: Mapping[str, Inference] = {
     "mean field, 10 updates": mean_field_naive,
-    "mean field, converged": _settled,
+    "mean field, converged": partial(mean_field_naive, iterations=10_000, tolerance=1e-9),
     "fast mean field, 10 updates": mean_field,
     "loopy sum-product": potts_messages,
     "loopy max-product": partial(potts_messages, best=True),
@@ -55,17 +45,8 @@ ONLY_LABELS = ("loopy max-product",)
 """Ways that don't say how probable a class is, so that only their labels are compared."""
 
 
-def crf_coupling(
-    log: str | Path,
-    *,
-    seed: int = 0,
-    draws: int = N_DRAWS,
-    grids: Sequence[tuple[int, int]] = GRIDS,
-    classes: Sequence[int] = CLASSES,
-    couplings: Sequence[float] = COUPLINGS,
-    fine: Sequence[float] = FINE,
-) -> dict:
-    """Compare every way with exact inference on random tiny grids, coupling by coupling, and in a symmetric case.
+def crf_coupling(log: str | Path, seed: int = 0, draws: int = 20) -> dict:
+    """Compare every way with exact inference on random tiny grids, coupling by coupling.
 
     Parameters
     ----------
@@ -75,18 +56,11 @@ def crf_coupling(
         Seed for the random CRFs.
     draws : int
         Number of random CRFs of each size, at least one.
-    grids : sequence of (int, int)
-        Rows and columns.
-    classes : sequence of int
-        Numbers of classes.
-    couplings, fine : sequence of float
-        Weights w1, for the random grids and for the symmetric case.
 
     Returns
     -------
     dict
-        "cases": by name from `measure_coupling`; "symmetric": from `symmetric_case`; with seed, command and
-        versions. JSON can hold it.
+        "cases": by name from `measure_coupling`; with seed, command and versions. JSON can hold it.
 
     Raises
     ------
@@ -98,18 +72,15 @@ def crf_coupling(
     if seed < 0 or draws < 1:
         name, value = ("seed", seed) if seed < 0 else ("draws", draws)
         raise ArgumentError(name, "a whole number from 0 up, and at least one draw", value)
-    identity = {"seed": seed, "draws": draws, "couplings": list(couplings)}
+    identity = {"seed": seed, "draws": draws, "couplings": list(COUPLINGS)}
+    command = f"semgrid-edu reproduce crf-coupling --seed {seed} --draws {draws}"
     done = resumable_json(log, identity, "cases")
-    for height, width, n in ((*grid, n) for grid in grids for n in classes):
+    for (height, width), n in product(GRIDS, CLASSES):
         name = f"{height} x {width} cells, {n} classes"
         if name not in done:
-            done[name] = measure_coupling((n, height, width), couplings, draws, seed, name)
+            done[name] = measure_coupling((n, height, width), COUPLINGS, draws, seed, name)
             write_json(log, identity | {"cases": done})
-    return identity | {
-        "cases": done,
-        "symmetric": symmetric_case(fine),
-        **made_by(f"semgrid-edu reproduce crf-coupling --seed {seed} --draws {draws}", "numpy", "scipy", "numba"),
-    }
+    return identity | {"cases": done, **made_by(command, "numpy", "scipy", "numba")}
 
 
 def random_crf(shape: tuple[int, int, int], seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -135,11 +106,7 @@ def random_crf(shape: tuple[int, int, int], seed: int) -> tuple[NDArray[np.float
 
 
 def measure_coupling(
-    shape: tuple[int, int, int],
-    couplings: Sequence[float],
-    draws: int,
-    seed: int = 0,
-    name: str = "",
+    shape: tuple[int, int, int], couplings: Sequence[float], draws: int, seed: int = 0, name: str = ""
 ) -> dict:
     """Compare every way with exact inference on random CRFs of one size.
 
@@ -167,46 +134,16 @@ def measure_coupling(
     labels: dict[str, list] = {way: [] for way in ("exact marginals", *WAYS)}
     for coupling, draw in tqdm(list(product(couplings, range(draws))), desc=name, unit="CRF"):
         crf = *random_crf(shape, seed + draw), coupled(coupling)
-        exact = visit_labellings(*crf)
-        found = {way: infer(*crf) for way, infer in WAYS.items()}
-        for way, Q in (("exact marginals", exact.marginals), *found.items()):
-            labels[way].append(float((Q.argmax(axis=0) != exact.labels).mean()))
+        exact, best = visit_labellings(*crf)
+        found = {"exact marginals": exact} | {way: infer(*crf) for way, infer in WAYS.items()}
+        for way, Q in found.items():
+            labels[way].append(float((Q.argmax(axis=0) != best).mean()))
         for way, errors in variation.items():
-            errors.append(float(np.abs(found[way] - exact.marginals).sum(axis=0).mean() / 2))
+            errors.append(float(np.abs(found[way] - exact).sum(axis=0).mean() / 2))
     return {
         part: {way: np.reshape(errors, (-1, draws)).tolist() for way, errors in by_way.items()}
         for part, by_way in (("variation", variation), ("labels", labels))
     }
-
-
-def symmetric_case(couplings: Sequence[float] = FINE, shape: tuple[int, int] = (3, 3), tilt: float = TILT) -> dict:
-    """Let all cells be free and (almost) undecided between two classes, and watch which of them each way takes.
-
-    With a tilt of exactly 1/2, the exact marginals are 1/2 by symmetry, at every coupling.
-
-    Parameters
-    ----------
-    couplings : sequence of float
-        Weights w1.
-    shape : (int, int)
-        H, W.
-    tilt : float
-        The network's probability of class 0 in every cell.
-
-    Returns
-    -------
-    dict
-        "shape" (H, W); "tilt"; "couplings" (n,); "probability": for each way the probability of class 0 in the middle
-        cell, (n,), with "exact" first, and as "mean field, other side" and so on with the tilt towards class 1.
-    """
-    middle, values = (shape[0] // 2, shape[1] // 2), all_free(shape)
-    ways: dict[str, Inference] = {"exact": lambda *crf: visit_labellings(*crf).marginals}
-    ways |= {way: WAYS[way] for way in ("mean field, 10 updates", "mean field, converged", "loopy sum-product")}
-    probability = {}
-    for (side, p), (way, infer) in product({"": tilt, ", other side": 1 - tilt}.items(), ways.items()):
-        found = [infer(two_classes(np.full(shape, p)), values, coupled(coupling)) for coupling in couplings]
-        probability[way + side] = [float(Q[(0, *middle)]) for Q in found]
-    return {"shape": list(shape), "tilt": tilt, "couplings": list(couplings), "probability": probability}
 
 
 def crf_coupling_tables(result: dict) -> str:

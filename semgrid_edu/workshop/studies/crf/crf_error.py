@@ -6,7 +6,7 @@ the *convergence error* compares it with the same kernel when nothing changes an
 drive, on the compact grid and on crops of the paper's.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -27,10 +27,12 @@ from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.storage.reading import resumable_json
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
-from semgrid_edu.workshop.studies.crf.nystrom import mean_field_low_rank
+from semgrid_edu.workshop.studies.crf.other_ways import mean_field_low_rank
 
 ITERATIONS = (1, 2, 3, 5, 10, 20, 50, 100)
 """Numbers of updates at which each way is timed and compared."""
+REFERENCE = "naive"
+"""The way with the exact kernel."""
 MOST, TOLERANCE = 1000, 1e-5
 """Mean field has converged when no update changes a probability by more than the tolerance, or after 1000 updates."""
 RANKS = (64, 256, 512)
@@ -124,7 +126,7 @@ def crops(problem: CrfProblem) -> list[CrfProblem]:
 
 
 def crf_ways(seed: int = 0) -> dict[str, Way]:
-    """Return every way to run mean field, by name, the one with the exact kernel first.
+    """Return every way to run mean field, by name.
 
     Parameters
     ----------
@@ -132,7 +134,7 @@ def crf_ways(seed: int = 0) -> dict[str, Way]:
         Seed for the landmarks of the low-rank kernels.
     """
     return {
-        "naive": mean_field_naive,
+        REFERENCE: mean_field_naive,
         "all pairs": partial(mean_field_accurate, radius=np.inf),
         "accurate": mean_field_accurate,
         "lattice": mean_field,
@@ -140,7 +142,7 @@ def crf_ways(seed: int = 0) -> dict[str, Way]:
     }
 
 
-def crf_error(log: str | Path, seed: int = 0, scenes: Mapping[str, Sequence[CrfProblem]] | None = None) -> dict:
+def crf_error(log: str | Path, seed: int = 0) -> dict:
     """Measure error and time of every way on every scene.
 
     Parameters
@@ -149,8 +151,6 @@ def crf_error(log: str | Path, seed: int = 0, scenes: Mapping[str, Sequence[CrfP
         Takes each scene as soon as it is done. If the file exists, scenes that it holds aren't measured again.
     seed : int
         Seed for the particles of the filter and for the landmarks.
-    scenes : mapping of str to sequence of CrfProblem, optional
-        What to measure on; `crf_scenes` when left out.
 
     Returns
     -------
@@ -168,14 +168,12 @@ def crf_error(log: str | Path, seed: int = 0, scenes: Mapping[str, Sequence[CrfP
         raise ArgumentError("seed", "a whole number from 0 up", seed)
     identity = {"seed": seed, "iterations": list(ITERATIONS)}
     done = resumable_json(log, identity, "scenes")
-    for name, problems in (scenes or crf_scenes(seed)).items():
+    for name, problems in crf_scenes(seed).items():
         if name not in done:
             done[name] = measure_scene(problems, seed, name)
             write_json(log, identity | {"scenes": done})
-    return identity | {
-        "scenes": done,
-        **made_by(f"semgrid-edu reproduce crf-error --seed {seed}", "numpy", "scipy", "numba", "torch"),
-    }
+    made = made_by(f"semgrid-edu reproduce crf-error --seed {seed}", "numpy", "scipy", "numba", "torch")
+    return identity | {"scenes": done, **made}
 
 
 def measure_scene(problems: Sequence[CrfProblem], seed: int = 0, name: str = "") -> dict:
@@ -197,14 +195,12 @@ def measure_scene(problems: Sequence[CrfProblem], seed: int = 0, name: str = "")
         the "seconds", and the "total", "kernel" and "convergence" errors, a list each, as long as `ITERATIONS`.
         Errors come from `distance`. "settled", a list of one, is the kernel error when both have converged.
     """
-    ways, found = crf_ways(seed), []
-    for problem in problems:
-        runs = {way: _run(infer, problem) for way, infer in tqdm(ways.items(), desc=name, unit="way")}
-        exact = next(iter(runs.values()))
-        found.append({way: _errors(run, exact) for way, run in runs.items()})
-    merged = {way: _merged([one[way] for one in found]) for way in ways}
-    shape = list(problems[0].unary.shape)
-    return {"shape": shape, "grids": len(problems), "reference": next(iter(ways)), "ways": merged}
+    ways = crf_ways(seed)
+    every = [
+        {way: _run(infer, problem) for way, infer in tqdm(ways.items(), desc=name, unit="way")} for problem in problems
+    ]
+    merged = {way: _merged([_errors(runs[way], runs[REFERENCE]) for runs in every]) for way in ways}
+    return {"shape": list(problems[0].unary.shape), "grids": len(problems), "reference": REFERENCE, "ways": merged}
 
 
 def distance(found: NDArray, reference: NDArray) -> dict[str, float]:
@@ -259,11 +255,10 @@ def _merged(found: Sequence[dict]) -> dict:
     def over_grids(same: Sequence[dict]) -> dict:
         return {of: float((np.max if of == "max" else np.mean)([one[of] for one in same])) for of in same[0]}
 
-    merged = {
-        error: [over_grids(same) for same in zip(*(one[error] for one in found), strict=True)]
-        for error in (*ERRORS, "settled")
-    }
-    return {"seconds": np.mean([one["seconds"] for one in found], axis=0).tolist()} | merged
+    merged = {"seconds": np.mean([one["seconds"] for one in found], axis=0).tolist()}
+    for error in (*ERRORS, "settled"):
+        merged[error] = [over_grids(same) for same in zip(*(one[error] for one in found), strict=True)]
+    return merged
 
 
 def crf_error_tables(result: dict, iterations: int = 10) -> str:
@@ -288,7 +283,6 @@ def crf_error_tables(result: dict, iterations: int = 10) -> str:
             errors = [f"{100 * found[e][k][of]:.4f}" for of in ("mean", "labels") for e in ERRORS]
             rows.append([way, f"{1000 * found['seconds'][k]:.1f}", *errors])
         grid = " x ".join(map(str, scene["shape"][1:]))
-        tables.append(
-            f"{name}, {grid} cells, {iterations} updates, against {scene['reference']}\n\n{markdown_table(rows)}"
-        )
+        title = f"{name}, {grid} cells, {iterations} updates, against {scene['reference']}"
+        tables.append(f"{title}\n\n{markdown_table(rows)}")
     return "\n\n".join(tables)

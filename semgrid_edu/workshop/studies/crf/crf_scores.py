@@ -8,16 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
-from semgrid_edu.crf import (
-    CrfParams,
-    at_temperature,
-    expected_calibration_error,
-    mean_field,
-    negative_log_likelihood,
-    reliability,
-    unary_from_log_probability,
-)
-from semgrid_edu.datasets.index import DatasetIndex, load_index
+from semgrid_edu.crf import CrfParams, mean_field, unary_from_log_probability
+from semgrid_edu.crf.temperature import at_temperature, expected_calibration_error, negative_log_likelihood, reliability
+from semgrid_edu.datasets.index import INDEX_FILE, DatasetIndex, load_index
 from semgrid_edu.datasets.readers.kitti_raw import drive_folder
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import DataError
@@ -27,7 +20,7 @@ from semgrid_edu.storage.files import sha256
 from semgrid_edu.workshop.scoring.confusions import drive_confusions
 from semgrid_edu.workshop.scoring.evaluate import scores
 from semgrid_edu.workshop.scoring.grids import learned_log_g
-from semgrid_edu.workshop.scoring.statistics import paired_interval
+from semgrid_edu.workshop.scoring.score_with_interval import compared
 
 
 class GridOutputs(NamedTuple):
@@ -117,9 +110,7 @@ def refined_confusions(outputs: GridOutputs, refined: NDArray) -> NDArray[np.int
     return np.stack([confusion_matrix(truth, predicted, refined.shape[1]) for truth, predicted in pairs])
 
 
-def scores_by_method(
-    grids: Iterable[tuple[str, NDArray]], outputs: GridOutputs, frames: TrainingSet
-) -> dict[str, object]:
+def scores_by_method(grids: Iterable[tuple[str, NDArray]], outputs: GridOutputs, frames: TrainingSet) -> dict:
     """Score what several methods make of the same frames.
 
     Parameters
@@ -152,16 +143,14 @@ def scores_by_method(
     }
 
 
-def compare_on_test(
-    dataset_dir: str | Path, weights: str | Path, temperature: float, chosen: dict[str, CrfParams]
-) -> dict[str, object]:
+def compare_on_test(dataset_dir: Path, weights: Path, temperature: float, chosen: dict[str, CrfParams]) -> dict:
     """Score the network, the default CRF, and the chosen CRFs on the test split.
 
     Parameters
     ----------
-    dataset_dir : path-like
+    dataset_dir : Path
         A data set with the split "test".
-    weights : path-like
+    weights : Path
         The network.
     temperature : float
         T of the calibrated network.
@@ -179,9 +168,8 @@ def compare_on_test(
     methods = {"network": (network, None), "CRF": (network, default), "calibrated, CRF": (calibrated, default)}
     methods |= {f"calibrated, CRF for {objective}": (calibrated, params) for objective, params in chosen.items()}
     grids = ((name, refined_grids(outputs, params)) for name, (outputs, params) in methods.items())
-    return scores_by_method(grids, network, test) | {
-        "calibration": {"before": calibration(network), "after": calibration(calibrated)}
-    }
+    both = {"before": calibration(network), "after": calibration(calibrated)}
+    return scores_by_method(grids, network, test) | {"calibration": both}
 
 
 def calibration(outputs: GridOutputs) -> dict[str, object]:
@@ -203,16 +191,27 @@ def calibration(outputs: GridOutputs) -> dict[str, object]:
     return {"NLL": nll, "ECE": expected_calibration_error(diagram), "reliability": columns}
 
 
-def refuse_known_drives(validation_dir: str | Path, dataset_dir: str | Path) -> None:
+def named_data(folder: Path) -> dict[str, str]:
+    """Return the "name" of a data set and the "sha256" of its index.
+
+    Parameters
+    ----------
+    folder : Path
+        The data set.
+    """
+    return {"name": load_index(folder).name, "sha256": sha256(folder / INDEX_FILE)}
+
+
+def refuse_known_drives(validation_dir: Path, dataset_dir: Path) -> None:
     """Refuse validation drives that a network was trained on or will be tested on.
 
     Two drives are the same when their first scans are, byte for byte, whatever their numbers are.
 
     Parameters
     ----------
-    validation_dir : path-like
+    validation_dir : Path
         A data set with the split "validation".
-    dataset_dir : path-like
+    dataset_dir : Path
         The data set with the splits "train" and "test".
 
     Raises
@@ -257,12 +256,11 @@ def gains_by_metric(a: NDArray, b: NDArray) -> dict[str, list[float | None]]:
     Returns
     -------
     dict of str to [low, gain, high]
-        By metric, with the 95 % interval of `paired_interval`. There is one network, so the interval is for that one,
+        By metric, with the 95 % interval of `compared`. There is one network, so the interval is for that one,
         on new drives. One drive alone gives no interval: then low and high are None.
     """
-    if len(a) == 1:
-        return {name: [None, metric(a[0]) - metric(b[0]), None] for name, metric in METRICS.items()}
-    return {name: list(paired_interval(a[None], b[None], metric)) for name, metric in METRICS.items()}
+    gains = {name: compared(a[None], b[None], metric) for name, metric in METRICS.items()}
+    return {name: [gain["low"], gain["mean"], gain["high"]] for name, gain in gains.items()}
 
 
 def gains_text(gains: dict[str, dict[str, list[float | None]]]) -> str:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
 from semgrid_edu.crf import CrfParams, fit_temperature
-from semgrid_edu.datasets.index import INDEX_FILE, load_index
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import LabelSet
@@ -18,16 +17,7 @@ from semgrid_edu.storage.files import sha256, write_json
 from semgrid_edu.storage.provenance import PROVENANCE, made_by, short_path
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.workshop.scoring.evaluate import scores, scores_table
-from semgrid_edu.workshop.studies.crf.crf_scores import (
-    GridOutputs,
-    calibration,
-    compare_on_test,
-    gains_text,
-    grid_outputs,
-    refined_confusions,
-    refined_grids,
-    refuse_known_drives,
-)
+from semgrid_edu.workshop.studies.crf import crf_scores
 from semgrid_edu.workshop.studies.crf.search_point import FACTORS, next_point, params_at, pareto_front, point_of
 
 OBJECTIVES = ("pixel accuracy", "class accuracy", "pixel accuracy, class accuracy kept")
@@ -38,7 +28,7 @@ Trial = dict[str, object]
 """One trial: "params" by name, "scores" by cells and metric as in `Scores`, and the "seconds" that it took."""
 
 
-def run_trial(calibrated: GridOutputs, params: CrfParams | None, label_set: LabelSet) -> Trial:
+def run_trial(calibrated: crf_scores.GridOutputs, params: CrfParams | None, label_set: LabelSet) -> Trial:
     """Refine every grid with these parameters, and score the result.
 
     Parameters
@@ -51,7 +41,7 @@ def run_trial(calibrated: GridOutputs, params: CrfParams | None, label_set: Labe
         The classes.
     """
     began = perf_counter()
-    confusion = refined_confusions(calibrated, refined_grids(calibrated, params)).sum(axis=0)
+    confusion = crf_scores.refined_confusions(calibrated, crf_scores.refined_grids(calibrated, params)).sum(axis=0)
     found = scores({"refined": confusion}, label_set)["refined"]
     tried = {name: getattr(params, name) for name in FACTORS} if params else {}
     return {"params": tried, "scores": found, "seconds": round(perf_counter() - began, 2)}
@@ -98,12 +88,12 @@ def objective_values(trials: Sequence[Trial], unrefined: dict) -> NDArray[np.flo
     return np.stack([pixel, by_class, np.where(lost >= 0, pixel, lost)], axis=1)
 
 
-def read_trials(log: str | Path, identity: dict) -> list[Trial]:
+def read_trials(log: Path, identity: dict) -> list[Trial]:
     """Return the trials of a search that was begun, or an empty list.
 
     Parameters
     ----------
-    log : path-like
+    log : Path
         The file that `search_crf` writes, which may be missing.
     identity : dict
         What makes the search: its data, weights and seed.
@@ -117,26 +107,17 @@ def read_trials(log: str | Path, identity: dict) -> list[Trial]:
     DataError
         When the file is something else, or the log of another search.
     """
-    path = Path(log)
-    if not path.exists():
-        return []
-    content = read_json(path)
-    found = {name: content.get(name) for name in identity}
-    if not isinstance(content.get("trials"), list):
-        raise DataError(path, "the trials of a search, or no file", f"something else: {repr(content)[:200]}")
+    content = read_json(log) if log.exists() else identity | {"trials": []}
+    found, trials = {name: content.get(name) for name in identity}, content.get("trials")
+    if not isinstance(trials, list):
+        raise DataError(log, "the trials of a search, or no file", f"something else: {repr(content)[:200]}")
     if found != identity:
-        raise DataError(path, f"trials of the search {identity}", f"{found}: choose another file")
-    return content["trials"]
+        raise DataError(log, f"trials of the search {identity}", f"{found}: choose another file")
+    return trials
 
 
 def search_crf(
-    validation_dir: str | Path,
-    dataset_dir: str | Path,
-    weights: str | Path,
-    log: str | Path,
-    *,
-    seed: int = 0,
-    n_trials: int = 200,
+    validation_dir: Path, dataset_dir: Path, weights: Path, log: Path, *, seed: int = 0, n_trials: int = 200
 ) -> dict[str, object]:
     """Calibrate a network, search the CRF's parameters, and score what was chosen on the test split.
 
@@ -151,13 +132,13 @@ def search_crf(
 
     Parameters
     ----------
-    validation_dir : path-like
+    validation_dir : Path
         A data set with the split "validation".
-    dataset_dir : path-like
+    dataset_dir : Path
         The data set that the network was trained on, such as data/minikitti, with the splits "train" and "test".
-    weights : path-like
+    weights : Path
         A network trained on the split "train".
-    log : path-like
+    log : Path
         Takes every trial as soon as it has ended, as JSON. If the file holds trials of the same search, they aren't
         repeated.
     seed : int
@@ -183,11 +164,11 @@ def search_crf(
     if n_trials < 1 or seed < 0:
         name, value = ("n_trials", n_trials) if n_trials < 1 else ("seed", seed)
         raise ArgumentError(name, "a whole number from 0 up, and one trial at least", value)
-    refuse_known_drives(validation_dir, dataset_dir)
+    crf_scores.refuse_known_drives(validation_dir, dataset_dir)
     validation = TrainingSet(validation_dir, "validation")
     identity = _identity(validation_dir, dataset_dir, weights, seed)
     trials = read_trials(log, identity)
-    network = grid_outputs(load_net(weights, validation.camera), validation)
+    network = crf_scores.grid_outputs(load_net(weights, validation.camera), validation)
     temperature = fit_temperature(network.columns, network.truth)
     calibrated, cell = network.at(temperature), validation.spec.cell
     unrefined = run_trial(calibrated, None, validation.label_set)["scores"]
@@ -196,7 +177,7 @@ def search_crf(
         trials.append(run_trial(calibrated, params, validation.label_set))
         write_json(log, identity | {"trials": trials})
     values = objective_values(trials, unrefined)
-    data, test = (Path(folder).resolve().name for folder in (validation_dir, dataset_dir))
+    data, test = (identity[name]["name"] for name in ("validation", "dataset"))
     command = f"semgrid-edu search-crf --data {data} --test {test} --weights {short_path(weights)}"
     chosen = {name: int(k) for name, k in zip(OBJECTIVES, values.argmax(axis=0), strict=True)}
     params = {name: CrfParams(**trials[k]["params"]) for name, k in chosen.items()}
@@ -204,11 +185,11 @@ def search_crf(
         "temperature": temperature,
         "cell": cell,
         "frames": len(validation),
-        "calibration": {"before": calibration(network), "after": calibration(calibrated)},
+        "calibration": {"before": crf_scores.calibration(network), "after": crf_scores.calibration(calibrated)},
         "unrefined": unrefined,
         "chosen": {name: {"trial": k, **trials[k]} for name, k in chosen.items()},
         "pareto": pareto_front(values[:, :2]).tolist(),
-        "test": compare_on_test(dataset_dir, weights, temperature, params),
+        "test": crf_scores.compare_on_test(dataset_dir, weights, temperature, params),
         **made_by(f"{command} --seed {seed} --trials {n_trials}", "numpy", "torch", "numba", "scipy"),
         "minutes": round(sum(trial["seconds"] for trial in trials) / 60, 1),
         "trials": trials,
@@ -238,17 +219,14 @@ def search_table(result: dict) -> str:
         warning = "; none of the trials kept class accuracy" if objective == OBJECTIVES[2] and crf < net else ""
         lines.append(f"best {objective}: trial {trial['trial']}, {params}{warning}")
         lines.append(f"    on the validation drives {', '.join(accuracies)}")
-    lines += ["", scores_table(result["test"]["scores"]), "", gains_text(result["test"]["gains"])]
+    lines += ["", scores_table(result["test"]["scores"]), "", crf_scores.gains_text(result["test"]["gains"])]
     return "\n".join(lines)
 
 
-def _identity(validation_dir: str | Path, dataset_dir: str | Path, weights: str | Path, seed: int) -> dict:
+def _identity(validation_dir: Path, dataset_dir: Path, weights: Path, seed: int) -> dict:
     """Return what makes the search: data by the SHA-256 of their index, weights, seed."""
-    data = {name: Path(folder) for name, folder in (("validation", validation_dir), ("dataset", dataset_dir))}
-    named = {
-        name: {"name": load_index(folder).name, "sha256": sha256(folder / INDEX_FILE)} for name, folder in data.items()
-    }
-    record = Path(weights).with_name(PROVENANCE)
+    data = {"validation": crf_scores.named_data(validation_dir), "dataset": crf_scores.named_data(dataset_dir)}
+    record = weights.with_name(PROVENANCE)
     trained_on = read_json(record).get("dataset") if record.exists() else None
     used = {"file": short_path(weights), "sha256": sha256(weights), "trained on": trained_on}
-    return named | {"weights": used, "seed": seed}
+    return data | {"weights": used, "seed": seed}

@@ -22,14 +22,7 @@ from semgrid_edu.storage.provenance import made_by, short_path, write_provenance
 from semgrid_edu.training import CHECKPOINT, TrainingParams
 from semgrid_edu.training.crf import CRF_TRAINING, train_crf
 from semgrid_edu.workshop.scoring.evaluate import scores_table
-from semgrid_edu.workshop.studies.crf.crf_scores import (
-    GridOutputs,
-    gains_text,
-    grid_outputs,
-    refined_grids,
-    refuse_known_drives,
-    scores_by_method,
-)
+from semgrid_edu.workshop.studies.crf import crf_scores
 
 MEAN_FIELD_UPDATES = 5
 """Updates that a learnt CRF makes, in training and afterwards: Zheng et al. 2015 trained with as many."""
@@ -75,14 +68,7 @@ VARIANTS = tuple(
 
 
 def train_crf_on(
-    dataset_dir: str | Path,
-    weights: str | Path,
-    folder: str | Path,
-    variant: CrfVariant,
-    *,
-    params: TrainingParams = CRF_TRAINING,
-    seed: int = 0,
-    resume: bool = False,
+    dataset_dir: Path, weights: Path, folder: Path, variant: CrfVariant, params: TrainingParams, seed: int, resume: bool
 ) -> None:
     """Train a CRF on the grids that a network makes of the frames of a split, and write its provenance.
 
@@ -90,11 +76,11 @@ def train_crf_on(
 
     Parameters
     ----------
-    dataset_dir : path-like
+    dataset_dir : Path
         A data set with the split of the variant.
-    weights : path-like
+    weights : Path
         The network.
-    folder : path-like
+    folder : Path
         Where to write the files of `train_crf`, and `provenance.json`.
     variant : CrfVariant
         Where it learns, what learns, and with which loss.
@@ -113,11 +99,11 @@ def train_crf_on(
         When a file is missing or damaged, or the folder holds a run that would be overwritten.
     """
     began, frames = datetime.now(UTC), TrainingSet(dataset_dir, variant.split)
-    outputs = grid_outputs(load_net(weights, frames.camera), frames)
+    outputs = crf_scores.grid_outputs(load_net(weights, frames.camera), frames)
     layer = _untrained(frames, variant.label_costs)
     params = replace(params, weight_limit=variant.weight_limit)
     train_crf(layer, *outputs, folder, params, seed, resume)
-    data, out = (Path(path).resolve().name for path in (dataset_dir, folder))
+    data, out = (path.resolve().name for path in (dataset_dir, folder))
     costs = " --label-costs" if variant.label_costs else ""
     write_provenance(
         folder,
@@ -131,7 +117,7 @@ def train_crf_on(
         # JSON has no infinity.
         params={name: str(value) if value == math.inf else value for name, value in asdict(params).items()},
         crf=layer.description(),
-        dataset=sha256(Path(dataset_dir) / INDEX_FILE),
+        dataset=sha256(dataset_dir / INDEX_FILE),
         network=sha256(weights),
     )
 
@@ -143,25 +129,19 @@ def _untrained(frames: TrainingSet, label_costs: bool = False) -> CrfLayer:
 
 
 def compare_learned_crfs(
-    dataset_dir: str | Path,
-    validation_dir: str | Path,
-    weights: str | Path,
-    runs: str | Path,
-    *,
-    params: TrainingParams = CRF_TRAINING,
-    seed: int = 0,
+    dataset: Path, validation: Path, weights: Path, runs: Path, params: TrainingParams = CRF_TRAINING, seed: int = 0
 ) -> dict[str, object]:
     """Learn a CRF in each of the ways of `VARIANTS`, and score all of them on the test split.
 
     Parameters
     ----------
-    dataset_dir : path-like
+    dataset : Path
         The data set that the network was trained on, with the splits "train" and "test".
-    validation_dir : path-like
+    validation : Path
         A data set with the split "validation", drives that the network has never seen.
-    weights : path-like
+    weights : Path
         The network.
-    runs : path-like
+    runs : Path
         Takes one folder per training run. A run that has ended isn't repeated, and one that was interrupted is
         resumed.
     params : TrainingParams
@@ -181,38 +161,35 @@ def compare_learned_crfs(
     DataError
         When a file is missing or damaged, or a drive of "validation" is one of "train" or "test".
     """
-    refuse_known_drives(validation_dir, dataset_dir)
-    data, layers = {"train": Path(dataset_dir), "validation": Path(validation_dir)}, {}
+    crf_scores.refuse_known_drives(validation, dataset)
+    data, layers = {"train": dataset, "validation": validation}, {}
     for variant in VARIANTS:
-        folder = Path(runs) / variant.folder
+        folder = runs / variant.folder
         if not (folder / WEIGHTS).exists():
             resume = (folder / CHECKPOINT).exists()
-            train_crf_on(data[variant.split], weights, folder, variant, params=params, seed=seed, resume=resume)
+            train_crf_on(data[variant.split], weights, folder, variant, params, seed, resume)
         layers[variant.name] = load_crf(folder / WEIGHTS)
-    names = {split: folder.resolve().name for split, folder in data.items()}
-    return scores_on_test(dataset_dir, weights, layers) | {
+    named = {split: crf_scores.named_data(folder) for split, folder in data.items()}
+    used = f"--data {named['train']['name']} --validation {named['validation']['name']} --weights {short_path(weights)}"
+    return scores_on_test(dataset, weights, layers) | {
         "learnt": {name: learnt_values(layer) for name, layer in layers.items()},
         "params": asdict(params),
         "mean field updates": MEAN_FIELD_UPDATES,
-        "data": {split: {"name": names[split], "sha256": sha256(path / INDEX_FILE)} for split, path in data.items()},
+        "data": named,
         "weights": {"file": short_path(weights), "sha256": sha256(weights)},
         "seed": seed,
-        **made_by(
-            f"semgrid-edu reproduce learned-crf --data {names['train']} --validation {names['validation']} "
-            f"--weights {short_path(weights)} --seed {seed}",
-            *("numpy", "torch", "numba"),
-        ),
+        **made_by(f"semgrid-edu reproduce learned-crf {used} --seed {seed}", "numpy", "torch", "numba"),
     }
 
 
-def scores_on_test(dataset_dir: str | Path, weights: str | Path, layers: Mapping[str, CrfLayer]) -> dict[str, object]:
+def scores_on_test(dataset: Path, weights: Path, layers: Mapping[str, CrfLayer]) -> dict[str, object]:
     """Score the network, the default CRF and trained ones on the test split.
 
     Parameters
     ----------
-    dataset_dir : path-like
+    dataset : Path
         A data set with the split "test".
-    weights : path-like
+    weights : Path
         The network.
     layers : dict of str to CrfLayer
         The trained CRFs by name.
@@ -222,20 +199,20 @@ def scores_on_test(dataset_dir: str | Path, weights: str | Path, layers: Mapping
     dict
         From `scores_by_method`, with the names of the "classes".
     """
-    test = TrainingSet(dataset_dir, "test")
-    outputs = grid_outputs(load_net(weights, test.camera), test)
+    test = TrainingSet(dataset, "test")
+    outputs = crf_scores.grid_outputs(load_net(weights, test.camera), test)
 
     def grids() -> Iterator[tuple[str, NDArray]]:
-        yield "network", refined_grids(outputs, None)
-        yield "network + CRF", refined_grids(outputs, CrfParams.for_cells(test.spec.cell))
+        yield "network", crf_scores.refined_grids(outputs, None)
+        yield "network + CRF", crf_scores.refined_grids(outputs, CrfParams.for_cells(test.spec.cell))
         for name, layer in {"untrained layer": _untrained(test), **layers}.items():
             yield name, layer_grids(layer, outputs)
 
-    return scores_by_method(grids(), outputs, test) | {"classes": list(test.label_set.names)}
+    return crf_scores.scores_by_method(grids(), outputs, test) | {"classes": list(test.label_set.names)}
 
 
 @torch.inference_mode()
-def layer_grids(layer: CrfLayer, outputs: GridOutputs) -> NDArray[np.float32]:
+def layer_grids(layer: CrfLayer, outputs: crf_scores.GridOutputs) -> NDArray[np.float32]:
     """Refine every grid by a layer.
 
     Parameters
@@ -286,7 +263,7 @@ def learned_crf_table(result: dict) -> str:
     str
         Scores in per cent; gains over the network without CRF in points, with 95 % intervals over test drives.
     """
-    lines = [scores_table(result["scores"]), "", gains_text(result["gains"]), ""]
+    lines = [scores_table(result["scores"]), "", crf_scores.gains_text(result["gains"]), ""]
     for method, learnt in result["learnt"].items():
         named = (f"{name} {value:.3g}" for name, value in learnt.items() if name != "compatibility")
         lines.append(f"{method}: {', '.join(named)}")

@@ -1,7 +1,7 @@
 """Scores of an occupancy filter, cell by cell, on drives whose truth is known (paper, section 3.2)."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,11 +74,9 @@ class Estimate:
         """
         state = np.where(p_occupied > 0.5, State.STATIC, State.FREE)
         state[np.abs(p_occupied - 0.5) <= UNDECIDED] = State.UNKNOWN
-        nothing = np.full((2, *p_occupied.shape), np.nan)
-        return cls(state, p_occupied, np.zeros(p_occupied.shape, bool), nothing)
+        return cls(state, p_occupied, np.zeros(p_occupied.shape, bool), np.full((2, *p_occupied.shape), np.nan))
 
 
-@dataclass(eq=False)
 class CellScores:
     """Counts over the frames of all drives, for one filter.
 
@@ -91,20 +89,20 @@ class CellScores:
     ----------
     confusion : (4, 4) int64
         How often each true state (row) is called each state (column); the true state of cells never seen is UNKNOWN.
-    hits : dict of str to [int, int, int]
+    hits : dict of str to (3,) int64
         For each group of `hit_cell_groups` the numbers of hit cells, of those called moving, and of those called
         occupied.
     errors : dict of str to list of float
         Errors of velocity in cells, by kind of thing, m/s.
-    smear : [int, int]
+    smear : (2,) int64
         Number of cells that something moving has left, and of those still called occupied.
     """
 
-    spec: GridSpec
-    confusion: NDArray[np.int64] = field(default_factory=lambda: np.zeros((N_STATES, N_STATES), np.int64), init=False)
-    hits: dict[str, list[int]] = field(default_factory=dict, init=False)
-    errors: dict[str, list[float]] = field(default_factory=dict, init=False)
-    smear: list[int] = field(default_factory=lambda: [0, 0], init=False)
+    def __init__(self, spec: GridSpec) -> None:
+        self.spec, self.confusion = spec, np.zeros((N_STATES, N_STATES), np.int64)
+        self.hits: dict[str, NDArray[np.int64]] = {}
+        self.errors: dict[str, list[float]] = {}
+        self.smear = np.zeros(2, np.int64)
 
     def add(self, scene: KnownScene, estimate: Estimate) -> None:
         """Score one frame.
@@ -117,18 +115,12 @@ class CellScores:
             What the filter says.
         """
         truth = np.where(scene.never_seen, State.UNKNOWN, scene.truth.state)
-        scored = scene.never_seen | scene.observed
+        scored, occupied = scene.never_seen | scene.observed, estimate.occupied > 0.5
         self.confusion += confusion_matrix(truth[scored], estimate.state[scored], N_STATES)
         for name, cells in hit_cell_groups(scene, self.spec):
-            count = self.hits.setdefault(name, [0, 0, 0])
-            for k, counted in enumerate((cells, cells & estimate.moves, cells & (estimate.occupied > 0.5))):
-                count[k] += int(counted.sum())
-        self._add_errors(scene, estimate)
-        self.smear[0] += int(scene.left.sum())
-        self.smear[1] += int((estimate.occupied > 0.5)[scene.left].sum())
-
-    def _add_errors(self, scene: KnownScene, estimate: Estimate) -> None:
-        """Score the velocity of observed cells that are DYNAMIC and are called so."""
+            counted = cells.sum(), estimate.moves[cells].sum(), occupied[cells].sum()
+            self.hits[name] = self.hits.get(name, 0) + np.array(counted)
+        self.smear += scene.left.sum(), occupied[scene.left].sum()
         found = scene.observed & (scene.truth.state == State.DYNAMIC) & (estimate.state == State.DYNAMIC)
         found &= np.isfinite(estimate.velocity[0])
         error = np.hypot(*(estimate.velocity - scene.truth.velocity))
@@ -143,20 +135,16 @@ class CellScores:
         dict
             JSON can hold it. A share of no cells is None.
         """
-        dynamic = self.confusion[:, State.DYNAMIC], self.confusion[State.DYNAMIC]
-        right = int(self.confusion[State.DYNAMIC, State.DYNAMIC])
+        dynamic = {"precision": self.confusion[:, State.DYNAMIC], "recall": self.confusion[State.DYNAMIC]}
         all_errors = [error for errors in self.errors.values() for error in errors]
         return {
             "confusion": self.confusion.tolist(),
-            "accuracy": share(int(np.trace(self.confusion)), int(self.confusion.sum())),
-            "dynamic": {
-                "precision": share(right, int(dynamic[0].sum())),
-                "recall": share(right, int(dynamic[1].sum())),
-            },
+            "accuracy": share(np.trace(self.confusion), self.confusion.sum()),
+            "dynamic": {name: share(counts[State.DYNAMIC], counts.sum()) for name, counts in dynamic.items()},
             "velocity error": {name: _spread(errors) for name, errors in {"all": all_errors, **self.errors}.items()},
-            "smear": {"cells": self.smear[0], "occupied": share(self.smear[1], self.smear[0])},
+            "smear": {"cells": int(self.smear[0]), "occupied": share(self.smear[1], self.smear[0])},
             "hit cells": {
-                name: {"cells": cells, "dynamic": share(moving, cells), "occupied": share(occupied, cells)}
+                name: {"cells": int(cells), "dynamic": share(moving, cells), "occupied": share(occupied, cells)}
                 for name, (cells, moving, occupied) in self.hits.items()
             },
         }
@@ -205,11 +193,10 @@ def share(part: int, whole: int) -> float | None:
     part, whole : int
         How many belong to the part, and how many there are.
     """
-    return part / whole if whole else None
+    return float(part / whole) if whole else None
 
 
 def _spread(errors: list[float]) -> dict[str, float | int | None]:
     """Return number, median and root mean square of errors."""
-    if not errors:
-        return {"cells": 0, "median": None, "rms": None}
-    return {"cells": len(errors), "median": float(np.median(errors)), "rms": float(np.sqrt(np.mean(np.square(errors))))}
+    median, rms = (float(np.median(errors)), float(np.sqrt(np.mean(np.square(errors))))) if errors else (None, None)
+    return {"cells": len(errors), "median": median, "rms": rms}

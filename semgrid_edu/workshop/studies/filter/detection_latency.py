@@ -1,6 +1,5 @@
 """How long a filter takes to find what moves: after it has come into view, and after the car ahead of it was found."""
 
-from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +17,6 @@ _LEAST_TIME = 1.0
 """Something never found counts only if it could have been found for this time, seconds."""
 
 
-@dataclass(eq=False)
 class DetectionLatency:
     """When cars and pedestrians are found, over several drives.
 
@@ -26,15 +24,16 @@ class DetectionLatency:
 
     Attributes
     ----------
-    waits : dict of str to list of float
-        For "cars" and "pedestrians": seconds from when each has moved in view until it is found; infinite if it isn't.
-    delays : list of float
+    waits : dict of str to list of float or None
+        For "cars" and "pedestrians": seconds from when each has moved in view until it is found; None if it isn't.
+    delays : list of float or None
         For each car that follows another one: seconds that it is found after the one ahead, counted from when it is hit
-        itself if that is later; infinite if it isn't found.
+        itself if that is later; None if it isn't found.
     """
 
-    waits: dict[str, list[float]] = field(default_factory=lambda: {"cars": [], "pedestrians": []}, init=False)
-    delays: list[float] = field(default_factory=list, init=False)
+    def __init__(self) -> None:
+        self.waits: dict[str, list[float | None]] = {"cars": [], "pedestrians": []}
+        self.delays: list[float | None] = []
 
     def begin(self, moving: list[Actor]) -> None:
         """Begin a drive.
@@ -46,8 +45,7 @@ class DetectionLatency:
         """
         self._kinds = {actor.instance: actor.kind for actor in moving}
         self._pairs = convoy_pairs(moving)
-        self._moves_since: dict[int, float] = {}
-        self._hit, self._found, self._last = {}, {}, {}
+        self._moves_since, self._hit, self._found, self._last = {}, {}, {}, {}  # seconds by number
 
     def add(self, scene: KnownScene, moves: NDArray) -> None:
         """Note what is hit and what is found in one frame.
@@ -93,17 +91,15 @@ class DetectionLatency:
     def end(self) -> None:
         """End a drive: work out its times."""
         for kind, name in ((Kind.CAR, "cars"), (Kind.PEDESTRIAN, "pedestrians")):
-            numbers = [number for number in self._hit if self._kinds[number] == kind]
-            self.waits[name] += self._delays({number: self._hit[number] for number in numbers})
-        found = self._found
-        self.delays += self._delays(
-            {b: max(found[a], self._hit[b]) for a, b in self._pairs if a in found and b in self._hit}
-        )
+            self.waits[name] += self._delays({k: time for k, time in self._hit.items() if self._kinds[k] == kind})
+        pairs = [(a, b) for a, b in self._pairs if a in self._found and b in self._hit]
+        self.delays += self._delays({b: max(self._found[a], self._hit[b]) for a, b in pairs})
 
-    def _delays(self, since: dict[int, float]) -> list[float]:
+    def _delays(self, since: dict[int, float]) -> list[float | None]:
         """Return how much later than `since` each thing is found; what leaves the view too early is left out."""
-        seen = {k: t for k, t in since.items() if k in self._found or self._last[k] - t >= _LEAST_TIME}
-        return [round(max(self._found.get(number, np.inf) - time, 0.0), 3) for number, time in seen.items()]
+        found = self._found
+        seen = {k: t for k, t in since.items() if k in found or self._last[k] - t >= _LEAST_TIME}
+        return [round(max(found[k] - t, 0.0), 3) if k in found else None for k, t in seen.items()]
 
     def summary(self) -> dict[str, object]:
         """Return all times.
@@ -111,15 +107,9 @@ class DetectionLatency:
         Returns
         -------
         dict
-            "found after" and "found after the car ahead"; JSON can hold it: an infinite time is None.
+            "found after" and "found after the car ahead"; JSON can hold it.
         """
-        waits = {name: _for_json(times) for name, times in self.waits.items()}
-        return {"found after": waits, "found after the car ahead": _for_json(self.delays)}
-
-
-def _for_json(times: list[float]) -> list[float | None]:
-    """Write infinite times as None."""
-    return [time if np.isfinite(time) else None for time in times]
+        return {"found after": self.waits, "found after the car ahead": self.delays}
 
 
 def convoy_pairs(moving: list[Actor]) -> list[tuple[int, int]]:
@@ -136,10 +126,8 @@ def convoy_pairs(moving: list[Actor]) -> list[tuple[int, int]]:
         The numbers of a car and of the next one behind it.
     """
     lines: dict[object, list[tuple[float, int]]] = {}
-    for actor in moving:
-        path = actor.trajectory
-        if actor.kind == Kind.CAR:
-            line = (path.along, path.across, path.d if path.along else path.s, path.pace)
-            lines.setdefault(line, []).append((path.s * path.along + path.d * path.across, actor.instance))
+    for path, number in ((actor.trajectory, actor.instance) for actor in moving if actor.kind == Kind.CAR):
+        line = (path.along, path.across, path.d if path.along else path.s, path.pace)
+        lines.setdefault(line, []).append((path.s * path.along + path.d * path.across, number))
     ordered = [[number for _, number in sorted(line, reverse=True)] for line in lines.values()]
     return [pair for line in ordered for pair in pairwise(line)]

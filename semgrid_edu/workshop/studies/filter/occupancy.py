@@ -1,29 +1,76 @@
 """Log-odds grid, BOF and CMCDOT compared on simulated drives, whose truth is known (paper, section 3.2)."""
 
-from collections.abc import Callable
-from datetime import UTC, datetime
+from time import perf_counter
 
 import numpy as np
-from numpy.typing import NDArray
 
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import Bof, Cmcdot, LogOddsGrid, PlanarMotion, SensorModel, State
+from semgrid_edu.occupancy import Bof, Cmcdot, LogOddsGrid, State
+from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import HDL64E, Lidar, Rig
 from semgrid_edu.workshop.studies.filter.cell_scores import BANKS, CellScores, Estimate, share
-from semgrid_edu.workshop.studies.filter.scenes import GRIDS, check_request, known_scenes, simulated_by
+from semgrid_edu.workshop.studies.filter.scenes import known_scenes
 
-LIDARS = {
-    "HDL-64E": HDL64E,
-    "coarse": Lidar(),
-}
+GRIDS = {"paper": GridSpec.paper(), "compact": GridSpec.compact()}
+LIDARS = {"HDL-64E": HDL64E, "coarse": Lidar()}
 """The real scanner at 10 Hz, and that of the simulated data sets, which looks ahead with a fifth of its columns."""
 FRAMES = 30
 """Number of frames of a drive, 3 s."""
 HELD_OUT = 100
 """Seed of the first drive for seed 0; each further seed adds 1000. Parameters were chosen on drives before this one."""
 METHODS = ("log-odds", "BOF", "CMCDOT")
+
+
+def check_request(seed: int, drives: int, frames: int, grids: tuple[str, ...]) -> None:
+    """Refuse what can't be run, before the work starts.
+
+    Parameters
+    ----------
+    seed : int
+        Seed for the drives and for the particles.
+    drives, frames : int
+        Number of drives, and number of frames of each.
+    grids : tuple of str
+        Keys of `GRIDS`.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such grid, the seed is negative, or there is nothing to do.
+    """
+    if not grids or not set(grids) <= set(GRIDS):
+        raise ArgumentError("grid", " or ".join(GRIDS), ", ".join(grids) or "none")
+    if seed < 0:
+        raise ArgumentError("seed", "a whole number from 0 up", seed)
+    if min(drives, frames) < 1:
+        raise ArgumentError("drives, frames", "at least one", f"{drives}, {frames}")
+
+
+def simulated_by(experiment: str, seed: int, drives: int, frames: int, grids: tuple[str, ...], began: float) -> dict:
+    """Return what made a result on simulated drives, see `made_by`.
+
+    Parameters
+    ----------
+    experiment : str
+        The command after `semgrid-edu reproduce`.
+    seed, drives, frames, grids
+        What was asked, as `check_request` takes it.
+    began : float
+        When the work started, by `perf_counter`.
+
+    Returns
+    -------
+    dict
+        Numbers of drives and frames, command, seed, date, minutes and versions; JSON can hold it.
+    """
+    one_grid = f" --grid {grids[0]}" if len(grids) == 1 else ""
+    command = f"semgrid-edu reproduce {experiment} --seed {seed} --drives {drives}{one_grid}"
+    minutes = round((perf_counter() - began) / 60, 1)
+    made = made_by(command, "numpy", "scipy", "numba", "embreex", "trimesh")
+    return {"drives": drives, "frames": frames, "seed": seed, "minutes": minutes, **made}
 
 
 def compare_filters(
@@ -57,47 +104,25 @@ def compare_filters(
     ArgumentError
         When there is no such grid, or nothing to do.
     """
-    began = datetime.now(UTC)
+    began = perf_counter()
     check_request(seed, drives, frames, grids)
-    scores = {lidar: {grid: _score(seed, drives, frames, lidar, grid) for grid in grids} for lidar in LIDARS}
     return {
-        "scores": scores,
+        "scores": {lidar: {grid: _score(seed, drives, frames, lidar, grid) for grid in grids} for lidar in LIDARS},
         "states": [state.name for state in State],
         **simulated_by("occupancy", seed, drives, frames, grids, began),
     }
 
 
-def occupancy_filters(spec: GridSpec, seed: int) -> dict[str, Callable[[NDArray, PlanarMotion, float], Estimate]]:
-    """Return the three filters with their default parameters, by name.
-
-    Parameters
-    ----------
-    spec : GridSpec
-        The grid.
-    seed : int
-        Seed for CMCDOT's particles; the other filters draw nothing.
-
-    Returns
-    -------
-    dict of str to callable
-        Functions that take a scan, and the motion and the time since the last scan, as `Cmcdot.step` does.
-    """
-    log_odds, bof, cmcdot = LogOddsGrid(spec), Bof(spec), Cmcdot(spec, seed=seed)
-    return {
-        "log-odds": lambda *scan: Estimate.of_log_odds(log_odds.step(*scan)),
-        "BOF": lambda *scan: Estimate.of_belief(bof.step(*scan)),
-        "CMCDOT": lambda *scan: Estimate.of_belief(cmcdot.step(*scan)),
-    }
-
-
 def _score(seed: int, drives: int, frames: int, lidar: str, grid: str) -> dict[str, object]:
-    """Score the filters on all drives of one LIDAR and grid."""
+    """Score the filters, with their default parameters, on all drives of one LIDAR and grid."""
     spec, scores = GRIDS[grid], {name: CellScores(GRIDS[grid]) for name in METHODS}
+    read = Estimate.of_log_odds, Estimate.of_belief, Estimate.of_belief
     for number in HELD_OUT + 1000 * seed + np.arange(drives):
-        drive, running = SimulatedDrive(number, frames, rig=Rig(lidar=LIDARS[lidar])), occupancy_filters(spec, seed)
-        for scene in known_scenes(drive, spec, SensorModel(), f"{lidar}, {grid} grid, drive {number}"):
-            for name, step in running.items():
-                scores[name].add(scene, step(scene.frame.points_grid, scene.motion, PERIOD))
+        drive = SimulatedDrive(number, frames, rig=Rig(lidar=LIDARS[lidar]))
+        trackers = LogOddsGrid(spec), Bof(spec), Cmcdot(spec, seed=seed)
+        for scene in known_scenes(drive, spec, f"{lidar}, {grid} grid, drive {number}"):
+            for name, tracker, estimate in zip(METHODS, trackers, read, strict=True):
+                scores[name].add(scene, estimate(tracker.step(scene.frame.points_grid, scene.motion, PERIOD)))
     return {name: one.summary() for name, one in scores.items()}
 
 

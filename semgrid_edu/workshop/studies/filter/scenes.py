@@ -1,83 +1,118 @@
 """Simulated drives, frame by frame, with all that is needed to score an occupancy filter (section 3.2).
 
-What experiments on simulated drives have in common: their grids, what may be asked, and what made a result.
+The truth of each cell, one of the states of section 3.2, is known instead of estimated.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import UTC, datetime
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
-from semgrid_edu.errors import ArgumentError
-from semgrid_edu.frame import Frame
+from semgrid_edu.frame import Frame, blocks
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import PlanarMotion, SensorModel, State, scan_evidence
 from semgrid_edu.occupancy.planar_motion import MAX_YAW, look_up, map_around
-from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
-from semgrid_edu.workshop.studies.filter.cell_truth import CellTruth, true_cells
+from semgrid_edu.workshop.simulation.street.traffic import MOVING_SPEED
+from semgrid_edu.workshop.simulation.things.materials import Kind
 
-GRIDS = {"paper": GridSpec.paper(), "compact": GridSpec.compact()}
-
-
-def check_request(seed: int, drives: int, frames: int, grids: tuple[str, ...]) -> None:
-    """Refuse what can't be run, before the work starts.
-
-    Parameters
-    ----------
-    seed : int
-        Seed for the drives and for the particles.
-    drives, frames : int
-        Number of drives, and number of frames of each.
-    grids : tuple of str
-        Keys of `GRIDS`.
-
-    Raises
-    ------
-    ArgumentError
-        When there is no such grid, the seed is negative, or there is nothing to do.
-    """
-    if not grids or not set(grids) <= set(GRIDS):
-        raise ArgumentError("grid", " or ".join(GRIDS), ", ".join(grids) or "none")
-    if seed < 0:
-        raise ArgumentError("seed", "a whole number from 0 up", seed)
-    if min(drives, frames) < 1:
-        raise ArgumentError("drives, frames", "at least one", f"{drives}, {frames}")
-
-
-def simulated_by(
-    experiment: str, seed: int, drives: int, frames: int, grids: tuple[str, ...], began: datetime
-) -> dict[str, object]:
-    """Return what made a result on simulated drives, see `made_by`.
-
-    Parameters
-    ----------
-    experiment : str
-        The command after `semgrid-edu reproduce`.
-    seed, drives, frames, grids
-        What was asked, as `check_request` takes it.
-    began : datetime
-        When the work started, UTC.
-
-    Returns
-    -------
-    dict
-        Numbers of drives and frames, command, seed, date, minutes and versions; JSON can hold it.
-    """
-    one_grid = f" --grid {grids[0]}" if len(grids) == 1 else ""
-    command = f"semgrid-edu reproduce {experiment} --seed {seed} --drives {drives}{one_grid}"
-    minutes = round((datetime.now(UTC) - began).total_seconds() / 60, 1)
-    made = made_by(command, "numpy", "scipy", "numba", "embreex", "trimesh")
-    return {"drives": drives, "frames": frames, "seed": seed, "minutes": minutes, **made}
-
-
+FLAT = (Kind.ROAD, Kind.LANE, Kind.SIDEWALK, Kind.GRASS)
+"""The kinds of bare ground."""
+HIGHEST = 1.6
+"""Height above flat ground up to which returns count, metres."""
 LEFT_SINCE = 10
 """Number of frames, 1 s. Cells that something moving has left within them should be free now."""
 OUT_OF_VIEW = 3
 """Number of frames without a hit after which something comes into view anew: in shorter gaps a post hid it."""
+
+
+@dataclass(frozen=True, eq=False)
+class CellTruth:
+    """What is true of the cells of a grid at one instant.
+
+    Parameters
+    ----------
+    state : (H, W) uint8
+        FREE, STATIC or DYNAMIC: the truth is never UNKNOWN.
+    kind : (H, W) uint8
+        What stands in each cell, a `Kind`; the kind of the ground where nothing does.
+    instance : (H, W) int32
+        Number of the car, pedestrian or bicycle in each cell; 0 for all else.
+    velocity : (2, H, W) float32
+        Velocity over ground, along x and y of the grid frame, m/s; 0 where nothing moves.
+    """
+
+    state: NDArray[np.uint8]
+    kind: NDArray[np.uint8]
+    instance: NDArray[np.int32]
+    velocity: NDArray[np.float32]
+
+
+def true_cells(drive: SimulatedDrive, time: float, spec: GridSpec) -> CellTruth:
+    """Return the truth of a simulated drive at one instant, pooled to a grid by `pool_truth`.
+
+    Parameters
+    ----------
+    drive : SimulatedDrive
+        The drive.
+    time : float
+        Seconds since it began.
+    spec : GridSpec
+        The grid: the extent of `LABEL_GRID`, a multiple of its cell.
+    """
+    return pool_truth(*drive.birdseye(time), drive.velocities(time), spec)
+
+
+def pool_truth(kinds: NDArray, instances: NDArray, velocities: dict[int, NDArray], spec: GridSpec) -> CellTruth:
+    """Pool the truth of 0.1 m cells to a coarser grid.
+
+    A cell takes what covers most of it, bare ground left aside. So a cell in which anything stands isn't free, even if
+    that is a thin pole in a single fine cell.
+
+    Parameters
+    ----------
+    kinds : (710, 310) uint8
+        What each cell of `LABEL_GRID` holds, members of `Kind`.
+    instances : (710, 310) int
+        Number of the object in each of these cells, 0 for none.
+    velocities : dict of int to (2,) float
+        Velocity over ground of each object that may move, by its number: along x and y of the grid frame, m/s.
+    spec : GridSpec
+        The coarser grid: the extent of `LABEL_GRID`, a multiple of its cell.
+
+    Returns
+    -------
+    CellTruth
+
+    Raises
+    ------
+    ArgumentError
+        When `spec` isn't a coarsening of `LABEL_GRID`.
+    """
+    numbers = np.int64(instances) * 256 + kinds  # what is there, as one number
+    chosen = _most_frequent(blocks(numbers, spec), blocks(np.isin(kinds, FLAT), spec))
+    instance, kind = np.divmod(chosen, 256)
+    speeds = np.zeros((instance.max() + 1, 2), np.float32)
+    for number, velocity in velocities.items():
+        if number < len(speeds):
+            speeds[number] = velocity
+    velocity = np.moveaxis(speeds[instance], -1, 0)
+    standing = np.where(np.hypot(*velocity) > MOVING_SPEED, State.DYNAMIC, State.STATIC)
+    state = np.where(np.isin(kind, FLAT), State.FREE, standing)
+    return CellTruth(state.astype(np.uint8), kind.astype(np.uint8), instance.astype(np.int32), velocity)
+
+
+def _most_frequent(numbers: NDArray, flat: NDArray) -> NDArray[np.int64]:
+    """Return the most frequent number in each block, (H, W, K) -> (H, W); a flat one only where all are flat.
+
+    Between two equally frequent numbers the larger one wins.
+    """
+    ranked = np.where(flat & ~flat.all(axis=-1, keepdims=True), -1, numbers)
+    count = (ranked[..., :, None] == ranked[..., None, :]).sum(axis=-1)
+    best = np.where(ranked < 0, -1, count * (ranked.max() + 1) + ranked).argmax(axis=-1)
+    return np.take_along_axis(numbers, best[..., None], axis=-1)[..., 0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +130,7 @@ class KnownScene:
     hit : (H, W) bool
         Cells that the scan hits, from `hit_cells`.
     observed : (H, W) bool
-        Cells about which this scan says something: P(z | occupied) and P(z | free) differ.
+        Cells about which this scan says something: P(z | occupied) and P(z | free) differ (`SensorModel`).
     never_seen : (H, W) bool
         Cells about which no scan of the drive has said anything so far, so that no filter can know them.
     left : (H, W) bool
@@ -114,9 +149,7 @@ class KnownScene:
     in_view: dict[int, int]
 
 
-def hit_cells(
-    points: NDArray, spec: GridSpec, least: int = 2, low: float = 0.3, high: float = 1.6
-) -> NDArray[np.bool_]:
+def hit_cells(points: NDArray, spec: GridSpec, least: int = 2, low: float = 0.3) -> NDArray[np.bool_]:
     """Return which cells hold enough returns from above the ground to be scored, (H, W).
 
     Parameters
@@ -127,18 +160,16 @@ def hit_cells(
         The grid.
     least : int
         Number of returns that a cell needs.
-    low, high : float
-        Heights above flat ground between which returns count, metres.
+    low : float
+        Height above flat ground from which on returns count, up to `HIGHEST`, metres.
     """
-    rows, cols, inside = spec.cells(points[(points[:, 2] >= low) & (points[:, 2] <= high)])
+    rows, cols, inside = spec.cells(points[(points[:, 2] >= low) & (points[:, 2] <= HIGHEST)])
     count = np.zeros(spec.shape, int)
     np.add.at(count, (rows[inside], cols[inside]), 1)
     return count >= least
 
 
-def known_scenes(
-    drive: SimulatedDrive, spec: GridSpec, sensor: SensorModel, name: str = "drive"
-) -> Iterator[KnownScene]:
+def known_scenes(drive: SimulatedDrive, spec: GridSpec, name: str = "drive") -> Iterator[KnownScene]:
     """Take the scans of a drive, one after the other, with their truth.
 
     Parameters
@@ -147,8 +178,6 @@ def known_scenes(
         The drive.
     spec : GridSpec
         The grid: the extent of `LABEL_GRID`, a multiple of its cell.
-    sensor : SensorModel
-        Decides about which cells a scan says something.
     name : str
         What the progress bar calls it.
 
@@ -156,7 +185,7 @@ def known_scenes(
     ------
     KnownScene
     """
-    past = SceneHistory(spec, sensor)
+    past = SceneHistory(spec)
     for k in tqdm(range(drive.n_frames), desc=name, unit="frame", leave=False):
         yield past.add(drive.scan(k), true_cells(drive, k * PERIOD, spec))
 
@@ -168,18 +197,13 @@ class SceneHistory:
     ----------
     spec : GridSpec
         The grid of the scenes.
-    sensor : SensorModel
-        Decides about which cells a scan says something.
     """
 
-    def __init__(self, spec: GridSpec, sensor: SensorModel) -> None:
-        self.spec, self.sensor = spec, sensor
+    def __init__(self, spec: GridSpec) -> None:
+        self.spec = spec
         self._around = map_around(spec, MAX_YAW)  # what the trackers remember of the grid's surroundings
-        self._poses: list[NDArray] = []
-        self._observed: list[NDArray] = []
-        self._dynamic: list[NDArray] = []
-        self._first_hit: dict[int, int] = {}
-        self._last_hit: dict[int, int] = {}
+        self._poses, self._observed, self._dynamic = [], [], []  # an array per frame
+        self._first_hit, self._last_hit = {}, {}  # frames by number of the object
 
     def add(self, frame: Frame, truth: CellTruth) -> KnownScene:
         """Make a scene of the next frame, and remember it.
@@ -191,7 +215,7 @@ class SceneHistory:
         truth : CellTruth
             What is true at that instant.
         """
-        evidence = scan_evidence(frame.points_grid, self._around, self.sensor)
+        evidence = scan_evidence(frame.points_grid, self._around, SensorModel())
         pose = frame.T_world_from_lidar
         motion = PlanarMotion.from_poses(self._poses[-1], pose) if self._poses else PlanarMotion()
         self._poses.append(pose)

@@ -1,14 +1,14 @@
 """CMCDOT on test streets with what is hard for it: wire mesh, hedges, glass, walls coming into view, convoys."""
 
-from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from itertools import product
+from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import Belief, Cmcdot, CmcdotParams, SensorModel, State
+from semgrid_edu.occupancy import Belief, Cmcdot, CmcdotParams, State
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
 from semgrid_edu.workshop.simulation.drive import PERIOD
 from semgrid_edu.workshop.simulation.named_streets import FRAMES, TEST_STREETS, named_street
@@ -16,14 +16,8 @@ from semgrid_edu.workshop.simulation.street.traffic import Actor
 from semgrid_edu.workshop.simulation.things.materials import Kind
 from semgrid_edu.workshop.studies.filter.cell_scores import FAR, NEAR, SCENERY, SETTLED_AFTER, share
 from semgrid_edu.workshop.studies.filter.detection_latency import DetectionLatency
-from semgrid_edu.workshop.studies.filter.scenes import (
-    GRIDS,
-    KnownScene,
-    check_request,
-    hit_cells,
-    known_scenes,
-    simulated_by,
-)
+from semgrid_edu.workshop.studies.filter.occupancy import GRIDS, check_request, simulated_by
+from semgrid_edu.workshop.studies.filter.scenes import KnownScene, hit_cells, known_scenes
 
 LEAST_DYNAMIC = 0.3
 """A phantom is a standing cell that is more DYNAMIC than STATIC, with more than this probability of DYNAMIC."""
@@ -31,11 +25,9 @@ LEAST_CELLS = 60
 """Number of hit cells of scenery from which on a frame is looked at for the worst frame."""
 CARS_AFTER, OTHERS_AFTER = 0.8, 1.5
 """Time, seconds, after which a filter should have found a car that moves in view; and a pedestrian, or any speed."""
-_HEIGHTS = {"low": 0.7, "high": 1.6}
-_AHEAD, _RIGHT = (2.0, 40.0), -2.0
+_LOW, _AHEAD, _RIGHT = 0.7, (2.0, 40.0), -2.0
 
 
-@dataclass(eq=False)
 class StreetScores:
     """Counts over the frames of a street's drives, for one filter.
 
@@ -60,11 +52,11 @@ class StreetScores:
         When each thing that moves is found.
     """
 
-    spec: GridSpec
-    cells: dict[str, list[int]] = field(default_factory=dict, init=False)
-    frames: list[tuple[int, int]] = field(default_factory=list, init=False)
-    speed_errors: list[float] = field(default_factory=list, init=False)
-    latency: DetectionLatency = field(default_factory=DetectionLatency, init=False)
+    def __init__(self, spec: GridSpec) -> None:
+        self.spec, self.latency = spec, DetectionLatency()
+        self.cells: dict[str, list[int]] = {}
+        self.frames: list[tuple[int, int]] = []
+        self.speed_errors: list[float] = []
 
     def begin(self, moving: list[Actor]) -> None:
         """Begin a drive.
@@ -106,7 +98,7 @@ class StreetScores:
     def _add_standing(self, scene: KnownScene, called: NDArray) -> None:
         """Count what stands, and what of it is a phantom."""
         truth, (x, y) = scene.truth, np.moveaxis(self.spec.centers(), -1, 0)
-        hit = hit_cells(scene.frame.points_grid, self.spec, least=2, **_HEIGHTS)
+        hit = hit_cells(scene.frame.points_grid, self.spec, low=_LOW)
         stands = hit & (truth.state == State.STATIC) & (x > _AHEAD[0]) & (x < _AHEAD[1]) & (y < _RIGHT)
         scenery = stands & np.isin(truth.kind, list(SCENERY))
         self._count("scenery", scenery, called)
@@ -150,9 +142,6 @@ class StreetScores:
         }
 
 
-_EMPTY = {"cells": 0, "called": None}
-
-
 def measure_streets(
     seed: int = 0,
     drives: int = 6,
@@ -188,27 +177,21 @@ def measure_streets(
     ArgumentError
         When there is no such grid or street, or nothing to do.
     """
-    began = datetime.now(UTC)
+    began = perf_counter()
     check_request(seed, drives, frames, grids)
     if not streets or not set(streets) <= set(TEST_STREETS):
         raise ArgumentError("streets", " or ".join(TEST_STREETS), ", ".join(streets) or "none")
-    params = params or CmcdotParams()
-    scores = {
-        grid: {street: _score(seed, drives, frames, grid, street, params) for street in streets} for grid in grids
-    }
+    scores: dict[str, dict] = {grid: {} for grid in grids}
+    for grid, street in product(grids, streets):
+        spec, counts = GRIDS[grid], StreetScores(GRIDS[grid])
+        for number in range(1000 * seed, 1000 * seed + drives):
+            drive, tracker = named_street(street, number, frames), Cmcdot(spec, params or CmcdotParams(), seed=seed)
+            counts.begin(drive.moving)
+            for scene in known_scenes(drive, spec, f"{street}, {grid} grid, drive {number}"):
+                counts.add(scene, tracker.step(scene.frame.points_grid, scene.motion, PERIOD))
+            counts.end()
+        scores[grid][street] = counts.summary()
     return {"scores": scores, **simulated_by("streets", seed, drives, frames, grids, began)}
-
-
-def _score(seed: int, drives: int, frames: int, grid: str, street: str, params: CmcdotParams) -> dict[str, object]:
-    """Score the filter on all drives through one street."""
-    spec, scores = GRIDS[grid], StreetScores(GRIDS[grid])
-    for number in 1000 * seed + np.arange(drives):
-        drive, tracker = named_street(street, int(number), frames), Cmcdot(spec, params, seed=seed)
-        scores.begin(drive.moving)
-        for scene in known_scenes(drive, spec, SensorModel(), f"{street}, {grid} grid, drive {number}"):
-            scores.add(scene, tracker.step(scene.frame.points_grid, scene.motion, PERIOD))
-        scores.end()
-    return scores.summary()
 
 
 def streets_tables(result: dict) -> str:
@@ -236,9 +219,9 @@ def _standing(scores: dict[str, dict]) -> list[list[str]]:
     kinds = [*SCENERY.values(), "standing cars"]
     rows = [["stands, called DYNAMIC", "cells", "all scenery", "worst frame", *kinds]]
     for street, one in scores.items():
-        shares = [per_cent(one["cells"].get(name, _EMPTY)["called"]) for name in ("scenery", *kinds)]
-        cells = one["cells"].get("scenery", _EMPTY)["cells"]
-        rows.append([street, str(cells), shares[0], per_cent(one["worst frame"]), *shares[1:]])
+        groups = [one["cells"].get(name, {"cells": 0, "called": None}) for name in ("scenery", *kinds)]
+        scenery, *others = (per_cent(group["called"]) for group in groups)
+        rows.append([street, str(groups[0]["cells"]), scenery, per_cent(one["worst frame"]), *others])
     return rows
 
 
@@ -249,14 +232,12 @@ def _moving(scores: dict[str, dict]) -> list[list[str]]:
     for street, one in scores.items():
         if not any(one["found after"].values()):
             continue
-        cars, near, far, left = (
-            per_cent(one["cells"][name]["called"]) for name in ("moving cars", "walkers, near", "walkers, far", "left")
-        )
-        waits = {name: _median(times) for name, times in one["found after"].items()}
-        delays = one["found after the car ahead"]
+        of = {name: per_cent(cells["called"]) for name, cells in one["cells"].items()}
+        cars, walkers = (_median(times) for times in one["found after"].values())
+        delays, speed = one["found after the car ahead"], per_cent(one["speed error"]["within 1.5 m/s"])
         soon = f"{sum(t is not None and t <= 0.5 for t in delays)} of {len(delays)}" if delays else "-"
-        speed = per_cent(one["speed error"]["within 1.5 m/s"])
-        rows.append([street, cars, speed, waits["cars"], near, far, waits["pedestrians"], soon, left])
+        near, far = of["walkers, near"], of["walkers, far"]
+        rows.append([street, of["moving cars"], speed, cars, near, far, walkers, soon, of["left"]])
     return rows
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
@@ -23,8 +23,6 @@ COUNTED = ("seen", "found", "missed", "labelled", "right", "hidden")
 """What is counted of each class c and each band: cells that the camera sees, in which c stands ("seen"), those of them
 that are labelled c ("found") and those without a label ("missed"); cells that are labelled c ("labelled"), those of
 them in which c stands ("right") and those that the camera doesn't see ("hidden")."""
-COLUMNS = ("found", "mistaken", "missed", "wrong", "hidden", "iou")
-"""Shares of `TruthCounts.shares`, in the order of the tables' columns."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,19 +94,20 @@ class TruthCounts:
         Returns
         -------
         dict of str to (...) float64
-            Shares from 0 to 1; NaN where there is nothing to share. "wrong": of the labelled cells, those in which
-            something else stands. "found", "mistaken" and "missed": of the cells that the camera sees, those with the
-            right label, with another label, and without a label. "hidden": of the labelled cells, those that the
-            camera doesn't see. "iou": intersection over union of both, among the cells that the camera sees.
+            Shares from 0 to 1, in the order of the tables' columns; NaN where there is nothing to share. "found",
+            "mistaken" and "missed": of the cells that the camera sees, those with the right label, with another label,
+            and without a label. "wrong": of the labelled cells, those in which something else stands. "hidden": of the
+            labelled cells, those that the camera doesn't see. "iou": intersection over union of both, among the cells
+            that the camera sees.
         """
         added = () if axis is None else tuple(a + 1 for a in np.atleast_1d(axis))
         seen, found, missed, labelled, right, hidden = self.cells.sum(axis=added).astype(np.float64)
         with np.errstate(invalid="ignore"):
             return {
-                "wrong": 1 - right / labelled,
                 "found": found / seen,
                 "mistaken": (seen - found - missed) / seen,
                 "missed": missed / seen,
+                "wrong": 1 - right / labelled,
                 "hidden": hidden / labelled,
                 "iou": found / (seen + labelled - hidden - found),
             }
@@ -142,12 +141,9 @@ def policy_table(result: dict) -> str:
     result : dict
         From `truth_policies`, or from the JSON file that it was written to.
     """
-    rows = [["per cent", *COLUMNS, "mean iou"]]
-    for name in result["sums"]:
-        counts = counts_of(result, name)
-        shares = counts.shares(axis=(0, 1)) | {"mean iou": np.nanmean(counts.shares(axis=0)["iou"])}
-        rows.append([name, *(_per_cent(shares[column]) for column in rows[0][1:])])
-    return markdown_table(rows)
+    of = {name: counts_of(result, name) for name in result["sums"]}
+    rows = [one.shares(axis=(0, 1)) | {"mean iou": np.nanmean(one.shares(axis=0)["iou"])} for one in of.values()]
+    return _table({column: [row[column] for row in rows] for column in rows[0]}, of)
 
 
 def class_table(result: dict, name: str) -> str:
@@ -168,14 +164,10 @@ def distance_table(result: dict, name: str) -> str:
     return _table(counts_of(result, name).shares(axis=1), band_names(result["bands"]))
 
 
-def _table(shares: dict[str, NDArray], names: Iterable[str]) -> str:
-    """Return one row per entry of the shares."""
-    rows = [[name, *(_per_cent(shares[column][k]) for column in COLUMNS)] for k, name in enumerate(names)]
-    return markdown_table([["per cent", *COLUMNS], *rows])
-
-
-def _per_cent(share: float) -> str:
-    return per_cent(None if np.isnan(share) else float(share))
+def _table(shares: dict[str, ArrayLike], names: Iterable[str]) -> str:
+    """Return one row per entry of the shares, one column per share."""
+    texts = ([per_cent(None if np.isnan(share) else share) for share in column] for column in shares.values())
+    return markdown_table([["per cent", *shares], *([*row] for row in zip(names, *texts, strict=True))])
 
 
 def truth_tables(result: dict) -> str:

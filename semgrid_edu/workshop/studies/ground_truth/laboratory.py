@@ -7,8 +7,8 @@ Simulated drives are filtered by CMCDOT, their calibration, labels and scans get
 import hashlib
 from collections.abc import Iterable
 from dataclasses import asdict, replace
-from datetime import UTC, datetime
 from pathlib import Path
+from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
@@ -23,13 +23,12 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.occupancy import track_drive
 from semgrid_edu.storage.files import write_json
-from semgrid_edu.storage.provenance import versions
+from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.storage.reading import resumable_json
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.things.materials import class_of_kind
-from semgrid_edu.workshop.studies.filter.occupancy import LIDARS
-from semgrid_edu.workshop.studies.filter.scenes import GRIDS, check_request
+from semgrid_edu.workshop.studies.filter.occupancy import GRIDS, LIDARS, check_request
 from semgrid_edu.workshop.studies.ground_truth.counts import BAND_EDGES, COUNTED, TruthCounts
 
 HELD_OUT = 700
@@ -96,18 +95,12 @@ TRIALS = {
 """What is compared, by name. The last four show what each kind of error in the data does to the paper's way."""
 
 
-def truth_policies(
-    log: str | Path,
-    seed: int = 0,
-    drives: int = 20,
-    grid: str = "compact",
-    lidar: str = "coarse",
-) -> dict[str, object]:
+def truth_policies(log: Path, seed: int = 0, drives: int = 20, grid: str = "compact", lidar: str = "coarse") -> dict:
     """Make the ground truth of simulated drives by every policy, and count how wrong it is.
 
     Parameters
     ----------
-    log : path-like
+    log : Path
         Takes every drive as soon as it is done. If the file exists, drives that it holds aren't simulated again.
     seed : int
         Seed for drives, errors and particles.
@@ -135,37 +128,31 @@ def truth_policies(
     check_request(seed, drives, 1, (grid,))
     if lidar not in LIDARS:
         raise ArgumentError("lidar", f"one of {', '.join(LIDARS)}", repr(lidar))
-    began, digest = datetime.now(UTC), hashlib.sha256(repr(TRIALS).encode()).hexdigest()[:16]
+    began, digest = perf_counter(), hashlib.sha256(repr(TRIALS).encode()).hexdigest()[:16]
     identity = {"seed": seed, "grid": grid, "lidar": lidar, "trials": digest}
-    done, sums = resumable_json(log, identity, "drives"), resumable_json(log, identity, "sums", list)
-    minutes = resumable_json(log, identity, "minutes", float).get("of all drives", 0.0)
-    first = HELD_OUT + 1000 * seed
+    kinds = {"drives": dict, "sums": list, "minutes": float}
+    kept = {key: resumable_json(log, identity, key, kind) for key, kind in kinds.items()}
+    minutes, first = kept["minutes"].get("of all drives", 0.0), HELD_OUT + 1000 * seed
     for number in tqdm(range(first, first + drives), desc="truth policies", unit="drive"):
-        if str(number) in done:
+        if str(number) in kept["drives"]:
             continue
-        counts = score_trials(TRIALS, GRIDS[grid], number, lidar)
-        done[str(number)] = {name: one.cells.sum(axis=(1, 2)).tolist() for name, one in counts.items()}
-        sums = {name: (one.cells + np.array(sums.get(name, 0))).tolist() for name, one in counts.items()}
-        spent = minutes + (datetime.now(UTC) - began).total_seconds() / 60
-        write_json(log, identity | {"drives": done, "sums": sums, "minutes": {"of all drives": round(spent, 2)}})
+        counts, sums = score_trials(TRIALS, GRIDS[grid], number, lidar), kept["sums"]
+        kept["drives"][str(number)] = {name: one.cells.sum(axis=(1, 2)).tolist() for name, one in counts.items()}
+        kept["sums"] = {name: (one.cells + np.array(sums.get(name, 0))).tolist() for name, one in counts.items()}
+        kept["minutes"] = {"of all drives": round(minutes + (perf_counter() - began) / 60, 2)}
+        write_json(log, identity | kept)
+    command = f"semgrid-edu reproduce truth-policies --seed {seed} --drives {drives} --grid {grid} --lidar {lidar}"
     return identity | {
         "policies": {name: asdict(trial.policy) | {"errors": asdict(trial.flaws)} for name, trial in TRIALS.items()},
         "counted": list(COUNTED),
         "bands": list(BAND_EDGES),
         "classes": list(KITTI_14.names[: KITTI_14.n_semantic]),
-        "drives": done,
-        "sums": sums,
-        "minutes": resumable_json(log, identity, "minutes", float),
-        "command": "semgrid-edu reproduce truth-policies "
-        f"--seed {seed} --drives {drives} --grid {grid} --lidar {lidar}",
-        "date": f"{began:%Y-%m-%d}",
-        "versions": versions("numpy", "scipy", "numba", "embreex", "trimesh"),
+        **kept,
+        **made_by(command, "numpy", "scipy", "numba", "embreex", "trimesh"),
     }
 
 
-def score_trials(
-    trials: dict[str, Trial], spec: GridSpec, number: int, lidar: str = "coarse"
-) -> dict[str, TruthCounts]:
+def score_trials(trials: dict[str, Trial], spec: GridSpec, number: int, lidar: str) -> dict[str, TruthCounts]:
     """Score every trial on one simulated drive, by name.
 
     Parameters

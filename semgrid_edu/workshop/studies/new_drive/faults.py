@@ -9,15 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import rigid_transform, transform_points
 from semgrid_edu.frame import Frame
+from semgrid_edu.workshop.studies.new_drive import drive_checks as checks
 from semgrid_edu.workshop.studies.new_drive.domain import colour_distance, mean_histograms
-from semgrid_edu.workshop.studies.new_drive.drive_checks import (
-    AXES,
-    axes_errors,
-    edge_contrast,
-    ground_plane,
-    time_gaps,
-    with_scan,
-)
 
 TURN = 2.0
 """By how much a sensor is turned, degrees."""
@@ -65,7 +58,7 @@ def _each(change: Callable[[Frame], Frame]) -> Fault:
 
 def _pose_in(axes: str) -> Fault:
     """Return a fault that expresses the poses in wrong axes."""
-    return _each(lambda frame: replace(frame, T_world_from_lidar=AXES[axes](frame.T_world_from_lidar)))
+    return _each(lambda frame: replace(frame, T_world_from_lidar=checks.AXES[axes](frame.T_world_from_lidar)))
 
 
 def _images_late(frames: Sequence[Frame]) -> list[Frame]:
@@ -107,14 +100,14 @@ def drive_readings(frames: Sequence[Frame], known: dict[str, NDArray], every: in
         motion of `AXES` that of the poses is, metres. "colours": how far the colours are from the known ones, total
         variation 0..1.
     """
-    frames = with_scan(frames)
+    frames = checks.with_scan(frames)
     some = frames[::every]
-    contrast = np.mean([edge_contrast(frame, YAWS) for frame in some], axis=0)
-    errors, seen = axes_errors(frames), mean_histograms([frame.need_image() for frame in some])
+    contrast = np.mean([checks.edge_contrast(frame, YAWS) for frame in some], axis=0)
+    errors, seen = checks.axes_errors(frames), mean_histograms([frame.need_image() for frame in some])
     return {
-        "gaps": float(len(time_gaps([frame.time for frame in frames]))),
+        "gaps": float(len(checks.time_gaps([frame.time for frame in frames]))),
         "yaw": float(YAWS[contrast.argmax()]),
-        "tilt": float(np.mean([ground_plane(frame.points, frame.camera.lidar_height).pitch for frame in some])),
+        "tilt": float(np.mean([checks.ground_plane(frame.points, frame.camera.lidar_height).pitch for frame in some])),
         "motion": errors["as the poses say"] - min(errors.values()),
         "colours": colour_distance(seen, known),
     }

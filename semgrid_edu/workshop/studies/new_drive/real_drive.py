@@ -1,8 +1,8 @@
 """Real drives through every check, beside the shipped drive: numbers only, never a picture (section 4)."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from datetime import UTC, datetime
 from pathlib import Path
+from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,20 +16,13 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import load_net
 from semgrid_edu.occupancy import Belief, State
 from semgrid_edu.pipeline import run_pipeline
-from semgrid_edu.storage.provenance import versions
+from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
 from semgrid_edu.workshop.studies.filter.scenes import hit_cells
-from semgrid_edu.workshop.studies.new_drive.domain import distances, image_statistics, mean_histograms, mean_over
-from semgrid_edu.workshop.studies.new_drive.drive_checks import (
-    axes_errors,
-    ground_plane,
-    sensor_delays,
-    share_on_image,
-    with_scan,
-)
+from semgrid_edu.workshop.studies.new_drive import domain
+from semgrid_edu.workshop.studies.new_drive import drive_checks as checks
 from semgrid_edu.workshop.studies.new_drive.faults import FAULTS, drive_readings
-from semgrid_edu.workshop.studies.new_drive.network_view import network_numbers, normalised_entropy, training_images
 
 EVERY = 4
 """Images, ground and networks are measured in each frame of this number."""
@@ -56,11 +49,12 @@ def compare_drives(roots: Sequence[Path], date: str, drive: str) -> dict[str, ob
     dict
         What `measure_drive` and `drive_readings` return for each drive, by name, and how it was made; JSON can hold it.
     """
-    began, known = datetime.now(UTC), mean_histograms(training_images())
+    began, known = perf_counter(), domain.mean_histograms(domain.training_images())
     drives = {"sample": (sample_drive(), sample_boxes(sample_drive()))}
     for number, root in enumerate(roots, 1):
         boxes = read_boxes(root / f"moving_cars_{drive}.json")
         drives[f"stretch {number}"] = KittiRawDrive(root, date, drive), boxes
+    command = f"semgrid-edu reproduce real-drive --date {date} --drive {drive}"
     return {
         "drives": {name: measure_drive(*one) for name, one in drives.items()},
         "faults": {
@@ -69,11 +63,9 @@ def compare_drives(roots: Sequence[Path], date: str, drive: str) -> dict[str, ob
         },
         "training images": _among_training_images(),
         "drive": f"{date}_drive_{drive}",
-        "command": f"semgrid-edu reproduce real-drive --date {date} --drive {drive}" + " --kitti FOLDER" * len(roots),
         "seed": 0,
-        "date": f"{began:%Y-%m-%d}",
-        "minutes": round((datetime.now(UTC) - began).total_seconds() / 60, 1),
-        "versions": versions("numpy", "scipy", "torch", "numba"),
+        "minutes": round((perf_counter() - began) / 60, 1),
+        **made_by(f"{command}{' --kitti FOLDER' * len(roots)}", "numpy", "scipy", "torch", "numba"),
     }
 
 
@@ -93,24 +85,24 @@ def measure_drive(drive: KittiRawDrive, boxes: Boxes) -> dict[str, object]:
         Numbers of the drive, of its ground, motion, images, networks and grids; JSON can hold it.
     """
     frames, net = drive[:], load_net(sample_image_stage(), drive.camera)
-    scanned = with_scan(frames)
+    scanned = checks.with_scan(frames)
     positions = np.array([frame.T_world_from_lidar[:3, 3] for frame in frames])
-    ground = np.mean([ground_plane(frame.points, frame.camera.lidar_height) for frame in scanned[::EVERY]], axis=0)
+    planes = [checks.ground_plane(frame.points, frame.camera.lidar_height) for frame in scanned[::EVERY]]
     images = [resize_image(frame.need_image(), net.architecture.image_size) for frame in frames[::EVERY]]
     return {
         "frames": len(frames),
         "problems": len(drive.problems()),
         "seconds": frames[-1].time - frames[0].time,
         "step ms": 1000 * float(np.median(np.diff([frame.time for frame in frames]))),
-        "delay ms": {name: 1000 * float(np.median(late)) for name, late in sensor_delays(drive).items()},
+        "delay ms": {name: 1000 * float(np.median(late)) for name, late in checks.sensor_delays(drive).items()},
         "metres": float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum()),
         "returns": float(np.mean([len(frame.points) for frame in scanned])),
-        "on image": float(np.mean([share_on_image(frame.points, frame.camera) for frame in scanned])),
-        "ground": dict(zip(("height", "pitch", "roll"), map(float, ground), strict=True)),
-        "axes": axes_errors(scanned),
-        "images": distances(images, training_images()) | _statistics(images),
-        "image network": network_numbers(net, scanned[::EVERY]),
-        "image network, colours matched": network_numbers(net, scanned[::EVERY], matched=True),
+        "on image": float(np.mean([checks.share_on_image(frame.points, frame.camera) for frame in scanned])),
+        "ground": dict(zip(("height", "pitch", "roll"), np.mean(planes, axis=0).tolist(), strict=True)),
+        "axes": checks.axes_errors(scanned),
+        "images": domain.distances(images, domain.training_images()) | _statistics(images),
+        "image network": domain.network_numbers(net, scanned[::EVERY]),
+        "image network, colours matched": domain.network_numbers(net, scanned[::EVERY], matched=True),
         "grids": _grid_numbers(frames, boxes),
     }
 
@@ -127,12 +119,12 @@ def _grid_numbers(frames: Sequence[Frame], boxes: Boxes) -> dict[str, object]:
         if k >= SETTLED:
             likely = result.belief.probability.argmax(axis=0)
             states.append(np.bincount(likely.ravel(), minlength=len(State)) / likely.size)
-            semantic.append([result.grid.max(axis=0).mean(), normalised_entropy(result.grid).mean()])
+            semantic.append([result.grid.max(axis=0).mean(), domain.normalised_entropy(result.grid).mean()])
             found.append(moving_hits(result.frame, result.belief, boxes.get(k, []), net.architecture.grid))
     found = np.concatenate(found)
     return {
-        "states": dict(zip((state.name for state in State), map(float, np.mean(states, axis=0)), strict=True)),
-        **dict(zip(("confidence", "entropy"), map(float, np.mean(semantic, axis=0)), strict=True)),
+        "states": dict(zip((state.name for state in State), np.mean(states, axis=0).tolist(), strict=True)),
+        **dict(zip(("confidence", "entropy"), np.mean(semantic, axis=0).tolist(), strict=True)),
         "moving cells": len(found),
         "found": float(found.mean()) if len(found) else None,
     }
@@ -140,13 +132,13 @@ def _grid_numbers(frames: Sequence[Frame], boxes: Boxes) -> dict[str, object]:
 
 def _among_training_images() -> dict[str, object]:
     """Return how far each shipped training image is from the others, largest distance last, and their statistics."""
-    images = training_images()
-    each = [distances([images[k]], images[:k] + images[k + 1 :]) for k in range(len(images))]
+    images = domain.training_images()
+    each = [domain.distances([images[k]], images[:k] + images[k + 1 :]) for k in range(len(images))]
     return {name: sorted(one[name] for one in each) for name in each[0]} | _statistics(images)
 
 
 def _statistics(images: Sequence[NDArray]) -> dict[str, float]:
-    return {name: float(mean) for name, mean in mean_over(images, image_statistics).items()}
+    return {name: float(mean) for name, mean in domain.mean_over(images, domain.image_statistics).items()}
 
 
 def real_drive_table(result: dict) -> str:

@@ -1,4 +1,4 @@
-"""Figures of ground truth made from LIDAR: where it differs from the truth, and its errors by distance (section 4)."""
+"""Figures of lecture 09: where ground truth made from LIDAR differs from the truth, and its errors by distance."""
 
 from collections.abc import Mapping, Sequence
 
