@@ -18,7 +18,7 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import SEGMENTERS
 from semgrid_edu.occupancy import CmcdotParams, Evidence, State, track_drive
 from semgrid_edu.workshop.commands.main import app
-from semgrid_edu.workshop.paper.reports import ablations
+from semgrid_edu.workshop.paper.reports import ablations, reproduce
 from semgrid_edu.workshop.paper.runs.variants import Variant
 
 ROOT = Path(__file__).parents[1]
@@ -83,23 +83,33 @@ def test_the_reader_makes_a_data_set_to_train_on_and_to_score(tmp_path, monkeypa
     assert "network + CRF" in capsys.readouterr().out
 
 
-def test_the_row_of_ablations_is_in_the_plan(tmp_path, monkeypatch):
+@pytest.fixture
+def plan_of(tmp_path, monkeypatch):
+    """What `semgrid-edu reproduce ... --plan` prints; it doesn't try how long a step of each run takes."""
+    monkeypatch.setattr(reproduce, "estimate", lambda plan, root: dict.fromkeys(plan, 1.0))
+
+    def plan(*command):
+        folders = ["--runs", str(tmp_path / "runs"), "--out", str(tmp_path)]
+        shown = CliRunner().invoke(app, ["reproduce", *command, "--plan", *folders])
+        assert shown.exit_code == 0, shown.output
+        return shown.output
+
+    return plan
+
+
+def test_the_row_of_ablations_is_in_the_plan(plan_of, monkeypatch):
     (row,) = re.findall(r'`(".*?": Variant\(.*?\)),`', TEXT)
-    ask = ["reproduce", "ablations", "--plan", "--seeds", "1", "--runs", str(tmp_path / "runs"), "--out", str(tmp_path)]
-    before = CliRunner().invoke(app, ask)
+    assert "compact-3planes" not in plan_of("ablations")
     monkeypatch.setattr(ablations, "VARIANTS", ablations.VARIANTS | eval(f"{{{row}}}", {"Variant": Variant}))
-    after = CliRunner().invoke(app, ask)
-    assert (before.exit_code, after.exit_code) == (0, 0)
-    assert "compact-3planes" not in before.output
-    assert "compact-3planes" in after.output
+    assert "compact-3planes" in plan_of("ablations")
 
 
-def test_the_backbone_gets_a_row_of_table_1(written, tmp_path, monkeypatch):
-    (command,) = re.findall(r"^ +semgrid-edu (reproduce table1 .*)$", TEXT, flags=re.MULTILINE)
+def test_the_backbone_gets_a_row_of_table_1(written, plan_of, monkeypatch):
+    (options,) = re.findall(
+        r"^ +semgrid-edu reproduce table1 (.*) --runs DIR/runs --out DIR/results$", TEXT, re.MULTILINE
+    )
     monkeypatch.setitem(SEGMENTERS, "two-layers", written["TwoLayers"])
-    plan = CliRunner().invoke(app, [*command.replace("DIR", str(tmp_path)).split(), "--plan"])
-    assert plan.exit_code == 0
-    assert "score two-layers compact with CRF" in plan.output
+    assert "score two-layers compact with CRF" in plan_of("table1", *options.split())
 
 
 def test_the_register_finds_the_equation():
