@@ -2,25 +2,28 @@
 
 import importlib
 import re
-from dataclasses import replace
+import tomllib
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import pytest
 import torch
 from npz_drive import CAMERA, write_npz_drives
-from torch import Tensor, nn
+from typer.testing import CliRunner
 
-from semgrid_edu.datasets import training_cache
+from semgrid_edu.datasets import index, training_cache
 from semgrid_edu.datasets.samples import sample_drive
-from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.networks import Segmenter
+from semgrid_edu.networks import SEGMENTERS
 from semgrid_edu.occupancy import CmcdotParams, Evidence, State, track_drive
+from semgrid_edu.workshop.commands.main import app
+from semgrid_edu.workshop.paper.reports import ablations, reproduce
+from semgrid_edu.workshop.paper.runs.variants import Variant
 
-TEXT = (Path(__file__).parents[1] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[1]
+TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+REGISTER = "semgrid_edu/workshop/course/registers.toml"
 
 BLOCKS = [
     re.sub(rf"^{re.match(' *', block)[0]}", "", block, flags=re.MULTILINE)
@@ -34,16 +37,13 @@ def written():
     """What the document's Python code defines, by name."""
     names = {
         "np": np,
-        "nn": nn,
-        "Tensor": Tensor,
-        "ClassVar": ClassVar,
-        "Segmenter": Segmenter,
         "Evidence": Evidence,
         "CmcdotParams": CmcdotParams,
         "track_drive": track_drive,
     }
     for block in BLOCKS:
-        exec(block, names)
+        if "npz_reader" not in block:  # that one is a script
+            exec(block, names)
     return names
 
 
@@ -62,18 +62,69 @@ def test_the_sensor_model_makes_what_it_hits_occupied_and_leaves_the_rest_unknow
     assert (belief.probability[State.UNKNOWN][~hit] > 0.99).all()
 
 
-def test_the_reader_makes_a_training_set(tmp_path, monkeypatch):
-    blocks = [block for block in BLOCKS if "class NpzDrive" in block]
-    if not blocks:
-        pytest.skip("CONTRIBUTING.md has no reader yet")
-    (tmp_path / "contributed_reader.py").write_text(blocks[0])
+def test_the_reader_makes_a_data_set_to_train_on_and_to_score(tmp_path, monkeypatch, capsys):
+    """In the document's own words: its module, its dataset.json and its script, on drives written by hand."""
+    reader, script = (block for block in BLOCKS if "NpzReader" in block)
+    (listed,) = re.findall(r"```json\n(.*?)```", TEXT, flags=re.DOTALL)
+    write_npz_drives(tmp_path / "mine")
+    (tmp_path / "mine" / "dataset.json").write_text(listed)
+    (tmp_path / "npz_reader.py").write_text(reader)
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(index, "READERS", dict(index.READERS))
     monkeypatch.setattr(training_cache, "WORKERS", 1)
-    reader = importlib.import_module("contributed_reader").NpzDrive
-    reader.camera = CAMERA
-    frames = TrainingSet(replace(write_npz_drives(tmp_path), reader=reader), "train", image_size=(24, 80))
+    monkeypatch.setattr(importlib.import_module("npz_reader").NpzReader, "camera", CAMERA)
+    names = {"__name__": "__main__"}
+    exec(script, names)
+    frames = names["frames"]
     assert (len(frames), frames.drives) == (2, ("a", "b"))
     assert {KITTI_14.index("road"), KITTI_14.index("building")} < set(frames[1].truth.unique().tolist())
+    assert len((tmp_path / "runs" / "mine" / "log.csv").read_text().splitlines()) == 3
+    assert "network + CRF" in capsys.readouterr().out
+
+
+@pytest.fixture
+def plan_of(tmp_path, monkeypatch):
+    """What `semgrid-edu reproduce ... --plan` prints; it doesn't try how long a step of each run takes."""
+    monkeypatch.setattr(reproduce, "estimate", lambda plan, root: dict.fromkeys(plan, 1.0))
+
+    def plan(*command):
+        folders = ["--runs", str(tmp_path / "runs"), "--out", str(tmp_path)]
+        shown = CliRunner().invoke(app, ["reproduce", *command, "--plan", *folders])
+        assert shown.exit_code == 0, shown.output
+        return shown.output
+
+    return plan
+
+
+def test_the_row_of_ablations_is_in_the_plan(plan_of, monkeypatch):
+    (row,) = re.findall(r'`(".*?": Variant\(.*?\)),`', TEXT)
+    assert "compact-3planes" not in plan_of("ablations")
+    monkeypatch.setattr(ablations, "VARIANTS", ablations.VARIANTS | eval(f"{{{row}}}", {"Variant": Variant}))
+    assert "compact-3planes" in plan_of("ablations")
+
+
+def test_the_backbone_gets_a_row_of_table_1(written, plan_of, monkeypatch):
+    (options,) = re.findall(
+        r"^ +semgrid-edu reproduce table1 (.*) --runs DIR/runs --out DIR/results$", TEXT, re.MULTILINE
+    )
+    monkeypatch.setitem(SEGMENTERS, "two-layers", written["TwoLayers"])
+    assert "score two-layers compact with CRF" in plan_of("table1", *options.split())
+
+
+def test_the_register_finds_the_equation():
+    registered = {entry["id"]: entry for entry in tomllib.loads((ROOT / REGISTER).read_text())["equation"]}
+    literal = registered["eq-4"]["literal"]
+    assert f"`{literal}`" in TEXT
+    package, _, name = literal.rpartition(".")
+    defined_in = getattr(importlib.import_module(package), name).__module__
+    assert f"`{defined_in.replace('.', '/')}.py`" in TEXT
+
+
+def test_every_path_of_the_package_exists():
+    paths = set(re.findall(r"`((?:semgrid_edu|tests|benchmarks|notebooks)/[\w/.]+)`", TEXT))
+    assert [path for path in paths if not (ROOT / path).exists() and not path.endswith("/two_layers.py")] == []
+    assert len(paths) > 5
 
 
 def test_the_resampling_tracks_a_drive(written):
