@@ -89,13 +89,10 @@ def _ready(waiting: list[Run], under_way: dict[Future, Run], failed: dict[Run, s
 
 def _hopeless(waiting: list[Run], failed: dict[Run, str]) -> list[Run]:
     """Return the runs that need a run that failed, and note so."""
-    found = []
     for run in waiting:  # in order of need, so that one pass finds those that need a hopeless one too
-        lacking = [needed.name for needed in run.needs if needed in failed]
-        if lacking:
+        if lacking := [needed.name for needed in run.needs if needed in failed]:
             failed[run] = f"not done: it needs {lacking[0]}"
-            found.append(run)
-    return found
+    return [run for run in waiting if run in failed]
 
 
 def _error(future: Future) -> str | None:

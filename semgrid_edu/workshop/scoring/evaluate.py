@@ -132,33 +132,33 @@ def scores_of_counts(counted: GridCounts, test: TrainingSet) -> dict[str, object
         for each method, one row per true class), and the "classes".
     """
     truth, *_ = truths_of_frames(test)
-    found = {method: counted.confusions.of(method, truth).counts[method] for method in counted.methods}
-    compared = FrameConfusions(test.drives, found)
-    confusions = {method: compared.total(method) for method in found}
+    counts = {method: counted.confusions.of(method, truth).counts[method] for method in counted.methods}
+    found = FrameConfusions(test.drives, counts)
+    confusions = {method: found.total(method) for method in counts}
     return {
         "scores": scores(confusions, test.label_set),
-        "intervals": intervals(compared, test.label_set) if len(set(test.drives)) > 1 else None,
+        "intervals": intervals(found, test.label_set) if len(set(test.drives)) > 1 else None,
         "confusion": {method: confusion.tolist() for method, confusion in confusions.items()},
         "classes": list(test.label_set.names),
     }
 
 
-def intervals(compared: FrameConfusions, label_set: LabelSet) -> Intervals:
+def intervals(confusions: FrameConfusions, label_set: LabelSet) -> Intervals:
     """Return the confidence intervals of all scores, each for this one network, or baseline, on new drives.
 
     Parameters
     ----------
-    compared : FrameConfusions
+    confusions : FrameConfusions
         Confusion matrices of the frames of two drives or more, by method.
     label_set : LabelSet
         The classes, of which it says which are semantic.
     """
 
-    def ends(confusions: NDArray, metric: Metric) -> list[float | None]:
-        value = score_with_interval(confusions, metric)
+    def ends(by_drive: NDArray, metric: Metric) -> list[float | None]:
+        value = score_with_interval(by_drive, metric)
         return [value["low"], value["mean"], value["high"]]
 
-    return {method: every_metric(ends, label_set, compared.by_drive(method)[None]) for method in compared.counts}
+    return {method: every_metric(ends, label_set, confusions.by_drive(method)[None]) for method in confusions.counts}
 
 
 def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS, semantic_cells
-from semgrid_edu.workshop.scoring.statistics import Interval, drive_interval, paired_interval
+from semgrid_edu.workshop.scoring.statistics import Interval, Metric, drive_interval, paired_interval
 
 ScoreWithInterval = dict[str, object]
 """The "mean" over the seeds, "low" and "high" of its 95 % interval, and the value of each of the "seeds"; None where
@@ -18,7 +18,7 @@ SHOWN_SEEDS = 5
 """With more seeds than this, `shown_seeds` shows only the lowest and the highest value."""
 
 
-def score_with_interval(confusions: NDArray, metric: Callable[[NDArray], float]) -> ScoreWithInterval:
+def score_with_interval(confusions: NDArray, metric: Metric) -> ScoreWithInterval:
     """Return a score.
 
     Parameters
@@ -32,7 +32,7 @@ def score_with_interval(confusions: NDArray, metric: Callable[[NDArray], float])
     return _with_interval(seeds, lambda: drive_interval(confusions, metric))
 
 
-def compared(a: NDArray, b: NDArray, metric: Callable[[NDArray], float]) -> ScoreWithInterval:
+def compared(a: NDArray, b: NDArray, metric: Metric) -> ScoreWithInterval:
     """Return the score of a minus that of b, on the same seeds and drives.
 
     Parameters

@@ -5,7 +5,7 @@ the LIDAR as in the paper.
 """
 
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -37,13 +37,20 @@ def _true(some: Sequence[CountingRun], root: Path, method: str = NETWORK) -> NDA
     return by_seed(some, root, method, "true")
 
 
+def _gains(
+    pairs: Mapping[str, tuple[NDArray, NDArray]], metrics: Mapping[str, Metric] = METRICS, limit: float = 0.0
+) -> list[Statement]:
+    """Return for each pair of methods and each metric the statement that the first is better by more than a limit."""
+    return [
+        Statement(f"{name}{what}", compared(a, b, metric), limit)
+        for what, (a, b) in pairs.items()
+        for name, metric in metrics.items()
+    ]
+
+
 def _order_of_networks(runs: SimpleNamespace, root: Path) -> list[Statement]:
     found = {name: by_seed(some, root, NETWORK, "lidar") for name, some in runs.networks.items()}
-    return [
-        Statement(f"{metric}: {NETWORKS[a]} - {NETWORKS[b]}", compared(found[a], found[b], METRICS[metric]))
-        for a, b in pairwise(NETWORKS)
-        for metric in METRICS
-    ]
+    return _gains({f": {NETWORKS[a]} - {NETWORKS[b]}": (found[a], found[b]) for a, b in pairwise(NETWORKS)})
 
 
 def _effect_of_crf(runs: SimpleNamespace, root: Path) -> list[Statement]:
@@ -153,10 +160,7 @@ def _apart(matrix: NDArray) -> NDArray[np.float64]:
 
 def _effect_of_reduction(runs: SimpleNamespace, root: Path) -> list[Statement]:
     ours, whole = (by_seed(some, root, NETWORK, "lidar") for some in (runs.usual, runs.unreduced))
-    costs = [
-        Statement(f"{name}: with reduction - without", compared(ours, whole, metric), -MARGIN)
-        for name, metric in METRICS.items()
-    ]
+    costs = _gains({": with reduction - without": (ours, whole)}, limit=-MARGIN)
     return [*costs, Statement("share of the time saved", time_saved(runs.times[0].seconds_per_frame(root)))]
 
 
@@ -164,16 +168,12 @@ def _geometry_and_learning(runs: SimpleNamespace, root: Path) -> list[Statement]
     network, off = _true(runs.usual, root), _true(runs.usual_off, root)
     geometry, geometry_off = _true(runs.baselines, root, GEOMETRY), _true(runs.baselines_off, root, GEOMETRY)
     pairs = {
-        "geometry: true image labels - the network's": (_true(runs.baselines, root, TRUE_GEOMETRY), geometry),
-        "geometry: right calibration - wrong one": (geometry, geometry_off),
-        "network - geometry": (network, geometry),
-        "wrong calibration: network - geometry": (off, geometry_off),
+        ", geometry: true image labels - the network's": (_true(runs.baselines, root, TRUE_GEOMETRY), geometry),
+        ", geometry: right calibration - wrong one": (geometry, geometry_off),
+        ", network - geometry": (network, geometry),
+        ", wrong calibration: network - geometry": (off, geometry_off),
     }
-    return [
-        Statement(f"{name}, {what}", compared(a, b, METRICS[name]))
-        for what, (a, b) in pairs.items()
-        for name in ("pixel accuracy", "class accuracy")
-    ]
+    return _gains(pairs, {name: METRICS[name] for name in ("pixel accuracy", "class accuracy")})
 
 
 STATEMENTS: dict[int, Callable[[SimpleNamespace, Path], list[Statement]]] = {

@@ -1,13 +1,12 @@
 """What training on other kinds of ground truth costs: SegNet on the same seeds and test frames (section 4)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from semgrid_edu.datasets.label_policies import POLICIES
 from semgrid_edu.labels import KITTI_14
@@ -30,6 +29,7 @@ from semgrid_edu.workshop.scoring.score_with_interval import (
     score_with_interval,
     shown,
 )
+from semgrid_edu.workshop.scoring.statistics import Metric
 
 USUAL_TRUTH = "lidar"
 """What all others are compared with: the paper's way, which Table 1's networks learn from."""
@@ -146,7 +146,7 @@ def _row(truth: str, runs: dict[str, list[ScoreRun]], labels: LabelsRun, root: P
     networks, usual = runs[truth], runs[USUAL_TRUTH]
     like_usual = labels.confusions(root, LABELS, "lidar").total(LABELS)
 
-    def part(metric: Callable[[NDArray], float], band: str | None = None) -> dict[str, ScoreWithInterval]:
+    def part(metric: Metric, band: str | None = None) -> dict[str, ScoreWithInterval]:
         """Return one score of labels and networks, over cells with a true semantic class."""
         of_labels, ours, theirs = (
             on_cells(by_seed(some, root, method, "true", band), "semantic", KITTI_14)

@@ -90,7 +90,7 @@ class ArraysRun(Run):
     truth: str = "true"
     preset: str = "compact"
     kind = "arrays"
-    size = property(lambda self: f"-{self.preset}" * (self.preset != "compact"))
+    size = property(lambda self: f"-{self.preset}" * (self.preset != "compact"))  # as names say it
     tag = property(lambda self: f"{self.data.tag}-{self.split}-{self.truth}{self.size}")
     pace = property(lambda self: f"arrays {self.preset}")
     trial_seconds = property(lambda self: 0.1 if self.preset == "compact" else 0.5)

@@ -195,8 +195,9 @@ class GridStageRun(TrainingRun):
         net = build_net(self.architecture, camera, self.seed)
         # The file is that of the usual network; of its weights, those of the image network fit every variant.
         _, tensors = read_tensors(self.image_stage.folder(root) / WEIGHTS)
-        parts = {name.partition("."): part for name, part in tensors.items()}
-        net.segmenter.load_state_dict({rest: part for (whose, _, rest), part in parts.items() if whose == "segmenter"})
+        own = "segmenter."
+        learnt = {name.removeprefix(own): part for name, part in tensors.items() if name.startswith(own)}
+        net.segmenter.load_state_dict(learnt)
         return net
 
 
