@@ -97,7 +97,7 @@ class Segmenter(nn.Module, ABC):
 
     @abstractmethod
     def build(self, n_classes: int, **preset: Any) -> None:
-        """Make the layers of one preset; `initialise` draws their first weights afterwards.
+        """Make the layers of one preset; `fresh_weights` draws their first weights afterwards.
 
         Parameters
         ----------
