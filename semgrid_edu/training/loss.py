@@ -81,7 +81,7 @@ def median_frequency_weights(maps: Iterable[NDArray], n_classes: int, limit: flo
     f = class_frequencies(maps, n_classes)
     occurs = f > 0
     if not occurs.any():
-        raise ArgumentError("maps", "at least one labelled cell", "none")
+        raise ArgumentError("maps", "at least one labelled cell or pixel", "none")
     alpha = np.zeros(n_classes)
     alpha[occurs] = np.clip(np.median(f[occurs]) / f[occurs], 1 / limit, limit)
     return alpha
