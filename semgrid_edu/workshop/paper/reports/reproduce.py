@@ -163,7 +163,7 @@ def write_result(name: str, experiment: Experiment, scale: Scale, seeds: int, ro
     records = {run.name: run.record(root) for run in with_needs(experiment.runs(scale, seeds))}
     processes = max(record.get("processes", 1) for record in records.values())
     command = f"semgrid-edu reproduce {name} --scale {scale.name} --seeds {seeds} --runs RUNS --out OUT"
-    made_by = {
+    about = {
         "experiment": name,
         "title": experiment.title,
         "command": command + (f" --processes {processes}" if processes > 1 else ""),
@@ -175,7 +175,7 @@ def write_result(name: str, experiment: Experiment, scale: Scale, seeds: int, ro
         "commits": sorted({str(record["commit"]) for record in records.values()}),
         "versions": versions("numpy", "torch", "numba", "scipy"),
     }
-    result = made_by | experiment.result(scale, seeds, root)
+    result = about | experiment.result(scale, seeds, root)
     text = result_markdown(result, experiment)
     write_json(out / f"{name}.json", result)
     write_text(out / f"{name}.md", text)
