@@ -109,7 +109,7 @@ def read_trials(log: Path, identity: dict) -> list[Trial]:
     """
     content = read_json(log) if log.exists() else identity | {"trials": []}
     found, trials = {name: content.get(name) for name in identity}, content.get("trials")
-    if not isinstance(trials, list):
+    if not isinstance(trials, list) or not identity.keys() <= content.keys():
         raise DataError(log, "the trials of a search, or no file", f"something else: {repr(content)[:200]}")
     if found != identity:
         raise DataError(log, f"trials of the search {identity}", f"{found}: choose another file")

@@ -60,7 +60,7 @@ def visit_labellings(
         raise ArgumentError("unary", f"at most {MOST_LABELLINGS:,} labellings", f"{classes}^{cells}")
     energy = _all_energies(unary.reshape(classes, -1).T, pair_weights(values, params))
     best = np.unravel_index(energy.argmin(), energy.shape)
-    half = cells // 2
+    half = cells // 2  # the sums over either half of the axes are small, and tell the marginals of the other half
     table = np.exp(np.subtract(energy[best], energy, out=energy), out=energy).reshape(classes**half, -1)
     halves = table.sum(axis=1).reshape((classes,) * half), table.sum(axis=0).reshape((classes,) * (cells - half))
     of_cells = [np.moveaxis(sums, k, 0).reshape(classes, -1).sum(axis=1) for sums in halves for k in range(sums.ndim)]
