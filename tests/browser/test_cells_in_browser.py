@@ -117,6 +117,11 @@ class TestMarks:
         assert page.locator("#slider").input_value() == str(FRAME)
 
 
+def turn(yaw):
+    """The rotation from the vehicle's axes to those of the world."""
+    return np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+
+
 class TestChosenCells:
     def test_without_a_cell_the_keys_begin_on_the_road_ahead(self, shipped):
         page = shipped()
@@ -156,10 +161,10 @@ class TestChosenCells:
         told(page, (120, 40))
         for k, view in enumerate(shipped_frames[:10]):
             page.locator("#slider").fill(str(k))
-            then, now = (np.array(shipped_frames[i]["pose"]).reshape(4, 4) for i in (0, k))
-            x, y = SPEC.centers()[120, 40]
-            here = np.linalg.inv(now) @ then @ (x, y, 0, 1)
-            row, col, inside = (one.item() for one in SPEC.cells(here[None, :2]))
+            then, now = (np.array(shipped_frames[i]["pose"]) for i in (0, k))
+            world = turn(then[2]) @ SPEC.centers()[120, 40] + then[:2]
+            here = turn(now[2]).T @ (world - now[:2])
+            row, col, inside = (one.item() for one in SPEC.cells(here[None]))
             if inside:
                 told(page, (row, col))
             else:
@@ -219,9 +224,8 @@ class TestStory:
         for word, step in words.items():
             assert sum(story.steps[step]) == pytest.approx(1)
             assert shown[word] == pytest.approx(100 * story.steps[step], abs=1.01)
-        bands = page.locator("#telling .band").evaluate_all(
-            "(all) => all.map((band) => sum([...band.children].map((part) => parseFloat(part.style.width))))"
-        )
+        width = "[...band.children].reduce((sum, part) => sum + parseFloat(part.style.width), 0)"
+        bands = page.locator("#telling .band").evaluate_all(f"(all) => all.map((band) => {width})")
         assert bands == pytest.approx([100] * len(bands), abs=0.01)
         past = list(rows(page, "#telling details table").values())
         np.testing.assert_allclose(past, 100 * story.history.T, atol=1.01)
