@@ -691,7 +691,7 @@ EXPERIMENTS = (
     Row(
         "another search's trials",
         SEARCH,
-        "log.json: expected trials of the search",
+        "log.json: expected the trials of a search",
         text("log.json", '{"trials": [], "seed": 0}'),
     ),
     Row(
