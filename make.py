@@ -54,8 +54,8 @@ def test() -> None:
     notebooks = [
         str(path.relative_to(CLONE)) for path in sorted([*folder.glob("*.ipynb"), *folder.glob("deeper/*.ipynb")])
     ]
-    # Four processes for two cores: about two of them wait for a kernel, a subprocess or the disk.
-    pool = ("-n", "4", "--dist", "loadfile", "-p", "no:cacheprovider")
+    # Three processes for two cores: one waits for a kernel, a subprocess or the disk most of the time.
+    pool = ("-n", "3", "--dist", "loadfile", "-p", "no:cacheprovider")
     nbval = ("--nbval", "--nbval-current-env", "--nbval-cell-timeout=300")
     _pytest(*pool, *nbval, "--doctest-modules", "semgrid_edu", "tests", "--ignore=tests/browser", *notebooks)
 
