@@ -4,7 +4,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.occupancy.evidence import Sensor, check_sensor
@@ -13,8 +12,6 @@ from semgrid_edu.occupancy.sensor import SensorModel
 from semgrid_edu.occupancy.state import check_fields, check_part, not_negative, positive_count
 
 Rates = tuple[tuple[float, ...], ...]
-AGES = 1e9
-"""Thirty years, in seconds. After so long nothing is remembered; for longer times exp(R dt) would overflow."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +80,12 @@ class WorldModel:
 
 
 def transition_matrix(world: WorldModel, dt: float) -> NDArray[np.float64]:
-    """Return the transition matrix of a time step, M = exp(R dt).
+    """Return the transition matrix of a time step, M = exp(R dt), by uniformisation.
+
+    With r the largest rate at which a state is left, A = (R + r I) dt has no negative entry, and exp(R dt) is the sum
+    of A^k / k! with its rows scaled to 1. The sum is taken over a small part of the time step, which is then doubled.
+    `scipy.linalg.expm` gives the same, but wakes the threads of its BLAS, which go on spinning on the core that the
+    scan is taken in on: a step of the filter took 28 ms with it instead of 18.
 
     Parameters
     ----------
@@ -108,8 +110,18 @@ def transition_matrix(world: WorldModel, dt: float) -> NDArray[np.float64]:
         raise ArgumentError("dt", "seconds, not negative", dt)
     R = np.array(world.rates, dtype=np.float64)
     np.fill_diagonal(R, 0)
-    np.fill_diagonal(R, -R.sum(axis=1))
-    return expm(R * min(dt, AGES)).clip(0, 1)
+    leaving = R.sum(axis=1)
+    np.fill_diagonal(R, leaving.max() - leaving)
+    doublings = max(0, np.frexp(leaving.max())[1] + np.frexp(dt)[1] + 1)
+    A = R * np.ldexp(dt, -doublings)
+    M = np.eye(4)
+    for k in range(14, 0, -1):
+        M = np.eye(4) + A @ M / k
+    M /= M.sum(axis=1, keepdims=True)
+    for _ in range(doublings):
+        M = M @ M
+        M /= M.sum(axis=1, keepdims=True)
+    return M
 
 
 @dataclass(frozen=True)
