@@ -93,23 +93,25 @@ class Cmcdot:
         """
         shift, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
         scan = observe, self.params.sensor, points_grid, pose, self.map_spec, self.spec  # called on another core below
+        steps: dict[str, NDArray[np.float32]] = {}
         with undo_after_errors(self._rng), on_another_core(*scan) as seen:
-            moved = move(self._state, self.map_spec, shift)
-            predicted = predict(moved, self.map_spec, self.params, dt, self._rng)
-            updated = update(predicted, self.map_spec, seen.result().on_map, self.params)
-            resampled = resample(updated, self.map_spec, self.params, self._rng)
-        self._state, self._pose = resampled, pose
-        cells = cells_of(resampled.particles.position, self.map_spec)
-        velocity = velocity_moments(resampled.particles, cells, self.map_spec.shape)
-        belief = local_belief(predicted.probability, velocity, seen.result(), self.map_spec, self.spec, self.params)
-        if not self.keep_steps:
-            return belief
-        states = {"move": moved, "predict": predicted, "update": updated, "resample": resampled}
-        return replace(belief, steps={name: self._in_grid(state, pose) for name, state in states.items()})
+            # One name for what is between two steps: its memory, as large as what the filter keeps, is then used again.
+            state = self._noted(steps, "move", move(self._state, self.map_spec, shift), pose)
+            state = self._noted(steps, "predict", predict(state, self.map_spec, self.params, dt, self._rng), pose)
+            predicted = state.probability
+            state = self._noted(steps, "update", update(state, self.map_spec, seen.result().on_map, self.params), pose)
+            state = self._noted(steps, "resample", resample(state, self.map_spec, self.params, self._rng), pose)
+        self._state, self._pose = state, pose
+        cells = cells_of(state.particles.position, self.map_spec)
+        velocity = velocity_moments(state.particles, cells, self.map_spec.shape)
+        belief = local_belief(predicted, velocity, seen.result(), self.map_spec, self.spec, self.params)
+        return replace(belief, steps=steps)
 
-    def _in_grid(self, state: FilterState, pose: PlanarMotion) -> NDArray[np.float32]:
-        """Look up what the map holds at the centres of the vehicle's own cells."""
-        return look_up(state.probability, NOTHING_KNOWN, self.map_spec, self.spec, pose)
+    def _noted(self, steps: dict[str, NDArray], name: str, state: FilterState, pose: PlanarMotion) -> FilterState:
+        """Return the state; when steps are kept, note what it holds at the centres of the vehicle's own cells."""
+        if self.keep_steps:
+            steps[name] = look_up(state.probability, NOTHING_KNOWN, self.map_spec, self.spec, pose)
+        return state
 
 
 LIDAR_PERIOD = 0.1
