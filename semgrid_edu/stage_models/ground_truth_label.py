@@ -101,7 +101,7 @@ class Counted(NamedTuple):
 
 
 def count_rings(noise: float = 1.0, rings: int = 3, z: int = 4) -> Counted:
-    """Measure how sure one scan makes exact inference, and the package's grid, of the cell of its returns.
+    """Measure the confidence of exact inference, and of the package's grid, in the cell of a scan's returns.
 
     With a pose error of one cell, 20 cm, the package's grid gives the cell P(occupied) = 0.80 after one ring and 0.97,
     its upper bound, after two. The exact probability is 0.40 after one ring and 0.46 after two, and a third ring adds

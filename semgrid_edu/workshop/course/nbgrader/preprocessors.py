@@ -138,15 +138,7 @@ class ExecuteApart(NbGraderPreprocessor):
     seed_by_student = Bool(help="Whether each student's hidden tests draw inputs of their own.").tag(config=True)
 
     def preprocess(self, nb: NotebookNode, resources: ResourcesDict) -> tuple[NotebookNode, ResourcesDict]:
-        """Run one notebook.
-
-        Parameters
-        ----------
-        nb : NotebookNode
-            The notebook.
-        resources : ResourcesDict
-            nbgrader's account of it: student, assignment, gradebook.
-        """
+        """Run one notebook. Parameters are those of `MakeWhole.preprocess`."""
         where, course = resources["nbgrader"], Path(self.course)
         prepared = prepare(course, where["assignment"], self.memory, tuple(self.container))
         with Gradebook(where["db_url"]) as gradebook:

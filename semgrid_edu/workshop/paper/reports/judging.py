@@ -19,16 +19,7 @@ HOLDS = {True: "yes", False: "no", None: "cannot tell"}
 
 
 def judge_claims(scale: Scale, seeds: int, root: Path) -> dict:
-    """Return the verdicts, from runs that have ended.
-
-    Parameters
-    ----------
-    scale : Scale
-        How large they are.
-    seeds : int
-        Number of seeds.
-    root : Path
-        The folder of all runs.
+    """Return the verdicts, from runs that have ended. Parameters are those of `ablations`.
 
     Returns
     -------

@@ -118,16 +118,7 @@ def truth_cost_runs(scale: Scale, seeds: int) -> list[Run]:
 
 
 def truth_costs(scale: Scale, seeds: int, root: Path) -> dict:
-    """Return what training on each kind of labels costs, from runs that have ended.
-
-    Parameters
-    ----------
-    scale : Scale
-        How large they are.
-    seeds : int
-        Number of seeds.
-    root : Path
-        The folder of all runs.
+    """Return what it costs to train on each kind of labels, from ended runs. Parameters are those of `ablations`.
 
     Returns
     -------
