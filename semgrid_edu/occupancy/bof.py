@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.errors import check_shape
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
 from semgrid_edu.occupancy.cellwise import clear_wakes, collide, mix, ratio
@@ -10,7 +11,7 @@ from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.local_belief import local_belief, observe
 from semgrid_edu.occupancy.particles import slow_down
 from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll
-from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State, check_shape
+from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import update
 from semgrid_edu.occupancy.world import WorldModel, transition_matrix
 

@@ -6,9 +6,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, check_fields
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.state import check_fields
 from semgrid_edu.occupancy.world import WorldModel
 
 FINEST = 100

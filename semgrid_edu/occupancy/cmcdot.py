@@ -73,7 +73,7 @@ class Cmcdot:
         ----------
         points_grid : (N, 3+) float
             The scan's returns: x forward, y left, z above the ground on which the vehicle stands (m), in the grid
-            frame of the vehicle now.
+            frame of the vehicle now; then reflectance, where it is known.
         motion : PlanarMotion
             Motion of the vehicle since the last step, metres and radians. At the first step any motion will do, because
             nothing has been seen yet.

@@ -11,10 +11,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, check_shape
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.state import check_part, check_shape
+from semgrid_edu.occupancy.state import check_part
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,8 @@ class Sensor(Protocol):
         ----------
         points : (N, 3+) float32 or float64
             Returns: x forward, y left, z above the ground on which the vehicle stands (m), in the grid frame of the
-            vehicle now. The filters have checked that all are finite. N may be 0.
+            vehicle now; a fourth column, where there is one, is reflectance. The filters have checked that x, y and z
+            are finite. N may be 0.
 
         Returns
         -------

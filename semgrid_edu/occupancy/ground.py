@@ -11,10 +11,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, check_fields, not_negative, positive_count
 from semgrid_edu.occupancy.evidence import check_points
 from semgrid_edu.occupancy.polar import beams_of
-from semgrid_edu.occupancy.state import check_fields, not_negative, positive_count
 
 
 @dataclass(frozen=True)

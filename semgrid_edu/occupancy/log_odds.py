@@ -5,13 +5,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, not_negative
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.evidence import Evidence, Sensor, check_sensor
 from semgrid_edu.occupancy.local_belief import observe
 from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll
 from semgrid_edu.occupancy.sensor import SensorModel
-from semgrid_edu.occupancy.state import not_negative
 
 TINY = np.float32(1e-30)
 """Stands for a likelihood of 0, whose logarithm is infinite. The bounds on P(occupied) make the difference vanish."""

@@ -1,5 +1,6 @@
 """Particles drawn anew: where dynamic mass is, and where it has just come into being (section 3.2, step 4)."""
 
+import math
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -91,15 +92,27 @@ def systematic_resample(weight, count, offset):
     total = 0.0
     for w in weight:  # in the same order as `below`, so that both end at the same number
         total += w
-    cuts = (np.arange(count) + offset) / count * total
-    chosen = np.empty(count, np.int64)
-    last, below = 0, np.float64(weight[0])
-    for m in range(count):
-        while below <= cuts[m] and last < len(weight) - 1:
-            last += 1
-            below += weight[last]
-        chosen[m] = last
-    return chosen
+    points = (np.arange(count) + offset) / count * total
+    chosen = np.zeros(count + 1, np.int64)
+    first, below = 0, 0.0
+    for i in range(len(weight)):
+        chosen[first] = i  # a weight on which no point lies is overwritten by the next
+        below += weight[i]
+        first = _points_below(below, points, below / total * count - offset)
+    for m in range(1, count):
+        chosen[m] = max(chosen[m], chosen[m - 1])
+    return chosen[:count]
+
+
+@njit(cache=True, nogil=True)
+def _points_below(weight, points, expected):
+    """Return how many points lie below a weight: about `expected`, which rounding may have made wrong by one."""
+    n = min(max(math.ceil(expected), 0), len(points))
+    while n > 0 and points[n - 1] >= weight:
+        n -= 1
+    while n < len(points) and points[n] < weight:
+        n += 1
+    return n
 
 
 def draw_again(particles: Particles, count: int, resampling: Resampling, rng: np.random.Generator) -> Particles:
@@ -157,10 +170,20 @@ def draw_newborn(
         M particles anywhere in their cells, with velocities from the prior; none when there is no newborn mass.
     """
     chosen = draw_indices(resampling, newborn.ravel(), count, rng)
-    corner = np.stack(np.unravel_index(chosen, spec.shape), axis=1)
-    position = (spec.x_max, spec.y_max) - (corner + rng.random(corner.shape, np.float32)) * spec.cell
-    velocity = draw_velocities(len(chosen), max_speed, rng)
-    return Particles(position.astype(np.float32), velocity, equal_weights(newborn, len(chosen)))
+    part = rng.random((len(chosen), 2), np.float32)
+    position = _positions(chosen, part, spec.shape[1], spec.x_max, spec.y_max, spec.cell)
+    return Particles(position, draw_velocities(len(chosen), max_speed, rng), equal_weights(newborn, len(chosen)))
+
+
+@njit(cache=True, nogil=True)
+def _positions(cells, part, width, x_max, y_max, cell):
+    """Return the places, (M, 2), at given parts of cells, (M, 2) from 0 to 1, from their corner of largest x and y."""
+    position = np.empty_like(part)
+    for m in range(len(cells)):
+        row, col = divmod(cells[m], width)
+        position[m, 0] = x_max - (row + part[m, 0]) * cell
+        position[m, 1] = y_max - (col + part[m, 1]) * cell
+    return position
 
 
 def draw_velocities(count: int, max_speed: float, rng: np.random.Generator) -> NDArray[np.float32]:

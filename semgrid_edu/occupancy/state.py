@@ -1,7 +1,5 @@
-"""What the filter believes of each cell, four states and a velocity, and checks of arguments (paper, section 3.2)."""
+"""What the filter believes of each cell: four states and a velocity (paper, section 3.2)."""
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
 
@@ -9,7 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, check_shape
 from semgrid_edu.grid import GridSpec
 
 
@@ -149,63 +147,6 @@ def cell_of(x, y, shape, x_max, y_max, cell):
     row, col = np.floor((x_max - x) / cell), np.floor((y_max - y) / cell)
     inside = (row >= 0) & (row < shape[0]) & (col >= 0) & (col < shape[1])  # `and` would branch, and be slower
     return np.int32(row * shape[1] + col if inside else OUTSIDE)
-
-
-def check_shape(name: str, values: NDArray, shape: tuple[int, ...]) -> None:
-    """Refuse an array that doesn't have the shape it should have.
-
-    Parameters
-    ----------
-    name : str
-        Name of the argument, for the error.
-    values : array
-        The array.
-    shape : tuple of int
-        The shape it should have.
-    """
-    if np.shape(values) != shape:
-        raise ArgumentError(name, f"shape {shape}", f"shape {np.shape(values)}")
-
-
-def check_fields(thing: object, expected: str, holds: Callable[[object], bool], *names: str) -> None:
-    """Refuse an object of which some fields don't have the values that they should have.
-
-    Parameters
-    ----------
-    thing : object
-        The object.
-    expected : str
-        What its fields should be, for the error.
-    holds : callable
-        Whether a value is that.
-    *names : str
-        The fields.
-    """
-    for name in names:
-        if not holds(getattr(thing, name)):
-            raise ArgumentError(name, expected, getattr(thing, name))
-
-
-def not_negative(number: float) -> bool:
-    """Tell whether a number is finite and at least 0.
-
-    Parameters
-    ----------
-    number : float
-        Any number.
-    """
-    return math.isfinite(number) and number >= 0
-
-
-def positive_count(number: float) -> bool:
-    """Tell whether a number is whole and at least 1.
-
-    Parameters
-    ----------
-    number : float
-        Any number.
-    """
-    return isinstance(number, int | np.integer) and number >= 1
 
 
 def check_part(name: str, part: object, protocol: type, example: str) -> None:

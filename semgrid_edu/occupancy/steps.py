@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.errors import check_shape
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.cellwise import bayes, clear_wakes, collide, mix, renormalise, rescale_weights
 from semgrid_edu.occupancy.evidence import Evidence
@@ -23,7 +24,7 @@ from semgrid_edu.occupancy.particles import (
 )
 from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up
 from semgrid_edu.occupancy.resampling import draw_again, draw_newborn
-from semgrid_edu.occupancy.state import FilterState, Particles, State, check_shape
+from semgrid_edu.occupancy.state import FilterState, Particles, State
 from semgrid_edu.occupancy.world import CmcdotParams, WorldModel, transition_matrix
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State

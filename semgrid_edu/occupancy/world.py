@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, check_fields, not_negative, positive_count
 from semgrid_edu.occupancy.evidence import Sensor, check_sensor
 from semgrid_edu.occupancy.resampling import Resampling, SystematicResampling
 from semgrid_edu.occupancy.sensor import SensorModel
-from semgrid_edu.occupancy.state import check_fields, check_part, not_negative, positive_count
+from semgrid_edu.occupancy.state import check_part
 
 Rates = tuple[tuple[float, ...], ...]
 

@@ -10,10 +10,9 @@ from itertools import product as every_combination
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, check_fields
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.layout import in_rows
-from semgrid_edu.occupancy.state import check_fields
 from semgrid_edu.stage_models.stage_graph import StageGraph, binary, cut_edges, directed
 
 BINS_PER_CELL = 10

@@ -6,7 +6,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from semgrid_edu.camera import Camera, project
-from semgrid_edu.datasets.training_arrays import resize_image, resize_labels
+from semgrid_edu.datasets.readers.frames import resize_labels
+from semgrid_edu.datasets.training_arrays import resize_image
 
 labels = arrays(np.uint8, (12, 8), elements=st.sampled_from([0, 3, 13, 255]))
 
@@ -23,6 +24,15 @@ def test_label_is_the_most_frequent_of_its_block(labels):
     blocks = labels.reshape(4, 3, 4, 2).swapaxes(1, 2).reshape(16, 6)
     expected = [max(sorted(set(block)), key=list(block).count) for block in blocks.tolist()]
     np.testing.assert_array_equal(resize_labels(labels, (4, 4)).ravel(), expected)
+
+
+@settings(deadline=None)
+@given(labels)
+def test_sparse_labels_outvote_what_is_unlabelled(labels):
+    blocks = labels.reshape(4, 3, 4, 2).swapaxes(1, 2).reshape(16, 6)
+    known = [[c for c in block if c != 255] or [255] for block in blocks.tolist()]
+    expected = [max(sorted(set(block)), key=block.count) for block in known]
+    np.testing.assert_array_equal(resize_labels(labels, (4, 4), sparse=True).ravel(), expected)
 
 
 @given(labels)

@@ -183,6 +183,19 @@ def test_the_vehicles_own_bonnet_is_no_obstacle(evidence_of):
     np.testing.assert_array_equal(with_bonnet.free, evidence_of(ground, spec, SENSOR).free)
 
 
+@TWINS
+@pytest.mark.parametrize(
+    ("y", "reflectance", "obstacles"),
+    [(1.35, 0.0, 0), (1.35, 0.01, 1), (2.1, 0.0, 1), (1.35, None, 1)],
+    ids=["split beam", "something beside the vehicle", "beyond a pulse", "no reflectance known"],
+)
+def test_a_beam_that_the_vehicles_edge_splits_is_no_obstacle(evidence_of, y, reflectance, obstacles):
+    """It merges two echoes closer than half a pulse, 0.75 m, and brings no light back."""
+    returns = np.array([[3.75, 0.25, 0.0, 0.3], [1.4, y, 1.0, reflectance or 0]])[:, : 3 if reflectance is None else 4]
+    evidence = evidence_of(returns, GridSpec(0, 4, -3, 3, 0.5), SENSOR)
+    assert (evidence.occupied > evidence.free).sum() == obstacles
+
+
 def test_wide_gaps_stay_blind_and_narrow_ones_see_no_farther_than_their_neighbours():
     reach = np.array([0.0, 7.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0, 9.0])
     assert fill_gaps(reach, 2).tolist() == [7.0, 7.0, 4.0, 4.0, 4.0, 0.0, 0.0, 0.0, 9.0]
@@ -214,6 +227,7 @@ def test_what_is_no_scan_is_refused_by_name(evidence_of, points):
         {"obstacle_min": 3},
         {"vehicle": (3, -2, -1, 1)},
         {"vehicle": (0, 1, 2)},
+        {"edge": -0.1},
         {"under": -1.0},
         {"column_spacing": np.nan},
         {"column_spacing": -0.1},

@@ -6,13 +6,14 @@ The last three functions are the rules that the BOF shares with CMCDOT.
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.errors import check_shape
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof import origins, whole_cells
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
 from semgrid_edu.occupancy.cellwise import CERTAIN, ratio
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.literal.particles import slow_down_literal
-from semgrid_edu.occupancy.state import Particles, State, check_shape
+from semgrid_edu.occupancy.state import Particles, State
 from semgrid_edu.occupancy.world import transition_matrix
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.errors import check_shape
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.cellwise import ratio
 from semgrid_edu.occupancy.evidence import Evidence
@@ -17,6 +18,7 @@ from semgrid_edu.occupancy.literal.particles import (
     SystematicResamplingLiteral,
     cells_at_literal,
     cells_of_literal,
+    draw_newborn_literal,
     fly_literal,
     scale_in_cells_literal,
     slow_down_literal,
@@ -24,8 +26,8 @@ from semgrid_edu.occupancy.literal.particles import (
     weight_in_cells_literal,
 )
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.resampling import SystematicResampling, draw_again, draw_newborn
-from semgrid_edu.occupancy.state import OUTSIDE, FilterState, Particles, State, check_shape
+from semgrid_edu.occupancy.resampling import SystematicResampling, draw_again
+from semgrid_edu.occupancy.state import OUTSIDE, FilterState, Particles, State
 from semgrid_edu.occupancy.world import CmcdotParams, WorldModel, transition_matrix
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
@@ -181,7 +183,7 @@ def resample_literal(state: FilterState, spec: GridSpec, params: CmcdotParams, r
     births, how = round(params.birth_share * params.n_particles), params.resampling
     how = SystematicResamplingLiteral() if isinstance(how, SystematicResampling) else how
     old = draw_again(state.particles, params.n_particles - births, how, rng)
-    new = draw_newborn(state.newborn, spec, births, params.max_speed, how, rng)
+    new = draw_newborn_literal(state.newborn, spec, births, params.max_speed, how, rng)
     position, velocity = np.vstack([old.position, new.position]), np.vstack([old.velocity, new.velocity])
     weight, cells = np.append(old.weight, new.weight), cells_of_literal(position, spec)
     carried = weight_in_cells_literal(weight, cells, spec.shape)

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.cellwise import ratio
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
+from semgrid_edu.occupancy.resampling import Resampling, draw_indices, draw_velocities, equal_weights
 from semgrid_edu.occupancy.state import OUTSIDE, Particles
 
 
@@ -90,6 +91,25 @@ def systematic_resample_literal(weight: NDArray, count: int, offset: float) -> N
     ends = np.cumsum(weight, dtype=np.float64)
     points = (np.arange(count) + offset) / count * ends[-1]
     return np.minimum(np.searchsorted(ends, points, side="right"), len(weight) - 1)
+
+
+def draw_newborn_literal(
+    newborn: NDArray,
+    spec: GridSpec,
+    count: int,
+    max_speed: float,
+    resampling: Resampling,
+    rng: np.random.Generator,
+) -> Particles:
+    """Draw new particles in proportion to each cell's newborn mass: the literal twin of `draw_newborn`.
+
+    Parameters and result are those of `draw_newborn`, and so are the random numbers that are drawn.
+    """
+    chosen = draw_indices(resampling, newborn.ravel(), count, rng)
+    corner = np.stack(np.unravel_index(chosen, spec.shape), axis=1)
+    position = (spec.x_max, spec.y_max) - (corner + rng.random(corner.shape, np.float32)) * spec.cell
+    velocity = draw_velocities(len(chosen), max_speed, rng)
+    return Particles(position.astype(np.float32), velocity, equal_weights(newborn, len(chosen)))
 
 
 class SystematicResamplingLiteral:
