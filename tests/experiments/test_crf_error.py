@@ -95,7 +95,7 @@ def test_with_every_cell_a_landmark_it_is_the_naive_one(normalization):
     spatial = gram_matrix(values, CrfParams(0, 1, 2, 0.3, 2, normalization))
     exact = gram_matrix(values, params) - spatial
     np.testing.assert_allclose(kernel(np.eye(42, dtype=np.float32)), exact, atol=1e-5)
-    found = mean_field_low_rank(unary, values, params, rank=1000, seed=0)
+    found = mean_field_low_rank(unary, values, params, 10, 0.0, rank=1000, seed=0)
     np.testing.assert_allclose(found, mean_field_naive(unary, values, params), atol=1e-4)
 
 

@@ -121,13 +121,13 @@ def test_interrupted_it_goes_on_to_the_same_result(found, inputs, tmp_path, monk
     resumed = crf_search.search_crf(*inputs, log, n_trials=TRIALS)
     assert resumed["trials"] == found["trials"]
     assert resumed["test"] == found["test"]
-    with pytest.raises(DataError, match=r"log\.json: expected trials of the search .*choose another file"):
+    with pytest.raises(DataError, match=r"log\.json: expected a result of .*choose another file"):
         crf_search.search_crf(*inputs, log, seed=1, n_trials=TRIALS)
 
 
 def test_a_file_that_holds_something_else_is_not_overwritten(inputs, tmp_path):
     (tmp_path / "notes.json").write_text("{}")
-    with pytest.raises(DataError, match="the trials of a search"):
+    with pytest.raises(DataError, match="a result of this experiment"):
         crf_search.search_crf(*inputs, tmp_path / "notes.json", n_trials=1)
     assert (tmp_path / "notes.json").read_text() == "{}"
 

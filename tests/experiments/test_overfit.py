@@ -58,7 +58,7 @@ def test_accuracy_is_of_labelled_cells_in_either_mode(streets):
 
 def test_every_step_sees_the_frames_as_they_are(streets):
     for k in range(8):
-        arguments = streets, overfit.FRAMES, overfit.PARAMS.jitter, k, 0
+        arguments = streets, overfit.PARAMS.batch_size, overfit.PARAMS.jitter, k, 0
         batch = draw_batch(*arguments, overfit.PARAMS.mirror)
         assert not batch.mirrored
         assert sorted(image.sum().item() for image in batch.frames.image) == pytest.approx(

@@ -16,7 +16,9 @@ from pathlib import Path
 
 from nbgrader.utils import determine_grade, is_grade, is_solution
 from nbgrader_scores import CellScore, error_message
+from numba.core.caching import UserProvidedCacheLocator
 
+from semgrid_edu.storage.compiled import PACKAGE
 from semgrid_edu.workshop.course.nbgrader.autograde import submission
 from semgrid_edu.workshop.course.nbgrader.preprocessors import instructors_cells, use_instructor
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
@@ -44,12 +46,21 @@ def _score(cell):
     return CellScore(points, score, error_message(cell))
 
 
+def share_compiled(folder):
+    """Copy what numba keeps beside the package's modules to where a process looks that keeps it in `folder`."""
+    for file in PACKAGE.rglob("__pycache__/*.nb[ic]"):
+        place = folder / UserProvidedCacheLocator.get_suitable_cache_subpath(str(file.parents[1] / "module.py"))
+        place.mkdir(parents=True, exist_ok=True)
+        shutil.copy(file, place)
+
+
 @contextmanager
 def warm_processes(source, prepared):
     """Start a server for an exercise; give a function that returns a new process.
 
     `prepared` is the folder of what is compiled already, and takes what the server compiles.
     """
+    share_compiled(prepared)
     use_instructor(NOTEBOOKS / "instructor")
     if not hasattr(os, "pidfd_open"):
         yield lambda: StudentProcess(Limits(), prepared)

@@ -4,12 +4,14 @@ Each function returns one sentence per problem, with the name of the notebook or
 """
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import nbformat
 from nbformat import NotebookNode
 from nbgrader.utils import is_grade
 
+from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.course.nbgrader.build import exercise_sources, student_version
 from semgrid_edu.workshop.course.notebooks.build import (
     NOTEBOOKS,
@@ -33,29 +35,9 @@ MAX_BYTES = 2_000_000
 MAX_BYTES_TOGETHER = 16_000_000
 """Largest size of all notebooks together, bytes, so that the project is quick to clone."""
 
-COMMON_PARTS = {
-    "a thesis": r"\*\*In one sentence\.\*\*",
-    "what the student will be able to do": r"\*\*You will be able to\*\*",
-    "prerequisites": r"\*\*Prerequisites\.\*\*",
-    "minutes": r"\*\*Time\.\*\* \d+ minutes",
-    "further reading": r"^## Further reading",
-}
-
-LECTURE_PARTS = COMMON_PARTS | {
-    "the paper's sections and equations": r"\*\*Paper\.\*\*",
-    "a prediction": r"\*\*Predict before you run\.\*\*(?s:.*?)<details><summary>Answer</summary>",
-    "a failure": r"^## Where this breaks",
-    "a summary": r"^## In five lines",
-    "the link to its exercise": r"\]\(exercises/\d\d_\w+\.ipynb\)",
-    "something to play with": r"\binteract\(",
-}
-"""The parts of a lecture, and how each is recognised in its source."""
-
-COMPANION_PARTS = COMMON_PARTS | {
-    "a limit": r"^## (Where this breaks|What this does not show)",
-    "the link back to its lecture or exercise": r"\]\(\.\./(exercises/)?\w+\.ipynb\)",
-}
-"""The parts of a companion, and how each is recognised in its source."""
+_PARTS = table_beside(__file__)
+LECTURE_PARTS, COMPANION_PARTS = (_PARTS["common"] | _PARTS[kind] for kind in ("lecture", "companion"))
+"""The parts of a lecture and of a companion, and how each is recognised in its source."""
 
 COMPANION_RULES = {name: rule for name, rule in RULES.items() if name != "length"}
 """The rules for a companion. It may be long, because students choose whether to read it."""
@@ -85,7 +67,7 @@ def companion_problems(source: Path) -> list[str]:
         The source, `notebooks/src/deeper/NAME.py`. The executed notebook is looked for where `built_path` puts it.
     """
     name = f"{notebook_name(source)}.ipynb"
-    problems = _problems(source, COMPANION_PARTS, COMPANION_RULES)
+    problems = [*_problems(source, COMPANION_PARTS, COMPANION_RULES)]
     if not any(f"]({name})" in lecture.read_text(encoding="utf-8") for lecture in source.parents[1].glob("*.py")):
         problems.append(f"no lecture links to it; write ]({name}) where it helps")
     return [f"{name}: {problem}" for problem in problems]
@@ -103,7 +85,7 @@ def exercise_problems(source: Path) -> list[str]:
     if not path.is_file():
         return [f"exercises/{path.name}: not built; run `semgrid-edu course notebooks`"]
     notebook = nbformat.read(path, as_version=4)
-    problems = text_problems(notebook, path.parent)
+    problems = [*text_problems(notebook, path.parent)]
     if notebook != student_version(source):
         problems.append(f"differs from src/exercises/{source.name}; run `semgrid-edu course notebooks {source.stem}`")
     return [f"exercises/{path.name}: {problem}" for problem in problems]
@@ -131,7 +113,7 @@ def course_problems(folder: Path = NOTEBOOKS) -> list[str]:
     return problems
 
 
-def text_problems(notebook: NotebookNode, folder: Path) -> list[str]:
+def text_problems(notebook: NotebookNode, folder: Path) -> Iterator[str]:
     """List long cells, paths of a machine and links that lead nowhere.
 
     Parameters
@@ -141,51 +123,49 @@ def text_problems(notebook: NotebookNode, folder: Path) -> list[str]:
     folder : Path
         The folder of the notebook, to which its links are relative.
     """
-    problems = []
     for cell in notebook.cells:
         name = cell.metadata.get("nbgrader", {}).get("grade_id") or cell.source.strip().split("\n")[0][:60]
         lines = len(cell.source.splitlines())
         most = MAX_TEST_LINES if is_grade(cell) else MAX_LINES
         if cell.cell_type == "code" and lines > most:
-            problems.append(f"cell '{name}' has {lines} lines, more than {most}")
+            yield f"cell '{name}' has {lines} lines, more than {most}"
         for found in MACHINE.findall(cell.source + _printed(cell)):
-            problems.append(f"cell '{name}' names a path of one machine: {found}")
+            yield f"cell '{name}' names a path of one machine: {found}"
         for target in LINK.findall(_shown(cell)):
             if not (folder / target).exists():
-                problems.append(f"cell '{name}' links to {target}, which does not exist")
-    return problems
+                yield f"cell '{name}' links to {target}, which does not exist"
 
 
-def _problems(source: Path, parts: dict[str, str], rules: dict[str, Rule]) -> list[str]:
+def _problems(source: Path, parts: dict[str, str], rules: dict[str, Rule]) -> Iterator[str]:
     """List what is wrong with a lecture or a companion; they differ in the parts they need and the rules they keep."""
     wanted, path, name = read_percent(source), built_path(source), notebook_name(source)
     text = "\n\n".join(cell.source for cell in wanted.cells)
-    problems = [f"lacks {part}" for part, pattern in parts.items() if not re.search(pattern, text, re.MULTILINE)]
+    yield from (f"lacks {part}" for part, pattern in parts.items() if not re.search(pattern, text, re.MULTILINE))
     if not path.is_file():
-        return [*problems, "not built; run `semgrid-edu course notebooks`"]
+        yield "not built; run `semgrid-edu course notebooks`"
+        return
     notebook = nbformat.read(path, as_version=4)
     if _inputs(notebook) != _inputs(wanted):
-        problems.append(f"differs from src/{name}.py; run `semgrid-edu course notebooks {source.stem}`")
+        yield f"differs from src/{name}.py; run `semgrid-edu course notebooks {source.stem}`"
     if path.stat().st_size > MAX_BYTES:
-        problems.append(f"{path.stat().st_size / 1e6:.1f} MB, more than {MAX_BYTES / 1e6} MB")
+        yield f"{path.stat().st_size / 1e6:.1f} MB, more than {MAX_BYTES / 1e6} MB"
     for number, cell in enumerate((c for c in notebook.cells if c.cell_type == "code"), start=1):
-        problems += [f"code cell {number} {problem}" for problem in _run_problems(cell, number)]
-    return problems + text_problems(notebook, path.parent) + rule_problems(notebook, rules, WAIVERS.get(name, ()))
+        yield from (f"code cell {number} {problem}" for problem in _run_problems(cell, number))
+    yield from text_problems(notebook, path.parent)
+    yield from rule_problems(notebook, rules, WAIVERS.get(name, ()))
 
 
-def _run_problems(cell: NotebookNode, number: int) -> list[str]:
+def _run_problems(cell: NotebookNode, number: int) -> Iterator[str]:
     """List the signs that a code cell didn't run in its turn, or raised an error, or gave a warning."""
-    problems = []
     if cell.execution_count != number:
-        problems.append(f"has execution count {cell.execution_count}; execute the whole notebook in order")
+        yield f"has execution count {cell.execution_count}; execute the whole notebook in order"
     for output in cell.outputs:
         if output.output_type == "error":
-            problems.append(f"ends in an error: {output.ename}: {output.evalue}")
+            yield f"ends in an error: {output.ename}: {output.evalue}"
         if output.output_type == "stream" and output.name == "stderr":
-            problems.append(f"writes to stderr: {output.text.strip()[:80]}")
+            yield f"writes to stderr: {output.text.strip()[:80]}"
     if ADDRESS.search(_printed(cell)):
-        problems.append("prints the address of an object; end a plot cell with plt.show()")
-    return problems
+        yield "prints the address of an object; end a plot cell with plt.show()"
 
 
 def _printed(cell: NotebookNode) -> str:

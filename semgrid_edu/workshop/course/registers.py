@@ -1,11 +1,10 @@
 """The two registers of the course, in `registers.toml`: the paper's equations, and each stage's graphical model."""
 
-import tomllib
 from dataclasses import dataclass
 from importlib import import_module
-from pathlib import Path
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.storage.files import table_beside
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ class StageModel:
     lecture: str | None = None
 
 
-_tables = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+_tables = table_beside(__file__)
 
 EQUATIONS = tuple(Equation(**entry) for entry in _tables["equation"])
 """All equations and procedures, in the order of the paper."""

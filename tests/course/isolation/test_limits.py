@@ -87,7 +87,7 @@ def test_no_socket_of_any_kind(limited, kind):
 
 
 def test_calls_that_were_given_up_are_refused(session):
-    calls = linux.REFUSED_CALLS.get(platform.machine(), {})
+    calls = linux.PROCESSORS.get(platform.machine(), {"refused": {}})["refused"]
     session.run(
         "import ctypes\nlibc = ctypes.CDLL(None, use_errno=True)\ndef try_call(number):\n"
         "    ctypes.set_errno(0)\n    return libc.syscall(number, 0, 0, 0, 0, 0), ctypes.get_errno()\n"

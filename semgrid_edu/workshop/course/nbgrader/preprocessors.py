@@ -21,6 +21,7 @@ from traitlets import List as ListTrait
 
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.compiled import takes_files, user_cache
+from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.notebook import INSTRUCTOR, cell_name, run_submission
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
@@ -28,11 +29,7 @@ from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 CRASHED = "Crashed: "
 """How a comment begins that says what ended Python."""
 
-SHOWN_TAGS = (
-    *bleach.ALLOWED_TAGS,
-    *("br", "dd", "del", "div", "dl", "dt", "h1", "h2", "h3", "h4", "h5", "h6", "hr", "img", "p", "pre", "s", "span"),
-    *("sub", "sup", "table", "tbody", "td", "th", "thead", "tr"),
-)
+SHOWN_TAGS = (*bleach.ALLOWED_TAGS, *table_beside(__file__)["tags"])
 """The HTML that Markdown becomes, and nothing that runs."""
 
 KEPT = ("kernelspec", "language_info")

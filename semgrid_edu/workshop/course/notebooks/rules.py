@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from nbformat import NotebookNode
 
 from semgrid_edu.plotting import FIGURE_DPI, MAX_ANIMATION_BYTES
+from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.course.notebooks.figures import PNG, alternative_text, figures, moves, png_bytes, resolution
 from semgrid_edu.workshop.course.notebooks.minutes import PREDICTION, reading_time, stated_minutes
 
@@ -19,7 +20,7 @@ MIN_ALT_WORDS = 4
 HEADING = re.compile(r"^#{1,6} ", re.MULTILINE)
 
 
-def dishonest_minutes(notebook: NotebookNode) -> list[str]:
+def dishonest_minutes(notebook: NotebookNode) -> Iterator[str]:
     """Report a header that states fewer minutes than `reading_time` computes.
 
     Parameters
@@ -28,12 +29,11 @@ def dishonest_minutes(notebook: NotebookNode) -> list[str]:
         An executed notebook.
     """
     needed, stated = round(reading_time(notebook).minutes), stated_minutes(notebook)
-    if stated is None or stated >= needed:
-        return []
-    return [f"states {stated} minutes and takes {needed}; `semgrid-edu course minutes NAME` shows where they go"]
+    if stated is not None and stated < needed:
+        yield f"states {stated} minutes and takes {needed}; `semgrid-edu course minutes NAME` shows where they go"
 
 
-def too_long(notebook: NotebookNode) -> list[str]:
+def too_long(notebook: NotebookNode) -> Iterator[str]:
     """Report a lecture of more than `MAX_MINUTES` minutes.
 
     Parameters
@@ -42,12 +42,11 @@ def too_long(notebook: NotebookNode) -> list[str]:
         An executed notebook.
     """
     needed = round(reading_time(notebook).minutes)
-    if needed <= MAX_MINUTES:
-        return []
-    return [f"takes {needed} minutes, more than {MAX_MINUTES}; move what is beside the path to a companion"]
+    if needed > MAX_MINUTES:
+        yield f"takes {needed} minutes, more than {MAX_MINUTES}; move what is beside the path to a companion"
 
 
-def answers_in_sight(notebook: NotebookNode) -> list[str]:
+def answers_in_sight(notebook: NotebookNode) -> Iterator[str]:
     """Report a cell that shows the answer to a prediction before the reader has asked for it.
 
     The answer is taken to be the first code cell with output below the prediction. If a heading comes before that
@@ -58,7 +57,7 @@ def answers_in_sight(notebook: NotebookNode) -> list[str]:
     notebook : NotebookNode
         An executed notebook.
     """
-    problems, open_question = [], False
+    open_question = False
     for cell in notebook.cells:
         if cell.cell_type == "markdown":
             _, asked, after = cell.source.rpartition(PREDICTION)
@@ -67,11 +66,10 @@ def answers_in_sight(notebook: NotebookNode) -> list[str]:
             open_question = False
             if not _collapsed(cell, "outputs_hidden"):
                 remedy = 'give it jupyter={"outputs_hidden": true}'
-                problems.append(f"cell {_first_line(cell)} shows the answer to a prediction; {remedy}")
-    return problems
+                yield f"cell {_first_line(cell)} shows the answer to a prediction; {remedy}"
 
 
-def plot_code_in_sight(notebook: NotebookNode) -> list[str]:
+def plot_code_in_sight(notebook: NotebookNode) -> Iterator[str]:
     """Report plot code that isn't collapsed: a cell with a figure that defines, asserts and prints nothing.
 
     Parameters
@@ -79,14 +77,12 @@ def plot_code_in_sight(notebook: NotebookNode) -> list[str]:
     notebook : NotebookNode
         An executed notebook.
     """
-    return [
-        f'cell {_first_line(cell)} only plots; give it jupyter={{"source_hidden": true}}'
-        for cell in notebook.cells
-        if any(figures(cell)) and _only_plots(cell.source) and not _collapsed(cell, "source_hidden")
-    ]
+    for cell in notebook.cells:
+        if any(figures(cell)) and _only_plots(cell.source) and not _collapsed(cell, "source_hidden"):
+            yield f'cell {_first_line(cell)} only plots; give it jupyter={{"source_hidden": true}}'
 
 
-def missing_alternative_texts(notebook: NotebookNode) -> list[str]:
+def missing_alternative_texts(notebook: NotebookNode) -> Iterator[str]:
     """Report a figure whose alternative text is missing or too short to describe it.
 
     Parameters
@@ -94,16 +90,14 @@ def missing_alternative_texts(notebook: NotebookNode) -> list[str]:
     notebook : NotebookNode
         An executed notebook.
     """
-    problems = []
     for cell, figure in _figures(notebook):
         words = len(alternative_text(cell, figure).split())
         if words < MIN_ALT_WORDS:
             found = f"one of {words} words" if words else "none"
-            problems.append(f'the figure of cell {_first_line(cell)} needs an alternative text, alt="...", has {found}')
-    return problems
+            yield f'the figure of cell {_first_line(cell)} needs an alternative text, alt="...", has {found}'
 
 
-def coarse_figures(notebook: NotebookNode) -> list[str]:
+def coarse_figures(notebook: NotebookNode) -> Iterator[str]:
     """Report figures of fewer dots per inch than `FIGURE_DPI`.
 
     Parameters
@@ -111,15 +105,13 @@ def coarse_figures(notebook: NotebookNode) -> list[str]:
     notebook : NotebookNode
         An executed notebook.
     """
-    problems = []
     for cell, figure in _figures(notebook):
         dpi = resolution(png_bytes(figure)) if PNG in figure.data else None
         if dpi is not None and dpi < FIGURE_DPI:
-            problems.append(f"the figure of cell {_first_line(cell)} has {dpi} dots per inch, not {FIGURE_DPI}")
-    return problems
+            yield f"the figure of cell {_first_line(cell)} has {dpi} dots per inch, not {FIGURE_DPI}"
 
 
-def unfit_animations(notebook: NotebookNode) -> list[str]:
+def unfit_animations(notebook: NotebookNode) -> Iterator[str]:
     """Report animations of more than `MAX_ANIMATION_BYTES`, and kinds of images that only JupyterLab shows.
 
     Parameters
@@ -127,19 +119,17 @@ def unfit_animations(notebook: NotebookNode) -> list[str]:
     notebook : NotebookNode
         An executed notebook.
     """
-    problems = []
     for cell, figure in _figures(notebook):
         name = _first_line(cell)
         for kind in {"image/gif", "image/webp"} & set(figure.data):
-            problems.append(f"cell {name} shows {kind}, which nbconvert leaves out; use plotting.animate")
+            yield f"cell {name} shows {kind}, which nbconvert leaves out; use plotting.animate"
         if PNG in figure.data and moves(png := png_bytes(figure)) and len(png) > MAX_ANIMATION_BYTES:
             limit = f"{MAX_ANIMATION_BYTES // 1000} kB"
-            problems.append(f"the animation of cell {name} has {len(png) // 1000} kB, more than {limit}")
-    return problems
+            yield f"the animation of cell {name} has {len(png) // 1000} kB, more than {limit}"
 
 
-Rule = Callable[[NotebookNode], list[str]]
-"""A function that takes an executed notebook and returns what is wrong, one sentence per problem."""
+Rule = Callable[[NotebookNode], Iterator[str]]
+"""A function that takes an executed notebook and yields what is wrong, one sentence per problem."""
 
 RULES: dict[str, Rule] = {
     "minutes": dishonest_minutes,
@@ -152,20 +142,8 @@ RULES: dict[str, Rule] = {
 }
 """All rules, by the names that waivers use."""
 
-NOT_YET = frozenset({"predictions", "plot code", "alternative texts", "resolution"})
-
-WAIVERS: Mapping[str, frozenset[str]] = {
-    "00_tour": NOT_YET,
-    "01_bayes": frozenset({"alternative texts"}),
-    "02_grids": NOT_YET - {"resolution"} | {"length"},
-    "03_bof": NOT_YET - {"resolution"} | {"length"},
-    "04_cmcdot": NOT_YET | {"length"},
-    "05_pixels": NOT_YET | {"length"},
-    "06_planes": NOT_YET | {"length"},
-    "07_segmentation": NOT_YET | {"length"},
-    "08_fusion": NOT_YET | {"length"},
-}
-"""The rules that each lecture may break until its second edition. A waiver that isn't needed is a problem too."""
+WAIVERS: Mapping[str, tuple[str, ...]] = table_beside(__file__)
+"""The rules that each lecture may break, from `rules.toml`."""
 
 
 def _figures(notebook: NotebookNode) -> Iterator[tuple[NotebookNode, NotebookNode]]:
@@ -208,8 +186,8 @@ def rule_problems(notebook: NotebookNode, rules: Mapping[str, Rule] = RULES, wai
     """
     problems = []
     for name, rule in rules.items():
-        found = rule(notebook)
+        found = [*rule(notebook)]
         if name in waived and not found:
-            problems.append(f"keeps the rule on {name}; take its waiver out of workshop/course/notebooks/rules.py")
+            problems.append(f"keeps the rule on {name}; take its waiver out of workshop/course/notebooks/rules.toml")
         problems += [] if name in waived else found
     return problems

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import semgrid_edu
+from semgrid_edu.storage.files import table_beside
 from semgrid_edu.storage.provenance import shipped_folder
 from semgrid_edu.workshop.course.sandbox import linux
 
@@ -15,10 +16,7 @@ PARTS = ("memory", "written files", "processes", "files", "network", "signals")
 
 MEGABYTE = 1_000_000
 
-SYSTEM = (
-    *("/usr", "/lib", "/lib32", "/lib64", "/bin", "/sbin", "/sys", "/proc", "/dev/urandom", "/dev/random", "/dev/zero"),
-    *("/etc/fonts", "/etc/group", "/etc/ld.so.cache", "/etc/localtime", "/etc/nsswitch.conf", "/etc/passwd"),
-)
+SYSTEM: tuple[str, ...] = table_beside(__file__)["system"]
 """What programs need of a Linux system."""
 
 

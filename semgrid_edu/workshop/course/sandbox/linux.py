@@ -12,6 +12,8 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
+from semgrid_edu.storage.files import table_beside
+
 NO_NEW_PRIVILEGES = 38
 """The argument of prctl without which the kernel refuses both."""
 
@@ -28,25 +30,8 @@ OF_FILES = EXECUTE | 1 << 1 | READ_FILE | TRUNCATE | DEVICE_CONTROL
 FILE_RIGHTS = {1: (1 << 13) - 1, 2: (1 << 14) - 1, 3: (1 << 15) - 1, 4: (1 << 15) - 1, 5: (1 << 16) - 1}
 """All rights to files that a version of Landlock knows; later versions know those of version 5."""
 
-REFUSED_CALLS = {
-    "x86_64": {
-        **{"socket": 41, "shmget": 29, "semget": 64, "msgget": 68, "ptrace": 101, "mount": 165, "mq_open": 240},
-        **{"add_key": 248, "request_key": 249, "keyctl": 250, "unshare": 272, "perf_event_open": 298, "setns": 308},
-        **{"memfd_create": 319, "bpf": 321, "userfaultfd": 323},
-    },
-    "aarch64": {
-        **{"socket": 198, "shmget": 194, "semget": 190, "msgget": 186, "ptrace": 117, "mount": 40, "mq_open": 180},
-        **{"add_key": 217, "request_key": 218, "keyctl": 219, "unshare": 97, "perf_event_open": 241, "setns": 268},
-        **{"memfd_create": 279, "bpf": 280, "userfaultfd": 282},
-    },
-}
-"""The calls that seccomp refuses, by processor: they reach other processes, outlive this one, or hide what it takes."""
-
-IO_URING = (425, 426, 427)
-"""io_uring_setup, io_uring_enter and io_uring_register, the same on every processor, are refused too."""
-
-AUDIT = {"x86_64": 0xC000003E, "aarch64": 0xC00000B7}
-"""The numbers of the processors' own calls; calls of another kind, such as 32-bit ones, are all refused."""
+PROCESSORS = table_beside(__file__)
+"""By processor the number of its own calls ("audit"), and those that seccomp refuses, by name ("refused")."""
 
 LOAD, EQUAL, AT_LEAST, RETURN = 0x20, 0x15, 0x35, 0x06
 """The four instructions of the filter: load a word, compare it in two ways, and end."""
@@ -124,11 +109,11 @@ def _call(number: int, *arguments: bytes | int | None) -> int:
 
 
 def give_up_calls() -> bool:
-    """Give up the system calls of `REFUSED_CALLS` and `IO_URING`; False where that isn't possible."""
+    """Give up the system calls of `linux.toml`; False where that isn't possible."""
     machine = platform.machine()
-    if sys.platform != "linux" or machine not in REFUSED_CALLS:
+    if sys.platform != "linux" or machine not in PROCESSORS:
         return False
-    code = _filter(AUDIT[machine], [*REFUSED_CALLS[machine].values(), *IO_URING])
+    code = _filter(PROCESSORS[machine]["audit"], [*PROCESSORS[machine]["refused"].values()])
     program = ctypes.create_string_buffer(code)
     # struct sock_fprog: the number of instructions, and where they are.
     described = struct.pack("HP", len(code) // 8, ctypes.addressof(program))

@@ -15,15 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.storage.files import table_beside
 
-RECORDS = (
-    "semgrid_edu.grid.GridSpec",
-    "semgrid_edu.graphical.factor.Factor",
-    "semgrid_edu.camera.Camera",
-    "semgrid_edu.frame.Frame",
-    "semgrid_edu.frame.FrameLabels",
-    "semgrid_edu.labels.LabelSet",
-)
+RECORDS: tuple[str, ...] = table_beside(__file__)["records"]
 """The package's records that pass; the last part is the class."""
 
 KINDS = "?biufcUS"

@@ -10,6 +10,7 @@ import numpy as np
 from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import pixel_accuracy
+from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.paper.reports.tables import beside_usual, beside_usual_table
 from semgrid_edu.workshop.paper.reports.truth_costs import learned_from
 from semgrid_edu.workshop.paper.runs.claim_runs import table1_runs
@@ -22,36 +23,17 @@ from semgrid_edu.workshop.scoring.confusions import distance_band_names
 from semgrid_edu.workshop.scoring.grids import NETWORK
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, on_cells, score_with_interval, shown
 
-VARIANTS = {
-    "1 plane": Variant(n_planes=1),
-    "2 planes": Variant(n_planes=2),
-    "5 planes": Variant(n_planes=5),
-    "10 planes": Variant(n_planes=10),
-    "planes 0.1 m apart": Variant(spacing=0.1),
-    "planes 0.4 m apart": Variant(spacing=0.4),
-    "no occupancy grid": Variant(occupancy=False),
-    "no 1x1 reduction": Variant(reduces=False),
-    "no balancing": Variant(balanced=False),
-}
-"""Each differs in one thing from the usual network: 20 planes 0.2 m apart, occupancy grid, reduction, balancing."""
+_TABLES = table_beside(__file__)
+VARIANTS = {name: Variant(**fields) for name, fields in _TABLES["variants"].items()}
+"""Each differs in one thing from the usual network."""
 
-CALIBRATION_ERRORS = (
-    *(CalibrationError(pitch=size) for size in (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)),
-    *(CalibrationError(yaw=size) for size in (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)),
-    *(CalibrationError(height=size) for size in (-0.2, -0.1, 0.1, 0.2)),
-)
+CALIBRATION_ERRORS = [CalibrationError(**{kind: size}) for kind, sizes in _TABLES["errors"].items() for size in sizes]
 """Errors in the calibration that the trained network is given when it is tested: degrees, metres."""
 
 FEW = 4
 """The small training set has one frame in four."""
 
-SECTIONS = {
-    "variants": "Networks that are trained differently. Usual: SegNet, 20 planes 0.2 m apart, occupancy grid, "
-    "reduction, balancing, labels made with the LIDAR.",
-    "calibration": "The usual network, tested with a wrong calibration: degrees of pitch (positive: believed to look "
-    "further down) and yaw (to the left), metres of height.",
-    "frames": "A quarter of the training frames, against all of them.",
-}
+SECTIONS = _TABLES["sections"]
 """The lists of rows that are compared with the usual network, and what each shows."""
 
 

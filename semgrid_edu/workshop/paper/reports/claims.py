@@ -4,7 +4,6 @@ Unless a statement says otherwise, scores are those of the networks of Table 1 w
 the LIDAR as in the paper.
 """
 
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.metrics import METRICS, class_accuracy
+from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.paper.reports.verdicts import Statement
 from semgrid_edu.workshop.paper.runs.other_runs import OVERTURNED, time_saved
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
@@ -23,9 +23,7 @@ from semgrid_edu.workshop.scoring.grids import NETWORK, OCCUPANCY_ALONE
 from semgrid_edu.workshop.scoring.score_with_interval import compared, score_with_interval
 from semgrid_edu.workshop.scoring.statistics import Metric
 
-CLAIMS: dict[int, dict[str, str]] = {
-    int(number): texts for number, texts in tomllib.loads(Path(__file__).with_suffix(".toml").read_text()).items()
-}
+CLAIMS: dict[int, dict[str, str]] = {int(number): texts for number, texts in table_beside(__file__).items()}
 """By number: what the paper says, in short ("claim"), and in words what must hold ("judged_by")."""
 
 MARGIN = 0.005

@@ -72,7 +72,7 @@ class Request:
             One of `chosen`.
         """
         scale = scale_named(self.scale)
-        return scale, self.seeds or experiment.seeds(scale)
+        return scale, self.seeds or getattr(scale, experiment.seeds)
 
     def plan(self) -> list[Run]:
         """Return the runs of all experiments, each after those that it needs."""

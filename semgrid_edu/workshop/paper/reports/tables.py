@@ -220,7 +220,7 @@ def confusion_result(runs: Sequence[ScoreRun], root: Path) -> dict:
         shares = np.mean(100 * counts / counts.sum(axis=2, keepdims=True), axis=0)
     return {
         "classes": list(SYNTHIA_10.names),
-        "paper": {"scores": TABLE_3_SCORES, "matrix": [list(row) for row in TABLE_3_CONFUSION]},
+        "paper": {"scores": TABLE_3_SCORES, "matrix": TABLE_3_CONFUSION},
         "ours": {
             "scores": {name: score_with_interval(found, metric) for name, metric in METRICS.items()},
             "matrix": [[None if np.isnan(share) else round(float(share), 2) for share in row] for row in shares],

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from semgrid_edu.datasets.label_policies import POLICIES
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import METRICS, class_iou, pixel_accuracy
+from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.paper.reports.forest import forest_plot
 from semgrid_edu.workshop.paper.reports.tables import TRUTHS, beside_usual, beside_usual_table
 from semgrid_edu.workshop.paper.runs.claim_runs import table1_runs
@@ -34,26 +35,8 @@ from semgrid_edu.workshop.scoring.statistics import Metric
 USUAL_TRUTH = "lidar"
 """What all others are compared with: the paper's way, which Table 1's networks learn from."""
 
-LEARNED_FROM = {
-    "lidar": "one scan (usual)",
-    "true": "true labels",
-    "no-cleanup": "one scan, no clean-up",
-    "camera-mask": "one scan, visible to camera",
-    "de-skewed": "one scan, de-skewed",
-    "accumulated-smeared": "ten scans, movers smeared",
-    "accumulated-carved": "ten scans, movers carved",
-    "accumulated-carried": "ten scans, movers carried",
-}
-"""What the networks learn from, in words."""
-
-CELLS = {"all": "all cells", "semantic": "cells with a semantic class"}
-"""On which cells labels and networks are scored."""
-
-PARTS = {
-    "classes": "By class: intersection over union with the true labels, cells with a true semantic class",
-    "distances": "By distance: share of the cells with a true semantic class that is right",
-}
-"""What is listed class by class, and band by band."""
+LEARNED_FROM, CELLS, PARTS = (table_beside(__file__)[name] for name in ("learned_from", "cells", "parts"))
+"""In words: what the networks learn from, on which cells they are scored, and what is listed part by part."""
 
 _MARKERS = "oXsD*v^<"
 

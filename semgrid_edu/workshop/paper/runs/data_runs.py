@@ -6,37 +6,9 @@ from pathlib import Path
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.training.run import architecture, chosen_truth
 from semgrid_edu.workshop.scheduler.runs import Run
-from semgrid_edu.workshop.simulation.datasets import RECIPES, DatasetRecipe, Route, make_from_recipe
-from semgrid_edu.workshop.simulation.street.plan import Wishes
-from semgrid_edu.workshop.simulation.street.road_users import overturned_car
+from semgrid_edu.workshop.simulation.datasets import RECIPES, make_from_recipe, read_recipes
 
-
-def _routes(number: int, n_frames: int, split: str = "test") -> tuple[Route, ...]:
-    """Return short routes, through a junction and a bend in turn, of which every frame is labelled."""
-    layouts = (("junction", "bend")[k % 2] for k in range(number))
-    return tuple(Route(split, n_frames, True, Wishes(layout=layout, speed=10.0)) for layout in layouts)
-
-
-def _overturned(number: int, n_frames: int) -> tuple[Route, ...]:
-    """Return drives to test on, in each of which a car lies on its top."""
-    return (Route("test", n_frames, False, Wishes(cast=overturned_car)),) * number
-
-
-SMALL_RECIPES = (
-    DatasetRecipe("quickkitti", "KITTI-14", (Route("train", 5, False),) * 18 + (Route("test", 5, False),) * 8),
-    DatasetRecipe("quickchroma", "KITTI-14", _routes(2, 6, "train") + _routes(2, 6)),
-    DatasetRecipe("quicksynthia", "SYNTHIA-10", _routes(1, 8, "train") + _routes(1, 8), dense=True),
-    DatasetRecipe("chromaroutes", "KITTI-14", _routes(20, 10)),
-    DatasetRecipe("synthiaroutes", "SYNTHIA-10", _routes(20, 10), dense=True),
-    DatasetRecipe("overturned", "KITTI-14", _overturned(30, 10)),
-    DatasetRecipe("quickoverturned", "KITTI-14", _overturned(4, 4)),
-    DatasetRecipe("quickchromaroutes", "KITTI-14", _routes(3, 2)),
-    DatasetRecipe("quicksynthiaroutes", "SYNTHIA-10", _routes(3, 2), dense=True),
-)
-"""Data sets like minikitti, minichroma and minisynthia, small enough to be made in a minute. More routes to test on,
-because two routes, or one, say little about how routes differ. And drives with overturned cars."""
-
-RECIPE_OF = RECIPES | {recipe.name: recipe for recipe in SMALL_RECIPES}
+RECIPE_OF = RECIPES | read_recipes("small_recipes")
 """Every data set that a run can make, by name."""
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from semgrid_edu.datasets.label_policies import POLICIES
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import SEGMENTERS
+from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun, DataRun
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
 from semgrid_edu.workshop.paper.runs.score_runs import ScoreRun
@@ -113,30 +114,8 @@ class Scale:
         return ArraysRun(DataRun(data), split, truth, self.preset)
 
 
-QUICK = Scale(
-    name="quick",
-    kitti="quickkitti",
-    chroma="quickchroma",
-    synthia="quicksynthia",
-    chroma_routes="quickchromaroutes",
-    synthia_routes="quicksynthiaroutes",
-    overturned="quickoverturned",
-    image_iterations=12,
-    grid_iterations=10,
-    table1_seeds=2,
-    seeds=2,
-    policies=("no-cleanup", "accumulated-carved"),
-)
-"""Minutes on a laptop: whether everything works, not whether it is true."""
-
-REDUCED = Scale(name="reduced")
-"""Hours on a laptop."""
-
-PAPER = Scale(name="paper", preset="paper", image_iterations=2000, grid_iterations=2000)
-"""The paper's sizes, which need a GPU."""
-
-SCALES = {scale.name: scale for scale in (QUICK, REDUCED, PAPER)}
-"""Every scale by name."""
+SCALES = {name: Scale(name=name, **row) for name, row in table_beside(__file__).items()}
+"""Every scale by name, from `scales.toml`."""
 
 
 def scale_named(name: str) -> Scale:

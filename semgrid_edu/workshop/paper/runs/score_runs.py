@@ -15,6 +15,7 @@ from semgrid_edu.datasets.index import load_index
 from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
 from semgrid_edu.datasets.readers.project_lidar import seen_returns
 from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.storage.files import table_beside
 from semgrid_edu.storage.tensors import read_arrays, write_arrays
 from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun
 from semgrid_edu.workshop.paper.runs.training_runs import NetworkRun
@@ -30,11 +31,7 @@ CONFUSIONS, RELIABILITY = "confusions.npz", "reliability.npz"
 WITH_CRF, WITH_SEARCHED = f"{NETWORK} + CRF", f"{NETWORK} + searched CRF"
 """The network's grid, refined with the CRF's default parameters, and with those that were searched."""
 
-SEARCHED = {
-    "segnet": (1.1622, CrfParams(1.82, 3.42, 1.79, 0.0756, 0.536)),
-    "fcn": (1.2057, CrfParams(0.947, 1.64, 26.9, 0.868, 1.27)),
-    "deeplab": (1.2656, CrfParams(1.32, 2.36, 18.7, 0.873, 0.957)),
-}
+SEARCHED = {name: (heat, CrfParams(*params)) for name, (heat, *params) in table_beside(__file__).items()}
 """For each image network the temperature and the CRF's parameters that `semgrid-edu search-crf` chose for pixel
 accuracy on validation drives, with the shipped network of that kind (docs/results/crf_search*.json). A network for
 which nothing was searched is scored without them."""

@@ -15,7 +15,7 @@ from scipy.special import softmax
 from tqdm.auto import tqdm
 
 from semgrid_edu.crf import CrfParams, mean_field, mean_field_naive, unary_from_probability
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import check_whole
 from semgrid_edu.stage_models.crf import coupled
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
@@ -69,9 +69,8 @@ def crf_coupling(log: str | Path, seed: int = 0, draws: int = 20) -> dict:
     DataError
         When the log is something else, or was begun with another seed or other numbers.
     """
-    if seed < 0 or draws < 1:
-        name, value = ("seed", seed) if seed < 0 else ("draws", draws)
-        raise ArgumentError(name, "a whole number from 0 up, and at least one draw", value)
+    check_whole(seed=seed)
+    check_whole(1, draws=draws)
     identity = {"seed": seed, "draws": draws, "couplings": list(COUPLINGS)}
     command = f"semgrid-edu reproduce crf-coupling --seed {seed} --draws {draws}"
     done = resumable_json(log, identity, "cases")

@@ -19,7 +19,7 @@ from tqdm.auto import tqdm
 
 from semgrid_edu.crf import CrfParams, mean_field, mean_field_accurate, mean_field_naive, unary_from_log_probability
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import check_whole
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import build_net, load_net
 from semgrid_edu.pipeline import Stages, network_image
@@ -164,8 +164,7 @@ def crf_error(log: str | Path, seed: int = 0) -> dict:
     DataError
         When the log is something else, or was begun with another seed.
     """
-    if seed < 0:
-        raise ArgumentError("seed", "a whole number from 0 up", seed)
+    check_whole(seed=seed)
     identity = {"seed": seed, "iterations": list(ITERATIONS)}
     done = resumable_json(log, identity, "scenes")
     for name, problems in crf_scenes(seed).items():

@@ -10,12 +10,12 @@ from tqdm.auto import tqdm
 
 from semgrid_edu.crf import CrfParams, fit_temperature
 from semgrid_edu.datasets.training_set import TrainingSet
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import check_whole
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.networks import load_net
 from semgrid_edu.storage.files import sha256, write_json
 from semgrid_edu.storage.provenance import PROVENANCE, made_by, short_path
-from semgrid_edu.storage.reading import read_json
+from semgrid_edu.storage.reading import read_json, resumable_json
 from semgrid_edu.workshop.scoring.evaluate import scores, scores_table
 from semgrid_edu.workshop.studies.crf import crf_scores
 from semgrid_edu.workshop.studies.crf.search_point import FACTORS, next_point, params_at, pareto_front, point_of
@@ -88,34 +88,6 @@ def objective_values(trials: Sequence[Trial], unrefined: dict) -> NDArray[np.flo
     return np.stack([pixel, by_class, np.where(lost >= 0, pixel, lost)], axis=1)
 
 
-def read_trials(log: Path, identity: dict) -> list[Trial]:
-    """Return the trials of a search that was begun, or an empty list.
-
-    Parameters
-    ----------
-    log : Path
-        The file that `search_crf` writes, which may be missing.
-    identity : dict
-        What makes the search: its data, weights and seed.
-
-    Returns
-    -------
-    list of dict
-
-    Raises
-    ------
-    DataError
-        When the file is something else, or the log of another search.
-    """
-    content = read_json(log) if log.exists() else identity | {"trials": []}
-    found, trials = {name: content.get(name) for name in identity}, content.get("trials")
-    if not isinstance(trials, list) or not identity.keys() <= content.keys():
-        raise DataError(log, "the trials of a search, or no file", f"something else: {repr(content)[:200]}")
-    if found != identity:
-        raise DataError(log, f"trials of the search {identity}", f"{found}: choose another file")
-    return trials
-
-
 def search_crf(
     validation_dir: Path, dataset_dir: Path, weights: Path, log: Path, *, seed: int = 0, n_trials: int = 200
 ) -> dict[str, object]:
@@ -161,13 +133,12 @@ def search_crf(
         When a file is missing or damaged, a drive of "validation" is one of "train" or "test", or the log is that of
         another search.
     """
-    if n_trials < 1 or seed < 0:
-        name, value = ("n_trials", n_trials) if n_trials < 1 else ("seed", seed)
-        raise ArgumentError(name, "a whole number from 0 up, and one trial at least", value)
+    check_whole(seed=seed)
+    check_whole(1, n_trials=n_trials)
     crf_scores.refuse_known_drives(validation_dir, dataset_dir)
     validation = TrainingSet(validation_dir, "validation")
     identity = _identity(validation_dir, dataset_dir, weights, seed)
-    trials = read_trials(log, identity)
+    trials = resumable_json(log, identity, "trials", listed=True)
     network = crf_scores.grid_outputs(load_net(weights, validation.camera), validation)
     temperature = fit_temperature(network.columns, network.truth)
     calibrated, cell = network.at(temperature), validation.spec.cell

@@ -176,14 +176,7 @@ class LowRankGaussian:
 
 
 def mean_field_low_rank(
-    unary: NDArray,
-    values: NDArray,
-    params: CrfParams,
-    iterations: int = 10,
-    tolerance: float = 0.0,
-    *,
-    rank: int,
-    seed: int,
+    unary: NDArray, values: NDArray, params: CrfParams, iterations: int, tolerance: float, *, rank: int, seed: int
 ) -> NDArray[np.float32]:
     """Approximate the CRF's marginals by mean field with a low-rank bilateral kernel.
 

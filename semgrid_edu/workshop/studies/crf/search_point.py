@@ -5,14 +5,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.crf.params import CrfParams
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.storage.files import table_beside
 
-FACTORS = {
-    "w_bilateral": (0.02, 10.0),
-    "w_spatial": (0.02, 10.0),
-    "sigma_alpha": (0.25, 10.0),
-    "sigma_beta": (0.25, 10.0),
-    "sigma_gamma": (0.25, 10.0),
-}
+FACTORS: dict[str, tuple[float, float]] = table_beside(__file__)
 """The parameters that are searched, the axes of a point, and the ends of each axis as factors of the default; between
 them an axis is logarithmic. Weights of a fiftieth leave a grid nearly as it is. So do kernels narrower than a cell, but
 they take the permutohedral lattice much longer."""

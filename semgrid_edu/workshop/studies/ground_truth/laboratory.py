@@ -6,7 +6,7 @@ Simulated drives are filtered by CMCDOT, their calibration, labels and scans get
 
 import hashlib
 from collections.abc import Iterable
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
@@ -16,13 +16,12 @@ from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.datasets.ground_truth import NO_FLAWS, Moment, TruthFlaws, TruthPolicy, drive_truth, flawed_drive
-from semgrid_edu.datasets.ground_truth.policy import MOVERS
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.occupancy import track_drive
-from semgrid_edu.storage.files import write_json
+from semgrid_edu.storage.files import table_beside, write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.storage.reading import resumable_json
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
@@ -52,47 +51,15 @@ class Trial(NamedTuple):
     flaws: TruthFlaws = TruthFlaws()
 
 
-_FLAWS = TruthFlaws()
-_BEFORE = TruthPolicy(past=REACH, vote="majority")  # with several scans, most cells have many returns
-_AROUND = replace(_BEFORE, future=REACH)
-_OWN = replace(_AROUND, labels="own", movers="carved")
-_WINDOWS = {
-    f"{REACH} scans before": _BEFORE,
-    f"{REACH} before and after": _AROUND,
-    f"{REACH} before and after, own labels": replace(_AROUND, labels="own"),
-}
+def _trial(row: dict) -> Trial:
+    """Return the trial that a row of `laboratory.toml` describes."""
+    policy = {name: value for name, value in row.items() if name != "errors"}
+    errors = row.get("errors", [field.name for field in fields(TruthFlaws)])
+    return Trial(TruthPolicy(**policy), replace(NO_FLAWS, **{name: getattr(TruthFlaws, name) for name in errors}))
 
-TRIALS = {
-    "one scan (the paper)": Trial(),
-    "one scan, no clean-up": Trial(TruthPolicy(cleanup="none")),
-    "one scan, all classes spread alike": Trial(TruthPolicy(cleanup="spread")),
-    "one scan, de-skewed": Trial(TruthPolicy(deskew=True)),
-    "one scan, visible to LIDAR": Trial(TruthPolicy(visible_to="lidar")),
-    "one scan, visible to camera": Trial(TruthPolicy(visible_to="camera")),
-    "one scan, majority of returns": Trial(TruthPolicy(vote="majority")),
-    **{
-        f"{name}, movers {movers}": Trial(replace(policy, movers=movers))
-        for name, policy in _WINDOWS.items()
-        for movers in MOVERS
-    },
-    **{
-        f"{REACH} before and after, own labels, movers carved, {change}": Trial(policy)
-        for change, policy in {
-            "no clean-up": replace(_OWN, cleanup="none"),
-            "what stands wins": replace(_OWN, vote="standing"),
-            "de-skewed": replace(_OWN, deskew=True),
-            "visible to LIDAR": replace(_OWN, visible_to="lidar"),
-            "visible to camera": replace(_OWN, visible_to="camera"),
-        }.items()
-    },
-    "one scan, no errors in the data": Trial(flaws=NO_FLAWS),
-    "one scan, error of calibration alone": Trial(
-        flaws=replace(NO_FLAWS, rotation=_FLAWS.rotation, translation=_FLAWS.translation)
-    ),
-    "one scan, errors of labels alone": Trial(flaws=replace(_FLAWS, rotation=0, translation=0, skewed=False)),
-    "one scan, skew alone": Trial(flaws=replace(NO_FLAWS, skewed=True)),
-}
-"""What is compared, by name. The last four show what each kind of error in the data does to the paper's way."""
+
+TRIALS = {name: _trial(row) for name, row in table_beside(__file__).items()}
+"""What is compared, by name, from `laboratory.toml`."""
 
 
 def truth_policies(log: Path, seed: int = 0, drives: int = 20, grid: str = "compact", lidar: str = "coarse") -> dict:

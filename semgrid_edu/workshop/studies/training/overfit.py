@@ -14,22 +14,13 @@ from semgrid_edu.datasets.samples import sample_drive, sample_frames
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.metrics import confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import SEGMENTERS, Architecture, SemanticGridNet, build_net, unit_image
+from semgrid_edu.storage.files import table_beside
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.training.log import LOG, read_log
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
 
-FRAMES = 4
-"""Number of frames."""
-PARAMS = TrainingParams(
-    image_iterations=0,
-    grid_iterations=400,
-    batch_size=FRAMES,
-    learning_rate=0.3,
-    weight_limit=1.0,
-    jitter=0.0,
-    mirror=False,
-)
+PARAMS = TrainingParams(**table_beside(__file__))
 """Every step sees the same four frames without augmentation, starting from random weights, and every class has the same
 weight. The learning rate is six times the usual one, because all steps follow the gradient of the same frames."""
 LOSS_EVERY = 50
@@ -54,7 +45,7 @@ def overfit(seed: int = 0) -> OverfitResult:
     dict
         "networks": for each image network what `learn_by_heart` returns; and all that made them. JSON can hold it.
     """
-    frames, camera = sample_frames()[:FRAMES], sample_drive().camera
+    frames, camera = sample_frames()[: PARAMS.batch_size], sample_drive().camera
     nets = {name: build_net(Architecture(name), camera, seed) for name in SEGMENTERS}
     return {
         "networks": {name: learn_by_heart(net, frames, PARAMS, seed) for name, net in nets.items()},
