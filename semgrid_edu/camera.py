@@ -10,6 +10,9 @@ from semgrid_edu.errors import ArgumentError
 KITTI_LIDAR_HEIGHT = 1.73
 """Height of the LIDAR on KITTI's car above the ground, metres (Geiger et al., 2013, figure 1)."""
 
+FOCAL_LENGTHS = (0.01, 100.0)
+"""Shortest and longest focal length of a lens, in image widths or heights: angles of view of 178 and 0.6 degrees."""
+
 
 def rigid_transform(rotation: NDArray, translation: NDArray) -> NDArray[np.float64]:
     """Return the transform that rotates, then shifts, for homogeneous column vectors, (4, 4).
@@ -91,16 +94,31 @@ class Camera:
     lidar_height: float = KITTI_LIDAR_HEIGHT
 
     def __post_init__(self) -> None:
-        """Refuse matrices of the wrong shape."""
+        """Refuse matrices of the wrong shape, and numbers that no camera has."""
         if np.shape(self.K) != (3, 3):
             raise ArgumentError("K", "a 3x3 intrinsic matrix", f"shape {np.shape(self.K)}")
         if np.shape(self.T_camera_from_lidar) != (4, 4):
             raise ArgumentError("T_camera_from_lidar", "a 4x4 transform", f"shape {np.shape(self.T_camera_from_lidar)}")
+        if not np.isfinite(self.T_camera_from_lidar).all():
+            raise ArgumentError("T_camera_from_lidar", "finite numbers", np.asarray(self.T_camera_from_lidar).tolist())
+        _check_pinhole(self.K, np.array(self.size[::-1]))
 
     @property
     def T_camera_from_grid(self) -> NDArray[np.float64]:
         """(4, 4): from the grid frame, on the ground below the LIDAR, to the camera."""
         return self.T_camera_from_lidar @ lidar_from_grid(self.lidar_height)
+
+    def same_as(self, other: "Camera") -> bool:
+        """Return whether another camera has the same calibration, number for number.
+
+        Parameters
+        ----------
+        other : Camera
+            The other one.
+        """
+        matrices = ((self.K, other.K), (self.T_camera_from_lidar, other.T_camera_from_lidar))
+        sizes = (self.size, self.lidar_height) == (other.size, other.lidar_height)
+        return sizes and all(np.array_equal(one, another) for one, another in matrices)
 
     def resized(self, size: tuple[int, int]) -> "Camera":
         """Return the camera that would have taken the same picture with another number of pixels.
@@ -116,6 +134,14 @@ class Camera:
         scale_v, scale_u = size[0] / self.size[0], size[1] / self.size[1]
         S = np.array([[scale_u, 0, (scale_u - 1) / 2], [0, scale_v, (scale_v - 1) / 2], [0, 0, 1]])
         return replace(self, K=S @ self.K, size=tuple(size))
+
+
+def _check_pinhole(K: NDArray, size: NDArray) -> None:
+    """Refuse focal lengths (pixels) that no lens has, for images of (w, h) pixels."""
+    (shortest, longest), focal_lengths = FOCAL_LENGTHS, np.diag(K)[:2]
+    if not ((focal_lengths >= shortest * size) & (focal_lengths <= longest * size)).all():
+        expected = f"focal lengths of {shortest:g} to {longest:g} times {size[0]} x {size[1]} pixels"
+        raise ArgumentError("K", expected, focal_lengths.tolist())
 
 
 def project(points: NDArray, camera: Camera) -> tuple[NDArray, NDArray[np.bool_]]:

@@ -1,6 +1,12 @@
-"""Errors that name the file or argument, what was expected and what was found."""
+"""Errors that name the file or argument, what was expected and what was found; checks of arguments that raise them."""
 
+import math
+from collections.abc import Callable
+from numbers import Integral
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 
 class ArgumentError(ValueError):
@@ -46,3 +52,80 @@ class DataError(ValueError):
     def __str__(self) -> str:
         """Return all three in one sentence."""
         return "{}: expected {}, found {}".format(*self.args)
+
+
+def check_whole(least: int = 0, **numbers: int) -> None:
+    """Refuse whole numbers that are too small.
+
+    Parameters
+    ----------
+    least : int
+        The smallest that will do.
+    **numbers : int
+        The numbers, by the names of the arguments that they were given as.
+
+    Raises
+    ------
+    ArgumentError
+        For the first that is smaller.
+    """
+    for name, value in numbers.items():
+        if value < least:
+            raise ArgumentError(name, f"a whole number from {least} up", value)
+
+
+def check_shape(name: str, values: ArrayLike, shape: tuple[int, ...]) -> None:
+    """Refuse an array that doesn't have the shape it should have.
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument, for the error.
+    values : array
+        The array.
+    shape : tuple of int
+        The shape it should have.
+    """
+    if np.shape(values) != shape:
+        raise ArgumentError(name, f"shape {shape}", f"shape {np.shape(values)}")
+
+
+def check_fields(thing: object, expected: str, holds: Callable[[object], bool], *names: str) -> None:
+    """Refuse an object of which some fields don't have the values that they should have.
+
+    Parameters
+    ----------
+    thing : object
+        The object.
+    expected : str
+        What its fields should be, for the error.
+    holds : callable
+        Whether a value is that.
+    *names : str
+        The fields.
+    """
+    for name in names:
+        if not holds(getattr(thing, name)):
+            raise ArgumentError(name, expected, getattr(thing, name))
+
+
+def not_negative(number: float) -> bool:
+    """Tell whether a number is finite and at least 0.
+
+    Parameters
+    ----------
+    number : float
+        Any number.
+    """
+    return math.isfinite(number) and number >= 0
+
+
+def positive_count(number: float) -> bool:
+    """Tell whether a number is whole and at least 1.
+
+    Parameters
+    ----------
+    number : float
+        Any number.
+    """
+    return isinstance(number, Integral) and number >= 1

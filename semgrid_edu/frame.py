@@ -30,6 +30,9 @@ class FrameLabels:
         The class of each 0.1 m cell of `LABEL_GRID`, seen or not; 255 where unlabelled.
     visible : (710, 310) bool
         Whether the camera sees what stands in the cell.
+    undecided : (710, 310) bool, optional
+        Where labels have gaps, whether the cell lies in view of the camera, which may see there what nobody labelled.
+        Without it, all that the camera sees is labelled.
     """
 
     label_set: LabelSet
@@ -37,6 +40,7 @@ class FrameLabels:
     depth: NDArray[np.float32]
     birdseye: NDArray[np.uint8]
     visible: NDArray[np.bool_]
+    undecided: NDArray[np.bool_] | None = None
 
     def birdseye_on(self, spec: GridSpec) -> NDArray[np.uint8]:
         """Pool the bird's-eye labels to a coarser grid.
@@ -62,6 +66,16 @@ class FrameLabels:
             The extent of `LABEL_GRID`, a multiple of its cell.
         """
         return blocks(self.visible, spec).any(axis=-1)
+
+    def undecided_on(self, spec: GridSpec) -> NDArray[np.bool_]:
+        """Pool `undecided` to a coarser grid, (H, W) bool: a cell is undecided when any part of it is.
+
+        Parameters
+        ----------
+        spec : GridSpec
+            The extent of `LABEL_GRID`, a multiple of its cell.
+        """
+        return np.zeros(spec.shape, np.bool_) if self.undecided is None else blocks(self.undecided, spec).any(axis=-1)
 
 
 @dataclass(frozen=True, eq=False)

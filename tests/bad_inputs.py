@@ -255,6 +255,9 @@ DRIVES = (
     Row("an empty date after an equals sign", "demo --kitti TINY --date= --drive 0001", "--date: expected a value"),
     Row("a folder without dates", DEMO.replace("TINY", "RUN"), "RUN/2026_01_01: expected a folder, found no dates"),
     Row("half a drive's name", "demo --kitti TINY", "expected all three or none"),
+    Row("half a scene's name", "demo --pandaset TINY", "expected both or none"),
+    Row("two data sets", f"{DEMO} --pandaset TINY --scene 002", "--kitti, --pandaset: expected one of them"),
+    Row("no such scene", "demo --pandaset TINY --scene 002", "TINY/002: expected a scene, found no scene"),
     Row("a page in place of a file", DEMO.replace("OUT", "architecture.json"), "File exists"),
     Row("no file of stages", f"{DEMO} --stages none.py", "none.py: expected a Python file"),
     Row("stages that are a pipe", f"{DEMO} --stages my.py", "my.py: expected a Python file", pipe("my.py")),
@@ -566,7 +569,7 @@ DATA = (
         text("OUT/sample/simulation.json", DEEP),
     ),
     Row("an empty folder's name", "data make sample ''", "argument 4: expected a value"),
-    Row("an unknown archive", "data fetch nuscenes --drive 2011_09_26_0013 --folder OUT", "name: expected kitti"),
+    Row("an unknown archive", "data fetch nuscenes --drive 2011_09_26_0013 --folder OUT", "expected kitti or pandaset"),
     Row("a drive that is no date", "data fetch kitti --drive 13 --folder OUT", "drive: expected date and number"),
     Row("samples without provenance", "data verify TINY", "provenance.json: expected a file"),
     Row("no samples", "data verify OUT", "OUT: expected folders of samples"),
@@ -605,6 +608,11 @@ DATA = (
         "expected an empty folder, or an earlier excerpt",
     ),
     Row("an excerpt of too many frames", "data excerpt OUT --data TINY --frames 99", "n_frames: expected 1 to 6"),
+    Row(
+        "a real excerpt of no scene",
+        "data real-excerpt OUT --pandaset TINY --scene 002",
+        "TINY/002: expected a scene, found no scene",
+    ),
     Row("an excerpt of no frame", "data excerpt OUT --data TINY --frames 0", "Invalid value for '--frames'"),
 )
 
@@ -628,6 +636,15 @@ EXPERIMENTS = (
     Row("too many processes", f"{TABLE1} --processes 1000", "Invalid value for '--processes'"),
     Row("an unknown grid, streets", "reproduce streets --grid tiny --out log.json", "grid: expected paper or compact"),
     Row("an unknown LIDAR", "reproduce truth-policies --lidar sonar --out log.json", "lidar: expected one of"),
+    Row("an unknown grid", "reproduce point-labels --grid huge --out log.json", "grid: expected"),
+    Row("no scene", "reproduce real-streets --pandaset NONE --runs RUNS --out log.json", "NONE/002"),
+    Row("a scene that isn't there", "data index OUT --pandaset TINY --scene 002", "TINY/002"),
+    Row(
+        "a network of another kind to start from",
+        "train --data TINY --out OUT --from fresh.safetensors --segmenter fcn",
+        "fresh.safetensors: expected a network like the one to train",
+    ),
+    Row("a tint that can't be", "train --data TINY --out OUT --tint -1", "tint: expected a share of at least 0"),
     Row("no drives", "reproduce occupancy --drives 0", "Invalid value for '--drives'"),
     Row("no draws", "reproduce crf-coupling --draws 0", "Invalid value for '--draws'"),
     Row("a result in a folder", "reproduce overfit --out TINY", "TINY: expected a file to write, found a folder"),
@@ -685,13 +702,13 @@ EXPERIMENTS = (
     Row(
         "trials that are a number",
         SEARCH,
-        "log.json: expected the trials of a search",
+        "log.json: expected a result of this experiment",
         text("log.json", '{"trials": 5}'),
     ),
     Row(
         "another search's trials",
         SEARCH,
-        "log.json: expected the trials of a search",
+        "log.json: expected a result of this experiment",
         text("log.json", '{"trials": [], "seed": 0}'),
     ),
     Row(

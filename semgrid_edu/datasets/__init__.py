@@ -4,6 +4,7 @@ from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame, load_index
 from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
 from semgrid_edu.datasets.readers.kitti_tracking import KittiTrackingRun
+from semgrid_edu.datasets.readers.pandaset import PandasetScene
 from semgrid_edu.datasets.readers.semantic_kitti import SemanticKittiSequence
 from semgrid_edu.datasets.readers.synthia import SynthiaSequence
 from semgrid_edu.datasets.readers.zhang import ZhangDrive, ZhangLabels
@@ -13,6 +14,7 @@ __all__ = [
     "KittiRawDrive",
     "KittiTrackingRun",
     "LabelledFrame",
+    "PandasetScene",
     "SemanticKittiSequence",
     "SynthiaSequence",
     "ZhangDrive",

@@ -27,9 +27,33 @@ def grid_truth(labels: FrameLabels, belief_probability: NDArray, spec: GridSpec)
     Returns
     -------
     (H, W) uint8
-        A class of the label set in every cell.
+        A class of the label set in every cell, 255 where `decided_truth` knows none.
     """
-    return fill_unlabelled(visible_labels(labels, spec), belief_probability, labels.label_set)
+    in_view = labels.undecided_on(spec)
+    return decided_truth(visible_labels(labels, spec), in_view, belief_probability, labels.label_set)
+
+
+def decided_truth(
+    truth: NDArray[np.uint8], in_view: NDArray[np.bool_], belief_probability: NDArray, label_set: LabelSet
+) -> NDArray[np.uint8]:
+    """Give the cells without a label a class, as far as one is right there.
+
+    Parameters not named here are those of `fill_unlabelled`.
+
+    Parameters
+    ----------
+    in_view : (H, W) bool
+        Where labels have gaps, the cells that the camera may see; no cell where all that it sees is labelled.
+
+    Returns
+    -------
+    (H, W) uint8
+        With gaps, 255 in a cell in view without a label, and the unknown classes in all cells that aren't in view.
+    """
+    if not in_view.any():
+        return fill_unlabelled(truth, belief_probability, label_set)
+    unseen = fill_unlabelled(np.full_like(truth, IGNORE), belief_probability, label_set)
+    return np.where(in_view, truth, unseen)
 
 
 def fill_unlabelled(truth: NDArray[np.uint8], belief_probability: NDArray, label_set: LabelSet) -> NDArray[np.uint8]:

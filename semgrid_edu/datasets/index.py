@@ -1,17 +1,20 @@
 """The index of a data set: its labelled frames, split into those for training and those for testing (section 4)."""
 
+import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from semgrid_edu.datasets.readers.frames import LabelledDrive
 from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
+from semgrid_edu.datasets.readers.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.readers.semantic_kitti import SemanticKittiSequence
 from semgrid_edu.datasets.readers.synthia import SynthiaSequence
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.labels import LABEL_SETS, LabelSet
+from semgrid_edu.labels import KITTI_14, LABEL_SETS, LabelSet
+from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.reading import read_json
 
 INDEX_FILE = "dataset.json"
@@ -37,6 +40,7 @@ class Reader(NamedTuple):
 
 READERS = {
     "kitti-raw": Reader(KittiRawDrive, ("date", "drive")),
+    "pandaset": Reader(PandasetScene, ("scene", "camera")),
     "semantic-kitti": Reader(SemanticKittiSequence),
     "synthia": Reader(SynthiaSequence),
 }
@@ -65,7 +69,7 @@ class DatasetIndex:
     Parameters
     ----------
     root : Path
-        Its folder, which holds its drives; what is made of them goes to `cache/` in it.
+        The folder that holds its drives.
     name : str
         What it is called, such as "minikitti".
     label_set : LabelSet
@@ -74,6 +78,8 @@ class DatasetIndex:
         Labelled frames by split, such as "train" and "test"; no drive is in two of them.
     reader : callable
         (root, *drive) -> `LabelledDrive`: opens a drive. Worker processes must be able to import it.
+    folder : Path, optional
+        What is made of the drives goes to `cache/` in this folder; `root` when left out.
     """
 
     root: Path
@@ -81,6 +87,7 @@ class DatasetIndex:
     label_set: LabelSet
     splits: dict[str, tuple[LabelledFrame, ...]]
     reader: Callable[..., LabelledDrive] = KittiRawDrive
+    folder: Path | None = None
 
     def frames_by_drive(self, split: str) -> dict[tuple[str, ...], list[int]]:
         """Return the labelled frames of a split, drive by drive.
@@ -156,6 +163,8 @@ def dataset_doubts(dataset_dir: str | Path, *splits: str) -> list[str]:
 def load_index(dataset_dir: str | Path) -> DatasetIndex:
     """Read the index of a data set, dataset.json.
 
+    Its drives lie in the same folder, or in the folder that it names as its "root".
+
     Parameters
     ----------
     dataset_dir : path-like
@@ -173,10 +182,55 @@ def load_index(dataset_dir: str | Path) -> DatasetIndex:
             raise DataError(path, f"{key}: one of {', '.join(known)}", repr(value))
     if not isinstance(splits, dict) or not all(isinstance(frames, list) and frames for frames in splits.values()):
         raise DataError(path, "splits: lists of labelled frames by name, none empty", repr(splits)[:200])
+    drives = content.get("root", ".")
+    if not isinstance(drives, str) or not (root / drives).is_dir():
+        raise DataError(path, "root: a folder that holds the drives", repr(drives)[:200])
     keys = READERS[reader].keys
     frames = {split: tuple(_frame(path, entry, keys) for entry in entries) for split, entries in splits.items()}
     _refuse_leaks(path, frames)
-    return DatasetIndex(root, name, LABEL_SETS[label_set], frames, READERS[reader].open)
+    return DatasetIndex(root / drives, name, LABEL_SETS[label_set], frames, READERS[reader].open, root)
+
+
+def write_pandaset_index(folder: str | Path, root: str | Path, scene: str, test_cameras: Sequence[str] = ()) -> Path:
+    """Write a dataset.json of the labelled frames of a scene, apart from the scene itself.
+
+    Parameters
+    ----------
+    folder : path-like
+        The folder of the data set, which is made when missing.
+    root : path-like
+        The folder that holds the scenes.
+    scene : str
+        Number of the scene, such as "002".
+    test_cameras : sequence of str
+        The cameras whose frames are for testing; the others' are for training.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such camera, or none is left to train on.
+    DataError
+        When there is no such scene, or a dataset.json already.
+    """
+    path, splits = Path(folder) / INDEX_FILE, {"train": [], "test": []}
+    if path.exists():
+        raise DataError(path, "no data set yet", "one that would be lost")
+    there = [camera for camera in CAMERAS if (Path(root) / scene / "camera" / camera).is_dir()] or CAMERAS
+    for camera in dict.fromkeys([*there, *test_cameras]):
+        drive = PandasetScene(root, scene, camera)
+        entries = [{"scene": scene, "camera": camera, "frame": k} for k in range(len(drive))]
+        splits["test" if camera in test_cameras else "train"] += entries
+    if not splits["train"]:
+        raise ArgumentError("test_cameras", "at least one camera less", ", ".join(test_cameras))
+    index = {"name": f"pandaset-{scene}", "reader": "pandaset", "root": os.path.relpath(root, folder)}
+    index |= {"label_set": KITTI_14.name, "splits": {split: frames for split, frames in splits.items() if frames}}
+    write_json(path, index)
+    return path
 
 
 def _entry(path: Path, content: Any, key: str) -> Any:

@@ -1,4 +1,4 @@
-"""The shipped samples: a short simulated drive, a few labelled frames and trained compact weights (section 4).
+"""The shipped samples: a simulated drive and a real one, a few labelled frames and trained weights (section 4).
 
 What needs torch is imported where it is used: torch takes seconds, and those who only read the drive don't need it.
 """
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
+from semgrid_edu.datasets.readers.pandaset_files import CREDIT
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.provenance import PROVENANCE, provenance_problems, shipped_folder
 
@@ -22,6 +23,18 @@ def samples_dir() -> Path:
 def sample_drive() -> KittiRawDrive:
     """Return the shipped drive: 20 labelled frames of a simulated street."""
     return KittiRawDrive(samples_dir() / "sample", "2026_01_01", "0001")
+
+
+def real_drive() -> KittiRawDrive:
+    """Return the shipped real drive: ten frames of a street, from PandaSet (its README.md names licence and terms)."""
+    drive = KittiRawDrive(samples_dir() / "real", "2019_05_11", "0002")
+    drive.credit = CREDIT
+    return drive
+
+
+def real_weights() -> Path:
+    """Return the file of the network that real drives take by default; `card.json` beside it says what is known."""
+    return samples_dir() / "segnet_real" / "weights.safetensors"
 
 
 def trained_segmenters() -> list[str]:

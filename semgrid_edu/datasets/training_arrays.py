@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from semgrid_edu.datasets.grid_truth import fill_unlabelled
+from semgrid_edu.datasets.grid_truth import decided_truth
 from semgrid_edu.datasets.readers.frames import LabelledDrive
 from semgrid_edu.datasets.readers.project_lidar import seen_returns
 from semgrid_edu.errors import DataError
@@ -80,12 +80,17 @@ def _frame_arrays(
     pixels, cells = seen_returns(frame, recipe.spec, recipe.image_size)
     return {
         "image": resize_image(frame.image, recipe.image_size).transpose(2, 0, 1),
-        "labels": resize_labels(frame.labels.image, recipe.image_size),
+        "labels": drive.image_labels(k, recipe.image_size),
         "occupancy": occupancy.astype(np.float32),
-        "truth": fill_unlabelled(drive.truth(k, recipe.spec), occupancy, frame.labels.label_set),
+        "truth": _truth(drive, k, occupancy, recipe.spec),
         "return_pixels": pixels,
         "return_cells": cells,
     }
+
+
+def _truth(drive: LabelledDrive, k: int, occupancy: NDArray, spec: GridSpec) -> NDArray[np.uint8]:
+    """Return the class of each cell of a frame; 255 where there may be one to be seen, but nobody labelled it."""
+    return decided_truth(drive.truth(k, spec), drive.undecided(k, spec), occupancy, drive.label_set)
 
 
 def resize_image(image: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
@@ -103,23 +108,3 @@ def resize_image(image: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.
     (*size, 3) uint8
     """
     return np.asarray(Image.fromarray(image).resize(size[::-1], Image.Resampling.BOX))
-
-
-def resize_labels(labels: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
-    """Give each larger pixel the class that covers most of it; between two equal shares the smaller number wins.
-
-    Parameters
-    ----------
-    labels : (h, w) uint8
-        The class of each pixel; 255 (unlabelled) counts as a class.
-    size : (int, int)
-        The new height and width, pixels.
-
-    Returns
-    -------
-    (*size,) uint8
-    """
-    classes = np.unique(labels)
-    masks = (Image.fromarray((labels == c).astype(np.float32)) for c in classes)
-    shares = [np.asarray(mask.resize(size[::-1], Image.Resampling.BOX)) for mask in masks]
-    return classes[np.argmax(shares, axis=0)]

@@ -77,7 +77,7 @@ def cached_arrays(index: DatasetIndex, split: str, recipe: ArrayRecipe) -> dict[
         When the data set, or what was kept, is damaged; or when nothing can be kept.
     """
     drives = index.drives(split)
-    folder = cache_folder(index.root) / _key(index, drives, recipe) / split
+    folder = cache_folder(index.folder or index.root) / _key(index, drives, recipe) / split
     if not folder.exists():
         _make_room(folder.parent)
         frames = in_each_drive(drive_arrays, [(*drive, recipe) for drive in drives], f"{index.name}, {split}")

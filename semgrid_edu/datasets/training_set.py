@@ -1,5 +1,7 @@
 """The training set: image, occupancy grid and truth of each labelled frame of a split; excerpts of it (section 4.1)."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,7 +12,7 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets.index import INDEX_FILE, DatasetIndex, load_index
+from semgrid_edu.datasets.index import INDEX_FILE, DatasetIndex, LabelledFrame, load_index
 from semgrid_edu.datasets.label_policies import LidarTruth
 from semgrid_edu.datasets.training_arrays import SEED, ArrayRecipe
 from semgrid_edu.datasets.training_cache import LabelledDrives, cached_arrays, cached_labels
@@ -144,15 +146,99 @@ class TrainingSet(Dataset[Sample]):
         return self.arrays["return_pixels"][first:last], self.arrays["return_cells"][first:last]
 
 
+class Mixture(Sequence[Sample]):
+    """Training sets to learn from in turn, such as simulated and real ones: each has a camera of its own.
+
+    Step by step the data sets take turns, however many frames each has, and within a data set its cameras do.
+
+    Parameters
+    ----------
+    data_sets : sequence of sequence of TrainingSet
+        For each data set the frames of each of its cameras, as `sets_by_camera` returns them.
+
+    Attributes
+    ----------
+    parts : tuple of TrainingSet
+        All of them, in the order in which the frames are numbered.
+    label_set : LabelSet
+        The classes, the same for all.
+    camera : Camera
+        The calibration of the first part.
+
+    Raises
+    ------
+    ArgumentError
+        When the data sets have other classes than the first.
+    """
+
+    def __init__(self, data_sets: Sequence[Sequence[TrainingSet]]) -> None:
+        self._data_sets = data_sets
+        self.parts = tuple(part for parts in data_sets for part in parts)
+        self.label_set, self.camera = self.parts[0].label_set, self.parts[0].camera
+        for part in self.parts:
+            if part.label_set != self.label_set:
+                raise ArgumentError("data_sets", f"the label set {self.label_set.name} in each", part.label_set.name)
+
+    def __len__(self) -> int:
+        """Return the number of frames of all parts."""
+        return sum(map(len, self.parts))
+
+    def __getitem__(self, k: int) -> Sample:
+        """Return frame k, counted through all parts."""
+        for part in self.parts:
+            if k < len(part):
+                return part[k]
+            k -= len(part)
+        raise IndexError("there are fewer frames")
+
+    def turn(self, iteration: int) -> tuple[TrainingSet, int]:
+        """Return whose turn it is, and how many turns it has had before.
+
+        Parameters
+        ----------
+        iteration : int
+            Number of the step of training, from 0.
+        """
+        round_, data_set = divmod(iteration, len(self._data_sets))
+        cameras = self._data_sets[data_set]
+        turns, camera = divmod(round_, len(cameras))
+        return cameras[camera], turns
+
+
+def sets_by_camera(
+    dataset: str | Path | DatasetIndex,
+    split: str,
+    spec: GridSpec | None = None,
+    image_size: tuple[int, int] = Architecture.image_size,
+    truth: LidarTruth | None = None,
+) -> list[TrainingSet]:
+    """Open a split of a data set whose drives may have several cameras.
+
+    Parameters and errors are those of `TrainingSet`.
+
+    Returns
+    -------
+    list of TrainingSet
+        One for each camera, in the order in which the index names them.
+    """
+    index = dataset if isinstance(dataset, DatasetIndex) else load_index(dataset)
+    groups: list[tuple[Camera, list[LabelledFrame]]] = []
+    for name, numbers in index.frames_by_drive(split).items():
+        camera = index.reader(index.root, *name).camera
+        frames = next((found for known, found in groups if known.same_as(camera)), None)
+        if frames is None:
+            groups.append((camera, frames := []))
+        frames += [LabelledFrame(name, number) for number in numbers]
+    parts = (replace(index, splits={split: tuple(frames)}) for _, frames in groups)
+    return [TrainingSet(part, split, spec, image_size, truth=truth) for part in parts]
+
+
 def _shared_camera(drives: LabelledDrives) -> Camera:
     """Return the camera of a split's drives, refusing two that differ, because one sampler serves them all."""
     (first, _), *others = drives
     camera = first.camera
     for drive, _ in others:
-        other = drive.camera
-        same = (camera.size, camera.lidar_height) == (other.size, other.lidar_height)
-        matrices = ((camera.K, other.K), (camera.T_camera_from_lidar, other.T_camera_from_lidar))
-        if not (same and all(np.array_equal(a, b) for a, b in matrices)):
+        if not camera.same_as(drive.camera):
             expected = f"the calibration of {first.name}, because one network serves both"
             raise DataError(drive.name, expected, "another")
     return camera

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
+from semgrid_edu.crf.doctor.distributions import sum_to_one
 from semgrid_edu.occupancy import N_STATES
 
 AXES = {"classes": "class", "states": "state"}
@@ -126,7 +127,7 @@ def sum_hint(values: NDArray, total: float, axis: str) -> str:
     """
     if np.isnan(total):
         return "was something divided by a sum of 0?"
-    if (values <= 0).all() and _sums_to_one(np.exp(values)):
+    if (values <= 0).all() and sum_to_one(np.exp(values).sum(axis=0)):
         return "are these log-probabilities? Return np.exp of them"
     return f"did you normalise over the {AXES[axis]} axis (axis 0)?"
 
@@ -138,10 +139,6 @@ def log_sum_hint(values: NDArray, total: float) -> str:
     """
     if np.isnan(total):
         return "is there a logarithm of a negative number?"
-    if (values >= 0).all() and _sums_to_one(values):
+    if (values >= 0).all() and sum_to_one(values.sum(axis=0)):
         return "are these probabilities? Return np.log of them"
     return "are these scores? Subtract scipy.special.logsumexp(scores, axis=0)"
-
-
-def _sums_to_one(values: NDArray) -> bool:
-    return bool(np.allclose(values.sum(axis=0), 1, atol=1e-3))

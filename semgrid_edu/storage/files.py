@@ -1,12 +1,15 @@
-"""Files that are written whole or not at all, and their checksums."""
+"""Files that are written whole or not at all, their checksums, and the tables that lie beside modules."""
 
 import hashlib
 import json
 import os
 import tempfile
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 from semgrid_edu.errors import DataError
 
@@ -139,3 +142,34 @@ def sha256(path: str | Path) -> str:
     """
     with Path(path).open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def table_beside(module: str, name: str | None = None) -> dict[str, Any]:
+    """Read a table of the package, a TOML file in the folder of a module; its lists become tuples.
+
+    Parameters
+    ----------
+    module : str
+        The `__file__` of the module.
+    name : str, optional
+        The name of the table's file without its suffix, if it isn't that of the module.
+    """
+    path = Path(module)
+    return _frozen(tomllib.loads(path.with_name(f"{name or path.stem}.toml").read_text(encoding="utf-8")))
+
+
+def _frozen(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _frozen(part) for name, part in value.items()}
+    return tuple(map(_frozen, value)) if isinstance(value, list) else value
+
+
+def named_rows(table: dict[str, dict]) -> dict[str, SimpleNamespace]:
+    """Return the rows of a table by their names, each with its columns as attributes.
+
+    Parameters
+    ----------
+    table : dict
+        A part of what `table_beside` returns: rows by their names.
+    """
+    return {name: SimpleNamespace(**row) for name, row in table.items()}

@@ -1,4 +1,4 @@
-"""Files that are read whole and checked: bytes, text, JSON and PNG images, with errors that name the file."""
+"""Files that are read whole and checked: bytes, text, JSON, PNG and JPEG images, with errors that name the file."""
 
 import io
 import json
@@ -152,6 +152,27 @@ def read_png(path: Path, mode: str, size: tuple[int, int] | None) -> NDArray:
     return pixels
 
 
+def read_jpeg(path: Path, size: tuple[int, int]) -> NDArray[np.uint8]:
+    """Return the pixels of a JPEG, (h, w, 3), RGB.
+
+    Parameters
+    ----------
+    path : Path
+        The file to read.
+    size : (int, int)
+        Height and width that the image must have, pixels.
+    """
+    content = read_bytes(path)
+    try:
+        image = Image.open(io.BytesIO(content), formats=["JPEG"])
+        pixels = np.asarray(image.convert("RGB"))
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        raise DataError(path, "a sound JPEG image", f"{str(error).partition(' <')[0]!r}") from error
+    if pixels.shape[:2] != size:
+        raise DataError(path, f"{size[0]} x {size[1]} pixels", f"{pixels.shape[0]} x {pixels.shape[1]}")
+    return pixels
+
+
 def _open_png(content: bytes) -> Image.Image:
     return Image.open(io.BytesIO(content), formats=["PNG"])
 
@@ -163,7 +184,9 @@ def _sixteen_bits(content: bytes) -> NDArray[np.uint16]:
     return np.array(upper).astype(np.uint16) << 8 | np.array(lower)
 
 
-def resumable_json(log: str | Path, identity: dict[str, object], key: str, kind: type = dict) -> dict[str, Any]:
+def resumable_json(
+    log: str | Path, identity: dict[str, object], key: str, kind: type = dict, listed: bool = False
+) -> Any:
     """Return the finished parts of a result that an experiment writes while it runs, to go on from after a break.
 
     Parameters
@@ -176,23 +199,25 @@ def resumable_json(log: str | Path, identity: dict[str, object], key: str, kind:
         Name under which the file keeps the parts.
     kind : type
         The type of every part.
+    listed : bool
+        Whether the parts stand in a list; by default they have names.
 
     Returns
     -------
-    dict of str to `kind`
-        The parts by name; none when there is no file.
+    dict of str to `kind`, or list of `kind`
+        The parts; none when there is no file.
 
     Raises
     ------
     DataError
         When the file is something else, or was made by another experiment.
     """
-    path = Path(log)
+    path, none = Path(log), [] if listed else {}
     if not path.exists():
-        return {}
+        return none
     content = read_json(path)
     found, parts = {name: content.get(name) for name in identity}, content.get(key)
-    sound = isinstance(parts, dict) and all(isinstance(part, kind) for part in parts.values())
+    sound = isinstance(parts, type(none)) and all(isinstance(p, kind) for p in (parts if listed else parts.values()))
     if not sound or not identity.keys() <= content.keys():
         raise DataError(path, "a result of this experiment, or no file", f"something else: {repr(content)[:200]}")
     if found != identity:

@@ -20,7 +20,7 @@ def root(tmp_path_factory):
     rng = np.random.default_rng(0)
     lines = [f"S_rect_02: {SIZE[1]} {SIZE[0]}\n"]
     for camera in range(4):
-        P = np.array([[700, 0, 600, rng.normal(0, 100)], [0, 710, 170, rng.normal()], [0, 0, 1, rng.normal(0, 0.003)]])
+        P = np.array([[700, 0, 19, rng.normal(0, 100)], [0, 710, 5, rng.normal()], [0, 0, 1, rng.normal(0, 0.003)]])
         R = Rotation.from_rotvec(rng.normal(0, 0.05, 3)).as_matrix()
         lines.append(f"R_rect_{camera:02d}: {numbers(R)}\nP_rect_{camera:02d}: {numbers(P)}\n")
     (root / DATE / "calib_cam_to_cam.txt").write_text("".join(lines))

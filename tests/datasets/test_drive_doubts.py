@@ -1,17 +1,25 @@
 """What is doubtful about a drive is said, and a sound drive is believed."""
 
+import re
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from tiny_drive import DATE, write_packet, write_tiny_dataset, write_tiny_drive
+from PIL import Image
+from tiny_drive import DATE, SIZE, K, write_packet, write_tiny_dataset, write_tiny_drive
 
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.index import dataset_doubts
-from semgrid_edu.datasets.readers.drive_doubts import FASTEST, jumps
+from semgrid_edu.datasets.readers.drive_doubts import FASTEST, frame_doubts, jumps
 from semgrid_edu.datasets.readers.oxts import read_packet
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.pipeline import Stages, run_pipeline
+from semgrid_edu.workshop import demo
+from semgrid_edu.workshop.commands import main as cli
 
 
 def test_sound_drives_are_believed(tmp_path):
@@ -66,3 +74,140 @@ def test_labels_of_another_set_are_refused(tmp_path):
     with pytest.raises(DataError, match=r"expected the label set of 2026_01_01 0002, SYNTHIA-10, found KITTI-14"):
         dataset_doubts(root, "train")
     assert dataset_doubts(root, "test") == []
+
+
+def scans(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Path], None]:
+    """Change the returns (N, 4) of every scan of a drive."""
+
+    def spoil(folder: Path) -> None:
+        for path in (folder / "velodyne_points" / "data").glob("*.bin"):
+            points = np.fromfile(path, "<f4").reshape(-1, 4)
+            path.write_bytes(change(points).astype("<f4").tobytes())
+
+    return spoil
+
+
+def again(sensor: str) -> Callable[[Path], None]:
+    """Write the first file of a sensor over all others."""
+
+    def spoil(folder: Path) -> None:
+        first, *others = sorted((folder / sensor / "data").iterdir())
+        for other in others:
+            shutil.copyfile(first, other)
+
+    return spoil
+
+
+def black(folder: Path) -> None:
+    for path in (folder / "image_02" / "data").glob("*.png"):
+        Image.new("RGB", SIZE[::-1]).save(path)
+
+
+def intrinsics(fx: float, cx: float) -> Callable[[Path], None]:
+    """Write another focal length and principal point, pixels."""
+
+    def spoil(folder: Path) -> None:
+        P = np.c_[[fx, 0, 0], [0, K[1, 1], 0], [cx, K[1, 2], 1], [0, 0, 0]]
+        path = folder.parent / "calib_cam_to_cam.txt"
+        lines = [line for line in path.read_text().splitlines() if not line.startswith("P_rect_02")]
+        path.write_text("\n".join([*lines, f"P_rect_02: {' '.join(map(str, P.ravel()))}\n"]))
+
+    return spoil
+
+
+def rotation(R: np.ndarray) -> Callable[[Path], None]:
+    """Write another rotation from LIDAR to camera."""
+    text = f"R: {' '.join(map(str, np.ravel(R)))}\nT: 0 0 0\n"
+    return lambda folder: (folder.parent / "calib_velo_to_cam.txt").write_text(text)
+
+
+LIDAR_FROM_CAMERA = np.array([[0, 0, 1.0], [-1, 0, 0], [0, -1, 0]])
+
+DOUBTFUL = {
+    "scans of only zeros": (scans(lambda p: 0 * p), "found only zeros"),
+    "kilometres": (scans(lambda p: p * (1e-3, 1e-3, 1e-3, 1)), "are they in kilometres"),
+    "camera axes": (scans(lambda p: p[:, [1, 2, 0, 3]] * (-1, -1, 1, 1)), "are they in camera axes"),
+    "three columns": (scans(lambda p: p[:, :3].reshape(-1, 4)), "were three columns read as four"),
+    "50 m below ground": (scans(lambda p: p - (0, 0, 50, 0)), "1.73 m below .*, found 0% .* below z = -51.7 m"),
+    "all behind": (scans(lambda p: p * (-1, 1, 1, 1)), "returns ahead .*, found 0 of 700"),
+    "beside the image": (scans(lambda p: p - (0, 75, 0, 0)), "returns in the image, found 0 of 700"),
+    "the same scan": (again("velodyne_points"), "scans that differ, found the same"),
+    "the same image": (again("image_02"), "images that differ, found the same"),
+    "black images": (black, "shows something, found .* from 0 to 0"),
+    "identity": (rotation(np.eye(3)), "from LIDAR to camera .*, found the identity"),
+    "camera to LIDAR": (rotation(LIDAR_FROM_CAMERA), "from LIDAR to camera .*, found"),
+}
+"""Drives that are done after a line that says what can't be right: how to make one, and what is said."""
+
+NONSENSE = {
+    "focal length of 1e30": (intrinsics(1e30, 19.5), "calib_cam_to_cam.txt: expected in K focal lengths of"),
+    "no focal length": (intrinsics(1e-6, 19.5), "calib_cam_to_cam.txt: expected in K focal lengths of"),
+    "principal point": (intrinsics(20, 4000), "in K a principal point within the image of 40 x 12 pixels, found .4000"),
+    "millimetres": (scans(lambda p: p * (1e3, 1e3, 1e3, 1)), "expected finite coordinates within 250 m"),
+}
+"""Drives that are refused."""
+
+
+@pytest.fixture
+def spoilt(request, tmp_path) -> KittiRawDrive:
+    request.param(write_tiny_drive(tmp_path, labelled=()))
+    return KittiRawDrive(tmp_path, DATE, "0001")
+
+
+@pytest.fixture
+def demo_says(tmp_path, monkeypatch, capsys) -> Callable[[], str]:
+    """Run the demo up to where the work begins, which reads the first frame, and return what it says."""
+
+    def says() -> str:
+        command = ["demo", "--kitti", str(tmp_path), "--date", DATE, "--drive", "0001"]
+        monkeypatch.setattr("sys.argv", ["semgrid-edu", *command])
+        monkeypatch.setattr(demo, "write_demo", lambda drive, *_: (drive[0], Path("done").resolve() / "page")[1])
+        with pytest.raises(SystemExit) as ended:
+            cli.run()
+        return f"{capsys.readouterr().err}{ended.value.code or ''}"
+
+    return says
+
+
+@pytest.mark.parametrize(("spoilt", "says"), DOUBTFUL.values(), ids=DOUBTFUL, indirect=["spoilt"])
+def test_what_cannot_be_right_is_said_before_the_work(spoilt, says, demo_says):
+    assert any(re.search(says, line) for line in spoilt.doubts())
+    assert any(re.search(says, line) for line in spoilt.problems())
+    for frames in (spoilt, spoilt[:]):
+        with pytest.raises(UserWarning, match=says):  # pytest turns warnings into errors
+            next(run_pipeline(frames, Stages()))
+    assert re.search(f"doubtful: .*{says}", demo_says())
+
+
+@pytest.mark.parametrize(("spoilt", "says"), NONSENSE.values(), ids=NONSENSE, indirect=["spoilt"])
+def test_nonsense_is_refused(spoilt, says, demo_says):
+    assert any(re.search(says, line) for line in spoilt.problems())
+    with pytest.raises(DataError, match=says):
+        next(run_pipeline(spoilt, Stages()))
+    assert re.search(f"^semgrid-edu: .*{says}", demo_says())
+
+
+def test_of_a_stream_the_first_frame_is_looked_at():
+    frame = sample_drive()[0]
+    buried = replace(frame, points=frame.points - np.array([0, 0, 50, 0], np.float32))
+    with pytest.raises(UserWarning, match=r"^frames: expected ground about 1\.73 m below the LIDAR"):
+        next(run_pipeline(iter([buried]), Stages()))
+
+
+def test_returns_in_millimetres_that_no_reader_refused():
+    frame = sample_drive()[0]
+    (doubt,) = frame_doubts([replace(frame, points=1000 * frame.points)])
+    assert "are they in millimetres" in doubt
+
+
+def test_no_frames_and_no_returns_give_no_doubt():
+    frame = sample_drive()[0]
+    assert frame_doubts([]) == []
+    assert frame_doubts([replace(frame, points=frame.points[:0], image=None)]) == []
+
+
+def test_a_frozen_sensor_is_said_wherever_the_drive_freezes():
+    frames = sample_drive()[:]
+    frames[12:] = [replace(frame, points=frames[12].points) for frame in frames[12:]]
+    (doubt,) = frame_doubts(frames)
+    assert doubt == "frames: expected scans that differ, found the same scan again in the next frame (frame 18)"

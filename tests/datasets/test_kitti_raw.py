@@ -275,6 +275,7 @@ DAMAGES = {
     "focal length zero": (CAM, replace("P_rect_02: 2.000000e+01", "P_rect_02: 0.000000e+00")),
     "image size of nothing": (CAM, replace("S_rect_02: 40", "S_rect_02: 0")),
     "unknown label set": (f"{LABELS}/label_set.txt", replace("KITTI-14", "KITTI-15")),
+    "words after the label set": (f"{LABELS}/label_set.txt", replace("KITTI-14", "KITTI-14\nwith gap")),
     "class that isn't": (f"{LABELS}/image/0000000002.png", save_image(np.full(SIZE, 14, np.uint8))),
     "grey mask": (f"{LABELS}/visible/0000000002.png", save_image(np.full((710, 310), 7, np.uint8))),
     "labels on another grid": (f"{LABELS}/birdseye/0000000002.png", save_image(np.zeros((355, 155), np.uint8))),

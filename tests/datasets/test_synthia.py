@@ -35,23 +35,30 @@ def write_png16(path, channels):
     cv2.imwrite(str(path), np.dstack(channels)[..., ::-1].astype(np.uint16))
 
 
-def scene():
+def scene(wall=WALL):
     """A flat road from the lower edge of the image to a wall: class and depth of each pixel, by geometry alone."""
     rows = np.arange(SIZE[0])[:, None] * np.ones(SIZE[1])
     below = np.maximum(rows - CENTRE_V, 1e-9)
-    depth = np.minimum(FOCAL * HEIGHT / below, WALL)
-    return np.where(depth < WALL, 3, 2), depth
+    depth = np.minimum(FOCAL * HEIGHT / below, wall)
+    return np.where(depth < wall, 3, 2), depth
+
+
+def colours(first):
+    """An image whose first pixel has a red of its own."""
+    image = np.random.default_rng(first).integers(0, 256, (*SIZE, 3), dtype=np.uint8)
+    image[0, 0, 0] = first
+    return image
 
 
 @pytest.fixture
 def root(tmp_path):
     folder = tmp_path / NAME
-    classes, depth = scene()
     (folder / "RGB" / VIEW).mkdir(parents=True)
     (folder / "CameraParams" / VIEW).mkdir(parents=True)
     (folder / "CameraParams" / "intrinsics.txt").write_text(f"{FOCAL}\n\n{CENTRE_U}\n\n{CENTRE_V}\n\n0.8\n")
     for k in range(3):
-        Image.new("RGB", SIZE[::-1], (k, 0, 0)).save(folder / "RGB" / VIEW / f"{k:06d}.png")
+        classes, depth = scene(WALL - k * STEP)
+        Image.fromarray(colours(k)).save(folder / "RGB" / VIEW / f"{k:06d}.png")
         write_png16(folder / "GT/LABELS" / VIEW / f"{k:06d}.png", [classes, np.full(SIZE, 7), np.zeros(SIZE)])
         write_png16(folder / "Depth" / VIEW / f"{k:06d}.png", [np.round(100 * depth)] * 3)
         (folder / "CameraParams" / VIEW / f"{k:06d}.txt").write_text(pose(k))

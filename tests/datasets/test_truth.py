@@ -41,6 +41,19 @@ def test_seen_cells_take_their_class_and_others_their_state(states):
     np.testing.assert_array_equal(np.array(KITTI_14.names)[truth[~seen]], names[states[~seen]])
 
 
+def test_where_labels_have_gaps_unlabelled_cells_in_view_are_left_out_and_the_others_are_unknown(states):
+    birdseye = np.full(LABEL_GRID.shape, IGNORE, np.uint8)
+    birdseye[:100] = KITTI_14.index("road")
+    labels = make_labels(birdseye, birdseye != IGNORE)
+    undecided = np.zeros(LABEL_GRID.shape, bool)
+    undecided[:350] = True
+    truth = grid_truth(replace(labels, undecided=undecided), belief_of(states), SPEC)
+    unknown = grid_truth(make_labels(np.full_like(birdseye, IGNORE), undecided), belief_of(states), SPEC)
+    assert (truth[:20] == KITTI_14.index("road")).all()
+    assert (truth[20:70] == IGNORE).all()
+    np.testing.assert_array_equal(truth[70:], unknown[70:])
+
+
 def test_one_seen_fine_cell_of_a_pole_names_its_cell(states):
     birdseye = np.full(LABEL_GRID.shape, KITTI_14.index("sidewalk"), np.uint8)
     birdseye[503, 202] = KITTI_14.index("signage")

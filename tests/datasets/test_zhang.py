@@ -41,8 +41,10 @@ def write_run(root, run=9, n_frames=2):
         (training / folder).mkdir(exist_ok=True)
     packets = []
     for k in range(n_frames):
-        Image.new("RGB", SIZE[::-1], (k, 2, 3)).save(training / "image_02" / name / f"{k:06d}.png")
-        np.array([[k, 1, 2, 0.5]], "<f4").tofile(training / "velodyne" / name / f"{k:06d}.bin")
+        image = np.full((*SIZE, 3), (k, 2, 3), np.uint8)
+        image[1:] = np.random.default_rng(k).integers(0, 256, image[1:].shape)
+        Image.fromarray(image).save(training / "image_02" / name / f"{k:06d}.png")
+        np.array([[10 + k, 1, -1.73, 0.5]], "<f4").tofile(training / "velodyne" / name / f"{k:06d}.bin")
         write_packet(root / "packet.txt", np.array([float(k), 0, 0]), (0.0, 0.0, 0.0))
         packets.append((root / "packet.txt").read_text())
     (training / "oxts" / f"{name}.txt").write_text("".join(packets))
@@ -114,7 +116,7 @@ class TestTrackingRun:
         assert run.problems() == []
         frame = run[1]
         assert tuple(frame.image[0, 0]) == (1, 2, 3)
-        np.testing.assert_array_equal(frame.points, np.array([[1, 1, 2, 0.5]], np.float32))
+        np.testing.assert_array_equal(frame.points, np.array([[11, 1, -1.73, 0.5]], np.float32))
         np.testing.assert_array_equal(frame.camera.K, K)
         assert (len(run), frame.camera.size, frame.time) == (2, SIZE, 0.1)
 

@@ -11,11 +11,10 @@ from semgrid_edu.datasets.ground_truth.carrying import carry_labels, close_and_s
 from semgrid_edu.datasets.ground_truth.policy import TruthPolicy
 from semgrid_edu.datasets.ground_truth.window import Moment, gather_returns
 from semgrid_edu.datasets.readers.project_lidar import seen_returns
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, check_shape
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import State
-from semgrid_edu.occupancy.state import check_shape
 
 SIGHT_COLUMNS = 100
 """Number of directions into which the image is divided, as wide as one column of the coarse simulated LIDAR."""

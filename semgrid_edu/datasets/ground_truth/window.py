@@ -11,12 +11,11 @@ from semgrid_edu.camera import invert_rigid, transform_points
 from semgrid_edu.datasets.ground_truth.policy import TruthPolicy
 from semgrid_edu.datasets.ground_truth.sweep import deskew_scan, ego_velocity
 from semgrid_edu.datasets.readers.project_lidar import closest_returns
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, check_shape
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE
 from semgrid_edu.occupancy import Belief, State
-from semgrid_edu.occupancy.state import check_shape
 
 
 class Moment(NamedTuple):

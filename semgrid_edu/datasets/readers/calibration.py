@@ -1,12 +1,16 @@
-"""KITTI's three calibration files: the rectified camera 2 of equation (1), and where the IMU stands."""
+"""KITTI's calibration: the rectified camera 2 of equation (1), and where LIDAR and IMU stand.
+
+Raw drives have three files; a sequence of the odometry and tracking benchmarks has one for all sensors.
+"""
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.camera import Camera, rigid_transform
-from semgrid_edu.errors import DataError
+from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, Camera, rigid_transform
+from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.reading import parse_numbers, read_text
 
 ROTATION_TOLERANCE = 1e-4
@@ -31,6 +35,35 @@ def read_camera(folder: Path, name: str = "image_02") -> Camera:
     K, T_camera_from_camera0, size = read_rectification(folder / "calib_cam_to_cam.txt", name)
     T_camera0_from_lidar = read_rigid(folder / "calib_velo_to_cam.txt")
     return Camera(K, T_camera_from_camera0 @ T_camera0_from_lidar, size)
+
+
+def camera_from(
+    path: Path,
+    K: NDArray[np.float64],
+    T_camera_from_lidar: NDArray[np.float64],
+    size: tuple[int, int],
+    lidar_height: float = KITTI_LIDAR_HEIGHT,
+) -> Camera:
+    """Return the camera of a calibration file, whose name stands in the error when it is no camera.
+
+    Parameters
+    ----------
+    path : Path
+        Where the calibration comes from, for the error.
+    K, T_camera_from_lidar, size, lidar_height
+        What `Camera` takes.
+    """
+    (height, width), principal_point = size, np.asarray(K)[:2, 2]
+    if not (
+        (principal_point >= -0.5) & (principal_point <= (width - 0.5, height - 0.5))
+    ).all():  # a cut image may do so
+        expected = f"in K a principal point within the image of {width} x {height} pixels"
+        raise DataError(path, expected, principal_point.tolist())
+    try:
+        return Camera(K, T_camera_from_lidar, size, lidar_height)
+    except ArgumentError as error:
+        name, expected, found = error.args
+        raise DataError(path, f"in {name} {expected}", found) from error
 
 
 def read_rectification(
@@ -61,7 +94,8 @@ def read_rectification(
     if not (width >= 1 and height >= 1 and width % 1 == 0 and height % 1 == 0):
         raise DataError(path, f"S_rect_{number}: width and height in pixels", [width, height])
     T_rectified_from_camera0 = rigid_transform(_rotation(path, calibration, "R_rect_00"), np.zeros(3))
-    return K, T_camera_from_rectified @ T_rectified_from_camera0, (int(height), int(width))
+    camera = camera_from(path, K, T_camera_from_rectified @ T_rectified_from_camera0, (int(height), int(width)))
+    return camera.K, camera.T_camera_from_lidar, camera.size
 
 
 def projection(path: Path, calibration: dict[str, str], key: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -182,3 +216,80 @@ def check_rotation(path: Path, R: NDArray[np.float64], what: str) -> NDArray[np.
     if np.abs(R @ R.T - np.eye(3)).max() > ROTATION_TOLERANCE or np.linalg.det(R) < 0:
         raise DataError(path, f"a rotation matrix for {what}", R.tolist())
     return R
+
+
+class BenchmarkCalibration(NamedTuple):
+    """What the file says of the left colour camera, and where the sensors stand.
+
+    Parameters
+    ----------
+    K : (3, 3) float64
+        Intrinsic matrix of the left colour camera, pixels.
+    T_camera_from_lidar : (4, 4) float64
+        From the LIDAR to the left colour camera, metres.
+    T_camera0_from_lidar : (4, 4) float64
+        From the LIDAR to the rectified camera 0, in whose frame the odometry benchmark gives poses, metres.
+    T_lidar_from_imu : (4, 4) float64 or None
+        From the IMU to the LIDAR, metres; None in the odometry benchmark.
+    """
+
+    K: NDArray[np.float64]
+    T_camera_from_lidar: NDArray[np.float64]
+    T_camera0_from_lidar: NDArray[np.float64]
+    T_lidar_from_imu: NDArray[np.float64] | None
+
+
+def read_benchmark_calibration(path: Path) -> BenchmarkCalibration:
+    """Read the calibration of a sequence.
+
+    The odometry benchmark has the keys P0 to P3 and Tr, the LIDAR in the rectified camera 0. The tracking benchmark has
+    P0 to P3, R_rect, Tr_velo_cam (the LIDAR in camera 0 before it is rectified) and Tr_imu_velo, the last three without
+    a colon.
+
+    Parameters
+    ----------
+    path : Path
+        calib.txt of an odometry sequence, or the file of a tracking run.
+    """
+    entries = _benchmark_entries(path)
+    K, T_camera_from_rectified = projection(path, entries, "P2")
+    if "Tr" in entries:
+        T_camera0_from_lidar, T_lidar_from_imu = _rigid(path, entries, "Tr"), None
+    else:
+        R = check_rotation(path, entry_of(path, entries, "R_rect", (3, 3)), "R_rect")
+        T_camera0_from_lidar = rigid_transform(R, np.zeros(3)) @ _rigid(path, entries, "Tr_velo_cam")
+        T_lidar_from_imu = _rigid(path, entries, "Tr_imu_velo")
+    return BenchmarkCalibration(
+        K, T_camera_from_rectified @ T_camera0_from_lidar, T_camera0_from_lidar, T_lidar_from_imu
+    )
+
+
+def parse_pose(path: Path, text: str, what: str) -> NDArray[np.float64]:
+    """Return the rigid transform in twelve numbers, the three upper rows of its matrix.
+
+    Parameters
+    ----------
+    path : Path
+        Where the numbers come from, for the error.
+    text : str
+        The numbers.
+    what : str
+        What the transform is, for the error.
+
+    Returns
+    -------
+    (4, 4) float64
+        Metres.
+    """
+    return _rigid(path, {what: text}, what)
+
+
+def _benchmark_entries(path: Path) -> dict[str, str]:
+    """Return the values of each key; a colon may follow the key."""
+    lines = [line.split(maxsplit=1) for line in read_text(path).splitlines() if line.strip()]
+    return {key.rstrip(":"): (values[0] if values else "") for key, *values in lines}
+
+
+def _rigid(path: Path, entries: dict[str, str], key: str) -> NDArray[np.float64]:
+    matrix = entry_of(path, entries, key, (3, 4))
+    return rigid_transform(check_rotation(path, matrix[:, :3], key), matrix[:, 3])

@@ -1,13 +1,16 @@
-"""What is doubtful about a drive and can be seen without reading its scans: its layout, sizes of files, and poses."""
+"""What is doubtful about a drive, as its layout, sizes of files, poses and a few of its frames show it at once."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.camera import project, transform_points
 from semgrid_edu.datasets.readers.oxts import mercator_pose, mercator_scale
 from semgrid_edu.errors import DataError
+from semgrid_edu.frame import Frame
 
 SHORT_SCAN = 0.6
 """A scan smaller than this share of the drive's median scan was probably cut short: sound ones differ less."""
@@ -20,6 +23,29 @@ RETURN = 16
 
 FASTEST = 100.0
 """Metres per second. No car drives faster."""
+
+LEVEL = (0.5, 0.05)
+"""Ground may lie this far above or below the level of the vehicle's: metres, and metres for each metre of distance."""
+
+FEWEST_ON_GROUND = 0.05
+"""The smallest share of a street's returns near the level of the ground: 0.7 to 0.9 in KITTI and in the sample."""
+
+MISTAKES: dict[str, Callable[[NDArray], NDArray]] = {
+    "are they in kilometres?": lambda points: 1000 * points,
+    "are they in millimetres?": lambda points: points / 1000,
+    "are they in camera axes (x right, y down, z ahead)?": lambda points: points[:, [2, 0, 1]] * (1, -1, -1),
+    "were three columns read as four?": lambda points: points.ravel()[: points.size // 3 * 3].reshape(-1, 3),
+}
+"""What undoes a mistake with the returns (N, 4), by what to ask if it puts most of them on the ground."""
+
+LIKELY = 0.4
+"""The smallest share of returns on the ground for which a mistake is named, if it is also 1.5 times what it was."""
+
+FEWEST_SEEN = 1e-3
+"""The smallest share of a street's returns that lie ahead, or in the image: 0.14 to 0.26 in KITTI and in the sample."""
+
+CONTRAST = 8
+"""An image in each of whose channels the levels differ by no more than this shows nothing."""
 
 _UNSYNCED = (
     "unsynchronised drives (_extract), whose images are neither rectified nor taken together with the scans: fetch the "
@@ -93,6 +119,81 @@ def jumps(packets: Mapping[Path, NDArray], seconds: NDArray) -> list[str]:
         for path, far, step, wrong in zip(list(packets)[1:], metres, steps, too_far, strict=True)
         if wrong
     ]
+
+
+def frame_doubts(
+    frames: Sequence[Frame], place: object = "frames", read: Callable[[int], Frame] | None = None
+) -> list[str]:
+    """Say what can't be right about three pairs of successive frames: the first, one in the middle and the last.
+
+    The ground lies about a LIDAR's height below it, some returns lie ahead and in the image, the image shows something,
+    and no scan or image is that of the frame before. What can't be read is an error of its frame, and no doubt.
+
+    Parameters
+    ----------
+    frames : sequence of Frame
+        The frames of a drive.
+    place : object
+        What the lines begin with: the folder of the drive, or the name of the argument.
+    read : callable, optional
+        Reads frame k, when that can be done quicker than by `frames[k]`, such as without labels.
+
+    Returns
+    -------
+    list of str
+        One line for each kind of doubt, which names the first of these frames that gives rise to it.
+    """
+    found: dict[str, str] = {}
+    read, n = read or frames.__getitem__, len(frames)
+    for k in sorted({0, n // 2, max(n - 2, 0)} & set(range(n))):
+        with suppress(DataError):
+            for expected, what in _doubts_of(read, k, n):
+                found.setdefault(expected, f"{what} (frame {k})")
+    return [str(DataError(place, expected, what)) for expected, what in found.items()]
+
+
+def _doubts_of(read: Callable[[int], Frame], k: int, n_frames: int) -> Iterator[tuple[str, str]]:
+    """Yield what was expected of frame k, and what was found."""
+    frame = read(k)
+    R, image = frame.camera.T_camera_from_lidar[:3, :3], frame.image
+    if not R[1, 2] < -0.5:
+        found = "the identity" if np.allclose(R, np.eye(3)) else R.round(3).tolist()
+        yield "a rotation from LIDAR to camera that turns up (z) into up (-y)", found
+    elif len(frame.points):
+        yield from _scan_doubts(frame)
+    if image is not None and np.ptp(image, axis=(0, 1)).max() <= CONTRAST:
+        yield "an image that shows something", f"one colour, all levels from {image.min()} to {image.max()}"
+    if k + 1 < n_frames:
+        after = read(k + 1)
+        if len(frame.points) and np.array_equal(frame.points, after.points):
+            yield "scans that differ", "the same scan again in the next frame"
+        if image is not None and np.array_equal(image, after.image):
+            yield "images that differ", "the same image again in the next frame"
+
+
+def _scan_doubts(frame: Frame) -> Iterator[tuple[str, str]]:
+    """Yield the first that is doubtful about a scan: whether it is one, where the ground lies, what the camera sees."""
+    points, height = frame.points, frame.camera.lidar_height
+    if not points[:, :3].any():
+        yield "returns from places around the LIDAR", "only zeros"
+        return
+    share, n = _on_ground(points, height), len(points)
+    other, mistake = max((_on_ground(undo(points), height), ask) for ask, undo in MISTAKES.items())
+    half = f"half of them are above, half below z = {np.median(points[:, 2]):.3g} m"
+    hint = mistake if other > max(LIKELY, 1.5 * share) else half if share < FEWEST_ON_GROUND else ""
+    in_image = project(transform_points(frame.camera.T_camera_from_lidar, points[:, :3]), frame.camera)[1]
+    if hint:
+        yield f"ground about {height:.3g} m below the LIDAR", f"{share:.0%} of the returns near there: {hint}"
+    elif (points[:, 0] > 0).mean() < FEWEST_SEEN:
+        yield "returns ahead of the LIDAR (x > 0)", f"{np.sum(points[:, 0] > 0)} of {n}: do all lie behind?"
+    elif in_image.mean() < FEWEST_SEEN:
+        yield "returns in the image", f"{in_image.sum()} of {n}: is the calibration that of this camera?"
+
+
+def _on_ground(points: NDArray, height: float) -> float:
+    """Return the share of returns (N, 3+) near the level of the ground, `height` metres below the LIDAR."""
+    distance = np.hypot(points[:, 0], points[:, 1])
+    return float(np.mean(np.abs(points[:, 2] + height) < LEVEL[0] + LEVEL[1] * distance))
 
 
 def what_is(folder: Path) -> str:

@@ -19,6 +19,16 @@ KITTI_LICENCE = (
     "Geiger, Lenz, Stiller and Urtasun, Vision meets Robotics: The KITTI Dataset, IJRR 2013."
 )
 
+PANDASET_LICENCE = (
+    "PandaSet (Hesai and Scale AI, Xiao et al., ITSC 2021) is not part of this project. Its licence, CC BY 4.0 "
+    "(https://creativecommons.org/licenses/by/4.0/) with the publisher's additional terms, asks for attribution and "
+    "forbids to identify anyone or to use the makers' names for publicity. https://pandaset.org describes it; its own "
+    "download has ended, and https://github.com/scaleapi/pandaset-devkit/issues/151 says where copies are. Unpack "
+    "a scene so that FOLDER/002 holds lidar, camera and annotations, then run "
+    "`semgrid-edu demo --pandaset FOLDER --scene 002`."
+)
+"""What a user has to know to get PandaSet, which no program can fetch for them."""
+
 REGISTRY = "registry.txt"
 """The file beside the archives that holds their SHA-256, in pooch's form: a line `name sha256` for each."""
 

@@ -10,8 +10,10 @@ from typing import Protocol, overload
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from semgrid_edu.camera import Camera
+from semgrid_edu.datasets.readers.drive_doubts import frame_doubts
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
@@ -58,11 +60,29 @@ class LabelledDrive(Protocol):
             The grid, (H, W) cells.
         """
 
+    def undecided(self, k: int, spec: GridSpec) -> NDArray[np.bool_]:
+        """Return the cells that the camera may see when not all of these are labelled, (H, W); otherwise none.
+
+        There, `truth` is 255 where nobody has labelled what is to be seen, which teaches nothing. Other cells are
+        unknown to the camera, also those of which a LIDAR knows more. Parameters are those of `LabelledDrive.truth`.
+        """
+
+    def image_labels(self, k: int, size: tuple[int, int]) -> NDArray[np.uint8]:
+        """Return the class of each pixel of frame k when its image is resized, (h, w); 255 where unlabelled.
+
+        Parameters
+        ----------
+        k : int
+            Number of a labelled frame.
+        size : (int, int)
+            Height and width of the resized image, pixels.
+        """
+
     def files(self) -> list[Path]:
         """Return the files that the frames are read from: when one changes, what was made of the drive is stale."""
 
     def doubts(self) -> list[str]:
-        """List what is doubtful about the drive, as far as it can be seen without reading the frames."""
+        """List what is doubtful about the drive, as far as a few of its frames show it."""
 
 
 class FrameSequence(Sequence[Frame]):
@@ -70,11 +90,12 @@ class FrameSequence(Sequence[Frame]):
 
     `drive[k]` is frame k, `drive[-1]` the last one, `drive[2:5]` a list of three. A reader derives from this class and
     defines `__len__`, `_frame`, `name`, and `folder`, which holds the files of the drive; for a `LabelledDrive` also
-    `camera` and `label_set`.
+    `camera` and `label_set`. Where data are used under a licence that asks for it, `credit` names whose they are.
     """
 
     name: str
     folder: Path
+    credit: str = ""
 
     @overload
     def __getitem__(self, index: int) -> Frame: ...
@@ -90,14 +111,14 @@ class FrameSequence(Sequence[Frame]):
         return self._frame(k % len(self))
 
     def problems(self) -> list[str]:
-        """Read every frame and list all that is wrong.
+        """Read every frame and list all that is wrong or doubtful.
 
         Returns
         -------
         list of str
-            One line for each problem, which names the file; empty when all frames are sound.
+            One line for each problem, which names file or folder; empty when all frames are sound.
         """
-        found = [error_of(partial(self._frame, k)) for k in range(len(self))]
+        found = [*(error_of(partial(self._frame, k)) for k in range(len(self))), *self.doubts()]
         return [error for error in dict.fromkeys(found) if error]
 
     def truth(self, k: int, spec: GridSpec) -> NDArray[np.uint8]:
@@ -105,22 +126,42 @@ class FrameSequence(Sequence[Frame]):
 
         Parameters and result are those of `LabelledDrive.truth`.
         """
+        return visible_labels(self._labels_of(k), spec)
+
+    def undecided(self, k: int, spec: GridSpec) -> NDArray[np.bool_]:
+        """Return `FrameLabels.undecided_on` of a frame's labels. Parameters are those of `LabelledDrive.truth`."""
+        return self._labels_of(k).undecided_on(spec)
+
+    def image_labels(self, k: int, size: tuple[int, int]) -> NDArray[np.uint8]:
+        """Return the labels of a frame's image, resized (`resize_labels`).
+
+        Parameters and result are those of `LabelledDrive.image_labels`.
+        """
+        labels = self._labels_of(k)
+        return resize_labels(labels.image, size, sparse=labels.undecided is not None)
+
+    def _labels_of(self, k: int) -> FrameLabels:
+        """Return the labels of a frame that has some."""
         labels = self[k].labels
         if labels is None:
             raise DataError(self.folder, f"labels of the frame {k}", "none")
-        return visible_labels(labels, spec)
+        return labels
 
     def files(self) -> list[Path]:
         """Return all files below the folder of the drive."""
         return [path for path in self.folder.rglob("*.*") if path.is_file()]
 
     def doubts(self) -> list[str]:
-        """List nothing. A reader that knows what may be doubtful about its drives overrides this."""
-        return []
+        """List what is doubtful about a few of the frames; a reader that knows more of its drives adds to it."""
+        return frame_doubts(self, self.folder, self._without_labels)
 
     @abstractmethod
     def _frame(self, k: int) -> Frame:
         """Read frame k, 0 <= k < len(self)."""
+
+    def _without_labels(self, k: int) -> Frame:
+        """Read frame k without its labels. A reader whose labels take long overrides this."""
+        return self._frame(k)
 
 
 def read_scan(path: Path) -> NDArray[np.float32]:
@@ -171,8 +212,32 @@ def count_frames(folder: Path, what: str, suffix: str) -> int:
     return 1 + max(numbers)
 
 
+def resize_labels(labels: NDArray[np.uint8], size: tuple[int, int], sparse: bool = False) -> NDArray[np.uint8]:
+    """Give each larger pixel the class that covers most of it; between two equal shares the smaller number wins.
+
+    Parameters
+    ----------
+    labels : (h, w) uint8
+        The class of each pixel; 255 (unlabelled) counts as a class.
+    size : (int, int)
+        The new height and width, pixels.
+    sparse : bool
+        Whether a larger pixel takes its class from the labelled ones alone, and is unlabelled if there are none.
+
+    Returns
+    -------
+    (*size,) uint8
+    """
+    classes = np.unique(labels)
+    masks = (Image.fromarray((labels == c).astype(np.float32)) for c in classes)
+    shares = [np.asarray(mask.resize(size[::-1], Image.Resampling.BOX)) for mask in masks]
+    if sparse and classes[-1] == IGNORE:
+        shares[-1] = np.full(size, 1e-6, np.float32)
+    return classes[np.argmax(shares, axis=0)]
+
+
 def visible_labels(labels: FrameLabels, spec: GridSpec) -> NDArray[np.uint8]:
-    """Return the class of each cell that the camera sees.
+    """Return the class of each cell that the camera sees; where labels have gaps, that of each labelled cell.
 
     Parameters
     ----------
@@ -186,7 +251,8 @@ def visible_labels(labels: FrameLabels, spec: GridSpec) -> NDArray[np.uint8]:
     (H, W) uint8
         255 where the camera doesn't see, or nothing is labelled.
     """
-    return np.where(labels.visible_on(spec), labels.birdseye_on(spec), np.uint8(IGNORE))
+    birdseye = labels.birdseye_on(spec)
+    return birdseye if labels.undecided is not None else np.where(labels.visible_on(spec), birdseye, np.uint8(IGNORE))
 
 
 def nothing_known(label_set: LabelSet, image_size: tuple[int, int]) -> FrameLabels:

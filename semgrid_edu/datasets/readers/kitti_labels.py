@@ -13,6 +13,9 @@ from semgrid_edu.storage.reading import read_png, read_text
 KINDS = ("image", "depth", "birdseye", "visible")
 """The four files of a labelled frame, each in a folder of this name."""
 
+WITH_GAPS = "with gaps"
+"""The second line of label_set.txt where the camera may see what nobody labelled, as when only returns are labelled."""
+
 DEPTH_UNIT = 1 / 256
 """One step of a depth PNG, metres (KITTI's convention); 0 means none."""
 
@@ -81,6 +84,17 @@ def read_label(folder: Path, kind: str, name: str, image_size: tuple[int, int] |
     return _classes(path, classes, read_label_set(folder / "label_set.txt"))
 
 
+def have_gaps(folder: Path) -> bool:
+    """Return whether the labels of a drive have gaps.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder labels/ of the drive.
+    """
+    return read_text(folder / "label_set.txt").strip().endswith(WITH_GAPS)
+
+
 def read_label_set(path: Path) -> LabelSet:
     """Return the label set that a file names.
 
@@ -89,9 +103,10 @@ def read_label_set(path: Path) -> LabelSet:
     path : Path
         label_set.txt of a drive.
     """
-    name = read_text(path).strip()
-    if name not in LABEL_SETS:
-        raise DataError(path, f"one of {', '.join(LABEL_SETS)}", repr(name))
+    name, *more = read_text(path).strip().splitlines() or [""]
+    if name not in LABEL_SETS or more not in ([], [WITH_GAPS]):
+        expected = f"one of {', '.join(LABEL_SETS)}, and perhaps a second line, {WITH_GAPS}"
+        raise DataError(path, expected, repr("\n".join([name, *more])))
     return LABEL_SETS[name]
 
 

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 
@@ -13,10 +14,18 @@ from semgrid_edu.camera import Camera, invert_rigid
 from semgrid_edu.datasets.readers.calibration import read_camera, read_rectification, read_rigid
 from semgrid_edu.datasets.readers.drive_doubts import jumps, short_scans, what_is
 from semgrid_edu.datasets.readers.frames import FrameSequence, error_of, read_scan
-from semgrid_edu.datasets.readers.kitti_labels import KINDS, is_labelled, read_label, read_label_set, read_labels
+from semgrid_edu.datasets.readers.kitti_labels import (
+    KINDS,
+    have_gaps,
+    is_labelled,
+    read_label,
+    read_label_set,
+    read_labels,
+)
 from semgrid_edu.datasets.readers.oxts import imu_pose, read_packet, read_timestamps
+from semgrid_edu.datasets.readers.project_lidar import cells_in_view
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.frame import Frame, FrameLabels
+from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.storage.reading import read_png
 
@@ -149,13 +158,13 @@ class KittiRawDrive(FrameSequence):
         return [error for error in dict.fromkeys(found) if error]
 
     def doubts(self) -> list[str]:
-        """List what is doubtful, as far as it can be seen without reading scans and images.
+        """List what is doubtful, as far as files' sizes, poses and a few frames show it.
 
         Returns
         -------
         list of str
             One line, which names the file, for each scan that is missing between others or was probably cut short, and
-            for each pose that no car can have reached since the one before.
+            for each pose that no car can have reached since the one before; then those of `frame_doubts`.
         """
         scans, packets, known = [self._file("velodyne_points", k, ".bin") for k in range(len(self))], {}, []
         for k in range(len(self)):
@@ -163,7 +172,8 @@ class KittiRawDrive(FrameSequence):
                 packets[self._file("oxts", k, ".txt")] = read_packet(self._file("oxts", k, ".txt"))
                 known.append(k)
         missing = [str(DataError(scans[k], "a scan", "none: the filter predicts over the gap")) for k in self.gaps]
-        return [*missing, *short_scans(scans), *jumps(packets, self._seconds("oxts")[np.array(known, int)])]
+        far = jumps(packets, self._seconds("oxts")[np.array(known, int)])
+        return [*missing, *short_scans(scans), *far, *super().doubts()]
 
     def _readers(self) -> Iterator[Callable[[], object]]:
         """Yield a reader for each file, so that no damaged file hides another."""
@@ -249,7 +259,13 @@ class KittiRawDrive(FrameSequence):
     def _labels(self, k: int) -> FrameLabels | None:
         if self.view != VIEWS[0]:
             return None
-        return read_labels(self.folder / "labels", f"{k:010d}.png", self.camera.size)
+        labels = read_labels(self.folder / "labels", f"{k:010d}.png", self.camera.size)
+        return replace(labels, undecided=self._in_view) if labels and have_gaps(self.folder / "labels") else labels
+
+    @cached_property
+    def _in_view(self) -> NDArray[np.bool_]:
+        """The cells of `LABEL_GRID` that lie in view of the camera, hidden or not."""
+        return cells_in_view(self.camera, LABEL_GRID)
 
 
 def _existing(root: Path, date: str, drive: str) -> tuple[Path, Path]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, invert_rigid
-from semgrid_edu.datasets.readers.benchmark_calibration import BenchmarkCalibration, read_benchmark_calibration
+from semgrid_edu.datasets.readers.calibration import BenchmarkCalibration, camera_from, read_benchmark_calibration
 from semgrid_edu.datasets.readers.frames import FrameSequence, count_frames, read_scan
 from semgrid_edu.datasets.readers.oxts import imu_pose, parse_packet
 from semgrid_edu.errors import DataError
@@ -66,14 +66,18 @@ class KittiTrackingRun(FrameSequence):
     def camera(self) -> Camera:
         """The calibration of image_02, the same for all frames; its size is that of the first image."""
         height, width = read_png(self._image_file(0), "RGB", None).shape[:2]
-        return Camera(self._calibration.K, self._calibration.T_camera_from_lidar, (height, width))
+        K, T_camera_from_lidar, *_ = self._calibration
+        return camera_from(self._calibration_file, K, T_camera_from_lidar, (height, width))
+
+    @property
+    def _calibration_file(self) -> Path:
+        return self.folder / "calib" / f"{self.name}.txt"
 
     @cached_property
     def _calibration(self) -> BenchmarkCalibration:
-        path = self.folder / "calib" / f"{self.name}.txt"
-        calibration = read_benchmark_calibration(path)
+        calibration = read_benchmark_calibration(self._calibration_file)
         if calibration.T_lidar_from_imu is None:
-            raise DataError(path, "the key Tr_imu_velo", "a calibration of the odometry benchmark")
+            raise DataError(self._calibration_file, "the key Tr_imu_velo", "a calibration of the odometry benchmark")
         return calibration
 
     def _image_file(self, k: int) -> Path:

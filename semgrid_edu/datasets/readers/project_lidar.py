@@ -2,10 +2,18 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter
 
-from semgrid_edu.camera import project, transform_points
+from semgrid_edu.camera import Camera, project, transform_points
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.planes import plane_heights, plane_pixels
+
+HIDING_ANGLE = 0.2
+"""Degrees between two neighbouring returns, about, of a scanner with 64 lasers."""
+
+HIDING_BLOCKS = (5, 3)
+"""How far what stands hides: rows and columns of blocks, `HIDING_ANGLE` wide. Lasers lie farther apart than columns."""
 
 
 def closest_returns(frame: Frame) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -63,3 +71,49 @@ def seen_returns(
     scale_v, scale_u = image_size[0] / frame.camera.size[0], image_size[1] / frame.camera.size[1]
     row, col = ((v + 0.5) * scale_v).astype(np.int32), ((u + 0.5) * scale_u).astype(np.int32)
     return row * image_size[1] + col, (rows * spec.shape[1] + cols)[inside].astype(np.int32)
+
+
+def cells_in_view(camera: Camera, spec: GridSpec) -> NDArray[np.bool_]:
+    """Return the cells above which a point of a plane lies in the image, (H, W), hidden or not.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    spec : GridSpec
+        The grid, (H, W) cells.
+    """
+    return plane_pixels(spec, plane_heights(), camera)[1].any(axis=0)
+
+
+def unhidden(points: NDArray, hiding: NDArray[np.bool_], camera: Camera) -> NDArray[np.bool_]:
+    """Return which points the camera sees: in its image, and behind nothing that stands.
+
+    Points of a LIDAR that stands elsewhere than the camera, and all the more points that other scans saw, lie behind
+    things that hide them from the camera, and mostly share no pixel with a point of what hides them
+    (`closest_returns`). So what stands counts as without gaps here: the image is divided into blocks, and a point is
+    hidden if something standing is 0.5 m and 3 % closer in its block or in one around it (`HIDING_BLOCKS`). Of what
+    shows just above something that stands, a narrow strip is lost.
+
+    Parameters
+    ----------
+    points : (N, 3) float
+        LIDAR frame, metres.
+    hiding : (N,) bool
+        Whether the point is of something that stands and can hide others: the ground hides nothing.
+    camera : Camera
+        The camera.
+
+    Returns
+    -------
+    (N,) bool
+    """
+    in_camera = transform_points(camera.T_camera_from_lidar, points)
+    uv, seen = project(in_camera, camera)
+    block = np.radians(HIDING_ANGLE) * camera.K[0, 0]
+    rows, cols = (uv[seen, ::-1] // block).astype(np.int64).T
+    depth = in_camera[seen, 2]
+    closest = np.full([int(side // block) + 1 for side in camera.size], np.inf)
+    np.minimum.at(closest, (rows[hiding[seen]], cols[hiding[seen]]), depth[hiding[seen]])
+    seen[seen] = depth <= 1.03 * minimum_filter(closest, HIDING_BLOCKS, mode="nearest")[rows, cols] + 0.5
+    return seen

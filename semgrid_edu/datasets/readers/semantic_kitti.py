@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, Camera, invert_rigid, lidar_from_grid, transform_points
-from semgrid_edu.datasets.readers.benchmark_calibration import (
+from semgrid_edu.datasets.readers.calibration import (
     BenchmarkCalibration,
+    camera_from,
     parse_pose,
     read_benchmark_calibration,
 )
@@ -194,8 +195,11 @@ class SemanticKittiSequence(FrameSequence):
         return transform_points(invert_rigid(lidar_from_grid(KITTI_LIDAR_HEIGHT)), points), classes
 
     def _frame(self, k: int) -> Frame:
-        frame = Frame(self._image(k), self.scan(k), self.camera, self._poses[k], self._times[k])
+        frame = self._without_labels(k)
         return replace(frame, labels=self._labels(k, frame))
+
+    def _without_labels(self, k: int) -> Frame:
+        return Frame(self._image(k), self.scan(k), self.camera, self._poses[k], self._times[k])
 
     def _labels(self, k: int, frame: Frame) -> FrameLabels | None:
         """Return the truth of the scan, None in a sequence without labels."""
@@ -235,7 +239,8 @@ class SemanticKittiSequence(FrameSequence):
             height, width = IMAGE_SIZES[self.folder.name]
         else:
             raise DataError(self._image_file(0), "an image, to know the camera's size", "no folder image_2")
-        return Camera(self._calibration.K, self._calibration.T_camera_from_lidar, (height, width))
+        K, T_camera_from_lidar, *_ = self._calibration
+        return camera_from(self.folder / "calib.txt", K, T_camera_from_lidar, (height, width))
 
     @cached_property
     def _poses(self) -> list[NDArray[np.float64]]:

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, invert_rigid, lidar_from_grid, rigid_transform, transform_points
-from semgrid_edu.datasets.readers.calibration import check_rotation
+from semgrid_edu.datasets.readers.calibration import camera_from, check_rotation
 from semgrid_edu.datasets.readers.class_tables import ClassTable
 from semgrid_edu.datasets.readers.depth_points import birdseye_votes, depth_scan, points_from_depth
 from semgrid_edu.datasets.readers.frames import FrameSequence, count_frames, error_of
@@ -221,9 +221,11 @@ class SynthiaSequence(FrameSequence):
     def camera(self) -> Camera:
         """The calibration, the same for all frames; its size is that of the first image."""
         height, width = read_png(self._file("RGB", 0), "RGB", None).shape[:2]
-        K = read_synthia_intrinsics(self.folder / "CameraParams" / "intrinsics.txt")
+        path = self.folder / "CameraParams" / "intrinsics.txt"
+        K = read_synthia_intrinsics(path)
         T_camera_from_lidar = rigid_transform(_CAMERA_FROM_LIDAR, np.zeros(3))
-        return Camera(K, T_camera_from_lidar, (height, width), self._camera_height(K, (height, width)))
+        lidar_height = self._camera_height(K, (height, width))
+        return camera_from(path, K, T_camera_from_lidar, (height, width), lidar_height)
 
     def _camera_height(self, K: NDArray[np.float64], size: tuple[int, int]) -> float:
         """Return how far below the camera the nearby road of the first image lies, in the median."""

@@ -1,0 +1,131 @@
+"""Labelled scans of several instants put together: what moves is carried with its cuboid, so that it doesn't smear."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.camera import invert_rigid, transform_points
+
+MARGIN = 0.1
+"""Metres by which a return may lie outside its thing's cuboid: cuboids are drawn by hand."""
+
+ANY_LIDAR = -1
+"""In place of a LIDAR's number: the cuboid holds for all of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cuboids:
+    """The things of one instant, each in a box.
+
+    Parameters
+    ----------
+    names : (B,) str
+        What tells a thing from the others, the same at all instants.
+    T_world_from_box : (B, 4, 4) float64
+        Pose of each box, whose frame has its origin in the middle of the box, metres.
+    sizes : (B, 3) float
+        Lengths of the edges along the box's own axes, metres.
+    moving : (B,) bool
+        Whether the thing moves at any time.
+    lidars : (B,) int
+        Number of the LIDAR whose returns the box holds, since two LIDARs see what moves in two places; `ANY_LIDAR` for
+        all.
+    """
+
+    names: NDArray
+    T_world_from_box: NDArray[np.float64]
+    sizes: NDArray[np.float64]
+    moving: NDArray[np.bool_]
+    lidars: NDArray[np.int64]
+
+    def holding(self, points: NDArray, lidars: NDArray) -> NDArray[np.int64]:
+        """Return the number of the box that holds each point, (N,); -1 where none does.
+
+        Parameters
+        ----------
+        points : (N, 3) float
+            World, metres.
+        lidars : (N,) int
+            Number of the LIDAR of each point.
+        """
+        holder = np.full(len(points), -1)
+        for b, (T, size, lidar) in enumerate(zip(self.T_world_from_box, self.sizes, self.lidars, strict=True)):
+            near = np.flatnonzero(np.abs(points - T[:3, 3]).max(axis=1) < np.linalg.norm(size) / 2 + MARGIN)
+            inside = (np.abs(transform_points(invert_rigid(T), points[near])) <= size / 2 + MARGIN).all(axis=1)
+            holder[near[inside & ((lidar == ANY_LIDAR) | (lidars[near] == lidar))]] = b
+        return holder
+
+    def poses(self) -> dict[str, NDArray[np.float64]]:
+        """Return T_world_from_box of each thing by its name; of two boxes that of the LIDAR with the lower number."""
+        return {self.names[b]: self.T_world_from_box[b] for b in np.argsort(-self.lidars, kind="stable")}
+
+
+class LabelledScan(NamedTuple):
+    """The returns of one instant with their classes, and the things among them.
+
+    Parameters
+    ----------
+    points : (N, 3) float64
+        World, metres.
+    classes : (N,) uint8
+        Class of each return; 255 where unlabelled.
+    movable : (N,) bool
+        Whether it comes from a thing that may move, such as a car, parked or not.
+    lidars : (N,) int
+        Number of the LIDAR of each return.
+    cuboids : Cuboids
+        The things.
+    """
+
+    points: NDArray[np.float64]
+    classes: NDArray[np.uint8]
+    movable: NDArray[np.bool_]
+    lidars: NDArray[np.int64]
+    cuboids: Cuboids
+
+
+def put_together(now: LabelledScan, others: Sequence[LabelledScan]) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
+    """Return the returns of several scans as they would lie at one instant.
+
+    Returns from a moving thing go where its cuboid is at that instant. In the other scans they are left out if it has
+    none then, and so are returns from a movable thing outside all cuboids: nobody says whether it stood.
+
+    Parameters
+    ----------
+    now : LabelledScan
+        The scan of that instant; its returns come first.
+    others : sequence of LabelledScan
+        Scans of other instants.
+
+    Returns
+    -------
+    points : (N, 3) float64
+        World, metres.
+    classes : (N,) uint8
+        Class of each; 255 where unlabelled.
+    """
+    places = now.cuboids.poses()
+    parts = [_carried(now, places, own=True), *(_carried(scan, places, own=False) for scan in others)]
+    points, classes = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    return points, classes
+
+
+def _carried(
+    scan: LabelledScan, places: dict[str, NDArray[np.float64]], own: bool
+) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
+    """Return the returns of a scan, those of moving things where the things are by `places`."""
+    points, kept, boxes = scan.points.copy(), np.ones(len(scan.points), bool), scan.cuboids
+    movable = np.flatnonzero(scan.movable)
+    holder = boxes.holding(points[movable], scan.lidars[movable])
+    kept[movable[holder < 0]] = own
+    for b in np.flatnonzero(boxes.moving):
+        held = movable[holder == b]
+        if boxes.names[b] in places:
+            T_now_from_then = places[boxes.names[b]] @ invert_rigid(boxes.T_world_from_box[b])
+            points[held] = transform_points(T_now_from_then, points[held])
+        else:
+            kept[held] = False
+    return points[kept], scan.classes[kept]

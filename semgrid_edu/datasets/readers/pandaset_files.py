@@ -1,0 +1,192 @@
+"""The files of a PandaSet scene, read and checked one by one: scans with classes and cuboids, poses, times, cameras.
+
+Points, poses and cuboids are given in a world whose z axis points up, metres. Two LIDARs: the Pandar64 on the roof
+turns (d = 0), the PandarGT looks ahead (d = 1).
+"""
+
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from semgrid_edu.camera import rigid_transform
+from semgrid_edu.datasets.readers.class_tables import PANDASET_CLASSES
+from semgrid_edu.datasets.readers.cuboids import Cuboids, LabelledScan
+from semgrid_edu.errors import DataError
+from semgrid_edu.storage.pickled_tables import read_pickled_table
+from semgrid_edu.storage.reading import read_json
+
+CREDIT = "PandaSet by Hesai and Scale AI, CC BY 4.0 (creativecommons.org/licenses/by/4.0), cut and reduced."
+"""What stands beside whatever shows data of PandaSet."""
+
+TURNING = 0
+"""The number d of the Pandar64, the only LIDAR that the occupancy filter gets."""
+
+FIRST_THING = 5
+"""Below this number are smoke, exhaust, spray and reflections: returns from where nothing is."""
+
+MOVABLE = range(13, 34)
+"""The numbers of the classes of things that may move: vehicles, people, animals."""
+
+
+class PandasetScan(NamedTuple):
+    """What the files of one scan hold.
+
+    Parameters
+    ----------
+    points : (N, 3) float64
+        World, metres.
+    reflectance : (N,) float32
+        From 0 to 1.
+    lidars : (N,) int
+        Number of the LIDAR of each return.
+    labelled : LabelledScan or None
+        The returns with their classes, without those from where nothing is (`FIRST_THING`); None in a scene without
+        labels.
+    """
+
+    points: NDArray[np.float64]
+    reflectance: NDArray[np.float32]
+    lidars: NDArray[np.int64]
+    labelled: LabelledScan | None
+
+
+def semseg_folder(scene: Path) -> Path:
+    """Return where a scene keeps the classes of its returns; scenes without labels have no such folder.
+
+    Parameters
+    ----------
+    scene : Path
+        The folder of the scene.
+    """
+    return scene / "annotations" / "semseg"
+
+
+def read_pandaset_scan(scene: Path, number: int) -> PandasetScan:
+    """Read the returns of a scan, their classes and the cuboids of the things among them.
+
+    Parameters
+    ----------
+    scene : Path
+        The folder of the scene.
+    number : int
+        Number of the scan.
+    """
+    path = scene / "lidar" / f"{number:02d}.pkl.gz"
+    table = _table(path, "x", "y", "z", "i", "d")
+    points = np.column_stack([table[axis] for axis in "xyz"])
+    reflectance, lidars = (table["i"] / 255).astype(np.float32), table["d"]
+    if not (np.isfinite(points).all() and (reflectance >= 0).all() and (reflectance <= 1).all()):
+        raise DataError(path, "finite coordinates, and i from 0 to 255", "others")
+    if not semseg_folder(scene).is_dir():
+        return PandasetScan(points, reflectance, lidars, None)
+    path = semseg_folder(scene) / f"{number:02d}.pkl.gz"
+    numbers = _table(path, "class")["class"]
+    if len(numbers) != len(points):
+        raise DataError(path, f"a class for each of the scan's {len(points)} returns", f"{len(numbers)}")
+    arrays = points, PANDASET_CLASSES.classes(path, numbers), np.isin(numbers, MOVABLE), lidars
+    cuboids = _read_cuboids(scene / "annotations" / "cuboids" / path.name)
+    labelled = LabelledScan(*(array[numbers >= FIRST_THING] for array in arrays), cuboids)
+    return PandasetScan(points, reflectance, lidars, labelled)
+
+
+def frame_numbers(folder: Path, what: str, suffix: str) -> tuple[int, ...]:
+    """Return the numbers of the files of a folder, which are named by two digits.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    what : str
+        What the files are, such as "images", for the error.
+    suffix : str
+        How their names end, such as ".jpg".
+    """
+    form = re.compile(rf"(\d\d){re.escape(suffix)}")
+    numbers = sorted(int(match[1]) for path in folder.glob(f"*{suffix}") if (match := form.fullmatch(path.name)))
+    if not numbers:
+        raise DataError(folder, f"{what} such as 00{suffix}", "none" if folder.is_dir() else "no folder")
+    return tuple(numbers)
+
+
+def read_poses(path: Path, last: int) -> NDArray[np.float64]:
+    """Read the poses of a sensor, T_world_from_sensor, (N, 4, 4), metres.
+
+    Parameters
+    ----------
+    path : Path
+        The file poses.json.
+    last : int
+        Number of the last frame that needs a pose.
+    """
+    entries = read_json(path, list)
+    if len(entries) <= last:
+        raise DataError(path, f"{last + 1} poses, since there is a frame {last}", f"{len(entries)}")
+    try:
+        places = np.array([[entry["position"][axis] for axis in "xyz"] for entry in entries], np.float64)
+        turns = np.array([[entry["heading"][axis] for axis in "xyzw"] for entry in entries], np.float64)
+        rotations = Rotation.from_quat(turns).as_matrix()
+    except (KeyError, TypeError, ValueError) as error:
+        raise DataError(path, "poses of a position x, y, z and a heading w, x, y, z", repr(error)) from error
+    if not (np.isfinite(places).all() and np.isfinite(rotations).all()):
+        raise DataError(path, "finite poses", "others")
+    return np.array([rigid_transform(*pose) for pose in zip(rotations, places, strict=True)])
+
+
+def read_times(path: Path, count: int) -> NDArray[np.float64]:
+    """Read the times of a sensor's poses, (count,) seconds.
+
+    Parameters
+    ----------
+    path : Path
+        The file timestamps.json.
+    count : int
+        How many poses there are.
+    """
+    try:
+        times = np.array(read_json(path, list), np.float64)
+    except (TypeError, ValueError) as error:
+        raise DataError(path, "times in seconds", repr(error)) from error
+    if times.shape != (count,) or not (np.diff(times) > 0).all():
+        raise DataError(path, f"{count} times that grow, one for each pose", f"{times.size} others")
+    return times
+
+
+def read_intrinsics(path: Path) -> NDArray[np.float64]:
+    """Read the intrinsic matrix of a camera, (3, 3), pixels.
+
+    Parameters
+    ----------
+    path : Path
+        The file intrinsics.json.
+    """
+    content = read_json(path)
+    try:
+        fx, fy, cx, cy = (float(content[key]) for key in ("fx", "fy", "cx", "cy"))
+    except (KeyError, TypeError, ValueError) as error:
+        raise DataError(path, "the numbers fx, fy, cx and cy", repr(content)[:200]) from error
+    return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+
+
+def _table(path: Path, *columns: str) -> dict[str, NDArray]:
+    """Read a table that has to have some columns."""
+    table = read_pickled_table(path)
+    if not set(columns) <= set(table):
+        raise DataError(path, f"the columns {', '.join(columns)}", ", ".join(table)[:200])
+    return table
+
+
+def _read_cuboids(path: Path) -> Cuboids:
+    """Read the cuboids of a scan. A thing that moves has two, one for each LIDAR, which name each other."""
+    columns = [f"{what}.{axis}" for what in ("position", "dimensions") for axis in "xyz"]
+    which = ("uuid", "stationary", "yaw", "cuboids.sibling_id", "cuboids.sensor_id")
+    table = _table(path, *which, *columns)
+    places, sizes = np.split(np.column_stack([table[column] for column in columns]).astype(np.float64), 2, axis=1)
+    turns = Rotation.from_rotvec(np.outer(table["yaw"], [0, 0, 1])).as_matrix()
+    T = np.array([rigid_transform(*pose) for pose in zip(turns, places, strict=True)]).reshape(-1, 4, 4)
+    lidars, sibling = table["cuboids.sensor_id"], table["cuboids.sibling_id"]
+    names = np.where((lidars > TURNING) & (sibling != "-"), sibling, table["uuid"])
+    return Cuboids(names, T, sizes, ~table["stationary"].astype(bool), lidars)

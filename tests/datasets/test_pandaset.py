@@ -1,0 +1,320 @@
+"""PandaSet's reader on a tiny scene whose street is known: frames, truth, image labels, and bad inputs."""
+
+import gzip
+import json
+import pickle
+import shutil
+
+import numpy as np
+import pytest
+from tiny_pandaset import (
+    CAR_SIZE,
+    CENTRE,
+    DRIVING,
+    GROUND,
+    LIDAR,
+    NUMBERS,
+    PARKED,
+    SCENE,
+    STEP,
+    WALL,
+    pickled_table,
+    write_table,
+    write_tiny_pandaset,
+)
+
+from semgrid_edu.camera import project, transform_points
+from semgrid_edu.datasets import DatasetIndex, LabelledFrame, PandasetScene, load_index
+from semgrid_edu.datasets.index import write_pandaset_index
+from semgrid_edu.datasets.readers.cuboids import put_together
+from semgrid_edu.datasets.readers.pandaset_files import read_pandaset_scan
+from semgrid_edu.datasets.training_set import TrainingSet, sets_by_camera
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
+from semgrid_edu.storage.pickled_tables import read_pickled_table
+
+SPEC = GridSpec(x_min=0, x_max=24, y_min=-8, y_max=8, cell=0.5)
+ROAD, CAR, BUILDING = (KITTI_14.index(name) for name in ("road", "car", "building"))
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory):
+    return write_tiny_pandaset(tmp_path_factory.mktemp("pandaset"))
+
+
+@pytest.fixture
+def copy(root, tmp_path):
+    shutil.copytree(root / SCENE, tmp_path / SCENE)
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def scene(root):
+    return PandasetScene(root, SCENE)
+
+
+def class_at(grid, x, y):
+    rows, cols, inside = SPEC.cells(np.array([[x, y]]))
+    assert inside.all()
+    return grid[rows[0], cols[0]]
+
+
+def test_there_is_a_frame_for_each_image(scene, root):
+    assert (len(scene), scene.numbers, scene.gaps, scene.problems()) == (3, NUMBERS, (), [])
+    assert [frame.time for frame in scene] == pytest.approx([0.0, 0.2, 0.4])
+    side = PandasetScene(root, SCENE, camera="left_camera")
+    assert (len(side), side.numbers, side.gaps) == (2, (0, 4), ())
+
+
+def test_the_grid_lies_on_the_ground_below_the_lidar_along_the_cameras_heading(scene):
+    for frame, number in zip(scene, NUMBERS, strict=True):
+        assert frame.camera.lidar_height == pytest.approx(LIDAR[2] - GROUND)
+        np.testing.assert_allclose(frame.T_world_from_lidar[:3, 3], np.add(LIDAR, (0, STEP * number, 0)), atol=1e-9)
+        np.testing.assert_allclose(frame.T_world_from_lidar[:3, 0], [0, 1, 0], atol=1e-9)  # ahead
+        np.testing.assert_allclose(frame.T_world_from_lidar[:3, 2], [0, 0, 1], atol=1e-9)  # up
+        assert frame.points_grid[:, 2].min() == pytest.approx(0, abs=1e-5)
+        assert frame.points[:, 0].max() == pytest.approx(WALL - STEP * number, abs=1e-5)
+        assert set(frame.points[:, 3].tolist()) == {np.float32(0.2)}
+
+
+def test_each_camera_has_a_grid_of_its_own(root):
+    frame = PandasetScene(root, SCENE, camera="left_camera")[0]
+    np.testing.assert_allclose(frame.T_world_from_lidar[:3, 0], [-1, 0, 0], atol=1e-9)
+    assert frame.points[:, 1].min() == pytest.approx(-WALL, abs=1e-5)
+
+
+def test_the_filter_gets_the_turning_lidar_alone(scene):
+    scan = scene._scan(0)
+    assert (scan.lidars == 1).sum() == 1
+    assert len(scene[0].points) == len(scan.points) - 1
+    assert len(scan.labelled.points) == len(scan.points) - 1  # the reflection isn't labelled
+
+
+def test_the_kept_rows_of_an_image_have_the_camera_that_took_them(scene):
+    frame = scene[0]
+    assert frame.image.shape == (580, 1920, 3)
+    assert frame.image[0, 0].tolist() == pytest.approx([216 // 8] * 3, abs=2)
+    wall = np.array([[WALL, 2.0, 1.0 - LIDAR[2] + GROUND]])  # 2 m to the left, 1 m above the ground
+    uv, seen = project(transform_points(frame.camera.T_camera_from_lidar, wall), frame.camera)
+    below = LIDAR[2] - 0.1 - GROUND - 1.0
+    assert seen.all()
+    np.testing.assert_allclose(uv[0], [CENTRE[0] - 2000 / WALL, CENTRE[1] - 216 + 1000 * below / WALL])
+
+
+def test_a_lidar_stands_where_it_was_when_the_image_was_taken(copy):
+    path = copy / SCENE / "camera/front_camera/timestamps.json"
+    path.write_text(json.dumps([time - 0.05 for time in json.loads(path.read_text())]))
+    frame = PandasetScene(copy, SCENE)[1]
+    np.testing.assert_allclose(frame.T_world_from_lidar[:3, 3], np.add(LIDAR, (0, STEP * 1.5, 0)), atol=1e-9)
+
+
+@pytest.mark.parametrize(("before", "after"), [(0, 0), (1, 1), (9, 9)])
+def test_cells_hold_what_stands_there_at_that_frame(scene, before, after):
+    truth, number = scene.truth(1, SPEC, before, after), NUMBERS[1]
+    x, left = WALL - STEP * number, -DRIVING[0]
+    assert class_at(truth, x, 0.1) == BUILDING
+    assert class_at(truth, PARKED[1] - STEP * number, -PARKED[0]) == CAR
+    for other in NUMBERS:
+        expected = CAR if other == number else ROAD
+        assert class_at(truth, DRIVING[1] - STEP * number, left - other) == expected, other
+    cars = truth == CAR
+    covered = 2 * CAR_SIZE[0] * CAR_SIZE[1] / SPEC.cell**2
+    assert covered <= cars.sum() <= 1.9 * covered  # a cell belongs to a car when the car covers a part of it
+    assert class_at(truth, 6.0, 0.0) == ROAD  # nothing is where a reflection is seen
+
+
+def test_only_the_scans_own_things_are_kept_when_nobody_says_where_they_went(copy):
+    for number in (0, 4):
+        path = copy / SCENE / f"annotations/cuboids/{number:02d}.pkl.gz"
+        empty = {
+            "uuid": np.zeros(0, object),
+            "stationary": np.zeros(0, bool),
+            "cuboids.sibling_id": np.zeros(0, object),
+        }
+        numbers = ("yaw", *(f"{what}.{axis}" for what in ("position", "dimensions") for axis in "xyz"))
+        write_table(path, empty | {name: np.zeros(0) for name in numbers} | {"cuboids.sensor_id": np.zeros(0, int)})
+    scene = PandasetScene(copy, SCENE)
+    np.testing.assert_array_equal(scene.truth(1, SPEC, 1, 1) == CAR, scene.truth(1, SPEC, 0, 0) == CAR)
+
+
+def test_what_the_camera_sees_is_told_from_what_only_a_lidar_sees(scene):
+    truth, visible = scene.truth(0, SPEC), scene.visible(0, SPEC)
+    assert visible[truth != IGNORE].mean() > 0.5
+    assert class_at(visible, PARKED[1] - 1.9, -PARKED[0])
+    behind = PARKED[1] + 2.6, -PARKED[0] * (PARKED[1] + 2.6) / (PARKED[1] - 2)
+    assert class_at(truth, *behind) == ROAD
+    assert not class_at(visible, *behind)  # the car hides it from the camera
+    assert not visible[truth == IGNORE].any()
+    assert not visible[-5:, :].any()  # too near: below the image
+
+
+@pytest.mark.parametrize("size", [(580, 1920), (96, 320)])
+def test_pixels_take_the_class_of_what_the_camera_sees(scene, size):
+    labels, camera = scene.image_labels(0, size), scene.camera.resized(size)
+    places = {BUILDING: (WALL, -1.0, 3.0), CAR: (PARKED[1] - 2.0, -PARKED[0], 0.75), ROAD: (9.1, 0.0, 0.0)}
+    for number, (x, y, z) in places.items():
+        uv, _ = project(transform_points(camera.T_camera_from_grid, np.array([[x, y, z]])), camera)
+        u, v = np.rint(uv[0]).astype(int)
+        reach = size[0] // 60
+        around = labels[v - reach : v + reach + 1, u - reach : u + reach + 1]
+        assert set(around[around != IGNORE]) == {number}, KITTI_14.names[number]
+    found = scene[0].labels
+    assert (labels != IGNORE).mean() > (0.005 if size[0] == 580 else 0.15)
+    if size == scene.camera.size:
+        np.testing.assert_array_equal(found.image, labels)
+        assert np.isfinite(found.depth[labels != IGNORE]).all()
+        assert found.depth[labels == BUILDING].max() == pytest.approx(WALL, abs=1e-3)
+
+
+def test_frame_labels_are_those_of_its_own_scan(scene):
+    labels = scene[0].labels
+    at_home = (labels.birdseye != IGNORE) & labels.visible
+    assert KITTI_14 is labels.label_set
+    assert set(np.unique(labels.birdseye[at_home])) == {ROAD, CAR, BUILDING}
+
+
+def test_a_scene_without_labels_has_frames(copy):
+    shutil.rmtree(copy / SCENE / "annotations")
+    scene = PandasetScene(copy, SCENE)
+    assert scene[0].labels is None
+    assert scene.lidar_height == pytest.approx(2.13)
+    with pytest.raises(DataError, match=r"semseg: expected the classes of the returns"):
+        scene.truth(0, SPEC)
+
+
+def test_the_index_knows_it(root):
+    frames = [{"scene": SCENE, "camera": "front_camera", "frame": k} for k in (0, 2)]
+    content = {"name": "real", "label_set": "KITTI-14", "reader": "pandaset", "splits": {"train": frames}}
+    (root / "dataset.json").write_text(json.dumps(content))
+    ((scene, numbers),) = load_index(root).drives("train")
+    assert (scene.name, numbers) == (f"{SCENE} front_camera", [0, 2])
+
+
+def test_a_training_set_takes_labels_of_its_own_image_size(root, scene):
+    frames = tuple(LabelledFrame((SCENE, "front_camera"), k) for k in (0, 2))
+    index = DatasetIndex(root, "real", KITTI_14, {"train": frames}, PandasetScene)
+    training = TrainingSet(index, "train", GridSpec(0, 71, -15.5, 15.5, 1.0), (24, 80))
+    np.testing.assert_array_equal(training.arrays["labels"][1], scene.image_labels(2, (24, 80)))
+    assert (training.arrays["labels"][1] != IGNORE).mean() > 0.3
+    truth, view = scene.truth(2, training.spec), scene.undecided(2, training.spec)
+    np.testing.assert_array_equal(training.arrays["truth"][1][view], truth[view])
+
+
+def test_two_boxes_of_one_thing_are_one(copy):
+    """A thing that moves has a box for each LIDAR; returns of the second go to where the first saw the thing."""
+    table = {"uuid": ["a", "b"], "stationary": np.array([False, False]), "yaw": np.zeros(2)}
+    places = {"x": [0.0, 1.0], "y": [14.0, 14.0], "z": [GROUND + 0.75] * 2}
+    table |= {f"position.{axis}": np.array(values) for axis, values in places.items()}
+    table |= {f"dimensions.{axis}": np.full(2, size) for axis, size in zip("xyz", CAR_SIZE, strict=True)}
+    table |= {"cuboids.sibling_id": ["b", "a"], "cuboids.sensor_id": np.array([0, 1])}
+    write_table(copy / SCENE / "annotations/cuboids/00.pkl.gz", table)
+    points = np.array([[0.5, 14.0, GROUND + 0.5], [1.5, 14.0, GROUND + 0.5]])
+    scan = {axis: points[:, column] for column, axis in enumerate("xyz")} | {"i": np.zeros(2), "d": np.array([0, 1])}
+    write_table(copy / SCENE / "lidar/00.pkl.gz", scan)
+    write_table(copy / SCENE / "annotations/semseg/00.pkl.gz", {"class": np.array([13, 13])})
+    moved, classes = put_together(read_pandaset_scan(copy / SCENE, 0).labelled, [])
+    np.testing.assert_allclose(moved, [points[0]] * 2)
+    assert classes.tolist() == [CAR, CAR]
+
+
+def gone(name):
+    return lambda folder: (folder / name).unlink()
+
+
+def written(name, content):
+    return lambda folder: (folder / name).write_bytes(content)
+
+
+def shortened(name):
+    return lambda folder: (folder / name).write_bytes((folder / name).read_bytes()[:-40])
+
+
+def relabelled(folder):
+    path = folder / "annotations/semseg/02.pkl.gz"
+    write_table(path, {"class": read_pickled_table(path)["class"] + 92})
+
+
+BAD = {
+    "a missing scan": (gone("lidar/02.pkl.gz"), r"lidar/02\.pkl\.gz: expected a file"),
+    "a missing label": (gone("annotations/semseg/02.pkl.gz"), r"semseg/02\.pkl\.gz: expected a file"),
+    "missing cuboids": (gone("annotations/cuboids/02.pkl.gz"), r"cuboids/02\.pkl\.gz: expected a file"),
+    "missing poses": (gone("lidar/poses.json"), r"lidar/poses\.json: expected a file"),
+    "missing poses of the camera": (
+        gone("camera/front_camera/poses.json"),
+        r"front_camera/poses\.json: expected a file",
+    ),
+    "too few poses": (written("lidar/poses.json", b"[]"), r"lidar/poses\.json: expected 5 poses.*found 0"),
+    "a pose of something else": (written("lidar/poses.json", b"[1, 2, 3, 4, 5]"), r"poses\.json: expected poses of"),
+    "too few times": (written("lidar/timestamps.json", b"[1, 2]"), r"timestamps\.json: expected 5 times"),
+    "no intrinsics": (written("camera/front_camera/intrinsics.json", b'{"fx": 1}'), r"intrinsics\.json: expected the"),
+    "an image cut short": (shortened("camera/front_camera/02.jpg"), r"02\.jpg: expected a sound JPEG"),
+    "a scan cut short": (shortened("lidar/02.pkl.gz"), r"lidar/02\.pkl\.gz: expected a gzipped pickle"),
+    "labels of another length": (
+        lambda folder: write_table(folder / "annotations/semseg/02.pkl.gz", {"class": np.full(7, 7)}),
+        r"semseg/02\.pkl\.gz: expected a class for each of the scan's \d+ returns, found 7",
+    ),
+    "unknown classes": (relabelled, r"semseg/02\.pkl\.gz: expected labels among"),
+    "another table": (written("lidar/02.pkl.gz", gzip.compress(pickled_table({"a": [1.0]}))), "expected the columns x"),
+    "a hostile scan": (written("lidar/02.pkl.gz", gzip.compress(pickle.dumps(print))), r"names builtins\.print"),
+}
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_bad_inputs_are_named(copy, kind):
+    spoil, says = BAD[kind]
+    spoil(copy / SCENE)
+    scene = PandasetScene(copy, SCENE)
+    with pytest.raises(DataError, match=says):
+        _ = scene[1]
+    assert scene.problems()
+
+
+def test_a_missing_image_is_a_gap(copy):
+    (copy / SCENE / "camera/front_camera/06.jpg").write_bytes(
+        (copy / SCENE / "camera/front_camera/04.jpg").read_bytes()
+    )
+    (copy / SCENE / "camera/front_camera/02.jpg").unlink()
+    scene = PandasetScene(copy, SCENE)
+    assert (scene.numbers, scene.gaps) == ((0, 4, 6), (2,))
+    (line,) = scene.doubts()
+    assert "02.jpg: expected an image" in line
+
+
+def test_says_which_scenes_and_cameras_there_are(root, tmp_path):
+    with pytest.raises(ArgumentError, match="camera: expected one of front_camera, "):
+        PandasetScene(root, SCENE, camera="rear")
+    with pytest.raises(DataError, match=r"003: expected a scene, found only 002"):
+        PandasetScene(root, "003")
+    with pytest.raises(DataError, match=r"back_camera: expected images such as 00\.jpg, found no folder"):
+        PandasetScene(root, SCENE, camera="back_camera")
+
+
+def test_a_scene_is_learnt_from_like_a_simulated_data_set(root, tmp_path):
+    """Cells in view without a label teach nothing; the labels of pixels are projected at the size of the image."""
+    write_pandaset_index(tmp_path / "data", root, SCENE, ["left_camera"])
+    index = load_index(tmp_path / "data")
+    assert {split: len(frames) for split, frames in index.splits.items()} == {"train": 3, "test": 2}
+    (front,) = sets_by_camera(index, "train")
+    scene = PandasetScene(root, SCENE)
+    assert front.camera.same_as(scene.camera.resized((96, 320)))
+    for k in range(3):
+        sample, truth, view = front[k], scene.truth(k, front.spec), scene.undecided(k, front.spec)
+        unknown = np.array(UNKNOWN_OF_STATE)[sample.occupancy.numpy().argmax(axis=0)]
+        np.testing.assert_array_equal(sample.labels.numpy(), scene.image_labels(k, (96, 320)))
+        np.testing.assert_array_equal(sample.truth.numpy(), np.where(view, truth, unknown))
+    assert (truth[view] == IGNORE).any()
+
+
+def test_what_cannot_be_a_data_set_is_refused(root, tmp_path):
+    with pytest.raises(ArgumentError, match=r"camera: expected one of .*, found 'roof'"):
+        write_pandaset_index(tmp_path, root, SCENE, ["roof"])
+    with pytest.raises(ArgumentError, match="test_cameras: expected at least one camera less"):
+        write_pandaset_index(tmp_path, root, SCENE, ["front_camera", "left_camera"])
+    write_pandaset_index(tmp_path, root, SCENE)
+    with pytest.raises(DataError, match=r"dataset.json: expected no data set yet"):
+        write_pandaset_index(tmp_path, root, SCENE)
+    moved = json.loads((tmp_path / "dataset.json").read_text()) | {"root": "nowhere"}
+    (tmp_path / "dataset.json").write_text(json.dumps(moved))
+    with pytest.raises(DataError, match=r"root: a folder that holds the drives, found 'nowhere'"):
+        load_index(tmp_path)
