@@ -38,10 +38,15 @@ def build_net(architecture: Architecture, camera: Camera, seed: int = 0) -> Sema
     if architecture.label_set not in LABEL_SETS:
         raise ArgumentError("label_set", f"one of {', '.join(LABEL_SETS)}", repr(architecture.label_set))
     n_classes = len(LABEL_SETS[architecture.label_set])
-    operator = plane_operator(architecture.grid, architecture.heights, camera.resized(architecture.image_size))
     segmenter = build_segmenter(architecture.segmenter, n_classes, architecture.preset, seed)
-    sampler = PlaneSampler.from_operator(operator)
+    sampler = plane_sampler(architecture, camera)
     return SemanticGridNet(segmenter, sampler, n_classes, seed, architecture=architecture)
+
+
+def plane_sampler(architecture: Architecture, camera: Camera) -> PlaneSampler:
+    """Return what samples a network's scores on its planes, for one camera. Parameters are those of `build_net`."""
+    operator = plane_operator(architecture.grid, architecture.heights, camera.resized(architecture.image_size))
+    return PlaneSampler.from_operator(operator)
 
 
 def plane_operator(grid: GridSpec, heights: ArrayLike, camera: Camera) -> PlaneOperator:

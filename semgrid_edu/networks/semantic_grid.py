@@ -82,7 +82,9 @@ class SemanticGridNet(nn.Module):
             raise ArgumentError("net", expected, "one made by hand, without an architecture")
         return self.architecture
 
-    def stages(self, image: Tensor, occupancy: Tensor, mirrored: bool = False) -> NetOutputs:
+    def stages(
+        self, image: Tensor, occupancy: Tensor, mirrored: bool = False, sampler: PlaneSampler | None = None
+    ) -> NetOutputs:
         """Return the result of every stage, from the scores to the semantic grid.
 
         Parameters
@@ -95,6 +97,8 @@ class SemanticGridNet(nn.Module):
             Whether the learnt parts see image and grid with left and right exchanged, as they do for half of the
             batches in training. Every result is mirrored back. The planes are always sampled unmirrored: the camera
             isn't quite symmetric, so a mirrored image would no longer lie where equation (1) looks.
+        sampler : PlaneSampler, optional
+            s -> p for another camera, which took these images; the network's own when left out.
 
         Returns
         -------
@@ -106,7 +110,7 @@ class SemanticGridNet(nn.Module):
         if len(image) != len(occupancy):
             raise ArgumentError("occupancy", f"one for each of the {len(image)} images", len(occupancy))
         scores = self.image_scores(image, mirrored)
-        planes = self.sampler(scores)
+        planes = (sampler or self.sampler)(scores)
         # Mirrored after the 1x1 convolution, which looks at one cell at a time: there is less to move.
         reduced, occupancy = (_flip(part, mirrored) for part in (self.fusion.reduce(planes), occupancy))
         return NetOutputs(scores, planes, _flip(self.fusion.fuse(reduced, occupancy), mirrored))

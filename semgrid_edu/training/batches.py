@@ -8,8 +8,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from semgrid_edu.datasets.training_set import Sample
+from semgrid_edu.datasets.training_set import Mixture, Sample
 from semgrid_edu.networks import SemanticGridNet, unit_image
+from semgrid_edu.planes import PlaneSampler
 
 
 class Batch(NamedTuple):
@@ -22,14 +23,23 @@ class Batch(NamedTuple):
     mirrored : bool
         Whether the network sees them with left and right exchanged. `image_scores` and `grid_logits` mirror their
         results back, so that they fit the labels of `frames`.
+    sampler : PlaneSampler, optional
+        Equation (2) for the camera that took these images; the network's own when left out.
     """
 
     frames: Sample
     mirrored: bool
+    sampler: PlaneSampler | None = None
 
 
 def draw_batch(
-    dataset: Sequence[Sample], size: int, jitter: float, iteration: int, seed: int, mirror: bool = True
+    dataset: Sequence[Sample],
+    size: int,
+    jitter: float,
+    iteration: int,
+    seed: int,
+    mirror: bool = True,
+    tint: float = 0.0,
 ) -> Batch:
     """Return the frames of a step, with jittered brightness and contrast, mirrored by chance (data augmentation).
 
@@ -39,7 +49,7 @@ def draw_batch(
     Parameters
     ----------
     dataset : sequence of Sample
-        The frames to learn from.
+        The frames to learn from; of a `Mixture`, those whose turn it is.
     size : int
         B, the number of frames in a batch.
     jitter : float
@@ -50,18 +60,23 @@ def draw_batch(
         Seed for the order, the jitter and the mirroring.
     mirror : bool
         Whether about half of the batches are mirrored.
+    tint : float
+        How far each colour of an image varies by itself, as a share.
 
     Returns
     -------
     Batch
         B frames.
     """
-    chosen = frames_of_step(len(dataset), size, iteration, seed)
-    frames = Sample(*map(torch.stack, zip(*(dataset[i] for i in chosen.tolist()), strict=True)))
+    part, turn = dataset.turn(iteration) if isinstance(dataset, Mixture) else (dataset, iteration)
+    chosen = frames_of_step(len(part), size, turn, seed)
+    frames = Sample(*map(torch.stack, zip(*(part[i] for i in chosen.tolist()), strict=True)))
     rng = np.random.default_rng((seed, 1, iteration))
     contrast, brightness = rng.uniform(-jitter, jitter, (2, size, 1, 1, 1)).astype(np.float32)
     image = (unit_image(frames.image) - 0.5) * (1 + torch.from_numpy(contrast)) + 0.5 + torch.from_numpy(brightness)
-    return Batch(frames._replace(image=image.clamp(0, 1)), mirrored=mirror and bool(rng.random() < 0.5))
+    mirrored = mirror and bool(rng.random() < 0.5)
+    tints = 1 + torch.from_numpy(rng.uniform(-tint, tint, (size, 3, 1, 1)).astype(np.float32))
+    return Batch(frames._replace(image=(image * tints).clamp(0, 1)), mirrored)
 
 
 def frames_of_step(n_frames: int, size: int, iteration: int, seed: int) -> NDArray[np.int64]:
@@ -136,4 +151,4 @@ def grid_logits(net: SemanticGridNet, batch: Batch) -> Tensor:
     (B, C, H, W) float32
         The logits, unmirrored.
     """
-    return net.stages(batch.frames.image, batch.frames.occupancy, batch.mirrored).logits
+    return net.stages(batch.frames.image, batch.frames.occupancy, batch.mirrored, batch.sampler).logits

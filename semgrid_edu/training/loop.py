@@ -11,9 +11,10 @@ import torch
 from torch import Tensor, nn
 from tqdm.auto import trange
 
-from semgrid_edu.datasets.training_set import Sample
+from semgrid_edu.datasets.training_set import Mixture, Sample, TrainingSet
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, save_net
+from semgrid_edu.networks.build import plane_sampler
 from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.training.batches import Batch, draw_batch, share_of_batch
@@ -58,7 +59,7 @@ def train(
         A network with an architecture, as `build_net` makes it. It is changed in place; afterwards it is in
         evaluation mode and on `device`.
     dataset : sequence of Sample
-        The frames to learn from.
+        The frames to learn from; for several cameras a `Mixture`.
     folder : path-like
         Where to write `log.csv`, the network after the first stage as `image_stage.safetensors`, the trained network
         as `weights.safetensors` and, as long as the run isn't finished, `checkpoint.safetensors`.
@@ -87,11 +88,15 @@ def train(
     run = {"seed": seed, "frames": len(dataset), **asdict(params), **asdict(net.need_architecture())}
     run |= {f"{stage} class weights": weights.tolist() for stage, weights in alpha.items()}
 
+    samplers = {part: plane_sampler(net.architecture, part.camera).to(device) for part in _parts(dataset)}
+
     def objective(stage: str) -> nn.Module:
         return _objective(net, stage, alpha[stage].to(device), params.end_to_end)
 
     def batch(iteration: int) -> Batch:
-        drawn = draw_batch(dataset, params.batch_size, params.jitter, iteration, seed, params.mirror)
+        drawn = draw_batch(dataset, params.batch_size, params.jitter, iteration, seed, params.mirror, params.tint)
+        if isinstance(dataset, Mixture):
+            drawn = drawn._replace(sampler=samplers[dataset.turn(iteration)[0]])
         return share_of_batch(drawn, rank(), world_size(), device)
 
     with shared_batch_norm(net), _gradients_as_found(net):
@@ -197,6 +202,11 @@ def _objective(net: SemanticGridNet, stage: str, alpha: Tensor, end_to_end: bool
     return in_parallel(Objective(net, stage, alpha), some_unused=stage == "image")
 
 
+def _parts(dataset: Sequence[Sample]) -> tuple[TrainingSet, ...]:
+    """Return the parts of a mixture, which have a camera each; nothing else has parts."""
+    return dataset.parts if isinstance(dataset, Mixture) else ()
+
+
 @contextmanager
 def _gradients_as_found(net: nn.Module) -> Iterator[None]:
     """Let the weights that could learn before the block, and only these, learn again after it."""
@@ -211,8 +221,9 @@ def _gradients_as_found(net: nn.Module) -> Iterator[None]:
 def _check_dataset(net: SemanticGridNet, dataset: Sequence[Sample], params: TrainingParams) -> None:
     """Refuse a network that can't be saved, frames that don't fit it, and batches that can't be shared."""
     net.need_architecture()
-    if len(dataset) < params.batch_size:
-        raise ArgumentError("dataset", f"at least one batch of {params.batch_size} frames", f"{len(dataset)} frames")
+    for part in _parts(dataset) or (dataset,):
+        if len(part) < params.batch_size:
+            raise ArgumentError("dataset", f"at least one batch of {params.batch_size} frames", f"{len(part)} frames")
     if params.batch_size % world_size():
         raise ArgumentError("batch_size", f"a multiple of {world_size()}, the number of processes", params.batch_size)
     size, shape = net.sampler.image_size, net.sampler.planes_shape[1:]

@@ -30,6 +30,8 @@ class TrainingParams:
     jitter : float
         How far brightness and contrast of the images vary, as a share of their range (data augmentation): 142 frames
         show few kinds of light.
+    tint : float
+        How far red, green and blue vary, each by itself, as a share: light and cameras differ from street to street.
     end_to_end : bool
         Whether the loss on the grid teaches the image network too. If not, training has two separate stages, as in the
         authors' earlier work, and the second stage doesn't change the image network.
@@ -45,6 +47,7 @@ class TrainingParams:
     momentum: float = 0.9
     weight_limit: float = 4.0
     jitter: float = 0.2
+    tint: float = 0.0
     end_to_end: bool = True
     mirror: bool = True
 
@@ -58,6 +61,7 @@ class TrainingParams:
             ("momentum", "a share from 0 to below 1", 0 <= self.momentum < 1),
             ("weight_limit", "1 or more", self.weight_limit >= 1),
             ("jitter", "a share of at least 0", 0 <= self.jitter < math.inf),
+            ("tint", "a share of at least 0", 0 <= self.tint < math.inf),
         ):
             if not fits:
                 raise ArgumentError(name, expected, getattr(self, name))

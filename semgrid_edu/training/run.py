@@ -1,16 +1,20 @@
 """Train a network on a data set and write down how it was made (paper, section 4.1)."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+from torch import Tensor
+
+from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
-from semgrid_edu.datasets.training_set import TrainingSet
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.datasets.training_set import Mixture, TrainingSet, sets_by_camera
+from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.networks import Architecture, build_net, load_imagenet
+from semgrid_edu.networks import Architecture, build_net, load_imagenet, load_net
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import write_provenance
 from semgrid_edu.training.checkpoint import CHECKPOINT
@@ -45,7 +49,7 @@ def architecture(segmenter: str, preset: str = "compact") -> Architecture:
 
 
 def training_params(
-    preset: str, iterations: int, end_to_end: bool = True, from_imagenet: bool = False
+    preset: str, iterations: int, end_to_end: bool = True, from_imagenet: bool = False, tint: float = 0.0
 ) -> TrainingParams:
     """Return the training parameters that a preset stands for.
 
@@ -60,6 +64,8 @@ def training_params(
         Whether the loss on the grid teaches the image network too.
     from_imagenet : bool
         Whether the image network starts from ImageNet weights. Training end to end then needs no first stage.
+    tint : float
+        How far each colour varies, see `TrainingParams`.
 
     Returns
     -------
@@ -67,7 +73,7 @@ def training_params(
         What `train` takes.
     """
     image_iterations = 0 if from_imagenet and end_to_end else iterations
-    params = TrainingParams(image_iterations, iterations, end_to_end=end_to_end)
+    params = TrainingParams(image_iterations, iterations, end_to_end=end_to_end, tint=tint)
     return params if preset == "compact" else replace(params, learning_rate=1e-3, weight_limit=math.inf)
 
 
@@ -91,7 +97,7 @@ def chosen_truth(name: str) -> LidarTruth | None:
 
 
 def train_network(
-    dataset_dir: str | Path,
+    data: str | Path | Sequence[str | Path],
     folder: str | Path,
     segmenter: str,
     params: TrainingParams,
@@ -102,13 +108,14 @@ def train_network(
     imagenet: str | Path | None = None,
     device: str = "cpu",
     truth: LidarTruth | None = None,
+    start: str | Path | None = None,
 ) -> None:
-    """Train a network on the split "train" of a data set; under torchrun, in all of its processes.
+    """Train a network on the split "train" of data sets; under torchrun, in all of its processes.
 
     Parameters
     ----------
-    dataset_dir : path-like
-        The folder of the data set, such as data/minikitti.
+    data : path-like or sequence of path-like
+        The folder of the data set, such as data/minikitti; or of several, which take turns (see `Mixture`).
     folder : path-like
         Where to write the files of `train`, and `provenance.json`, which names the data by the SHA-256 of their index.
     segmenter : str
@@ -126,7 +133,9 @@ def train_network(
     device : str
         "cpu", "cuda", "cuda:N" or "auto", see `choose_device`.
     truth : LidarTruth, optional
-        How to make the truth from image labels and LIDAR; the data set's own truth when left out.
+        How to make the truth from image labels and LIDAR; the data sets' own truth when left out.
+    start : path-like, optional
+        A network to start from, of the same architecture; fresh weights when left out.
 
     Raises
     ------
@@ -136,16 +145,20 @@ def train_network(
         When a file is missing or damaged, or the folder holds a run that would be overwritten.
     """
     began, description = datetime.now(UTC), architecture(segmenter, preset)
+    folders = [data] if isinstance(data, str | Path) else list(data)
     with process_group(device) as chosen:
         with first_process_first():
-            dataset = TrainingSet(dataset_dir, "train", description.grid, description.image_size, truth=truth)
+            dataset = _open(folders, description, truth)
         description = replace(description, label_set=dataset.label_set.name)
         net = build_net(description, dataset.camera, seed)
         if imagenet:
             load_imagenet(net.segmenter, imagenet)
+        if start:
+            net.load_state_dict(_weights_to_start_from(start, description, dataset.camera))
         train(net, dataset, folder, params, seed, resume, chosen)
         processes, is_first = world_size(), rank() == 0
     if is_first:
+        hashes = [sha256(Path(folder) / INDEX_FILE) for folder in folders]
         details = {
             "date": f"{began:%Y-%m-%d}",
             "minutes": round((datetime.now(UTC) - began).total_seconds() / 60, 1),
@@ -154,19 +167,37 @@ def train_network(
             "processes": processes,
             # JSON has no infinity.
             "params": {name: str(value) if value == math.inf else value for name, value in asdict(params).items()},
-            "dataset": sha256(Path(dataset_dir) / INDEX_FILE),
+            "dataset": hashes[0] if len(hashes) == 1 else hashes,
             **({"imagenet": sha256(imagenet)} if imagenet else {}),
+            **({"from": sha256(start)} if start else {}),
             **({"truth": asdict(truth)} if truth else {}),
         }
-        command = _command(dataset_dir, folder, description, imagenet, seed, params, truth)
+        command = _command(folders, folder, description, imagenet, start, seed, params, truth)
         write_provenance(folder, command, seed, ("torch", "numpy", "safetensors"), **details)
 
 
+def _open(folders: Sequence[str | Path], description: Architecture, truth: LidarTruth | None) -> TrainingSet | Mixture:
+    """Open what is learnt from: the frames of one camera, or a mixture."""
+    chosen = {"spec": description.grid, "image_size": description.image_size, "truth": truth}
+    data_sets = [sets_by_camera(folder, "train", **chosen) for folder in folders]
+    alone = len(data_sets) == len(data_sets[0]) == 1
+    return data_sets[0][0] if alone else Mixture(data_sets)
+
+
+def _weights_to_start_from(path: str | Path, description: Architecture, camera: Camera) -> dict[str, Tensor]:
+    """Read the weights of another training run, and refuse those of another architecture."""
+    net = load_net(path, camera)
+    if net.architecture != description:
+        raise DataError(path, f"a network like the one to train, {description}", net.architecture)
+    return net.state_dict()
+
+
 def _command(
-    dataset_dir: str | Path,
+    folders: Sequence[str | Path],
     folder: str | Path,
     description: Architecture,
     imagenet: str | Path | None,
+    start: str | Path | None,
     seed: int,
     params: TrainingParams,
     truth: LidarTruth | None,
@@ -174,10 +205,13 @@ def _command(
     """Return the command that makes the same training run, or as near as a command can: not every policy has a name."""
     named = (name for name, policy in POLICIES.items() if truth == LidarTruth(policy))
     options = [
-        f"--data {_name(dataset_dir)} --out {_name(folder)} --segmenter {description.segmenter}",
+        *(f"--data {_name(data)}" for data in folders),
+        f"--out {_name(folder)} --segmenter {description.segmenter}",
         f"--preset {description.preset}" if description.preset != Architecture.preset else "",
         f"--imagenet {_name(imagenet)}" if imagenet else "",
+        f"--from {_name(start)}" if start else "",
         f"--seed {seed} --iterations {params.grid_iterations}",
+        f"--tint {params.tint:g}" if params.tint else "",
         "" if params.end_to_end else "--two-stage",
         f"--truth {next(named, 'lidar')}" if truth else "",
     ]

@@ -61,10 +61,10 @@ def belief(dynamic: list[float], speed: float = 9.0) -> Belief:
 
 def scored(*frames: tuple[float, list[float]]) -> dict:
     scores = StreetScores(ROW)
-    scores.begin(MOVING)
+    scores.latency.begin(MOVING)
     for time, dynamic in frames:
         scores.add(scene(time), belief(dynamic))
-    scores.end()
+    scores.latency.end()
     return scores.summary()
 
 
@@ -84,14 +84,14 @@ def test_a_phantom_is_likelier_dynamic_than_static_and_than_0_3():
     weak = belief([NO, 0.25, 0.45, NO, NO, NO, NO, NO])
     weak.probability[STATIC, 0, 1] = 0.2
     scores = StreetScores(ROW)
-    scores.begin(MOVING)
+    scores.latency.begin(MOVING)
     scores.add(scene(2.0), weak)
     assert scores.summary()["cells"]["fences"]["called"] == 0.0
 
 
 def test_what_stands_counts_where_it_is_hit_above_0_7_m():
     scores = StreetScores(ROW)
-    scores.begin(MOVING)
+    scores.latency.begin(MOVING)
     scores.add(scene(2.0, height=0.5), belief([NO] * 8))
     assert scores.summary()["cells"]["scenery"]["cells"] == 0
 
@@ -134,14 +134,14 @@ def test_something_in_view_for_less_than_a_second_may_stay_unfound():
 def test_a_follower_is_late_from_when_the_first_is_found_and_it_is_hit():
     """Car 7 is found at 0.2 s; car 8 behind it is hit from the beginning, and found at 0.6 s."""
     scores, pace = StreetScores(ROW), Pace(10)
-    scores.begin([actor(7, Kind.CAR, 20.0, pace), actor(8, Kind.CAR, 5.0, pace)])
+    scores.latency.begin([actor(7, Kind.CAR, 20.0, pace), actor(8, Kind.CAR, 5.0, pace)])
     for time, first, second in ((0.0, NO, NO), (0.2, YES, NO), (0.6, YES, YES)):
         one = scene(time)
         one.truth.instance[:] = [[0, 0, 0, 8, 7, 7, 7, 0]]
         one.truth.state[:] = [[FREE, DYNAMIC, DYNAMIC, DYNAMIC, DYNAMIC, DYNAMIC, DYNAMIC, FREE]]
         one.truth.instance[0, 1:4] = 8
         scores.add(one, belief([NO, second, second, second, first, first, first, NO]))
-    scores.end()
+    scores.latency.end()
     assert scores.summary()["found after the car ahead"] == [pytest.approx(0.4)]
 
 

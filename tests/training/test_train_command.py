@@ -11,8 +11,9 @@ from semgrid_edu.camera import Camera
 from semgrid_edu.datasets import index as dataset_index
 from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
 from semgrid_edu.datasets.training_set import Sample
+from semgrid_edu.errors import DataError
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
-from semgrid_edu.networks import SEGMENTERS, Architecture, load_net
+from semgrid_edu.networks import SEGMENTERS, Architecture, build_net, load_net, save_net
 from semgrid_edu.networks.backbones.fcn import Fcn
 from semgrid_edu.storage.files import sha256, write_text
 from semgrid_edu.storage.provenance import provenance_problems
@@ -52,6 +53,10 @@ class _Noise:
         return Sample(image.to(torch.uint8), labels.to(torch.uint8), occupancy, truth.to(torch.uint8))
 
 
+def one_camera(*arguments, **named):
+    return [_Noise(*arguments, **named)]
+
+
 @pytest.fixture(autouse=True)
 def data_without_doubts(monkeypatch):
     """The data set isn't on disk, so nothing can be asked of it."""
@@ -63,7 +68,7 @@ class _Net:
 
 
 def test_the_command_leaves_weights_log_and_provenance(monkeypatch, tmp_path):
-    monkeypatch.setattr(experiment, "TrainingSet", _Noise)
+    monkeypatch.setattr(experiment, "sets_by_camera", one_camera)
     data, out = tmp_path / "minikitti", tmp_path / "compact"
     write_text(data / "dataset.json", "{}")
     arguments = [
@@ -99,7 +104,7 @@ def test_a_network_gets_the_classes_of_its_data(monkeypatch, tmp_path):
     """minisynthia has ten classes and no unknown ones; networks have KITTI-14 by default."""
     built = {}
     monkeypatch.setattr(_Noise, "label_set", SYNTHIA_10)
-    monkeypatch.setattr(experiment, "TrainingSet", _Noise)
+    monkeypatch.setattr(experiment, "sets_by_camera", one_camera)
     monkeypatch.setattr(experiment, "build_net", lambda description, *_: built.update(net=description) or _Net)
     monkeypatch.setattr(experiment, "train", lambda *_: None)
     write_text(tmp_path / "minisynthia" / "dataset.json", "{}")
@@ -137,7 +142,7 @@ def test_a_paper_preset_is_the_papers():
 def test_the_options_reach_the_training(monkeypatch, tmp_path, truth):
     """The paper's networks don't fit a test: what trains them is looked at instead."""
     given = {}
-    monkeypatch.setattr(experiment, "TrainingSet", _Noise)
+    monkeypatch.setattr(experiment, "sets_by_camera", one_camera)
     monkeypatch.setattr(experiment, "build_net", lambda description, *_: given.update(net=description) or _Net)
     monkeypatch.setattr(experiment, "load_imagenet", lambda segmenter, path: given.update(imagenet=(segmenter, path)))
     monkeypatch.setattr(experiment, "train", lambda *args: given.update(train=args))
@@ -163,9 +168,34 @@ def test_the_options_reach_the_training(monkeypatch, tmp_path, truth):
     assert provenance["imagenet"] == sha256(imagenet)
 
 
+def test_a_network_starts_from_another_and_says_so(monkeypatch, tmp_path):
+    monkeypatch.setattr(experiment, "sets_by_camera", one_camera)
+    data, first = tmp_path / "minikitti", tmp_path / "first.safetensors"
+    write_text(data / "dataset.json", "{}")
+    save_net(start := build_net(Architecture(), _Noise.camera, seed=5), first)
+    monkeypatch.setattr(experiment, "train", lambda net, *_: built.update(net.state_dict()))
+    built = {}
+    options = ["--data", str(data), "--data", str(data), "--from", str(first), "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(app, ["train", *options])
+    assert result.exit_code == 0, result.output
+    assert all(torch.equal(tensor, built[name]) for name, tensor in start.state_dict().items())
+    provenance = json.loads((tmp_path / "out" / "provenance.json").read_text())
+    assert "--data minikitti --data minikitti --out out --segmenter segnet --from first.saf" in provenance["command"]
+    assert provenance["from"] == sha256(first)
+    assert provenance["dataset"] == 2 * [sha256(data / "dataset.json")]
+
+
+def test_a_network_of_another_kind_is_no_start(monkeypatch, tmp_path):
+    monkeypatch.setattr(experiment, "sets_by_camera", one_camera)
+    save_net(build_net(Architecture("fcn"), _Noise.camera), tmp_path / "fcn.safetensors")
+    options = ["--data", str(tmp_path), "--out", str(tmp_path / "out"), "--from", str(tmp_path / "fcn.safetensors")]
+    with pytest.raises(DataError, match=r"fcn.safetensors: expected a network like the one to train"):
+        CliRunner().invoke(app, ["train", *options], catch_exceptions=False)
+
+
 @pytest.mark.parametrize("kept", [True, False])
 def test_ctrl_c_says_how_to_go_on(monkeypatch, tmp_path, kept):
-    monkeypatch.setattr(experiment, "TrainingSet", _Noise)
+    monkeypatch.setattr(experiment, "sets_by_camera", one_camera)
 
     def interrupted(*_):
         if kept:
@@ -191,7 +221,7 @@ def test_ctrl_c_says_how_to_go_on(monkeypatch, tmp_path, kept):
     ],
 )
 def test_an_option_that_cannot_be_is_named(monkeypatch, tmp_path, option, message):
-    monkeypatch.setattr(experiment, "TrainingSet", _Noise)
+    monkeypatch.setattr(experiment, "sets_by_camera", one_camera)
     with pytest.raises(ValueError, match=message):
         CliRunner().invoke(
             app, ["train", "--data", str(tmp_path), "--out", str(tmp_path / "out"), *option], catch_exceptions=False

@@ -14,8 +14,9 @@ from safetensors.torch import load_file, save_file
 from sklearn.metrics import accuracy_score
 from tiny_streets import CAMERA, SMALL, tiny_streets
 
+from semgrid_edu.datasets.training_set import Mixture
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.labels import IGNORE
+from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.networks import SEGMENTERS, SemanticGridNet, build_net
 from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
@@ -63,6 +64,16 @@ def test_a_batch_is_a_function_of_seed_and_step(streets):
     assert torch.equal(image(5, 1), image(5, 1))
     assert not torch.equal(image(5, 1), image(6, 1))
     assert not torch.equal(image(5, 1), image(5, 2))
+
+
+def test_each_colour_of_a_frame_varies_by_itself(streets):
+    plain, tinted = (draw_batch(streets, 4, 0.0, 3, seed=0, tint=tint).frames.image for tint in (0.0, 0.3))
+    shown = (plain > 0) & (tinted < 1)
+    factors = [(tinted / plain)[frame, colour][shown[frame, colour]] for frame in range(4) for colour in range(3)]
+    assert all(factor.max() - factor.min() < 1e-5 for factor in factors if len(factor))
+    found = torch.stack([factor[0] for factor in factors if len(factor)])
+    assert found.sub(1).abs().max() <= 0.3 + 1e-6
+    assert len(found.unique()) == len(found) > 6
 
 
 def test_each_frame_has_a_brightness_and_a_contrast_of_its_own(streets):
@@ -205,6 +216,46 @@ def test_the_first_loss_is_that_of_the_definition(streets, tmp_path, field, scor
             below += alpha[c]
     train(build_net(SMALL, CAMERA), streets, tmp_path, params)
     assert read_log(tmp_path / "log.csv").loss[0] == pytest.approx(above / below, rel=1e-5)
+
+
+class _Part(list):
+    """Streets that one camera has seen, as a `TrainingSet` holds them."""
+
+    label_set = KITTI_14
+
+    def __init__(self, streets, camera):
+        super().__init__(streets)
+        self.camera = camera
+
+    __hash__ = object.__hash__
+
+
+TURNED = replace(CAMERA, T_camera_from_lidar=CAMERA.T_camera_from_lidar @ np.diag([-1.0, -1, 1, 1]))
+"""The same camera, looking back."""
+
+
+def test_data_sets_take_turns_and_so_do_their_cameras(streets):
+    front, back, other = (_Part(streets, CAMERA) for _ in range(3))
+    mixture = Mixture([[front, back], [other]])
+    turns = [mixture.turn(iteration) for iteration in range(8)]
+    assert [part is other for part, _ in turns] == 4 * [False, True]
+    assert [(part is back, turn) for part, turn in turns[::2]] == [(False, 0), (True, 0), (False, 1), (True, 1)]
+    assert [turn for _, turn in turns[1::2]] == [0, 1, 2, 3]
+    assert len(mixture) == 3 * len(streets) == len(list(mixture))
+
+
+def test_each_camera_of_a_mixture_has_planes_of_its_own(streets, tmp_path):
+    params = replace(QUICK, image_iterations=0, grid_iterations=2, batch_size=len(streets), mirror=False, jitter=0.0)
+    trained = {}
+    for name, data in {
+        "alone": streets,
+        "twice": Mixture([[_Part(streets, CAMERA)], [_Part(streets, CAMERA)]]),
+        "turned": Mixture([[_Part(streets, CAMERA)], [_Part(streets, TURNED)]]),
+    }.items():
+        train(build_net(SMALL, CAMERA), data, tmp_path / name, params)
+        trained[name] = load_file(tmp_path / name / "weights.safetensors")["fusion.reduce.0.weight"]
+    torch.testing.assert_close(trained["alone"], trained["twice"], rtol=1e-3, atol=1e-4)
+    assert (trained["turned"] - trained["alone"]).abs().max() > 1e-3
 
 
 def test_a_step_goes_down_the_gradient_with_momentum(streets, tmp_path):
@@ -357,6 +408,7 @@ def test_a_loss_that_is_not_finite_stops_the_run(streets, tmp_path):
         ({"momentum": 1.0}, "momentum: expected a share from 0 to below 1, found 1.0"),
         ({"weight_limit": 0.5}, "weight_limit: expected 1 or more, found 0.5"),
         ({"jitter": -0.1}, "jitter: expected a share of at least 0, found -0.1"),
+        ({"tint": math.nan}, "tint: expected a share of at least 0, found nan"),
     ],
 )
 def test_numbers_that_nothing_is_learnt_with_are_refused(numbers, message):

@@ -4,7 +4,7 @@ from time import perf_counter
 
 import numpy as np
 
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, check_whole
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Bof, Cmcdot, LogOddsGrid, State
 from semgrid_edu.storage.provenance import made_by
@@ -43,10 +43,8 @@ def check_request(seed: int, drives: int, frames: int, grids: tuple[str, ...]) -
     """
     if not grids or not set(grids) <= set(GRIDS):
         raise ArgumentError("grid", " or ".join(GRIDS), ", ".join(grids) or "none")
-    if seed < 0:
-        raise ArgumentError("seed", "a whole number from 0 up", seed)
-    if min(drives, frames) < 1:
-        raise ArgumentError("drives, frames", "at least one", f"{drives}, {frames}")
+    check_whole(seed=seed)
+    check_whole(1, drives=drives, frames=frames)
 
 
 def simulated_by(experiment: str, seed: int, drives: int, frames: int, grids: tuple[str, ...], began: float) -> dict:

@@ -12,7 +12,6 @@ from semgrid_edu.occupancy import Belief, Cmcdot, CmcdotParams, State
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
 from semgrid_edu.workshop.simulation.drive import PERIOD
 from semgrid_edu.workshop.simulation.named_streets import FRAMES, TEST_STREETS, named_street
-from semgrid_edu.workshop.simulation.street.traffic import Actor
 from semgrid_edu.workshop.simulation.things.materials import Kind
 from semgrid_edu.workshop.studies.filter.cell_scores import FAR, NEAR, SCENERY, SETTLED_AFTER, share
 from semgrid_edu.workshop.studies.filter.detection_latency import DetectionLatency
@@ -58,16 +57,6 @@ class StreetScores:
         self.frames: list[tuple[int, int]] = []
         self.speed_errors: list[float] = []
 
-    def begin(self, moving: list[Actor]) -> None:
-        """Begin a drive.
-
-        Parameters
-        ----------
-        moving : list of Actor
-            What moves in it.
-        """
-        self.latency.begin(moving)
-
     def add(self, scene: KnownScene, belief: Belief) -> None:
         """Score one frame.
 
@@ -85,10 +74,6 @@ class StreetScores:
             self._add_standing(scene, moves & (p[State.DYNAMIC] > LEAST_DYNAMIC))
         self._add_moving(scene, moves, belief.velocity)
         self._count("left", scene.left, p[State.STATIC] + p[State.DYNAMIC] > 0.5)
-
-    def end(self) -> None:
-        """End a drive."""
-        self.latency.end()
 
     def _count(self, name: str, cells: NDArray, called: NDArray) -> None:
         count = self.cells.setdefault(name, [0, 0])
@@ -186,10 +171,10 @@ def measure_streets(
         spec, counts = GRIDS[grid], StreetScores(GRIDS[grid])
         for number in range(1000 * seed, 1000 * seed + drives):
             drive, tracker = named_street(street, number, frames), Cmcdot(spec, params or CmcdotParams(), seed=seed)
-            counts.begin(drive.moving)
+            counts.latency.begin(drive.moving)
             for scene in known_scenes(drive, spec, f"{street}, {grid} grid, drive {number}"):
                 counts.add(scene, tracker.step(scene.frame.points_grid, scene.motion, PERIOD))
-            counts.end()
+            counts.latency.end()
         scores[grid][street] = counts.summary()
     return {"scores": scores, **simulated_by("streets", seed, drives, frames, grids, began)}
 

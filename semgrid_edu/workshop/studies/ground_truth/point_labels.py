@@ -1,0 +1,135 @@
+"""How wrong the truth from labelled returns is: `PandasetScene.truth`'s way, on simulated drives whose truth is known.
+
+Every return of a simulated scan gets its class, and every road user its cuboid, both without error. So what is counted
+is what the way itself gets wrong: gaps, edges of cells, what hangs over, what moves.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+from tqdm.auto import tqdm
+
+from semgrid_edu.camera import invert_rigid, rigid_transform, transform_points
+from semgrid_edu.datasets.readers.cuboids import ANY_LIDAR, Cuboids, LabelledScan, put_together
+from semgrid_edu.datasets.readers.depth_points import birdseye_votes
+from semgrid_edu.datasets.readers.frames import visible_labels
+from semgrid_edu.datasets.readers.project_lidar import unhidden
+from semgrid_edu.frame import FrameLabels
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import IGNORE, KITTI_14
+from semgrid_edu.storage.provenance import made_by
+from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
+from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.simulation.things.materials import Kind, class_of_kind
+from semgrid_edu.workshop.studies.filter.occupancy import GRIDS, LIDARS, check_request
+from semgrid_edu.workshop.studies.ground_truth.counts import BAND_EDGES, COUNTED, TruthCounts
+from semgrid_edu.workshop.studies.ground_truth.laboratory import HELD_OUT, REACH
+
+MOVABLE = (Kind.CAR, Kind.PEDESTRIAN, Kind.BICYCLE)
+
+
+def point_labels(seed: int = 0, drives: int = 20, grid: str = "compact", lidar: str = "HDL-64E") -> dict:
+    """Make truth from the labelled returns of simulated drives in several ways, and count how wrong it is.
+
+    Parameters
+    ----------
+    seed : int
+        Seed for the drives.
+    drives : int
+        Number of drives, at least one.
+    grid : str
+        "compact" or "paper".
+    lidar : str
+        "HDL-64E", or "coarse" for the LIDAR of the simulated data sets.
+
+    Returns
+    -------
+    dict
+        What `truth_tables` reads: "sums", by name of the way the cells of `TruthCounts`, of all drives, and all that
+        made them. JSON can hold it.
+    """
+    check_request(seed, drives, 1, (grid,))
+    sums: dict[str, TruthCounts] = {}
+    numbers = range(HELD_OUT + 1000 * seed, HELD_OUT + 1000 * seed + drives)
+    for number in tqdm(numbers, desc="labelled returns", unit="drive"):
+        for name, counts in score_drive(GRIDS[grid], number, lidar).items():
+            sums[name] = sums[name] + counts if name in sums else counts
+    command = f"semgrid-edu reproduce point-labels --seed {seed} --drives {drives} --grid {grid} --lidar {lidar}"
+    return {
+        "sums": {name: counts.cells.tolist() for name, counts in sums.items()},
+        "drives": list(numbers),
+        "counted": list(COUNTED),
+        "bands": list(BAND_EDGES),
+        "classes": list(KITTI_14.names[: KITTI_14.n_semantic]),
+        **made_by(command, "numpy", "scipy", "numba", "embreex", "trimesh"),
+    }
+
+
+def score_drive(spec: GridSpec, number: int, lidar: str) -> dict[str, TruthCounts]:
+    """Count the cells of the frame in the middle of one drive, by name of the way.
+
+    Parameters
+    ----------
+    spec : GridSpec
+        The grid.
+    number : int
+        Seed for the drive.
+    lidar : str
+        A key of `LIDARS`.
+    """
+    drive = SimulatedDrive(number, 2 * REACH + 1, rig=Rig(lidar=LIDARS[lidar]))
+    scans = [_labelled_scan(drive, k) for k in range(drive.n_frames)]
+    now, others = scans[REACH], [*scans[:REACH], *scans[REACH + 1 :]]
+    raw = np.concatenate([scan.points for scan in scans]), np.concatenate([scan.classes for scan in scans])
+    majority = replace(KITTI_14, flat=())
+    around = f"{REACH} before and after"
+    clouds = {
+        around: (put_together(now, others), KITTI_14),
+        "one scan": (put_together(now, []), KITTI_14),
+        f"{around}, movers smeared": (raw, KITTI_14),
+        f"{around}, majority of returns": (put_together(now, others), majority),
+    }
+    camera, T = drive.rig.camera, invert_rigid(drive.pose(REACH * PERIOD))
+    found, flat = {}, [KITTI_14.index(name) for name in ("road", "sidewalk")]
+    for name, ((points, classes), voters) in clouds.items():
+        points = transform_points(T, points)
+        in_grid = transform_points(drive.rig.T_grid_from_lidar, points)
+        found[name] = birdseye_votes(in_grid, classes, spec, voters)
+        seen = unhidden(points, ~np.isin(classes, flat), camera)
+        rows, cols, inside = spec.cells(in_grid[seen])
+        visible = np.zeros(spec.shape, bool)
+        visible[rows[inside], cols[inside]] = True
+        found[f"{name}, seen by the camera"] = np.where(visible, found[name], np.uint8(IGNORE))
+    labels = _true_labels(drive)
+    truth, standing = visible_labels(labels, spec), labels.birdseye_on(spec)
+    return {name: TruthCounts.of_frame(one, truth, standing, spec, KITTI_14) for name, one in found.items()}
+
+
+def _labelled_scan(drive: SimulatedDrive, k: int) -> LabelledScan:
+    """Take a scan with the classes of its returns and with the cuboids of all road users."""
+    points, kinds = drive.labelled_scan(k)
+    world = transform_points(drive.pose(k * PERIOD), points[:, :3].astype(np.float64))
+    lidars = np.zeros(len(points), np.int64)
+    return LabelledScan(world, class_of_kind(KITTI_14)[kinds], np.isin(kinds, MOVABLE), lidars, _cuboids(drive, k))
+
+
+def _cuboids(drive: SimulatedDrive, k: int) -> Cuboids:
+    """Return the boxes of all road users at one instant."""
+    road, t, actors = drive.plan.road, k * PERIOD, [*drive.parked, *drive.moving]
+    turns = [Rotation.from_euler("z", actor.trajectory.pose(road, t)[1]).as_matrix() for actor in actors]
+    T = [rigid_transform(turn, actor.middle(road, t)) for turn, actor in zip(turns, actors, strict=True)]
+    return Cuboids(
+        names=np.array([str(actor.instance) for actor in actors]),
+        T_world_from_box=np.reshape(T, (-1, 4, 4)),
+        sizes=np.reshape([actor.size for actor in actors], (-1, 3)),
+        moving=np.arange(len(actors)) >= len(drive.parked),
+        lidars=np.full(len(actors), ANY_LIDAR),
+    )
+
+
+def _true_labels(drive: SimulatedDrive) -> FrameLabels:
+    """Return what is true of the frame in the middle."""
+    frame, classes = drive.frame(REACH, labelled=True), class_of_kind(KITTI_14)
+    picture, truth = frame.picture, frame.truth
+    return FrameLabels(KITTI_14, classes[picture.kind], picture.depth, classes[truth.kinds], truth.visible)
