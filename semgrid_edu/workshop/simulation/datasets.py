@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from concurrent.futures import as_completed
 from dataclasses import dataclass
 from functools import partial
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -12,19 +11,18 @@ from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.readers.kitti_raw import drive_folder
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import ArgumentError, DataError, check_whole
 from semgrid_edu.labels import LABEL_SETS
-from semgrid_edu.storage.files import write_json
+from semgrid_edu.storage.files import table_beside, write_json
 from semgrid_edu.storage.locking import LOCK, sole_writer
 from semgrid_edu.storage.provenance import versions, write_provenance
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.storage.workplace import check_workers, workplace
 from semgrid_edu.workshop.simulation import writer
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
-from semgrid_edu.workshop.simulation.named_streets import SAMPLE_WISHES
+from semgrid_edu.workshop.simulation.named_streets import SAMPLE_WISHES, wishes_of
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.street.plan import ANY, Wishes
-from semgrid_edu.workshop.simulation.things.tables import read_table
 
 FORMAT = 1
 """Raised whenever the simulator changes what a seed gives, so that old and new drives don't mix in one folder."""
@@ -79,13 +77,24 @@ class DatasetRecipe:
     dense: bool = False
 
 
-def _recipe(name: str, row: dict) -> DatasetRecipe:
-    """Return what a row of `recipes.toml` says."""
-    routes = (([Route(**route, wishes=Wishes(**wishes))] * times) for times, route, wishes in row["routes"])
-    return DatasetRecipe(name, row["label_set"], tuple(chain.from_iterable(routes)), row.get("dense", False))
+def read_recipes(name: str) -> dict[str, DatasetRecipe]:
+    """Return the data sets of one of the simulator's tables, by name.
+
+    Parameters
+    ----------
+    name : str
+        The table's file, without its suffix, such as "recipes". Its routes follow their wishes in turn.
+    """
+    recipes = {}
+    for data, row in table_beside(__file__, name).items():
+        routes: list[Route] = []
+        for times, route, *each in row["routes"]:
+            routes += [Route(**route, wishes=wishes_of(wishes)) for wishes in each] * times
+        recipes[data] = DatasetRecipe(data, row["label_set"], tuple(routes), row.get("dense", False))
+    return recipes
 
 
-RECIPES = {name: _recipe(name, row) for name, row in read_table("recipes").items()}
+RECIPES = read_recipes("recipes")
 RECIPES["sample"] = DatasetRecipe("sample", "KITTI-14", (Route("drive", 20, True, SAMPLE_WISHES),))
 """Numbers of frames as in the paper: KITTI 142 + 110 labelled frames, INRIA-Chroma 146 + 130 in 3 + 2 routes.
 "validation" has drives like minikitti's, half as many as its training split, for parameters that are chosen when the
@@ -151,8 +160,7 @@ def make_from_recipe(
         When the folder holds something else, the same with another seed or an older version, or a drive that lacks
         files; or when another process writes to it.
     """
-    if seed < 0:
-        raise ArgumentError("seed", "a whole number from 0 up", seed)
+    check_whole(seed=seed)
     check_workers(workers)
     root = Path(folder).resolve() / recipe.name  # absolute: the machines of a cluster work in other folders
     routes = {f"{k + 1:04d}": route for k, route in enumerate(recipe.routes)}

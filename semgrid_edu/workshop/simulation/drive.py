@@ -9,7 +9,7 @@ from semgrid_edu.camera import transform_points
 from semgrid_edu.frame import LABEL_GRID, Frame
 from semgrid_edu.workshop.simulation.sensors.camera import Picture, take_picture
 from semgrid_edu.workshop.simulation.sensors.gps import Geodesy
-from semgrid_edu.workshop.simulation.sensors.lidar import scan
+from semgrid_edu.workshop.simulation.sensors.lidar import labelled_scan, scan
 from semgrid_edu.workshop.simulation.sensors.raycast import Instant, PorousMesh, RayMesh
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.sensors.truth import BirdseyeTruth, birdseye_kinds, visible_cells, world_cells
@@ -214,6 +214,21 @@ class SimulatedDrive:
         points = scan(self.instant(t), self.pose(t), self.rig.lidar, self.plan.road, self._noise(index, 1))
         nearest = t + float(self._noise(index, 2).uniform(-half, half)) if half else t
         return Frame(None, points, self.rig.camera, self.pose(nearest), t)
+
+    def labelled_scan(self, index: int) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+        """Take the scan of `SimulatedDrive.scan`, and say what each return hit, as PandaSet's annotators do.
+
+        Parameters are those of `SimulatedDrive.scan`.
+
+        Returns
+        -------
+        points : (N, 4) float32
+            LIDAR frame, metres, and reflectance.
+        kinds : (N,) uint8
+            Members of `Kind`.
+        """
+        t = index * PERIOD
+        return labelled_scan(self.instant(t), self.pose(t), self.rig.lidar, self.plan.road, self._noise(index, 1))
 
     def _noise(self, *key: int) -> np.random.Generator:
         """Return the drive's own generator for a key, such as the number of a frame."""

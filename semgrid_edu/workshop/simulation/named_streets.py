@@ -3,6 +3,7 @@
 import numpy as np
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import HDL64E, Rig
 from semgrid_edu.workshop.simulation.street import road_users as casts
@@ -10,17 +11,27 @@ from semgrid_edu.workshop.simulation.street.light import Light
 from semgrid_edu.workshop.simulation.street.plan import Wishes
 from semgrid_edu.workshop.simulation.street.traffic import Traffic
 from semgrid_edu.workshop.simulation.street.trajectories import STAND, Pace
-from semgrid_edu.workshop.simulation.things.tables import read_table
 
 KITTI_RIG = Rig(lidar=HDL64E, packet_interval=0.01)
 """An HDL-64E at 10 Hz, and poses from packets that come every 10 ms."""
 FRAMES = 36
 """Number of frames of a test street, 3.5 s."""
-_TABLES = read_table("streets")
+_TABLES = table_beside(__file__, "streets")
 _STREETS = {name: _TABLES[common] | row for name, (common, row) in _TABLES["streets"].items()}
 """What is wished for; the name of the cast; and the recording car's slowest and fastest mean speed, m/s."""
 TEST_STREETS = tuple(_STREETS)
 """The names of the test streets."""
+
+
+def wishes_of(row: dict) -> Wishes:
+    """Return the wishes of a row of a table.
+
+    Parameters
+    ----------
+    row : dict
+        Fields of `Wishes`; its cast is the name of a function of `street/road_users.py`.
+    """
+    return Wishes(**row | ({"cast": getattr(casts, row["cast"])} if "cast" in row else {}))
 
 
 def named_street(name: str, seed: int, frames: int = FRAMES, rig: Rig = KITTI_RIG) -> SimulatedDrive:
@@ -48,10 +59,10 @@ def named_street(name: str, seed: int, frames: int = FRAMES, rig: Rig = KITTI_RI
     if name not in _STREETS:
         raise ArgumentError("name", " or ".join(_STREETS), name)
     row = dict(_STREETS[name])
-    speeds, cast = row.pop("speeds"), getattr(casts, row.pop("cast"))
+    speeds = row.pop("speeds")
     root = np.random.SeedSequence([seed, *name.encode()])
     speed = np.random.default_rng(root.spawn(1)[0]).uniform(*speeds)
-    return SimulatedDrive(root, frames, Wishes(**row, cast=cast, speed=float(speed)), rig)
+    return SimulatedDrive(root, frames, wishes_of(row | {"speed": float(speed)}), rig)
 
 
 def _sample_cast(traffic: Traffic) -> None:

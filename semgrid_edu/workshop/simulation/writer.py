@@ -1,11 +1,12 @@
-"""Simulated drives on disk: KITTI's raw layout, each drive written whole or not at all."""
+"""Drives on disk, simulated ones and excerpts: KITTI's raw layout, each drive written whole or not at all."""
 
 import json
 import shutil
 import tempfile
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from datetime import datetime, timedelta
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,10 @@ from semgrid_edu.datasets.readers.depth_points import depth_scan
 from semgrid_edu.datasets.readers.kitti_labels import DEPTH_UNIT, KINDS
 from semgrid_edu.datasets.readers.kitti_raw import drive_folder
 from semgrid_edu.errors import DataError
+from semgrid_edu.frame import FrameLabels
 from semgrid_edu.labels import KITTI_14, LabelSet
 from semgrid_edu.storage.files import write_text
-from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive, SimulatedFrame
+from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.gps import DATAFORMAT, oxts_packet
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.things.materials import class_of_kind
@@ -73,7 +75,7 @@ def _row(name: str, numbers: NDArray | tuple) -> str:
     return f"{name}: " + " ".join(f"{x:.12e}" for x in np.ravel(numbers)) + "\n"
 
 
-def write_calibration(root: Path, rig: Rig) -> None:
+def write_calibration(root: Path, rig: Rig, date: str = DATE) -> None:
     """Write KITTI's three calibration files. The cameras are ideal: they have no distortion and look in one direction.
 
     Parameters
@@ -82,8 +84,10 @@ def write_calibration(root: Path, rig: Rig) -> None:
         The folder that takes the day's folder.
     rig : Rig
         Where camera, LIDAR and IMU stand.
+    date : str
+        The day, of which the folder has the name.
     """
-    day, time = Path(root) / DATE, "calib_time: 01-Jan-2026 09:00:00\n"
+    day, time = Path(root) / date, "calib_time: 01-Jan-2026 09:00:00\n"
     height, width = rig.image_size
     text = time + _row("corner_dist", (0.0995,))
     for index in range(4):
@@ -100,13 +104,13 @@ def write_calibration(root: Path, rig: Rig) -> None:
         write_text(day / name, time + _row("R", T[:3, :3]) + _row("T", T[:3, 3]) + extra)
 
 
-def _write_times(folder: Path, n_frames: int) -> None:
+def _write_times(folder: Path, times: Sequence[datetime]) -> None:
     """Write timestamps: camera, LIDAR and IMU all take a frame at the middle of the LIDAR's turn."""
     offsets = {"image_02/timestamps": 0.0, "oxts/timestamps": 0.0, "velodyne_points/timestamps": 0.0}
     offsets |= {"velodyne_points/timestamps_start": -PERIOD / 2, "velodyne_points/timestamps_end": PERIOD / 2}
     for name, offset in offsets.items():
-        times = (_START + timedelta(seconds=k * PERIOD + offset) for k in range(n_frames))
-        (folder / f"{name}.txt").write_text("".join(f"{time:%Y-%m-%d %H:%M:%S.%f}000\n" for time in times))
+        moved = (time + timedelta(seconds=offset) for time in times)
+        (folder / f"{name}.txt").write_text("".join(f"{time:%Y-%m-%d %H:%M:%S.%f}000\n" for time in moved))
 
 
 def _save_png(path: Path, pixels: NDArray) -> None:
@@ -132,41 +136,102 @@ def depth_to_png(depth: NDArray) -> NDArray[np.uint16]:
     return np.where(scaled < 65536, scaled, 0).astype(np.uint16)
 
 
-def _write_labels(folder: Path, name: str, frame: SimulatedFrame, label_set: LabelSet) -> None:
+class WrittenFrame(NamedTuple):
+    """One frame as it goes to disk.
+
+    Parameters
+    ----------
+    time : datetime
+        When the sensors took it.
+    image : (h, w, 3) uint8
+        RGB.
+    points : (N, 4) float32
+        LIDAR returns: x, y, z in the LIDAR frame, metres, and reflectance 0..1.
+    oxts : str
+        The packet of GPS and IMU, from `oxts_packet`.
+    labels : FrameLabels or None
+        What is true, for a frame that is labelled.
+    objects : sequence of dict
+        Cars, pedestrians and bicycles in the bird's-eye grid, from `SimulatedDrive.objects`.
+    """
+
+    time: datetime
+    image: NDArray[np.uint8]
+    points: NDArray[np.float32]
+    oxts: str
+    labels: FrameLabels | None = None
+    objects: Sequence[dict] = ()
+
+
+def _write_labels(folder: Path, name: str, labels: FrameLabels) -> None:
     """Write what is true of one frame."""
-    classes, picture, truth = class_of_kind(label_set), frame.picture, frame.truth
-    images = (classes[picture.kind], depth_to_png(picture.depth), classes[truth.kinds], np.uint8(255) * truth.visible)
-    for kind, pixels in zip(("image", "depth", "birdseye", "visible"), images, strict=True):
+    images = (labels.image, depth_to_png(labels.depth), labels.birdseye, np.uint8(255) * labels.visible)
+    for kind, pixels in zip(KINDS, images, strict=True):
         _save_png(folder / kind / f"{name}.png", pixels)
 
 
-def _write_files(
-    folder: Path, simulated: SimulatedDrive, labelled: Collection[int], label_set: LabelSet, dense: bool
-) -> None:
-    """Write all files of a drive to its folder."""
+def _write_files(folder: Path, frames: Iterable[WrittenFrame], label_set: str) -> tuple[int, list[int]]:
+    """Write all files of a drive to its folder; return the number of frames, and which have labels."""
     for name in ("image_02/data", "velodyne_points/data", "oxts/data", "labels"):
         (folder / name).mkdir(parents=True)
-    objects = {}
-    for k in range(simulated.n_frames):
-        name, frame = f"{k:010d}", simulated.frame(k, k in labelled)
-        _save_png(folder / "image_02" / "data" / f"{name}.png", frame.picture.image)
-        points = depth_scan(frame.picture.depth, simulated.rig.camera) if dense else frame.points
-        (folder / "velodyne_points" / "data" / f"{name}.bin").write_bytes(points.tobytes())
-        oxts = oxts_packet(simulated.T_world_from_imu, frame.time, simulated.geodesy)
-        (folder / "oxts" / "data" / f"{name}.txt").write_text(oxts)
+    objects, times, labelled = {}, [], []
+    for k, frame in enumerate(frames):
+        name = f"{k:010d}"
+        _save_png(folder / "image_02" / "data" / f"{name}.png", frame.image)
+        (folder / "velodyne_points" / "data" / f"{name}.bin").write_bytes(frame.points.tobytes())
+        (folder / "oxts" / "data" / f"{name}.txt").write_text(frame.oxts)
+        times.append(frame.time)
         objects[name] = frame.objects
-        if k in labelled:
-            _write_labels(folder / "labels", name, frame, label_set)
-    _write_times(folder, simulated.n_frames)
+        if frame.labels is not None:
+            labelled.append(k)
+            _write_labels(folder / "labels", name, frame.labels)
+    _write_times(folder, times)
     (folder / "oxts" / "dataformat.txt").write_text(DATAFORMAT)
-    (folder / "labels" / "label_set.txt").write_text(f"{label_set.name}\n")
+    (folder / "labels" / "label_set.txt").write_text(f"{label_set}\n")
     (folder / "labels" / "objects.json").write_text(json.dumps(objects, separators=(",", ":")) + "\n")
+    return len(times), labelled
+
+
+def _simulated_frames(
+    simulated: SimulatedDrive, labelled: Collection[int], label_set: LabelSet, dense: bool
+) -> Iterator[WrittenFrame]:
+    """Take the frames of a simulated drive."""
+    classes = class_of_kind(label_set)
+    for k in range(simulated.n_frames):
+        frame, labels = simulated.frame(k, k in labelled), None
+        picture, truth = frame.picture, frame.truth
+        if truth is not None:
+            kinds = classes[picture.kind], picture.depth, classes[truth.kinds], truth.visible
+            labels = FrameLabels(label_set, *kinds)
+        points = depth_scan(picture.depth, simulated.rig.camera) if dense else frame.points
+        oxts = oxts_packet(simulated.T_world_from_imu, frame.time, simulated.geodesy)
+        time = _START + timedelta(seconds=k * PERIOD)
+        yield WrittenFrame(time, picture.image, points, oxts, labels, frame.objects)
 
 
 def write_drive(
     root: Path, drive: str, simulated: SimulatedDrive, labelled: Collection[int],
     label_set: LabelSet = KITTI_14, dense: bool = False,
 ) -> Path:  # fmt: skip
+    """Write a simulated drive, as `write_frames` does.
+
+    Parameters not named here, result and errors are those of `write_frames`.
+
+    Parameters
+    ----------
+    simulated : SimulatedDrive
+        The drive.
+    labelled : collection of int
+        Numbers of the frames that get labels.
+    label_set : LabelSet
+        The classes of the labels.
+    dense : bool
+        Whether the points come from the depth image, thinned (section 4: SYNTHIA), instead of the LIDAR.
+    """
+    return write_frames(root, (DATE, drive), _simulated_frames(simulated, labelled, label_set, dense), label_set.name)
+
+
+def write_frames(root: Path, drive: tuple[str, str], frames: Iterable[WrittenFrame], label_set: str) -> Path:
     """Write a drive: images, points, oxts, timestamps, and labels of some frames.
 
     It grows in a hidden folder of its own, which gets the drive's name when the drive is whole. So a killed process
@@ -176,16 +241,12 @@ def write_drive(
     ----------
     root : path-like
         The folder that holds the day's folder, into which `write_calibration` writes too.
-    drive : str
-        Number of the drive, four digits.
-    simulated : SimulatedDrive
-        The drive.
-    labelled : collection of int
-        Numbers of the frames that get labels.
-    label_set : LabelSet
-        The classes of the labels.
-    dense : bool
-        Whether the points come from the depth image, thinned (section 4: SYNTHIA), instead of the LIDAR.
+    drive : (str, str)
+        Date and number of the drive, four digits.
+    frames : iterable of WrittenFrame
+        Its frames.
+    label_set : str
+        What label_set.txt says: the name of the label set, and `WITH_GAPS` in a second line where that holds.
 
     Returns
     -------
@@ -197,11 +258,10 @@ def write_drive(
     DataError
         When another process has removed what was written.
     """
-    folder = drive_folder(root, DATE, drive)
+    folder = drive_folder(root, *drive)
     folder.parent.mkdir(parents=True, exist_ok=True)
     partial = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}-", suffix=UNFINISHED))
-    _write_files(partial, simulated, labelled, label_set, dense)
-    check_complete(partial, simulated.n_frames, labelled)
+    check_complete(partial, *_write_files(partial, frames, label_set))
     partial.chmod(0o755)
     try:
         partial.rename(folder)

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.simulation.street.layout import Road, Side
 from semgrid_edu.workshop.simulation.street.light import Light
 from semgrid_edu.workshop.simulation.street.terrain import Extent
 from semgrid_edu.workshop.simulation.things.furniture import FENCES
-from semgrid_edu.workshop.simulation.things.tables import read_table
 
 BORDERS = (*FENCES, "hedge", "none")
 """What may run along the gardens of a suburb."""
@@ -104,7 +104,7 @@ class Plan:
         return self.borders[0 if sign > 0 else 1]
 
 
-_SIDES = read_table("streets")["sides"]  # how it may look beside the road in each style
+_SIDES = table_beside(__file__)["sides"]  # how it may look beside the road in each style
 
 
 def _side(style: str, lanes: int, lane: float, parking: bool, rng: np.random.Generator) -> Side:

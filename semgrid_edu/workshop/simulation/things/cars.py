@@ -6,11 +6,11 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from semgrid_edu.storage.files import named_rows, table_beside
 from semgrid_edu.workshop.simulation.things.materials import PALETTES, Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, box, merge, shape, tube
-from semgrid_edu.workshop.simulation.things.tables import named_rows, read_table
 
-_TABLES = read_table("things/cars")
+_TABLES = table_beside(__file__)
 _BODIES = named_rows(_TABLES["bodies"])
 BODIES = tuple(_BODIES)
 """The car bodies that `car` knows."""

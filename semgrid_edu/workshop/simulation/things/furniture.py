@@ -5,13 +5,13 @@ from functools import cache, partial
 import numpy as np
 from numpy.typing import ArrayLike
 
+from semgrid_edu.storage.files import named_rows, table_beside
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, ball, box, merge, quads, shape, tube
-from semgrid_edu.workshop.simulation.things.tables import named_rows, read_table
 
 _STONE, _GREY, _ZINC = (0.36, 0.34, 0.31), (0.42, 0.43, 0.44), (0.33, 0.35, 0.35)
 _TWIGS = (0.05, 0.11, 0.028)
-_TABLES = read_table("things/furniture")
+_TABLES = table_beside(__file__)
 _FENCES, _FACES = named_rows(_TABLES["fences"]), _TABLES["signs"]
 FENCES = (*_FENCES, "wall")
 """The fences that `fence` knows."""

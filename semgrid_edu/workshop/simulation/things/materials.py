@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.labels import IGNORE, LabelSet
-from semgrid_edu.workshop.simulation.things.tables import read_table
+from semgrid_edu.storage.files import table_beside
 
-_TABLES = read_table("things/materials")
+_TABLES = table_beside(__file__)
 Kind = IntEnum("Kind", tuple(_TABLES["classes"]), start=0, module=__name__)
 """What a surface belongs to: finer than either label set, so that both can be derived."""
 Material = IntEnum("Material", tuple(_TABLES["reflectance"]), start=0, module=__name__)

@@ -11,13 +11,13 @@ from functools import cache, partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.simulation.things.cars import PAINTS
 from semgrid_edu.workshop.simulation.things.materials import PALETTES, Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, ball, merge, quads, tube
-from semgrid_edu.workshop.simulation.things.tables import read_table
 
 _BLACK, _GREY = (0.02, 0.02, 0.02), (0.25, 0.25, 0.25)
-_BICYCLE = read_table("things/bicycle")
+_BICYCLE = table_beside(__file__, "bicycle")
 
 
 def _wheel(x: float) -> list[Shape]:

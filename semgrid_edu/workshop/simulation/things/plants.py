@@ -6,16 +6,16 @@ from functools import cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.storage.files import named_rows, table_beside
 from semgrid_edu.workshop.simulation.things import shapes
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, merge
-from semgrid_edu.workshop.simulation.things.tables import named_rows, read_table
 
 _leaves = partial(shapes.shape, material=Material.LEAF, kind=Kind.PLANT)
 _bark = partial(shapes.tube, material=Material.BARK, kind=Kind.PLANT)
 
 
-_SPECIES = named_rows(read_table("things/plants"))
+_SPECIES = named_rows(table_beside(__file__))
 TREES = tuple(_SPECIES)
 """The species that `tree` knows."""
 
