@@ -13,7 +13,7 @@ demo test test-browser lint:
 
 test-real: .venv/made
 	@test -n "$(KITTI)" || { echo "usage: make test-real KITTI=<folder that holds 2011_09_26>"; exit 2; }
-	KITTI="$(abspath $(KITTI))" SEMANTIC_KITTI="$(abspath $(SEMANTIC_KITTI))" $(PYTEST) -m real tests
+	KITTI="$(abspath $(KITTI))" SEMANTIC_KITTI="$(abspath $(SEMANTIC_KITTI))" PANDASET="$(abspath $(PANDASET))" $(PYTEST) -m real tests
 
 notebooks: .venv/made
 	$(BIN)/semgrid-edu course notebooks

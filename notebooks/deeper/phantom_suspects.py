@@ -104,11 +104,11 @@ def run_filter(
 ) -> None:
     """Run CMCDOT over the scenes of a drive; `scores` takes the counts, and `seed` is that of the particles."""
     tracker = Cmcdot(scores.spec, suspect.params, seed=seed)
-    scores.begin(drive.moving)
+    scores.latency.begin(drive.moving)
     with suspect.context():
         for scene in scenes:
             scores.add(scene, tracker.step(scene.frame.points_grid, scene.motion, PERIOD))
-    scores.end()
+    scores.latency.end()
 
 
 def measure_suspects(

@@ -37,7 +37,8 @@ from matplotlib.colors import LogNorm
 
 from semgrid_edu import plotting
 from semgrid_edu.camera import Camera, rigid_transform, transform_points
-from semgrid_edu.datasets.training_arrays import resize_image, resize_labels
+from semgrid_edu.datasets.readers.frames import resize_labels
+from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.datasets.samples import sample_drive, sample_image_stage
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14

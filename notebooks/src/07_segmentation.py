@@ -35,7 +35,8 @@ import torch.nn.functional as F
 from ipywidgets import IntSlider, interact
 
 from semgrid_edu import plotting
-from semgrid_edu.datasets.training_arrays import resize_image, resize_labels
+from semgrid_edu.datasets.readers.frames import resize_labels
+from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.datasets.samples import sample_drive, sample_image_stage
 from semgrid_edu.workshop.illustrations.thin_pole import draw_poles, score_poles, train_pole_net
 from semgrid_edu.workshop.illustrations.thin_pole import MECHANISMS, apply_mechanism, place_and_width

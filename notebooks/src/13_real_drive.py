@@ -46,7 +46,8 @@ from scipy.spatial import KDTree
 from semgrid_edu import plotting
 from semgrid_edu.camera import project, transform_points
 from semgrid_edu.datasets import KittiRawDrive
-from semgrid_edu.datasets.training_arrays import resize_image, resize_labels
+from semgrid_edu.datasets.readers.frames import resize_labels
+from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.datasets.samples import sample_drive, sample_image_stage, sample_weights
 from semgrid_edu.workshop.studies.new_drive.domain import (
     agrees_with_lidar, class_probabilities, colour_distance, match_colours, mean_histograms, network_numbers,

@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.datasets.ground_truth import carry_labels
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, check_fields
 from semgrid_edu.graphical.exact import eliminate
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.layout import in_rows
 from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
-from semgrid_edu.occupancy.state import check_fields
 from semgrid_edu.stage_models.beam import BINS_PER_CELL, MARGIN, BeamWorld, range_bins, range_state, reflection
 from semgrid_edu.stage_models.stage_graph import StageGraph, binary, cut_edges, directed
 from semgrid_edu.stage_models.thick_walls import beam_beliefs, occupied, package_row, same_sensor

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.errors import check_fields
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
     FilterState,
@@ -19,7 +20,6 @@ from semgrid_edu.occupancy import (
     update,
 )
 from semgrid_edu.occupancy.sensor import likelihoods
-from semgrid_edu.occupancy.state import check_fields
 from semgrid_edu.stage_models.beam import BeamWorld, reflection
 
 CLASSES = ("road", "sidewalk", "car", "building")

@@ -44,6 +44,7 @@ def out(drive, tmp_path_factory):
     shutil.copy(EXAMPLE, folder / "my_stages.py")
     root = str(drive.folder.parents[1])
     arguments = ["--kitti", root, "--date", DATE, "--drive", "0001", "--stages", str(folder / "my_stages.py")]
+    arguments += ["--weights", str(sample_weights())]
     result = CliRunner().invoke(app, ["demo", *arguments, "--out", str(folder / "out")])
     assert result.exit_code == 0, result.exception
     return folder / "out"

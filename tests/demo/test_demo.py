@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from types import SimpleNamespace
 
 import numpy as np
@@ -190,6 +191,58 @@ class TestWithoutTruth:
         assert len(page.all("figure")) == 5
         assert len(page.all("table")) == 1
         assert "FmIoU" not in blank
+
+    def test_a_card_beside_the_weights_says_what_is_known_instead(self, weights, blank, tmp_path):
+        write_tiny_drive(tmp_path, n_frames=2, labelled=())
+        shutil.copy(weights, tmp_path / "net.safetensors")
+        words = "What is known of <other> streets. Half of it."
+        (tmp_path / "card.json").write_text(json.dumps({"other_streets": words}))
+        page = write_demo(KittiRawDrive(tmp_path, DATE, "0001"), tmp_path / "net.safetensors", tmp_path / "out")
+        html = page.read_text(encoding="utf-8")
+        assert "Expect poor semantics" not in html
+        assert "<b>What is known of &lt;other&gt; streets.</b> Half of it." in html
+        assert "can lose the ground" in html
+        assert "can lose the ground" in blank
+
+
+class TestBothStreets:
+    """Without a drive the demo shows the shipped ones, the real street first."""
+
+    @pytest.fixture(scope="class")
+    @staticmethod
+    def folder(tmp_path_factory):
+        folder = tmp_path_factory.mktemp("both")
+        result = CliRunner().invoke(app, ["demo", "--out", str(folder), "--frames", "3:4"])
+        assert result.exit_code == 0, result.exception
+        assert f"open {(folder / 'index.html').as_uri()}" in result.output
+        return folder
+
+    def test_each_page_leads_to_the_other(self, folder):
+        for place, other in ((folder, folder / "simulated"), (folder / "simulated", folder)):
+            (link,) = Page((place / "index.html").read_text(encoding="utf-8")).all("a")
+            assert (place / link["href"]).resolve() == (other / "index.html").resolve()
+            assert {path.name for path in place.iterdir()} >= {"index.html", "overview.png"}
+
+    def test_the_real_street_comes_first_and_says_whose_it_is(self, folder):
+        real, simulated = ((folder / name / "index.html").read_text(encoding="utf-8") for name in (".", "simulated"))
+        assert "2019_05_11_drive_0002_sync" in real
+        assert "2026_01_01_drive_0001_sync" in simulated
+        assert "Data: PandaSet by Hesai and Scale AI, CC BY 4.0" in real
+        assert "PandaSet" not in simulated
+        assert '<p class="notice"><b>' not in simulated
+
+    def test_what_the_truth_leaves_out_is_white_and_explained(self, folder):
+        real, simulated = ((folder / name / "index.html").read_text(encoding="utf-8") for name in (".", "simulated"))
+        truth = np.array(decode(json.loads(Page(real).text["frames"])[0]["images"]["truth"]))
+        assert (truth == 255).mean() > 0.03
+        for words in ("White cells are left out", "left out</span>"):
+            assert words in real
+            assert words not in simulated
+
+    def test_the_picture_of_a_real_street_has_words_below(self, folder):
+        with Image.open(folder / "overview.png") as real, Image.open(folder / "simulated/overview.png") as simulated:
+            assert real.size[0] == simulated.size[0]
+            assert real.size[1] > simulated.size[1]
 
 
 class TestPanels:

@@ -330,7 +330,7 @@ class TestFigure:
     @pytest.fixture
     def axes(self, results, net):
         story = cell_story(results[-1], (82, 25), net, past=results[:-1])
-        figure = plotting.cell_story(story, results[-1].frame.image)
+        figure = plotting.draw_cell_story(story, results[-1].frame.image)
         yield story, figure.axes
         plt.close(figure)
 
@@ -352,6 +352,6 @@ class TestFigure:
 
     def test_without_an_image(self, axes):
         story, with_image = axes
-        figure = plotting.cell_story(story)
+        figure = plotting.draw_cell_story(story)
         assert len(figure.axes) == len(with_image) - 1
         plt.close(figure)

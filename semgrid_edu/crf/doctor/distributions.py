@@ -13,7 +13,7 @@ SAMPLE = 500
 """At most this many cells are looked at for a common factor of their costs."""
 
 CLOSE = 0.02
-"""How far the logarithm of a sum may be from 0; probabilities kept as float16, or raised by 1e-3 each, are nearer."""
+"""How far a sum may be from 1, or its logarithm from 0; with float16, or probabilities 1e-3 too high, it is less."""
 
 UNITS = {100: "per cent", 255: "255ths"}
 """What probabilities sum to that are given as percentages or grey levels."""
@@ -41,8 +41,20 @@ def unary_fault(unary: NDArray) -> Finding | None:
     return next(others, None) or _no_distribution(np.exp(total), unary.dtype)
 
 
-def _sums_to_one(log_totals: NDArray) -> bool:
-    return bool(np.mean(np.abs(log_totals) <= CLOSE) >= 0.99)
+def sum_to_one(totals: NDArray) -> bool:
+    """Tell whether these are sums of probabilities: nearly all of them nearly 1.
+
+    Parameters
+    ----------
+    totals : (...) float
+        Sums over classes or states, of many cells.
+    """
+    return bool(np.mean(np.abs(totals - 1) <= CLOSE) >= 0.99)
+
+
+def _total(phi: NDArray, axis: int | tuple[int, ...] = 0) -> NDArray:
+    """Sum exp(-phi). A sum beyond e is far from 1 anyway; it becomes e, as it could overflow."""
+    return np.exp(np.minimum(logsumexp(-phi, axis=axis), 1))
 
 
 def _no_number(unary: NDArray, phi: NDArray) -> Iterator[Finding]:
@@ -65,7 +77,7 @@ def _no_choice(phi: NDArray) -> Iterator[Finding]:
 
 
 def _log_probability(phi: NDArray) -> Iterator[Finding]:
-    if phi.max() <= CLOSE and _sums_to_one(logsumexp(phi, axis=0)):
+    if phi.max() <= CLOSE and sum_to_one(_total(-phi)):
         yield finding("log probabilities", low=phi.min(), high=phi.max())
 
 
@@ -79,7 +91,7 @@ def _infinite(phi: NDArray) -> Iterator[Finding]:
 
 def _probability(phi: NDArray) -> Iterator[Finding]:
     sums, ends = phi.sum(axis=0), {"low": phi.min(), "high": phi.max()}
-    total = next((unit for unit in (1, *UNITS) if np.mean(np.abs(sums / unit - 1) < CLOSE) >= 0.99), None)
+    total = next((unit for unit in (1, *UNITS) if sum_to_one(sums / unit)), None)
     if total == 1 and phi.min() >= 0:
         yield finding("probabilities", **ends)
     elif total and phi.min() >= 0:
@@ -90,7 +102,7 @@ def _constant_class(phi: NDArray) -> Iterator[Finding]:
     """Look for a class whose cost is the same everywhere, beside classes whose costs vary."""
     constant = np.ptp(phi, axis=(1, 2)) <= 1e-6
     if phi[0].size >= 16 and 0 < constant.sum() < len(phi) - 1:
-        complete = _sums_to_one(logsumexp(-phi[~constant], axis=0))
+        complete = sum_to_one(_total(phi[~constant]))
         rest = ", and the probabilities of the other classes already sum to one" if complete else ""
         label = constant.argmax()
         yield finding("ignore label/one plane", label=label, cost=phi[label, 0, 0], rest=rest)
@@ -99,9 +111,9 @@ def _constant_class(phi: NDArray) -> Iterator[Finding]:
 def _elsewhere(phi: NDArray) -> Iterator[Finding]:
     """Look for distributions along another axis, or in the order of memory."""
     for axes in (1, 2, (1, 2), (0, 1, 2)):
-        if _sums_to_one(logsumexp(-phi, axis=axes)):
+        if sum_to_one(_total(phi, axes)):
             yield finding("soft-max over the wrong axis", axes=axes)
-    if _sums_to_one(logsumexp(-phi.reshape(*phi.shape[1:], -1), axis=-1)):
+    if sum_to_one(_total(phi.reshape(*phi.shape[1:], -1), -1)):
         yield _reshaped("unary", phi)
 
 

@@ -9,6 +9,7 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.crf.doctor.distributions import sum_to_one
 from semgrid_edu.crf.doctor.finding import Finding, finding
 from semgrid_edu.occupancy import N_STATES
 
@@ -68,7 +69,7 @@ def arguments_swapped(unary: NDArray, values: NDArray) -> bool:
     """
     if unary.ndim != 3 or values.ndim != 3 or unary.shape[1:] != values.shape[1:]:
         return False
-    return len(unary) == N_STATES and len(values) != N_STATES and _sums_to_one(unary, 0)
+    return len(unary) == N_STATES and len(values) != N_STATES and sum_to_one(unary.sum(axis=0, dtype=np.float64))
 
 
 def oriented_values(values: NDArray) -> Mended:
@@ -94,7 +95,7 @@ def oriented_values(values: NDArray) -> Mended:
         yield finding("not four states", shape=values.shape)
         return None
     axes = [axis for axis, size in enumerate(values.shape) if size == N_STATES]
-    axis = next((axis for axis in axes if _sums_to_one(values, axis)), axes[0])
+    axis = next((axis for axis in axes if sum_to_one(values.sum(axis=axis, dtype=np.float64))), axes[0])
     if axis != 0:
         yield finding("states on the wrong axis", shape=values.shape, axis=axis)
     return np.moveaxis(values, axis, 0)
@@ -154,7 +155,3 @@ def _without_batch(argument: str, array: NDArray) -> Mended:
         yield finding("batch axis", argument=argument, shape=array.shape)
         return array[0]
     return array
-
-
-def _sums_to_one(array: NDArray, axis: int) -> bool:
-    return bool(np.abs(array.sum(axis=axis, dtype=np.float64) - 1).max() < 1e-2)

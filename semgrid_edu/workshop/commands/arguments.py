@@ -1,12 +1,16 @@
-"""What every command asks first: whether its arguments are given, and what is doubtful about its data."""
+"""What every command asks first: whether its arguments are given, which drive, and what is doubtful about its data."""
 
 import os
 import re
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import typer
 
 from semgrid_edu.errors import ArgumentError
+
+if TYPE_CHECKING:  # a command that needs no drive starts faster without numpy
+    from semgrid_edu.datasets.readers.frames import FrameSequence
 
 LARGEST = 2**63 - 1
 """The largest whole number that a command takes: PyTorch's generators take no larger seed."""
@@ -62,3 +66,38 @@ def tell(doubts: Iterable[str]) -> None:
         typer.echo(f"semgrid-edu: doubtful: {doubt}", err=True)
     if len(doubts) > TOLD:
         typer.echo(f"semgrid-edu: doubtful: {len(doubts) - TOLD} things more", err=True)
+
+
+def chosen_drive(kitti: dict[str, object], pandaset: dict[str, object], camera: str | None) -> "FrameSequence | None":
+    """Open the drive that options name, one of KITTI's or one of PandaSet's scenes; None when they name none.
+
+    Parameters
+    ----------
+    kitti : dict of str to object
+        The values of --kitti, --date and --drive; None for an option that isn't given.
+    pandaset : dict of str to object
+        The values of --pandaset and --scene.
+    camera : str or None
+        The camera, by the name that the data set gives it; its first one when left out.
+
+    Raises
+    ------
+    ArgumentError
+        When options of one data set are missing, both are named, or the shipped drives have no such camera.
+    """
+    from semgrid_edu.datasets import KittiRawDrive, PandasetScene
+    from semgrid_edu.datasets.readers.kitti_raw import VIEWS
+
+    opened = []
+    for named, reader, option in ((kitti, KittiRawDrive, "view"), (pandaset, PandasetScene, "camera")):
+        given = [name for name, value in named.items() if value is not None]
+        if given and len(given) < len(named):
+            every = {2: "both", 3: "all three"}[len(named)]
+            raise ArgumentError(", ".join(named), f"{every} or none", f"only {' and '.join(given)}")
+        if given:
+            opened.append((reader, named.values(), {option: camera} if camera else {}))
+    if len(opened) > 1:
+        raise ArgumentError("--kitti, --pandaset", "one of them", "both")
+    if camera not in (None, VIEWS[0]) and not opened:
+        raise ArgumentError("--camera", f"{VIEWS[0]}, the only one of the shipped drives", camera)
+    return next((reader(*names, **view) for reader, names, view in opened), None)

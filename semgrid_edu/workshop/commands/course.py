@@ -28,17 +28,12 @@ def notebooks(
 ) -> None:
     """Execute lectures and companions and write the students' exercises, from their sources."""
     from semgrid_edu.workshop.course.nbgrader.build import build_exercise, exercise_sources
-    from semgrid_edu.workshop.course.notebooks.build import (
-        build_lecture,
-        companion_sources,
-        lecture_sources,
-        named,
-        notebook_name,
-    )
+    from semgrid_edu.workshop.course.notebooks import build as lectures
 
-    for source in named([*exercise_sources(), *lecture_sources(), *companion_sources()], names):
-        build = build_exercise if source in exercise_sources() else build_lecture
-        typer.echo(f"{notebook_name(source)}: {build(source)}")
+    sources = [*exercise_sources(), *lectures.lecture_sources(), *lectures.companion_sources()]
+    for source in lectures.named(sources, names):
+        build = build_exercise if source in exercise_sources() else lectures.build_lecture
+        typer.echo(f"{lectures.notebook_name(source)}: {build(source)}")
 
 
 @course.command()

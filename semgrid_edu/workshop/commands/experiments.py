@@ -6,6 +6,10 @@ from typing import Annotated
 
 import typer
 
+from semgrid_edu.storage.files import table_beside
+from semgrid_edu.workshop.commands.arguments import tell
+from semgrid_edu.workshop.paper import reports
+
 reproduce = typer.Typer(no_args_is_help=True, help="Run the experiments of the lectures.")
 """What `semgrid-edu` adds to its commands."""
 
@@ -47,9 +51,14 @@ def two_stage(
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("two_stage.json"),
 ) -> None:
     """Train end to end and in two stages, and score both kinds of networks (lecture 08)."""
+    from semgrid_edu.datasets.index import dataset_doubts
     from semgrid_edu.workshop.studies.training.two_stage import compare_training, two_stage_table
 
-    keep_result(out, lambda: compare_training(data, runs, seeds), lambda result: two_stage_table(result["scores"]))
+    def scored() -> dict:
+        tell(dataset_doubts(data, "train", "test"))
+        return compare_training(data, runs, seeds)
+
+    keep_result(out, scored, lambda result: two_stage_table(result["scores"]))
 
 
 @reproduce.command()
@@ -96,9 +105,14 @@ def learned_crf(
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("learned_crf.json"),
 ) -> None:
     """Learn a CRF's weights, widths and label costs in eight ways, and score them on test frames (lecture 11)."""
+    from semgrid_edu.datasets.index import dataset_doubts
     from semgrid_edu.workshop.studies.crf.learned_crf import compare_learned_crfs, learned_crf_table
 
-    keep_result(out, lambda: compare_learned_crfs(data, validation, weights, runs, seed=seed), learned_crf_table)
+    def scored() -> dict:
+        tell(dataset_doubts(data, "train", "test") + dataset_doubts(validation, "validation"))
+        return compare_learned_crfs(data, validation, weights, runs, seed=seed)
+
+    keep_result(out, scored, learned_crf_table)
 
 
 @reproduce.command()
@@ -114,6 +128,35 @@ def truth_policies(
     from semgrid_edu.workshop.studies.ground_truth.laboratory import truth_policies
 
     keep_result(out, lambda: truth_policies(out, seed, drives, grid, lidar), truth_tables)
+
+
+@reproduce.command()
+def point_labels(
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives.")] = 0,
+    drives: Annotated[int, typer.Option(min=1, help="Number of drives, of two seconds each.")] = 20,
+    grid: Annotated[str, typer.Option(help="compact or paper.")] = "compact",
+    lidar: Annotated[str, typer.Option(help="HDL-64E, or coarse, that of the simulated data sets.")] = "HDL-64E",
+    out: Annotated[Path, typer.Option(help="Where to write the counts.")] = Path("point_labels.json"),
+) -> None:
+    """Measure how wrong the truth from labelled returns and cuboids is, such as PandaSet's (lecture 09)."""
+    from semgrid_edu.workshop.studies.ground_truth.counts import truth_tables
+    from semgrid_edu.workshop.studies.ground_truth.point_labels import point_labels
+
+    keep_result(out, lambda: point_labels(seed, drives, grid, lidar), truth_tables)
+
+
+@reproduce.command()
+def real_streets(
+    pandaset: Annotated[Path, typer.Option(help="The folder that holds PandaSet's scenes.")],
+    runs: Annotated[Path, typer.Option(help="Takes one folder per training run; a run that has ended isn't repeated.")],
+    scene: Annotated[str, typer.Option(help="Number of the scene.")] = "002",
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the initial weights and the order of the frames.")] = 0,
+    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("real_streets.json"),
+) -> None:
+    """Train for real streets in several ways, on labelled returns, and score views and times kept apart."""
+    from semgrid_edu.workshop.studies.training.real_streets import compare_real, real_streets_table
+
+    keep_result(out, lambda: compare_real(pandaset, scene, runs, seed), real_streets_table)
 
 
 @reproduce.command()
@@ -152,16 +195,8 @@ def keep_result(out: Path, compute: Callable[[], dict], table: Callable[[dict], 
     typer.echo(f"{table(result)}\n\nwritten to {out}")
 
 
-PAPER = {
-    "table1": "Table 1: SegNet, FCN and DeepLab, with and without the CRF.",
-    "table2": "Table 2: SegNet on routes that were never driven in training.",
-    "table3": "Table 3: SegNet's confusion matrix on data without any error.",
-    "claims": "The paper's nine claims, each with a verdict.",
-    "ablations": "What the paper leaves open: planes, occupancy, reduction, balancing, calibration, frames, distance.",
-    "truth-costs": "What training costs on truth made in other ways: clean-up, mask, de-skew, scans added up.",
-    "figures": "Figures 6 and 7: a few test frames with their labels and grids.",
-    "all": "All of these.",
-}
+PAPER = {name: row["help"] for name, row in table_beside(reports.__file__, "experiments").items()}
+PAPER["all"] = "All of these."
 """The experiments of the paper, and their commands' help."""
 
 

@@ -10,7 +10,7 @@ from typer.core import TyperCommand
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.compiled import CACHE_VARIABLE, keep_compiled_functions
-from semgrid_edu.workshop.commands.arguments import check_arguments, tell
+from semgrid_edu.workshop.commands.arguments import check_arguments, chosen_drive, tell
 from semgrid_edu.workshop.commands.course import course
 from semgrid_edu.workshop.commands.data import data
 from semgrid_edu.workshop.commands.experiments import keep_result, reproduce
@@ -36,31 +36,33 @@ def demo(
     kitti: Annotated[Path | None, typer.Option(help="A folder of KITTI raw drives, which holds the dates.")] = None,
     date: Annotated[str | None, typer.Option(help="Such as 2011_09_26.")] = None,
     drive: Annotated[str | None, typer.Option(help="Such as 0013.")] = None,
-    camera: Annotated[str, typer.Option(help="image_02 (left colour camera) or image_03 (right).")] = "image_02",
-    weights: Annotated[Path | None, typer.Option(help="A trained network; the shipped SegNet by default.")] = None,
+    pandaset: Annotated[Path | None, typer.Option(help="Instead, a folder of PandaSet's scenes.")] = None,
+    scene: Annotated[str | None, typer.Option(help="Such as 002.")] = None,
+    camera: Annotated[
+        str | None,
+        typer.Option(help="KITTI: image_02 (left, default) or image_03. PandaSet: front_camera (default) ..."),
+    ] = None,
+    weights: Annotated[Path | None, typer.Option(help="A trained network; else a shipped SegNet.")] = None,
     frames: Annotated[str | None, typer.Option(help="FIRST:LAST[:STEP], LAST excluded, such as 40:120:2.")] = None,
     stages: Annotated[Path | None, typer.Option(help="A Python file with stages of your own, to compare.")] = None,
     out: Annotated[Path, typer.Option(help="Where to write the page.")] = Path("out/demo"),
 ) -> None:
-    """Run every stage over a drive, the shipped one by default, and write a page that shows it.
+    """Run every stage over a drive, and write a page that shows it; without a drive, over the two shipped ones.
 
-    Without --frames all frames are run. A file for --stages defines some of track, segment, sample, fuse and refine.
+    These are a real street, and in the folder simulated/ a simulated one. Without --frames all frames are run. A file
+    for --stages defines some of track, segment, sample, fuse and refine.
     """
-    from semgrid_edu.datasets import KittiRawDrive
-    from semgrid_edu.datasets.readers.kitti_raw import VIEWS
-    from semgrid_edu.datasets.samples import sample_drive, sample_weights
+    from semgrid_edu.datasets.samples import real_weights
     from semgrid_edu.networks.weights import weights_doubts
-    from semgrid_edu.workshop.demo import write_demo
+    from semgrid_edu.workshop.demo import write_both_streets, write_demo
 
-    named = {"--kitti": kitti, "--date": date, "--drive": drive}
-    given = [option for option, value in named.items() if value is not None]
-    if given and len(given) < len(named):
-        raise ArgumentError(", ".join(named), "all three or none", f"only {' and '.join(given)}")
-    if camera != VIEWS[0] and not given:
-        raise ArgumentError("--camera", f"{VIEWS[0]}, the only one of the shipped drive", camera)
-    chosen = KittiRawDrive(kitti, date, drive, view=camera) if given else sample_drive()
-    tell([*chosen.doubts(), *(weights_doubts(weights) if weights else ())])
-    page = write_demo(chosen, weights or sample_weights(), out, stages, frames)
+    kitti_named = {"--kitti": kitti, "--date": date, "--drive": drive}
+    chosen = chosen_drive(kitti_named, {"--pandaset": pandaset, "--scene": scene}, camera)
+    tell([*(chosen.doubts() if chosen else ()), *(weights_doubts(weights) if weights else ())])
+    if chosen is None:
+        page = write_both_streets(out, weights, stages, frames)
+    else:
+        page = write_demo(chosen, weights or real_weights(), out, stages, frames)
     typer.echo(f"open {page.resolve().as_uri()}\nin one picture: {page.parent / 'overview.png'}")
 
 
@@ -78,13 +80,15 @@ class _TrainCommand(TyperCommand):
 
 @app.command(cls=_TrainCommand)
 def train(
-    data: Annotated[Path, typer.Option(help="A data set with train frames, such as data/minikitti.")],
+    data: Annotated[list[Path], typer.Option(help="A data set with train frames; several take turns.")],
     out: Annotated[Path, typer.Option(help="A folder for the weights, the log and their provenance.")],
     segmenter: Annotated[str, typer.Option(help="The image network.")] = "segnet",
     preset: Annotated[str, typer.Option(help="compact or paper (published size, 0.2 m cells).")] = "compact",
     imagenet: Annotated[Path | None, typer.Option(help="ImageNet weights from which --preset paper starts.")] = None,
+    start: Annotated[Path | None, typer.Option("--from", help="A trained network of this kind to start from.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed for the initial weights and the order of the frames.")] = 0,
     iterations: Annotated[int, typer.Option(min=1, help="Steps of each of the two stages.")] = 2000,
+    tint: Annotated[float, typer.Option(help="How far each colour of an image varies: 0.15 is 15 % either way.")] = 0.0,
     two_stage: Annotated[bool, typer.Option("--two-stage", help="Train the fusion on a fixed image network.")] = False,
     truth: Annotated[str, typer.Option(help="true, lidar, or another way, such as no-cleanup.")] = "true",
     resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was interrupted.")] = False,
@@ -98,9 +102,9 @@ def train(
     from semgrid_edu.datasets.index import dataset_doubts
     from semgrid_edu.training.run import chosen_truth, how_to_go_on, train_network, training_params
 
-    params = training_params(preset, iterations, end_to_end=not two_stage, from_imagenet=imagenet is not None)
-    tell(dataset_doubts(data, "train"))
-    choices = {"preset": preset, "imagenet": imagenet, "device": device, "truth": chosen_truth(truth)}
+    params = training_params(preset, iterations, not two_stage, from_imagenet=imagenet is not None, tint=tint)
+    tell([line for folder in data for line in dataset_doubts(folder, "train")])
+    choices = {"preset": preset, "imagenet": imagenet, "device": device, "truth": chosen_truth(truth), "start": start}
     try:
         train_network(data, out, segmenter, params, seed, resume, **choices)
     except KeyboardInterrupt:
@@ -189,10 +193,16 @@ def search_crf(
     out: Annotated[Path, typer.Option(help="Takes each trial, then all scores.")] = Path("crf_search.json"),
 ) -> None:
     """Calibrate a network, search the CRF's parameters on validation frames, and score the best on test frames."""
+    from semgrid_edu.datasets.index import dataset_doubts
+    from semgrid_edu.networks.weights import weights_doubts
     from semgrid_edu.workshop.studies.crf.crf_search import search_crf, search_table
 
+    def searched() -> dict:
+        tell(dataset_doubts(data, "validation") + dataset_doubts(test, "test") + weights_doubts(weights))
+        return search_crf(data, test, weights, out, seed=seed, n_trials=trials)
+
     try:
-        keep_result(out, lambda: search_crf(data, test, weights, out, seed=seed, n_trials=trials), search_table)
+        keep_result(out, searched, search_table)
     except KeyboardInterrupt:
         sys.exit(f"semgrid-edu: interrupted; the same command goes on from {out}")
 

@@ -3,23 +3,13 @@
 from dataclasses import dataclass
 from html import escape
 
-from semgrid_edu.pipeline import STAGES
+from semgrid_edu.storage.files import table_beside
 
-MADE_BY = {
-    "scores": ("segment",),
-    "occupancy": ("track",),
-    "grid": ("track", "segment", "sample", "fuse"),
-    "refined": tuple(STAGES),
-}
+_TABLES = table_beside(__file__)
+MADE_BY: dict[str, tuple[str, ...]] = _TABLES["made_by"]
 """The stages that a picture depends on."""
 
-STAGE_WORDS = {
-    "track": ("l → o", "Bayes filter, CMCDOT"),
-    "segment": ("i → s", "image network"),
-    "sample": ("s → p", "sampling on planes"),
-    "fuse": ("(p, o) → g", "reduction and fusion"),
-    "refine": ("g → g", "CRF, mean field"),
-}
+STAGE_WORDS: dict[str, tuple[str, str]] = _TABLES["stages"]
 """Input and output of each stage, in the symbols of the paper's Fig. 2, and what the package's own stage does."""
 
 

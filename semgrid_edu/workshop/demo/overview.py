@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import wrap
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -25,7 +26,7 @@ REACH = 50.0
 STYLE = {"font.size": 9, "axes.titlesize": 11, "axes.titlelocation": "left"}
 
 
-def save_overview(record: Record, path: str | Path) -> None:
+def save_overview(record: Record, path: str | Path, words: str = "") -> None:
     """Draw image and grids of the frame in which most moves, and save them as PNG.
 
     Parameters
@@ -35,24 +36,28 @@ def save_overview(record: Record, path: str | Path) -> None:
         below it, by the student's own grid.
     path : path-like
         The file to write; its folder is made when missing.
+    words : str
+        What stands below the picture: what to expect of it, and whose data it shows.
     """
     with plt.rc_context(STYLE):
-        figure = _draw(record)
+        figure = _draw(record, wrap(words, 190))
     with atomic_path(path) as temporary:
         figure.savefig(temporary, dpi=110)
     plt.close(figure)
 
 
-def _draw(record: Record) -> Figure:
-    """Draw (l, i), s, o, g, refined g and, where it is known, the truth."""
+def _draw(record: Record, lines: list[str]) -> Figure:
+    """Draw (l, i), s, o, g, refined g and, where it is known, the truth; below it some lines of text."""
     package, yours = record.liveliest
     maps = {"semantic grid g": package.grid.argmax(axis=0), "g refined by the CRF": package.refined.argmax(axis=0)}
     if package.frame.labels is not None:
         maps["truth"] = grid_truth(package.frame.labels, package.belief.probability, record.spec)
     rows = 1 if yours is None else 2
-    heights = 2.3, 5.4 * rows, 0.6
+    heights = [2.3, 5.4 * rows, 0.6, *[0.2 * len(lines) + 0.1] * bool(lines)]
     figure = plt.figure(figsize=(13, sum(heights)), layout="constrained")
-    photos, grids, legend = figure.subfigures(3, 1, height_ratios=heights)
+    photos, grids, legend, *below = figure.subfigures(len(heights), 1, height_ratios=heights)
+    for part in below:
+        part.text(0.01, 0.5, "\n".join(lines), va="center", linespacing=1.3)
     _draw_photos(photos, record)
     axes = grids.subplots(rows, 1 + len(maps), sharey=True, squeeze=False)
     _draw_grids(axes[0], package, maps, record)

@@ -1,7 +1,6 @@
 """The demo's page: one HTML file that holds its figures, style, script and data."""
 
 import json
-import tomllib
 from collections.abc import Iterable
 from html import escape
 from importlib.resources import files
@@ -13,6 +12,7 @@ import numpy as np
 from semgrid_edu.camera import Camera
 from semgrid_edu.occupancy.cmcdot import LIDAR_PERIOD
 from semgrid_edu.plotting import DEPTH_RANGE, STATE_COLOURS, STATE_NAMES, depth_colours
+from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.demo.comparison import STAGE_WORDS, Comparison
 from semgrid_edu.workshop.demo.pictures import grid_svg
 from semgrid_edu.workshop.demo.record import YOURS, FrameView, Record
@@ -21,6 +21,10 @@ SCAN_MILLISECONDS = 1000 * LIDAR_PERIOD
 """Time from one scan of KITTI's LIDAR to the next, ms."""
 
 COMPARED = " The package's occupancy grid names the unknown cells of the truth, so that both runs have the same truth."
+
+
+GAPS = " White cells are left out: they are in view, but nobody labelled what is there."
+"""Added to what the truth shows, when its labels have gaps."""
 
 
 class Panel(NamedTuple):
@@ -50,14 +54,16 @@ def page_html(
     story: dict[str, object] | None = None,
     choice: str = "",
     broken: str = "",
+    expected: str = "",
+    credit: str = "",
+    switch: str = "",
 ) -> str:
     """Write the page.
 
     Parameters
     ----------
     record : Record
-        What was recorded of the drive; at least one frame. Without truth the page shows no metrics, and says what to
-        expect.
+        What was recorded of the drive; at least one frame. Without truth the page shows no metrics.
     title : str
         The drive's name.
     camera : Camera
@@ -70,6 +76,12 @@ def page_html(
         Which frames of the drive are shown, as `ChosenFrames.told` says it.
     broken : str
         What could not be read, so that the page ends before it; empty when all could.
+    expected : str
+        What to expect of the classes, in plain text; its first sentence is set in bold.
+    credit : str
+        Whose data the page shows, in plain text.
+    switch : str
+        What leads to another page, as HTML.
 
     Returns
     -------
@@ -77,8 +89,10 @@ def page_html(
         HTML that refers to nothing outside itself.
     """
     first, (near, far), comparison = record.views[0], DEPTH_RANGE, record.comparison
-    panels = [Panel(name, **words) for name, words in tomllib.loads(_resource("captions.toml")).items()]
+    panels = [Panel(name, **words) for name, words in table_beside(__file__, "captions").items()]
     shown = [panel for panel in panels if panel.name != "truth" or record.labelled]
+    if record.gaps:
+        shown[-1] = shown[-1]._replace(see=shown[-1].see + GAPS)
     whose = " The stories are about the package's own stages." if comparison else ""
     return _filled(
         "page.html",
@@ -90,7 +104,9 @@ def page_html(
         column=_column_svg(camera),
         story=_json(story),
         lead=_lead(record, title, choice),
-        notice=_broken(broken) + ("" if record.labelled else _resource("notice.html")),
+        notice=_broken(broken) + _notice(expected),
+        switch=f'<p class="switch">{switch}</p>' if switch else "",
+        credit=escape(f"Data: {credit} ") if credit else "",
         last=len(record.views) - 1,
         clock=escape(first.clock),
         longest=max(len(frame.clock) for frame in record.views),  # so that the slider keeps its length
@@ -155,6 +171,12 @@ def _broken(error: str) -> str:
     """Return the notice that the drive could not be read to its end."""
     notice = '<p class="notice"><b>The drive could not be read to its end.</b> The page shows what came before: {}</p>'
     return notice.format(escape(error)) if error else ""
+
+
+def _notice(expected: str) -> str:
+    """Return the notice that says what to expect of the classes."""
+    first, _, rest = escape(expected).partition(". ")
+    return _filled("notice.html", first=first.removesuffix("."), rest=rest) if expected else ""
 
 
 def _lead(record: Record, title: str, choice: str) -> str:

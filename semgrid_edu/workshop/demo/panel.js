@@ -68,7 +68,7 @@ async function tell(k) {
 
 function heading(cell, read) {
   const [, , refined, truth] = read("classes", cell), row = Math.floor(cell / story.grid.cols);
-  const known = truth === 255 ? "Nobody labelled this frame." : truth === refined ? "This is right." : `The truth is <b>${escaped(story.names[truth])}</b>.`;
+  const known = truth === 255 ? frames[shown()].images.truth ? "Nobody labelled this cell." : "Nobody labelled this frame." : truth === refined ? "This is right." : `The truth is <b>${escaped(story.names[truth])}</b>.`;
   return `<p><b>${place(centre(story.grid, cell))}</b> (row ${row}, column ${cell % story.grid.cols}): the refined grid says ${swatch(refined)}. ${known}</p>`;
 }
 
@@ -204,7 +204,8 @@ async function paintErrors(k) {
     if (k !== shown() || !errorsOn()) return;
     const painted = new ImageData(guess.width, guess.height);
     for (let i = 0; i < guess.data.length; i += 4) {
-      const right = [0, 1, 2].every((j) => guess.data[i + j] === truth.data[i + j]);
+      const [guessed, known] = [guess, truth].map(({ data }) => data.slice(i, i + 3).join());
+      const right = guessed === known || known === "255,255,255"; // white: without a label
       painted.data.set(right ? [255, 255, 255, 200] : [215, 25, 28, 255], i);
     }
     const canvas = document.createElement("canvas");

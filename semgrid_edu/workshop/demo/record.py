@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import LabelSet
+from semgrid_edu.labels import IGNORE, LabelSet
 from semgrid_edu.metrics import METRICS, confusion_matrix, semantic_cells
 from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.occupancy import PlanarMotion, State
@@ -162,8 +162,14 @@ class Record:
 
     def classes(self) -> list[tuple[str, tuple[int, int, int]]]:
         """Return names and colours of the classes that occur in a shown picture."""
-        both = zip(self.label_set.names, self.label_set.rgb, strict=True)
-        return [entry for entry, occurs in zip(both, self._occurs, strict=False) if occurs]
+        entries = dict(enumerate(zip(self.label_set.names, self.label_set.rgb, strict=True)))
+        entries[IGNORE] = "left out", (255, 255, 255)
+        return [entry for number, entry in entries.items() if self._occurs[number]]
+
+    @property
+    def gaps(self) -> bool:
+        """Whether the truth leaves cells out."""
+        return bool(self._occurs[IGNORE])
 
     def _show(self, runs: dict[str, FrameResult], maps: dict[str, NDArray]) -> None:
         package = runs[""]

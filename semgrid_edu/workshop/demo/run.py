@@ -7,13 +7,15 @@ from typing import NamedTuple
 
 from tqdm.auto import tqdm
 
-from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.datasets.readers.frames import FrameSequence
+from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_weights
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.networks import load_net
 from semgrid_edu.pipeline import FrameResult, Stages, load_stages, run_side_by_side
 from semgrid_edu.storage.files import write_text
+from semgrid_edu.storage.reading import read_json
 from semgrid_edu.workshop.demo.comparison import Comparison
 from semgrid_edu.workshop.demo.details import story_data
 from semgrid_edu.workshop.demo.overview import save_overview
@@ -90,23 +92,34 @@ class ChosenFrames(NamedTuple):
         return f" ({rate}frames {self.run[0]} to {self.run[-1]}; it has {n_frames})"
 
 
+CARD = "card.json"
+"""A model card beside weights; its "other_streets" says how well the network does on real streets."""
+
+POOR = (
+    "Expect poor semantics here. The truth is not known for this drive, and the network has learned from simulated "
+    "streets alone. Real images look different, so expect many wrong classes in the image scores, the semantic grid "
+    "and the refined grid."
+)
+"""What to expect of a drive without labels, of weights without a card."""
+
 STORIES = 200_000
 """Most cells that have a story, in all frames together: one takes some 55 bytes of the page."""
 
 
 def write_demo(
-    drive: KittiRawDrive,
+    drive: FrameSequence,
     weights: str | Path,
     out: str | Path,
     stages: str | Path | None = None,
     frames: str | None = None,
+    switch: str = "",
 ) -> Path:
     """Run every stage over a drive and write a page that shows it.
 
     Parameters
     ----------
-    drive : KittiRawDrive
-        The drive; it has to have camera images.
+    drive : FrameSequence
+        The drive, with its `camera`; it has to have camera images.
     weights : path-like
         The network's weights, as `save_net` wrote them.
     out : path-like
@@ -116,6 +129,8 @@ def write_demo(
         stages beside the package's.
     frames : str, optional
         Which frames to run over and to show, such as "40:120:2", see `ChosenFrames.of`.
+    switch : str
+        What leads from the page to another one, as HTML.
 
     Returns
     -------
@@ -143,15 +158,50 @@ def write_demo(
     record = Record(net.architecture.grid, label_set, chosen.shown, comparison, net, stories)
     results = run_side_by_side((drive[k] for k in chosen.run), own, *yours)
     broken = _record_all(tqdm(results, total=len(chosen.run), desc=drive.folder.name, unit="frame"), record)
-    save_overview(record, Path(out) / "overview.png")
+    words = {"expected": _expected(weights, record), "credit": drive.credit}
+    save_overview(record, Path(out) / "overview.png", " ".join(filter(None, words.values())))
     page = Path(out) / "index.html"
     story = story_data(net, drive.camera, record.layout)
-    words = {"choice": chosen.told(len(drive)), "broken": str(broken or "")}
+    words |= {"choice": chosen.told(len(drive)), "broken": str(broken or ""), "switch": switch}
     html = page_html(record, drive.folder.name, drive.camera, net.architecture.image_size, story, **words)
     write_text(page, html)
     if broken:
         raise DataError(broken.path, broken.args[1], f"{broken.args[2]}; {page} shows the frames before it") from broken
     return page
+
+
+REAL = "<b>A real street</b> · <a href='simulated/index.html'>a simulated street</a>"
+SIMULATED = "<a href='../index.html'>A real street</a> · <b>a simulated street</b>"
+
+
+def write_both_streets(out: str | Path, weights: str | Path | None = None, *options: str | Path | None) -> Path:
+    """Write the pages of the two shipped drives, the real street and in `simulated/` the simulated one.
+
+    Parameters
+    ----------
+    out : path-like
+        The folder to write to; made when missing.
+    weights : path-like, optional
+        The network for both; when left out, each street has one that has learned from such streets.
+    *options
+        `stages` and `frames` of `write_demo`.
+
+    Returns
+    -------
+    Path
+        The page of the real street, which leads to the other one.
+    """
+    page = write_demo(real_drive(), weights or real_weights(), out, *options, switch=REAL)
+    write_demo(sample_drive(), weights or sample_weights(), Path(out) / "simulated", *options, switch=SIMULATED)
+    return page
+
+
+def _expected(weights: str | Path, record: Record) -> str:
+    """Say what to expect of the classes: by the card beside the weights, or that they are poor where none are known."""
+    card = Path(weights).with_name(CARD)
+    if card.is_file():
+        return str(read_json(card).get("other_streets", ""))
+    return "" if record.labelled else POOR
 
 
 def _record_all(results: Iterable[tuple[FrameResult, ...]], record: Record) -> DataError | None:
