@@ -148,15 +148,16 @@ def point_labels(
 @reproduce.command()
 def real_streets(
     pandaset: Annotated[Path, typer.Option(help="The folder that holds PandaSet's scenes.")],
+    simulated: Annotated[Path, typer.Option(help="A data set of simulated streets, such as data/minikitti.")],
     runs: Annotated[Path, typer.Option(help="Takes one folder per training run; a run that has ended isn't repeated.")],
     scene: Annotated[str, typer.Option(help="Number of the scene.")] = "002",
-    seed: Annotated[int, typer.Option(min=0, help="Seed for the initial weights and the order of the frames.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="First seed for initial weights and the order of frames.")] = 0,
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("real_streets.json"),
 ) -> None:
     """Train for real streets in several ways, on labelled returns, and score views and times kept apart."""
     from semgrid_edu.workshop.studies.training.real_streets import compare_real, real_streets_table
 
-    keep_result(out, lambda: compare_real(pandaset, scene, runs, seed), real_streets_table)
+    keep_result(out, lambda: compare_real(pandaset, scene, simulated, runs, seed), real_streets_table)
 
 
 @reproduce.command()

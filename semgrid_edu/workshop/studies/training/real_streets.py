@@ -16,7 +16,7 @@ from semgrid_edu.crf.temperature import Reliability
 from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame
 from semgrid_edu.datasets.readers.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import sample_weights
-from semgrid_edu.datasets.training_set import Mixture, TrainingSet
+from semgrid_edu.datasets.training_set import Mixture, TrainingSet, sets_by_camera
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.networks import WEIGHTS, Architecture, SemanticGridNet, build_net, load_net
@@ -53,9 +53,14 @@ BLOCK = 2.0
 Part = tuple[TrainingSet, list[int]]
 """The frames of a camera, and the numbers of some of them."""
 
+Counted = dict[str, list[tuple[str, GridCounts]]]
+"""For each method what it is called in the counts of each part, and these counts."""
 
-def compare_real(root: str | Path, scene: str, runs: str | Path, seed: int = 0) -> dict[str, object]:
-    """Train a network in each of `VARIANTS` for each of two splits of a scene, and score what was kept apart.
+
+def compare_real(
+    root: str | Path, scene: str, simulated: str | Path, runs: str | Path, seed: int = 0
+) -> dict[str, object]:
+    """Train networks in each of `VARIANTS` for each of two splits of a scene, and score what was kept apart.
 
     A cell counts when a labelled return of its own scan lies in it and the camera may see it. Networks learn from the
     returns of the neighbouring scans too.
@@ -64,10 +69,12 @@ def compare_real(root: str | Path, scene: str, runs: str | Path, seed: int = 0) 
     ----------
     root, scene : path-like, str
         As `PandasetScene` takes them.
+    simulated : path-like
+        The data set of simulated streets that some ways learn from as well, such as data/minikitti.
     runs : path-like
         Takes one folder per training run. A run that has ended isn't repeated, and one that was interrupted is resumed.
     seed : int
-        Seed for initial weights and for the order of the frames.
+        First seed for initial weights and for the order of the frames; a row of `VARIANTS` says how many are used.
 
     Returns
     -------
@@ -76,17 +83,20 @@ def compare_real(root: str | Path, scene: str, runs: str | Path, seed: int = 0) 
         the recall of each class, and the "ECE"; and all that made them. JSON can hold it.
     """
     views = {camera: _frames(Path(root), scene, camera) for camera in CAMERAS}
+    streets = sets_by_camera(simulated, "train")
     found, weights = {}, {}
     for split, (training, test) in splits(views).items():
-        counted = [_score_states(training, test)]
+        found[split] = _scores_by_method([_count_states(training, test)])
         for name, variant in VARIANTS.items():
             if split == LATER and name not in TABLE["later"]:
                 continue
-            folder = Path(runs) / f"{split}, {name}, {seed}"
-            net = _trained(variant, training, folder, seed)
-            weights[folder.name] = sha256(folder / WEIGHTS) if variant.grid else sha256(_start(variant))
-            counted.append(_score(name, net, test))
-        found[split] = {name: scores for one in counted for name, scores in one.items()}
+            counted = []
+            for k in range(seed, seed + (variant.seeds if split != LATER else 1)):
+                folder = Path(runs) / f"{split}, {name}, {k}"
+                net = _trained(variant, training, streets, folder, k)
+                weights[folder.name] = sha256(folder / WEIGHTS) if variant.grid else sha256(_start(variant))
+                counted.append(_count(name, net, test))
+            found[split] |= _scores_by_method(counted)
     command = f"semgrid-edu reproduce real-streets --scene {scene} --seed {seed}"
     return {"scores": found, "weights": weights, "seed": seed, **made_by(command, "numpy", "torch", "numba")}
 
@@ -133,38 +143,46 @@ def _start(variant: SimpleNamespace) -> Path:
     return sample_weights(getattr(variant, "segmenter", "segnet"))
 
 
-def _trained(variant: SimpleNamespace, training: list[Part], folder: Path, seed: int) -> SemanticGridNet:
+def _trained(
+    variant: SimpleNamespace, training: list[Part], streets: list[TrainingSet], folder: Path, seed: int
+) -> SemanticGridNet:
     """Train a network, unless that was done before."""
-    mixture = Mixture([[_Some(*part) for part in training]])
+    real = [_Some(*part) for part in training]
+    mixture = Mixture([real, streets] if getattr(variant, "together", False) else [real])
+    net = _initial(variant, mixture, seed)
+    if not variant.grid:
+        return net
+    if not (folder / WEIGHTS).exists():
+        chosen = {name: getattr(variant, name) for name in ("end_to_end", "tint") if hasattr(variant, name)}
+        params = TrainingParams(variant.image, variant.grid, min(6, *map(len, mixture.parts)), **chosen)
+        train(net, mixture, folder, params, seed, (folder / CHECKPOINT).exists())
+    return load_net(folder / WEIGHTS, mixture.camera)
+
+
+def _initial(variant: SimpleNamespace, mixture: Mixture, seed: int) -> SemanticGridNet:
+    """Return the network with which training begins."""
+    if getattr(variant, "start", False):
+        return load_net(_start(variant), mixture.camera)
     named = {
         name: getattr(variant, name) for name in ("segmenter", "uses_occupancy", "heights") if hasattr(variant, name)
     }
-    start = _start(variant) if getattr(variant, "start", False) else None
-    net = (
-        load_net(start, mixture.camera) if start else build_net(replace(Architecture(), **named), mixture.camera, seed)
-    )
-    if variant.grid and not (folder / WEIGHTS).exists():
-        fewest = min(map(len, mixture.parts))
-        chosen = {name: getattr(variant, name) for name in ("end_to_end", "tint") if hasattr(variant, name)}
-        params = TrainingParams(variant.image, variant.grid, min(6, fewest), **chosen)
-        train(net, mixture, folder, params, seed, (folder / CHECKPOINT).exists())
-    return load_net(folder / WEIGHTS, mixture.camera) if variant.grid else net
+    return build_net(replace(Architecture(), **named), mixture.camera, seed)
 
 
-def _score(name: str, net: SemanticGridNet, test: list[Part]) -> dict[str, dict]:
-    """Score a network and its refined grids on all parts."""
-    counts: dict[str, list[GridCounts]] = {}
+def _count(name: str, net: SemanticGridNet, test: list[Part]) -> Counted:
+    """Count the errors of a network, and of its refined grids, in all parts."""
+    counted: Counted = {}
     for part in test:
         frames = _Some(*part)
         net.sampler = plane_sampler(net.need_architecture(), frames.camera)
         found = count_grids(network_grids(net, frames, {"CRF": Stages.of(net).refine}), frames)
         for method in found.methods:
-            counts.setdefault(method.replace("network", name), []).append((method, found))
-    return {title: _scores_of(parts) for title, parts in counts.items()}
+            counted.setdefault(method.replace("network", name), []).append((method, found))
+    return counted
 
 
-def _score_states(training: list[Part], test: list[Part]) -> dict[str, dict]:
-    """Score the most frequent class of each occupancy state."""
+def _count_states(training: list[Part], test: list[Part]) -> Counted:
+    """Count the errors of the most frequent class of each occupancy state."""
     counts = np.zeros((len(State), KITTI_14.n_semantic), np.int64)
     for frames in (_Some(*part) for part in training):
         states, truth = frames.arrays["occupancy"].argmax(axis=1), frames.arrays["true"]
@@ -176,25 +194,34 @@ def _score_states(training: list[Part], test: list[Part]) -> dict[str, dict]:
         found.append(
             (STATE_TABLE, count_grids(lambda k, o=occupancy: {STATE_TABLE: best[o[k].argmax(axis=0)]}, frames))
         )
-    return {STATE_TABLE: _scores_of(found)}
+    return {STATE_TABLE: found}
 
 
-def _scores_of(parts: list[tuple[str, GridCounts]]) -> dict[str, object]:
-    """Return what is said of a method, from the counts of all cameras."""
-    confusions = [counted.confusions.of(method, "true") for method, counted in parts]
-    drives = tuple(drive for one in confusions for drive in one.drives)
-    matrices = np.concatenate([one.counts[method] for one, (method, _) in zip(confusions, parts, strict=True)])
-    by_block = FrameConfusions(drives, {"": matrices}).by_drive("")[None]
+def _scores_by_method(seeds: list[Counted]) -> dict[str, dict]:
+    """Return what is said of each method, from the counts of each seed."""
+    return {method: _scores_of([counted[method] for counted in seeds]) for method in seeds[0]}
+
+
+def _scores_of(seeds: list[list[tuple[str, GridCounts]]]) -> dict[str, object]:
+    """Return what is said of a method, from the counts of all cameras for each seed."""
+    drives = tuple(drive for _, counted in seeds[0] for drive in counted.confusions.drives)
+    matrices = np.stack([np.concatenate([_matrices(*part) for part in parts]) for parts in seeds])
+    by_block = np.stack([FrameConfusions(drives, {"": one}).by_drive("") for one in matrices])
     kept = on_cells(by_block, "semantic", KITTI_14)
-    total = matrices.sum(axis=0)[: KITTI_14.n_semantic]
-    diagrams = [counted.reliability[method] for method, counted in parts if method in counted.reliability]
+    total = matrices.sum(axis=(0, 1))[: KITTI_14.n_semantic]
+    diagrams = [counted.reliability[name] for parts in seeds for name, counted in parts if name in counted.reliability]
     return {
         **{name: score_with_interval(kept, METRICS[name]) for name in ("pixel accuracy", "class accuracy")},
         "recall": {KITTI_14.names[c]: total[c, c] / row.sum() for c, row in enumerate(total) if row.any()},
-        "cells": int(total.sum()),
+        "cells": int(matrices[0].sum()),
         "frames": len(drives),
         "ECE": _calibration_error(sum(diagrams)) if diagrams else None,
     }
+
+
+def _matrices(method: str, counted: GridCounts) -> NDArray[np.int64]:
+    """Return the confusion matrix of each frame, (N, C, C), rows: labelled returns."""
+    return counted.confusions.of(method, "true").counts[method]
 
 
 def _calibration_error(sums: NDArray) -> float:
