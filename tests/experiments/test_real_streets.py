@@ -1,0 +1,105 @@
+"""The study of real streets: what is kept apart stays apart, runs aren't mixed up, and the README quotes its result."""
+
+import json
+from pathlib import Path
+
+import pytest
+from tiny_pandaset import SCENE, write_tiny_pandaset
+
+import semgrid_edu
+from semgrid_edu.datasets.readers.pandaset import CAMERAS
+from semgrid_edu.errors import DataError
+from semgrid_edu.networks import WEIGHTS, Architecture
+from semgrid_edu.training import TrainingParams
+from semgrid_edu.workshop.studies.training import real_streets
+from semgrid_edu.workshop.studies.training.real_streets import LATER, STATE_TABLE, WayToTrain, compare_real, splits
+
+CLONE = Path(semgrid_edu.__file__).parents[1]
+
+
+@pytest.fixture
+def sides():
+    """Frames by camera: 20 ahead and 10 to each other side, which stand for themselves."""
+    return {camera: list(range(20 if camera == "front_camera" else 10)) for camera in CAMERAS}
+
+
+def test_no_network_is_tested_on_what_it_learned(sides):
+    for training, test in splits(sides).values():
+        learned, kept = ({(id(frames), k) for frames, ks in parts for k in ks} for parts in (training, test))
+        assert min(len(learned), len(kept)) > 0
+        assert not learned & kept
+
+
+def test_a_camera_is_left_out_whole_and_later_frames_come_a_second_later(sides):
+    by_side, in_time = splits(sides).values()
+    assert sum(len(ks) for _, ks in by_side[1]) == 20
+    assert sum(len(ks) for part in by_side for _, ks in part) == 70
+    for (frames, learned), (_, kept) in zip(*in_time, strict=True):
+        assert kept[-1] == frames[-1]
+        assert (kept[0] - learned[-1]) * 4 / len(frames) >= 1  # the frames of each camera span four seconds
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory):
+    return write_tiny_pandaset(tmp_path_factory.mktemp("pandaset"))
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """Two cameras, and two ways of which one takes two steps."""
+    once = WayToTrain(Architecture(), params=TrainingParams(1, 1))
+    monkeypatch.setattr(real_streets, "CAMERAS", ("front_camera", "left_camera"))
+    monkeypatch.setattr(real_streets, "WAYS", {"as shipped": WayToTrain(Architecture(), "segnet"), "once": once})
+    chosen = {"left_out": ("left_camera",), "later": ("once",)}
+    monkeypatch.setattr(real_streets, "TABLE", real_streets.TABLE | chosen)
+
+
+def test_every_way_is_scored_and_a_run_that_has_ended_is_not_repeated(small, root, tmp_path):
+    before = sorted(root.rglob("*"))
+    result = compare_real(root, SCENE, tmp_path)
+    (by_side, in_time), runs = result["scores"].values(), sorted((tmp_path / SCENE).glob(f"*/{WEIGHTS}"))
+    assert list(by_side) == [STATE_TABLE, "as shipped", "as shipped + CRF", "once", "once + CRF"]
+    assert list(in_time) == [STATE_TABLE, "once", "once + CRF"]
+    assert len({scores["cells"] for scores in by_side.values()}) == 1
+    assert [run.parent.name for run in runs] == [f"{LATER}, once, 0", "two cameras left out, once, 0"]
+    assert sorted(root.rglob("*")) == before
+    written = [run.stat().st_mtime_ns for run in runs]
+    assert compare_real(root, SCENE, tmp_path)["scores"] == result["scores"]
+    assert [run.stat().st_mtime_ns for run in runs] == written
+    json.dumps(result)
+
+
+def test_a_camera_that_is_missing_is_named_before_any_work(root, tmp_path):
+    with pytest.raises(DataError, match="front_left_camera: expected images"):
+        compare_real(root, SCENE, tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+NAMES = {
+    "a table that knows only the occupancy state": STATE_TABLE,
+    "SegNet from simulated streets alone": "simulated only",
+    "SegNet, then real cells": "simulated, then real",
+    "SegNet, then real pixels and cells": "simulated, then real, image stage on points",
+    "SegNet, then real pixels and cells, image network frozen on cells": "simulated, then real, two stages",
+    "SegNet, then real pixels and cells, each colour varied by 15 %": (
+        "simulated, then real, image stage on points, tint"
+    ),
+    "FCN, then real cells": "simulated, then real, FCN",
+    "DeepLab, then real cells": "simulated, then real, DeepLab",
+    "SegNet, real pixels and cells alone": "real only",
+    "the same without occupancy": "real only, without occupancy",
+    "the same with one plane": "real only, one plane",
+}
+
+
+def test_the_readme_quotes_the_committed_result():
+    by_side, in_time = json.loads((CLONE / "docs/results/real_streets.json").read_text())["scores"].values()
+    section = (CLONE / "README.md").read_text(encoding="utf-8").split("### On a real street")[1].split("\n###")[0]
+    rows = [[cell.strip(" *") for cell in line.split("|")[1:-1]] for line in section.splitlines() if line[:1] == "|"][
+        2:
+    ]
+    assert [name for name, *_ in rows] == list(NAMES)
+    for name, *quoted in rows:
+        scores = [split.get(NAMES[name]) for split in (by_side, in_time)]
+        metrics = [(one, metric) for one in scores for metric in ("pixel accuracy", "class accuracy")]
+        assert quoted == [f"{100 * one[metric]['mean']:.1f}" if one else "" for one, metric in metrics]
