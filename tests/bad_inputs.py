@@ -637,6 +637,7 @@ EXPERIMENTS = (
     Row("an unknown grid, streets", "reproduce streets --grid tiny --out log.json", "grid: expected paper or compact"),
     Row("an unknown LIDAR", "reproduce truth-policies --lidar sonar --out log.json", "lidar: expected one of"),
     Row("an unknown grid", "reproduce point-labels --grid huge --out log.json", "grid: expected"),
+    Row("an unknown LIDAR of labelled returns", "reproduce point-labels --lidar sonar", "lidar: expected one of"),
     Row("no scene", "reproduce real-streets --pandaset NONE --runs RUNS --out log.json", "NONE/002"),
     Row("a scene that isn't there", "data index OUT --pandaset TINY --scene 002", "TINY/002"),
     Row(

@@ -40,7 +40,7 @@ def demo(
     scene: Annotated[str | None, typer.Option(help="Such as 002.")] = None,
     camera: Annotated[
         str | None,
-        typer.Option(help="KITTI: image_02 (left, default) or image_03. PandaSet: front_camera (default) ..."),
+        typer.Option(help="KITTI: image_02 (default) or image_03. PandaSet: front_camera (default), left_camera ..."),
     ] = None,
     weights: Annotated[Path | None, typer.Option(help="A trained network; else a shipped SegNet.")] = None,
     frames: Annotated[str | None, typer.Option(help="FIRST:LAST[:STEP], LAST excluded, such as 40:120:2.")] = None,

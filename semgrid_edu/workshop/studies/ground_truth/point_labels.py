@@ -48,8 +48,13 @@ def point_labels(seed: int = 0, drives: int = 20, grid: str = "compact", lidar: 
     dict
         What `truth_tables` reads: "sums", by name of the way the cells of `TruthCounts`, of all drives, and all that
         made them. JSON can hold it.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such grid or LIDAR, or nothing to do.
     """
-    check_request(seed, drives, 1, (grid,))
+    check_request(seed, drives, 1, (grid,), lidar)
     sums: dict[str, TruthCounts] = {}
     numbers = range(HELD_OUT + 1000 * seed, HELD_OUT + 1000 * seed + drives)
     for number in tqdm(numbers, desc="labelled returns", unit="drive"):
