@@ -13,9 +13,7 @@ from semgrid_edu.workshop.paper import reports
 reproduce = typer.Typer(no_args_is_help=True, help="Run the experiments of the lectures.")
 """What `semgrid-edu` adds to its commands."""
 
-TrainingRuns = Annotated[
-    Path, typer.Option(help="Takes one folder per training run; a run that has ended isn't repeated.")
-]
+TrainingRuns = Annotated[Path, typer.Option(help="Takes a folder per training run; an ended run isn't repeated.")]
 TwoSecondDrives = Annotated[int, typer.Option(min=1, help="Number of drives, of two seconds each.")]
 GridName = Annotated[str, typer.Option(help="compact or paper.")]
 GridOrBoth = Annotated[str | None, typer.Option(help="paper or compact; both by default.")]
