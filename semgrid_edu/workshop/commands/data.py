@@ -54,11 +54,9 @@ def index(
     folder: Annotated[Path, typer.Argument(help="The folder of the data set; the scene itself stays where it is.")],
     pandaset: Scenes,
     scene: SceneNumber = "002",
-    test: Annotated[
-        list[str] | None, typer.Option(help="A camera that is kept for testing; may be given again.")
-    ] = None,
+    test: Annotated[list[str] | None, typer.Option(help="A camera to keep for testing; again for another.")] = None,
 ) -> None:
-    """Make a data set of a labelled PandaSet scene, for `train` and `evaluate`."""
+    """Make a data set of a labelled scene of PandaSet, for `train` and `evaluate`."""
     from semgrid_edu.datasets.index import write_pandaset_index
 
     typer.echo(f"written to {write_pandaset_index(folder, pandaset, scene, test or ())}")
@@ -93,7 +91,7 @@ def real_excerpt(
     scene: SceneNumber,
     frames: Annotated[int, typer.Option(help="Number of frames, from the first one.")] = 10,
 ) -> None:
-    """Keep a few frames of a real scene, reduced, in KITTI's raw layout."""
+    """Keep a few frames of a labelled scene of PandaSet, reduced in size, in KITTI's raw layout."""
     from semgrid_edu.workshop.simulation.real_excerpt import write_real_excerpt
 
     typer.echo(f"the drive is in {write_real_excerpt(pandaset, scene, frames, folder)}")
