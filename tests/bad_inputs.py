@@ -645,6 +645,11 @@ EXPERIMENTS = (
         "train --data TINY --out OUT --from fresh.safetensors --segmenter fcn",
         "fresh.safetensors: expected a network like the one to train",
     ),
+    Row(
+        "no network to start from",
+        "train --data NONE --out OUT --from none.safetensors",
+        "none.safetensors: expected a safetensors file, found no such file",
+    ),
     Row("a tint that can't be", "train --data TINY --out OUT --tint -1", "tint: expected a share of at least 0"),
     Row("no drives", "reproduce occupancy --drives 0", "Invalid value for '--drives'"),
     Row("no draws", "reproduce crf-coupling --draws 0", "Invalid value for '--draws'"),

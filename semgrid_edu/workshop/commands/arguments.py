@@ -3,8 +3,7 @@
 import os
 import re
 from collections.abc import Iterable, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -15,10 +14,6 @@ if TYPE_CHECKING:  # a command that needs no drive starts faster without numpy
 
 LARGEST = 2**63 - 1
 """The largest whole number that a command takes: PyTorch's generators take no larger seed."""
-
-Scenes = Annotated[Path, typer.Option(help="The folder that holds PandaSet's scenes.")]
-SceneNumber = Annotated[str, typer.Option(help="Number of the scene, such as 002.")]
-"""Options of the commands that read a scene of PandaSet."""
 
 TOLD = 20
 """Most doubtful things of a kind that are shown one by one."""

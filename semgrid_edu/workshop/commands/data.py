@@ -6,7 +6,6 @@ from typing import Annotated
 import typer
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.workshop.commands.arguments import SceneNumber, Scenes
 
 data = typer.Typer(no_args_is_help=True, help="Make, fetch and check data.")
 """What `semgrid-edu` adds to its commands."""
@@ -52,8 +51,8 @@ def fetch(
 @data.command()
 def index(
     folder: Annotated[Path, typer.Argument(help="The folder of the data set; the scene itself stays where it is.")],
-    pandaset: Scenes,
-    scene: SceneNumber = "002",
+    pandaset: Annotated[Path, typer.Option(help="The folder that holds PandaSet's scenes.")],
+    scene: Annotated[str, typer.Option(help="Number of the scene, such as 002.")] = "002",
     test: Annotated[list[str] | None, typer.Option(help="A camera to keep for testing; again for another.")] = None,
 ) -> None:
     """Make a data set of a labelled scene of PandaSet, for `train` and `evaluate`."""
@@ -87,8 +86,8 @@ def excerpt(
 @data.command()
 def real_excerpt(
     folder: Annotated[Path, typer.Argument(help="A new folder, which takes the drive, its licence and provenance.")],
-    pandaset: Scenes,
-    scene: SceneNumber,
+    pandaset: Annotated[Path, typer.Option(help="The folder that holds PandaSet's scenes.")],
+    scene: Annotated[str, typer.Option(help="Number of the scene, such as 002.")],
     frames: Annotated[int, typer.Option(help="Number of frames, from the first one.")] = 10,
 ) -> None:
     """Keep a few frames of a labelled scene of PandaSet, reduced in size, in KITTI's raw layout."""

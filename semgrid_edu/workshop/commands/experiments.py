@@ -7,18 +7,11 @@ from typing import Annotated
 import typer
 
 from semgrid_edu.storage.files import table_beside
-from semgrid_edu.workshop.commands.arguments import SceneNumber, Scenes, tell
+from semgrid_edu.workshop.commands.arguments import tell
 from semgrid_edu.workshop.paper import reports
 
 reproduce = typer.Typer(no_args_is_help=True, help="Run the experiments of the lectures.")
 """What `semgrid-edu` adds to its commands."""
-
-TrainingRuns = Annotated[Path, typer.Option(help="Takes a folder per training run; an ended run isn't repeated.")]
-TwoSecondDrives = Annotated[int, typer.Option(min=1, help="Number of drives, of two seconds each.")]
-GridName = Annotated[str, typer.Option(help="compact or paper.")]
-GridOrBoth = Annotated[str | None, typer.Option(help="paper or compact; both by default.")]
-LidarName = Annotated[str, typer.Option(help="HDL-64E, or coarse, which the simulated data sets have.")]
-"""Options that several commands take."""
 
 KEPT = ("dataset.json", "provenance.json")
 """JSON files that no result may replace."""
@@ -28,7 +21,7 @@ KEPT = ("dataset.json", "provenance.json")
 def occupancy(
     seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives and the particles.")] = 0,
     drives: Annotated[int, typer.Option(min=1, help="Number of drives, of three seconds each.")] = 20,
-    grid: GridOrBoth = None,
+    grid: Annotated[str | None, typer.Option(help="paper or compact; both by default.")] = None,
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("occupancy.json"),
 ) -> None:
     """Score log-odds grid, BOF and CMCDOT on simulated drives (lecture 04)."""
@@ -41,7 +34,7 @@ def occupancy(
 def streets(
     seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives and the particles.")] = 0,
     drives: Annotated[int, typer.Option(min=1, help="Number of drives through each street.")] = 6,
-    grid: GridOrBoth = None,
+    grid: Annotated[str | None, typer.Option(help="paper or compact; both by default.")] = None,
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("streets.json"),
 ) -> None:
     """Score CMCDOT on streets with wire mesh, hedges, glass, walls that come into view, convoys (lecture 04)."""
@@ -53,7 +46,7 @@ def streets(
 @reproduce.command()
 def two_stage(
     data: Annotated[Path, typer.Option(help="A data set with train and test frames, such as data/minikitti.")],
-    runs: TrainingRuns,
+    runs: Annotated[Path, typer.Option(help="Takes one folder per training run; a run that has ended isn't repeated.")],
     seeds: Annotated[int, typer.Option(min=1, help="Number of training runs of each kind.")] = 3,
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("two_stage.json"),
 ) -> None:
@@ -107,7 +100,7 @@ def learned_crf(
     data: Annotated[Path, typer.Option(help="The data set that the network learned from, such as data/minikitti.")],
     validation: Annotated[Path, typer.Option(help="A data set with validation frames, such as data/validation.")],
     weights: Annotated[Path, typer.Option(help="A network trained on the train frames of --data.")],
-    runs: TrainingRuns,
+    runs: Annotated[Path, typer.Option(help="Takes one folder per training run; a run that has ended isn't repeated.")],
     seed: Annotated[int, typer.Option(min=0, help="Seed for the order of the frames.")] = 0,
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("learned_crf.json"),
 ) -> None:
@@ -125,9 +118,11 @@ def learned_crf(
 @reproduce.command()
 def truth_policies(
     seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives, the errors, the particles.")] = 0,
-    drives: TwoSecondDrives = 20, grid: GridName = "compact", lidar: LidarName = "coarse",
+    drives: Annotated[int, typer.Option(min=1, help="Number of drives, of two seconds each.")] = 20,
+    grid: Annotated[str, typer.Option(help="compact or paper.")] = "compact",
+    lidar: Annotated[str, typer.Option(help="coarse, which the simulated data sets have, or HDL-64E.")] = "coarse",
     out: Annotated[Path, typer.Option(help="Takes each drive; the same command goes on.")] = Path("truth.json"),
-) -> None:  # fmt: skip
+) -> None:
     """Measure how wrong each way of making ground truth from LIDAR is, by class and distance (lecture 09)."""
     from semgrid_edu.workshop.studies.ground_truth.counts import truth_tables
     from semgrid_edu.workshop.studies.ground_truth.laboratory import truth_policies
@@ -138,9 +133,11 @@ def truth_policies(
 @reproduce.command()
 def point_labels(
     seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives.")] = 0,
-    drives: TwoSecondDrives = 20, grid: GridName = "compact", lidar: LidarName = "HDL-64E",
+    drives: Annotated[int, typer.Option(min=1, help="Number of drives, of two seconds each.")] = 20,
+    grid: Annotated[str, typer.Option(help="compact or paper.")] = "compact",
+    lidar: Annotated[str, typer.Option(help="HDL-64E, or coarse, which the simulated data sets have.")] = "HDL-64E",
     out: Annotated[Path, typer.Option(help="Where to write the counts.")] = Path("point_labels.json"),
-) -> None:  # fmt: skip
+) -> None:
     """Measure how wrong the truth from labelled returns and cuboids is, such as PandaSet's (lecture 09)."""
     from semgrid_edu.workshop.studies.ground_truth.counts import truth_tables
     from semgrid_edu.workshop.studies.ground_truth.point_labels import point_labels
@@ -150,9 +147,9 @@ def point_labels(
 
 @reproduce.command()
 def real_streets(
-    pandaset: Scenes,
-    runs: TrainingRuns,
-    scene: SceneNumber = "002",
+    pandaset: Annotated[Path, typer.Option(help="The folder that holds PandaSet's scenes.")],
+    runs: Annotated[Path, typer.Option(help="Takes one folder per training run; a run that has ended isn't repeated.")],
+    scene: Annotated[str, typer.Option(help="Number of the scene, such as 002.")] = "002",
     seed: Annotated[int, typer.Option(min=0, help="Seed for the initial weights and the order of the frames.")] = 0,
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("real_streets.json"),
 ) -> None:
