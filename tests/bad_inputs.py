@@ -637,12 +637,18 @@ EXPERIMENTS = (
     Row("an unknown grid, streets", "reproduce streets --grid tiny --out log.json", "grid: expected paper or compact"),
     Row("an unknown LIDAR", "reproduce truth-policies --lidar sonar --out log.json", "lidar: expected one of"),
     Row("an unknown grid", "reproduce point-labels --grid huge --out log.json", "grid: expected"),
+    Row("an unknown LIDAR of labelled returns", "reproduce point-labels --lidar sonar", "lidar: expected one of"),
     Row("no scene", "reproduce real-streets --pandaset NONE --runs RUNS --out log.json", "NONE/002"),
     Row("a scene that isn't there", "data index OUT --pandaset TINY --scene 002", "TINY/002"),
     Row(
         "a network of another kind to start from",
         "train --data TINY --out OUT --from fresh.safetensors --segmenter fcn",
         "fresh.safetensors: expected a network like the one to train",
+    ),
+    Row(
+        "no network to start from",
+        "train --data NONE --out OUT --from none.safetensors",
+        "none.safetensors: expected a safetensors file, found no such file",
     ),
     Row("a tint that can't be", "train --data TINY --out OUT --tint -1", "tint: expected a share of at least 0"),
     Row("no drives", "reproduce occupancy --drives 0", "Invalid value for '--drives'"),

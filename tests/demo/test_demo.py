@@ -204,6 +204,14 @@ class TestWithoutTruth:
         assert "can lose the ground" in html
         assert "can lose the ground" in blank
 
+    def test_a_damaged_card_is_refused_before_the_work(self, weights, tmp_path):
+        write_tiny_drive(tmp_path, n_frames=2, labelled=())
+        shutil.copy(weights, tmp_path / "net.safetensors")
+        (tmp_path / "card.json").write_text("{")
+        with pytest.raises(DataError, match=r"card\.json"):
+            write_demo(KittiRawDrive(tmp_path, DATE, "0001"), tmp_path / "net.safetensors", tmp_path / "out")
+        assert not (tmp_path / "out").exists()
+
 
 class TestBothStreets:
     """Without a drive the demo shows the shipped ones, the real street first."""

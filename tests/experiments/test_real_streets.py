@@ -1,36 +1,88 @@
-"""Ways to train for real streets: what is kept apart, seeds that count together, and a run from end to end."""
+"""The study of real streets: what is kept apart stays apart, runs aren't mixed up, and the README quotes its result."""
 
+import json
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from tiny_pandaset import SCENE, write_tiny_pandaset
 
+import semgrid_edu
 from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame
+from semgrid_edu.datasets.readers.pandaset import CAMERAS
 from semgrid_edu.datasets.samples import samples_dir
 from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.errors import DataError
 from semgrid_edu.labels import KITTI_14
+from semgrid_edu.networks import WEIGHTS, Architecture
+from semgrid_edu.training import TrainingParams
 from semgrid_edu.workshop.studies.training import real_streets
+from semgrid_edu.workshop.studies.training.real_streets import LATER, STATE_TABLE, WayToTrain, compare_real, splits
 
-CAMERAS = ("front_camera", "left_camera")
+CLONE = Path(semgrid_edu.__file__).parents[1]
 
 
 @pytest.fixture
-def two_cameras(monkeypatch):
-    monkeypatch.setattr(real_streets, "CAMERAS", CAMERAS)
-    table = {"left_out": ["left_camera"], "later": ["both"], "learnt": 0.5, "skipped": 0.2}
-    monkeypatch.setattr(real_streets, "TABLE", table)
+def sides():
+    """Frames by camera: 20 ahead and 10 to each other side, which stand for themselves."""
+    return {camera: list(range(20 if camera == "front_camera" else 10)) for camera in CAMERAS}
 
 
-def test_what_is_tested_is_not_learnt(two_cameras):
-    views = {"front_camera": range(20), "left_camera": range(10)}
-    (others, left_out), (first, last) = real_streets.splits(views).values()
-    assert others == [(views["front_camera"], list(range(20)))]
-    assert left_out == [(views["left_camera"], list(range(10)))]
-    for (frames, learnt), (same, tested) in zip(first, last, strict=True):
-        assert frames is same
-        assert learnt == list(range(len(frames) // 2))
-        assert tested == list(range(round(0.7 * len(frames)), len(frames)))
+def test_no_network_is_tested_on_what_it_learned(sides):
+    for training, test in splits(sides).values():
+        learned, kept = ({(id(frames), k) for frames, ks in parts for k in ks} for parts in (training, test))
+        assert min(len(learned), len(kept)) > 0
+        assert not learned & kept
+
+
+def test_a_camera_is_left_out_whole_and_later_frames_come_a_second_later(sides):
+    by_side, in_time = splits(sides).values()
+    assert sum(len(ks) for _, ks in by_side[1]) == 20
+    assert sum(len(ks) for part in by_side for _, ks in part) == 70
+    for (frames, learned), (_, kept) in zip(*in_time, strict=True):
+        assert kept[-1] == frames[-1]
+        assert (kept[0] - learned[-1]) * 4 / len(frames) >= 1  # the frames of each camera span four seconds
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory):
+    return write_tiny_pandaset(tmp_path_factory.mktemp("pandaset"))
+
+
+@pytest.fixture(scope="module")
+def streets(tmp_path_factory):
+    """The first frame of the shipped simulated drive."""
+    frame = LabelledFrame(("2026_01_01", "0001"), 0)
+    cache = tmp_path_factory.mktemp("sample")
+    index = DatasetIndex(samples_dir() / "sample", "sample", KITTI_14, {"train": (frame,)}, folder=cache)
+    return TrainingSet(index, "train")
+
+
+@pytest.fixture
+def small(monkeypatch, streets):
+    """Two cameras, and two ways of which one takes two steps, the second with simulated frames."""
+    once = WayToTrain(Architecture(), params=TrainingParams(0, 2), with_simulated=True)
+    monkeypatch.setattr(real_streets, "sets_by_camera", lambda *_: [streets])
+    monkeypatch.setattr(real_streets, "CAMERAS", ("front_camera", "left_camera"))
+    monkeypatch.setattr(real_streets, "WAYS", {"as shipped": WayToTrain(Architecture(), "segnet"), "once": once})
+    chosen = {"left_out": ("left_camera",), "later": ("once",)}
+    monkeypatch.setattr(real_streets, "TABLE", real_streets.TABLE | chosen)
+
+
+def test_every_way_is_scored_and_a_run_that_has_ended_is_not_repeated(small, root, tmp_path):
+    before = sorted(root.rglob("*"))
+    result = compare_real(root, SCENE, "simulated", tmp_path)
+    (by_side, in_time), runs = result["scores"].values(), sorted((tmp_path / SCENE).glob(f"*/{WEIGHTS}"))
+    assert list(by_side) == [STATE_TABLE, "as shipped", "as shipped + CRF", "once", "once + CRF"]
+    assert list(in_time) == [STATE_TABLE, "once", "once + CRF"]
+    assert len({scores["cells"] for scores in by_side.values()}) == 1
+    assert [run.parent.name for run in runs] == [f"{LATER}, once, 0", "two cameras left out, once, 0"]
+    assert sorted(root.rglob("*")) == before
+    written = [run.stat().st_mtime_ns for run in runs]
+    assert compare_real(root, SCENE, "simulated", tmp_path)["scores"] == result["scores"]
+    assert [run.stat().st_mtime_ns for run in runs] == written
+    json.dumps(result)
 
 
 @pytest.mark.parametrize("method", ["pixel accuracy", "class accuracy"])
@@ -51,19 +103,37 @@ def test_each_seed_counts_as_much(monkeypatch, method):
     assert (scores["cells"], scores["frames"]) == (40, 2)
 
 
-def test_a_run_from_end_to_end(two_cameras, tmp_path, monkeypatch):
-    """One step on a real and one on a simulated frame; the same folder a second time gives the same numbers."""
-    both = SimpleNamespace(seeds=1, start=True, together=True, image=0, grid=2)
-    monkeypatch.setattr(real_streets, "VARIANTS", {"both": both})
-    first_frame = (LabelledFrame(("2026_01_01", "0001"), 0),)
-    index = DatasetIndex(samples_dir() / "sample", "sample", KITTI_14, {"train": first_frame}, folder=tmp_path)
-    streets = TrainingSet(index, "train")
-    monkeypatch.setattr(real_streets, "sets_by_camera", lambda *_: [streets])
-    root, runs = write_tiny_pandaset(tmp_path / "pandaset"), tmp_path / "runs"
-    first = real_streets.compare_real(root, SCENE, "simulated", runs)
-    assert set(first["scores"]) == {"two cameras left out", "later"}
-    assert set(first["scores"]["later"]) == {"occupancy state alone", "both", "both + CRF"}
-    assert first["scores"]["two cameras left out"]["both"]["frames"] == 2
-    assert real_streets.compare_real(root, SCENE, "simulated", runs)["scores"] == first["scores"]
-    assert "\n| both " in real_streets.real_streets_table(first)
+def test_a_camera_that_is_missing_is_named_before_any_work(root, tmp_path):
+    with pytest.raises(DataError, match="front_left_camera: expected images"):
+        compare_real(root, SCENE, "simulated", tmp_path)
+    assert not list(tmp_path.iterdir())
 
+
+NAMES = {
+    "a table that knows only the occupancy state": STATE_TABLE,
+    "SegNet from simulated streets alone": "simulated only",
+    "SegNet, then real cells": "simulated, then real",
+    "SegNet, then real pixels and cells": "simulated, then real, image stage on points",
+    "SegNet, then real pixels and cells, image network frozen on cells": "simulated, then real, two stages",
+    "SegNet, then real pixels and cells, each colour varied by 15 %": (
+        "simulated, then real, image stage on points, tint"
+    ),
+    "FCN, then real cells": "simulated, then real, FCN",
+    "DeepLab, then real cells": "simulated, then real, DeepLab",
+    "SegNet, real pixels and cells alone": "real only",
+    "the same without occupancy": "real only, without occupancy",
+    "the same with one plane": "real only, one plane",
+}
+
+
+def test_the_readme_quotes_the_committed_result():
+    by_side, in_time = json.loads((CLONE / "docs/results/real_streets.json").read_text())["scores"].values()
+    section = (CLONE / "README.md").read_text(encoding="utf-8").split("### On a real street")[1].split("\n###")[0]
+    rows = [[cell.strip(" *") for cell in line.split("|")[1:-1]] for line in section.splitlines() if line[:1] == "|"][
+        2:
+    ]
+    assert [name for name, *_ in rows] == list(NAMES)
+    for name, *quoted in rows:
+        scores = [split.get(NAMES[name]) for split in (by_side, in_time)]
+        metrics = [(one, metric) for one in scores for metric in ("pixel accuracy", "class accuracy")]
+        assert quoted == [f"{100 * one[metric]['mean']:.1f}" if one else "" for one, metric in metrics]

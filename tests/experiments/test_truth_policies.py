@@ -1,6 +1,7 @@
 """The policy laboratory: counts by hand, trials on the sample drive, and a run that is interrupted."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -117,6 +118,14 @@ class TestSampleDrive:
     def test_a_frame_that_has_no_labels_is_refused(self):
         with pytest.raises(ArgumentError, match="k: expected the number of a labelled frame"):
             laboratory.score_frame({}, sample_drive()[:2], 2, GridSpec.compact())
+
+
+def test_windows_of_scans_reach_as_far_as_the_simulated_drives_and_as_their_names_say():
+    for name, (policy, _) in TRIALS.items():
+        said = re.search(r"(\d+) (scans before|before and after)", name)
+        reach, after = (int(said[1]), said[2] == "before and after") if said else (0, False)
+        assert (policy.past, policy.future) == (reach, reach * after)
+        assert reach in (0, laboratory.REACH)
 
 
 def test_a_simulated_frame_is_what_a_reader_finds_on_disk(tmp_path):

@@ -1,5 +1,6 @@
 """An excerpt of a real scene reads back as the scene, and the filter doesn't notice which returns are left out."""
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -86,6 +87,15 @@ def test_the_filter_believes_the_same_without_the_other_returns():
 def test_a_scene_with_fewer_frames_and_a_folder_with_files_are_refused(root, tmp_path):
     with pytest.raises(ArgumentError, match="n_frames: expected 2 to 3 frames, found 4"):
         write_real_excerpt(root, SCENE, 4, tmp_path / "new")
+    assert not (tmp_path / "new").exists()
     (tmp_path / "mine.txt").touch()
     with pytest.raises(DataError, match="expected a new or an empty folder, found one with files"):
         write_real_excerpt(root, SCENE, 2, tmp_path)
+
+
+def test_a_scene_without_labels_is_refused_before_anything_is_written(tmp_path):
+    bare = write_tiny_pandaset(tmp_path / "bare")
+    shutil.rmtree(bare / SCENE / "annotations")
+    with pytest.raises(DataError, match="expected the classes of the returns, found no folder"):
+        write_real_excerpt(bare, SCENE, 2, tmp_path / "new")
+    assert not (tmp_path / "new").exists()

@@ -31,11 +31,11 @@ def make(
 
 @data.command()
 def fetch(
-    name: Annotated[str, typer.Argument(help="kitti: real drives. pandaset: says where its scenes are.")],
+    name: Annotated[str, typer.Argument(help="kitti; or pandaset, which only says where its scenes are.")],
     drive: Annotated[str, typer.Option(help="KITTI's date and number, such as 2011_09_26_0013.")] = "",
     folder: Annotated[Path, typer.Option(help="Where the day's folder and the archives go.")] = Path("kitti_raw"),
 ) -> None:
-    """Download a real drive and its calibration, and unpack them. The same command continues after an interruption."""
+    """Download a drive of KITTI and its calibration, and unpack them. After an interruption, run the same command."""
     from semgrid_edu.datasets.readers.fetch import KITTI_LICENCE, PANDASET_LICENCE, fetch_kitti
 
     if name == "pandaset":
@@ -51,13 +51,11 @@ def fetch(
 @data.command()
 def index(
     folder: Annotated[Path, typer.Argument(help="The folder of the data set; the scene itself stays where it is.")],
-    pandaset: Annotated[Path, typer.Option(help="The folder that holds the scenes.")],
-    scene: Annotated[str, typer.Option(help="Number of the scene.")] = "002",
-    test: Annotated[
-        list[str] | None, typer.Option(help="A camera that is kept for testing; may be given again.")
-    ] = None,
+    pandaset: Annotated[Path, typer.Option(help="The folder that holds PandaSet's scenes.")],
+    scene: Annotated[str, typer.Option(help="Number of the scene, such as 002.")] = "002",
+    test: Annotated[list[str] | None, typer.Option(help="A camera to keep for testing; again for another.")] = None,
 ) -> None:
-    """Make a data set of a labelled PandaSet scene, for `train` and `evaluate`."""
+    """Make a data set of a labelled scene of PandaSet, for `train` and `evaluate`."""
     from semgrid_edu.datasets.index import write_pandaset_index
 
     typer.echo(f"written to {write_pandaset_index(folder, pandaset, scene, test or ())}")
@@ -88,11 +86,11 @@ def excerpt(
 @data.command()
 def real_excerpt(
     folder: Annotated[Path, typer.Argument(help="A new folder, which takes the drive, its licence and provenance.")],
-    pandaset: Annotated[Path, typer.Option(help="A folder of PandaSet's scenes.")],
-    scene: Annotated[str, typer.Option(help="Such as 002.")],
+    pandaset: Annotated[Path, typer.Option(help="The folder that holds PandaSet's scenes.")],
+    scene: Annotated[str, typer.Option(help="Number of the scene, such as 002.")],
     frames: Annotated[int, typer.Option(help="Number of frames, from the first one.")] = 10,
 ) -> None:
-    """Keep a few frames of a real scene, reduced, in KITTI's raw layout."""
+    """Keep a few frames of a labelled scene of PandaSet, reduced in size, in KITTI's raw layout."""
     from semgrid_edu.workshop.simulation.real_excerpt import write_real_excerpt
 
     typer.echo(f"the drive is in {write_real_excerpt(pandaset, scene, frames, folder)}")

@@ -120,7 +120,7 @@ def truth_policies(
     seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives, the errors, the particles.")] = 0,
     drives: Annotated[int, typer.Option(min=1, help="Number of drives, of two seconds each.")] = 20,
     grid: Annotated[str, typer.Option(help="compact or paper.")] = "compact",
-    lidar: Annotated[str, typer.Option(help="coarse, that of the simulated data sets, or HDL-64E.")] = "coarse",
+    lidar: Annotated[str, typer.Option(help="coarse, which the simulated data sets have, or HDL-64E.")] = "coarse",
     out: Annotated[Path, typer.Option(help="Takes each drive; the same command goes on.")] = Path("truth.json"),
 ) -> None:
     """Measure how wrong each way of making ground truth from LIDAR is, by class and distance (lecture 09)."""
@@ -135,7 +135,7 @@ def point_labels(
     seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives.")] = 0,
     drives: Annotated[int, typer.Option(min=1, help="Number of drives, of two seconds each.")] = 20,
     grid: Annotated[str, typer.Option(help="compact or paper.")] = "compact",
-    lidar: Annotated[str, typer.Option(help="HDL-64E, or coarse, that of the simulated data sets.")] = "HDL-64E",
+    lidar: Annotated[str, typer.Option(help="HDL-64E, or coarse, which the simulated data sets have.")] = "HDL-64E",
     out: Annotated[Path, typer.Option(help="Where to write the counts.")] = Path("point_labels.json"),
 ) -> None:
     """Measure how wrong the truth from labelled returns and cuboids is, such as PandaSet's (lecture 09)."""
@@ -150,11 +150,11 @@ def real_streets(
     pandaset: Annotated[Path, typer.Option(help="The folder that holds PandaSet's scenes.")],
     simulated: Annotated[Path, typer.Option(help="A data set of simulated streets, such as data/minikitti.")],
     runs: Annotated[Path, typer.Option(help="Takes one folder per training run; a run that has ended isn't repeated.")],
-    scene: Annotated[str, typer.Option(help="Number of the scene.")] = "002",
+    scene: Annotated[str, typer.Option(help="Number of the scene, such as 002.")] = "002",
     seed: Annotated[int, typer.Option(min=0, help="First seed for initial weights and the order of frames.")] = 0,
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("real_streets.json"),
 ) -> None:
-    """Train for real streets in several ways, on labelled returns, and score views and times kept apart."""
+    """Train for a real street in several ways, and score the networks on cameras and times that were kept apart."""
     from semgrid_edu.workshop.studies.training.real_streets import compare_real, real_streets_table
 
     keep_result(out, lambda: compare_real(pandaset, scene, simulated, runs, seed), real_streets_table)

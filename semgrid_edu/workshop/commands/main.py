@@ -40,7 +40,7 @@ def demo(
     scene: Annotated[str | None, typer.Option(help="Such as 002.")] = None,
     camera: Annotated[
         str | None,
-        typer.Option(help="KITTI: image_02 (left, default) or image_03. PandaSet: front_camera (default) ..."),
+        typer.Option(help="KITTI: image_02 (default) or image_03. PandaSet: front_camera (default), left_camera ..."),
     ] = None,
     weights: Annotated[Path | None, typer.Option(help="A trained network; else a shipped SegNet.")] = None,
     frames: Annotated[str | None, typer.Option(help="FIRST:LAST[:STEP], LAST excluded, such as 40:120:2.")] = None,
@@ -100,8 +100,11 @@ def train(
     LIDAR, with the errors of real data; other ways of making them, such as no-cleanup, have names of their own.
     """
     from semgrid_edu.datasets.index import dataset_doubts
+    from semgrid_edu.storage.tensors import read_tensors
     from semgrid_edu.training.run import chosen_truth, how_to_go_on, train_network, training_params
 
+    if start:
+        read_tensors(start)  # to refuse a missing or damaged file before the data are prepared, which takes minutes
     params = training_params(preset, iterations, not two_stage, from_imagenet=imagenet is not None, tint=tint)
     tell([line for folder in data for line in dataset_doubts(folder, "train")])
     choices = {"preset": preset, "imagenet": imagenet, "device": device, "truth": chosen_truth(truth), "start": start}

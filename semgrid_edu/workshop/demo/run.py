@@ -93,14 +93,14 @@ class ChosenFrames(NamedTuple):
 
 
 CARD = "card.json"
-"""A model card beside weights; its "other_streets" says how well the network does on real streets."""
+"""A model card beside weights; its "other_streets" says what is known of the network on other real streets."""
 
 POOR = (
-    "Expect poor semantics here. The truth is not known for this drive, and the network has learned from simulated "
-    "streets alone. Real images look different, so expect many wrong classes in the image scores, the semantic grid "
-    "and the refined grid."
+    "Expect poor semantics here. The truth is not known for this drive, and no card beside the weights says how well "
+    "the network does on real streets. A network that has learned from simulated streets alone takes many things in "
+    "real images for something else, and then the image scores, the semantic grid and the refined grid are wrong there."
 )
-"""What to expect of a drive without labels, of weights without a card."""
+"""What to expect on a drive without labels, with weights that have no card."""
 
 STORIES = 200_000
 """Most cells that have a story, in all frames together: one takes some 55 bytes of the page."""
@@ -130,7 +130,7 @@ def write_demo(
     frames : str, optional
         Which frames to run over and to show, such as "40:120:2", see `ChosenFrames.of`.
     switch : str
-        What leads from the page to another one, as HTML.
+        The link from the page to another one, as HTML.
 
     Returns
     -------
@@ -142,12 +142,12 @@ def write_demo(
     ArgumentError
         When the drive has no images, or not the frames that are asked for.
     DataError
-        When a file of the drive, the weights or the stages can't be read. If it is a file of a later frame, the page
-        of the frames before it is written first.
+        When a file of the drive, the weights, their card or the stages can't be read. If it is a file of a later frame,
+        the page of the frames before it is written first.
     StageError
         When a stage of the file raises an error, or returns what the next one can't use.
     """
-    chosen, net = ChosenFrames.of(len(drive), frames), load_net(weights, drive.camera)
+    chosen, net, known = ChosenFrames.of(len(drive), frames), load_net(weights, drive.camera), _said_by_card(weights)
     own, yours, comparison = Stages.of(net, keep_steps=True), (), None
     if stages is not None:
         mine = load_stages(stages)
@@ -158,7 +158,7 @@ def write_demo(
     record = Record(net.architecture.grid, label_set, chosen.shown, comparison, net, stories)
     results = run_side_by_side((drive[k] for k in chosen.run), own, *yours)
     broken = _record_all(tqdm(results, total=len(chosen.run), desc=drive.folder.name, unit="frame"), record)
-    words = {"expected": _expected(weights, record), "credit": drive.credit}
+    words = {"expected": known or ("" if record.labelled else POOR), "credit": drive.credit}
     save_overview(record, Path(out) / "overview.png", " ".join(filter(None, words.values())))
     page = Path(out) / "index.html"
     story = story_data(net, drive.camera, record.layout)
@@ -174,7 +174,9 @@ REAL = "<b>A real street</b> · <a href='simulated/index.html'>a simulated stree
 SIMULATED = "<a href='../index.html'>A real street</a> · <b>a simulated street</b>"
 
 
-def write_both_streets(out: str | Path, weights: str | Path | None = None, *options: str | Path | None) -> Path:
+def write_both_streets(
+    out: str | Path, weights: str | Path | None = None, stages: str | Path | None = None, frames: str | None = None
+) -> Path:
     """Write the pages of the two shipped drives, the real street and in `simulated/` the simulated one.
 
     Parameters
@@ -183,25 +185,23 @@ def write_both_streets(out: str | Path, weights: str | Path | None = None, *opti
         The folder to write to; made when missing.
     weights : path-like, optional
         The network for both; when left out, each street has one that has learned from such streets.
-    *options
-        `stages` and `frames` of `write_demo`.
+    stages, frames
+        Those of `write_demo`.
 
     Returns
     -------
     Path
         The page of the real street, which leads to the other one.
     """
-    page = write_demo(real_drive(), weights or real_weights(), out, *options, switch=REAL)
-    write_demo(sample_drive(), weights or sample_weights(), Path(out) / "simulated", *options, switch=SIMULATED)
+    page = write_demo(real_drive(), weights or real_weights(), out, stages, frames, REAL)
+    write_demo(sample_drive(), weights or sample_weights(), Path(out) / "simulated", stages, frames, SIMULATED)
     return page
 
 
-def _expected(weights: str | Path, record: Record) -> str:
-    """Say what to expect of the classes: by the card beside the weights, or that they are poor where none are known."""
+def _said_by_card(weights: str | Path) -> str:
+    """Return what the card beside the weights says of other streets; nothing without a card."""
     card = Path(weights).with_name(CARD)
-    if card.is_file():
-        return str(read_json(card).get("other_streets", ""))
-    return "" if record.labelled else POOR
+    return str(read_json(card).get("other_streets", "")) if card.is_file() else ""
 
 
 def _record_all(results: Iterable[tuple[FrameResult, ...]], record: Record) -> DataError | None:

@@ -83,7 +83,7 @@ def read_recipes(name: str) -> dict[str, DatasetRecipe]:
     Parameters
     ----------
     name : str
-        The table's file, without its suffix, such as "recipes". Its routes follow their wishes in turn.
+        The table's file, without its suffix, such as "recipes".
     """
     recipes = {}
     for data, row in table_beside(__file__, name).items():

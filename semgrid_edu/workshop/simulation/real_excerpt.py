@@ -31,21 +31,21 @@ IMAGE_SIZE = (145, 480)
 """Height and width of the images, pixels: a quarter of the original. At a third, a number plate could be read."""
 
 AROUND, BEHIND = 4.0, 8.0
-"""Metres around the grid in which all returns are kept, as the filter's map is larger than the grid; and metres behind
-the vehicle up to which the ground's course is."""
+"""Metres around the grid in which all returns are kept, because the filter's map is larger than the grid; and metres
+behind the vehicle as far as which the returns that show the course of the ground are kept."""
 
 SCANS = 9
 """Scans before and after a frame whose returns label its cells."""
 
 NOWHERE = Geodesy(latitude=0.0, longitude=0.0, altitude=0.0, heading=0.0)
-"""Where the packets of GPS and IMU begin: the true place isn't told."""
+"""Where the packets of GPS and IMU begin, so that they don't tell the true place."""
 
 
 class _FixedRig(PandasetScene):
     """A scene as KITTI's car would have seen it: one calibration for all frames, and the LIDAR frame 1.73 m high.
 
-    The original scene has a level LIDAR frame, below which the camera sways. Here the LIDAR frame sways with the
-    camera, so that the sway is in the poses and in the returns.
+    In the scene the LIDAR frame is level, and the camera sways in it. Here the LIDAR frame sways with the camera, so
+    the calibration is the same in all frames, and the sway is in the poses and in the returns.
     """
 
     def __init__(self, root: Path, scene: str) -> None:
@@ -82,7 +82,7 @@ class _FixedRig(PandasetScene):
 
 
 def needed_returns(points: NDArray) -> NDArray[np.bool_]:
-    """Choose the returns without which the filter would believe something else of the cells of `LABEL_GRID`.
+    """Choose the returns that the filter needs to believe the same of the cells of `LABEL_GRID` as with all of them.
 
     All returns on the grid and closely around it are kept. Of the others the filter only has to know how far each beam
     sees, and how the ground goes on: the nearest obstacle and the farthest ground of each beam, and ahead the lowest
@@ -96,6 +96,7 @@ def needed_returns(points: NDArray) -> NDArray[np.bool_]:
     Returns
     -------
     (N,) bool
+        True for the returns to keep.
     """
     sensor, (x, y, z) = SensorModel(), points[:, :3].T.astype(np.float64)
     far, height = np.hypot(x, y), height_above_ground(points, sensor.ground)
@@ -104,7 +105,8 @@ def needed_returns(points: NDArray) -> NDArray[np.bool_]:
     ahead = ~kept & (x > -BEHIND)
     bins = np.minimum(far / sensor.ground.bin, sensor.ground.bins - 1).astype(np.int64)
     bins += beams_of(x, y, sensor.ground.sectors).astype(np.int64) * sensor.ground.bins
-    beam = beams_of(points[:, 0], points[:, 1], sensor.beams)  # in the filter's precision: columns lie on borders
+    # In the filter's own precision, float32, because many returns lie on the border between two beams.
+    beam = beams_of(points[:, 0], points[:, 1], sensor.beams)
     obstacle = (height >= sensor.obstacle_min) & (height <= sensor.obstacle_max)
     for place, value, among in (
         (bins, z, ahead),
@@ -142,11 +144,12 @@ def write_real_excerpt(pandaset: str | Path, scene: str, n_frames: int, folder: 
     ArgumentError
         When the scene has fewer frames.
     DataError
-        When the folder holds something, or a file of the scene is missing or damaged.
+        When the folder holds something, the scene has no labels, or a file of it is missing or damaged.
     """
     excerpt, folder = _FixedRig(Path(pandaset), scene), Path(folder)
     if not 2 <= n_frames <= len(excerpt):
         raise ArgumentError("n_frames", f"2 to {len(excerpt)} frames", n_frames)
+    excerpt.visible(0, LABEL_GRID, 0, 0)  # refuses a scene without labels before anything is written
     with sole_writer(folder):
         if {path.name for path in folder.iterdir()} - {LOCK}:
             raise DataError(folder, "a new or an empty folder", "one with files")

@@ -49,11 +49,10 @@ def _networks(scale: Scale) -> list[str]:
         return []
     usual, paper = architecture("segnet", scale.preset), architecture("segnet", "paper")
     ours, theirs = (" x ".join(map(str, size)) for size in (usual.image_size, PAPER_IMAGE))
-    text = _TEXTS["compact"]["networks"]
-    return [text.format(ours=ours, theirs=theirs, cell=usual.grid.cell, papers_cell=paper.grid.cell)]
+    cells = {"our_cell": usual.grid.cell, "their_cell": paper.grid.cell}
+    return [_TEXTS["networks"]["compact"].format(our_size=ours, their_size=theirs, **cells)]
 
 
 def _training(scale: Scale) -> str:
-    then = _TEXTS["compact"]["training"].format(steps=scale.grid_iterations) if scale.preset == "compact" else ""
-    steps = scale.image_iterations
-    return f"No ImageNet weights: the image network first learns from image labels, {steps} steps{then}."
+    text = _TEXTS["training"][scale.preset]
+    return text.format(image_steps=scale.image_iterations, grid_steps=scale.grid_iterations)

@@ -31,7 +31,7 @@ CONFUSIONS, RELIABILITY = "confusions.npz", "reliability.npz"
 WITH_CRF, WITH_SEARCHED = f"{NETWORK} + CRF", f"{NETWORK} + searched CRF"
 """The network's grid, refined with the CRF's default parameters, and with those that were searched."""
 
-SEARCHED = {name: (heat, CrfParams(*params)) for name, (heat, *params) in table_beside(__file__).items()}
+SEARCHED = {name: (row["temperature"], CrfParams(**row["crf"])) for name, row in table_beside(__file__).items()}
 """For each image network the temperature and the CRF's parameters that `semgrid-edu search-crf` chose for pixel
 accuracy on validation drives, with the shipped network of that kind (docs/results/crf_search*.json). A network for
 which nothing was searched is scored without them."""

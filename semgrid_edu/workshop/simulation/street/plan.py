@@ -104,17 +104,17 @@ class Plan:
         return self.borders[0 if sign > 0 else 1]
 
 
-_SIDES = table_beside(__file__)["sides"]  # how it may look beside the road in each style
+_SIDES = table_beside(__file__)  # how it may look beside the road in each style
 
 
 def _side(style: str, lanes: int, lane: float, parking: bool, rng: np.random.Generator) -> Side:
     """Draw one side of the road."""
-    edge, (often, widths, rises) = lanes * lane + (2.2 if parking else 0.35), _SIDES[style]
-    strip = rng.uniform(1.4, 2.6) if rng.random() < often else 0.0
-    walk = rng.uniform(*widths)
+    edge, looks = lanes * lane + (2.2 if parking else 0.35), _SIDES[style]
+    strip = rng.uniform(1.4, 2.6) if rng.random() < looks["grass"] else 0.0
+    walk = rng.uniform(*looks["sidewalk"])
     if style == "park" and rng.random() < 0.4:
         strip, walk = 0.0, 0.0
-    rise = rng.uniform(*rises) if rises else 0.0
+    rise = rng.uniform(*looks["bank"]) if "bank" in looks else 0.0
     return Side(edge, strip, walk, rise, rng.uniform(2.5, 6.0))
 
 

@@ -24,7 +24,7 @@ HELD_OUT = 100
 METHODS = ("log-odds", "BOF", "CMCDOT")
 
 
-def check_request(seed: int, drives: int, frames: int, grids: tuple[str, ...]) -> None:
+def check_request(seed: int, drives: int, frames: int, grids: tuple[str, ...], lidar: str | None = None) -> None:
     """Refuse what can't be run, before the work starts.
 
     Parameters
@@ -35,14 +35,18 @@ def check_request(seed: int, drives: int, frames: int, grids: tuple[str, ...]) -
         Number of drives, and number of frames of each.
     grids : tuple of str
         Keys of `GRIDS`.
+    lidar : str, optional
+        A key of `LIDARS`, where there is a choice.
 
     Raises
     ------
     ArgumentError
-        When there is no such grid, the seed is negative, or there is nothing to do.
+        When there is no such grid or LIDAR, the seed is negative, or there is nothing to do.
     """
     if not grids or not set(grids) <= set(GRIDS):
         raise ArgumentError("grid", " or ".join(GRIDS), ", ".join(grids) or "none")
+    if lidar not in (None, *LIDARS):
+        raise ArgumentError("lidar", f"one of {', '.join(LIDARS)}", repr(lidar))
     check_whole(seed=seed)
     check_whole(1, drives=drives, frames=frames)
 

@@ -92,9 +92,7 @@ def truth_policies(log: Path, seed: int = 0, drives: int = 20, grid: str = "comp
     DataError
         When the log is something else, or was begun with other choices.
     """
-    check_request(seed, drives, 1, (grid,))
-    if lidar not in LIDARS:
-        raise ArgumentError("lidar", f"one of {', '.join(LIDARS)}", repr(lidar))
+    check_request(seed, drives, 1, (grid,), lidar)
     began, digest = perf_counter(), hashlib.sha256(repr(TRIALS).encode()).hexdigest()[:16]
     identity = {"seed": seed, "grid": grid, "lidar": lidar, "trials": digest}
     kinds = {"drives": dict, "sums": list, "minutes": float}

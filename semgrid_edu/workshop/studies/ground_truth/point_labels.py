@@ -1,12 +1,13 @@
-"""How wrong the truth from labelled returns is: `PandasetScene.truth`'s way, on simulated drives whose truth is known.
+"""How wrong the truth from labelled returns is, made as by `PandasetScene.truth`, on drives whose truth is known.
 
-Every return of a simulated scan gets its class, and every road user its cuboid, both without error. So what is counted
-is what the way itself gets wrong: gaps, edges of cells, what hangs over, what moves.
+Every return of a simulated scan gets its class, and every road user its cuboid, both without error. So the errors that
+are counted are those of the method alone: gaps, edges of cells, things that hang over the ground, things that move.
 """
 
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from tqdm.auto import tqdm
 
@@ -17,7 +18,7 @@ from semgrid_edu.datasets.readers.frames import visible_labels
 from semgrid_edu.datasets.readers.project_lidar import unhidden
 from semgrid_edu.frame import FrameLabels
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import IGNORE, KITTI_14
+from semgrid_edu.labels import IGNORE, KITTI_14, LabelSet
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
@@ -27,6 +28,7 @@ from semgrid_edu.workshop.studies.ground_truth.counts import BAND_EDGES, COUNTED
 from semgrid_edu.workshop.studies.ground_truth.laboratory import HELD_OUT, REACH
 
 MOVABLE = (Kind.CAR, Kind.PEDESTRIAN, Kind.BICYCLE)
+FLAT = [KITTI_14.index(name) for name in ("road", "sidewalk")]
 
 
 def point_labels(seed: int = 0, drives: int = 20, grid: str = "compact", lidar: str = "HDL-64E") -> dict:
@@ -48,8 +50,13 @@ def point_labels(seed: int = 0, drives: int = 20, grid: str = "compact", lidar: 
     dict
         What `truth_tables` reads: "sums", by name of the way the cells of `TruthCounts`, of all drives, and all that
         made them. JSON can hold it.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such grid or LIDAR, or nothing to do.
     """
-    check_request(seed, drives, 1, (grid,))
+    check_request(seed, drives, 1, (grid,), lidar)
     sums: dict[str, TruthCounts] = {}
     numbers = range(HELD_OUT + 1000 * seed, HELD_OUT + 1000 * seed + drives)
     for number in tqdm(numbers, desc="labelled returns", unit="drive"):
@@ -79,31 +86,32 @@ def score_drive(spec: GridSpec, number: int, lidar: str) -> dict[str, TruthCount
         A key of `LIDARS`.
     """
     drive = SimulatedDrive(number, 2 * REACH + 1, rig=Rig(lidar=LIDARS[lidar]))
-    scans = [_labelled_scan(drive, k) for k in range(drive.n_frames)]
-    now, others = scans[REACH], [*scans[:REACH], *scans[REACH + 1 :]]
-    raw = np.concatenate([scan.points for scan in scans]), np.concatenate([scan.classes for scan in scans])
-    majority = replace(KITTI_14, flat=())
-    around = f"{REACH} before and after"
-    clouds = {
-        around: (put_together(now, others), KITTI_14),
-        "one scan": (put_together(now, []), KITTI_14),
-        f"{around}, movers smeared": (raw, KITTI_14),
-        f"{around}, majority of returns": (put_together(now, others), majority),
-    }
-    camera, T = drive.rig.camera, invert_rigid(drive.pose(REACH * PERIOD))
-    found, flat = {}, [KITTI_14.index(name) for name in ("road", "sidewalk")]
-    for name, ((points, classes), voters) in clouds.items():
+    T, found = invert_rigid(drive.pose(REACH * PERIOD)), {}
+    for name, ((points, classes), label_set) in _clouds(drive).items():
         points = transform_points(T, points)
         in_grid = transform_points(drive.rig.T_grid_from_lidar, points)
-        found[name] = birdseye_votes(in_grid, classes, spec, voters)
-        seen = unhidden(points, ~np.isin(classes, flat), camera)
-        rows, cols, inside = spec.cells(in_grid[seen])
+        found[name] = birdseye_votes(in_grid, classes, spec, label_set)
+        rows, cols, inside = spec.cells(in_grid[unhidden(points, ~np.isin(classes, FLAT), drive.rig.camera)])
         visible = np.zeros(spec.shape, bool)
         visible[rows[inside], cols[inside]] = True
         found[f"{name}, seen by the camera"] = np.where(visible, found[name], np.uint8(IGNORE))
     labels = _true_labels(drive)
     truth, standing = visible_labels(labels, spec), labels.birdseye_on(spec)
     return {name: TruthCounts.of_frame(one, truth, standing, spec, KITTI_14) for name, one in found.items()}
+
+
+def _clouds(drive: SimulatedDrive) -> dict[str, tuple[tuple[NDArray, NDArray], LabelSet]]:
+    """Return, by name of the way, returns and classes in the world, and the label set that says what outvotes what."""
+    scans = [_labelled_scan(drive, k) for k in range(drive.n_frames)]
+    now, others = scans[REACH], [*scans[:REACH], *scans[REACH + 1 :]]
+    raw = np.concatenate([scan.points for scan in scans]), np.concatenate([scan.classes for scan in scans])
+    around = f"{REACH} before and after"
+    return {
+        around: (put_together(now, others), KITTI_14),
+        "one scan": (put_together(now, []), KITTI_14),
+        f"{around}, movers smeared": (raw, KITTI_14),
+        f"{around}, majority of returns": (put_together(now, others), replace(KITTI_14, flat=())),
+    }
 
 
 def _labelled_scan(drive: SimulatedDrive, k: int) -> LabelledScan:

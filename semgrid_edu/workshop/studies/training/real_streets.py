@@ -1,12 +1,12 @@
 """Ways to train for real streets, scored on labelled returns of a PandaSet scene that were kept apart (section 4).
 
-One scene is one corner of one city for eight seconds. A camera that is left out sees another side of it; a later time
-sees the same side again. Neither stands for other streets.
+A scene shows a few seconds of one street corner. A camera that is left out of training sees another side of it; a later
+time shows the same side again. Neither says how a network does in other streets.
 """
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,18 +17,18 @@ from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame
 from semgrid_edu.datasets.readers.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import sample_weights
 from semgrid_edu.datasets.training_set import Mixture, TrainingSet, sets_by_camera
+from semgrid_edu.errors import check_whole
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS
-from semgrid_edu.networks import WEIGHTS, Architecture, SemanticGridNet, build_net, load_net
-from semgrid_edu.networks.build import plane_sampler
+from semgrid_edu.networks import WEIGHTS, Architecture, build_net, load_net
 from semgrid_edu.occupancy import State
 from semgrid_edu.pipeline import Stages
-from semgrid_edu.storage.files import named_rows, sha256, table_beside
+from semgrid_edu.storage.files import check_writable, sha256, table_beside
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training import CHECKPOINT, TrainingParams, train
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions
 from semgrid_edu.workshop.scoring.counting import GridCounts, count_grids
-from semgrid_edu.workshop.scoring.grids import network_grids
+from semgrid_edu.workshop.scoring.grids import NETWORK, network_grids
 from semgrid_edu.workshop.scoring.score_with_interval import (
     markdown_table,
     on_cells,
@@ -37,9 +37,40 @@ from semgrid_edu.workshop.scoring.score_with_interval import (
     shown,
 )
 
+
+class WayToTrain(NamedTuple):
+    """One way to train for real streets.
+
+    Parameters
+    ----------
+    architecture : Architecture
+        The network that starts from fresh weights, where it doesn't start from a shipped one.
+    start : str, optional
+        The image network of the shipped compact network to start from.
+    params : TrainingParams, optional
+        How it learns; left out, it is scored as it starts.
+    seeds : int
+        How many networks learn in this way from the first split; one does from the split in time.
+    with_simulated : bool
+        Whether every other step takes frames of simulated streets.
+    """
+
+    architecture: Architecture
+    start: str | None = None
+    params: TrainingParams | None = None
+    seeds: int = 1
+    with_simulated: bool = False
+
+
+def _way(architecture: dict | None = None, training: dict | None = None, **fields) -> WayToTrain:
+    """Return the way that a row of `real_streets.toml` describes."""
+    params = None if training is None else TrainingParams(**training)
+    return WayToTrain(Architecture(**(architecture or {})), params=params, **fields)
+
+
 TABLE = table_beside(__file__)
-VARIANTS = named_rows(TABLE["variants"])
-"""The ways to train, by name."""
+WAYS = {name: _way(**row) for name, row in TABLE["ways"].items()}
+"""The ways to train, by name, from `real_streets.toml`."""
 
 LATER = "later"
 """The split in time."""
@@ -51,19 +82,19 @@ BLOCK = 2.0
 """Seconds of one camera that count as one drive in an interval: neighbouring frames look alike."""
 
 Part = tuple[TrainingSet, list[int]]
-"""The frames of a camera, and the numbers of some of them."""
+"""The frames of one camera, and the numbers of those that are meant."""
 
 Counted = dict[str, list[tuple[str, GridCounts]]]
-"""For each method what it is called in the counts of each part, and these counts."""
+"""For each method and camera, what the method is called in the counts, and the counts."""
 
 
 def compare_real(
     root: str | Path, scene: str, simulated: str | Path, runs: str | Path, seed: int = 0
 ) -> dict[str, object]:
-    """Train networks in each of `VARIANTS` for each of two splits of a scene, and score what was kept apart.
+    """Train networks on one part of a scene in each of `WAYS`, and score them on the other part, for two splits.
 
-    A cell counts when a labelled return of its own scan lies in it and the camera may see it. Networks learn from the
-    returns of the neighbouring scans too.
+    A cell counts when it lies in view of the camera and a labelled return of the frame's own scan lies in it. Networks
+    learn from the returns of the neighbouring scans too.
 
     Parameters
     ----------
@@ -72,42 +103,55 @@ def compare_real(
     simulated : path-like
         The data set of simulated streets that some ways learn from as well, such as data/minikitti.
     runs : path-like
-        Takes one folder per training run. A run that has ended isn't repeated, and one that was interrupted is resumed.
+        Takes a folder per scene, which holds one folder per training run, and the arrays that are made of the frames. A
+        run that has ended isn't repeated, and one that was interrupted is resumed.
     seed : int
-        First seed for initial weights and for the order of the frames; a row of `VARIANTS` says how many are used.
+        First seed for initial weights and for the order of the frames.
 
     Returns
     -------
     dict
         "scores": by split and method "pixel accuracy" and "class accuracy" with intervals over blocks of two seconds,
         the recall of each class, and the "ECE"; and all that made them. JSON can hold it.
+
+    Raises
+    ------
+    ArgumentError
+        When the seed is negative.
+    DataError
+        When there is no such scene, it lacks a camera or labels, or a file is damaged.
     """
-    views = {camera: _frames(Path(root), scene, camera) for camera in CAMERAS}
+    check_whole(seed=seed)
+    drives = {camera: PandasetScene(root, scene, camera) for camera in CAMERAS}  # before any is read: all are needed
+    runs = Path(runs) / scene
+    check_writable(runs / "run")
     streets = sets_by_camera(simulated, "train")
+    views = {camera: _frames(drive, runs) for camera, drive in drives.items()}
     found, weights = {}, {}
     for split, (training, test) in splits(views).items():
         found[split] = _scores_by_method([_count_states(training, test)])
-        for name, variant in VARIANTS.items():
-            if split == LATER and name not in TABLE["later"]:
-                continue
-            counted = []
-            for k in range(seed, seed + (variant.seeds if split != LATER else 1)):
-                folder = Path(runs) / f"{split}, {name}, {k}"
-                net = _trained(variant, training, streets, folder, k)
-                weights[folder.name] = sha256(folder / WEIGHTS) if variant.grid else sha256(_start(variant))
-                counted.append(_count(name, net, test))
-            found[split] |= _scores_by_method(counted)
+        for name in TABLE["later"] if split == LATER else WAYS:
+            seeds = range(seed, seed + (1 if split == LATER else WAYS[name].seeds))
+            folders = {k: runs / f"{split}, {name}, {k}" for k in seeds}
+            files = {k: _trained(WAYS[name], training, streets, folders[k], k) for k in seeds}
+            weights |= {folders[k].name: sha256(files[k]) for k in seeds}
+            found[split] |= _scores_by_method([_count(name, file, test) for file in files.values()])
     command = f"semgrid-edu reproduce real-streets --scene {scene} --seed {seed}"
     return {"scores": found, "weights": weights, "seed": seed, **made_by(command, "numpy", "torch", "numba")}
 
 
 def splits(views: dict[str, TrainingSet]) -> dict[str, tuple[list[Part], list[Part]]]:
-    """Return what is learnt from and what is kept apart, by the name of the split.
+    """Return the frames to learn from and those to score on, by the name of the split.
 
     Parameters
     ----------
     views : dict of str to TrainingSet
         The frames of each camera.
+
+    Returns
+    -------
+    dict of str to (list of Part, list of Part)
+        Training and test frames, camera by camera.
     """
     whole = {camera: (frames, list(range(len(frames)))) for camera, frames in views.items()}
     first = [(frames, ks[: round(TABLE["learnt"] * len(ks))]) for frames, ks in whole.values()]
@@ -117,11 +161,12 @@ def splits(views: dict[str, TrainingSet]) -> dict[str, tuple[list[Part], list[Pa
     return {"two cameras left out": (others, left_out), LATER: (first, last)}
 
 
-def _frames(root: Path, scene: str, camera: str) -> TrainingSet:
+def _frames(drive: PandasetScene, folder: Path) -> TrainingSet:
     """Open all frames of a camera; "true" is what the returns of each scan alone say of the cells in view."""
-    drive = PandasetScene(root, scene, camera)
+    root, scene, camera = drive.folder.parent, drive.folder.name, drive.view.name
     listed = tuple(LabelledFrame((scene, camera), k) for k in range(len(drive)))
-    frames = TrainingSet(DatasetIndex(root, f"pandaset-{scene}", KITTI_14, {camera: listed}, PandasetScene), camera)
+    index = DatasetIndex(root, f"pandaset-{scene}", KITTI_14, {camera: listed}, PandasetScene, folder)
+    frames = TrainingSet(index, camera)
     spec, ignored = frames.spec, np.uint8(IGNORE)
     own = [np.where(drive.undecided(k, spec), drive.truth(k, spec, 0, 0), ignored) for k in range(len(drive))]
     frames.arrays["true"] = np.stack(own)
@@ -129,8 +174,8 @@ def _frames(root: Path, scene: str, camera: str) -> TrainingSet:
     return frames
 
 
-class _Some(TrainingSet):
-    """Some frames of a training set."""
+class _Subset(TrainingSet):
+    """Some frames of a training set, by number."""
 
     def __init__(self, frames: TrainingSet, numbers: list[int]) -> None:
         self.__dict__ |= frames.__dict__
@@ -138,72 +183,51 @@ class _Some(TrainingSet):
         self.arrays = {name: frames.arrays[name][numbers] for name in ("image", "labels", "occupancy", "truth", "true")}
 
 
-def _start(variant: SimpleNamespace) -> Path:
-    """Return the shipped network that a variant starts from."""
-    return sample_weights(getattr(variant, "segmenter", "segnet"))
-
-
-def _trained(
-    variant: SimpleNamespace, training: list[Part], streets: list[TrainingSet], folder: Path, seed: int
-) -> SemanticGridNet:
-    """Train a network, unless that was done before."""
-    real = [_Some(*part) for part in training]
-    mixture = Mixture([real, streets] if getattr(variant, "together", False) else [real])
-    net = _initial(variant, mixture, seed)
-    if not variant.grid:
-        return net
-    if not (folder / WEIGHTS).exists():
-        chosen = {name: getattr(variant, name) for name in ("end_to_end", "tint") if hasattr(variant, name)}
-        params = TrainingParams(variant.image, variant.grid, min(6, *map(len, mixture.parts)), **chosen)
+def _trained(way: WayToTrain, training: list[Part], streets: list[TrainingSet], folder: Path, seed: int) -> Path:
+    """Return the file of a network's weights: the shipped one if it doesn't learn, else that of its training run."""
+    start, file = sample_weights(way.start) if way.start else None, folder / WEIGHTS
+    if start and not way.params:
+        return start
+    if not file.exists():
+        mixture = Mixture([[_Subset(*part) for part in training], *([streets] if way.with_simulated else [])])
+        net = load_net(start, mixture.camera) if start else build_net(way.architecture, mixture.camera, seed)
+        params = replace(way.params, batch_size=min(way.params.batch_size, *map(len, mixture.parts)))
         train(net, mixture, folder, params, seed, (folder / CHECKPOINT).exists())
-    return load_net(folder / WEIGHTS, mixture.camera)
+    return file
 
 
-def _initial(variant: SimpleNamespace, mixture: Mixture, seed: int) -> SemanticGridNet:
-    """Return the network with which training begins."""
-    if getattr(variant, "start", False):
-        return load_net(_start(variant), mixture.camera)
-    named = {
-        name: getattr(variant, name) for name in ("segmenter", "uses_occupancy", "heights") if hasattr(variant, name)
-    }
-    return build_net(replace(Architecture(), **named), mixture.camera, seed)
-
-
-def _count(name: str, net: SemanticGridNet, test: list[Part]) -> Counted:
-    """Count the errors of a network, and of its refined grids, in all parts."""
-    counted: Counted = {}
-    for part in test:
-        frames = _Some(*part)
-        net.sampler = plane_sampler(net.need_architecture(), frames.camera)
+def _count(name: str, weights: Path, test: list[Part]) -> Counted:
+    """Count the errors of a network and of its refined grids on all parts."""
+    counts: Counted = {}
+    for frames in (_Subset(*part) for part in test):
+        net = load_net(weights, frames.camera)
         found = count_grids(network_grids(net, frames, {"CRF": Stages.of(net).refine}), frames)
         for method in found.methods:
-            counted.setdefault(method.replace("network", name), []).append((method, found))
-    return counted
+            counts.setdefault(method.replace(NETWORK, name), []).append((method, found))
+    return counts
 
 
 def _count_states(training: list[Part], test: list[Part]) -> Counted:
     """Count the errors of the most frequent class of each occupancy state."""
     counts = np.zeros((len(State), KITTI_14.n_semantic), np.int64)
-    for frames in (_Some(*part) for part in training):
+    for frames in (_Subset(*part) for part in training):
         states, truth = frames.arrays["occupancy"].argmax(axis=1), frames.arrays["true"]
         np.add.at(counts, (states[truth != IGNORE], truth[truth != IGNORE]), 1)
     best = counts.argmax(axis=1)
     found = []
-    for frames in (_Some(*part) for part in test):
-        occupancy = frames.arrays["occupancy"]
-        found.append(
-            (STATE_TABLE, count_grids(lambda k, o=occupancy: {STATE_TABLE: best[o[k].argmax(axis=0)]}, frames))
-        )
+    for frames in (_Subset(*part) for part in test):
+        called = best[frames.arrays["occupancy"].argmax(axis=1)]
+        found.append((STATE_TABLE, count_grids(lambda k, called=called: {STATE_TABLE: called[k]}, frames)))
     return {STATE_TABLE: found}
 
 
 def _scores_by_method(seeds: list[Counted]) -> dict[str, dict]:
-    """Return what is said of each method, from the counts of each seed."""
+    """Return the scores of each method, from what was counted for each seed."""
     return {method: _scores_of([counted[method] for counted in seeds]) for method in seeds[0]}
 
 
 def _scores_of(seeds: list[list[tuple[str, GridCounts]]]) -> dict[str, object]:
-    """Return what is said of a method, from the counts of all cameras for each seed."""
+    """Return the scores of a method, from its counts on each camera, for each seed."""
     drives = tuple(drive for _, counted in seeds[0] for drive in counted.confusions.drives)
     matrices = np.stack([np.concatenate([_matrices(*part) for part in parts]) for parts in seeds])
     by_block = np.stack([FrameConfusions(drives, {"": one}).by_drive("") for one in matrices])
@@ -225,10 +249,10 @@ def _matrices(method: str, counted: GridCounts) -> NDArray[np.int64]:
 
 
 def _calibration_error(sums: NDArray) -> float:
-    """Return the expected calibration error of counts, summed confidences and hits by bin."""
+    """Return the expected calibration error from cells, summed confidences and right cells by bin of confidence."""
     cells, confidence, right = sums
-    several = np.maximum(cells, 1)
-    return expected_calibration_error(Reliability(confidence / several, right / several, cells))
+    divisor = np.maximum(cells, 1)  # an empty bin has weight 0
+    return expected_calibration_error(Reliability(confidence / divisor, right / divisor, cells))
 
 
 def real_streets_table(result: dict[str, object]) -> str:
