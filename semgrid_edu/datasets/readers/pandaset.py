@@ -252,7 +252,7 @@ class PandasetScene(FrameSequence):
         K = read_intrinsics(self.view / "intrinsics.json")
         K[1, 2] -= ROWS.start
         T = invert_rigid(self._camera_poses[self.numbers[k]]) @ self._T_world_from_lidar(k)
-        return camera_from(self.view, K, T, (ROWS.stop - ROWS.start, IMAGE_SIZE[1]), self.lidar_height)
+        return camera_from(self.view / "intrinsics.json", K, T, (ROWS.stop - ROWS.start, IMAGE_SIZE[1]), self.lidar_height)
 
     def _T_world_from_lidar(self, k: int) -> NDArray[np.float64]:
         """Return the pose of the Pandar64 at the instant of the image, turned to where the camera looks."""
