@@ -181,6 +181,22 @@ def test_a_scene_without_labels_has_frames(copy):
     assert scene.lidar_height == pytest.approx(2.13)
     with pytest.raises(DataError, match=r"semseg: expected the classes of the returns"):
         scene.truth(0, SPEC)
+    with pytest.raises(DataError, match=r"semseg: expected the classes of the returns"):
+        write_pandaset_index(copy / "data", copy, SCENE)
+
+
+def test_a_worker_process_can_open_it_again(root):
+    scene = PandasetScene(root, SCENE, camera="left_camera")
+    first = scene[0]
+    again = pickle.loads(pickle.dumps(scene))
+    assert (again.name, again.numbers) == (scene.name, scene.numbers)
+    np.testing.assert_array_equal(again[0].points, first.points)
+
+
+@pytest.mark.parametrize("window", [{"before": -1}, {"after": -1}])
+def test_a_window_of_fewer_than_no_scans_is_refused(scene, window):
+    with pytest.raises(ArgumentError, match=rf"{next(iter(window))}: expected a whole number from 0 up, found -1"):
+        scene.truth(1, SPEC, **window)
 
 
 def test_the_index_knows_it(root):

@@ -29,7 +29,7 @@ from semgrid_edu.datasets.readers.pandaset_files import (
     semseg_folder,
 )
 from semgrid_edu.datasets.readers.project_lidar import cells_in_view, closest_returns, unhidden
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import ArgumentError, DataError, check_whole
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
@@ -106,7 +106,7 @@ class PandasetScene(FrameSequence):
             raise DataError(
                 self.folder, "a scene", f"only {', '.join(there)}" if there else "no scene beside it either"
             )
-        self.name = f"{scene} {camera}"
+        self.name, self._opened = f"{scene} {camera}", (root, scene, camera)
         self.numbers = frame_numbers(self.view, "images", ".jpg")
         self._scan = lru_cache(_WINDOW)(partial(read_pandaset_scan, self.folder))
 
@@ -114,9 +114,13 @@ class PandasetScene(FrameSequence):
         """Return the number of frames."""
         return len(self.numbers)
 
+    def __reduce__(self) -> tuple:
+        """Open the scene anew in another process, which reads scans of its own."""
+        return type(self), self._opened
+
     @cached_property
     def gaps(self) -> tuple[int, ...]:
-        """Published numbers between the frames that would keep their spacing, but have no image."""
+        """Published numbers at which an image is missing: the others keep a constant spacing."""
         spacing = min(np.diff(self.numbers), default=1)
         return tuple(sorted(set(range(self.numbers[0], self.numbers[-1], spacing)) - set(self.numbers)))
 
@@ -155,14 +159,21 @@ class PandasetScene(FrameSequence):
         -------
         (H, W) uint8
             Classes of KITTI-14; 255 in a cell without a labelled return.
+
+        Raises
+        ------
+        ArgumentError
+            When `before` or `after` is negative.
+        DataError
+            When a scan has no labels, or its files are damaged.
         """
         points, classes = self._cloud(k, before, after)
         return birdseye_votes(self._in_grid(points), classes, spec, KITTI_14)
 
     def visible(self, k: int, spec: GridSpec, before: int = 9, after: int = 9) -> NDArray[np.bool_]:
-        """Return in which cells the camera sees a return (`unhidden`), (H, W). Other cells only a LIDAR has seen.
+        """Return in which cells the camera sees a return (`unhidden`), (H, W). It doesn't see what is in the others.
 
-        Parameters are those of `PandasetScene.truth`.
+        Parameters and errors are those of `PandasetScene.truth`.
         """
         return self._visible(*self._cloud(k, before, after), self._camera(k), spec)
 
@@ -188,7 +199,7 @@ class PandasetScene(FrameSequence):
         return _painted(*self._cloud(k, before, after), self._camera(k).resized(size))[0]
 
     def undecided(self, k: int, spec: GridSpec) -> NDArray[np.bool_]:
-        """Return the cells in view of the camera, (H, W): not in each of them is a labelled return.
+        """Return the cells in view of the camera, (H, W). Only some of them hold a labelled return.
 
         Parameters are those of `LabelledDrive.truth`.
         """
@@ -224,6 +235,7 @@ class PandasetScene(FrameSequence):
 
     def _cloud(self, k: int, before: int = 0, after: int = 0) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
         """Return the returns of a window of scans in the LIDAR frame of frame k, and their classes."""
+        check_whole(before=before, after=after)
         number, scans = self.numbers[k], frame_numbers(self.folder / "lidar", "scans", ".pkl.gz")
         earlier, later = [n for n in scans if n < number], [n for n in scans if n > number]
         others = earlier[max(len(earlier) - before, 0) :] + later[:after]
