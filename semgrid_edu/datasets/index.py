@@ -230,7 +230,8 @@ def write_pandaset_index(folder: str | Path, root: str | Path, scene: str, test_
         raise DataError(semseg_folder(Path(root) / scene), "the classes of the returns", "no folder")
     if not splits["train"]:
         raise ArgumentError("test_cameras", "at least one camera less", ", ".join(test_cameras))
-    index = {"name": f"pandaset-{scene}", "reader": "pandaset", "root": os.path.relpath(Path(root).resolve(), Path(folder).resolve())}
+    place = os.path.relpath(Path(root).resolve(), Path(folder).resolve())
+    index = {"name": f"pandaset-{scene}", "reader": "pandaset", "root": place}
     index |= {"label_set": KITTI_14.name, "splits": {split: frames for split, frames in splits.items() if frames}}
     write_json(path, index)
     return path

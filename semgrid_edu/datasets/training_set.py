@@ -149,8 +149,7 @@ class TrainingSet(Dataset[Sample]):
 class Mixture(Sequence[Sample]):
     """Training sets that take turns in training, such as simulated and real ones; each has a camera of its own.
 
-    Each step takes its frames from the next data set, however many frames each has. When a data set has several
-    cameras, they take turns too, one each time that it is the data set's turn.
+    Each step takes its frames from the next data set, however many frames each has, and from its next camera.
 
     Parameters
     ----------
@@ -174,10 +173,8 @@ class Mixture(Sequence[Sample]):
 
     def __init__(self, data_sets: Sequence[Sequence[TrainingSet]]) -> None:
         if not data_sets or not all(data_sets):
-            found = [len(cameras) for cameras in data_sets]
-            raise ArgumentError("data_sets", "at least one data set, each of at least one camera", f"{found} cameras")
-        self._data_sets = data_sets
-        self.parts = tuple(part for parts in data_sets for part in parts)
+            raise ArgumentError("data_sets", "at least one data set, each of at least one camera", "none")
+        self._data_sets, self.parts = data_sets, tuple(part for parts in data_sets for part in parts)
         self.label_set, self.camera = self.parts[0].label_set, self.parts[0].camera
         for part in self.parts:
             if part.label_set != self.label_set:
@@ -196,19 +193,12 @@ class Mixture(Sequence[Sample]):
         raise IndexError(f"no such frame of {len(self)}")
 
     def turn(self, iteration: int) -> tuple[TrainingSet, int]:
-        """Return the part whose turn it is at a step, and how many turns it has had before.
+        """Return the part whose turn it is at a step of training, from 0, and how many turns it has had before.
 
         Parameters
         ----------
         iteration : int
-            Number of the step of training, from 0.
-
-        Returns
-        -------
-        part : TrainingSet
-            One of `parts`.
-        turns : int
-            From 0.
+            Number of the step.
         """
         round_, data_set = divmod(iteration, len(self._data_sets))
         cameras = self._data_sets[data_set]

@@ -287,7 +287,7 @@ BAD = {
     "another table": (written("lidar/02.pkl.gz", gzip.compress(pickled_table({"a": [1.0]}))), "expected the columns x"),
     "text for numbers": (
         column("annotations/semseg/02.pkl.gz", "class", ["car"]),
-        r"semseg/02\.pkl\.gz: expected numbers in the column class, found str",
+        r"semseg/02\.pkl\.gz: expected finite numbers in the column class",
     ),
     "a place that is nowhere": (
         column("annotations/cuboids/02.pkl.gz", "position.x", np.array([0.0, np.nan])),

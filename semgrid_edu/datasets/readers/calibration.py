@@ -39,8 +39,8 @@ def read_camera(folder: Path, name: str = "image_02") -> Camera:
 
 def camera_from(
     path: Path,
-    K: NDArray[np.float64],
-    T_camera_from_lidar: NDArray[np.float64],
+    K: NDArray,
+    T_camera_from_lidar: NDArray,
     size: tuple[int, int],
     lidar_height: float = KITTI_LIDAR_HEIGHT,
 ) -> Camera:
@@ -269,7 +269,7 @@ def read_benchmark_calibration(path: Path) -> BenchmarkCalibration:
 
 
 def parse_pose(path: Path, text: str, what: str) -> NDArray[np.float64]:
-    """Return the rigid transform in twelve numbers, the three upper rows of its matrix.
+    """Return the rigid transform that twelve numbers give, the three upper rows of its matrix.
 
     Parameters
     ----------

@@ -14,20 +14,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import Camera, invert_rigid, lidar_from_grid, rigid_transform, transform_points
+from semgrid_edu.datasets.readers import pandaset_files as files
 from semgrid_edu.datasets.readers.calibration import camera_from
 from semgrid_edu.datasets.readers.cuboids import LabelledScan, put_together
 from semgrid_edu.datasets.readers.depth_points import birdseye_votes
 from semgrid_edu.datasets.readers.frames import FrameSequence, nothing_known
-from semgrid_edu.datasets.readers.pandaset_files import (
-    CREDIT,
-    TURNING,
-    frame_numbers,
-    read_intrinsics,
-    read_pandaset_scan,
-    read_poses,
-    read_times,
-    semseg_folder,
-)
 from semgrid_edu.datasets.readers.project_lidar import cells_in_view, closest_returns, unhidden
 from semgrid_edu.errors import ArgumentError, DataError, check_whole
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
@@ -95,7 +86,7 @@ class PandasetScene(FrameSequence):
     >>> truth = scene.truth(4, GridSpec.compact(), before=9, after=9)     # doctest: +SKIP
     """
 
-    label_set, credit = KITTI_14, CREDIT
+    label_set, credit = KITTI_14, files.CREDIT
 
     def __init__(self, root: str | Path, scene: str, camera: str = CAMERAS[0]) -> None:
         if camera not in CAMERAS:
@@ -103,12 +94,10 @@ class PandasetScene(FrameSequence):
         self.folder, self.view = Path(root) / scene, Path(root) / scene / "camera" / camera
         if not self.folder.is_dir():
             there = sorted(path.parent.name for path in Path(root).glob("*/lidar"))
-            raise DataError(
-                self.folder, "a scene", f"only {', '.join(there)}" if there else "no scene beside it either"
-            )
+            raise DataError(self.folder, "a scene", f"only {', '.join(there)}" if there else "no scene beside it")
         self.name, self._opened = f"{scene} {camera}", (root, scene, camera)
-        self.numbers = frame_numbers(self.view, "images", ".jpg")
-        self._scan = lru_cache(_WINDOW)(partial(read_pandaset_scan, self.folder))
+        self.numbers = files.frame_numbers(self.view, "images", ".jpg")
+        self._scan = lru_cache(_WINDOW)(partial(files.read_pandaset_scan, self.folder))
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -217,12 +206,12 @@ class PandasetScene(FrameSequence):
 
     def _without_labels(self, k: int) -> Frame:
         scan, camera, T_world_from_lidar = self._scan(self.numbers[k]), self._camera(k), self._T_world_from_lidar(k)
-        turning = scan.lidars == TURNING
+        turning = scan.lidars == files.TURNING
         points = transform_points(invert_rigid(T_world_from_lidar), scan.points[turning])
         points = np.column_stack([points, scan.reflectance[turning]]).astype(np.float32)
         image = read_jpeg(self.view / f"{self.numbers[k]:02d}.jpg", IMAGE_SIZE)[ROWS]
-        time = self._camera_times[self.numbers[k]] - self._camera_times[self.numbers[0]]
-        return Frame(image, points, camera, T_world_from_lidar, float(time))
+        start, now = self._camera_track[1][[self.numbers[0], self.numbers[k]]]
+        return Frame(image, points, camera, T_world_from_lidar, float(now - start))
 
     def _labels(self, k: int, camera: Camera) -> FrameLabels | None:
         if self._scan(self.numbers[k]).labelled is None:
@@ -236,7 +225,7 @@ class PandasetScene(FrameSequence):
     def _cloud(self, k: int, before: int = 0, after: int = 0) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
         """Return the returns of a window of scans in the LIDAR frame of frame k, and their classes."""
         check_whole(before=before, after=after)
-        number, scans = self.numbers[k], frame_numbers(self.folder / "lidar", "scans", ".pkl.gz")
+        number, scans = self.numbers[k], files.frame_numbers(self.folder / "lidar", "scans", ".pkl.gz")
         earlier, later = [n for n in scans if n < number], [n for n in scans if n > number]
         others = earlier[max(len(earlier) - before, 0) :] + later[:after]
         now, *rest = (self._labelled_scan(n) for n in (number, *others))
@@ -256,41 +245,33 @@ class PandasetScene(FrameSequence):
     def _labelled_scan(self, number: int) -> LabelledScan:
         labelled = self._scan(number).labelled
         if labelled is None:
-            raise DataError(semseg_folder(self.folder), "the classes of the returns", "no folder")
+            raise DataError(files.semseg_folder(self.folder), "the classes of the returns", "no folder")
         return labelled
 
     def _camera(self, k: int) -> Camera:
         """Return the calibration of the kept rows at a frame."""
-        K = read_intrinsics(self.view / "intrinsics.json")
+        path = self.view / "intrinsics.json"
+        K = files.read_intrinsics(path)
         K[1, 2] -= ROWS.start
-        T = invert_rigid(self._camera_poses[self.numbers[k]]) @ self._T_world_from_lidar(k)
-        return camera_from(self.view / "intrinsics.json", K, T, (ROWS.stop - ROWS.start, IMAGE_SIZE[1]), self.lidar_height)
+        T = invert_rigid(self._camera_track[0][self.numbers[k]]) @ self._T_world_from_lidar(k)
+        return camera_from(path, K, T, (ROWS.stop - ROWS.start, IMAGE_SIZE[1]), self.lidar_height)
 
     def _T_world_from_lidar(self, k: int) -> NDArray[np.float64]:
         """Return the pose of the Pandar64 at the instant of the image, turned to where the camera looks."""
-        number = self.numbers[k]
-        poses, times = self._poses, self._times
+        number, (poses, times), (camera_poses, camera_times) = self.numbers[k], self._lidar_track, self._camera_track
         places = poses[:, :3, :3] @ LIDAR_IN_POSE + poses[:, :3, 3]
         velocity = np.gradient(places, times, axis=0)[number]
-        ahead = self._camera_poses[number][:3, 2]
+        ahead = camera_poses[number][:3, 2]
         turn = Rotation.from_euler("z", np.arctan2(ahead[1], ahead[0])).as_matrix()
-        return rigid_transform(turn, places[number] + velocity * (self._camera_times[number] - times[number]))
+        return rigid_transform(turn, places[number] + velocity * (camera_times[number] - times[number]))
 
     @cached_property
-    def _poses(self) -> NDArray[np.float64]:
-        return read_poses(self.folder / "lidar" / "poses.json", self.numbers[-1])
+    def _lidar_track(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return files.read_track(self.folder / "lidar", self.numbers[-1])
 
     @cached_property
-    def _times(self) -> NDArray[np.float64]:
-        return read_times(self.folder / "lidar" / "timestamps.json", len(self._poses))
-
-    @cached_property
-    def _camera_poses(self) -> NDArray[np.float64]:
-        return read_poses(self.view / "poses.json", self.numbers[-1])
-
-    @cached_property
-    def _camera_times(self) -> NDArray[np.float64]:
-        return read_times(self.view / "timestamps.json", len(self._camera_poses))
+    def _camera_track(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return files.read_track(self.view, self.numbers[-1])
 
 
 def _standing(classes: NDArray[np.uint8]) -> NDArray[np.bool_]:

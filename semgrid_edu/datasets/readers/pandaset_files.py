@@ -138,20 +138,31 @@ def frame_numbers(folder: Path, what: str, suffix: str) -> tuple[int, ...]:
     return tuple(numbers)
 
 
-def read_poses(path: Path, last: int) -> NDArray[np.float64]:
-    """Read the poses of a sensor, T_world_from_sensor, (N, 4, 4), metres.
+def read_track(folder: Path, last: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Read where a sensor was, and when, from poses.json and timestamps.json.
 
     Parameters
     ----------
-    path : Path
-        The file poses.json.
+    folder : Path
+        The folder of the sensor.
     last : int
         Number of the last frame that needs a pose.
+
+    Returns
+    -------
+    poses : (N, 4, 4) float64
+        T_world_from_sensor, metres.
+    times : (N,) float64
+        Seconds.
     """
+    poses = _read_poses(folder / "poses.json", max(last + 1, 2))  # a velocity takes two
+    return poses, _read_times(folder / "timestamps.json", len(poses))
+
+
+def _read_poses(path: Path, least: int) -> NDArray[np.float64]:
     entries = read_json(path, list)
-    least = max(last + 1, 2)  # a velocity takes two
     if len(entries) < least:
-        raise DataError(path, f"at least {least} poses, since there is a frame {last}", f"{len(entries)}")
+        raise DataError(path, f"at least {least} poses, one for each frame", f"{len(entries)}")
     try:
         places = np.array([[entry["position"][axis] for axis in "xyz"] for entry in entries], np.float64)
         turns = np.array([[entry["heading"][axis] for axis in "xyzw"] for entry in entries], np.float64)
@@ -163,16 +174,7 @@ def read_poses(path: Path, last: int) -> NDArray[np.float64]:
     return np.array([rigid_transform(*pose) for pose in zip(rotations, places, strict=True)])
 
 
-def read_times(path: Path, count: int) -> NDArray[np.float64]:
-    """Read the times of a sensor's poses, (count,) seconds.
-
-    Parameters
-    ----------
-    path : Path
-        The file timestamps.json.
-    count : int
-        How many poses there are.
-    """
+def _read_times(path: Path, count: int) -> NDArray[np.float64]:
     try:
         times = np.array(read_json(path, list), np.float64)
     except (TypeError, ValueError) as error:
@@ -204,11 +206,8 @@ def _table(path: Path, numbers: Sequence[str], others: Sequence[str] = ()) -> di
     if not set(columns) <= set(table):
         raise DataError(path, f"the columns {', '.join(columns)}", ", ".join(table)[:200])
     for name in numbers:
-        values = table[name]
-        if values.dtype == object and len(values):  # pandas doesn't know the type of a column without rows
-            raise DataError(path, f"numbers in the column {name}", ", ".join({type(one).__name__ for one in values}))
-        if values.dtype != object and not np.isfinite(values).all():
-            raise DataError(path, f"finite numbers in the column {name}", "NaN or infinity")
+        if len(table[name]) and (table[name].dtype == object or not np.isfinite(table[name]).all()):
+            raise DataError(path, f"finite numbers in the column {name}", "others")
     return table
 
 
