@@ -12,6 +12,9 @@ from semgrid_edu.datasets.readers.oxts import mercator_pose, mercator_scale
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import Frame
 
+LIDAR_RANGE = 250.0
+"""Largest coordinate of a return, metres. KITTI's HDL-64E sees 120 m, so what lies twice as far is no measurement."""
+
 SHORT_SCAN = 0.6
 """A scan smaller than this share of the drive's median scan was probably cut short: sound ones differ less."""
 
@@ -191,9 +194,10 @@ def _scan_doubts(frame: Frame) -> Iterator[tuple[str, str]]:
 
 
 def _on_ground(points: NDArray, height: float) -> float:
-    """Return the share of returns (N, 3+) near the level of the ground, `height` metres below the LIDAR."""
+    """Return the share of returns (N, 3+) in range and near the ground, which lies `height` metres below the LIDAR."""
     distance = np.hypot(points[:, 0], points[:, 1])
-    return float(np.mean(np.abs(points[:, 2] + height) < LEVEL[0] + LEVEL[1] * distance))
+    near = np.abs(points[:, 2] + height) < LEVEL[0] + LEVEL[1] * distance
+    return float(np.mean(near & (distance < LIDAR_RANGE)))
 
 
 def what_is(folder: Path) -> str:

@@ -13,15 +13,12 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets.readers.drive_doubts import frame_doubts
+from semgrid_edu.datasets.readers.drive_doubts import LIDAR_RANGE, frame_doubts
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, LabelSet
 from semgrid_edu.storage.reading import read_bytes
-
-LIDAR_RANGE = 250.0
-"""Largest coordinate of a return, metres. KITTI's HDL-64E sees 120 m, so what lies twice as far is no measurement."""
 
 
 class LabelledDrive(Protocol):
