@@ -133,14 +133,11 @@ class PandasetScene(FrameSequence):
         """Return the class of each cell in which there is a labelled return, seen by the camera or not.
 
         What stands outvotes the ground below it (`birdseye_votes`). Returns of moving things in other scans are put
-        where the things are at this frame, by their cuboids.
+        where the things are at this frame, by their cuboids. Parameters not named here are those of
+        `LabelledDrive.truth`.
 
         Parameters
         ----------
-        k : int
-            Number of the frame.
-        spec : GridSpec
-            The grid, (H, W) cells.
         before, after : int
             How many scans before and after this frame's are added.
 
@@ -170,13 +167,10 @@ class PandasetScene(FrameSequence):
         """Return the class of each pixel of the resized image: that of the closest return on it that the camera sees.
 
         Labels of single pixels can't be resized like an image, so the returns are projected anew for each size.
+        Parameters not named here are those of `LabelledDrive.image_labels`.
 
         Parameters
         ----------
-        k : int
-            Number of the frame.
-        size : (int, int)
-            Height and width of the resized image, pixels.
         before, after : int
             How many scans before and after this frame's are added.
 
