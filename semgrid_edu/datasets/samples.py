@@ -33,7 +33,7 @@ def real_drive() -> KittiRawDrive:
 
 
 def real_weights() -> Path:
-    """Return the weights that are used on real drives by default; `card.json` beside them says what is known of them."""
+    """Return the weights that real drives use by default; `card.json` beside them says what is known of them."""
     return samples_dir() / "segnet_real" / "weights.safetensors"
 
 

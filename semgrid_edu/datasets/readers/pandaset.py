@@ -133,11 +133,14 @@ class PandasetScene(FrameSequence):
         """Return the class of each cell in which there is a labelled return, seen by the camera or not.
 
         What stands outvotes the ground below it (`birdseye_votes`). Returns of moving things in other scans are put
-        where the things are at this frame, by their cuboids. Parameters not named here are those of
-        `LabelledDrive.truth`.
+        where the things are at this frame, by their cuboids.
 
         Parameters
         ----------
+        k : int
+            Number of the frame.
+        spec : GridSpec
+            The grid, (H, W) cells.
         before, after : int
             How many scans before and after this frame's are added.
 
@@ -204,7 +207,7 @@ class PandasetScene(FrameSequence):
         points = transform_points(invert_rigid(T_world_from_lidar), scan.points[turning])
         points = np.column_stack([points, scan.reflectance[turning]]).astype(np.float32)
         image = read_jpeg(self.view / f"{self.numbers[k]:02d}.jpg", IMAGE_SIZE)[ROWS]
-        start, now = self._camera_track[1][[self.numbers[0], self.numbers[k]]]
+        start, now = self._camera_times[[self.numbers[0], self.numbers[k]]]
         return Frame(image, points, camera, T_world_from_lidar, float(now - start))
 
     def _labels(self, k: int, camera: Camera) -> FrameLabels | None:
@@ -247,25 +250,34 @@ class PandasetScene(FrameSequence):
         path = self.view / "intrinsics.json"
         K = files.read_intrinsics(path)
         K[1, 2] -= ROWS.start
-        T = invert_rigid(self._camera_track[0][self.numbers[k]]) @ self._T_world_from_lidar(k)
+        T = invert_rigid(self._camera_poses[self.numbers[k]]) @ self._T_world_from_lidar(k)
         return camera_from(path, K, T, (ROWS.stop - ROWS.start, IMAGE_SIZE[1]), self.lidar_height)
 
     def _T_world_from_lidar(self, k: int) -> NDArray[np.float64]:
         """Return the pose of the Pandar64 at the instant of the image, turned to where the camera looks."""
-        number, (poses, times), (camera_poses, camera_times) = self.numbers[k], self._lidar_track, self._camera_track
+        number, poses, times = self.numbers[k], self._poses, self._times
         places = poses[:, :3, :3] @ LIDAR_IN_POSE + poses[:, :3, 3]
         velocity = np.gradient(places, times, axis=0)[number]
-        ahead = camera_poses[number][:3, 2]
+        ahead = self._camera_poses[number][:3, 2]
         turn = Rotation.from_euler("z", np.arctan2(ahead[1], ahead[0])).as_matrix()
-        return rigid_transform(turn, places[number] + velocity * (camera_times[number] - times[number]))
+        return rigid_transform(turn, places[number] + velocity * (self._camera_times[number] - times[number]))
 
     @cached_property
-    def _lidar_track(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        return files.read_track(self.folder / "lidar", self.numbers[-1])
+    def _poses(self) -> NDArray[np.float64]:
+        # A velocity takes two poses, even at a single frame.
+        return files.read_poses(self.folder / "lidar" / "poses.json", max(self.numbers[-1] + 1, 2))
 
     @cached_property
-    def _camera_track(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        return files.read_track(self.view, self.numbers[-1])
+    def _times(self) -> NDArray[np.float64]:
+        return files.read_times(self.folder / "lidar" / "timestamps.json", len(self._poses))
+
+    @cached_property
+    def _camera_poses(self) -> NDArray[np.float64]:
+        return files.read_poses(self.view / "poses.json", self.numbers[-1] + 1)
+
+    @cached_property
+    def _camera_times(self) -> NDArray[np.float64]:
+        return files.read_times(self.view / "timestamps.json", len(self._camera_poses))
 
 
 def _standing(classes: NDArray[np.uint8]) -> NDArray[np.bool_]:

@@ -138,28 +138,16 @@ def frame_numbers(folder: Path, what: str, suffix: str) -> tuple[int, ...]:
     return tuple(numbers)
 
 
-def read_track(folder: Path, last: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Read where a sensor was, and when, from poses.json and timestamps.json.
+def read_poses(path: Path, least: int) -> NDArray[np.float64]:
+    """Read the poses of a sensor, T_world_from_sensor, (N, 4, 4), metres.
 
     Parameters
     ----------
-    folder : Path
-        The folder of the sensor.
-    last : int
-        Number of the last frame that needs a pose.
-
-    Returns
-    -------
-    poses : (N, 4, 4) float64
-        T_world_from_sensor, metres.
-    times : (N,) float64
-        Seconds.
+    path : Path
+        The file poses.json.
+    least : int
+        How many poses there have to be at least.
     """
-    poses = _read_poses(folder / "poses.json", max(last + 1, 2))  # a velocity takes two
-    return poses, _read_times(folder / "timestamps.json", len(poses))
-
-
-def _read_poses(path: Path, least: int) -> NDArray[np.float64]:
     entries = read_json(path, list)
     if len(entries) < least:
         raise DataError(path, f"at least {least} poses, one for each frame", f"{len(entries)}")
@@ -174,7 +162,16 @@ def _read_poses(path: Path, least: int) -> NDArray[np.float64]:
     return np.array([rigid_transform(*pose) for pose in zip(rotations, places, strict=True)])
 
 
-def _read_times(path: Path, count: int) -> NDArray[np.float64]:
+def read_times(path: Path, count: int) -> NDArray[np.float64]:
+    """Read the times of a sensor's poses, (count,) seconds.
+
+    Parameters
+    ----------
+    path : Path
+        The file timestamps.json.
+    count : int
+        How many poses there are.
+    """
     try:
         times = np.array(read_json(path, list), np.float64)
     except (TypeError, ValueError) as error:
