@@ -95,12 +95,8 @@ class Camera:
 
     def __post_init__(self) -> None:
         """Refuse matrices of the wrong shape, and numbers that no camera has."""
-        if np.shape(self.K) != (3, 3):
-            raise ArgumentError("K", "a 3x3 intrinsic matrix", f"shape {np.shape(self.K)}")
-        if np.shape(self.T_camera_from_lidar) != (4, 4):
-            raise ArgumentError("T_camera_from_lidar", "a 4x4 transform", f"shape {np.shape(self.T_camera_from_lidar)}")
-        if not np.isfinite(self.T_camera_from_lidar).all():
-            raise ArgumentError("T_camera_from_lidar", "finite numbers", np.asarray(self.T_camera_from_lidar).tolist())
+        _check_matrix("K", "a 3x3 intrinsic matrix", self.K, (3, 3))
+        _check_matrix("T_camera_from_lidar", "a 4x4 transform", self.T_camera_from_lidar, (4, 4))
         _check_pinhole(self.K, np.array(self.size[::-1]))
 
     @property
@@ -134,6 +130,13 @@ class Camera:
         scale_v, scale_u = size[0] / self.size[0], size[1] / self.size[1]
         S = np.array([[scale_u, 0, (scale_u - 1) / 2], [0, scale_v, (scale_v - 1) / 2], [0, 0, 1]])
         return replace(self, K=S @ self.K, size=tuple(size))
+
+
+def _check_matrix(name: str, expected: str, matrix: NDArray, shape: tuple[int, int]) -> None:
+    if np.shape(matrix) != shape:
+        raise ArgumentError(name, expected, f"shape {np.shape(matrix)}")
+    if not np.isfinite(matrix).all():
+        raise ArgumentError(name, "finite numbers", np.asarray(matrix).tolist())
 
 
 def _check_pinhole(K: NDArray, size: NDArray) -> None:

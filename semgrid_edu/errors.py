@@ -55,7 +55,7 @@ class DataError(ValueError):
 
 
 def check_whole(least: int = 0, **numbers: int) -> None:
-    """Refuse whole numbers that are too small.
+    """Refuse numbers that aren't whole, or too small.
 
     Parameters
     ----------
@@ -67,10 +67,10 @@ def check_whole(least: int = 0, **numbers: int) -> None:
     Raises
     ------
     ArgumentError
-        For the first that is smaller.
+        For the first such number.
     """
     for name, value in numbers.items():
-        if value < least:
+        if not (isinstance(value, Integral) and value >= least):
             raise ArgumentError(name, f"a whole number from {least} up", value)
 
 
@@ -85,13 +85,18 @@ def check_shape(name: str, values: ArrayLike, shape: tuple[int, ...]) -> None:
         The array.
     shape : tuple of int
         The shape it should have.
+
+    Raises
+    ------
+    ArgumentError
+        When it has another.
     """
     if np.shape(values) != shape:
         raise ArgumentError(name, f"shape {shape}", f"shape {np.shape(values)}")
 
 
 def check_fields(thing: object, expected: str, holds: Callable[[object], bool], *names: str) -> None:
-    """Refuse an object of which some fields don't have the values that they should have.
+    """Refuse an object when a field has a value that it can't have.
 
     Parameters
     ----------
@@ -100,9 +105,14 @@ def check_fields(thing: object, expected: str, holds: Callable[[object], bool], 
     expected : str
         What its fields should be, for the error.
     holds : callable
-        Whether a value is that.
+        Tells whether a value is as expected.
     *names : str
         The fields.
+
+    Raises
+    ------
+    ArgumentError
+        For the first field with another value.
     """
     for name in names:
         if not holds(getattr(thing, name)):

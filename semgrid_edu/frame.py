@@ -31,8 +31,8 @@ class FrameLabels:
     visible : (710, 310) bool
         Whether the camera sees what stands in the cell.
     undecided : (710, 310) bool, optional
-        Where labels have gaps, whether the cell lies in view of the camera, which may see there what nobody labelled.
-        Without it, all that the camera sees is labelled.
+        For labels with gaps: whether the cell lies in view of the camera, which may see something there that nobody
+        labelled. None when all that the camera sees is labelled.
     """
 
     label_set: LabelSet

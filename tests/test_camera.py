@@ -53,6 +53,18 @@ def test_resizing_there_and_back_changes_nothing():
     np.testing.assert_allclose(again.K, CAMERA.K, atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("entry", "number", "expected"),
+    [((0, 2), np.nan, "finite numbers"), ((0, 0), 0.99, "focal lengths"), ((1, 1), 4001, "focal lengths")],
+)
+def test_what_no_lens_has_is_refused(entry, number, expected):
+    """Images of 40 x 100 pixels: focal lengths from 1 to 10,000 along u, from 0.4 to 4,000 along v."""
+    wrong = K.copy()
+    wrong[entry] = number
+    with pytest.raises(ArgumentError, match=f"K: expected {expected}"):
+        Camera(wrong, np.eye(4), (40, 100))
+
+
 def test_wrong_shapes_are_refused_by_name():
     with pytest.raises(ArgumentError, match="K: expected a 3x3"):
         Camera(np.eye(4), np.eye(4), (4, 4))

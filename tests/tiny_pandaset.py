@@ -148,7 +148,7 @@ def _write_camera(folder, numbers, heading):
 
 
 def write_tiny_pandaset(root):
-    """Write the scene, and return the folder of its parent."""
+    """Write the scene to a folder of scenes, and return that folder."""
     folder = root / SCENE
     for number in NUMBERS:
         points, classes, lidars = _scan(number)

@@ -27,7 +27,7 @@ def grid_truth(labels: FrameLabels, belief_probability: NDArray, spec: GridSpec)
     Returns
     -------
     (H, W) uint8
-        A class of the label set in every cell, 255 where `decided_truth` knows none.
+        A class of the label set in every cell, or 255 as `decided_truth` says.
     """
     in_view = labels.undecided_on(spec)
     return decided_truth(visible_labels(labels, spec), in_view, belief_probability, labels.label_set)
@@ -36,19 +36,19 @@ def grid_truth(labels: FrameLabels, belief_probability: NDArray, spec: GridSpec)
 def decided_truth(
     truth: NDArray[np.uint8], in_view: NDArray[np.bool_], belief_probability: NDArray, label_set: LabelSet
 ) -> NDArray[np.uint8]:
-    """Give the cells without a label a class, as far as one is right there.
+    """Give unlabelled cells an unknown class, except where the camera may see something that nobody labelled.
 
     Parameters not named here are those of `fill_unlabelled`.
 
     Parameters
     ----------
     in_view : (H, W) bool
-        Where labels have gaps, the cells that the camera may see; no cell where all that it sees is labelled.
+        The cells in view of the camera when the labels have gaps; no cell when all that it sees is labelled.
 
     Returns
     -------
     (H, W) uint8
-        With gaps, 255 in a cell in view without a label, and the unknown classes in all cells that aren't in view.
+        Where labels have gaps: 255 in unlabelled cells in view, and an unknown class in every cell out of view.
     """
     if not in_view.any():
         return fill_unlabelled(truth, belief_probability, label_set)

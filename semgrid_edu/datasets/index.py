@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from semgrid_edu.datasets.readers.frames import LabelledDrive
 from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
 from semgrid_edu.datasets.readers.pandaset import CAMERAS, PandasetScene
+from semgrid_edu.datasets.readers.pandaset_files import semseg_folder
 from semgrid_edu.datasets.readers.semantic_kitti import SemanticKittiSequence
 from semgrid_edu.datasets.readers.synthia import SynthiaSequence
 from semgrid_edu.errors import ArgumentError, DataError
@@ -215,7 +216,7 @@ def write_pandaset_index(folder: str | Path, root: str | Path, scene: str, test_
     ArgumentError
         When there is no such camera, or none is left to train on.
     DataError
-        When there is no such scene, or a dataset.json already.
+        When there is no such scene, its returns have no labels, or there is a dataset.json already.
     """
     path, splits = Path(folder) / INDEX_FILE, {"train": [], "test": []}
     if path.exists():
@@ -225,9 +226,12 @@ def write_pandaset_index(folder: str | Path, root: str | Path, scene: str, test_
         drive = PandasetScene(root, scene, camera)
         entries = [{"scene": scene, "camera": camera, "frame": k} for k in range(len(drive))]
         splits["test" if camera in test_cameras else "train"] += entries
+    if not semseg_folder(Path(root) / scene).is_dir():
+        raise DataError(semseg_folder(Path(root) / scene), "the classes of the returns", "no folder")
     if not splits["train"]:
         raise ArgumentError("test_cameras", "at least one camera less", ", ".join(test_cameras))
-    index = {"name": f"pandaset-{scene}", "reader": "pandaset", "root": os.path.relpath(root, folder)}
+    place = os.path.relpath(Path(root).resolve(), Path(folder).resolve())
+    index = {"name": f"pandaset-{scene}", "reader": "pandaset", "root": place}
     index |= {"label_set": KITTI_14.name, "splits": {split: frames for split, frames in splits.items() if frames}}
     write_json(path, index)
     return path

@@ -33,7 +33,7 @@ def real_drive() -> KittiRawDrive:
 
 
 def real_weights() -> Path:
-    """Return the file of the network that real drives take by default; `card.json` beside it says what is known."""
+    """Return the weights that real drives use by default; `card.json` beside them says what is known of them."""
     return samples_dir() / "segnet_real" / "weights.safetensors"
 
 

@@ -89,7 +89,7 @@ def _frame_arrays(
 
 
 def _truth(drive: LabelledDrive, k: int, occupancy: NDArray, spec: GridSpec) -> NDArray[np.uint8]:
-    """Return the class of each cell of a frame; 255 where there may be one to be seen, but nobody labelled it."""
+    """Return the class of each cell of a frame; 255 where the camera may see something that nobody labelled."""
     return decided_truth(drive.truth(k, spec), drive.undecided(k, spec), occupancy, drive.label_set)
 
 

@@ -147,9 +147,9 @@ class TrainingSet(Dataset[Sample]):
 
 
 class Mixture(Sequence[Sample]):
-    """Training sets to learn from in turn, such as simulated and real ones: each has a camera of its own.
+    """Training sets that take turns in training, such as simulated and real ones; each has a camera of its own.
 
-    Step by step the data sets take turns, however many frames each has, and within a data set its cameras do.
+    Each step takes its frames from the next data set, however many frames each has, and from its next camera.
 
     Parameters
     ----------
@@ -168,12 +168,13 @@ class Mixture(Sequence[Sample]):
     Raises
     ------
     ArgumentError
-        When the data sets have other classes than the first.
+        When there is no data set, one without a camera, or one with other classes than the first.
     """
 
     def __init__(self, data_sets: Sequence[Sequence[TrainingSet]]) -> None:
-        self._data_sets = data_sets
-        self.parts = tuple(part for parts in data_sets for part in parts)
+        if not data_sets or not all(data_sets):
+            raise ArgumentError("data_sets", "at least one data set, each of at least one camera", "none")
+        self._data_sets, self.parts = data_sets, tuple(part for parts in data_sets for part in parts)
         self.label_set, self.camera = self.parts[0].label_set, self.parts[0].camera
         for part in self.parts:
             if part.label_set != self.label_set:
@@ -184,20 +185,20 @@ class Mixture(Sequence[Sample]):
         return sum(map(len, self.parts))
 
     def __getitem__(self, k: int) -> Sample:
-        """Return frame k, counted through all parts."""
+        """Return frame k, counted from 0 through all parts."""
         for part in self.parts:
-            if k < len(part):
+            if 0 <= k < len(part):
                 return part[k]
             k -= len(part)
-        raise IndexError("there are fewer frames")
+        raise IndexError(f"no such frame of {len(self)}")
 
     def turn(self, iteration: int) -> tuple[TrainingSet, int]:
-        """Return whose turn it is, and how many turns it has had before.
+        """Return the part whose turn it is at a step of training, from 0, and how many turns it has had before.
 
         Parameters
         ----------
         iteration : int
-            Number of the step of training, from 0.
+            Number of the step.
         """
         round_, data_set = divmod(iteration, len(self._data_sets))
         cameras = self._data_sets[data_set]

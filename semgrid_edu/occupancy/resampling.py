@@ -140,12 +140,7 @@ def draw_again(particles: Particles, count: int, resampling: Resampling, rng: np
 
 
 def draw_newborn(
-    newborn: NDArray,
-    spec: GridSpec,
-    count: int,
-    max_speed: float,
-    resampling: Resampling,
-    rng: np.random.Generator,
+    newborn: NDArray, spec: GridSpec, count: int, max_speed: float, resampling: Resampling, rng: np.random.Generator
 ) -> Particles:
     """Draw new particles in proportion to each cell's newborn mass; all of them get the same weight.
 

@@ -46,9 +46,10 @@ class SensorModel:
         the vehicle's own bonnet or mirror. The default is the outline of KITTI's estate car, whose LIDAR sees the end
         of its bonnet 2.5 m ahead.
     edge : float
-        How far outside the outline an obstacle without reflectance still is the vehicle's own, metres. A beam that
-        grazes the vehicle's edge is split, and its two echoes merge into one range in between while they are closer
-        than half the length of a pulse: 0.75 m for the default, a pulse of 5 ns.
+        Up to how far outside the outline an obstacle whose reflectance is 0 counts as the vehicle's own, metres. A
+        beam that grazes the vehicle's edge is split, and its two echoes merge into one range in between while they are
+        closer than half the length of a pulse: 0.75 m for the default, a pulse of 5 ns. Take 0 for a scanner that
+        measures no reflectance and writes 0 for all returns.
     ground : GroundParams or None
         How the ground is found from which heights count; None for flat ground at z = 0.
     """

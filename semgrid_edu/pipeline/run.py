@@ -62,8 +62,8 @@ def run_pipeline(
 ) -> Iterator[FrameResult]:
     """Send the frames of a drive through every stage, one after the other, and check what each stage hands on.
 
-    What is doubtful about the frames is a `UserWarning` before the work: `frame_doubts` of a sequence, or of the first
-    frame when the frames can be read only once.
+    Before the work, a `UserWarning` says what is doubtful about the frames: `frame_doubts` of a sequence, or of the
+    first frame when the frames can be read only once.
 
     Parameters
     ----------

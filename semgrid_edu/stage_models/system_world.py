@@ -11,14 +11,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import check_fields
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import (
-    FilterState,
-    State,
-    WorldModel,
-    predict,
-    transition_matrix,
-    update,
-)
+from semgrid_edu.occupancy import FilterState, State, WorldModel, predict, transition_matrix, update
 from semgrid_edu.occupancy.sensor import likelihoods
 from semgrid_edu.stage_models.beam import BeamWorld, reflection
 

@@ -155,13 +155,13 @@ def table_beside(module: str, name: str | None = None) -> dict[str, Any]:
         The name of the table's file without its suffix, if it isn't that of the module.
     """
     path = Path(module)
-    return _frozen(tomllib.loads(path.with_name(f"{name or path.stem}.toml").read_text(encoding="utf-8")))
+    return _with_tuples(tomllib.loads(path.with_name(f"{name or path.stem}.toml").read_text(encoding="utf-8")))
 
 
-def _frozen(value: Any) -> Any:
+def _with_tuples(value: Any) -> Any:
     if isinstance(value, dict):
-        return {name: _frozen(part) for name, part in value.items()}
-    return tuple(map(_frozen, value)) if isinstance(value, list) else value
+        return {name: _with_tuples(part) for name, part in value.items()}
+    return tuple(map(_with_tuples, value)) if isinstance(value, list) else value
 
 
 def named_rows(table: dict[str, dict]) -> dict[str, SimpleNamespace]:

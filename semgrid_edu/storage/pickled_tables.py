@@ -2,12 +2,13 @@
 
 A pickle is a program: it names functions, and whoever loads it calls them. Here every name stands for an empty class
 that only keeps what it is given (`_StandIn`), names that no table needs are refused, and the columns are then taken
-out of what was kept. So a hostile file can at most be refused.
+out of what was kept. So nothing that a hostile file asks for is run.
 """
 
 import gzip
 import io
 import pickle
+import pickletools
 import re
 import zlib
 from pathlib import Path
@@ -21,6 +22,9 @@ from semgrid_edu.storage.reading import read_bytes
 
 MOST_BYTES = 256 * 2**20
 """Unpacked bytes from which on a file is no table of this kind: thirty times a scan of 170,000 returns."""
+
+MOST_OPERATIONS = 10**6
+"""Operations from which on a pickle is no table of this kind: a column of text takes two for each row."""
 
 _EXPECTED = "a gzipped pickle of a pandas table"
 
@@ -86,13 +90,13 @@ def read_pickled_table(path: Path) -> dict[str, NDArray]:
     Raises
     ------
     DataError
-        When the file is missing, damaged or longer than `MOST_BYTES`, holds something else, or names a class that is
-        neither of numpy's arrays nor of pandas' tables. Nothing in it has been run then.
+        When the file is missing, damaged, longer than `MOST_BYTES` or has more than `MOST_OPERATIONS`, holds something
+        else, or names a class that belongs neither to numpy's arrays nor to pandas' tables.
     """
     content = _unpacked(path)
     try:
-        table = _TableUnpickler(io.BytesIO(content)).load()
-        return _columns(table)
+        _check_operations(content)
+        return _columns(_TableUnpickler(io.BytesIO(content)).load())
     except Exception as error:  # a damaged pickle can raise any
         found = str(error) if isinstance(error, pickle.UnpicklingError) else f"{type(error).__name__}: {error}"
         raise DataError(path, _EXPECTED, found[:300]) from error
@@ -110,6 +114,17 @@ def _unpacked(path: Path) -> bytes:
     return content
 
 
+def _check_operations(content: bytes) -> None:
+    """Refuse a pickle of too many operations, before they are done: one byte can ask for an object of 200 bytes.
+
+    Five bytes can ask for a memo, the list of objects to come back to, of tens of gigabytes.
+    """
+    for done, (operation, argument, _) in enumerate(pickletools.genops(content)):
+        numbered = argument if operation.name in ("PUT", "LONG_BINPUT") else 0
+        if max(done, numbered) >= MOST_OPERATIONS:
+            raise pickle.UnpicklingError(f"more than {MOST_OPERATIONS} operations")
+
+
 def _columns(table: _StandIn) -> dict[str, NDArray]:
     """Return the columns of a table. pandas keeps columns of one type together, as the rows of a block."""
     state = _of(table, "DataFrame").state
@@ -125,8 +140,9 @@ def _columns(table: _StandIn) -> dict[str, NDArray]:
     for values, places in pairs:
         rows = np.atleast_2d(_array(values))
         columns |= dict(zip((names[place] for place in _places(places)), rows, strict=True))
-    if len({len(column) for column in columns.values()}) > 1 or sorted(columns) != sorted(map(str, names)):
-        raise pickle.UnpicklingError("a table whose columns differ in length or are missing")
+    even = len({len(column) for column in columns.values()}) <= 1 and all(one.ndim == 1 for one in columns.values())
+    if not even or sorted(columns) != sorted(map(str, names)):
+        raise pickle.UnpicklingError("a table whose columns differ in length, come twice or are missing")
     return {name: columns[name] for name in names}
 
 

@@ -161,6 +161,11 @@ def read_jpeg(path: Path, size: tuple[int, int]) -> NDArray[np.uint8]:
         The file to read.
     size : (int, int)
         Height and width that the image must have, pixels.
+
+    Raises
+    ------
+    DataError
+        When the file isn't a sound JPEG of this size.
     """
     content = read_bytes(path)
     try:

@@ -135,15 +135,19 @@ def train_network(
     truth : LidarTruth, optional
         How to make the truth from image labels and LIDAR; the data sets' own truth when left out.
     start : path-like, optional
-        A network to start from, of the same architecture; fresh weights when left out.
+        A trained network of the same architecture to start from, in place of `imagenet`; fresh weights when left out.
 
     Raises
     ------
     ArgumentError
-        When there is no such image network, preset or device, or as `train` raises it.
+        When there is no such image network, preset or device, both `imagenet` and `start` are given, or as `train`
+        raises it.
     DataError
-        When a file is missing or damaged, or the folder holds a run that would be overwritten.
+        When a file is missing or damaged, `start` has another architecture, or the folder holds a run that would be
+        overwritten.
     """
+    if imagenet and start:
+        raise ArgumentError("start", "no other network beside the ImageNet weights, which it would replace", start)
     began, description = datetime.now(UTC), architecture(segmenter, preset)
     folders = [data] if isinstance(data, str | Path) else list(data)
     with process_group(device) as chosen:
@@ -177,11 +181,10 @@ def train_network(
 
 
 def _open(folders: Sequence[str | Path], description: Architecture, truth: LidarTruth | None) -> TrainingSet | Mixture:
-    """Open what is learnt from: the frames of one camera, or a mixture."""
+    """Open the frames to learn from: those of one camera, or a mixture."""
     chosen = {"spec": description.grid, "image_size": description.image_size, "truth": truth}
-    data_sets = [sets_by_camera(folder, "train", **chosen) for folder in folders]
-    alone = len(data_sets) == len(data_sets[0]) == 1
-    return data_sets[0][0] if alone else Mixture(data_sets)
+    mixture = Mixture([sets_by_camera(folder, "train", **chosen) for folder in folders])
+    return mixture.parts[0] if len(mixture.parts) == 1 else mixture
 
 
 def _weights_to_start_from(path: str | Path, description: Architecture, camera: Camera) -> dict[str, Tensor]:

@@ -200,6 +200,12 @@ def test_returns_in_millimetres_that_no_reader_refused():
     assert "are they in millimetres" in doubt
 
 
+def test_a_scan_without_its_ground_is_not_taken_for_kilometres():
+    """Returns at the height of the LIDAR would be near the ground at a thousand times their distance."""
+    frame = sample_drive()[0]
+    assert frame_doubts([replace(frame, points=frame.points[frame.points[:, 2] > 0])]) == []
+
+
 def test_no_frames_and_no_returns_give_no_doubt():
     frame = sample_drive()[0]
     assert frame_doubts([]) == []

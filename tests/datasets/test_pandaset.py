@@ -181,6 +181,22 @@ def test_a_scene_without_labels_has_frames(copy):
     assert scene.lidar_height == pytest.approx(2.13)
     with pytest.raises(DataError, match=r"semseg: expected the classes of the returns"):
         scene.truth(0, SPEC)
+    with pytest.raises(DataError, match=r"semseg: expected the classes of the returns"):
+        write_pandaset_index(copy / "data", copy, SCENE)
+
+
+def test_a_worker_process_can_open_it_again(root):
+    scene = PandasetScene(root, SCENE, camera="left_camera")
+    first = scene[0]
+    again = pickle.loads(pickle.dumps(scene))
+    assert (again.name, again.numbers) == (scene.name, scene.numbers)
+    np.testing.assert_array_equal(again[0].points, first.points)
+
+
+@pytest.mark.parametrize("window", [{"before": -1}, {"after": -1}])
+def test_a_window_of_fewer_than_no_scans_is_refused(scene, window):
+    with pytest.raises(ArgumentError, match=rf"{next(iter(window))}: expected a whole number from 0 up, found -1"):
+        scene.truth(1, SPEC, **window)
 
 
 def test_the_index_knows_it(root):
@@ -226,6 +242,11 @@ def written(name, content):
     return lambda folder: (folder / name).write_bytes(content)
 
 
+def column(name, key, values):
+    """Write a table again, with other values in one column."""
+    return lambda folder: write_table(folder / name, read_pickled_table(folder / name) | {key: values})
+
+
 def shortened(name):
     return lambda folder: (folder / name).write_bytes((folder / name).read_bytes()[:-40])
 
@@ -244,10 +265,18 @@ BAD = {
         gone("camera/front_camera/poses.json"),
         r"front_camera/poses\.json: expected a file",
     ),
-    "too few poses": (written("lidar/poses.json", b"[]"), r"lidar/poses\.json: expected 5 poses.*found 0"),
+    "too few poses": (written("lidar/poses.json", b"[]"), r"lidar/poses\.json: expected at least 5 poses.*found 0"),
     "a pose of something else": (written("lidar/poses.json", b"[1, 2, 3, 4, 5]"), r"poses\.json: expected poses of"),
-    "too few times": (written("lidar/timestamps.json", b"[1, 2]"), r"timestamps\.json: expected 5 times"),
+    "too few times": (written("lidar/timestamps.json", b"[1, 2]"), r"timestamps\.json: expected 5 finite times"),
+    "times without end": (
+        written("lidar/timestamps.json", b"[1, 2, 3, 4, Infinity]"),
+        r"timestamps\.json: expected 5 finite times",
+    ),
     "no intrinsics": (written("camera/front_camera/intrinsics.json", b'{"fx": 1}'), r"intrinsics\.json: expected the"),
+    "no such lens": (
+        written("camera/front_camera/intrinsics.json", b'{"fx": 1e9, "fy": 1000, "cx": 960, "cy": 540}'),
+        r"intrinsics\.json: expected in K focal lengths",
+    ),
     "an image cut short": (shortened("camera/front_camera/02.jpg"), r"02\.jpg: expected a sound JPEG"),
     "a scan cut short": (shortened("lidar/02.pkl.gz"), r"lidar/02\.pkl\.gz: expected a gzipped pickle"),
     "labels of another length": (
@@ -256,6 +285,30 @@ BAD = {
     ),
     "unknown classes": (relabelled, r"semseg/02\.pkl\.gz: expected labels among"),
     "another table": (written("lidar/02.pkl.gz", gzip.compress(pickled_table({"a": [1.0]}))), "expected the columns x"),
+    "text for numbers": (
+        column("annotations/semseg/02.pkl.gz", "class", ["car"]),
+        r"semseg/02\.pkl\.gz: expected finite numbers in the column class",
+    ),
+    "a place that is nowhere": (
+        column("annotations/cuboids/02.pkl.gz", "position.x", np.array([0.0, np.nan])),
+        r"cuboids/02\.pkl\.gz: expected finite numbers in the column position\.x",
+    ),
+    "a name that is a number": (
+        column("annotations/cuboids/02.pkl.gz", "uuid", np.array([1, 2])),
+        r"cuboids/02\.pkl\.gz: expected text in the columns uuid",
+    ),
+    "neither true nor false": (
+        column("annotations/cuboids/02.pkl.gz", "stationary", ["no", "yes"]),
+        r"cuboids/02\.pkl\.gz: expected true or false in the column stationary",
+    ),
+    "a box that is turned inside out": (
+        column("annotations/cuboids/02.pkl.gz", "dimensions.x", np.array([2.0, -2.0])),
+        r"cuboids/02\.pkl\.gz: expected dimensions from 0 m up, found -2 m",
+    ),
+    "too much light": (
+        lambda folder: write_table(folder / "lidar/02.pkl.gz", dict.fromkeys("xyzid", np.array([3.0, 256.0]))),
+        r"lidar/02\.pkl\.gz: expected i from 0 to 255, found 3 to 256",
+    ),
     "a hostile scan": (written("lidar/02.pkl.gz", gzip.compress(pickle.dumps(print))), r"names builtins\.print"),
 }
 

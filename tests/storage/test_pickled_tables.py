@@ -113,6 +113,21 @@ def test_stops_unpacking_what_is_too_long(tmp_path, monkeypatch):
         read_pickled_table(written(tmp_path, gzip.compress(bytes(2 * 10**6))))
 
 
+@pytest.mark.parametrize(
+    "content",
+    [b"Nr\0\0\0\x10.", b"Np268435456\n.", b"(" + b"\x8f" * 10**6 + b"t."],
+    ids=["a memo of gigabytes", "the same in text", "a set for each byte"],
+)
+def test_a_small_file_cannot_ask_for_much_memory(tmp_path, content):
+    with pytest.raises(DataError, match="found more than 1000000 operations"):
+        read_pickled_table(written(tmp_path, gzip.compress(content)))
+
+
+def test_a_column_is_a_row_of_numbers(tmp_path):
+    with pytest.raises(DataError, match="columns differ in length"):
+        read_pickled_table(written(tmp_path, gzip.compress(pickled_table({"x": np.zeros((4, 3))}))))
+
+
 def test_an_array_of_anything_else_is_refused(tmp_path):
     for values in (np.zeros(2, "M8[s]"), np.zeros(2, [("a", "f8")])):
         with pytest.raises(DataError, match=r"an array of the type|expected a gzipped pickle"):

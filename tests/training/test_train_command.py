@@ -11,7 +11,7 @@ from semgrid_edu.camera import Camera
 from semgrid_edu.datasets import index as dataset_index
 from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
 from semgrid_edu.datasets.training_set import Sample
-from semgrid_edu.errors import DataError
+from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.networks import SEGMENTERS, Architecture, build_net, load_net, save_net
 from semgrid_edu.networks.backbones.fcn import Fcn
@@ -191,6 +191,12 @@ def test_a_network_of_another_kind_is_no_start(monkeypatch, tmp_path):
     options = ["--data", str(tmp_path), "--out", str(tmp_path / "out"), "--from", str(tmp_path / "fcn.safetensors")]
     with pytest.raises(DataError, match=r"fcn.safetensors: expected a network like the one to train"):
         CliRunner().invoke(app, ["train", *options], catch_exceptions=False)
+
+
+def test_a_network_starts_from_one_kind_of_weights(tmp_path):
+    params = experiment.training_params("compact", iterations=1)
+    with pytest.raises(ArgumentError, match="start: expected no other network beside the ImageNet weights"):
+        experiment.train_network(tmp_path, tmp_path, "segnet", params, imagenet=tmp_path / "a", start=tmp_path / "b")
 
 
 @pytest.mark.parametrize("kept", [True, False])

@@ -242,6 +242,16 @@ def test_data_sets_take_turns_and_so_do_their_cameras(streets):
     assert [(part is back, turn) for part, turn in turns[::2]] == [(False, 0), (True, 0), (False, 1), (True, 1)]
     assert [turn for _, turn in turns[1::2]] == [0, 1, 2, 3]
     assert len(mixture) == 3 * len(streets) == len(list(mixture))
+    assert mixture[len(streets)] is back[0]
+    for beyond in (-1, len(mixture)):
+        with pytest.raises(IndexError):
+            mixture[beyond]
+
+
+@pytest.mark.parametrize("data_sets", [[], [[]]])
+def test_a_mixture_of_nothing_is_refused(data_sets):
+    with pytest.raises(ArgumentError, match="data_sets: expected at least one data set"):
+        Mixture(data_sets)
 
 
 def test_each_camera_of_a_mixture_has_planes_of_its_own(streets, tmp_path):

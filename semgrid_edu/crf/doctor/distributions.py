@@ -13,7 +13,7 @@ SAMPLE = 500
 """At most this many cells are looked at for a common factor of their costs."""
 
 CLOSE = 0.02
-"""How far a sum may be from 1, or its logarithm from 0; with float16, or probabilities 1e-3 too high, it is less."""
+"""How far a sum of probabilities may be from 1, or its logarithm from 0. Rounding to float16 moves it by less."""
 
 UNITS = {100: "per cent", 255: "255ths"}
 """What probabilities sum to that are given as percentages or grey levels."""
@@ -53,7 +53,7 @@ def sum_to_one(totals: NDArray) -> bool:
 
 
 def _total(phi: NDArray, axis: int | tuple[int, ...] = 0) -> NDArray:
-    """Sum exp(-phi). A sum beyond e is far from 1 anyway; it becomes e, as it could overflow."""
+    """Sum exp(-phi). A sum beyond e becomes e: it is far from 1 in any case, and could overflow."""
     return np.exp(np.minimum(logsumexp(-phi, axis=axis), 1))
 
 

@@ -39,24 +39,28 @@ def read_camera(folder: Path, name: str = "image_02") -> Camera:
 
 def camera_from(
     path: Path,
-    K: NDArray[np.float64],
-    T_camera_from_lidar: NDArray[np.float64],
+    K: NDArray,
+    T_camera_from_lidar: NDArray,
     size: tuple[int, int],
     lidar_height: float = KITTI_LIDAR_HEIGHT,
 ) -> Camera:
-    """Return the camera of a calibration file, whose name stands in the error when it is no camera.
+    """Return the camera that a calibration file describes, and name the file when there is no such camera.
 
     Parameters
     ----------
     path : Path
         Where the calibration comes from, for the error.
     K, T_camera_from_lidar, size, lidar_height
-        What `Camera` takes.
+        The fields of `Camera`: (3, 3) pixels, (4, 4) metres, (h, w) pixels, metres.
+
+    Raises
+    ------
+    DataError
+        When `Camera` refuses them, or the principal point lies outside the image.
     """
     (height, width), principal_point = size, np.asarray(K)[:2, 2]
-    if not (
-        (principal_point >= -0.5) & (principal_point <= (width - 0.5, height - 0.5))
-    ).all():  # a cut image may do so
+    # `Camera` itself allows it, because an image may be a part cut out of a larger one.
+    if not ((principal_point >= -0.5) & (principal_point <= (width - 0.5, height - 0.5))).all():
         expected = f"in K a principal point within the image of {width} x {height} pixels"
         raise DataError(path, expected, principal_point.tolist())
     try:
@@ -265,7 +269,7 @@ def read_benchmark_calibration(path: Path) -> BenchmarkCalibration:
 
 
 def parse_pose(path: Path, text: str, what: str) -> NDArray[np.float64]:
-    """Return the rigid transform in twelve numbers, the three upper rows of its matrix.
+    """Return the rigid transform that twelve numbers give, the three upper rows of its matrix.
 
     Parameters
     ----------

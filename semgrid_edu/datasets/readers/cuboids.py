@@ -59,7 +59,7 @@ class Cuboids:
         return holder
 
     def poses(self) -> dict[str, NDArray[np.float64]]:
-        """Return T_world_from_box of each thing by its name; of two boxes that of the LIDAR with the lower number."""
+        """Return T_world_from_box of each thing by its name; of its two boxes, the one of the lower LIDAR number."""
         return {self.names[b]: self.T_world_from_box[b] for b in np.argsort(-self.lidars, kind="stable")}
 
 
@@ -91,7 +91,7 @@ def put_together(now: LabelledScan, others: Sequence[LabelledScan]) -> tuple[NDA
     """Return the returns of several scans as they would lie at one instant.
 
     Returns from a moving thing go where its cuboid is at that instant. In the other scans they are left out if it has
-    none then, and so are returns from a movable thing outside all cuboids: nobody says whether it stood.
+    none then. So are returns from a movable thing outside all cuboids, because nothing says whether it stood still.
 
     Parameters
     ----------

@@ -12,6 +12,9 @@ from semgrid_edu.datasets.readers.oxts import mercator_pose, mercator_scale
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import Frame
 
+LIDAR_RANGE = 250.0
+"""Largest coordinate of a return, metres. KITTI's HDL-64E sees 120 m, so what lies twice as far is no measurement."""
+
 SHORT_SCAN = 0.6
 """A scan smaller than this share of the drive's median scan was probably cut short: sound ones differ less."""
 
@@ -25,7 +28,7 @@ FASTEST = 100.0
 """Metres per second. No car drives faster."""
 
 LEVEL = (0.5, 0.05)
-"""Ground may lie this far above or below the level of the vehicle's: metres, and metres for each metre of distance."""
+"""How far the ground may lie above or below its level under the vehicle: metres, and metres per metre of distance."""
 
 FEWEST_ON_GROUND = 0.05
 """The smallest share of a street's returns near the level of the ground: 0.7 to 0.9 in KITTI and in the sample."""
@@ -36,10 +39,10 @@ MISTAKES: dict[str, Callable[[NDArray], NDArray]] = {
     "are they in camera axes (x right, y down, z ahead)?": lambda points: points[:, [2, 0, 1]] * (1, -1, -1),
     "were three columns read as four?": lambda points: points.ravel()[: points.size // 3 * 3].reshape(-1, 3),
 }
-"""What undoes a mistake with the returns (N, 4), by what to ask if it puts most of them on the ground."""
+"""Changes of the returns (N, 4) that undo a common mistake, by the question to ask when one puts them on the ground."""
 
 LIKELY = 0.4
-"""The smallest share of returns on the ground for which a mistake is named, if it is also 1.5 times what it was."""
+"""A mistake is named when undoing it puts at least this share of the returns on the ground, and 1.5 times as many."""
 
 FEWEST_SEEN = 1e-3
 """The smallest share of a street's returns that lie ahead, or in the image: 0.14 to 0.26 in KITTI and in the sample."""
@@ -136,7 +139,7 @@ def frame_doubts(
     place : object
         What the lines begin with: the folder of the drive, or the name of the argument.
     read : callable, optional
-        Reads frame k, when that can be done quicker than by `frames[k]`, such as without labels.
+        Reads frame k where that is quicker than `frames[k]`, for example without labels.
 
     Returns
     -------
@@ -172,14 +175,14 @@ def _doubts_of(read: Callable[[int], Frame], k: int, n_frames: int) -> Iterator[
 
 
 def _scan_doubts(frame: Frame) -> Iterator[tuple[str, str]]:
-    """Yield the first that is doubtful about a scan: whether it is one, where the ground lies, what the camera sees."""
+    """Yield the first doubt about a scan: only zeros, no ground where it should lie, nothing ahead or in the image."""
     points, height = frame.points, frame.camera.lidar_height
     if not points[:, :3].any():
         yield "returns from places around the LIDAR", "only zeros"
         return
     share, n = _on_ground(points, height), len(points)
     other, mistake = max((_on_ground(undo(points), height), ask) for ask, undo in MISTAKES.items())
-    half = f"half of them are above, half below z = {np.median(points[:, 2]):.3g} m"
+    half = f"half of them lie below z = {np.median(points[:, 2]):.3g} m"
     hint = mistake if other > max(LIKELY, 1.5 * share) else half if share < FEWEST_ON_GROUND else ""
     in_image = project(transform_points(frame.camera.T_camera_from_lidar, points[:, :3]), frame.camera)[1]
     if hint:
@@ -191,9 +194,10 @@ def _scan_doubts(frame: Frame) -> Iterator[tuple[str, str]]:
 
 
 def _on_ground(points: NDArray, height: float) -> float:
-    """Return the share of returns (N, 3+) near the level of the ground, `height` metres below the LIDAR."""
+    """Return the share of returns (N, 3+) in range and near the ground, which lies `height` metres below the LIDAR."""
     distance = np.hypot(points[:, 0], points[:, 1])
-    return float(np.mean(np.abs(points[:, 2] + height) < LEVEL[0] + LEVEL[1] * distance))
+    near = np.abs(points[:, 2] + height) < LEVEL[0] + LEVEL[1] * distance
+    return float(np.mean(near & (distance < LIDAR_RANGE)))
 
 
 def what_is(folder: Path) -> str:

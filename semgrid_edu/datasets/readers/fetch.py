@@ -22,7 +22,7 @@ KITTI_LICENCE = (
 PANDASET_LICENCE = (
     "Of PandaSet (Hesai and Scale AI, Xiao et al., ITSC 2021) only an excerpt is shipped. Its licence, CC BY 4.0 "
     "(https://creativecommons.org/licenses/by/4.0/) with the publisher's additional terms, asks for attribution and "
-    "forbids to identify anyone or to use the makers' names for publicity. https://pandaset.org describes it; its own "
+    "forbids identifying anyone or using the makers' names for publicity. https://pandaset.org describes it; its own "
     "download has ended, and https://github.com/scaleapi/pandaset-devkit/issues/151 says where copies are. Unpack "
     "a scene so that FOLDER/002 holds lidar, camera and annotations, then run "
     "`semgrid-edu demo --pandaset FOLDER --scene 002`."

@@ -13,15 +13,12 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets.readers.drive_doubts import frame_doubts
+from semgrid_edu.datasets.readers.drive_doubts import LIDAR_RANGE, frame_doubts
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, LabelSet
 from semgrid_edu.storage.reading import read_bytes
-
-LIDAR_RANGE = 250.0
-"""Largest coordinate of a return, metres. KITTI's HDL-64E sees 120 m, so what lies twice as far is no measurement."""
 
 
 class LabelledDrive(Protocol):
@@ -61,10 +58,11 @@ class LabelledDrive(Protocol):
         """
 
     def undecided(self, k: int, spec: GridSpec) -> NDArray[np.bool_]:
-        """Return the cells that the camera may see when not all of these are labelled, (H, W); otherwise none.
+        """Return the cells in view of the camera when the labels have gaps, (H, W); no cell when they have none.
 
-        There, `truth` is 255 where nobody has labelled what is to be seen, which teaches nothing. Other cells are
-        unknown to the camera, also those of which a LIDAR knows more. Parameters are those of `LabelledDrive.truth`.
+        In these cells a 255 of `truth` means that nobody labelled what the camera may see, so training leaves it out.
+        The other cells become unknown classes, even where a LIDAR saw more. Parameters are those of
+        `LabelledDrive.truth`.
         """
 
     def image_labels(self, k: int, size: tuple[int, int]) -> NDArray[np.uint8]:
@@ -222,7 +220,7 @@ def resize_labels(labels: NDArray[np.uint8], size: tuple[int, int], sparse: bool
     size : (int, int)
         The new height and width, pixels.
     sparse : bool
-        Whether a larger pixel takes its class from the labelled ones alone, and is unlabelled if there are none.
+        Whether 255 doesn't count: a larger pixel takes its class from the labelled ones, and is 255 if there are none.
 
     Returns
     -------

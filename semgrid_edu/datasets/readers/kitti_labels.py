@@ -14,7 +14,7 @@ KINDS = ("image", "depth", "birdseye", "visible")
 """The four files of a labelled frame, each in a folder of this name."""
 
 WITH_GAPS = "with gaps"
-"""The second line of label_set.txt where the camera may see what nobody labelled, as when only returns are labelled."""
+"""The second line of label_set.txt when not all that the camera sees is labelled, for example only LIDAR returns."""
 
 DEPTH_UNIT = 1 / 256
 """One step of a depth PNG, metres (KITTI's convention); 0 means none."""

@@ -14,22 +14,13 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import Camera, invert_rigid, lidar_from_grid, rigid_transform, transform_points
+from semgrid_edu.datasets.readers import pandaset_files as files
 from semgrid_edu.datasets.readers.calibration import camera_from
 from semgrid_edu.datasets.readers.cuboids import LabelledScan, put_together
 from semgrid_edu.datasets.readers.depth_points import birdseye_votes
 from semgrid_edu.datasets.readers.frames import FrameSequence, nothing_known
-from semgrid_edu.datasets.readers.pandaset_files import (
-    CREDIT,
-    TURNING,
-    frame_numbers,
-    read_intrinsics,
-    read_pandaset_scan,
-    read_poses,
-    read_times,
-    semseg_folder,
-)
 from semgrid_edu.datasets.readers.project_lidar import cells_in_view, closest_returns, unhidden
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import ArgumentError, DataError, check_whole
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
@@ -95,7 +86,7 @@ class PandasetScene(FrameSequence):
     >>> truth = scene.truth(4, GridSpec.compact(), before=9, after=9)     # doctest: +SKIP
     """
 
-    label_set, credit = KITTI_14, CREDIT
+    label_set, credit = KITTI_14, files.CREDIT
 
     def __init__(self, root: str | Path, scene: str, camera: str = CAMERAS[0]) -> None:
         if camera not in CAMERAS:
@@ -103,20 +94,22 @@ class PandasetScene(FrameSequence):
         self.folder, self.view = Path(root) / scene, Path(root) / scene / "camera" / camera
         if not self.folder.is_dir():
             there = sorted(path.parent.name for path in Path(root).glob("*/lidar"))
-            raise DataError(
-                self.folder, "a scene", f"only {', '.join(there)}" if there else "no scene beside it either"
-            )
-        self.name = f"{scene} {camera}"
-        self.numbers = frame_numbers(self.view, "images", ".jpg")
-        self._scan = lru_cache(_WINDOW)(partial(read_pandaset_scan, self.folder))
+            raise DataError(self.folder, "a scene", f"only {', '.join(there)}" if there else "no scene beside it")
+        self.name, self._opened = f"{scene} {camera}", (root, scene, camera)
+        self.numbers = files.frame_numbers(self.view, "images", ".jpg")
+        self._scan = lru_cache(_WINDOW)(partial(files.read_pandaset_scan, self.folder))
 
     def __len__(self) -> int:
         """Return the number of frames."""
         return len(self.numbers)
 
+    def __reduce__(self) -> tuple:
+        """Open the scene anew in another process, which reads scans of its own."""
+        return type(self), self._opened
+
     @cached_property
     def gaps(self) -> tuple[int, ...]:
-        """Published numbers between the frames that would keep their spacing, but have no image."""
+        """Published numbers at which an image is missing: the others keep a constant spacing."""
         spacing = min(np.diff(self.numbers), default=1)
         return tuple(sorted(set(range(self.numbers[0], self.numbers[-1], spacing)) - set(self.numbers)))
 
@@ -155,14 +148,21 @@ class PandasetScene(FrameSequence):
         -------
         (H, W) uint8
             Classes of KITTI-14; 255 in a cell without a labelled return.
+
+        Raises
+        ------
+        ArgumentError
+            When `before` or `after` is negative.
+        DataError
+            When a scan has no labels, or its files are damaged.
         """
         points, classes = self._cloud(k, before, after)
         return birdseye_votes(self._in_grid(points), classes, spec, KITTI_14)
 
     def visible(self, k: int, spec: GridSpec, before: int = 9, after: int = 9) -> NDArray[np.bool_]:
-        """Return in which cells the camera sees a return (`unhidden`), (H, W). Other cells only a LIDAR has seen.
+        """Return in which cells the camera sees a return (`unhidden`), (H, W). It doesn't see what is in the others.
 
-        Parameters are those of `PandasetScene.truth`.
+        Parameters and errors are those of `PandasetScene.truth`.
         """
         return self._visible(*self._cloud(k, before, after), self._camera(k), spec)
 
@@ -170,13 +170,10 @@ class PandasetScene(FrameSequence):
         """Return the class of each pixel of the resized image: that of the closest return on it that the camera sees.
 
         Labels of single pixels can't be resized like an image, so the returns are projected anew for each size.
+        Parameters not named here are those of `LabelledDrive.image_labels`.
 
         Parameters
         ----------
-        k : int
-            Number of the frame.
-        size : (int, int)
-            Height and width of the resized image, pixels.
         before, after : int
             How many scans before and after this frame's are added.
 
@@ -188,7 +185,7 @@ class PandasetScene(FrameSequence):
         return _painted(*self._cloud(k, before, after), self._camera(k).resized(size))[0]
 
     def undecided(self, k: int, spec: GridSpec) -> NDArray[np.bool_]:
-        """Return the cells in view of the camera, (H, W): not in each of them is a labelled return.
+        """Return the cells in view of the camera, (H, W). Only some of them hold a labelled return.
 
         Parameters are those of `LabelledDrive.truth`.
         """
@@ -206,12 +203,12 @@ class PandasetScene(FrameSequence):
 
     def _without_labels(self, k: int) -> Frame:
         scan, camera, T_world_from_lidar = self._scan(self.numbers[k]), self._camera(k), self._T_world_from_lidar(k)
-        turning = scan.lidars == TURNING
+        turning = scan.lidars == files.TURNING
         points = transform_points(invert_rigid(T_world_from_lidar), scan.points[turning])
         points = np.column_stack([points, scan.reflectance[turning]]).astype(np.float32)
         image = read_jpeg(self.view / f"{self.numbers[k]:02d}.jpg", IMAGE_SIZE)[ROWS]
-        time = self._camera_times[self.numbers[k]] - self._camera_times[self.numbers[0]]
-        return Frame(image, points, camera, T_world_from_lidar, float(time))
+        start, now = self._camera_times[[self.numbers[0], self.numbers[k]]]
+        return Frame(image, points, camera, T_world_from_lidar, float(now - start))
 
     def _labels(self, k: int, camera: Camera) -> FrameLabels | None:
         if self._scan(self.numbers[k]).labelled is None:
@@ -224,7 +221,8 @@ class PandasetScene(FrameSequence):
 
     def _cloud(self, k: int, before: int = 0, after: int = 0) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
         """Return the returns of a window of scans in the LIDAR frame of frame k, and their classes."""
-        number, scans = self.numbers[k], frame_numbers(self.folder / "lidar", "scans", ".pkl.gz")
+        check_whole(before=before, after=after)
+        number, scans = self.numbers[k], files.frame_numbers(self.folder / "lidar", "scans", ".pkl.gz")
         earlier, later = [n for n in scans if n < number], [n for n in scans if n > number]
         others = earlier[max(len(earlier) - before, 0) :] + later[:after]
         now, *rest = (self._labelled_scan(n) for n in (number, *others))
@@ -244,20 +242,20 @@ class PandasetScene(FrameSequence):
     def _labelled_scan(self, number: int) -> LabelledScan:
         labelled = self._scan(number).labelled
         if labelled is None:
-            raise DataError(semseg_folder(self.folder), "the classes of the returns", "no folder")
+            raise DataError(files.semseg_folder(self.folder), "the classes of the returns", "no folder")
         return labelled
 
     def _camera(self, k: int) -> Camera:
         """Return the calibration of the kept rows at a frame."""
-        K = read_intrinsics(self.view / "intrinsics.json")
+        path = self.view / "intrinsics.json"
+        K = files.read_intrinsics(path)
         K[1, 2] -= ROWS.start
         T = invert_rigid(self._camera_poses[self.numbers[k]]) @ self._T_world_from_lidar(k)
-        return camera_from(self.view, K, T, (ROWS.stop - ROWS.start, IMAGE_SIZE[1]), self.lidar_height)
+        return camera_from(path, K, T, (ROWS.stop - ROWS.start, IMAGE_SIZE[1]), self.lidar_height)
 
     def _T_world_from_lidar(self, k: int) -> NDArray[np.float64]:
         """Return the pose of the Pandar64 at the instant of the image, turned to where the camera looks."""
-        number = self.numbers[k]
-        poses, times = self._poses, self._times
+        number, poses, times = self.numbers[k], self._poses, self._times
         places = poses[:, :3, :3] @ LIDAR_IN_POSE + poses[:, :3, 3]
         velocity = np.gradient(places, times, axis=0)[number]
         ahead = self._camera_poses[number][:3, 2]
@@ -266,19 +264,20 @@ class PandasetScene(FrameSequence):
 
     @cached_property
     def _poses(self) -> NDArray[np.float64]:
-        return read_poses(self.folder / "lidar" / "poses.json", self.numbers[-1])
+        # A velocity takes two poses, even at a single frame.
+        return files.read_poses(self.folder / "lidar" / "poses.json", max(self.numbers[-1] + 1, 2))
 
     @cached_property
     def _times(self) -> NDArray[np.float64]:
-        return read_times(self.folder / "lidar" / "timestamps.json", len(self._poses))
+        return files.read_times(self.folder / "lidar" / "timestamps.json", len(self._poses))
 
     @cached_property
     def _camera_poses(self) -> NDArray[np.float64]:
-        return read_poses(self.view / "poses.json", self.numbers[-1])
+        return files.read_poses(self.view / "poses.json", self.numbers[-1] + 1)
 
     @cached_property
     def _camera_times(self) -> NDArray[np.float64]:
-        return read_times(self.view / "timestamps.json", len(self._camera_poses))
+        return files.read_times(self.view / "timestamps.json", len(self._camera_poses))
 
 
 def _standing(classes: NDArray[np.uint8]) -> NDArray[np.bool_]:

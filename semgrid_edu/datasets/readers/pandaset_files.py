@@ -5,6 +5,7 @@ turns (d = 0), the PandarGT looks ahead (d = 1).
 """
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,9 +14,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import rigid_transform
-from semgrid_edu.datasets.readers.class_tables import PANDASET_CLASSES
+from semgrid_edu.datasets.readers.class_tables import ClassTable
 from semgrid_edu.datasets.readers.cuboids import Cuboids, LabelledScan
 from semgrid_edu.errors import DataError
+from semgrid_edu.labels import KITTI_14
 from semgrid_edu.storage.pickled_tables import read_pickled_table
 from semgrid_edu.storage.reading import read_json
 
@@ -30,6 +32,30 @@ FIRST_THING = 5
 
 MOVABLE = range(13, 34)
 """The numbers of the classes of things that may move: vehicles, people, animals."""
+
+PANDASET_CLASSES = ClassTable(
+    KITTI_14,
+    {
+        **dict.fromkeys((7, 8, 9, 10), "road"),  # road, lane lines, stop lines, other markings
+        **dict.fromkeys((11,), "sidewalk"),
+        **dict.fromkeys((5,), "vegetation"),
+        **dict.fromkeys((13, 14, 15, 16, 17), "car"),  # car, pickup, two sizes of trucks, towed object
+        **dict.fromkeys((19, 20, 22, 23), "car"),  # construction, uncommon and emergency vehicles, bus
+        **dict.fromkeys((27, 28, 29), "car"),  # train, trolley, tram
+        **dict.fromkeys((30, 31), "pedestrian"),  # also with an object
+        **dict.fromkeys((18, 25, 26), "bicycle"),  # motorcycle, scooter, bicycle
+        **dict.fromkeys((41,), "building"),
+        **dict.fromkeys((36, 38), "signage"),  # signs, also of construction sites
+        **dict.fromkeys((35, 39), "fence"),  # road barriers, also of construction sites
+        **dict.fromkeys((1, 2, 3, 4), None),  # smoke, exhaust, spray, reflection: nothing is there
+        **dict.fromkeys((6, 12), None),  # other ground and driveways: neither road nor sidewalk
+        **dict.fromkeys((21, 24, 32, 33), None),  # pedicab, mobility device, animals
+        **dict.fromkeys((34, 37, 40, 42), None),  # pylon, cone, rolling container, other static object
+    },
+)
+"""KITTI-14's class of each number in annotations/semseg; the numbers are those of PandaSet's classes.json.
+
+What could be several classes stays unlabelled: an "other static object" is a pole, a wall or a hydrant."""
 
 
 class PandasetScan(NamedTuple):
@@ -76,15 +102,15 @@ def read_pandaset_scan(scene: Path, number: int) -> PandasetScan:
         Number of the scan.
     """
     path = scene / "lidar" / f"{number:02d}.pkl.gz"
-    table = _table(path, "x", "y", "z", "i", "d")
+    table = _table(path, ("x", "y", "z", "i", "d"))
     points = np.column_stack([table[axis] for axis in "xyz"])
     reflectance, lidars = (table["i"] / 255).astype(np.float32), table["d"]
-    if not (np.isfinite(points).all() and (reflectance >= 0).all() and (reflectance <= 1).all()):
-        raise DataError(path, "finite coordinates, and i from 0 to 255", "others")
+    if not ((reflectance >= 0) & (reflectance <= 1)).all():
+        raise DataError(path, "i from 0 to 255", f"{table['i'].min():g} to {table['i'].max():g}")
     if not semseg_folder(scene).is_dir():
         return PandasetScan(points, reflectance, lidars, None)
     path = semseg_folder(scene) / f"{number:02d}.pkl.gz"
-    numbers = _table(path, "class")["class"]
+    numbers = _table(path, ("class",))["class"]
     if len(numbers) != len(points):
         raise DataError(path, f"a class for each of the scan's {len(points)} returns", f"{len(numbers)}")
     arrays = points, PANDASET_CLASSES.classes(path, numbers), np.isin(numbers, MOVABLE), lidars
@@ -112,19 +138,19 @@ def frame_numbers(folder: Path, what: str, suffix: str) -> tuple[int, ...]:
     return tuple(numbers)
 
 
-def read_poses(path: Path, last: int) -> NDArray[np.float64]:
+def read_poses(path: Path, least: int) -> NDArray[np.float64]:
     """Read the poses of a sensor, T_world_from_sensor, (N, 4, 4), metres.
 
     Parameters
     ----------
     path : Path
         The file poses.json.
-    last : int
-        Number of the last frame that needs a pose.
+    least : int
+        How many poses there have to be at least.
     """
     entries = read_json(path, list)
-    if len(entries) <= last:
-        raise DataError(path, f"{last + 1} poses, since there is a frame {last}", f"{len(entries)}")
+    if len(entries) < least:
+        raise DataError(path, f"at least {least} poses, one for each frame", f"{len(entries)}")
     try:
         places = np.array([[entry["position"][axis] for axis in "xyz"] for entry in entries], np.float64)
         turns = np.array([[entry["heading"][axis] for axis in "xyzw"] for entry in entries], np.float64)
@@ -150,8 +176,8 @@ def read_times(path: Path, count: int) -> NDArray[np.float64]:
         times = np.array(read_json(path, list), np.float64)
     except (TypeError, ValueError) as error:
         raise DataError(path, "times in seconds", repr(error)) from error
-    if times.shape != (count,) or not (np.diff(times) > 0).all():
-        raise DataError(path, f"{count} times that grow, one for each pose", f"{times.size} others")
+    if times.shape != (count,) or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
+        raise DataError(path, f"{count} finite times that grow, one for each pose", f"{times.size} others")
     return times
 
 
@@ -171,22 +197,37 @@ def read_intrinsics(path: Path) -> NDArray[np.float64]:
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
 
 
-def _table(path: Path, *columns: str) -> dict[str, NDArray]:
-    """Read a table that has to have some columns."""
-    table = read_pickled_table(path)
+def _table(path: Path, numbers: Sequence[str], others: Sequence[str] = ()) -> dict[str, NDArray]:
+    """Read a table that has to have some columns, of finite numbers and of other things."""
+    table, columns = read_pickled_table(path), [*numbers, *others]
     if not set(columns) <= set(table):
         raise DataError(path, f"the columns {', '.join(columns)}", ", ".join(table)[:200])
+    for name in numbers:
+        if len(table[name]) and (table[name].dtype == object or not np.isfinite(table[name]).all()):
+            raise DataError(path, f"finite numbers in the column {name}", "others")
     return table
 
 
 def _read_cuboids(path: Path) -> Cuboids:
     """Read the cuboids of a scan. A thing that moves has two, one for each LIDAR, which name each other."""
     columns = [f"{what}.{axis}" for what in ("position", "dimensions") for axis in "xyz"]
-    which = ("uuid", "stationary", "yaw", "cuboids.sibling_id", "cuboids.sensor_id")
-    table = _table(path, *which, *columns)
+    which = ("uuid", "stationary", "cuboids.sibling_id")
+    table = _table(path, (*columns, "yaw", "cuboids.sensor_id"), which)
     places, sizes = np.split(np.column_stack([table[column] for column in columns]).astype(np.float64), 2, axis=1)
     turns = Rotation.from_rotvec(np.outer(table["yaw"], [0, 0, 1])).as_matrix()
     T = np.array([rigid_transform(*pose) for pose in zip(turns, places, strict=True)]).reshape(-1, 4, 4)
     lidars, sibling = table["cuboids.sensor_id"], table["cuboids.sibling_id"]
     names = np.where((lidars > TURNING) & (sibling != "-"), sibling, table["uuid"])
-    return Cuboids(names, T, sizes, ~table["stationary"].astype(bool), lidars)
+    stationary = table["stationary"].tolist()
+    _check_things(path, names, stationary, sizes)
+    return Cuboids(names, T, sizes, ~np.array(stationary, bool), lidars)
+
+
+def _check_things(path: Path, names: NDArray, stationary: list, sizes: NDArray[np.float64]) -> None:
+    """Refuse names that are no text, what is neither moving nor not, and boxes that hold nothing."""
+    if not all(isinstance(name, str) for name in names):
+        raise DataError(path, "text in the columns uuid and cuboids.sibling_id", "others")
+    if not all(isinstance(stands, bool) for stands in stationary):
+        raise DataError(path, "true or false in the column stationary", "others")
+    if (sizes < 0).any():
+        raise DataError(path, "dimensions from 0 m up", f"{sizes.min():g} m")

@@ -10,10 +10,12 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.planes import plane_heights, plane_pixels
 
 HIDING_ANGLE = 0.2
-"""Degrees between two neighbouring returns, about, of a scanner with 64 lasers."""
+"""Angle between two neighbouring returns of a scanner with 64 lasers, about, degrees."""
 
 HIDING_BLOCKS = (5, 3)
-"""How far what stands hides: rows and columns of blocks, `HIDING_ANGLE` wide. Lasers lie farther apart than columns."""
+"""Rows and columns of blocks, `HIDING_ANGLE` wide, in which a standing point in the middle one hides what is behind it.
+
+There are more rows because the lasers lie farther apart than the returns of one laser."""
 
 
 def closest_returns(frame: Frame) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -74,7 +76,7 @@ def seen_returns(
 
 
 def cells_in_view(camera: Camera, spec: GridSpec) -> NDArray[np.bool_]:
-    """Return the cells above which a point of a plane lies in the image, (H, W), hidden or not.
+    """Return the cells in view, (H, W): above its centre, a point of some plane lies in the image, hidden or not.
 
     Parameters
     ----------
@@ -89,11 +91,11 @@ def cells_in_view(camera: Camera, spec: GridSpec) -> NDArray[np.bool_]:
 def unhidden(points: NDArray, hiding: NDArray[np.bool_], camera: Camera) -> NDArray[np.bool_]:
     """Return which points the camera sees: in its image, and behind nothing that stands.
 
-    Points of a LIDAR that stands elsewhere than the camera, and all the more points that other scans saw, lie behind
-    things that hide them from the camera, and mostly share no pixel with a point of what hides them
-    (`closest_returns`). So what stands counts as without gaps here: the image is divided into blocks, and a point is
-    hidden if something standing is 0.5 m and 3 % closer in its block or in one around it (`HIDING_BLOCKS`). Of what
-    shows just above something that stands, a narrow strip is lost.
+    The LIDAR stands elsewhere than the camera, and other scans were taken from other places. So some points lie behind
+    things that hide them from the camera, but most of these share no pixel with a point of what hides them, as
+    `closest_returns` would need. Therefore what stands is taken to have no gaps between its points: the image is
+    divided into blocks, and a point is hidden if a standing one is 0.5 m and 3 % closer in its block or in a block
+    around it (`HIDING_BLOCKS`). This also hides a narrow strip of what the camera sees just above a standing thing.
 
     Parameters
     ----------

@@ -94,12 +94,7 @@ def systematic_resample_literal(weight: NDArray, count: int, offset: float) -> N
 
 
 def draw_newborn_literal(
-    newborn: NDArray,
-    spec: GridSpec,
-    count: int,
-    max_speed: float,
-    resampling: Resampling,
-    rng: np.random.Generator,
+    newborn: NDArray, spec: GridSpec, count: int, max_speed: float, resampling: Resampling, rng: np.random.Generator
 ) -> Particles:
     """Draw new particles in proportion to each cell's newborn mass: the literal twin of `draw_newborn`.
 
