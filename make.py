@@ -23,7 +23,10 @@ OLDEST = (3, 11)
 
 
 def environment() -> None:
-    """Make `.venv` with all that demo and tests need, or bring it up to date; nothing is done when it is."""
+    """Make `.venv` with all that demo and tests need, or bring it up to date; nothing is done when it is.
+
+    What numba compiles is part of it: demo and tests then find it compiled.
+    """
     if sys.version_info < OLDEST:
         found = f"{sys.executable} is {sys.version.split()[0]}; set PYTHON=... for make"
         sys.exit(f"Python {OLDEST[0]}.{OLDEST[1]} or later is needed, {found}")
@@ -31,6 +34,8 @@ def environment() -> None:
         return
     venv.create(ENVIRONMENT, with_pip=True, symlinks=os.name != "nt")
     _run("python", "-m", "pip", "install", "--quiet", "-c", "constraints.txt", "-e", ".[test]")
+    print("compiling the filters, the CRF and the simulator, once for this clone: about a minute", flush=True)
+    _run("python", "compile_functions.py", OMP_NUM_THREADS="1", NUMBA_NUM_THREADS="1")
     MADE.touch()
 
 

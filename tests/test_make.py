@@ -3,11 +3,15 @@
 import os
 import subprocess
 import sys
+from importlib import import_module
 from types import SimpleNamespace
 
 import pytest
 
+import compile_functions
 import make
+
+INSTALLS = ("-m", "pip", "install", "--quiet", "-c", "constraints.txt", "-e", ".[test]")
 
 
 @pytest.fixture
@@ -41,12 +45,11 @@ def ran(monkeypatch):
 def test_the_environment_is_made_once_and_again_when_a_pin_changes(clone, ran):
     make.environment()
     make.environment()
-    assert len(ran) == 1
-    assert ran[0][:4] == ("python", "-m", "pip", "install")
+    assert [command[1:-1] for command in ran] == [INSTALLS, ("compile_functions.py",)]
     made = make.MADE.stat().st_mtime
     os.utime(clone / "constraints.txt", (made + 5, made + 5))
     make.environment()
-    assert len(ran) == 2
+    assert len(ran) == 4
 
 
 def test_an_environment_that_could_not_be_made_is_made_again(clone, monkeypatch):
@@ -57,9 +60,36 @@ def test_an_environment_that_could_not_be_made_is_made_again(clone, monkeypatch)
     assert not make.MADE.exists()
 
 
+SLOW_TO_COMPILE = {
+    "semgrid_edu.occupancy.particles": "_fly",
+    "semgrid_edu.crf.mean_field": "_update",
+    "semgrid_edu.crf.accurate": "_window_sums",
+    "semgrid_edu.workshop.simulation.sensors.shading": "_shade",
+}
+"""A function each of the filter, the two ways of the CRF and the simulator, by its module."""
+
+
+def test_what_takes_long_to_compile_is_called_when_the_environment_is_made(monkeypatch):
+    called = set()
+    for module, name in SLOW_TO_COMPILE.items():
+        function = getattr(import_module(module), name)
+        monkeypatch.setattr(
+            sys.modules[module], name, lambda *a, f=function, m=module, **k: (called.add(m), f(*a, **k))[1]
+        )
+    for part in compile_functions.PARTS.values():
+        part()
+    assert called == set(SLOW_TO_COMPILE)
+
+
+def test_a_part_that_does_not_compile_is_told(monkeypatch):
+    monkeypatch.setattr(compile_functions, "PARTS", {"nothing of this name": None})
+    assert compile_functions.compile_all() != 0
+
+
 def test_tests_are_style_tests_and_notebooks(clone, ran):
     make.test()
-    assert [command[2] for command in ran] == ["pip", "ruff", "ruff", "pytest"]
+    assert [command[1] for command in ran[:2]] == ["-m", "compile_functions.py"]
+    assert [command[2] for command in ran if command[1] == "-m"] == ["pip", "ruff", "ruff", "pytest"]
     words = ran[-1][:-1]
     assert len([word for word in words if word.endswith(".ipynb")]) == 3
     assert {"--nbval", "--doctest-modules", "semgrid_edu", "tests"} <= set(words)
@@ -69,8 +99,8 @@ def test_tests_are_style_tests_and_notebooks(clone, ran):
 
 def test_tests_in_a_browser_are_apart(clone, ran):
     make.make_targets(["test-browser"])
-    assert [command[2] for command in ran] == ["pip", "pip", "pytest"]
-    assert ".[browser]" in ran[1]
+    assert [command[2] for command in ran if command[1] == "-m"] == ["pip", "pip", "pytest"]
+    assert ".[browser]" in ran[2]
     assert ran[-1][3] == "tests/browser"
     ran.clear()
     make.test()

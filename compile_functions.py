@@ -1,0 +1,54 @@
+"""Let numba compile the functions of the filter, the CRF and the simulator, which takes about a minute of two cores.
+
+numba compiles a function when it is first called, and keeps the result beside the module. Three test processes and a
+student's process that begin without it would each compile the same functions. So make.py runs this once for each clone.
+"""
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+
+def filters_and_simulator() -> None:
+    """Track a wall and two frames of the shipped drive with every filter, and simulate a drive of two frames."""
+    from semgrid_edu.datasets.samples import sample_drive
+    from semgrid_edu.grid import GridSpec
+    from semgrid_edu.occupancy import Bof, LogOddsGrid, PlanarMotion, track_drive
+    from semgrid_edu.workshop.simulation.datasets import DatasetRecipe, Route, make_from_recipe
+
+    spec, drive = GridSpec(0, 32, -8, 8, 1.0), sample_drive()
+    list(track_drive([drive[0], drive[1]], spec))
+    wall = np.array([[20.25, y, 1.0] for y in np.arange(-3, 3, 0.1)])
+    for tracker in (Bof(spec), LogOddsGrid(spec)):
+        tracker.step(wall, PlanarMotion(), 0.1)
+    with tempfile.TemporaryDirectory() as folder:
+        recipe = DatasetRecipe("small", "KITTI-14", (Route("test", 2, False),))
+        make_from_recipe(recipe, Path(folder), seed=0, workers=1)
+
+
+def refinement() -> None:
+    """Refine a small map by both ways to filter messages."""
+    from semgrid_edu.crf import CrfParams, mean_field, mean_field_accurate
+
+    rng = np.random.default_rng(0)
+    unary = rng.random((14, 8, 6), np.float32)
+    occupancy = np.moveaxis(rng.dirichlet(np.ones(4), (8, 6)), 2, 0).astype(np.float32).copy()
+    for refine in (mean_field, mean_field_accurate):
+        refine(unary, occupancy, CrfParams())
+
+
+PARTS = {part.__name__: part for part in (filters_and_simulator, refinement)}
+"""What is compiled in a process of its own each: they take about the same time, and share no module."""
+
+
+def compile_all() -> int:
+    """Run all parts side by side; return the largest exit status."""
+    running = [subprocess.Popen([sys.executable, __file__, part], stderr=subprocess.DEVNULL) for part in PARTS]
+    return max(process.wait() for process in running)
+
+
+if __name__ == "__main__":
+    sys.exit(PARTS[sys.argv[1]]() if sys.argv[1:] else compile_all())
