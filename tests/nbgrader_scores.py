@@ -1,14 +1,25 @@
 """What nbgrader gives submissions to an exercise: a score and a message for each test cell, and so for each task."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import nbformat
+import nbgrader.api
+import pytest
 from nbconvert.filters import strip_ansi
 from nbgrader.utils import is_grade, is_solution
 
 from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, autograde_one, place
 from semgrid_edu.workshop.course.nbgrader.gradebook import open_gradebook
 from semgrid_edu.workshop.course.notebooks.build import read_percent, write_notebook
+
+
+@pytest.fixture(scope="session", autouse=True)
+def alembic_asked_once():
+    """Let nbgrader ask for the version of its tables once: it starts alembic, for three seconds, for each gradebook."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(nbgrader.api, "get_alembic_version", cache(nbgrader.api.get_alembic_version))
+        yield
 
 
 @dataclass(frozen=True)
@@ -20,6 +31,7 @@ class CellScore:
     message: str
 
 
+@cache
 def tasks(source):
     """Return the test cells of each task by the grade_id of its answer cell; a written answer is its own test."""
     found = {}

@@ -1,13 +1,24 @@
 """A course for each that asks for one, and a test for each entry of an exercise's catalogue."""
 
 import shutil
+from functools import cache
 
 import pytest
+from nbgrader_scores import alembic_asked_once  # noqa: F401 (a fixture for all tests here)
 from typer.testing import CliRunner
 
 from semgrid_edu.workshop.commands.main import app
+from semgrid_edu.workshop.course.nbgrader import autograde
 
 pytest.register_assert_rewrite("grader_checks")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def exercises_read_once():
+    """Let the hundreds of students here fill in copies of one student version, since no exercise changes meanwhile."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(autograde, "student_version", cache(autograde.student_version))
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 
 from nbgrader.utils import determine_grade, is_grade, is_solution
@@ -31,14 +32,18 @@ SERVER = Path(__file__).with_name("warm_server.py")
 
 def grade_warm(source, answers, start, timeout):
     """Run one submission; return the result of each test cell, by its grade_id."""
-    trusted = instructors_cells(read_percent(source))
-    notebook = submission(source, answers)
+    trusted, notebook = _trusted(source), submission(source, answers)
     for cell in notebook.cells:
         if is_grade(cell) and not is_solution(cell):
             cell.source = trusted[cell_name(cell)]  # with its hidden tests, as nbgrader's OverwriteCells does
     run_submission(notebook, trusted, start, timeout)
     cells = {cell_name(cell): cell for cell in notebook.cells if is_grade(cell)}
     return {name: _score(cell) for name, cell in cells.items()}
+
+
+@cache
+def _trusted(source):
+    return instructors_cells(read_percent(source))
 
 
 def _score(cell):
