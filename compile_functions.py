@@ -45,9 +45,13 @@ PARTS = {part.__name__: part for part in (filters_and_simulator, refinement)}
 
 
 def compile_all() -> int:
-    """Run all parts side by side; return the largest exit status."""
-    running = [subprocess.Popen([sys.executable, __file__, part], stderr=subprocess.DEVNULL) for part in PARTS]
-    return max(process.wait() for process in running)
+    """Run all parts side by side; return 1, and show what they said, when one of them fails."""
+    command = [sys.executable, __file__]
+    running = [subprocess.Popen([*command, part], stderr=subprocess.PIPE, text=True) for part in PARTS]
+    said = [process.communicate()[1] for process in running]
+    failed = [text for process, text in zip(running, said, strict=True) if process.returncode]
+    print("".join(failed), end="", file=sys.stderr)
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":

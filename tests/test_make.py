@@ -81,9 +81,10 @@ def test_what_takes_long_to_compile_is_called_when_the_environment_is_made(monke
     assert called == set(SLOW_TO_COMPILE)
 
 
-def test_a_part_that_does_not_compile_is_told(monkeypatch):
+def test_a_part_that_does_not_compile_is_told(monkeypatch, capsys):
     monkeypatch.setattr(compile_functions, "PARTS", {"nothing of this name": None})
-    assert compile_functions.compile_all() != 0
+    assert compile_functions.compile_all() == 1
+    assert "KeyError: 'nothing of this name'" in capsys.readouterr().err
 
 
 def test_tests_are_style_tests_and_notebooks(clone, ran):
