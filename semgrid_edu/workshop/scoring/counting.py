@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
-from semgrid_edu.crf import reliability
+from semgrid_edu.crf.temperature import Reliability, reliability
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
@@ -54,6 +54,19 @@ class GridCounts(NamedTuple):
     methods: tuple[str, ...]
     confusions: FrameConfusions
     reliability: dict[str, NDArray[np.float64]]
+
+
+def reliability_of_sums(sums: NDArray) -> Reliability:
+    """Return how often a method is right by its confidence.
+
+    Parameters
+    ----------
+    sums : (3, B) float
+        As in `GridCounts.reliability`, perhaps added over several.
+    """
+    cells, confidence, right = sums
+    divisor = np.maximum(cells, 1)  # an empty bin has weight 0
+    return Reliability(confidence / divisor, right / divisor, cells.astype(np.int64))
 
 
 def count_grids(grids: Grids, frames: TrainingSet) -> GridCounts:

@@ -22,7 +22,7 @@ from semgrid_edu.workshop.paper.runs.training_runs import NetworkRun
 from semgrid_edu.workshop.paper.runs.variants import EXACT, CalibrationError
 from semgrid_edu.workshop.scheduler.runs import Run
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions, load_confusions, save_confusions, seed_confusions
-from semgrid_edu.workshop.scoring.counting import Grids, count_grids
+from semgrid_edu.workshop.scoring.counting import Grids, count_grids, reliability_of_sums
 from semgrid_edu.workshop.scoring.grids import MAJORITY, NETWORK, OCCUPANCY_ALONE, Refine, baseline_grids, network_grids
 
 CONFUSIONS, RELIABILITY = "confusions.npz", "reliability.npz"
@@ -107,9 +107,7 @@ class CountingRun(Run):
         DataError
             When the run hasn't ended, or its file is damaged.
         """
-        cells, confidence, right = read_arrays(self.folder(root) / RELIABILITY)[method]
-        some = np.maximum(cells, 1)
-        return Reliability(confidence / some, right / some, cells.astype(np.int64))
+        return reliability_of_sums(read_arrays(self.folder(root) / RELIABILITY)[method])
 
 
 def by_seed(

@@ -9,10 +9,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from semgrid_edu.crf import expected_calibration_error
-from semgrid_edu.crf.temperature import Reliability
 from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame
 from semgrid_edu.datasets.readers.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import sample_weights
@@ -21,14 +19,13 @@ from semgrid_edu.errors import check_whole
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.networks import WEIGHTS, Architecture, build_net, load_net
-from semgrid_edu.occupancy import State
 from semgrid_edu.pipeline import Stages
 from semgrid_edu.storage.files import check_writable, sha256, table_beside
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training import CHECKPOINT, TrainingParams, train
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions
-from semgrid_edu.workshop.scoring.counting import GridCounts, count_grids
-from semgrid_edu.workshop.scoring.grids import NETWORK, network_grids
+from semgrid_edu.workshop.scoring.counting import GridCounts, count_grids, reliability_of_sums
+from semgrid_edu.workshop.scoring.grids import NETWORK, majority_by_state, network_grids
 from semgrid_edu.workshop.scoring.score_with_interval import (
     markdown_table,
     on_cells,
@@ -133,8 +130,8 @@ def compare_real(
         for name in TABLE["later"] if split == LATER else WAYS:
             seeds = range(seed, seed + (1 if split == LATER else WAYS[name].seeds))
             folders = {k: runs / f"{split}, {name}, {k}" for k in seeds}
-            files = {k: _trained(WAYS[name], training, streets, folders[k], k) for k in seeds}
-            weights |= {folders[k].name: sha256(files[k]) for k in seeds}
+            files = {folder.name: _trained(WAYS[name], training, streets, folder, k) for k, folder in folders.items()}
+            weights |= {run: sha256(file) for run, file in files.items()}
             found[split] |= _scores_by_method([_count(name, file, test) for file in files.values()])
     command = f"semgrid-edu reproduce real-streets --scene {scene} --seed {seed}"
     return {"scores": found, "weights": weights, "seed": seed, **made_by(command, "numpy", "torch", "numba")}
@@ -209,16 +206,12 @@ def _count(name: str, weights: Path, test: list[Part]) -> Counted:
 
 def _count_states(training: list[Part], test: list[Part]) -> Counted:
     """Count the errors of the most frequent class of each occupancy state."""
-    counts = np.zeros((len(State), KITTI_14.n_semantic), np.int64)
-    for frames in (_Subset(*part) for part in training):
-        states, truth = frames.arrays["occupancy"].argmax(axis=1), frames.arrays["true"]
-        np.add.at(counts, (states[truth != IGNORE], truth[truth != IGNORE]), 1)
-    best = counts.argmax(axis=1)
-    found = []
-    for frames in (_Subset(*part) for part in test):
-        called = best[frames.arrays["occupancy"].argmax(axis=1)]
-        found.append((STATE_TABLE, count_grids(lambda k, called=called: {STATE_TABLE: called[k]}, frames)))
-    return {STATE_TABLE: found}
+    learned = [_Subset(*part).arrays for part in training]
+    truths = np.concatenate([arrays["true"].reshape(-1, 1, 1) for arrays in learned])
+    occupancy = np.concatenate([np.moveaxis(arrays["occupancy"], 1, -1).reshape(-1, 4, 1, 1) for arrays in learned])
+    best = majority_by_state(truths, occupancy)[:, 0, 0]  # every cell of every frame counts as one grid
+    called = [(frames, best[frames.arrays["occupancy"].argmax(axis=1)]) for frames in (_Subset(*part) for part in test)]
+    return {STATE_TABLE: [(STATE_TABLE, count_grids(lambda k, c=c: {STATE_TABLE: c[k]}, f)) for f, c in called]}
 
 
 def _scores_by_method(seeds: list[Counted]) -> dict[str, dict]:
@@ -229,7 +222,8 @@ def _scores_by_method(seeds: list[Counted]) -> dict[str, dict]:
 def _scores_of(seeds: list[list[tuple[str, GridCounts]]]) -> dict[str, object]:
     """Return the scores of a method, from its counts on each camera, for each seed."""
     drives = tuple(drive for _, counted in seeds[0] for drive in counted.confusions.drives)
-    matrices = np.stack([np.concatenate([_matrices(*part) for part in parts]) for parts in seeds])
+    of_parts = [[counted.confusions.of(name, "true").counts[name] for name, counted in parts] for parts in seeds]
+    matrices = np.stack([np.concatenate(parts) for parts in of_parts])  # (S, N, C, C), rows: labelled returns
     by_block = np.stack([FrameConfusions(drives, {"": one}).by_drive("") for one in matrices])
     kept = on_cells(by_block, "semantic", KITTI_14)
     total = matrices.sum(axis=(0, 1))[: KITTI_14.n_semantic]
@@ -239,20 +233,8 @@ def _scores_of(seeds: list[list[tuple[str, GridCounts]]]) -> dict[str, object]:
         "recall": {KITTI_14.names[c]: total[c, c] / row.sum() for c, row in enumerate(total) if row.any()},
         "cells": int(matrices[0].sum()),
         "frames": len(drives),
-        "ECE": _calibration_error(sum(diagrams)) if diagrams else None,
+        "ECE": expected_calibration_error(reliability_of_sums(sum(diagrams))) if diagrams else None,
     }
-
-
-def _matrices(method: str, counted: GridCounts) -> NDArray[np.int64]:
-    """Return the confusion matrix of each frame, (N, C, C), rows: labelled returns."""
-    return counted.confusions.of(method, "true").counts[method]
-
-
-def _calibration_error(sums: NDArray) -> float:
-    """Return the expected calibration error from cells, summed confidences and right cells by bin of confidence."""
-    cells, confidence, right = sums
-    divisor = np.maximum(cells, 1)  # an empty bin has weight 0
-    return expected_calibration_error(Reliability(confidence / divisor, right / divisor, cells))
 
 
 def real_streets_table(result: dict[str, object]) -> str:
