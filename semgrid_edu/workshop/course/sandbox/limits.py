@@ -11,7 +11,7 @@ from semgrid_edu.storage.files import table_beside
 from semgrid_edu.storage.provenance import shipped_folder
 from semgrid_edu.workshop.course.sandbox import linux
 
-PARTS = ("memory", "written files", "processes", "files", "network", "signals")
+PARTS = ("memory", "written files", "processes", "files", "modes and dates of files", "network", "signals")
 """All that is limited here; the grader's own process limits time."""
 
 MEGABYTE = 1_000_000
@@ -56,7 +56,7 @@ def limit_this_process(limits: Limits, folder: Path) -> list[str]:
     if linux.landlock_version():
         done += linux.give_up_files(*_readable(), [folder, Path("/dev/null")])
     # Landlock knows of networks only TCP; without sockets there is none.
-    return [*done, "network"] if linux.give_up_calls() else done
+    return [*done, "network", "modes and dates of files"] if linux.give_up_calls() else done
 
 
 def _limit_resources(limits: Limits) -> list[str]:

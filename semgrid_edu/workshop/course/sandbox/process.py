@@ -5,12 +5,13 @@ import queue
 import shlex
 import shutil
 import signal
+import stat
 import subprocess
 import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
 from functools import cache
@@ -25,8 +26,10 @@ from semgrid_edu.workshop.course.sandbox.values import Wire, decode, encode
 WORKER = ("-m", "semgrid_edu.workshop.course.sandbox.worker")
 """What Python is started with."""
 
-ALONE = ("unshare", "--user", "--map-current-user", "--net", "--ipc", "--pid", "--mount-proc", "--fork", "--kill-child")
-"""Starts a program that sees no network and no processes but its own (util-linux; needs no privileges)."""
+ALONE = tuple(
+    "setpriv --pdeathsig KILL unshare --user --map-current-user --net --ipc --pid --mount-proc --fork --kill-child".split()
+)
+"""Starts a program that sees no network and no processes but its own, and ends with this one (util-linux)."""
 
 INHERITED = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT")
 """What a student's process inherits of the environment."""
@@ -86,8 +89,8 @@ class StudentProcess:
         self.received: queue.Queue[bytes | None] = queue.Queue()
         self.speaker = threading.Thread(target=self._speak, daemon=True)
         self.speaker.start()
-        threading.Thread(target=self._watch, args=(3 * limits.written * MEGABYTE,), daemon=True).start()
         self.unlimited = self._greeted(limits, alone, container)
+        threading.Thread(target=self._watch, args=(limits, _namespace(self.process.pid)), daemon=True).start()
 
     def _started(self, command: Sequence[str]) -> subprocess.Popen:
         """Start the worker in a session of its own, with a pipe in each direction."""
@@ -117,9 +120,12 @@ class StudentProcess:
 
     def _limit(self, limits: Limits, alone: tuple[str, ...]) -> list[str]:
         """Let the process limit itself; return what it couldn't."""
-        limits = replace(limits, processes=limits.processes + _threads_of_this_user())
+        ours = os.getuid() if hasattr(os, "getuid") else None
+        limits = replace(limits, processes=limits.processes + _tasks(lambda at: at.stat().st_uid == ours))
         message = {"do": "limit", "limits": asdict(limits), "folder": str(self.folder)}
-        done = self.ask(message, time.monotonic() + STARTED)["done"] + (["network", "signals"] if alone else [])
+        done = self.ask(message, time.monotonic() + STARTED)["done"] + (
+            ["network", "processes", "signals"] * bool(alone)
+        )
         return [part for part in PARTS if part not in done]
 
     def _speak(self) -> None:
@@ -131,10 +137,12 @@ class StudentProcess:
             except (OSError, ValueError, MemoryError):
                 self.received.put(None)  # the process is no more
 
-    def _watch(self, most: int) -> None:
-        """End the process when all its files together become too large, or too many."""
+    def _watch(self, limits: Limits, namespace: str) -> None:
+        """End the process when it has too many processes, or when its files together become too large, or too many."""
         while self.process.poll() is None:
-            if _takes_too_much(self.folder, most):
+            if _takes_too_much(self.folder, 3 * limits.written * MEGABYTE) or (
+                namespace and _tasks(lambda at: os.readlink(at.parent / "ns" / "pid") == namespace) > limits.processes
+            ):
                 self._kill()
             time.sleep(WATCHED)
 
@@ -246,52 +254,47 @@ def _can_be_alone() -> bool:
     return subprocess.run([*ALONE, "true"], capture_output=True, check=False).returncode == 0
 
 
-def _threads_of_this_user() -> int:
-    """Return how many threads the user of this process has; 0 where there is no `/proc` to count them."""
-    user, count = os.getuid() if hasattr(os, "getuid") else None, 0
+def _namespace(pid: int) -> str:
+    """Return the name of the namespace of a process's children, "" if that is this process's own, too."""
+    with suppress(OSError):
+        name = os.readlink(f"/proc/{pid}/ns/pid_for_children")
+        return name if name != os.readlink("/proc/self/ns/pid") else ""
+    return ""
+
+
+def _tasks(counts: Callable[[Path], bool]) -> int:
+    """Return how many threads the processes have that count, given `/proc/PID/task`; 0 where there is no `/proc`."""
+    found = 0
     for tasks in Path("/proc").glob("[0-9]*/task"):
         with suppress(OSError):
-            count += sum(1 for _ in tasks.iterdir()) if tasks.stat().st_uid == user else 0
-    return count
+            found += sum(1 for _ in tasks.iterdir()) if counts(tasks) else 0
+    return found
 
 
 def _takes_too_much(folder: Path, most: int) -> bool:
-    """Return whether the files in a folder take more bytes, are too many, or hide where nobody can look."""
-    closed: list[str] = []
-    size = count = 0
-    for entry in _inside(folder, closed):
-        with suppress(FileNotFoundError):
-            found = entry.stat(follow_symlinks=False)
-            size, count = size + (getattr(found, "st_blocks", 0) * 512 or found.st_size), count + 1
-        if size > most or count > MOST_FILES:
+    """Return whether the files in a folder take more bytes, are too many, or lie where nobody can look."""
+    size, count, waiting = 0, 0, [str(folder)]
+    while waiting:
+        try:
+            with os.scandir(waiting.pop()) as entries:
+                for entry in entries:
+                    found = entry.stat(follow_symlinks=False)
+                    size, count = size + (getattr(found, "st_blocks", 0) * 512 or found.st_size), count + 1
+                    if stat.S_ISDIR(found.st_mode):
+                        waiting.append(entry.path)
+                    if size > most or count > MOST_FILES:
+                        return True
+        except (FileNotFoundError, NotADirectoryError):
+            continue
+        except OSError:  # a closed folder, or a path that is too long for the system
             return True
-    return bool(closed)
+    return False
 
 
 def _delete(folder: Path) -> None:
     """Delete a folder, even if it was made unreadable, or too deep for Python's own way."""
-    folder.chmod(0o700)
-    for entry in _inside(folder, []):
-        if entry.is_dir(follow_symlinks=False):
-            Path(entry.path).chmod(0o700)
     if shutil.which("rm"):
-        subprocess.run(["rm", "-rf", "--", folder], capture_output=True, check=False)
+        for command in (["chmod", "-R", "u+rwX"], ["rm", "-rf"]):
+            subprocess.run([*command, "--", folder], capture_output=True, check=False)
     else:
         shutil.rmtree(folder, ignore_errors=True)
-
-
-def _inside(folder: Path, closed: list[str]) -> Iterator[os.DirEntry]:
-    """Yield all that is in a folder, however deep; `closed` takes the folders in it that can't be opened."""
-    waiting = [str(folder)]
-    while waiting:
-        place = waiting.pop()
-        try:
-            with os.scandir(place) as found:
-                for entry in found:
-                    yield entry
-                    if entry.is_dir(follow_symlinks=False):
-                        waiting.append(entry.path)
-        except (FileNotFoundError, NotADirectoryError):
-            continue
-        except OSError:
-            closed.append(place)
