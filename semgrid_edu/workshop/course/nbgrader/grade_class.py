@@ -1,10 +1,15 @@
 """A whole class: every submission that was collected, graded by nbgrader on all cores."""
 
-from collections.abc import Iterator, Sequence
+import tempfile
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from functools import partial
 from glob import has_magic
 from multiprocessing import get_context
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import nbformat
 from nbformat.v4 import new_markdown_cell
@@ -18,14 +23,19 @@ from semgrid_edu.workshop.course.nbgrader.gradebook import (
     check_file,
     check_time,
     forget,
-    is_graded,
+    has_begun,
     open_gradebook,
     result_of,
     submissions,
     unfinished,
+    ungraded,
 )
 from semgrid_edu.workshop.course.nbgrader.preprocessors import CRASHED, prepare, starter
 from semgrid_edu.workshop.course.notebooks.build import write_notebook
+from semgrid_edu.workshop.course.sandbox.limits import limit_grader
+
+KILLED = "the file can't be graded: twice it ended the process that grades, perhaps for want of memory"
+"""The note on a submission that took the grader with it, among others and alone."""
 
 UNREADABLE = "unreadable"
 """The folder with notebooks that stand in for files that can't be read."""
@@ -63,29 +73,67 @@ def grade_course(
     UngradedError
         In the end, when submissions stay ungraded for a reason that isn't theirs; it names them, one per line.
     """
-    course = course.resolve()
-    wanted = [one for one in submissions(course, assignments) if again or not is_graded(course, *one)]
-    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
-        try:
-            failed = _failing_references(pool, course, settings, [assignment for assignment, _ in wanted])
-            ready = [one for one in wanted if one[0] not in failed]
-            waiting = {pool.submit(grade_one, course, *one, settings): one for one in ready}
-            yield from _as_they_end(course, waiting, failed)
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
+    course, failed = course.resolve(), {}
+    wanted = submissions(course, assignments) if again else ungraded(course, assignments)
+    yield from _in_pools(course, wanted, settings, workers, failed)
     if failed:
         raise UngradedError("\n".join(f"{which}: {says}" for which, says in failed.items()))
 
 
-def _as_they_end(course: Path, waiting: dict[Future, tuple[str, str]], failed: dict[str, str]) -> Iterator[Graded]:
-    """Yield results; note submissions that have none because their grading failed or its process was ended."""
+def _in_pools(course: Path, wanted: list, settings: GradeSettings, workers: int, failed: dict) -> Iterator[Graded]:
+    """Yield results; what was in work when a process died is graded again alone, so that only the one at fault is noted."""
+    with _pool(settings, workers) as pool:
+        failed |= _failing_references(pool, course, settings, [assignment for assignment, _ in wanted])
+        ready = [one for one in wanted if one[0] not in failed]
+        waiting = {pool.submit(grade_one, course, *one, settings): one for one in ready}
+        left = yield from _as_they_end(course, waiting, failed)
+    begun = [one for one in left if has_begun(course, *one)]
+    if begun and len(wanted) == 1:
+        yield _grade_stand_in(course, *begun[0], settings, f"{CRASHED}{KILLED}")
+    elif begun:
+        for one in begun:
+            yield from _in_pools(course, [one], settings, 1, failed)
+        yield from _in_pools(course, [one for one in left if one not in begun], settings, workers, failed)
+    else:
+        failed |= {_which(one): "the process that grades was ended" for one in left}
+
+
+@contextmanager
+def _pool(settings: GradeSettings, workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Start processes that grade, with temporary files in a folder that is deleted in the end, however they ended."""
+    with TemporaryDirectory(prefix="semgrid-grading-", ignore_cleanup_errors=True) as folder:
+        begin = partial(_begin, folder, settings.memory)
+        with ProcessPoolExecutor(workers, get_context("spawn"), begin) as pool:
+            try:
+                yield pool
+            except BaseException:
+                pool.shutdown(cancel_futures=True)
+                raise
+
+
+def _begin(folder: str, memory: int) -> None:
+    """Prepare a process that grades."""
+    tempfile.tempdir = folder
+    limit_grader(memory)
+
+
+def _as_they_end(course: Path, waiting: dict[Future, tuple[str, str]], failed: dict[str, str]) -> Generator:
+    """Yield results; note submissions whose grading failed, and return those that have none since a process died."""
+    left = []
     for done in tqdm(as_completed(waiting), "submissions", len(waiting)):
         try:
             yield done.result()
+        except BrokenProcessPool:
+            left.append(waiting[done])
         except Exception as error:
             forget(course, *waiting[done])
-            failed[", ".join(reversed(waiting[done]))] = one_line(error)
+            failed[_which(waiting[done])] = one_line(error)
+    return left
+
+
+def _which(submission: tuple[str, str]) -> str:
+    """Return how a submission is named."""
+    return ", ".join(reversed(submission))
 
 
 def _failing_references(
@@ -141,7 +189,8 @@ def grade_one(course: Path, assignment: str, student: str, settings: GradeSettin
     try:
         with unfinished(course, assignment, student):
             if fault := _graded_or_fault(course, assignment, student, settings):
-                _grade_stand_in(course, assignment, student, settings, f"{CRASHED}the file can't be graded: {fault}")
+                note = f"{CRASHED}the file can't be graded: {fault}"
+                return _grade_stand_in(course, assignment, student, settings, note)
             return result_of(course, assignment, student)
     except Exception as error:
         raise UngradedError(one_line(error)) from error
@@ -159,14 +208,16 @@ def _graded_or_fault(course: Path, assignment: str, student: str, settings: Grad
     return ""
 
 
-def _grade_stand_in(course: Path, assignment: str, student: str, settings: GradeSettings, note: str) -> None:
+def _grade_stand_in(course: Path, assignment: str, student: str, settings: GradeSettings, note: str) -> Graded:
     """Grade the exercise as students get it in place of a file that can't be graded; say so in the gradebook."""
     _stand_in(course, assignment, student, note)
-    autograde_one(course, assignment, student, settings, UNREADABLE)
-    with open_gradebook(course) as gradebook:
-        for comment in gradebook.find_submission_notebook(assignment, assignment, student).comments:
-            comment.auto_comment = note
-        gradebook.db.commit()
+    with unfinished(course, assignment, student):
+        autograde_one(course, assignment, student, settings, UNREADABLE)
+        with open_gradebook(course) as gradebook:
+            for comment in gradebook.find_submission_notebook(assignment, assignment, student).comments:
+                comment.auto_comment = note
+            gradebook.db.commit()
+    return result_of(course, assignment, student)
 
 
 def _stand_in(course: Path, assignment: str, student: str, note: str) -> None:

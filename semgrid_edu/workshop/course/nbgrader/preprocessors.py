@@ -1,8 +1,10 @@
 """What this course adds to nbgrader's autograde: submissions are made whole, and run apart from their tests."""
 
+import re
 import sys
 import zlib
 from collections.abc import Callable
+from html import escape
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
@@ -31,6 +33,12 @@ CRASHED = "Crashed: "
 
 SHOWN_TAGS = (*bleach.ALLOWED_TAGS, *table_beside(__file__)["tags"])
 """The HTML that Markdown becomes, and nothing that runs."""
+
+SHOWN_ATTRIBUTES: dict[str, str] = table_beside(__file__)["attributes"]
+"""The pattern of an attribute's value, by its name, or by tag and name."""
+
+MOST_TAGS = 1500
+"""A text with more tags is shown as it was written: to clean it may take the square of their number."""
 
 KEPT = ("kernelspec", "language_info")
 """What is kept of a notebook's metadata."""
@@ -258,8 +266,17 @@ def without_scripts(html: str) -> str:
         What nbconvert made of Markdown. This function stands in for its filter `strip_files_prefix`, the last that
         nbgrader applies.
     """
-    attributes = {**bleach.ALLOWED_ATTRIBUTES, "*": ["class", "id"], "img": ["src", "alt"]}
-    return bleach.clean(strip_files_prefix(html), tags=SHOWN_TAGS, attributes=attributes)
+    html = strip_files_prefix(html)
+    if html.count("<") > MOST_TAGS:
+        return f"<pre>{escape(html)}</pre>"
+    protocols = {*bleach.ALLOWED_PROTOCOLS, "data"}
+    return bleach.clean(html, tags=SHOWN_TAGS, attributes=_is_shown, protocols=protocols)
+
+
+def _is_shown(tag: str, name: str, value: str) -> bool:
+    """Return whether an attribute stays: links, colours of code, pictures within the text, but none from elsewhere."""
+    pattern = SHOWN_ATTRIBUTES.get(f"{tag} {name}", SHOWN_ATTRIBUTES.get(name, "(?!)"))
+    return re.fullmatch(pattern, value, re.IGNORECASE | re.DOTALL) is not None
 
 
 class NoteCrashes(NbGraderPreprocessor):
