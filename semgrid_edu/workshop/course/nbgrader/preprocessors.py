@@ -1,8 +1,8 @@
 """What this course adds to nbgrader's autograde: submissions are made whole, and run apart from their tests."""
 
+import hashlib
 import re
 import sys
-import zlib
 from collections.abc import Callable
 from html import escape
 from importlib.util import module_from_spec, spec_from_file_location
@@ -24,6 +24,8 @@ from traitlets import List as ListTrait
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.compiled import takes_files, user_cache
 from semgrid_edu.storage.files import table_beside
+from semgrid_edu.storage.reading import read_json
+from semgrid_edu.workshop.course.nbgrader.build import MARKER
 from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.notebook import INSTRUCTOR, cell_name, run_submission
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
@@ -75,6 +77,8 @@ class MakeWhole(NbGraderPreprocessor):
             blanks = {cell.name: _blank(cell, exercise) for cell in exercise.source_cells}
         # Any other metadata would be the student's: widgets, a title, what else is shown in feedback.
         nb.metadata = NotebookNode({name: nb.metadata[name] for name in KEPT if name in nb.metadata})
+        if not any(cell_name(cell) in blanks for cell in nb.cells):
+            _recognise(nb.cells, [blank for blank in blanks.values() if is_solution(blank)])
         _mark(nb.cells, blanks)
         nb.cells = _with_own_versions(nb.cells, blanks)
         _insert_missing(nb.cells, blanks)
@@ -98,6 +102,24 @@ def _blank(source: SourceCell, exercise) -> NotebookNode:
         **({"points": points[source.name]} if source.name in points else {}),
     )
     return cell
+
+
+def _recognise(cells: list[NotebookNode], answers: list[NotebookNode]) -> None:
+    """Name answers by what they define, in a notebook that has lost its metadata: the written one is its last text."""
+    found = 0
+    for answer in answers:
+        wanted = _defined(answer.source)
+        alike = [c for c in cells if c.cell_type == answer.cell_type and (wanted & _defined(c.source) or not wanted)]
+        if alike and (wanted or found):
+            alike[-1].metadata["nbgrader"] = NotebookNode(grade_id=cell_name(answer))
+            found += 1
+    if not found:
+        raise ValueError("no cell of this exercise was recognised, so a person must read it")
+
+
+def _defined(source: str) -> set[str]:
+    """Return the names of functions and classes at the left margin of a cell."""
+    return set(re.findall(r"^(?:def|class) +(\w+)", source, re.MULTILINE))
 
 
 def _mark(cells: list[NotebookNode], blanks: dict[str, NotebookNode]) -> None:
@@ -149,10 +171,31 @@ class ExecuteApart(NbGraderPreprocessor):
         with Gradebook(where["db_url"]) as gradebook:
             exercise = gradebook.find_notebook(where["notebook"], where["assignment"])
             trusted = {cell.name: cell.source for cell in exercise.source_cells}
-        variant = (zlib.crc32(where["student"].encode()),) if self.seed_by_student else ()
-        start = starter(self.memory, tuple(self.container))
+        variant = (student_variant(course, where["student"]),) if self.seed_by_student else ()
+        start = starter(self.memory, tuple(self.container), beside=Path(resources["metadata"]["path"]))
         resources[CRASHES] = run_submission(nb, trusted, lambda: start(prepared), self.timeout, variant)
         return nb, resources
+
+
+def student_variant(course: Path, student: str) -> int:
+    """Return which inputs a student's hidden tests draw: the same each time, and known to nobody without the salt.
+
+    Parameters
+    ----------
+    course : Path
+        A course that `build_course` wrote, with its salt.
+    student : str
+        The student.
+
+    Raises
+    ------
+    DataError
+        When the course has no salt.
+    """
+    salt = read_json(course / MARKER).get("salt")
+    if not salt:
+        raise DataError(course / MARKER, "a salt, which `semgrid-edu course build` adds", "none")
+    return int.from_bytes(hashlib.sha256(f"{salt} {student}".encode()).digest()[:8], "big")
 
 
 def use_instructor(folder: Path) -> None:
@@ -173,7 +216,9 @@ def use_instructor(folder: Path) -> None:
     spec.loader.exec_module(sys.modules[INSTRUCTOR])
 
 
-def starter(memory: int, container: tuple[str, ...], keeps: bool = False) -> Callable[[Path | None], StudentProcess]:
+def starter(
+    memory: int, container: tuple[str, ...], keeps: bool = False, beside: Path | None = None
+) -> Callable[[Path | None], StudentProcess]:
     """Return a function that starts a process for a student's code, given the folder of what is prepared.
 
     Parameters
@@ -184,8 +229,10 @@ def starter(memory: int, container: tuple[str, ...], keeps: bool = False) -> Cal
         A command that starts a program in a container; () for none.
     keeps : bool
         Whether the process adds what it compiles to that folder.
+    beside : Path, optional
+        The folder of a submission, for the files that were handed in beside it.
     """
-    return lambda prepared: StudentProcess(Limits(memory=memory), prepared, keeps, container)
+    return lambda prepared: StudentProcess(Limits(memory=memory), prepared, keeps, container, beside)
 
 
 def prepare(course: Path, assignment: str, memory: int, container: tuple[str, ...] = ()) -> Path:

@@ -18,10 +18,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.storage.files import atomic_path
 from semgrid_edu.workshop.course.sandbox.limits import MEGABYTE, PARTS, Limits
-from semgrid_edu.workshop.course.sandbox.values import Wire, decode, encode
+from semgrid_edu.workshop.course.sandbox.values import MOST_BYTES, Wire, decode, encode
 
 WORKER = ("-m", "semgrid_edu.workshop.course.sandbox.worker")
 """What Python is started with."""
@@ -62,6 +65,8 @@ class StudentProcess:
     container : tuple of str
         A command before the worker's that starts it in a container, such as ("docker", "run", ...); otherwise it is
         started in namespaces of its own where the system can.
+    beside : Path, optional
+        A folder with a notebook and what was handed in with it, which is copied beside the student's code.
 
     Raises
     ------
@@ -75,9 +80,14 @@ class StudentProcess:
     """
 
     def __init__(
-        self, limits: Limits, prepared: Path | None = None, keeps: bool = False, container: tuple[str, ...] = ()
+        self,
+        limits: Limits,
+        prepared: Path | None = None,
+        keeps: bool = False,
+        container: tuple[str, ...] = (),
+        beside: Path | None = None,
     ) -> None:
-        self.prepared, self.keeps = prepared, keeps
+        self.prepared, self.keeps, self.contained = prepared, keeps, bool(container)
         self.folder = Path(tempfile.mkdtemp(prefix="semgrid-answers-"))
         if prepared is not None:
             shutil.copytree(prepared, self.folder / "prepared")
@@ -90,6 +100,8 @@ class StudentProcess:
         self.speaker = threading.Thread(target=self._speak, daemon=True)
         self.speaker.start()
         self.unlimited = self._greeted(limits, alone, container)
+        if beside is not None:
+            self.ask({"do": "beside", "files": _files(beside)}, time.monotonic() + STARTED)
         threading.Thread(target=self._watch, args=(limits, _namespace(self.process.pid)), daemon=True).start()
 
     def _started(self, command: Sequence[str]) -> subprocess.Popen:
@@ -192,6 +204,22 @@ class StudentProcess:
             self.stop()
             raise ProcessEndedError from None
 
+    def begin_measuring(self) -> bool:
+        """Let the peak of the process's memory begin anew, seen from outside; False where the system can't tell it."""
+        try:
+            self.inner = int(Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text() or self.process.pid)
+            Path(f"/proc/{self.inner}/clear_refs").write_text("5")
+            self.held = _memory(self.inner)["RssAnon"]
+        except (OSError, ValueError, KeyError):
+            return False
+        return not self.contained
+
+    def megabytes(self) -> float:
+        """Return the most memory that the process has held since `begin_measuring`, beyond what it held then."""
+        now = _memory(self.inner)
+        # What is read of libraries meanwhile is nobody's array.
+        return (now["VmHWM"] - now["RssFile"] - now["RssShmem"] - self.held) / 1000
+
     def stop(self) -> None:
         """End the process with all that it has started, and delete its folder."""
         self.sent.put(None)
@@ -254,12 +282,28 @@ def _can_be_alone() -> bool:
     return subprocess.run([*ALONE, "true"], capture_output=True, check=False).returncode == 0
 
 
+def _files(folder: Path) -> dict[str, NDArray]:
+    """Return the files that lie beside a notebook: their bytes by their paths, as far as a message may hold them."""
+    found, room = {}, MOST_BYTES
+    for path in sorted(one for one in folder.rglob("*") if one.is_file() and not one.is_symlink()):
+        if path.suffix != ".ipynb" and path.stat().st_size <= room:
+            found[path.relative_to(folder).as_posix()] = np.fromfile(path, np.uint8)
+            room -= path.stat().st_size
+    return found
+
+
 def _namespace(pid: int) -> str:
     """Return the name of the namespace of a process's children, "" if that is this process's own, too."""
     with suppress(OSError):
         name = os.readlink(f"/proc/{pid}/ns/pid_for_children")
         return name if name != os.readlink("/proc/self/ns/pid") else ""
     return ""
+
+
+def _memory(pid: int) -> dict[str, int]:
+    """Return what Linux tells of a process's memory, by the names of proc(5), kilobytes of 1000 bytes."""
+    lines = (line.split() for line in Path(f"/proc/{pid}/status").read_text().splitlines())
+    return {line[0].rstrip(":"): int(line[1]) * 1024 // 1000 for line in lines if line[-1] == "kB"}
 
 
 def _tasks(counts: Callable[[Path], bool]) -> int:
