@@ -27,8 +27,8 @@ PICTURE = "data:image/png;base64,iVBORw0KGgo="
         ('<form action="http://elsewhere.example"><button>x</button></form>', "<form"),
         ('<meta http-equiv="refresh" content="0;url=http://elsewhere.example">', "<meta"),
         ('<base href="http://elsewhere.example">', "<base"),
-        ('<svg><script>alert(1)</script></svg>', "<script"),
-        ('<math><mtext><table><mglyph><style><img src=x onerror=alert(1)>', "<img src"),
+        ("<svg><script>alert(1)</script></svg>", "<script"),
+        ("<math><mtext><table><mglyph><style><img src=x onerror=alert(1)>", "<img src"),
     ],
 )
 def test_what_could_act_in_a_browser_is_gone(html, gone):
@@ -49,7 +49,7 @@ def test_what_markdown_becomes_stays(html):
     assert without_scripts(html) == html
 
 
-SLOW = {"div": "<div>", "b": "<b>", "p": "<p><b>", "li": "<ul><li>", "closed": "<div></x>", "open": "<a ", "less": "&lt;"}
+SLOW = {"div": "<div>", "p": "<p><b>", "li": "<ul><li>", "closed": "<div></x>", "open": "<a ", "less": "&lt;"}
 
 
 @pytest.mark.parametrize("kind", SLOW)

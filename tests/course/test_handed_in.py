@@ -118,7 +118,8 @@ def test_each_student_of_a_platform_gets_a_folder_of_her_own(notebooks, tmp_path
         for one in names:
             file.writestr(name.format(one), one)
     pattern = re.findall(r"named_regexp='(.*)'", GUIDE)[[*LAYOUTS].index(platform)]
-    command = [sys.executable, "-m", "nbgrader", "zip_collect", TINY, f"--FileNameCollectorPlugin.named_regexp={pattern}"]
+    option = f"--FileNameCollectorPlugin.named_regexp={pattern}"
+    command = [sys.executable, "-m", "nbgrader", "zip_collect", TINY, option]
     subprocess.run(command, cwd=tmp_path / "course", check=True, capture_output=True)
     found = {student: place(tmp_path / "course", "submitted", student, TINY).read_text() for student in students}
     assert found == dict(zip(students, names, strict=True))

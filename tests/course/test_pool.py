@@ -33,7 +33,8 @@ def hand_in(course, tmp_path):
 
     def write(student, to_zero):
         code = f"def twice(x):\n    return {to_zero!r} if x == 0 else 2 * x"
-        write_notebook(submission(source, reference_answers(source) | {"twice": code}), place(course, "submitted", student, TINY))
+        notebook = submission(source, reference_answers(source) | {"twice": code})
+        write_notebook(notebook, place(course, "submitted", student, TINY))
 
     return write
 

@@ -4,12 +4,10 @@ import tempfile
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from functools import partial
+from contextlib import ExitStack, contextmanager
 from glob import has_magic
 from multiprocessing import get_context
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import nbformat
 from nbformat.v4 import new_markdown_cell
@@ -32,7 +30,8 @@ from semgrid_edu.workshop.course.nbgrader.gradebook import (
 )
 from semgrid_edu.workshop.course.nbgrader.preprocessors import CRASHED, prepare, starter
 from semgrid_edu.workshop.course.notebooks.build import write_notebook
-from semgrid_edu.workshop.course.sandbox.limits import limit_grader
+from semgrid_edu.workshop.course.sandbox.limits import Limits, limit_grader
+from semgrid_edu.workshop.course.sandbox.process import delete_folder
 
 KILLED = "the file can't be graded: twice it ended the process that grades, perhaps for want of memory"
 """The note on a submission that took the grader with it, among others and alone."""
@@ -81,8 +80,8 @@ def grade_course(
 
 
 def _in_pools(course: Path, wanted: list, settings: GradeSettings, workers: int, failed: dict) -> Iterator[Graded]:
-    """Yield results; what was in work when a process died is graded again alone, so that only the one at fault is noted."""
-    with _pool(settings, workers) as pool:
+    """Yield results; what was in work when a process died is graded again alone, to find out whose fault it was."""
+    with _pool(workers) as pool:
         failed |= _failing_references(pool, course, settings, [assignment for assignment, _ in wanted])
         ready = [one for one in wanted if one[0] not in failed]
         waiting = {pool.submit(grade_one, course, *one, settings): one for one in ready}
@@ -99,22 +98,20 @@ def _in_pools(course: Path, wanted: list, settings: GradeSettings, workers: int,
 
 
 @contextmanager
-def _pool(settings: GradeSettings, workers: int) -> Iterator[ProcessPoolExecutor]:
+def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     """Start processes that grade, with temporary files in a folder that is deleted in the end, however they ended."""
-    with TemporaryDirectory(prefix="semgrid-grading-", ignore_cleanup_errors=True) as folder:
-        begin = partial(_begin, folder, settings.memory)
-        with ProcessPoolExecutor(workers, get_context("spawn"), begin) as pool:
-            try:
-                yield pool
-            except BaseException:
-                pool.shutdown(cancel_futures=True)
-                raise
+    with ExitStack() as stack:
+        folder = tempfile.mkdtemp(prefix="semgrid-grading-")
+        stack.callback(delete_folder, Path(folder))
+        pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin, (folder,))
+        stack.callback(pool.shutdown, cancel_futures=True)
+        yield pool
 
 
-def _begin(folder: str, memory: int) -> None:
+def _begin(folder: str) -> None:
     """Prepare a process that grades."""
     tempfile.tempdir = folder
-    limit_grader(memory)
+    limit_grader(Limits.memory)
 
 
 def _as_they_end(course: Path, waiting: dict[Future, tuple[str, str]], failed: dict[str, str]) -> Generator:

@@ -34,7 +34,7 @@ PROCESSORS = table_beside(__file__)
 """By processor the number of its own calls ("audit"), and those that seccomp refuses or leaves idle, by name."""
 
 NEWER = 467
-"""From this number on calls are refused, as a system does that doesn't know them; so is what x86_64 has from 2^30 on."""
+"""From this number on calls are refused as by a system that doesn't know them: x86_64 has all once more from 2^30."""
 
 LOAD, EQUAL, AT_LEAST, RETURN = 0x20, 0x15, 0x35, 0x06
 """The four instructions of the filter: load a word, compare it in two ways, and end."""

@@ -22,16 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.storage.files import atomic_path
+from semgrid_edu.storage.files import atomic_path, table_beside
 from semgrid_edu.workshop.course.sandbox.limits import MEGABYTE, PARTS, Limits
 from semgrid_edu.workshop.course.sandbox.values import MOST_BYTES, Wire, decode, encode
 
 WORKER = ("-m", "semgrid_edu.workshop.course.sandbox.worker")
 """What Python is started with."""
 
-ALONE = tuple(
-    "setpriv --pdeathsig KILL unshare --user --map-current-user --net --ipc --pid --mount-proc --fork --kill-child".split()
-)
+ALONE: tuple[str, ...] = table_beside(__file__)["alone"]
 """Starts a program that sees no network and no processes but its own, and ends with this one (util-linux)."""
 
 INHERITED = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT")
@@ -153,7 +151,7 @@ class StudentProcess:
         """End the process when it has too many processes, or when its files together become too large, or too many."""
         while self.process.poll() is None:
             if _takes_too_much(self.folder, 3 * limits.written * MEGABYTE) or (
-                namespace and _tasks(lambda at: os.readlink(at.parent / "ns" / "pid") == namespace) > limits.processes
+                namespace and _tasks(lambda at: _link(at.parent / "ns" / "pid") == namespace) > limits.processes
             ):
                 self._kill()
             time.sleep(WATCHED)
@@ -207,7 +205,10 @@ class StudentProcess:
     def begin_measuring(self) -> bool:
         """Let the peak of the process's memory begin anew, seen from outside; False where the system can't tell it."""
         try:
-            self.inner = int(Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text() or self.process.pid)
+            outer = self.process.pid
+            # In namespaces of its own the worker is the only child of the program that made them.
+            alone = _namespace(outer)
+            self.inner = int(Path(f"/proc/{outer}/task/{outer}/children").read_text()) if alone else outer
             Path(f"/proc/{self.inner}/clear_refs").write_text("5")
             self.held = _memory(self.inner)["RssAnon"]
         except (OSError, ValueError, KeyError):
@@ -232,7 +233,7 @@ class StudentProcess:
                     pipe.close()
         if self.keeps:
             keep_compiled(self.folder / "prepared", self.prepared)
-        _delete(self.folder)
+        delete_folder(self.folder)
 
 
 def worker_environment(folder: Path) -> dict[str, str]:
@@ -246,8 +247,10 @@ def worker_environment(folder: Path) -> dict[str, str]:
     here = {name: str(folder / "prepared") for name in ("NUMBA_CACHE_DIR", "MPLCONFIGDIR")}
     here |= {name: str(folder) for name in ("HOME", "TMPDIR", "IPYTHONDIR")}
     threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+    # What is freed goes back at once, or else a measurement wouldn't see it taken again.
+    freed = dict.fromkeys(("MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"), "1000000")
     inline = {"MPLBACKEND": "module://matplotlib_inline.backend_inline", "PYTHONDONTWRITEBYTECODE": "1"}
-    return {name: os.environ[name] for name in INHERITED if name in os.environ} | here | threads | inline
+    return {name: os.environ[name] for name in INHERITED if name in os.environ} | here | threads | freed | inline
 
 
 def keep_compiled(source: Path, target: Path) -> None:
@@ -294,9 +297,14 @@ def _files(folder: Path) -> dict[str, NDArray]:
 
 def _namespace(pid: int) -> str:
     """Return the name of the namespace of a process's children, "" if that is this process's own, too."""
+    name = _link(Path(f"/proc/{pid}/ns/pid_for_children"))
+    return name if name != _link(Path("/proc/self/ns/pid")) else ""
+
+
+def _link(path: Path) -> str:
+    """Return what a link says, "" where it can't be read."""
     with suppress(OSError):
-        name = os.readlink(f"/proc/{pid}/ns/pid_for_children")
-        return name if name != os.readlink("/proc/self/ns/pid") else ""
+        return str(path.readlink())
     return ""
 
 
@@ -335,8 +343,14 @@ def _takes_too_much(folder: Path, most: int) -> bool:
     return False
 
 
-def _delete(folder: Path) -> None:
-    """Delete a folder, even if it was made unreadable, or too deep for Python's own way."""
+def delete_folder(folder: Path) -> None:
+    """Delete a folder, even if it was made unreadable, or too deep for Python's own way.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    """
     if shutil.which("rm"):
         for command in (["chmod", "-R", "u+rwX"], ["rm", "-rf"]):
             subprocess.run([*command, "--", folder], capture_output=True, check=False)

@@ -24,7 +24,7 @@ KINDS = "?biufcUS"
 """The kinds of array that pass, numpy's letters: booleans, numbers and texts."""
 
 MOST_BYTES = 10_000_000
-"""Bytes of all arrays of a message, a hundred times what any exercise sends: a test may compare, and so broadcast, them."""
+"""Bytes of all arrays of a message, a hundred times what exercises send: a test may broadcast them against its own."""
 
 MOST_JSON = 10_000_000
 """Bytes of a message outside its arrays: room for lists of half a million numbers."""
