@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from semgrid_edu.workshop.course.nbgrader.preprocessors import without_scripts
+from semgrid_edu.workshop.course.nbgrader.cleaning import without_scripts
 
 PICTURE = "data:image/png;base64,iVBORw0KGgo="
 

@@ -12,10 +12,15 @@ from tiny_course import tiny_notebooks
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.reading import read_json
-from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, place, reference_answers, submission
+from semgrid_edu.workshop.course.nbgrader.autograde import (
+    GradeSettings,
+    place,
+    reference_answers,
+    student_variant,
+    submission,
+)
 from semgrid_edu.workshop.course.nbgrader.build import MARKER, build_course
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_one
-from semgrid_edu.workshop.course.nbgrader.preprocessors import student_variant
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, write_notebook
 
 TINY = "00_tiny"

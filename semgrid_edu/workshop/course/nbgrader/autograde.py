@@ -1,6 +1,7 @@
 """One submission, graded by nbgrader: its score and messages are then in the course's gradebook and folders."""
 
 import copy
+import hashlib
 import warnings
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -12,7 +13,14 @@ from nbgrader.utils import is_solution
 from sqlalchemy.exc import DatabaseError, SAWarning
 
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.workshop.course.nbgrader.build import caught_errors, course_api, failure_reason, student_version
+from semgrid_edu.storage.reading import read_json
+from semgrid_edu.workshop.course.nbgrader.build import (
+    MARKER,
+    caught_errors,
+    course_api,
+    failure_reason,
+    student_version,
+)
 from semgrid_edu.workshop.course.notebooks.build import read_percent
 
 PATIENCE = 10
@@ -141,3 +149,24 @@ def place(course: Path, step: str, student: str, assignment: str) -> Path:
         Whose notebook.
     """
     return course / step / student / assignment / f"{assignment}.ipynb"
+
+
+def student_variant(course: Path, student: str) -> int:
+    """Return which inputs a student's hidden tests draw: the same each time, and known to nobody without the salt.
+
+    Parameters
+    ----------
+    course : Path
+        A course that `build_course` wrote, with its salt.
+    student : str
+        The student.
+
+    Raises
+    ------
+    DataError
+        When the course has no salt.
+    """
+    salt = read_json(course / MARKER).get("salt")
+    if not salt:
+        raise DataError(course / MARKER, "a salt, which `semgrid-edu course build` adds", "none")
+    return int.from_bytes(hashlib.sha256(f"{salt} {student}".encode()).digest()[:8], "big")

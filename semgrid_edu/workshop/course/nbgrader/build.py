@@ -13,15 +13,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 from nbformat import NotebookNode
+from nbgrader import preprocessors as steps
 from nbgrader.apps import NbGraderAPI
-from nbgrader.preprocessors import (
-    CheckCellMetadata,
-    ClearHiddenTests,
-    ClearOutput,
-    ClearSolutions,
-    ComputeChecksums,
-    LockCells,
-)
 from traitlets.config import PyFileConfigLoader
 
 from semgrid_edu.errors import ArgumentError, DataError
@@ -35,7 +28,10 @@ from semgrid_edu.workshop.course.notebooks.build import (
     write_notebook,
 )
 
-RELEASE_STEPS = (LockCells, ClearSolutions, ClearOutput, ClearHiddenTests, ComputeChecksums, CheckCellMetadata)
+RELEASE_STEPS = (
+    *(steps.LockCells, steps.ClearSolutions, steps.ClearOutput, steps.ClearHiddenTests),
+    *(steps.ComputeChecksums, steps.CheckCellMetadata),
+)
 """What nbgrader's generate_assignment does to a notebook, without its gradebook."""
 
 MARKER = "semgrid_course.json"

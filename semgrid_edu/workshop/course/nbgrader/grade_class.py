@@ -14,24 +14,14 @@ from nbformat.v4 import new_markdown_cell
 from tqdm import tqdm
 
 from semgrid_edu.errors import DataError
+from semgrid_edu.workshop.course.nbgrader import gradebook as book
 from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, UngradedError, autograde_one, place
 from semgrid_edu.workshop.course.nbgrader.build import one_line
-from semgrid_edu.workshop.course.nbgrader.gradebook import (
-    Graded,
-    check_file,
-    check_time,
-    forget,
-    has_begun,
-    open_gradebook,
-    result_of,
-    submissions,
-    unfinished,
-    ungraded,
-)
+from semgrid_edu.workshop.course.nbgrader.gradebook import Graded, submissions
 from semgrid_edu.workshop.course.nbgrader.preprocessors import CRASHED, prepare, starter
 from semgrid_edu.workshop.course.notebooks.build import write_notebook
 from semgrid_edu.workshop.course.sandbox.limits import Limits, limit_grader
-from semgrid_edu.workshop.course.sandbox.process import delete_folder
+from semgrid_edu.workshop.course.sandbox.taken import delete_folder
 
 KILLED = "the file can't be graded: twice it ended the process that grades, perhaps for want of memory"
 """The note on a submission that took the grader with it, among others and alone."""
@@ -73,7 +63,7 @@ def grade_course(
         In the end, when submissions stay ungraded for a reason that isn't theirs; it names them, one per line.
     """
     course, failed = course.resolve(), {}
-    wanted = submissions(course, assignments) if again else ungraded(course, assignments)
+    wanted = submissions(course, assignments) if again else book.ungraded(course, assignments)
     yield from _in_pools(course, wanted, settings, workers, failed)
     if failed:
         raise UngradedError("\n".join(f"{which}: {says}" for which, says in failed.items()))
@@ -86,7 +76,7 @@ def _in_pools(course: Path, wanted: list, settings: GradeSettings, workers: int,
         ready = [one for one in wanted if one[0] not in failed]
         waiting = {pool.submit(grade_one, course, *one, settings): one for one in ready}
         left = yield from _as_they_end(course, waiting, failed)
-    begun = [one for one in left if has_begun(course, *one)]
+    begun = [one for one in left if book.has_begun(course, *one)]
     if begun and len(wanted) == 1:
         yield _grade_stand_in(course, *begun[0], settings, f"{CRASHED}{KILLED}")
     elif begun:
@@ -123,7 +113,7 @@ def _as_they_end(course: Path, waiting: dict[Future, tuple[str, str]], failed: d
         except BrokenProcessPool:
             left.append(waiting[done])
         except Exception as error:
-            forget(course, *waiting[done])
+            book.forget(course, *waiting[done])
             failed[_which(waiting[done])] = one_line(error)
     return left
 
@@ -184,11 +174,11 @@ def grade_one(course: Path, assignment: str, student: str, settings: GradeSettin
         note = f"{CRASHED}nbgrader takes * ? [ in a student's name for a pattern: rename the folder"
         return Graded(student, assignment, 0, 0, 0, note)
     try:
-        with unfinished(course, assignment, student):
+        with book.unfinished(course, assignment, student):
             if fault := _graded_or_fault(course, assignment, student, settings):
                 note = f"{CRASHED}the file can't be graded: {fault}"
                 return _grade_stand_in(course, assignment, student, settings, note)
-            return result_of(course, assignment, student)
+            return book.result_of(course, assignment, student)
     except Exception as error:
         raise UngradedError(one_line(error)) from error
 
@@ -196,9 +186,9 @@ def grade_one(course: Path, assignment: str, student: str, settings: GradeSettin
 def _graded_or_fault(course: Path, assignment: str, student: str, settings: GradeSettings) -> str:
     """Grade a submission; return what is wrong with its file, "" when it has been graded."""
     path = place(course, "submitted", student, assignment)
-    check_time(path)
+    book.check_time(path)
     try:
-        check_file(path)
+        book.check_file(path)
         autograde_one(course, assignment, student, settings)
     except DataError as error:
         return error.args[2] if error.path == path else one_line(error)
@@ -208,13 +198,13 @@ def _graded_or_fault(course: Path, assignment: str, student: str, settings: Grad
 def _grade_stand_in(course: Path, assignment: str, student: str, settings: GradeSettings, note: str) -> Graded:
     """Grade the exercise as students get it in place of a file that can't be graded; say so in the gradebook."""
     _stand_in(course, assignment, student, note)
-    with unfinished(course, assignment, student):
+    with book.unfinished(course, assignment, student):
         autograde_one(course, assignment, student, settings, UNREADABLE)
-        with open_gradebook(course) as gradebook:
+        with book.open_gradebook(course) as gradebook:
             for comment in gradebook.find_submission_notebook(assignment, assignment, student).comments:
                 comment.auto_comment = note
             gradebook.db.commit()
-    return result_of(course, assignment, student)
+    return book.result_of(course, assignment, student)
 
 
 def _stand_in(course: Path, assignment: str, student: str, note: str) -> None:

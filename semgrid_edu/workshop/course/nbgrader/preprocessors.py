@@ -1,18 +1,14 @@
 """What this course adds to nbgrader's autograde: submissions are made whole, and run apart from their tests."""
 
-import hashlib
 import re
 import sys
 from collections.abc import Callable
-from html import escape
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
-import bleach
 import nbformat
 from filelock import FileLock
 from nbconvert.exporters.exporter import ResourcesDict
-from nbconvert.filters import strip_files_prefix
 from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell, new_markdown_cell
 from nbgrader.api import Gradebook, SourceCell
@@ -23,24 +19,13 @@ from traitlets import List as ListTrait
 
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.compiled import takes_files, user_cache
-from semgrid_edu.storage.files import table_beside
-from semgrid_edu.storage.reading import read_json
-from semgrid_edu.workshop.course.nbgrader.build import MARKER
+from semgrid_edu.workshop.course.nbgrader.autograde import student_variant
 from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.notebook import INSTRUCTOR, cell_name, run_submission
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 
 CRASHED = "Crashed: "
 """How a comment begins that says what ended Python."""
-
-SHOWN_TAGS = (*bleach.ALLOWED_TAGS, *table_beside(__file__)["tags"])
-"""The HTML that Markdown becomes, and nothing that runs."""
-
-SHOWN_ATTRIBUTES: dict[str, str] = table_beside(__file__)["attributes"]
-"""The pattern of an attribute's value, by its name, or by tag and name."""
-
-MOST_TAGS = 1500
-"""A text with more tags is shown as it was written: to clean it may take the square of their number."""
 
 KEPT = ("kernelspec", "language_info")
 """What is kept of a notebook's metadata."""
@@ -177,27 +162,6 @@ class ExecuteApart(NbGraderPreprocessor):
         return nb, resources
 
 
-def student_variant(course: Path, student: str) -> int:
-    """Return which inputs a student's hidden tests draw: the same each time, and known to nobody without the salt.
-
-    Parameters
-    ----------
-    course : Path
-        A course that `build_course` wrote, with its salt.
-    student : str
-        The student.
-
-    Raises
-    ------
-    DataError
-        When the course has no salt.
-    """
-    salt = read_json(course / MARKER).get("salt")
-    if not salt:
-        raise DataError(course / MARKER, "a salt, which `semgrid-edu course build` adds", "none")
-    return int.from_bytes(hashlib.sha256(f"{salt} {student}".encode()).digest()[:8], "big")
-
-
 def use_instructor(folder: Path) -> None:
     """Let test cells import the hidden tests of this course, and of no other.
 
@@ -302,28 +266,6 @@ def instructors_cells(notebook: NotebookNode) -> dict[str, str]:
     """
     cells = [cell for cell in notebook.cells if cell.metadata.get("nbgrader") and not is_solution(cell)]
     return {cell.metadata.nbgrader.grade_id: cell.source for cell in cells}
-
-
-def without_scripts(html: str) -> str:
-    """Take out of a text cell's HTML whatever could run in a browser: the instructor's is logged in.
-
-    Parameters
-    ----------
-    html : str
-        What nbconvert made of Markdown. This function stands in for its filter `strip_files_prefix`, the last that
-        nbgrader applies.
-    """
-    html = strip_files_prefix(html)
-    if html.count("<") > MOST_TAGS:
-        return f"<pre>{escape(html)}</pre>"
-    protocols = {*bleach.ALLOWED_PROTOCOLS, "data"}
-    return bleach.clean(html, tags=SHOWN_TAGS, attributes=_is_shown, protocols=protocols)
-
-
-def _is_shown(tag: str, name: str, value: str) -> bool:
-    """Return whether an attribute stays: links, colours of code, pictures within the text, but none from elsewhere."""
-    pattern = SHOWN_ATTRIBUTES.get(f"{tag} {name}", SHOWN_ATTRIBUTES.get(name, "(?!)"))
-    return re.fullmatch(pattern, value, re.IGNORECASE | re.DOTALL) is not None
 
 
 class NoteCrashes(NbGraderPreprocessor):

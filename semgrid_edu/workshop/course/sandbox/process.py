@@ -5,7 +5,6 @@ import queue
 import shlex
 import shutil
 import signal
-import stat
 import subprocess
 import sys
 import tempfile
@@ -24,6 +23,13 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.storage.files import atomic_path, table_beside
 from semgrid_edu.workshop.course.sandbox.limits import MEGABYTE, PARTS, Limits
+from semgrid_edu.workshop.course.sandbox.taken import (
+    count_tasks,
+    delete_folder,
+    memory_of,
+    namespace_of,
+    takes_too_much,
+)
 from semgrid_edu.workshop.course.sandbox.values import MOST_BYTES, Wire, decode, encode
 
 WORKER = ("-m", "semgrid_edu.workshop.course.sandbox.worker")
@@ -37,9 +43,6 @@ INHERITED = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT")
 
 WATCHED = 0.5
 """Seconds from one look at the files of a process to the next."""
-
-MOST_FILES = 20_000
-"""How many files and folders a process may have."""
 
 STARTED = 60.0
 """Seconds that a process may take to start."""
@@ -100,7 +103,7 @@ class StudentProcess:
         self.unlimited = self._greeted(limits, alone, container)
         if beside is not None:
             self.ask({"do": "beside", "files": _files(beside)}, time.monotonic() + STARTED)
-        threading.Thread(target=self._watch, args=(limits, _namespace(self.process.pid)), daemon=True).start()
+        threading.Thread(target=self._watch, args=(limits, namespace_of(self.process.pid)), daemon=True).start()
 
     def _started(self, command: Sequence[str]) -> subprocess.Popen:
         """Start the worker in a session of its own, with a pipe in each direction."""
@@ -131,7 +134,7 @@ class StudentProcess:
     def _limit(self, limits: Limits, alone: tuple[str, ...]) -> list[str]:
         """Let the process limit itself; return what it couldn't."""
         ours = os.getuid() if hasattr(os, "getuid") else None
-        limits = replace(limits, processes=limits.processes + _tasks(lambda at: at.stat().st_uid == ours))
+        limits = replace(limits, processes=limits.processes + count_tasks(lambda at: at.stat().st_uid == ours))
         message = {"do": "limit", "limits": asdict(limits), "folder": str(self.folder)}
         done = self.ask(message, time.monotonic() + STARTED)["done"] + (
             ["network", "processes", "signals"] * bool(alone)
@@ -150,8 +153,9 @@ class StudentProcess:
     def _watch(self, limits: Limits, namespace: str) -> None:
         """End the process when it has too many processes, or when its files together become too large, or too many."""
         while self.process.poll() is None:
-            if _takes_too_much(self.folder, 3 * limits.written * MEGABYTE) or (
-                namespace and _tasks(lambda at: _link(at.parent / "ns" / "pid") == namespace) > limits.processes
+            if takes_too_much(self.folder, 3 * limits.written * MEGABYTE) or (
+                namespace
+                and count_tasks(lambda at: str((at.parent / "ns" / "pid").readlink()) == namespace) > limits.processes
             ):
                 self._kill()
             time.sleep(WATCHED)
@@ -207,17 +211,17 @@ class StudentProcess:
         try:
             outer = self.process.pid
             # In namespaces of its own the worker is the only child of the program that made them.
-            alone = _namespace(outer)
+            alone = namespace_of(outer)
             self.inner = int(Path(f"/proc/{outer}/task/{outer}/children").read_text()) if alone else outer
             Path(f"/proc/{self.inner}/clear_refs").write_text("5")
-            self.held = _memory(self.inner)["RssAnon"]
+            self.held = memory_of(self.inner)["RssAnon"]
         except (OSError, ValueError, KeyError):
             return False
         return not self.contained
 
     def megabytes(self) -> float:
         """Return the most memory that the process has held since `begin_measuring`, beyond what it held then."""
-        now = _memory(self.inner)
+        now = memory_of(self.inner)
         # What is read of libraries meanwhile is nobody's array.
         return (now["VmHWM"] - now["RssFile"] - now["RssShmem"] - self.held) / 1000
 
@@ -293,66 +297,3 @@ def _files(folder: Path) -> dict[str, NDArray]:
             found[path.relative_to(folder).as_posix()] = np.fromfile(path, np.uint8)
             room -= path.stat().st_size
     return found
-
-
-def _namespace(pid: int) -> str:
-    """Return the name of the namespace of a process's children, "" if that is this process's own, too."""
-    name = _link(Path(f"/proc/{pid}/ns/pid_for_children"))
-    return name if name != _link(Path("/proc/self/ns/pid")) else ""
-
-
-def _link(path: Path) -> str:
-    """Return what a link says, "" where it can't be read."""
-    with suppress(OSError):
-        return str(path.readlink())
-    return ""
-
-
-def _memory(pid: int) -> dict[str, int]:
-    """Return what Linux tells of a process's memory, by the names of proc(5), kilobytes of 1000 bytes."""
-    lines = (line.split() for line in Path(f"/proc/{pid}/status").read_text().splitlines())
-    return {line[0].rstrip(":"): int(line[1]) * 1024 // 1000 for line in lines if line[-1] == "kB"}
-
-
-def _tasks(counts: Callable[[Path], bool]) -> int:
-    """Return how many threads the processes have that count, given `/proc/PID/task`; 0 where there is no `/proc`."""
-    found = 0
-    for tasks in Path("/proc").glob("[0-9]*/task"):
-        with suppress(OSError):
-            found += sum(1 for _ in tasks.iterdir()) if counts(tasks) else 0
-    return found
-
-
-def _takes_too_much(folder: Path, most: int) -> bool:
-    """Return whether the files in a folder take more bytes, are too many, or lie where nobody can look."""
-    size, count, waiting = 0, 0, [str(folder)]
-    while waiting:
-        try:
-            with os.scandir(waiting.pop()) as entries:
-                for entry in entries:
-                    found = entry.stat(follow_symlinks=False)
-                    size, count = size + (getattr(found, "st_blocks", 0) * 512 or found.st_size), count + 1
-                    if stat.S_ISDIR(found.st_mode):
-                        waiting.append(entry.path)
-                    if size > most or count > MOST_FILES:
-                        return True
-        except (FileNotFoundError, NotADirectoryError):
-            continue
-        except OSError:  # a closed folder, or a path that is too long for the system
-            return True
-    return False
-
-
-def delete_folder(folder: Path) -> None:
-    """Delete a folder, even if it was made unreadable, or too deep for Python's own way.
-
-    Parameters
-    ----------
-    folder : Path
-        The folder.
-    """
-    if shutil.which("rm"):
-        for command in (["chmod", "-R", "u+rwX"], ["rm", "-rf"]):
-            subprocess.run([*command, "--", folder], capture_output=True, check=False)
-    else:
-        shutil.rmtree(folder, ignore_errors=True)
