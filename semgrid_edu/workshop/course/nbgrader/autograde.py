@@ -14,13 +14,8 @@ from sqlalchemy.exc import DatabaseError, SAWarning
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.reading import read_json
-from semgrid_edu.workshop.course.nbgrader.build import (
-    MARKER,
-    caught_errors,
-    course_api,
-    failure_reason,
-    student_version,
-)
+from semgrid_edu.workshop.course.nbgrader import build
+from semgrid_edu.workshop.course.nbgrader.build import MARKER
 from semgrid_edu.workshop.course.notebooks.build import read_percent
 
 PATIENCE = 10
@@ -82,7 +77,7 @@ def submission(source: Path, answers: Mapping[str, str]) -> NotebookNode:
     ArgumentError
         When an answer belongs to no cell.
     """
-    notebook = copy.deepcopy(student_version(source))
+    notebook = copy.deepcopy(build.student_version(source))
     cells = {c.metadata.nbgrader.grade_id: c for c in notebook.cells if is_solution(c)}
     for name, text in answers.items():
         if name not in cells:
@@ -114,18 +109,18 @@ def autograde_one(
     UngradedError
         When it could not for a reason that isn't the file's, such as a full disk or a gradebook that stays locked.
     """
-    with course_api(course) as api, warnings.catch_warnings():
+    with build.course_api(course) as api, warnings.catch_warnings():
         # nbgrader 0.9.6 builds a submission outside its database session.
         warnings.filterwarnings("ignore", "Object of type <Submitted", SAWarning)
         api.config.ExecuteApart.merge(asdict(settings) | {"container": list(settings.container)})
         api.coursedir.submitted_directory = submitted
         for _ in range(PATIENCE):
-            with caught_errors(api.log) as errors:
+            with build.caught_errors(api.log) as errors:
                 result = api.autograde(assignment, student)
             if result["success"] or not any(map(_may_pass, errors)):
                 break
     if not result["success"]:
-        reason = failure_reason(result, errors)
+        reason = build.failure_reason(result, errors)
         if not errors or isinstance(errors[-1], NOT_THE_FILE):
             raise UngradedError(reason)
         raise DataError(place(course, submitted, student, assignment), "a notebook that can be graded", reason)

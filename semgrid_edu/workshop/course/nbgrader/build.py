@@ -28,10 +28,8 @@ from semgrid_edu.workshop.course.notebooks.build import (
     write_notebook,
 )
 
-RELEASE_STEPS = (
-    *(steps.LockCells, steps.ClearSolutions, steps.ClearOutput, steps.ClearHiddenTests),
-    *(steps.ComputeChecksums, steps.CheckCellMetadata),
-)
+CLEARED = steps.LockCells, steps.ClearSolutions, steps.ClearOutput, steps.ClearHiddenTests
+RELEASE_STEPS = *CLEARED, steps.ComputeChecksums, steps.CheckCellMetadata
 """What nbgrader's generate_assignment does to a notebook, without its gradebook."""
 
 MARKER = "semgrid_course.json"

@@ -191,12 +191,9 @@ def ungraded(course: Path, assignments: Sequence[str] = ()) -> list[tuple[str, s
 
     Parameters and errors are those of `submissions`.
     """
+    found = submissions(course, assignments)
     with open_gradebook(course) as book:
-        return [
-            one
-            for one in submissions(course, assignments)
-            if not (_is_up_to_date(course, *one) and _has_scores(book, *one))
-        ]
+        return [one for one in found if not (_is_up_to_date(course, *one) and _has_scores(book, *one))]
 
 
 def _is_up_to_date(course: Path, assignment: str, student: str) -> bool:

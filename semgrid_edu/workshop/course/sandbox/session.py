@@ -157,7 +157,7 @@ class Session:
     def _as_error(self, error: dict[str, Any]) -> Exception:
         """Return the error that an answer raised; where its inputs are secret, no more of it than the line."""
         if self.secret:
-            lines = min(MOST_LINES, max(cell.count("\n") + 1 for cell in self.cells))
+            lines = min(MOST_LINES, max((cell.count("\n") + 1 for cell in self.cells), default=0))
             says = f"an error in line {error['number']}" if error["number"] in range(1, lines + 1) else "an error"
             found = _standard_error(error | {"kind": "", "says": says, "line": ""})
             found.secret = says
