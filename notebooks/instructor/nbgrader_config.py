@@ -42,7 +42,7 @@ c.Autograde.autograde_preprocessors = [
 ]
 
 # The formgrader and feedback show a submission's text without the scripts that it may hold.
-c.HTMLExporter.filters = {"strip_files_prefix": "semgrid_edu.workshop.course.nbgrader.preprocessors.without_scripts"}
+c.HTMLExporter.filters = {"strip_files_prefix": "semgrid_edu.workshop.course.nbgrader.cleaning.without_scripts"}
 
 c.ExecuteApart.course = str(course)
 

@@ -27,7 +27,7 @@ from semgrid_edu.workshop.course.nbgrader.autograde import (
 )
 from semgrid_edu.workshop.course.nbgrader.build import build_course
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course, grade_one, missing_limits
-from semgrid_edu.workshop.course.nbgrader.gradebook import is_graded, misplaced, write_graded
+from semgrid_edu.workshop.course.nbgrader.gradebook import misplaced, ungraded, write_graded
 from semgrid_edu.workshop.course.nbgrader.preprocessors import instructors_cells
 from semgrid_edu.workshop.course.notebooks.build import write_notebook
 from semgrid_edu.workshop.course.sandbox.limits import Limits
@@ -62,6 +62,10 @@ def handed_in(course, right, request):
     student = request.node.name.translate(str.maketrans("[]", "--"))
     write_notebook(right, place(course, "submitted", student, TINY))
     return student
+
+
+def is_graded(course, assignment, student):
+    return (assignment, student) not in ungraded(course)
 
 
 def stays_ungraded(course, student, settings=GradeSettings(timeout=5)):  # noqa: B008 (it is frozen)

@@ -212,7 +212,7 @@ def shift(mass, down, right):
             "negative indices come round",
             task="shift",
             loses=2,
-            says="on inputs you haven't seen: it raises IndexError",
+            says="on inputs you haven't seen: it raises an error in line",
             code="""
 def shift(mass, down, right):
     flown = np.zeros_like(mass)

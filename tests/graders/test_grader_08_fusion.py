@@ -491,7 +491,7 @@ def balance(maps, n_classes):
             "maps of one size only",
             task="balance",
             loses=2,
-            says="on inputs you haven't seen: it raises ValueError",
+            says="on inputs you haven't seen: it raises an error in line",
             code="""
 def balance(maps, n_classes):
     maps = np.stack(maps)

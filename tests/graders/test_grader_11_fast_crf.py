@@ -659,7 +659,7 @@ def others_say(blur, Q):
             "three cells only",
             task="others-say",
             loses=2,
-            says="on inputs you haven't seen: it raises ValueError",
+            says="on inputs you haven't seen: it raises an error in line",
             code=own("np.diag(blur(np.eye(3)))[:, None]"),
         ),
         # ---- task 5

@@ -37,7 +37,8 @@ def hidden(check: Callable[..., None]) -> Callable[..., str]:
         except AnswerTimeoutError:
             return f"{answer.__name__}, on inputs you haven't seen: it does not come to an end"
         except Exception as error:
-            return f"{answer.__name__}, on inputs you haven't seen: it raises {type(error).__name__}: {error}"
+            says = getattr(error, "secret", f"{type(error).__name__}: {error}")
+            return f"{answer.__name__}, on inputs you haven't seen: it raises {says}"
         return ""
 
     return complaint

@@ -103,5 +103,5 @@ def grade(
         ungraded = str(error)
     typer.echo(f"all scores so far: {write_graded(folder)}")
     if ungraded:
-        told = "these stay ungraded, through no fault of the students; mend it, then the same command without --again"
+        told = "these stay ungraded, through no fault of the students; the same command without --again tries them anew"
         sys.exit(f"semgrid-edu: {told}:\n{ungraded}")

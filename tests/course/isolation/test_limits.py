@@ -6,7 +6,9 @@ import platform
 import signal
 import socket
 import subprocess
+import sys
 import tempfile
+import time
 from pathlib import Path
 
 import pytest
@@ -16,6 +18,7 @@ from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 from semgrid_edu.workshop.course.sandbox import linux
 from semgrid_edu.workshop.course.sandbox.limits import PARTS, Limits, _all_but
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
+from semgrid_edu.workshop.course.sandbox.taken import namespace_of
 
 needs_landlock = pytest.mark.skipif(not linux.landlock_version(), reason="this system has no Landlock")
 
@@ -96,13 +99,67 @@ def test_calls_that_were_given_up_are_refused(session):
     assert session.names(["got"], session)["got"] == dict.fromkeys(calls, (-1, errno.EPERM))
 
 
+TOUCHES = {
+    "chmod": "os.chmod({0!r}, 0o777)",
+    "chmod by its folder": "h = os.open(os.path.dirname({0!r}), os.O_PATH); "
+    "os.chmod(os.path.basename({0!r}), 511, dir_fd=h)",
+    "chown": "os.chown({0!r}, 65534, 65534)",
+    "utime": "os.utime({0!r}, (1, 1))",
+    "attribute": "os.setxattr({0!r}, 'user.mine', b'1')",
+    "truncate": "os.truncate({0!r}, 0)",
+    "shell": "os.system('touch -d 1980-01-01 {0}; chmod 777 {0}')",
+}
+
+
+@pytest.mark.parametrize("kind", TOUCHES)
+@pytest.mark.parametrize("name", ["submitted.ipynb", "folder"])
+def test_modes_owners_and_dates_of_others_files_stay(limited, tmp_path, kind, name):
+    path = tmp_path / name
+    path.mkdir() if name == "folder" else path.write_text("hers")
+    before = path.stat(), os.listxattr(path)
+    limited(f"exec({'import os; ' + TOUCHES[kind].format(str(path))!r})", "modes and dates of files")
+    assert (path.stat(), os.listxattr(path)) == before
+
+
+def test_a_library_that_may_be_read_keeps_its_mode(limited):
+    before = Path(semgrid_edu.__file__).stat()
+    line = f"__import__('os').fchmod(open({semgrid_edu.__file__!r}).fileno(), 0o666)"
+    limited(line, "modes and dates of files")
+    assert Path(semgrid_edu.__file__).stat() == before
+
+
+def test_files_can_be_copied_although_their_modes_cannot_be_set(limited):
+    line = "open('a', 'w').write('x') and open(__import__('shutil').copy2('a', 'b')).read()"
+    assert limited(line, "files") == ("value", "x")
+
+
+def test_the_superusers_capabilities_are_given_up(session):
+    session.run("held = [line for line in open('/proc/self/status') if line.startswith(('CapEff', 'CapPrm'))]")
+    if "modes and dates of files" in session.process.unlimited:
+        pytest.skip("this system has no seccomp")
+    for line in session.names(["held"], session)["held"]:
+        assert int(line.split()[1], 16) in (0, 4)
+
+
+def test_processes_have_an_end_for_the_superuser_too(session):
+    session.run("pass")
+    if "processes" in session.process.unlimited:
+        pytest.skip("this system can't limit processes")
+    many = "import subprocess, time\nmany = [subprocess.Popen(['sleep', '60.25']) for _ in range(300)]\ntime.sleep(5)"
+    session.timeout = 30
+    assert session.run(many)["error"]["kind"] in ("AnswerEndedError", "BlockingIOError")
+    session.stop()
+    assert "60.25" not in subprocess.run(["ps", "ax"], capture_output=True, text=True, check=True).stdout
+
+
 @pytest.mark.parametrize(
     "code",
     [
         "for k in range(100): open(f'{k}', 'wb').write(bytes(2_000_000))",
         "for k in range(30_000): open(f'{k}', 'w')",
+        "import os\nfor k in range(3000): os.mkdir('dd'); os.chdir('dd')",
     ],
-    ids=["large", "many"],
+    ids=["large", "many", "deep"],
 )
 def test_all_files_together_have_an_end(session, code):
     session.timeout = 60  # a slow disk takes seconds for so many files
@@ -112,11 +169,42 @@ def test_all_files_together_have_an_end(session, code):
 def test_a_folder_that_cannot_be_listed_is_gone_afterwards(session):
     session.run(
         "import os\nfor k in range(1500):\n    os.mkdir('d')\n    os.chdir('d')\nos.chdir(os.environ['HOME'])\n"
-        "os.mkdir('closed')\nopen('closed/x', 'w')\nos.chmod('closed', 0)\nos.symlink('/etc', 'link')\nos.chmod('.', 0)"
+        "os.mkdir('closed', 0)\nos.mkdir('seen', 0o444)\nos.symlink('/etc', 'link')"
     )
     folder = session.process.folder
     session.stop()
     assert not folder.exists()
+
+
+def test_a_folder_that_is_deeper_than_a_path_is_gone_afterwards(session):
+    session.timeout = 20
+    session.run(
+        "import os\nfor k in range(3000): os.mkdir('dd'); os.chdir('dd')\nopen('large', 'wb').write(bytes(10**6))"
+    )
+    folder = session.process.folder if session.process else None
+    session.stop()
+    assert folder is None or not folder.exists()
+
+
+ENDS_FIRST = """
+import os, sys, tempfile, threading
+from semgrid_edu.workshop.course.sandbox.limits import Limits
+from semgrid_edu.workshop.course.sandbox.process import StudentProcess
+from semgrid_edu.workshop.course.sandbox.taken import namespace_of
+tempfile.tempdir = sys.argv[1]
+process = StudentProcess(Limits())
+threading.Timer(2, os._exit, [9]).start()
+process.ask({"do": "run", "code": "__import__('subprocess').run(['sleep', '61.375'])"}, 1e12)
+"""
+
+
+def test_it_ends_with_a_grader_that_is_killed(session, tmp_path):
+    session.run("pass")
+    if not namespace_of(session.process.process.pid):
+        pytest.skip("this system can't give a process namespaces of its own")
+    subprocess.run([sys.executable, "-c", ENDS_FIRST, tmp_path], check=False, timeout=60)
+    time.sleep(1)
+    assert "61.375" not in subprocess.run(["ps", "ax"], capture_output=True, text=True, check=True).stdout
 
 
 def test_the_grader_cannot_be_stopped(limited):
@@ -135,7 +223,7 @@ def test_memory_and_files_have_an_end(limited):
 
 def test_what_it_started_ends_with_it(session):
     session.run("import subprocess; child = subprocess.Popen(['sleep', '60.125'], start_new_session=True)")
-    if "signals" in session.process.unlimited:
+    if not namespace_of(session.process.process.pid):
         pytest.skip("this system can't give a process namespaces of its own")
     session.stop()
     assert "60.125" not in subprocess.run(["ps", "ax"], capture_output=True, text=True, check=True).stdout

@@ -2,11 +2,20 @@
 
 import math
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from semgrid_edu.workshop.course.sandbox.session import AnswerEndedError, AnswerError, AnswerTimeoutError
+from semgrid_edu.workshop.course.sandbox import process as process_module
+from semgrid_edu.workshop.course.sandbox.limits import Limits
+from semgrid_edu.workshop.course.sandbox.process import StudentProcess
+from semgrid_edu.workshop.course.sandbox.session import (
+    AnswerEndedError,
+    AnswerError,
+    AnswerTimeoutError,
+    Session,
+)
 
 
 def test_cells_share_names_and_display(session):
@@ -129,9 +138,62 @@ def test_an_error_tells_its_line(answer):
 def test_where_inputs_are_secret_an_error_says_its_line_alone(session, answer):
     session.secret = True
     f = answer("def f(x):\n    raise ValueError(f'hidden: {x}')")
-    with pytest.raises(ValueError, match="in the line") as caught:
+    with pytest.raises(ValueError, match=r"^an error in line 2$") as caught:
         f(123)
-    assert "123" not in str(caught.value)
+    assert not hasattr(caught.value, "__notes__")
+
+
+TELLING = {
+    "a line of a table": "# <9319>\ndef f(x):\n    import linecache\n"
+    "    linecache.getline = lambda *a: f'<{x}>'\n    [][x]",
+    "a class": "def f(x):\n    raise type(f'cells_{x}', (Exception,), {})(x)",
+    "a class that can't be made": "def f(x):\n"
+    "    raise type(f'c{x}', (UnicodeDecodeError,), {})('ascii', b'', 0, 1, str(x))",
+    "a line of many": "\n" * 10_000
+    + "def f(x):\n    exec(compile('\\n' * x + 'raise ValueError', '<ipython-1', 'exec'))",
+    "a number of its own": "def f(x):\n    exec(compile('\\n' * x + 'raise ValueError', '<ipython-1', 'exec'))",
+}
+
+
+@pytest.mark.parametrize("kind", TELLING)
+def test_no_error_tells_a_secret_input(session, answer, kind):
+    f = answer(TELLING[kind])
+    session.secret = True
+    with pytest.raises(Exception, match=r"^an error") as caught:
+        f(9319)
+    assert "9319" not in f"{caught.value} {type(caught.value)}"
+    assert "9320" not in str(caught.value)
+
+
+def test_an_error_of_a_students_own_kind_is_not_the_graders(session):
+    reply = session.run("class AnswerEndedError(Exception): pass\nraise AnswerEndedError('full points')")
+    assert (reply["error"]["kind"], session.ended) == ("AnswerEndedError", "")
+    session.run("import os; os._exit(0)")
+    assert session.ended.startswith("Python itself ended here")
+
+
+def test_a_pool_of_processes_is_refused_in_a_sentence(session):
+    if "files" in session.run("1") or "files" in session.process.unlimited:
+        pytest.skip("this system can't limit files")
+    error = session.run("import multiprocessing\nmultiprocessing.Pool(2)")["error"]
+    assert "not allowed where answers are graded: pools of processes" in error["says"]
+
+
+def test_files_that_were_handed_in_beside_the_notebook_are_there(prepared, tmp_path):
+    folder = tmp_path / "handed in"
+    (folder / "data").mkdir(parents=True)
+    (folder / "helper.py").write_text("def more(x):\n    return x + 1")
+    (folder / "filterpy.py").write_text("raise SystemExit")
+    (folder / "semgrid_edu.py").write_text("raise SystemExit")
+    (folder / "data" / "table.txt").write_text("1 2")
+    (folder / "own.ipynb").write_text("{}")
+    session = Session(lambda: StudentProcess(Limits(memory=1000), prepared, beside=folder), timeout=10)
+    session.run("import os, helper, filterpy.discrete_bayes\nf = lambda: helper.more(2)\nfiles = sorted(os.listdir())")
+    files = set(session.names(["files"], session)["files"])
+    assert files >= {"data", "filterpy.py", "helper.py", "semgrid_edu.py"}
+    assert "own.ipynb" not in files
+    assert session.call("f", (), {}, measured=False)[0] == 3
+    session.stop()
 
 
 @pytest.mark.parametrize(
@@ -206,8 +268,46 @@ def test_memory_is_measured_where_it_is_taken(answer):
     f = answer("import numpy as np\ndef f(n):\n    return float(np.ones(n).sum())")
     result, megabytes = f.peak_megabytes(1_000_000)
     assert result == 1_000_000
-    assert 8 <= megabytes < 9
+    assert 7 <= megabytes < 12
     assert f(3) == 3
+
+
+HIDES = {
+    "torch": "import torch\ndef f(n):\n    return float(torch.ones(n).sum())",
+    "stopped": "import numpy as np, tracemalloc\n"
+    "def f(n):\n    tracemalloc.stop()\n    return float(np.ones(n, 'f4').sum())",
+    "own numbers": "import numpy as np, tracemalloc\ntracemalloc.get_traced_memory = lambda: (0, 0)\n"
+    "def f(n):\n    return float(np.ones(n, 'f4').sum())",
+    "in numbers of Python": "def f(n):\n    return len([1.5] * (n // 2)) * 2",
+}
+
+
+@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="only Linux tells a process's memory")
+@pytest.mark.parametrize("kind", HIDES)
+def test_memory_is_measured_from_outside(session, answer, kind):
+    session.timeout = 60
+    f = answer(HIDES[kind])
+    f(10)
+    result, megabytes = f.peak_megabytes(10_000_000)
+    assert result == 10_000_000
+    assert 38 <= megabytes < 60
+    assert 38 <= f.peak_megabytes(10_000_000)[1] < 60, "although it was freed a moment ago"
+    assert f.peak_megabytes(10)[1] < 5
+
+
+def test_a_first_call_is_not_measured(answer):
+    """A function that is compiled takes far more memory then."""
+    f = answer("kept = []\ndef f(a):\n    kept or kept.append(bytes(b'1' * 10**8))\n    return a")
+    assert f.peak_megabytes(np.arange(3.0))[1] < 5
+
+
+def test_a_child_is_not_measured_in_place_of_the_worker(session, answer, monkeypatch):
+    monkeypatch.setattr(process_module, "_can_be_alone", lambda: False)
+    f = answer(
+        "import numpy as np, subprocess\nchild = subprocess.Popen(['sleep', '9'])\n"
+        "def f(n):\n    return float(np.ones(n, 'f4').sum())"
+    )
+    assert f.peak_megabytes(10_000_000)[1] >= 38
 
 
 def test_cells_that_wait_run_before_the_first_call(session):

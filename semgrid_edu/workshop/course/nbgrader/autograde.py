@@ -1,6 +1,7 @@
 """One submission, graded by nbgrader: its score and messages are then in the course's gradebook and folders."""
 
 import copy
+import hashlib
 import warnings
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -12,7 +13,9 @@ from nbgrader.utils import is_solution
 from sqlalchemy.exc import DatabaseError, SAWarning
 
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.workshop.course.nbgrader.build import caught_errors, course_api, failure_reason, student_version
+from semgrid_edu.storage.reading import read_json
+from semgrid_edu.workshop.course.nbgrader import build
+from semgrid_edu.workshop.course.nbgrader.build import MARKER
 from semgrid_edu.workshop.course.notebooks.build import read_percent
 
 PATIENCE = 10
@@ -74,7 +77,7 @@ def submission(source: Path, answers: Mapping[str, str]) -> NotebookNode:
     ArgumentError
         When an answer belongs to no cell.
     """
-    notebook = copy.deepcopy(student_version(source))
+    notebook = copy.deepcopy(build.student_version(source))
     cells = {c.metadata.nbgrader.grade_id: c for c in notebook.cells if is_solution(c)}
     for name, text in answers.items():
         if name not in cells:
@@ -106,18 +109,18 @@ def autograde_one(
     UngradedError
         When it could not for a reason that isn't the file's, such as a full disk or a gradebook that stays locked.
     """
-    with course_api(course) as api, warnings.catch_warnings():
+    with build.course_api(course) as api, warnings.catch_warnings():
         # nbgrader 0.9.6 builds a submission outside its database session.
         warnings.filterwarnings("ignore", "Object of type <Submitted", SAWarning)
         api.config.ExecuteApart.merge(asdict(settings) | {"container": list(settings.container)})
         api.coursedir.submitted_directory = submitted
         for _ in range(PATIENCE):
-            with caught_errors(api.log) as errors:
+            with build.caught_errors(api.log) as errors:
                 result = api.autograde(assignment, student)
             if result["success"] or not any(map(_may_pass, errors)):
                 break
     if not result["success"]:
-        reason = failure_reason(result, errors)
+        reason = build.failure_reason(result, errors)
         if not errors or isinstance(errors[-1], NOT_THE_FILE):
             raise UngradedError(reason)
         raise DataError(place(course, submitted, student, assignment), "a notebook that can be graded", reason)
@@ -141,3 +144,24 @@ def place(course: Path, step: str, student: str, assignment: str) -> Path:
         Whose notebook.
     """
     return course / step / student / assignment / f"{assignment}.ipynb"
+
+
+def student_variant(course: Path, student: str) -> int:
+    """Return which inputs a student's hidden tests draw: the same each time, and known to nobody without the salt.
+
+    Parameters
+    ----------
+    course : Path
+        A course that `build_course` wrote, with its salt.
+    student : str
+        The student.
+
+    Raises
+    ------
+    DataError
+        When the course has no salt.
+    """
+    salt = read_json(course / MARKER).get("salt")
+    if not salt:
+        raise DataError(course / MARKER, "a salt, which `semgrid-edu course build` adds", "none")
+    return int.from_bytes(hashlib.sha256(f"{salt} {student}".encode()).digest()[:8], "big")

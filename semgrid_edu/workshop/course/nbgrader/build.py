@@ -4,6 +4,7 @@ import hashlib
 import logging
 import os
 import re
+import secrets
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,15 +13,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 from nbformat import NotebookNode
+from nbgrader import preprocessors as steps
 from nbgrader.apps import NbGraderAPI
-from nbgrader.preprocessors import (
-    CheckCellMetadata,
-    ClearHiddenTests,
-    ClearOutput,
-    ClearSolutions,
-    ComputeChecksums,
-    LockCells,
-)
 from traitlets.config import PyFileConfigLoader
 
 from semgrid_edu.errors import ArgumentError, DataError
@@ -34,7 +28,8 @@ from semgrid_edu.workshop.course.notebooks.build import (
     write_notebook,
 )
 
-RELEASE_STEPS = (LockCells, ClearSolutions, ClearOutput, ClearHiddenTests, ComputeChecksums, CheckCellMetadata)
+CLEARED = steps.LockCells, steps.ClearSolutions, steps.ClearOutput, steps.ClearHiddenTests
+RELEASE_STEPS = *CLEARED, steps.ComputeChecksums, steps.CheckCellMetadata
 """What nbgrader's generate_assignment does to a notebook, without its gradebook."""
 
 MARKER = "semgrid_course.json"
@@ -129,7 +124,8 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS, lectures: str 
     digests, kept = _write_unless_changed(directory, _course_files(folder, sources, lectures), before.get("files", {}))
     names = [source.stem for source in sources]
     about = {"written by": f"semgrid_edu {version('semgrid_edu')}", "assignments": names}
-    write_json(marker, about | {"lectures": lectures, "files": digests})
+    salt = before.get("salt") or secrets.token_hex(16)
+    write_json(marker, about | {"lectures": lectures, "files": digests, "salt": salt})
     with course_api(directory) as api:
         for name in names:
             _release(api, name, directory / "source" / name)

@@ -1,7 +1,10 @@
 """A whole class: every submission that was collected, graded by nbgrader on all cores."""
 
-from collections.abc import Iterator, Sequence
+import tempfile
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack, contextmanager
 from glob import has_magic
 from multiprocessing import get_context
 from pathlib import Path
@@ -11,21 +14,17 @@ from nbformat.v4 import new_markdown_cell
 from tqdm import tqdm
 
 from semgrid_edu.errors import DataError
+from semgrid_edu.workshop.course.nbgrader import gradebook as book
 from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, UngradedError, autograde_one, place
 from semgrid_edu.workshop.course.nbgrader.build import one_line
-from semgrid_edu.workshop.course.nbgrader.gradebook import (
-    Graded,
-    check_file,
-    check_time,
-    forget,
-    is_graded,
-    open_gradebook,
-    result_of,
-    submissions,
-    unfinished,
-)
+from semgrid_edu.workshop.course.nbgrader.gradebook import Graded, submissions
 from semgrid_edu.workshop.course.nbgrader.preprocessors import CRASHED, prepare, starter
 from semgrid_edu.workshop.course.notebooks.build import write_notebook
+from semgrid_edu.workshop.course.sandbox.limits import Limits, limit_grader
+from semgrid_edu.workshop.course.sandbox.taken import delete_folder
+
+KILLED = "the file can't be graded: twice it ended the process that grades, perhaps for want of memory"
+"""The note on a submission that took the grader with it, among others and alone."""
 
 UNREADABLE = "unreadable"
 """The folder with notebooks that stand in for files that can't be read."""
@@ -63,29 +62,65 @@ def grade_course(
     UngradedError
         In the end, when submissions stay ungraded for a reason that isn't theirs; it names them, one per line.
     """
-    course = course.resolve()
-    wanted = [one for one in submissions(course, assignments) if again or not is_graded(course, *one)]
-    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
-        try:
-            failed = _failing_references(pool, course, settings, [assignment for assignment, _ in wanted])
-            ready = [one for one in wanted if one[0] not in failed]
-            waiting = {pool.submit(grade_one, course, *one, settings): one for one in ready}
-            yield from _as_they_end(course, waiting, failed)
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
+    course, failed = course.resolve(), {}
+    wanted = submissions(course, assignments) if again else book.ungraded(course, assignments)
+    yield from _in_pools(course, wanted, settings, workers, failed)
     if failed:
         raise UngradedError("\n".join(f"{which}: {says}" for which, says in failed.items()))
 
 
-def _as_they_end(course: Path, waiting: dict[Future, tuple[str, str]], failed: dict[str, str]) -> Iterator[Graded]:
-    """Yield results; note submissions that have none because their grading failed or its process was ended."""
+def _in_pools(course: Path, wanted: list, settings: GradeSettings, workers: int, failed: dict) -> Iterator[Graded]:
+    """Yield results; what was in work when a process died is graded again alone, to find out whose fault it was."""
+    with _pool(workers) as pool:
+        failed |= _failing_references(pool, course, settings, [assignment for assignment, _ in wanted])
+        ready = [one for one in wanted if one[0] not in failed]
+        waiting = {pool.submit(grade_one, course, *one, settings): one for one in ready}
+        left = yield from _as_they_end(course, waiting, failed)
+    begun = [one for one in left if book.has_begun(course, *one)]
+    if begun and len(wanted) == 1:
+        yield _grade_stand_in(course, *begun[0], settings, f"{CRASHED}{KILLED}")
+    elif begun:
+        for one in begun:
+            yield from _in_pools(course, [one], settings, 1, failed)
+        yield from _in_pools(course, [one for one in left if one not in begun], settings, workers, failed)
+    else:
+        failed |= {_which(one): "the process that grades was ended" for one in left}
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Start processes that grade, with temporary files in a folder that is deleted in the end, however they ended."""
+    with ExitStack() as stack:
+        folder = tempfile.mkdtemp(prefix="semgrid-grading-")
+        stack.callback(delete_folder, Path(folder))
+        pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin, (folder,))
+        stack.callback(pool.shutdown, cancel_futures=True)
+        yield pool
+
+
+def _begin(folder: str) -> None:
+    """Prepare a process that grades."""
+    tempfile.tempdir = folder
+    limit_grader(Limits.memory)
+
+
+def _as_they_end(course: Path, waiting: dict[Future, tuple[str, str]], failed: dict[str, str]) -> Generator:
+    """Yield results; note submissions whose grading failed, and return those that have none since a process died."""
+    left = []
     for done in tqdm(as_completed(waiting), "submissions", len(waiting)):
         try:
             yield done.result()
+        except BrokenProcessPool:
+            left.append(waiting[done])
         except Exception as error:
-            forget(course, *waiting[done])
-            failed[", ".join(reversed(waiting[done]))] = one_line(error)
+            book.forget(course, *waiting[done])
+            failed[_which(waiting[done])] = one_line(error)
+    return left
+
+
+def _which(submission: tuple[str, str]) -> str:
+    """Return how a submission is named."""
+    return ", ".join(reversed(submission))
 
 
 def _failing_references(
@@ -139,10 +174,11 @@ def grade_one(course: Path, assignment: str, student: str, settings: GradeSettin
         note = f"{CRASHED}nbgrader takes * ? [ in a student's name for a pattern: rename the folder"
         return Graded(student, assignment, 0, 0, 0, note)
     try:
-        with unfinished(course, assignment, student):
+        with book.unfinished(course, assignment, student):
             if fault := _graded_or_fault(course, assignment, student, settings):
-                _grade_stand_in(course, assignment, student, settings, f"{CRASHED}the file can't be graded: {fault}")
-            return result_of(course, assignment, student)
+                note = f"{CRASHED}the file can't be graded: {fault}"
+                return _grade_stand_in(course, assignment, student, settings, note)
+            return book.result_of(course, assignment, student)
     except Exception as error:
         raise UngradedError(one_line(error)) from error
 
@@ -150,23 +186,25 @@ def grade_one(course: Path, assignment: str, student: str, settings: GradeSettin
 def _graded_or_fault(course: Path, assignment: str, student: str, settings: GradeSettings) -> str:
     """Grade a submission; return what is wrong with its file, "" when it has been graded."""
     path = place(course, "submitted", student, assignment)
-    check_time(path)
+    book.check_time(path)
     try:
-        check_file(path)
+        book.check_file(path)
         autograde_one(course, assignment, student, settings)
     except DataError as error:
         return error.args[2] if error.path == path else one_line(error)
     return ""
 
 
-def _grade_stand_in(course: Path, assignment: str, student: str, settings: GradeSettings, note: str) -> None:
+def _grade_stand_in(course: Path, assignment: str, student: str, settings: GradeSettings, note: str) -> Graded:
     """Grade the exercise as students get it in place of a file that can't be graded; say so in the gradebook."""
     _stand_in(course, assignment, student, note)
-    autograde_one(course, assignment, student, settings, UNREADABLE)
-    with open_gradebook(course) as gradebook:
-        for comment in gradebook.find_submission_notebook(assignment, assignment, student).comments:
-            comment.auto_comment = note
-        gradebook.db.commit()
+    with book.unfinished(course, assignment, student):
+        autograde_one(course, assignment, student, settings, UNREADABLE)
+        with book.open_gradebook(course) as gradebook:
+            for comment in gradebook.find_submission_notebook(assignment, assignment, student).comments:
+                comment.auto_comment = note
+            gradebook.db.commit()
+    return book.result_of(course, assignment, student)
 
 
 def _stand_in(course: Path, assignment: str, student: str, note: str) -> None:

@@ -181,26 +181,25 @@ def _mark(course: Path, assignment: str, student: str) -> Path:
     return course / UNFINISHED / student / assignment
 
 
-def is_graded(course: Path, assignment: str, student: str) -> bool:
-    """Return whether a submission has been graded, all of it and as it is now.
+def has_begun(course: Path, assignment: str, student: str) -> bool:
+    """Return whether the grading of a submission has begun and not ended. Parameters are those of `forget`."""
+    return _mark(course, assignment, student).exists()
 
-    Parameters
-    ----------
-    course : Path
-        The course.
-    assignment, student : str
-        Whose submission.
+
+def ungraded(course: Path, assignments: Sequence[str] = ()) -> list[tuple[str, str]]:
+    """Return the submissions that are not graded, all of each and as it is now.
+
+    Parameters and errors are those of `submissions`.
     """
-    if not _is_up_to_date(course, assignment, student):
-        return False
-    with open_gradebook(course) as gradebook:
-        return _has_scores(gradebook, assignment, student)
+    found = submissions(course, assignments)
+    with open_gradebook(course) as book:
+        return [one for one in found if not (_is_up_to_date(course, *one) and _has_scores(book, *one))]
 
 
 def _is_up_to_date(course: Path, assignment: str, student: str) -> bool:
     """Return whether nbgrader wrote all of a submission's graded notebook, and did so after it was handed in."""
     submitted, graded = (place(course, step, student, assignment) for step in ("submitted", "autograded"))
-    if _mark(course, assignment, student).exists():
+    if has_begun(course, assignment, student):
         return False
     return graded.exists() and graded.stat().st_mtime >= submitted.stat().st_mtime
 
@@ -259,8 +258,7 @@ def write_graded(course: Path) -> Path:
     table = csv.writer(text)
     table.writerow(column.name for column in fields(Graded))
     with open_gradebook(course) as gradebook:
-        for one in submissions(course):
-            if _is_up_to_date(course, *one) and _has_scores(gradebook, *one):
-                table.writerow(astuple(_row(gradebook, *one)))
+        for one in sorted({*submissions(course)} - {*ungraded(course)}):
+            table.writerow(astuple(_row(gradebook, *one)))
     write_text(course / GRADED, text.getvalue())
     return course / GRADED

@@ -1,16 +1,14 @@
 """What this course adds to nbgrader's autograde: submissions are made whole, and run apart from their tests."""
 
+import re
 import sys
-import zlib
 from collections.abc import Callable
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
-import bleach
 import nbformat
 from filelock import FileLock
 from nbconvert.exporters.exporter import ResourcesDict
-from nbconvert.filters import strip_files_prefix
 from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell, new_markdown_cell
 from nbgrader.api import Gradebook, SourceCell
@@ -21,16 +19,13 @@ from traitlets import List as ListTrait
 
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.compiled import takes_files, user_cache
-from semgrid_edu.storage.files import table_beside
+from semgrid_edu.workshop.course.nbgrader.autograde import student_variant
 from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.notebook import INSTRUCTOR, cell_name, run_submission
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 
 CRASHED = "Crashed: "
 """How a comment begins that says what ended Python."""
-
-SHOWN_TAGS = (*bleach.ALLOWED_TAGS, *table_beside(__file__)["tags"])
-"""The HTML that Markdown becomes, and nothing that runs."""
 
 KEPT = ("kernelspec", "language_info")
 """What is kept of a notebook's metadata."""
@@ -67,6 +62,8 @@ class MakeWhole(NbGraderPreprocessor):
             blanks = {cell.name: _blank(cell, exercise) for cell in exercise.source_cells}
         # Any other metadata would be the student's: widgets, a title, what else is shown in feedback.
         nb.metadata = NotebookNode({name: nb.metadata[name] for name in KEPT if name in nb.metadata})
+        if not any(cell_name(cell) in blanks for cell in nb.cells):
+            _recognise(nb.cells, [blank for blank in blanks.values() if is_solution(blank)])
         _mark(nb.cells, blanks)
         nb.cells = _with_own_versions(nb.cells, blanks)
         _insert_missing(nb.cells, blanks)
@@ -90,6 +87,24 @@ def _blank(source: SourceCell, exercise) -> NotebookNode:
         **({"points": points[source.name]} if source.name in points else {}),
     )
     return cell
+
+
+def _recognise(cells: list[NotebookNode], answers: list[NotebookNode]) -> None:
+    """Name answers by what they define, in a notebook that has lost its metadata: the written one is its last text."""
+    found = 0
+    for answer in answers:
+        wanted = _defined(answer.source)
+        alike = [c for c in cells if c.cell_type == answer.cell_type and (wanted & _defined(c.source) or not wanted)]
+        if alike and (wanted or found):
+            alike[-1].metadata["nbgrader"] = NotebookNode(grade_id=cell_name(answer))
+            found += 1
+    if not found:
+        raise ValueError("no cell of this exercise was recognised, so a person must read it")
+
+
+def _defined(source: str) -> set[str]:
+    """Return the names of functions and classes at the left margin of a cell."""
+    return set(re.findall(r"^(?:def|class) +(\w+)", source, re.MULTILINE))
 
 
 def _mark(cells: list[NotebookNode], blanks: dict[str, NotebookNode]) -> None:
@@ -141,8 +156,8 @@ class ExecuteApart(NbGraderPreprocessor):
         with Gradebook(where["db_url"]) as gradebook:
             exercise = gradebook.find_notebook(where["notebook"], where["assignment"])
             trusted = {cell.name: cell.source for cell in exercise.source_cells}
-        variant = (zlib.crc32(where["student"].encode()),) if self.seed_by_student else ()
-        start = starter(self.memory, tuple(self.container))
+        variant = (student_variant(course, where["student"]),) if self.seed_by_student else ()
+        start = starter(self.memory, tuple(self.container), beside=Path(resources["metadata"]["path"]))
         resources[CRASHES] = run_submission(nb, trusted, lambda: start(prepared), self.timeout, variant)
         return nb, resources
 
@@ -165,7 +180,9 @@ def use_instructor(folder: Path) -> None:
     spec.loader.exec_module(sys.modules[INSTRUCTOR])
 
 
-def starter(memory: int, container: tuple[str, ...], keeps: bool = False) -> Callable[[Path | None], StudentProcess]:
+def starter(
+    memory: int, container: tuple[str, ...], keeps: bool = False, beside: Path | None = None
+) -> Callable[[Path | None], StudentProcess]:
     """Return a function that starts a process for a student's code, given the folder of what is prepared.
 
     Parameters
@@ -176,8 +193,10 @@ def starter(memory: int, container: tuple[str, ...], keeps: bool = False) -> Cal
         A command that starts a program in a container; () for none.
     keeps : bool
         Whether the process adds what it compiles to that folder.
+    beside : Path, optional
+        The folder of a submission, for the files that were handed in beside it.
     """
-    return lambda prepared: StudentProcess(Limits(memory=memory), prepared, keeps, container)
+    return lambda prepared: StudentProcess(Limits(memory=memory), prepared, keeps, container, beside)
 
 
 def prepare(course: Path, assignment: str, memory: int, container: tuple[str, ...] = ()) -> Path:
@@ -247,19 +266,6 @@ def instructors_cells(notebook: NotebookNode) -> dict[str, str]:
     """
     cells = [cell for cell in notebook.cells if cell.metadata.get("nbgrader") and not is_solution(cell)]
     return {cell.metadata.nbgrader.grade_id: cell.source for cell in cells}
-
-
-def without_scripts(html: str) -> str:
-    """Take out of a text cell's HTML whatever could run in a browser: the instructor's is logged in.
-
-    Parameters
-    ----------
-    html : str
-        What nbconvert made of Markdown. This function stands in for its filter `strip_files_prefix`, the last that
-        nbgrader applies.
-    """
-    attributes = {**bleach.ALLOWED_ATTRIBUTES, "*": ["class", "id"], "img": ["src", "alt"]}
-    return bleach.clean(strip_files_prefix(html), tags=SHOWN_TAGS, attributes=attributes)
 
 
 class NoteCrashes(NbGraderPreprocessor):

@@ -11,7 +11,7 @@ from semgrid_edu.storage.files import table_beside
 from semgrid_edu.storage.provenance import shipped_folder
 from semgrid_edu.workshop.course.sandbox import linux
 
-PARTS = ("memory", "written files", "processes", "files", "network", "signals")
+PARTS = ("memory", "written files", "processes", "files", "modes and dates of files", "network", "signals")
 """All that is limited here; the grader's own process limits time."""
 
 MEGABYTE = 1_000_000
@@ -56,7 +56,7 @@ def limit_this_process(limits: Limits, folder: Path) -> list[str]:
     if linux.landlock_version():
         done += linux.give_up_files(*_readable(), [folder, Path("/dev/null")])
     # Landlock knows of networks only TCP; without sockets there is none.
-    return [*done, "network"] if linux.give_up_calls() else done
+    return [*done, "network", "modes and dates of files"] if linux.give_up_calls() else done
 
 
 def _limit_resources(limits: Limits) -> list[str]:
@@ -65,10 +65,8 @@ def _limit_resources(limits: Limits) -> list[str]:
         return []
     import resource
 
-    held = Path("/proc/self/statm")
-    pages = int(held.read_text().split()[0]) if held.exists() else 0
     wanted = {
-        "memory": (resource.RLIMIT_AS, pages * resource.getpagesize() + limits.memory * MEGABYTE),
+        "memory": (resource.RLIMIT_AS, _held() + limits.memory * MEGABYTE),
         "written files": (resource.RLIMIT_FSIZE, limits.written * MEGABYTE),
     }
     _set(resource.RLIMIT_CORE, 0)
@@ -76,6 +74,30 @@ def _limit_resources(limits: Limits) -> list[str]:
     if os.getuid():
         wanted["processes"] = resource.RLIMIT_NPROC, limits.processes
     return [part for part, (kind, value) in wanted.items() if _set(kind, value)]
+
+
+def limit_grader(megabytes: int) -> None:
+    """Limit the memory of this process: what a student's answer makes of it is then an error, not the end of a class.
+
+    Parameters
+    ----------
+    megabytes : int
+        How much it may take beyond what it holds now. Processes that it starts may set another limit.
+    """
+    if sys.platform != "win32":
+        import resource
+
+        most = resource.getrlimit(resource.RLIMIT_AS)[1]
+        with suppress(ValueError, OSError):
+            resource.setrlimit(resource.RLIMIT_AS, (_held() + megabytes * MEGABYTE, most))
+
+
+def _held() -> int:
+    """Return the bytes of addresses that this process holds; 0 where there is no `/proc` to ask."""
+    import resource
+
+    held = Path("/proc/self/statm")
+    return int(held.read_text().split()[0]) * resource.getpagesize() if held.exists() else 0
 
 
 def _set(kind: int, value: int) -> bool:

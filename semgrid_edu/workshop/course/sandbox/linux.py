@@ -31,16 +31,22 @@ FILE_RIGHTS = {1: (1 << 13) - 1, 2: (1 << 14) - 1, 3: (1 << 15) - 1, 4: (1 << 15
 """All rights to files that a version of Landlock knows; later versions know those of version 5."""
 
 PROCESSORS = table_beside(__file__)
-"""By processor the number of its own calls ("audit"), and those that seccomp refuses, by name ("refused")."""
+"""By processor the number of its own calls ("audit"), and those that seccomp refuses or leaves idle, by name."""
+
+NEWER = 467
+"""From this number on calls are refused as by a system that doesn't know them: x86_64 has all once more from 2^30."""
 
 LOAD, EQUAL, AT_LEAST, RETURN = 0x20, 0x15, 0x35, 0x06
 """The four instructions of the filter: load a word, compare it in two ways, and end."""
 
-ALLOW, REFUSE = 0x7FFF0000, 0x00050000 | errno.EPERM
-"""The filter's two verdicts."""
+ALLOW, IDLE, REFUSE, UNKNOWN = 0x7FFF0000, 0x00050000, 0x00050000 | errno.EPERM, 0x00050000 | errno.ENOSYS
+"""The filter's verdicts: do it, do nothing and report success, or fail."""
 
 SET_SECCOMP, FILTER = 22, 2
 """Arguments of prctl."""
+
+CAPABILITIES, READ_ANY = 0x20080522, 1 << 2
+"""The version of capset's arguments, and the one capability that root's process keeps: Python may be another user's."""
 
 
 def landlock_version() -> int:
@@ -109,24 +115,26 @@ def _call(number: int, *arguments: bytes | int | None) -> int:
 
 
 def give_up_calls() -> bool:
-    """Give up the system calls of `linux.toml`; False where that isn't possible."""
+    """Give up the system calls of `linux.toml`, and all capabilities; False where that isn't possible."""
     machine = platform.machine()
     if sys.platform != "linux" or machine not in PROCESSORS:
         return False
-    code = _filter(PROCESSORS[machine]["audit"], [*PROCESSORS[machine]["refused"].values()])
+    code = _filter(**PROCESSORS[machine])
     program = ctypes.create_string_buffer(code)
     # struct sock_fprog: the number of instructions, and where they are.
     described = struct.pack("HP", len(code) // 8, ctypes.addressof(program))
     library = ctypes.CDLL(None)
     library.prctl(NO_NEW_PRIVILEGES, 1, 0, 0, 0)
+    for kept in (READ_ANY, 0):  # Docker's root hasn't got the first
+        if library.capset(struct.pack("Ii", CAPABILITIES, 0), struct.pack("6I", kept, kept, 0, 0, 0, 0)) == 0:
+            break
     return library.prctl(SET_SECCOMP, FILTER, described, 0, 0) == 0
 
 
-def _filter(audit: int, refused: list[int]) -> bytes:
+def _filter(audit: int, refused: dict[str, int], idle: dict[str, int]) -> bytes:
     """Return the filter's instructions: each has a code, how many to skip if it holds and if not, and a number."""
     lines = [(LOAD, 0, 0, 4), (EQUAL, 1, 0, audit), (RETURN, 0, 0, REFUSE), (LOAD, 0, 0, 0)]
-    # From 2^30 on, x86_64 has its calls once more, under other numbers.
-    lines += [(AT_LEAST, 0, 1, 1 << 30), (RETURN, 0, 0, REFUSE)]
-    for number in refused:
-        lines += [(EQUAL, 0, 1, number), (RETURN, 0, 0, REFUSE)]
+    lines += [(AT_LEAST, 0, 1, NEWER), (RETURN, 0, 0, UNKNOWN)]
+    for number, verdict in [*((n, REFUSE) for n in refused.values()), *((n, IDLE) for n in idle.values())]:
+        lines += [(EQUAL, 0, 1, number), (RETURN, 0, 0, verdict)]
     return b"".join(struct.pack("HBBI", *line) for line in [*lines, (RETURN, 0, 0, ALLOW)])

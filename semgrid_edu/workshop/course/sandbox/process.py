@@ -10,32 +10,39 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.storage.files import atomic_path
+from semgrid_edu.storage.files import atomic_path, table_beside
 from semgrid_edu.workshop.course.sandbox.limits import MEGABYTE, PARTS, Limits
-from semgrid_edu.workshop.course.sandbox.values import Wire, decode, encode
+from semgrid_edu.workshop.course.sandbox.taken import (
+    count_tasks,
+    delete_folder,
+    memory_of,
+    namespace_of,
+    takes_too_much,
+)
+from semgrid_edu.workshop.course.sandbox.values import MOST_BYTES, Wire, decode, encode
 
 WORKER = ("-m", "semgrid_edu.workshop.course.sandbox.worker")
 """What Python is started with."""
 
-ALONE = ("unshare", "--user", "--map-current-user", "--net", "--ipc", "--pid", "--mount-proc", "--fork", "--kill-child")
-"""Starts a program that sees no network and no processes but its own (util-linux; needs no privileges)."""
+ALONE: tuple[str, ...] = table_beside(__file__)["alone"]
+"""Starts a program that sees no network and no processes but its own, and ends with this one (util-linux)."""
 
 INHERITED = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT")
 """What a student's process inherits of the environment."""
 
 WATCHED = 0.5
 """Seconds from one look at the files of a process to the next."""
-
-MOST_FILES = 20_000
-"""How many files and folders a process may have."""
 
 STARTED = 60.0
 """Seconds that a process may take to start."""
@@ -59,6 +66,8 @@ class StudentProcess:
     container : tuple of str
         A command before the worker's that starts it in a container, such as ("docker", "run", ...); otherwise it is
         started in namespaces of its own where the system can.
+    beside : Path, optional
+        A folder with a notebook and what was handed in with it, which is copied beside the student's code.
 
     Raises
     ------
@@ -72,9 +81,14 @@ class StudentProcess:
     """
 
     def __init__(
-        self, limits: Limits, prepared: Path | None = None, keeps: bool = False, container: tuple[str, ...] = ()
+        self,
+        limits: Limits,
+        prepared: Path | None = None,
+        keeps: bool = False,
+        container: tuple[str, ...] = (),
+        beside: Path | None = None,
     ) -> None:
-        self.prepared, self.keeps = prepared, keeps
+        self.prepared, self.keeps, self.contained = prepared, keeps, bool(container)
         self.folder = Path(tempfile.mkdtemp(prefix="semgrid-answers-"))
         if prepared is not None:
             shutil.copytree(prepared, self.folder / "prepared")
@@ -86,8 +100,10 @@ class StudentProcess:
         self.received: queue.Queue[bytes | None] = queue.Queue()
         self.speaker = threading.Thread(target=self._speak, daemon=True)
         self.speaker.start()
-        threading.Thread(target=self._watch, args=(3 * limits.written * MEGABYTE,), daemon=True).start()
         self.unlimited = self._greeted(limits, alone, container)
+        if beside is not None:
+            self.ask({"do": "beside", "files": _files(beside)}, time.monotonic() + STARTED)
+        threading.Thread(target=self._watch, args=(limits, namespace_of(self.process.pid)), daemon=True).start()
 
     def _started(self, command: Sequence[str]) -> subprocess.Popen:
         """Start the worker in a session of its own, with a pipe in each direction."""
@@ -117,10 +133,11 @@ class StudentProcess:
 
     def _limit(self, limits: Limits, alone: tuple[str, ...]) -> list[str]:
         """Let the process limit itself; return what it couldn't."""
-        limits = replace(limits, processes=limits.processes + _threads_of_this_user())
+        ours = os.getuid() if hasattr(os, "getuid") else None
+        limits = replace(limits, processes=limits.processes + count_tasks(lambda at: at.stat().st_uid == ours))
         message = {"do": "limit", "limits": asdict(limits), "folder": str(self.folder)}
-        done = self.ask(message, time.monotonic() + STARTED)["done"] + (["network", "signals"] if alone else [])
-        return [part for part in PARTS if part not in done]
+        done = self.ask(message, time.monotonic() + STARTED)["done"]
+        return [part for part in PARTS if part not in (*done, *(("network", "processes", "signals") if alone else ()))]
 
     def _speak(self) -> None:
         """Send and receive in a thread: neither a full pipe nor a silent process may hold up the grader for ever."""
@@ -131,10 +148,13 @@ class StudentProcess:
             except (OSError, ValueError, MemoryError):
                 self.received.put(None)  # the process is no more
 
-    def _watch(self, most: int) -> None:
-        """End the process when all its files together become too large, or too many."""
+    def _watch(self, limits: Limits, namespace: str) -> None:
+        """End the process when it has too many processes, or when its files together become too large, or too many."""
         while self.process.poll() is None:
-            if _takes_too_much(self.folder, most):
+            if takes_too_much(self.folder, 3 * limits.written * MEGABYTE) or (
+                namespace
+                and count_tasks(lambda at: str((at.parent / "ns" / "pid").readlink()) == namespace) > limits.processes
+            ):
                 self._kill()
             time.sleep(WATCHED)
 
@@ -184,6 +204,25 @@ class StudentProcess:
             self.stop()
             raise ProcessEndedError from None
 
+    def begin_measuring(self) -> bool:
+        """Let the peak of the process's memory begin anew, seen from outside; False where the system can't tell it."""
+        try:
+            outer = self.process.pid
+            # In namespaces of its own the worker is the only child of the program that made them.
+            alone = namespace_of(outer)
+            self.inner = int(Path(f"/proc/{outer}/task/{outer}/children").read_text()) if alone else outer
+            Path(f"/proc/{self.inner}/clear_refs").write_text("5")
+            self.held = memory_of(self.inner)["RssAnon"]
+        except (OSError, ValueError, KeyError):
+            return False
+        return not self.contained
+
+    def megabytes(self) -> float:
+        """Return the most memory that the process has held since `begin_measuring`, beyond what it held then."""
+        now = memory_of(self.inner)
+        # What is read of libraries meanwhile is nobody's array.
+        return (now["VmHWM"] - now["RssFile"] - now["RssShmem"] - self.held) / 1000
+
     def stop(self) -> None:
         """End the process with all that it has started, and delete its folder."""
         self.sent.put(None)
@@ -196,7 +235,7 @@ class StudentProcess:
                     pipe.close()
         if self.keeps:
             keep_compiled(self.folder / "prepared", self.prepared)
-        _delete(self.folder)
+        delete_folder(self.folder)
 
 
 def worker_environment(folder: Path) -> dict[str, str]:
@@ -210,8 +249,10 @@ def worker_environment(folder: Path) -> dict[str, str]:
     here = {name: str(folder / "prepared") for name in ("NUMBA_CACHE_DIR", "MPLCONFIGDIR")}
     here |= {name: str(folder) for name in ("HOME", "TMPDIR", "IPYTHONDIR")}
     threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+    # What is freed goes back at once, or else a measurement wouldn't see it taken again.
+    freed = dict.fromkeys(("MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"), "1000000")
     inline = {"MPLBACKEND": "module://matplotlib_inline.backend_inline", "PYTHONDONTWRITEBYTECODE": "1"}
-    return {name: os.environ[name] for name in INHERITED if name in os.environ} | here | threads | inline
+    return {name: os.environ[name] for name in INHERITED if name in os.environ} | here | threads | freed | inline
 
 
 def keep_compiled(source: Path, target: Path) -> None:
@@ -246,52 +287,11 @@ def _can_be_alone() -> bool:
     return subprocess.run([*ALONE, "true"], capture_output=True, check=False).returncode == 0
 
 
-def _threads_of_this_user() -> int:
-    """Return how many threads the user of this process has; 0 where there is no `/proc` to count them."""
-    user, count = os.getuid() if hasattr(os, "getuid") else None, 0
-    for tasks in Path("/proc").glob("[0-9]*/task"):
-        with suppress(OSError):
-            count += sum(1 for _ in tasks.iterdir()) if tasks.stat().st_uid == user else 0
-    return count
-
-
-def _takes_too_much(folder: Path, most: int) -> bool:
-    """Return whether the files in a folder take more bytes, are too many, or hide where nobody can look."""
-    closed: list[str] = []
-    size = count = 0
-    for entry in _inside(folder, closed):
-        with suppress(FileNotFoundError):
-            found = entry.stat(follow_symlinks=False)
-            size, count = size + (getattr(found, "st_blocks", 0) * 512 or found.st_size), count + 1
-        if size > most or count > MOST_FILES:
-            return True
-    return bool(closed)
-
-
-def _delete(folder: Path) -> None:
-    """Delete a folder, even if it was made unreadable, or too deep for Python's own way."""
-    folder.chmod(0o700)
-    for entry in _inside(folder, []):
-        if entry.is_dir(follow_symlinks=False):
-            Path(entry.path).chmod(0o700)
-    if shutil.which("rm"):
-        subprocess.run(["rm", "-rf", "--", folder], capture_output=True, check=False)
-    else:
-        shutil.rmtree(folder, ignore_errors=True)
-
-
-def _inside(folder: Path, closed: list[str]) -> Iterator[os.DirEntry]:
-    """Yield all that is in a folder, however deep; `closed` takes the folders in it that can't be opened."""
-    waiting = [str(folder)]
-    while waiting:
-        place = waiting.pop()
-        try:
-            with os.scandir(place) as found:
-                for entry in found:
-                    yield entry
-                    if entry.is_dir(follow_symlinks=False):
-                        waiting.append(entry.path)
-        except (FileNotFoundError, NotADirectoryError):
-            continue
-        except OSError:
-            closed.append(place)
+def _files(folder: Path) -> dict[str, NDArray]:
+    """Return the files that lie beside a notebook: their bytes by their paths, as far as a message may hold them."""
+    found, room = {}, MOST_BYTES
+    for path in sorted(one for one in folder.rglob("*") if one.is_file() and not one.is_symlink()):
+        if path.suffix != ".ipynb" and path.stat().st_size <= room:
+            found[path.relative_to(folder).as_posix()] = np.fromfile(path, np.uint8)
+            room -= path.stat().st_size
+    return found

@@ -5,11 +5,17 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from semgrid_edu.workshop.course.sandbox.process import ProcessEndedError, StudentProcess
 from semgrid_edu.workshop.course.sandbox.values import put_back
 
 ALL = 20
 """How many times the time of a cell all cells and calls together may take."""
+
+
+MOST_LINES = 300
+"""The last line of a cell that is named where inputs are secret: a longer cell could tell any number by its line."""
 
 
 class AnswerTimeoutError(Exception):
@@ -47,6 +53,8 @@ class Session:
     ----------
     printed : str
         What the student's functions have printed since it was last emptied.
+    ended : str
+        What ended the process since the time of this cell began; "" when nothing did.
     """
 
     def __init__(self, start: Callable[[], StudentProcess], timeout: float, secret: bool = False) -> None:
@@ -60,7 +68,7 @@ class Session:
 
     def begin(self) -> None:
         """Let the time of a cell begin."""
-        self.left = self.timeout
+        self.left, self.ended = self.timeout, ""
 
     def run(self, code: str) -> dict[str, Any]:
         """Run a cell; one that ends the process, or doesn't end, is left out from then on.
@@ -135,17 +143,28 @@ class Session:
             AnswerEndedError.
         """
         self._catch_up()
-        message = {"do": "call", "name": name, "arguments": arguments, "named": named, "measured": measured}
+        inside = measured and not self._alive().begin_measuring()
+        message = {"do": "call", "name": name, "arguments": arguments, "named": named, "measured": inside}
         reply = self._ask(message, [])
         self.printed += reply.get("streams", {}).get("stdout", "")
         if "changed" in reply:
             put_back((arguments, named), reply["changed"])
         if "error" in reply:
-            error = reply["error"]
-            # A line that is in no cell was put there to say something else.
-            known = any(error["line"] in cell for cell in self.cells)
-            raise _as_error(error | {"line": error["line"] if known else ""}, self.secret)
-        return reply["result"], reply.get("megabytes", float("nan"))
+            raise self._as_error(reply["error"])
+        outside = measured and not inside
+        return reply["result"], self._alive().megabytes() if outside else reply.get("megabytes", float("nan"))
+
+    def _as_error(self, error: dict[str, Any]) -> Exception:
+        """Return the error that an answer raised; where its inputs are secret, no more of it than the line."""
+        if self.secret:
+            lines = min(MOST_LINES, max((cell.count("\n") + 1 for cell in self.cells), default=0))
+            says = f"an error in line {error['number']}" if error["number"] in range(1, lines + 1) else "an error"
+            found = _standard_error(error | {"kind": "", "says": says, "line": ""})
+            found.secret = says
+            return found
+        # A line that is in no cell was put there to say something else.
+        known = any(error["line"] in cell for cell in self.cells)
+        return _standard_error(error | {"line": error["line"] if known else ""})
 
     def _catch_up(self) -> None:
         """Run the cells that are waiting."""
@@ -157,21 +176,26 @@ class Session:
     def _ask(self, message: dict, callbacks: list[Callable] | None = None) -> dict[str, Any]:
         """Ask the process, one that is alive; only the time that passes meanwhile counts as the student's."""
         if self.left_in_all <= 0:
-            raise AnswerTimeoutError(f"all cells together have used up their time, {ALL * self.timeout:g} s")
-        if self.process is None:
-            self._start_again()
-        began = time.monotonic()
+            self.ended = f"all cells together have used up their time, {ALL * self.timeout:g} s"
+            raise AnswerTimeoutError(self.ended)
+        process, began = self._alive(), time.monotonic()
         try:
-            return self.process.ask(message, began + self.left, callbacks)
+            return process.ask(message, began + self.left, callbacks)
         except TimeoutError:
-            self.process = None
-            raise AnswerTimeoutError(f"no reply before timeout, {self.timeout:g} s: does a loop never end?") from None
+            self.process, self.ended = None, f"no reply before timeout, {self.timeout:g} s: does a loop never end?"
+            raise AnswerTimeoutError(self.ended) from None
         except ProcessEndedError:
-            self.process = None
-            raise AnswerEndedError("Python itself ended here: by exit(), a crash, or for want of memory?") from None
+            self.process, self.ended = None, "Python itself ended here: by exit(), a crash, or for want of memory?"
+            raise AnswerEndedError(self.ended) from None
         finally:
             self.left -= time.monotonic() - began
             self.left_in_all -= time.monotonic() - began
+
+    def _alive(self) -> StudentProcess:
+        """Return a process; without one, start it, and run in it the cells that ran before."""
+        if self.process is None:
+            self._start_again()
+        return self.process
 
     def _start_again(self) -> None:
         """Start a process, and run in it the cells that ran before."""
@@ -227,20 +251,21 @@ class RemoteFunction:
         *arguments
             What it is called with.
         """
+        # What is compiled or loaded on a first call isn't counted; the same call would find its result remembered.
+        self(*(np.flip(one).copy() if isinstance(one, np.ndarray) else one for one in arguments))
         return self.session.call(self.__name__, arguments, {}, measured=True)
 
 
-def _as_error(reported: dict[str, Any], secret: bool) -> Exception:
+def _standard_error(reported: dict[str, Any]) -> Exception:
     """Return the error that an answer raised, of the same standard kind."""
     kind = getattr(builtins, reported["standard"], Exception)
     # A StopIteration would silently end a loop of the test.
     if not issubclass(kind, Exception) or kind is Exception or issubclass(kind, StopIteration | StopAsyncIteration):
-        kind, reported = AnswerError, reported | {"says": f"{reported['kind']}: {reported['says']}"}
-    says = f"in the line `{reported['line']}`" if secret else reported["says"]
+        kind, reported = AnswerError, reported | {"says": f"{reported['kind']}: {reported['says']}".removeprefix(": ")}
     try:
-        error = kind(says)
+        error = kind(reported["says"])
     except TypeError:
-        error = AnswerError(f"{kind.__name__}: {says}")
+        error = AnswerError(f"{reported['kind']}: {reported['says']}".removeprefix(": "))
     if reported["line"]:
         error.add_note(f"in your line: {reported['line']}")
     return error

@@ -23,16 +23,16 @@ RECORDS: tuple[str, ...] = table_beside(__file__)["records"]
 KINDS = "?biufcUS"
 """The kinds of array that pass, numpy's letters: booleans, numbers and texts."""
 
-MOST_BYTES = 150_000_000
-"""Bytes of all arrays of a message."""
+MOST_BYTES = 10_000_000
+"""Bytes of all arrays of a message, a hundred times what exercises send: a test may broadcast them against its own."""
 
-MOST_JSON = 20_000_000
-"""Bytes of a message outside its arrays: room for lists of a million numbers; the grader can hold a hundred of them."""
+MOST_JSON = 10_000_000
+"""Bytes of a message outside its arrays: room for lists of half a million numbers."""
 
 MOST_KEYS = 20_000
 """Entries of a set or dict: keys that were chosen to collide take the square of their number to put in."""
 
-LONGEST = 200_000_000
+LONGEST = 25_000_000
 """Bytes of a message that are still read."""
 
 

@@ -24,6 +24,9 @@ from semgrid_edu.workshop.course.sandbox.values import NotPlainError, Wire, deco
 MOST_TEXT = 20_000
 """Characters of a text that are kept."""
 
+FORBIDDEN = "not allowed where answers are graded: pools of processes, the network, files outside the notebook's folder"
+"""What is added to the error of a system that refuses."""
+
 MOST_SHOWN = 5_000_000
 """Characters of all that a cell displays, pictures among it, that are kept."""
 
@@ -105,6 +108,19 @@ class Worker:
         if error is not None:
             found["error"] = _report(error) | {"traceback": [_text(line) for line in self.traceback]}
         return found
+
+    def beside(self, files: dict) -> dict:
+        """Write the files that were handed in beside the notebook.
+
+        Parameters
+        ----------
+        files : dict
+            Their bytes, arrays of shape (n,), by their paths.
+        """
+        for name, content in files.items():
+            Path(name).parent.mkdir(parents=True, exist_ok=True)
+            Path(name).write_bytes(content.tobytes())
+        return {}
 
     def names(self, wanted: list[str]) -> dict:
         """Report which of these names are functions, and the values of the others.
@@ -206,8 +222,9 @@ def _report(error: BaseException) -> dict[str, Any]:
     kinds = [kind.__name__ for kind in type(error).__mro__ if kind.__module__ == "builtins"]
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename.startswith("<ipython")]
     line = linecache.getline(frames[-1].filename, frames[-1].lineno).strip() if frames else ""
-    kind = type(error).__name__
-    return {"kind": kind, "standard": kinds[0], "says": _text(str(error)), "line": _text(line)[:200]}
+    says = f"{error}: {FORBIDDEN}" if isinstance(error, PermissionError) else str(error)
+    said = {"kind": type(error).__name__, "standard": kinds[0], "says": _text(says), "line": _text(line)[:200]}
+    return said | {"number": frames[-1].lineno if frames else 0}
 
 
 def _main() -> None:
@@ -216,7 +233,8 @@ def _main() -> None:
     nothing = os.open(os.devnull, os.O_RDWR)
     for stream in (0, 1, 2):
         os.dup2(nothing, stream)
-    sys.path.insert(0, "")
+    # What was handed in beside a notebook may be imported, and takes no library's place.
+    sys.path[:] = [*sys.path[1:], ""]
     Worker(wire).serve()
 
 

@@ -1,0 +1,150 @@
+"""Submissions as platforms, editors and students leave them: none is merged with another, none lost without a word."""
+
+import re
+import subprocess
+import sys
+import zipfile
+
+import pytest
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+from tiny_course import tiny_notebooks
+
+from semgrid_edu.errors import DataError
+from semgrid_edu.storage.files import write_json
+from semgrid_edu.storage.reading import read_json
+from semgrid_edu.workshop.course.nbgrader.autograde import (
+    GradeSettings,
+    place,
+    reference_answers,
+    student_variant,
+    submission,
+)
+from semgrid_edu.workshop.course.nbgrader.build import MARKER, build_course
+from semgrid_edu.workshop.course.nbgrader.grade_class import grade_one
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, write_notebook
+
+TINY = "00_tiny"
+GUIDE = (NOTEBOOKS / "instructor" / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def notebooks(tmp_path_factory):
+    return tiny_notebooks(tmp_path_factory.mktemp("notebooks"))
+
+
+@pytest.fixture(scope="module")
+def course(notebooks, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("courses") / "course"
+    build_course(folder, notebooks)
+    return folder
+
+
+@pytest.fixture
+def right(notebooks):
+    source = notebooks / "src" / "exercises" / f"{TINY}.py"
+    return submission(source, reference_answers(source) | {"why": "Since 2 is 2."})
+
+
+def graded(course, student, notebook):
+    write_notebook(notebook, place(course, "submitted", student, TINY))
+    return grade_one(course, TINY, student, GradeSettings(timeout=5))
+
+
+def stripped(notebook):
+    for cell in notebook.cells:
+        cell.metadata = {}
+    return notebook
+
+
+def test_a_notebook_that_lost_its_metadata_keeps_its_points(course, right):
+    result = graded(course, "stripped", stripped(right))
+    assert (result.score, result.to_read, result.note) == (2, 1, "")
+
+
+def test_an_untouched_notebook_without_metadata_earns_nothing(course, notebooks):
+    result = graded(course, "untouched", stripped(submission(notebooks / "src" / "exercises" / f"{TINY}.py", {})))
+    assert (result.score, result.to_read, result.note) == (0, 0, "")
+
+
+def test_a_notebook_of_something_else_is_left_to_a_person(course):
+    other = new_notebook(cells=[new_code_cell("def thrice(x): return 3 * x"), new_markdown_cell("An essay.")])
+    result = graded(course, "other", other)
+    assert (result.score, result.points) == (0, 3)
+    assert "no cell of this exercise was recognised" in result.note
+
+
+def test_an_error_that_is_called_as_the_graders_writes_no_note(course, right):
+    own = "class AnswerEndedError(Exception): pass\nraise AnswerEndedError('full points granted by the dean')"
+    right.cells.insert(0, new_code_cell(own))
+    result = graded(course, "dean", right)
+    assert (result.score, result.note) == (2, "")
+
+
+def test_a_helper_that_was_handed_in_beside_is_found(course, right):
+    cell = next(cell for cell in right.cells if cell.metadata.get("nbgrader", {}).get("grade_id") == "twice")
+    cell.source = "from helper import twice"
+    helper = place(course, "submitted", "helped", TINY).with_name("helper.py")
+    helper.parent.mkdir(parents=True)
+    helper.write_text("def twice(x):\n    return 2 * x")
+    assert graded(course, "helped", right).score == 2
+
+
+@pytest.mark.parametrize("student", ["Anna Maria Silva_4711", "o'neill", "josé", "joao.silva"])
+def test_names_as_platforms_write_them_are_graded(course, right, student):
+    assert graded(course, student, right).score == 2
+
+
+LAYOUTS = {
+    "Blackboard": (
+        "{}_attempt_2027-03-01-17-12-00_00_tiny.ipynb",
+        ["anna silva", "joao.silva", "silva", "o'neill"],
+        ["anna silva", "joao.silva", "silva", "o'neill"],
+    ),
+    "Canvas": (
+        "{}_00_tiny.ipynb",
+        ["silvaanna_4711_90210", "silvajoao_LATE_4712_90211", "silvaanna_4713_90212"],
+        ["4711", "4712", "4713"],
+    ),
+    "Moodle": (
+        "{}/00_tiny.ipynb",
+        ["Anna Silva_4711_assignsubmission_file", "João Silva_4712_assignsubmission_file_"],
+        ["Anna Silva_4711", "João Silva_4712"],
+    ),
+}
+
+
+@pytest.mark.parametrize("platform", LAYOUTS)
+def test_each_student_of_a_platform_gets_a_folder_of_her_own(notebooks, tmp_path, platform):
+    name, names, students = LAYOUTS[platform]
+    build_course(tmp_path / "course", notebooks)
+    archive = tmp_path / "course" / "downloaded" / TINY / "archive"
+    archive.mkdir(parents=True)
+    with zipfile.ZipFile(archive / "all of them.zip", "w") as file:
+        for one in names:
+            file.writestr(name.format(one), one)
+    pattern = re.findall(r"named_regexp='(.*)'", GUIDE)[[*LAYOUTS].index(platform)]
+    option = f"--FileNameCollectorPlugin.named_regexp={pattern}"
+    command = [sys.executable, "-m", "nbgrader", "zip_collect", TINY, option]
+    subprocess.run(command, cwd=tmp_path / "course", check=True, capture_output=True)
+    found = {student: place(tmp_path / "course", "submitted", student, TINY).read_text() for student in students}
+    assert found == dict(zip(students, names, strict=True))
+    assert len(list((tmp_path / "course" / "submitted").iterdir())) == len(students)
+
+
+def test_a_resubmission_on_canvas_keeps_the_exercises_name():
+    pattern = re.findall(r"named_regexp='(.*)'", GUIDE)[1]
+    found = re.match(pattern, "/x/silvaanna_LATE_4711_90210_01_bayes-1.ipynb")
+    assert (found["student_id"], found["file_id"]) == ("4711", "01_bayes")
+
+
+def test_variants_are_known_to_nobody_without_the_courses_salt(notebooks, tmp_path):
+    for name in ("one", "two"):
+        build_course(tmp_path / name, notebooks)
+    one, two = (student_variant(tmp_path / name, "ada") for name in ("one", "two"))
+    assert one != two
+    assert one != student_variant(tmp_path / "one", "bob")
+    build_course(tmp_path / "one", notebooks)
+    assert student_variant(tmp_path / "one", "ada") == one, "each time the same"
+    write_json(tmp_path / "one" / MARKER, {**read_json(tmp_path / "one" / MARKER), "salt": ""})
+    with pytest.raises(DataError, match="course build"):
+        student_variant(tmp_path / "one", "ada")

@@ -1,0 +1,65 @@
+"""A submission that ends the grader's own process: it is marked, and everybody else is graded in a fresh pool."""
+
+import tempfile
+
+import pytest
+from tiny_course import tiny_notebooks
+
+from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, place, reference_answers, submission
+from semgrid_edu.workshop.course.nbgrader.build import build_course
+from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course
+from semgrid_edu.workshop.course.notebooks.build import write_notebook
+
+TINY = "00_tiny"
+KILLS = "if twice(0) == 'kill': import os; os._exit(9)\n    "
+GROWS = "np.zeros(10**9, dtype=np.uint8)[:, None] == np.zeros((1, 9)) if twice(0) == 'grow' else 0\n    "
+
+
+@pytest.fixture
+def course(tmp_path):
+    """A course whose hidden test dies of one answer, and takes much memory for another."""
+    notebooks = tiny_notebooks(tmp_path / "notebooks")
+    build_course(tmp_path / "course", notebooks)
+    module = tmp_path / "course" / "instructor" / "semgrid_instructor" / "tiny.py"
+    text = module.read_text().replace("from semgrid_instructor", "import numpy as np\n\nfrom semgrid_instructor")
+    module.write_text(text.replace("    secret_input", f"    {KILLS}{GROWS}secret_input"))
+    return tmp_path / "course"
+
+
+@pytest.fixture
+def hand_in(course, tmp_path):
+    """Return a function that hands in right answers, but for what they say to 0."""
+    source = tmp_path / "notebooks" / "src" / "exercises" / f"{TINY}.py"
+
+    def write(student, to_zero):
+        code = f"def twice(x):\n    return {to_zero!r} if x == 0 else 2 * x"
+        notebook = submission(source, reference_answers(source) | {"twice": code})
+        write_notebook(notebook, place(course, "submitted", student, TINY))
+
+    return write
+
+
+def test_who_ends_the_grader_is_marked_and_nobody_else(course, hand_in):
+    for k in range(5):
+        hand_in(f"right-{k}", 0)
+    hand_in("killer", "kill")
+    results = {one.student: one for one in grade_course(course, GradeSettings(timeout=5), workers=2)}
+    assert {name: one.score for name, one in results.items()} == {f"right-{k}": 2 for k in range(5)} | {"killer": 0}
+    assert "twice it ended the process that grades" in results["killer"].note
+    assert {name for name, one in results.items() if one.note} == {"killer"}
+    assert list(grade_course(course, GradeSettings(timeout=5))) == []
+
+
+def test_memory_that_an_answer_takes_in_a_test_is_an_error_of_its_own(course, hand_in):
+    hand_in("grows", "grow")
+    hand_in("right", 0)
+    results = {one.student: one.score for one in grade_course(course, GradeSettings(timeout=5, memory=1000))}
+    assert results == {"grows": 0, "right": 2}
+
+
+def test_no_folder_is_left_by_a_pool_that_died(course, hand_in, tmp_path, monkeypatch):
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    hand_in("killer", "kill")
+    list(grade_course(course, GradeSettings(timeout=5)))
+    assert list((tmp_path / "temporary").iterdir()) == []
