@@ -2,7 +2,9 @@
 
 import math
 from collections.abc import Callable
-from numbers import Integral
+from dataclasses import fields
+from functools import wraps
+from numbers import Integral, Real
 from pathlib import Path
 
 import numpy as np
@@ -117,6 +119,28 @@ def check_fields(thing: object, expected: str, holds: Callable[[object], bool], 
     for name in names:
         if not holds(getattr(thing, name)):
             raise ArgumentError(name, expected, getattr(thing, name))
+
+
+def types_named(check: Callable[[object], None]) -> Callable[[object], None]:
+    """Make the `__post_init__` of a dataclass name the field whose value is no number, or no sequence, but should be.
+
+    Parameters
+    ----------
+    check : callable
+        The `__post_init__`.
+    """
+
+    @wraps(check)
+    def checked(thing: object) -> None:
+        try:
+            check(thing)
+        except (TypeError, AttributeError) as error:
+            for field in fields(thing):
+                if field.type in (int, float) and not isinstance(value := getattr(thing, field.name), Real):
+                    raise ArgumentError(field.name, "a number", repr(value)) from error
+            raise ArgumentError(type(thing).__name__, "values of the types that it describes", error) from error
+
+    return checked
 
 
 def not_negative(number: float) -> bool:

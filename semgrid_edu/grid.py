@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, types_named
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,7 @@ class GridSpec:
     y_max: float
     cell: float
 
+    @types_named
     def __post_init__(self) -> None:
         """Refuse a grid that no array can hold."""
         if not (np.isfinite(self.cell) and self.cell > 0):

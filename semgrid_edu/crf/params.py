@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, types_named
 from semgrid_edu.occupancy import N_STATES
 
 LARGEST_WEIGHT = 1e30
@@ -75,6 +75,7 @@ class CrfParams:
         scale = PAPER_CELL / cell
         return cls(sigma_alpha=cls.sigma_alpha * scale, sigma_gamma=cls.sigma_gamma * scale)
 
+    @types_named
     def __post_init__(self) -> None:
         """Refuse numbers for which eq. (4) has no meaning."""
         for name in ("w_bilateral", "w_spatial"):

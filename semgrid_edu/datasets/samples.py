@@ -86,7 +86,10 @@ def sample_frames() -> list["Sample"]:
     """Return the shipped labelled frames of minikitti's training split, for experiments that take a minute."""
     from semgrid_edu.datasets.training_set import read_excerpt
 
-    return read_excerpt(samples_dir() / "frames")
+    folder = samples_dir() / "frames"
+    if not folder.is_dir():
+        raise DataError(folder, "the frames of a clone of semgrid_edu", "no such folder: a wheel has none")
+    return read_excerpt(folder)
 
 
 def samples_problems(folder: Path | None = None) -> list[str]:

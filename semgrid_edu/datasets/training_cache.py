@@ -9,8 +9,8 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Sequence
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict
 from pathlib import Path
 
@@ -112,10 +112,8 @@ def cached_labels(drives: LabelledDrives, recipe: ArrayRecipe, truth: LidarTruth
         grids = in_each_drive(drive_labels, jobs, f"{folder.name}: labels from LIDAR")
         tensors = {GRIDS_KEY: torch.from_numpy(np.stack(grids))}
         write_tensors(path, tensors, {"truth": json.dumps(asdict(truth), sort_keys=True)})
-    _, tensors = read_tensors(path)
-    if GRIDS_KEY not in tensors:
-        raise DataError(path, f"the tensor {GRIDS_KEY} (delete the file to make it anew)", ", ".join(tensors) or "none")
-    return tensors[GRIDS_KEY].numpy()
+    with _to_delete(path):
+        return read_tensors(path)[1][GRIDS_KEY].numpy()
 
 
 def in_each_drive(make: Callable[..., list], jobs: Sequence[tuple], what: str) -> list:
@@ -211,20 +209,21 @@ def _pack(frames: list[dict[str, NDArray]]) -> dict[str, NDArray]:
 
 def _map_arrays(folder: Path) -> dict[str, NDArray]:
     """Map the arrays that the manifest lists, once they are what it says."""
-    manifest = read_json(folder / "manifest.json").get("arrays")
-    if not isinstance(manifest, dict) or not all(isinstance(one, list) and one for one in manifest.values()):
-        expected = "type and shape of each array (delete the folder to make it anew)"
-        raise DataError(folder / "manifest.json", expected, repr(manifest)[:200])
+    with _to_delete(folder / "manifest.json") as path:
+        described = {name: list(one) for name, one in read_json(path)["arrays"].items()}
     arrays = {}
-    for name, described in manifest.items():
-        path = folder / f"{name}.npy"
-        if not path.is_file():
-            raise DataError(path, "an array (delete the folder to make it anew)", "no such file")
-        try:
+    for name, expected in described.items():
+        with _to_delete(folder / f"{name}.npy") as path:
             arrays[name] = np.load(path, mmap_mode="r", allow_pickle=False)
-        except (OSError, ValueError, EOFError) as error:
-            raise DataError(path, "an array (delete the folder to make it anew)", error) from error
-        found = [str(arrays[name].dtype), *arrays[name].shape]
-        if found != described:
-            raise DataError(path, f"{described} (delete the folder to make it anew)", found)
+            if (found := [str(arrays[name].dtype), *arrays[name].shape]) != expected:
+                raise ValueError(f"{found} in place of {expected}")
     return arrays
+
+
+@contextmanager
+def _to_delete(path: Path) -> Iterator[Path]:
+    """Say of a damaged file that it can be made anew."""
+    try:
+        yield path
+    except (OSError, EOFError, LookupError, ValueError, TypeError, AttributeError) as error:
+        raise DataError(path, "what was made of the data (delete its folder to make it anew)", error) from error

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, types_named
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.planes import plane_heights
 
@@ -49,6 +49,7 @@ class Architecture:
     uses_occupancy: bool = True
     reduces: bool = True
 
+    @types_named
     def __post_init__(self) -> None:
         """Refuse sizes that no computer has the memory for."""
         height, width = self.image_size

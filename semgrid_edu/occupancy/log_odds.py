@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.errors import ArgumentError, not_negative
+from semgrid_edu.errors import ArgumentError, not_negative, types_named
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.evidence import Evidence, Sensor, check_sensor
 from semgrid_edu.occupancy.local_belief import observe
@@ -37,6 +37,7 @@ class LogOddsParams:
     highest: float = 0.97
     sensor: Sensor = field(default_factory=SensorModel)
 
+    @types_named
     def __post_init__(self) -> None:
         """Refuse bounds that allow for certainty, and a prior outside the bounds."""
         if not 0 < self.lowest < self.highest < 1:

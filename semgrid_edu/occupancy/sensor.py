@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.errors import ArgumentError, check_fields, not_negative, positive_count
+from semgrid_edu.errors import ArgumentError, check_fields, not_negative, positive_count, types_named
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.evidence import Evidence, check_points
 from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
@@ -68,6 +68,7 @@ class SensorModel:
     edge: float = 0.75
     ground: GroundParams | None = field(default_factory=GroundParams)
 
+    @types_named
     def __post_init__(self) -> None:
         """Refuse a sensor that is impossible, or that never errs: no scan could ever correct a cell that is certain."""
         check_fields(self, "metres, not negative", not_negative, "under", "edge")

@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.errors import ArgumentError, check_shape
+from semgrid_edu.errors import ArgumentError, check_shape, types_named
 from semgrid_edu.grid import GridSpec
 
 
@@ -67,6 +67,7 @@ class Particles:
     velocity: NDArray[np.float32]
     weight: NDArray[np.float32]
 
+    @types_named
     def __post_init__(self) -> None:
         """Refuse arrays of different lengths: compiled loops would read beyond the end of the shorter ones."""
         for name in ("position", "velocity"):
@@ -104,6 +105,7 @@ class FilterState:
     particles: Particles
     newborn: NDArray[np.float32]
 
+    @types_named
     def __post_init__(self) -> None:
         """Refuse planes of different sizes: compiled loops would read beyond the end of the smaller ones."""
         check_shape("probability", self.probability, (N_STATES, *np.shape(self.newborn)))

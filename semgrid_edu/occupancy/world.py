@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.errors import ArgumentError, check_fields, not_negative, positive_count
+from semgrid_edu.errors import ArgumentError, check_fields, not_negative, positive_count, types_named
 from semgrid_edu.occupancy.evidence import Sensor, check_sensor
 from semgrid_edu.occupancy.resampling import Resampling, SystematicResampling
 from semgrid_edu.occupancy.sensor import SensorModel
@@ -66,6 +66,7 @@ class WorldModel:
     clearing_cells: float = 3.0
     sensor: Sensor = field(default_factory=SensorModel)
 
+    @types_named
     def __post_init__(self) -> None:
         """Refuse a world that is impossible."""
         rates = np.asarray(self.rates, dtype=float)
@@ -155,6 +156,7 @@ class CmcdotParams(WorldModel):
     birth_share: float = 0.3
     resampling: Resampling = field(default_factory=SystematicResampling)
 
+    @types_named
     def __post_init__(self) -> None:
         """Refuse parameters that describe no filter."""
         super().__post_init__()

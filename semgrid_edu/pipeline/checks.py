@@ -96,7 +96,7 @@ class StageCheck:
             yield
         except StageError:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             if self.own:
                 raise
             raise self.error("a result", f"an error: {in_short(error, file_of(self.function))}") from error

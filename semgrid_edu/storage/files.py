@@ -81,15 +81,45 @@ def check_writable(path: str | Path) -> None:
     Raises
     ------
     DataError
-        When a folder is in its place.
+        When a folder, a pipe or a device is in its place.
     OSError
         When its folder can't be made or takes no files.
     """
     path = Path(path)
-    if path.is_dir():
-        raise DataError(path, "a file to write", "a folder")
+    if path.exists() and not path.is_file():
+        raise DataError(path, "a file to write", "a folder" if path.is_dir() else "a pipe or a device")
     path.parent.mkdir(parents=True, exist_ok=True)
     tempfile.TemporaryFile(dir=path.parent).close()
+
+
+def check_ours(mark: str, *paths: str | Path, force: bool | None = None) -> None:
+    """Check that files can be written and that nobody else's would be lost; every command asks this before its work.
+
+    A file is ours when it holds the mark that its writer puts into it, such as the command in a result. What is empty
+    may be replaced too.
+
+    Parameters
+    ----------
+    mark : str
+        What a file of ours holds.
+    *paths : path-like
+        The files. The first one holds the mark, and the others belong to it.
+    force : bool, optional
+        Whether to replace what isn't ours all the same; left out where nobody can ask for that.
+
+    Raises
+    ------
+    DataError
+        When one of the files isn't ours, or can't be written.
+    OSError
+        As for `check_writable`.
+    """
+    ours = force or (Path(paths[0]).is_file() and mark.encode() in Path(paths[0]).read_bytes())
+    for path in map(Path, paths):
+        check_writable(path)
+        if not ours and path.exists() and path.stat().st_size:
+            found = "something else, which would be lost" + " without --force" * (force is False)
+            raise DataError(path, "a new file, or an earlier result of this command", found)
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:

@@ -1,12 +1,13 @@
 """Where independent tasks are done: in processes of this machine, or on a dask.distributed cluster."""
 
 import os
+import signal
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import current_process, get_context, parent_process
+from multiprocessing import active_children, current_process, get_context, parent_process
 
 from semgrid_edu.errors import ArgumentError
 
@@ -27,6 +28,11 @@ def worker_pool(workers: int) -> Iterator[Executor]:
     ------
     concurrent.futures.Executor
         Its processes end with the block, or when this process is killed.
+
+    Raises
+    ------
+    ChildProcessError
+        When a process ends before its work does.
     """
     if current_process().daemon:
         with ThreadPoolExecutor(1) as pool:
@@ -35,13 +41,25 @@ def worker_pool(workers: int) -> Iterator[Executor]:
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_end_with_parent) as pool:
         try:
             yield pool
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
+        except BrokenExecutor as error:
+            raise ChildProcessError(DIED) from error
+        except BaseException as error:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for worker in active_children() if isinstance(error, KeyboardInterrupt) else ():
+                worker.terminate()  # it may have an hour of work before it
             raise
 
 
+DIED = 'a worker died: does your script start them below `if __name__ == "__main__":`? Else memory may have run out'
+"""What to say when a worker ends before its work: each imports the script that started it."""
+
+
 def _end_with_parent() -> None:
-    """End this worker when the process that started it is killed: an orphan would write beside the one that resumes."""
+    """End this worker when the process that started it is killed: an orphan would write beside the one that resumes.
+
+    Ctrl-C, which a terminal sends to all of them, is left to that process.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:
         parent_process().join()

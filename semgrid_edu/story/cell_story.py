@@ -1,20 +1,20 @@
 """The story of one cell: what each stage did to it, from returns and pixels to its class (paper, Fig. 2)."""
 
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import softmax
 
 from semgrid_edu.crf import CrfParams
 from semgrid_edu.datasets.grid_truth import grid_truth
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, check_shape
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, LABEL_SETS
 from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.occupancy import SensorModel
-from semgrid_edu.pipeline import FrameResult
+from semgrid_edu.pipeline import FrameResult, Stages
 from semgrid_edu.planes import plane_pixels
 from semgrid_edu.story.cell_evidence import CellScan, cell_scan, place_history
 from semgrid_edu.story.contributions import Contributions, cell_contributions
@@ -131,14 +131,13 @@ def cell_story(
     """
     architecture = net.need_architecture()
     spec = architecture.grid
-    cell = _checked(cell, spec)
-    o = result.belief.probability
+    cell, o = _checked(cell, spec), result.belief.probability
+    _check_net(Stages.of(net), result)
     truth = _truth(result, spec, cell)
     label, rival = map(int, label_and_rival(result.grid[:, *cell], IGNORE if truth is None else truth))
     times, history = place_history([*past[max(0, len(past) - FRAMES + 1) :], result], spec, cell)
     pixels, visible = plane_pixels(spec, architecture.heights, result.frame.camera)
     parts = [cell_contributions(net, result.scores, o, cell, c) for c in (label, rival)]
-    _check_net(parts, result.grid[[label, rival], *cell])
     params = crf or CrfParams.for_cells(spec.cell)
     return CellStory(
         cell=cell,
@@ -180,21 +179,23 @@ def label_and_rival(probability: NDArray, truth: ArrayLike) -> tuple[NDArray[np.
 
 
 def _checked(cell: tuple[int, int], spec: GridSpec) -> tuple[int, int]:
-    row, col = (int(index) for index in cell)
-    if not (0 <= row < spec.shape[0] and 0 <= col < spec.shape[1]):
-        raise ArgumentError("cell", f"row and column in a grid of {spec.shape} cells", (row, col))
+    try:
+        row, col = (range(n).index(operator.index(k)) for n, k in zip(spec.shape, cell, strict=True))
+    except (TypeError, ValueError):
+        raise ArgumentError("cell", f"row and column in a grid of {spec.shape} cells", cell) from None
     return row, col
+
+
+def _check_net(own: Stages, result: FrameResult) -> None:
+    """Refuse a network that makes other probabilities of the frame's scores."""
+    check_shape("scores", result.scores, (len(result.grid), *own.architecture.image_size))
+    check_shape("grid", result.grid, (len(result.scores), *own.architecture.grid.shape))
+    given = np.exp(own.fuse(own.sample(result.scores), result.belief.probability))
+    if not (apart := np.abs(given - result.grid).max()) <= TOLERANCE:
+        raise ArgumentError("net", "the network that made the result", f"one whose probabilities are {apart:.3f} apart")
 
 
 def _truth(result: FrameResult, spec: GridSpec, cell: tuple[int, int]) -> int | None:
     if result.frame.labels is None:
         return None
     return int(grid_truth(result.frame.labels, result.belief.probability, spec)[cell])
-
-
-def _check_net(parts: list[Contributions], probability: NDArray) -> None:
-    """Refuse a network whose two scores don't give the result's ratio of probabilities."""
-    share = softmax([part.score for part in parts])[0]
-    given = probability[0] / probability.sum()
-    if not abs(share - given) <= TOLERANCE:
-        raise ArgumentError("net", "the network that made the result", f"one that gives {share:.3f}, not {given:.3f}")

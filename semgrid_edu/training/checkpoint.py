@@ -8,19 +8,20 @@ from torch.optim import SGD
 
 from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.networks import WEIGHTS
+from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS
 from semgrid_edu.networks.weights import check_tensors
+from semgrid_edu.storage.files import check_ours
 from semgrid_edu.storage.provenance import PROVENANCE
 from semgrid_edu.storage.reading import parse_json
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
-from semgrid_edu.training.log import LOG
+from semgrid_edu.training.log import HEADER, LOG
 
 CHECKPOINT = "checkpoint.safetensors"
 """The file from which an interrupted run goes on, in the folder of the run."""
 
 
 def check_folder(folder: Path, resume: bool) -> None:
-    """Refuse to overwrite a finished or an interrupted run, or the provenance of something else.
+    """Refuse to overwrite a finished or an interrupted run, or files of something else.
 
     Parameters
     ----------
@@ -32,7 +33,7 @@ def check_folder(folder: Path, resume: bool) -> None:
     Raises
     ------
     DataError
-        When the folder holds a run that would be lost, a data set, or the provenance of something else.
+        When the folder holds a run that would be lost, a data set, or files of something else.
     """
     if (folder / INDEX_FILE).exists():
         raise DataError(folder, "a folder for the training run alone", "a data set")
@@ -40,6 +41,8 @@ def check_folder(folder: Path, resume: bool) -> None:
         raise DataError(folder, "a folder for the training run alone", f"the {PROVENANCE} of something else")
     if (folder / WEIGHTS).exists():
         raise DataError(folder, "a folder without a trained network, which would be lost", WEIGHTS)
+    if folder.exists():
+        check_ours(HEADER, folder / LOG, folder / IMAGE_STAGE)
     if (folder / CHECKPOINT).exists() and not resume:
         raise DataError(folder, "a folder without an interrupted run (--resume continues it)", CHECKPOINT)
 

@@ -104,7 +104,7 @@ def train_crf(
     seed : int
         Seed for the order of the frames.
     resume : bool
-        Whether to continue from the folder's checkpoint.
+        Whether to go on from the folder's checkpoint; before there is one, the run begins.
 
     Raises
     ------
@@ -112,8 +112,8 @@ def train_crf(
         When there are too few frames, grids don't fit the layer, the checkpoint belongs to another run, or the loss
         isn't finite.
     DataError
-        When there is no checkpoint to resume from or it is damaged; when the folder holds a run that a new one would
-        overwrite; or when another process trains in it.
+        When the checkpoint is damaged; when the folder holds files that a new run would overwrite; or when another
+        process trains in it.
     """
     if len(truth) < params.batch_size:
         raise ArgumentError("truth", f"at least one batch of {params.batch_size} frames", f"{len(truth)} frames")

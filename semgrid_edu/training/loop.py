@@ -68,7 +68,7 @@ def train(
     seed : int
         Seed for the order of the frames and for their jitter.
     resume : bool
-        Whether to continue from the folder's checkpoint.
+        Whether to go on from the folder's checkpoint; before there is one, the run begins.
     device : torch.device or str
         The device to compute on.
 
@@ -78,8 +78,8 @@ def train(
         When the network has no architecture, the data don't fit the network, the checkpoint belongs to another run, or
         the loss isn't finite.
     DataError
-        When there is no checkpoint to resume from or it is damaged; when the folder holds a checkpoint or a trained
-        network that a new run would overwrite; or when another process trains in it.
+        When the checkpoint is damaged; when the folder holds files that a new run would overwrite; or when another
+        process trains in it.
     """
     params, device = params or TrainingParams(), torch.device(device)
     _check_dataset(net, dataset, params)
@@ -134,14 +134,15 @@ def descend(
     run : dict
         What distinguishes this run from others, as for `save_checkpoint`.
     resume : bool
-        Whether to continue from the folder's checkpoint.
+        Whether to go on from the folder's checkpoint; before there is one, the run begins.
     """
     check_folder(folder, resume)
     with sole_writer(folder) if rank() == 0 else nullcontext():
         check_folder(folder, resume)  # once more: until now another process could write to it
         learning = [parameter for parameter in learner.parameters() if parameter.requires_grad]
         optimiser = torch.optim.SGD(learning, lr=params.learning_rate, momentum=params.momentum)
-        start = load_checkpoint(folder / CHECKPOINT, run, learner, optimiser) if resume else 0
+        # After `check_folder` there is a checkpoint only if the run is to be resumed.
+        start = load_checkpoint(folder / CHECKPOINT, run, learner, optimiser) if (folder / CHECKPOINT).exists() else 0
         if rank() == 0:
             begin_log(folder / LOG, start)
         keep_freed_memory()

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, types_named
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,7 @@ class TrainingParams:
     end_to_end: bool = True
     mirror: bool = True
 
+    @types_named
     def __post_init__(self) -> None:
         """Refuse numbers that nothing can be learnt with."""
         for name, expected, fits in (

@@ -14,10 +14,11 @@ from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
 from semgrid_edu.datasets.training_set import Mixture, TrainingSet, sets_by_camera
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.networks import Architecture, build_net, load_imagenet, load_net
+from semgrid_edu.networks import Architecture, build_net, build_segmenter, load_imagenet, load_net
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import write_provenance
-from semgrid_edu.training.checkpoint import CHECKPOINT
+from semgrid_edu.storage.tensors import read_tensors
+from semgrid_edu.training.checkpoint import CHECKPOINT, check_folder
 from semgrid_edu.training.distributed import first_process_first, process_group, rank, world_size
 from semgrid_edu.training.loop import train
 from semgrid_edu.training.params import TrainingParams
@@ -125,7 +126,7 @@ def train_network(
     seed : int
         Seed for the initial weights, and for the order and the jitter of the frames.
     resume : bool
-        Whether to continue a run that was interrupted.
+        Whether to go on with a run that was interrupted, if there is one.
     preset : str
         "compact" or "paper", see `architecture`.
     imagenet : path-like, optional
@@ -148,7 +149,14 @@ def train_network(
     """
     if imagenet and start:
         raise ArgumentError("start", "no other network beside the ImageNet weights, which it would replace", start)
-    began, description = datetime.now(UTC), architecture(segmenter, preset)
+    began, description, folder = datetime.now(UTC), architecture(segmenter, preset), Path(folder)
+    check_folder(folder, resume)
+    # What can't be is refused before the data are prepared, which takes minutes.
+    like_it, resumed = build_segmenter(segmenter, n_classes=1, preset=preset), (folder / CHECKPOINT).exists()
+    if imagenet:
+        load_imagenet(like_it, imagenet)
+    if start:
+        read_tensors(start)
     folders = [data] if isinstance(data, str | Path) else list(data)
     with process_group(device) as chosen:
         with first_process_first():
@@ -166,7 +174,7 @@ def train_network(
         details = {
             "date": f"{began:%Y-%m-%d}",
             "minutes": round((datetime.now(UTC) - began).total_seconds() / 60, 1),
-            "resumed": resume,
+            "resumed": resumed,
             "device": chosen.type,
             "processes": processes,
             # JSON has no infinity.
@@ -224,20 +232,3 @@ def _command(
 def _name(path: str | Path) -> str:
     """Return the last part of a path, also for a path such as `.`."""
     return Path(path).resolve().name
-
-
-def how_to_go_on(folder: str | Path) -> str:
-    """Return a sentence on how to go on after an interruption, which loses the steps since the last checkpoint.
-
-    Parameters
-    ----------
-    folder : path-like
-        The folder of the training run.
-
-    Returns
-    -------
-    str
-        The sentence, without a full stop.
-    """
-    path = Path(folder) / CHECKPOINT
-    return f"--resume goes on from {path}" if path.exists() else f"start again: there is no {path} yet"

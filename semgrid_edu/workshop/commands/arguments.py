@@ -2,10 +2,12 @@
 
 import os
 import re
+import sys
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import typer
+from typer.core import TyperGroup
 
 from semgrid_edu.errors import ArgumentError
 
@@ -17,6 +19,37 @@ LARGEST = 2**63 - 1
 
 TOLD = 20
 """Most doubtful things of a kind that are shown one by one."""
+
+
+class Commands(TyperGroup):
+    """A group of commands, which knows the one that was asked for and says how to go on after Ctrl-C or `kill`."""
+
+    asked, command = "semgrid-edu", None
+    """The command that was asked for last, such as "semgrid-edu data make"; by name, and itself."""
+
+    def resolve_command(self, ctx: object, args: list[str]) -> tuple:
+        """Find a command, and remember it.
+
+        Parameters
+        ----------
+        ctx : typer.Context
+            The group's context.
+        args : list of str
+            What was typed after the group's name.
+        """
+        name, command, rest = super().resolve_command(ctx, args)
+        Commands.asked, Commands.command = " ".join(["semgrid-edu", *ctx.command_path.split()[1:], str(name)]), command
+        return name, command, rest
+
+    def invoke(self, ctx: object) -> object:
+        """Run a command; `ctx` is the group's context. Parameters are those of `Commands.resolve_command`."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            helps = [self.command.help, *(f"{one.opts} {vars(one).get('help')}" for one in self.command.params)]
+            how = "goes on" if "the same command" in " ".join(map(str, helps)).lower() else "begins again"
+            how = "goes on with --resume" if "--resume" in str(helps) else how
+            sys.exit(f"semgrid-edu: interrupted; the same command {how}")
 
 
 def check_arguments(arguments: Sequence[str]) -> None:

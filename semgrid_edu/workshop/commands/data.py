@@ -1,14 +1,29 @@
 """The commands of `semgrid-edu data`: make, fetch and check data."""
 
+from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.workshop.commands.arguments import Commands
 
-data = typer.Typer(no_args_is_help=True, help="Make, fetch and check data.")
+data = typer.Typer(cls=Commands, no_args_is_help=True, help="Make, fetch and check data.")
 """What `semgrid-edu` adds to its commands."""
+
+
+@data.command("list")
+def list_data() -> None:
+    """List the data sets that can be made or fetched."""
+    from semgrid_edu.workshop.simulation.datasets import RECIPES
+
+    for name, recipe in RECIPES.items():
+        frames = Counter(route.split for route in recipe.routes for _ in route.labelled)
+        told = ", ".join(f"{number} labelled frames in {split!r}" for split, number in frames.items())
+        typer.echo(f"{name}: simulated, {told}, classes of {recipe.label_set}; semgrid-edu data make {name} FOLDER")
+    typer.echo("kitti: real drives, no labels; semgrid-edu data fetch kitti --drive 2011_09_26_0013 --folder FOLDER")
+    typer.echo("pandaset: a real street with labels; semgrid-edu data fetch pandaset says where it is")
 
 
 @data.command()
@@ -88,7 +103,7 @@ def real_excerpt(
     folder: Annotated[Path, typer.Argument(help="A new folder, which takes the drive, its licence and provenance.")],
     pandaset: Annotated[Path, typer.Option(help="The folder that holds PandaSet's scenes.")],
     scene: Annotated[str, typer.Option(help="Number of the scene, such as 002.")],
-    frames: Annotated[int, typer.Option(help="Number of frames, from the first one.")] = 10,
+    frames: Annotated[int, typer.Option(min=1, help="Number of frames, from the first one.")] = 10,
 ) -> None:
     """Keep a few frames of a labelled scene of PandaSet, reduced in size, in KITTI's raw layout."""
     from semgrid_edu.workshop.simulation.real_excerpt import write_real_excerpt

@@ -6,21 +6,21 @@ from typing import Annotated
 
 import typer
 
-from semgrid_edu.storage.files import table_beside
-from semgrid_edu.workshop.commands.arguments import tell
+from semgrid_edu.storage.files import check_ours, table_beside, write_json
+from semgrid_edu.workshop.commands.arguments import Commands, tell
 from semgrid_edu.workshop.paper import reports
 
-reproduce = typer.Typer(no_args_is_help=True, help="Run the experiments of the lectures.")
+reproduce = typer.Typer(cls=Commands, no_args_is_help=True, help="Run the experiments of the lectures.")
 """What `semgrid-edu` adds to its commands."""
 
-KEPT = ("dataset.json", "provenance.json")
-"""JSON files that no result may replace."""
+
+Runs = Annotated[Path, typer.Option(help="Takes one folder per run; the same command goes on.")]
 
 
 @reproduce.command()
 def occupancy(
     seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives and the particles.")] = 0,
-    drives: Annotated[int, typer.Option(min=1, help="Number of drives, of three seconds each.")] = 20,
+    drives: Annotated[int, typer.Option(min=1, max=1000, help="Number of drives, of three seconds each.")] = 20,
     grid: Annotated[str | None, typer.Option(help="paper or compact; both by default.")] = None,
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("occupancy.json"),
 ) -> None:
@@ -33,7 +33,7 @@ def occupancy(
 @reproduce.command()
 def streets(
     seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives and the particles.")] = 0,
-    drives: Annotated[int, typer.Option(min=1, help="Number of drives through each street.")] = 6,
+    drives: Annotated[int, typer.Option(min=1, max=1000, help="Number of drives through each street.")] = 6,
     grid: Annotated[str | None, typer.Option(help="paper or compact; both by default.")] = None,
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("streets.json"),
 ) -> None:
@@ -46,8 +46,8 @@ def streets(
 @reproduce.command()
 def two_stage(
     data: Annotated[Path, typer.Option(help="A data set with train and test frames, such as data/minikitti.")],
-    runs: Annotated[Path, typer.Option(help="Takes one folder per training run; a run that has ended isn't repeated.")],
-    seeds: Annotated[int, typer.Option(min=1, help="Number of training runs of each kind.")] = 3,
+    runs: Runs,
+    seeds: Annotated[int, typer.Option(min=1, max=1000, help="Number of training runs of each kind.")] = 3,
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("two_stage.json"),
 ) -> None:
     """Train end to end and in two stages, and score both kinds of networks (lecture 08)."""
@@ -80,19 +80,19 @@ def crf_error(
     """Measure error against time of every way to run the CRF, kernel and convergence apart (lecture 11)."""
     from semgrid_edu.workshop.studies.crf.crf_error import crf_error, crf_error_tables
 
-    keep_result(out, lambda: crf_error(out, seed), crf_error_tables)
+    keep_result(out, lambda: crf_error(out, seed), crf_error_tables, goes_on=True)
 
 
 @reproduce.command()
 def crf_coupling(
     seed: Annotated[int, typer.Option(min=0, help="Seed for the random grids.")] = 0,
-    draws: Annotated[int, typer.Option(min=1, help="Number of random grids of each size.")] = 20,
+    draws: Annotated[int, typer.Option(min=1, max=1000, help="Number of random grids of each size.")] = 20,
     out: Annotated[Path, typer.Option(help="Takes each size; the same command goes on.")] = Path("crf_coupling.json"),
 ) -> None:
     """Compare approximate with exact inference in the CRF on tiny grids, as the coupling grows (lecture 10)."""
     from semgrid_edu.workshop.studies.crf.crf_coupling import crf_coupling, crf_coupling_tables
 
-    keep_result(out, lambda: crf_coupling(out, seed, draws), crf_coupling_tables)
+    keep_result(out, lambda: crf_coupling(out, seed, draws), crf_coupling_tables, goes_on=True)
 
 
 @reproduce.command()
@@ -100,7 +100,7 @@ def learned_crf(
     data: Annotated[Path, typer.Option(help="The data set that the network learned from, such as data/minikitti.")],
     validation: Annotated[Path, typer.Option(help="A data set with validation frames, such as data/validation.")],
     weights: Annotated[Path, typer.Option(help="A network trained on the train frames of --data.")],
-    runs: Annotated[Path, typer.Option(help="Takes one folder per training run; a run that has ended isn't repeated.")],
+    runs: Runs,
     seed: Annotated[int, typer.Option(min=0, help="Seed for the order of the frames.")] = 0,
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("learned_crf.json"),
 ) -> None:
@@ -118,7 +118,7 @@ def learned_crf(
 @reproduce.command()
 def truth_policies(
     seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives, the errors, the particles.")] = 0,
-    drives: Annotated[int, typer.Option(min=1, help="Number of drives, of two seconds each.")] = 20,
+    drives: Annotated[int, typer.Option(min=1, max=1000, help="Number of drives, of two seconds each.")] = 20,
     grid: Annotated[str, typer.Option(help="compact or paper.")] = "compact",
     lidar: Annotated[str, typer.Option(help="coarse, which the simulated data sets have, or HDL-64E.")] = "coarse",
     out: Annotated[Path, typer.Option(help="Takes each drive; the same command goes on.")] = Path("truth.json"),
@@ -127,13 +127,13 @@ def truth_policies(
     from semgrid_edu.workshop.studies.ground_truth.counts import truth_tables
     from semgrid_edu.workshop.studies.ground_truth.laboratory import truth_policies
 
-    keep_result(out, lambda: truth_policies(out, seed, drives, grid, lidar), truth_tables)
+    keep_result(out, lambda: truth_policies(out, seed, drives, grid, lidar), truth_tables, goes_on=True)
 
 
 @reproduce.command()
 def point_labels(
     seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives.")] = 0,
-    drives: Annotated[int, typer.Option(min=1, help="Number of drives, of two seconds each.")] = 20,
+    drives: Annotated[int, typer.Option(min=1, max=1000, help="Number of drives, of two seconds each.")] = 20,
     grid: Annotated[str, typer.Option(help="compact or paper.")] = "compact",
     lidar: Annotated[str, typer.Option(help="HDL-64E, or coarse, which the simulated data sets have.")] = "HDL-64E",
     out: Annotated[Path, typer.Option(help="Where to write the counts.")] = Path("point_labels.json"),
@@ -149,7 +149,7 @@ def point_labels(
 def real_streets(
     pandaset: Annotated[Path, typer.Option(help="The folder that holds PandaSet's scenes.")],
     simulated: Annotated[Path, typer.Option(help="A data set of simulated streets, such as data/minikitti.")],
-    runs: Annotated[Path, typer.Option(help="Takes one folder per training run; a run that has ended isn't repeated.")],
+    runs: Runs,
     scene: Annotated[str, typer.Option(help="Number of the scene, such as 002.")] = "002",
     seed: Annotated[int, typer.Option(min=0, help="First seed for initial weights and the order of frames.")] = 0,
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("real_streets.json"),
@@ -173,7 +173,13 @@ def real_drive(
     keep_result(out, lambda: compare_drives(kitti, date, drive), real_drive_table)
 
 
-def keep_result(out: Path, compute: Callable[[], dict], table: Callable[[dict], str]) -> None:
+def keep_result(
+    out: Path,
+    compute: Callable[[], dict],
+    table: Callable[[dict], str],
+    goes_on: bool = False,
+    force: bool | None = None,
+) -> None:
     """Compute an experiment's result, once it is known that the file can be written; write it, and print its table.
 
     Parameters
@@ -184,13 +190,12 @@ def keep_result(out: Path, compute: Callable[[], dict], table: Callable[[dict], 
         Returns the result.
     table : callable
         Turns the result into text to print.
+    goes_on : bool
+        Whether `compute` goes on from the file, and so refuses that of something else.
+    force : bool, optional
+        Whether to replace the file of something else, see `check_ours`.
     """
-    from semgrid_edu.errors import DataError
-    from semgrid_edu.storage.files import check_writable, write_json
-
-    check_writable(out)
-    if out.exists() and (out.suffix != ".json" or out.name in KEPT):
-        raise DataError(out, "a new file, or the JSON of an earlier result", "something else, which would be lost")
+    check_ours("" if goes_on else f'"command": "{Commands.asked} ', out, force=force)
     result = compute()
     write_json(out, result)
     typer.echo(f"{table(result)}\n\nwritten to {out}")
@@ -205,7 +210,7 @@ def _command(experiment: str) -> Callable[..., None]:
     """Return the command of an experiment."""
 
     def command(
-        runs: Annotated[Path, typer.Option(help="Takes one folder per run; the same command goes on.")],
+        runs: Runs,
         out: Annotated[Path, typer.Option(help="Takes the results: JSON, Markdown and pictures.")],
         scale: Annotated[
             str,
@@ -220,19 +225,9 @@ def _command(experiment: str) -> Callable[..., None]:
     ) -> None:
         from semgrid_edu.workshop.paper.reports.reproduce import Request, reproduce
 
-        request = Request(
-            experiment=experiment,
-            scale=scale,
-            runs=runs,
-            out=out,
-            seeds=seeds,
-            workers=workers,
-            scheduler=scheduler,
-            device=device,
-            processes=processes,
-        )
-        problems = reproduce(request, typer.echo, plan)
-        if problems:
+        places = {"runs": runs, "out": out, "workers": workers, "scheduler": scheduler, "device": device}
+        request = Request(experiment=experiment, scale=scale, seeds=seeds, processes=processes, **places)
+        if problems := reproduce(request, typer.echo, plan):
             typer.echo(problems, err=True)
             raise typer.Exit(1)
 

@@ -1,6 +1,7 @@
 """The command line, `semgrid-edu`: parses and calls, nothing else."""
 
 import os
+import signal
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -8,21 +9,37 @@ from typing import Annotated
 import typer
 from typer.core import TyperCommand
 
+from semgrid_edu import __version__
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.compiled import CACHE_VARIABLE, keep_compiled_functions
-from semgrid_edu.workshop.commands.arguments import check_arguments, chosen_drive, tell
+from semgrid_edu.workshop.commands.arguments import Commands, check_arguments, chosen_drive, tell
 from semgrid_edu.workshop.commands.course import course
 from semgrid_edu.workshop.commands.data import data
 from semgrid_edu.workshop.commands.experiments import keep_result, reproduce
 
-app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+app = typer.Typer(cls=Commands, no_args_is_help=True, pretty_exceptions_enable=False)
+Resume = Annotated[bool, typer.Option("--resume", help="Go on with a run that was interrupted, if there is one.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace files that this command hasn't written, too.")]
+
+PICTURES = (".png", ".pdf", ".svg")
+"""Formats of pictures that say who made them."""
+
 app.add_typer(data, name="data")
 app.add_typer(course, name="course")
 app.add_typer(reproduce, name="reproduce")
 
 
+def _version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"semgrid_edu {__version__}")
+        raise typer.Exit
+
+
 @app.callback()
-def main(cache: Annotated[Path | None, typer.Option(help="Where preprocessed data are kept.")] = None) -> None:
+def main(
+    cache: Annotated[Path | None, typer.Option(help="Where preprocessed data are kept.")] = None,
+    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Say which.")] = False,
+) -> None:
     """Probabilistic bird's-eye semantic perception, taught notebook by notebook.
 
     Without --cache each data set keeps its preprocessed data itself, so it can't be read-only.
@@ -45,7 +62,9 @@ def demo(
     weights: Annotated[Path | None, typer.Option(help="A trained network; else a shipped SegNet.")] = None,
     frames: Annotated[str | None, typer.Option(help="FIRST:LAST[:STEP], LAST excluded, such as 40:120:2.")] = None,
     stages: Annotated[Path | None, typer.Option(help="A Python file with stages of your own, to compare.")] = None,
-    out: Annotated[Path, typer.Option(help="Where to write the page.")] = Path("out/demo"),
+    out: Annotated[Path, typer.Option(help="The folder for the page.")] = Path("out/demo"),
+    force: Force = False,
+    show: Annotated[bool, typer.Option("--open", help="Show the page in a browser.")] = False,
 ) -> None:
     """Run every stage over a drive, and write a page that shows it; without a drive, over the two shipped ones.
 
@@ -60,10 +79,12 @@ def demo(
     chosen = chosen_drive(kitti_named, {"--pandaset": pandaset, "--scene": scene}, camera)
     tell([*(chosen.doubts() if chosen else ()), *(weights_doubts(weights) if weights else ())])
     if chosen is None:
-        page = write_both_streets(out, weights, stages, frames)
+        page = write_both_streets(out, weights, stages=stages, frames=frames, force=force)
     else:
-        page = write_demo(chosen, weights or real_weights(), out, stages, frames)
+        page = write_demo(chosen, weights or real_weights(), out, stages, frames, force=force)
     typer.echo(f"open {page.resolve().as_uri()}\nin one picture: {page.parent / 'overview.png'}")
+    if show:
+        typer.launch(page.resolve().as_uri())
 
 
 class _TrainCommand(TyperCommand):
@@ -91,7 +112,7 @@ def train(
     tint: Annotated[float, typer.Option(help="How far each colour of an image varies: 0.15 is 15 % either way.")] = 0.0,
     two_stage: Annotated[bool, typer.Option("--two-stage", help="Train the fusion on a fixed image network.")] = False,
     truth: Annotated[str, typer.Option(help="true, lidar, or another way, such as no-cleanup.")] = "true",
-    resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was interrupted.")] = False,
+    resume: Resume = False,
     device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu, cuda or cuda:N.")] = "auto",
 ) -> None:
     """Train a network: first its image network, then all of it on grids. torchrun runs it in several processes.
@@ -100,18 +121,12 @@ def train(
     LIDAR, with the errors of real data; other ways of making them, such as no-cleanup, have names of their own.
     """
     from semgrid_edu.datasets.index import dataset_doubts
-    from semgrid_edu.storage.tensors import read_tensors
-    from semgrid_edu.training.run import chosen_truth, how_to_go_on, train_network, training_params
+    from semgrid_edu.training.run import chosen_truth, train_network, training_params
 
-    if start:
-        read_tensors(start)  # to refuse a missing or damaged file before the data are prepared, which takes minutes
     params = training_params(preset, iterations, not two_stage, from_imagenet=imagenet is not None, tint=tint)
     tell([line for folder in data for line in dataset_doubts(folder, "train")])
     choices = {"preset": preset, "imagenet": imagenet, "device": device, "truth": chosen_truth(truth), "start": start}
-    try:
-        train_network(data, out, segmenter, params, seed, resume, **choices)
-    except KeyboardInterrupt:
-        sys.exit(f"semgrid-edu: interrupted; {how_to_go_on(out)}")
+    train_network(data, out, segmenter, params, seed, resume, **choices)
 
 
 @app.command()
@@ -124,7 +139,7 @@ def train_crf(
     weight_limit: Annotated[float, typer.Option(help="Limit of the class weights; 1: all cells count the same.")] = 4.0,
     seed: Annotated[int, typer.Option(min=0, help="Seed for the order of the frames.")] = 0,
     iterations: Annotated[int, typer.Option(min=1, help="Steps of two frames each.")] = 150,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was interrupted.")] = False,
+    resume: Resume = False,
 ) -> None:
     """Train a CRF on the grids of a trained network: its weights, widths, and costs of labels."""
     from dataclasses import replace
@@ -132,35 +147,33 @@ def train_crf(
     from semgrid_edu.datasets.index import dataset_doubts
     from semgrid_edu.networks.weights import weights_doubts
     from semgrid_edu.training.crf import CRF_TRAINING
-    from semgrid_edu.training.run import how_to_go_on
     from semgrid_edu.workshop.studies.crf.learned_crf import CrfVariant, train_crf_on
 
     tell(dataset_doubts(data, split) + weights_doubts(weights))
     params, variant = replace(CRF_TRAINING, grid_iterations=iterations), CrfVariant(split, label_costs, weight_limit)
-    try:
-        train_crf_on(data, weights, out, variant, params, seed, resume)
-    except KeyboardInterrupt:
-        sys.exit(f"semgrid-edu: interrupted; {how_to_go_on(out)}")
+    train_crf_on(data, weights, out, variant, params, seed, resume)
 
 
 @app.command()
 def curves(
     runs: Annotated[list[Path], typer.Argument(help="Folders that `semgrid-edu train` writes, finished or not.")],
-    out: Annotated[Path, typer.Option(help="Where to write the picture.")] = Path("curves.png"),
+    out: Annotated[Path, typer.Option(help="Where to write the picture: a .png, .pdf or .svg.")] = Path("curves.png"),
+    force: Force = False,
 ) -> None:
     """Draw the loss of one or several training runs over their steps."""
     from semgrid_edu.plotting import training_curves
-    from semgrid_edu.storage.files import atomic_path
+    from semgrid_edu.storage.files import atomic_path, check_ours
     from semgrid_edu.training.log import LOG, read_log
 
+    if out.suffix not in PICTURES:
+        raise ArgumentError("--out", f"a picture that ends in one of {', '.join(PICTURES)}", out)
+    check_ours(Commands.asked, out, force=force)
     names = [run.resolve().name for run in runs]
     if len(set(names)) < len(names):
         names = list(map(str, runs))
     axes = training_curves({name: read_log(run / LOG) for name, run in zip(names, runs, strict=True)})
-    if out.suffix[1:].lower() not in (formats := axes.figure.canvas.get_supported_filetypes()):
-        raise ArgumentError("--out", f"a picture that ends in one of {', '.join(sorted(formats))}", out)
     with atomic_path(out) as path:
-        axes.figure.savefig(path, dpi=150)
+        axes.figure.savefig(path, dpi=150, metadata={"Creator": Commands.asked})
     typer.echo(f"written to {out}")
 
 
@@ -170,20 +183,25 @@ def evaluate(
     weights: Annotated[Path, typer.Option(help="A network trained on its train frames.")],
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("evaluation.json"),
     confusions: Annotated[Path | None, typer.Option(help="Takes each frame's confusion matrices, as .npz.")] = None,
+    force: Force = False,
 ) -> None:
     """Score a trained network and the baselines on the test frames."""
     from semgrid_edu.datasets.index import dataset_doubts
     from semgrid_edu.networks.weights import weights_doubts
+    from semgrid_edu.storage.files import check_ours
+    from semgrid_edu.workshop.scoring.confusions import confusion_key, distance_band_names
     from semgrid_edu.workshop.scoring.evaluate import evaluate, scores_table
 
     if confusions and confusions.suffix != ".npz":
         raise ArgumentError("--confusions", "a file that ends in .npz", confusions)
+    if confusions:
+        check_ours(confusion_key("network", "true", distance_band_names()[0]), confusions, force=force)
 
     def scored() -> dict:
         tell(dataset_doubts(data, "train", "test") + weights_doubts(weights))
         return evaluate(data, weights, confusions_file=confusions)
 
-    keep_result(out, scored, lambda result: scores_table(result["scores"]))
+    keep_result(out, scored, lambda result: scores_table(result["scores"]), force=force)
 
 
 @app.command()
@@ -192,8 +210,10 @@ def search_crf(
     test: Annotated[Path, typer.Option(help="The data set that the network was trained on, with test frames.")],
     weights: Annotated[Path, typer.Option(help="A network trained on its train frames.")],
     seed: Annotated[int, typer.Option(min=0, help="Seed for the parameters that are tried.")] = 0,
-    trials: Annotated[int, typer.Option(min=1, help="Number of trials in all; a search that ended can go on.")] = 200,
-    out: Annotated[Path, typer.Option(help="Takes each trial, then all scores.")] = Path("crf_search.json"),
+    trials: Annotated[
+        int, typer.Option(min=1, max=100_000, help="Number of trials in all; a search that ended can go on.")
+    ] = 200,
+    out: Annotated[Path, typer.Option(help="Takes each trial; the same command goes on.")] = Path("crf_search.json"),
 ) -> None:
     """Calibrate a network, search the CRF's parameters on validation frames, and score the best on test frames."""
     from semgrid_edu.datasets.index import dataset_doubts
@@ -204,10 +224,7 @@ def search_crf(
         tell(dataset_doubts(data, "validation") + dataset_doubts(test, "test") + weights_doubts(weights))
         return search_crf(data, test, weights, out, seed=seed, n_trials=trials)
 
-    try:
-        keep_result(out, searched, search_table)
-    except KeyboardInterrupt:
-        sys.exit(f"semgrid-edu: interrupted; the same command goes on from {out}")
+    keep_result(out, searched, search_table, goes_on=True)
 
 
 def run() -> None:
@@ -215,17 +232,15 @@ def run() -> None:
     # Idle OpenMP threads spin, which keeps busy cores from the threads that have work: on two busy cores a frame took
     # 1.2 s instead of 0.07 s. OpenMP reads this once, when a command loads torch or numba, so it must be set before.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+    if "RANK" not in os.environ:  # torchrun ends its processes by this signal, and waits for them
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         check_arguments(sys.argv[1:])
         if told := keep_compiled_functions():
             typer.echo(f"semgrid-edu: {told}", err=True)
-        app()
-    except (ArgumentError, DataError) as error:
-        sys.exit(f"semgrid-edu: {error}")
-    except RuntimeError as error:
-        if "Symlink loop" not in str(error):
+        app(prog_name="semgrid-edu")
+    except (ArgumentError, DataError, OSError, RuntimeError) as error:
+        if isinstance(error, RuntimeError) and "Symlink loop" not in str(error):
             raise
-        sys.exit(f"semgrid-edu: {error}")
-    except OSError as error:
-        where = f"{error.filename}: " if error.filename else ""
-        sys.exit(f"semgrid-edu: {where}{error.strerror or error}")
+        where = f"{error.filename}: " if getattr(error, "filename", None) else ""
+        sys.exit(f"semgrid-edu: {where}{getattr(error, 'strerror', None) or error}")

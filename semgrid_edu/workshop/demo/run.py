@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
+from numba.core.event import Listener, install_listener
 from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.readers.frames import FrameSequence
@@ -14,7 +15,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.networks import load_net
 from semgrid_edu.pipeline import FrameResult, Stages, load_stages, run_side_by_side
-from semgrid_edu.storage.files import write_text
+from semgrid_edu.storage.files import check_ours, write_text
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.workshop.demo.comparison import Comparison
 from semgrid_edu.workshop.demo.details import story_data
@@ -56,7 +57,7 @@ class ChosenFrames(NamedTuple):
         Raises
         ------
         ArgumentError
-            When it isn't such a choice, or chooses no frame.
+            When it isn't such a choice, chooses no frame, or one that the drive hasn't.
 
         Examples
         --------
@@ -68,7 +69,7 @@ class ChosenFrames(NamedTuple):
         match = re.fullmatch(r"(\d*):(\d*)(?::(\d*))?", wanted or ":")
         first, last, step = ((int(part) if part else None) for part in match.groups()) if match else (None, 0, None)
         run = range(n_frames)[first:last]
-        if not run or step == 0:
+        if not run or step == 0 or (last or 0) > n_frames:
             expected = f"FIRST:LAST or FIRST:LAST:STEP with frames of 0 to {n_frames - 1}, such as 0:{n_frames}:2"
             raise ArgumentError("--frames", expected, repr(wanted))
         return cls(run, run[:: step or -(-len(run) // SHOWN)])
@@ -92,6 +93,27 @@ class ChosenFrames(NamedTuple):
         return f" ({rate}frames {self.run[0]} to {self.run[-1]}; it has {n_frames})"
 
 
+class CompileBar(Listener):
+    """A bar that counts the functions that numba compiles, which takes half a minute and is kept for the next time."""
+
+    bar: tqdm | None = None
+
+    def on_start(self, event: object) -> None:
+        """Show the bar.
+
+        Parameters
+        ----------
+        event : numba.core.event.Event
+            What begins or ends.
+        """
+        if self.bar is None:
+            self.bar = tqdm(desc="compiling, only the first time", unit=" functions")
+
+    def on_end(self, event: object) -> None:
+        """Count a function. Parameters are those of `CompileBar.on_start`."""
+        self.bar.update()
+
+
 CARD = "card.json"
 """A model card beside weights; its "other_streets" says what is known of the network on other real streets."""
 
@@ -113,6 +135,7 @@ def write_demo(
     stages: str | Path | None = None,
     frames: str | None = None,
     switch: str = "",
+    force: bool | None = None,
 ) -> Path:
     """Run every stage over a drive and write a page that shows it.
 
@@ -131,6 +154,8 @@ def write_demo(
         Which frames to run over and to show, such as "40:120:2", see `ChosenFrames.of`.
     switch : str
         The link from the page to another one, as HTML.
+    force : bool, optional
+        Whether to replace an index.html that isn't a demo's, see `check_ours`.
 
     Returns
     -------
@@ -147,20 +172,22 @@ def write_demo(
     StageError
         When a stage of the file raises an error, or returns what the next one can't use.
     """
+    page, picture = _check_page(out, force)
     chosen, net, known = ChosenFrames.of(len(drive), frames), load_net(weights, drive.camera), _said_by_card(weights)
+    if drive[chosen.run[0]].image is None:
+        raise DataError(drive.folder, f"images of {getattr(drive, 'view', 'its camera')}", "none")
     own, yours, comparison = Stages.of(net, keep_steps=True), (), None
     if stages is not None:
         mine = load_stages(stages)
         yours, comparison = (mine.over(own),), Comparison(Path(stages).name, mine.given)
-    Path(out).mkdir(parents=True, exist_ok=True)  # before the work, to refuse a bad folder at once
     label_set = LABEL_SETS[net.architecture.label_set]
     stories = _stories_every(len(chosen.shown), net.architecture.grid)
     record = Record(net.architecture.grid, label_set, chosen.shown, comparison, net, stories)
     results = run_side_by_side((drive[k] for k in chosen.run), own, *yours)
-    broken = _record_all(tqdm(results, total=len(chosen.run), desc=drive.folder.name, unit="frame"), record)
+    with install_listener("numba:compile", CompileBar()):
+        broken = _record_all(tqdm(results, total=len(chosen.run), desc=drive.folder.name, unit="frame"), record)
     words = {"expected": known or ("" if record.labelled else POOR), "credit": drive.credit}
-    save_overview(record, Path(out) / "overview.png", " ".join(filter(None, words.values())))
-    page = Path(out) / "index.html"
+    save_overview(record, picture, " ".join(filter(None, words.values())))
     story = story_data(net, drive.camera, record.layout)
     words |= {"choice": chosen.told(len(drive)), "broken": str(broken or ""), "switch": switch}
     html = page_html(record, drive.folder.name, drive.camera, net.architecture.image_size, story, **words)
@@ -174,9 +201,7 @@ REAL = "<b>A real street</b> · <a href='simulated/index.html'>a simulated stree
 SIMULATED = "<a href='../index.html'>A real street</a> · <b>a simulated street</b>"
 
 
-def write_both_streets(
-    out: str | Path, weights: str | Path | None = None, stages: str | Path | None = None, frames: str | None = None
-) -> Path:
+def write_both_streets(out: str | Path, weights: str | Path | None = None, **options: object) -> Path:
     """Write the pages of the two shipped drives, the real street and in `simulated/` the simulated one.
 
     Parameters
@@ -185,17 +210,27 @@ def write_both_streets(
         The folder to write to; made when missing.
     weights : path-like, optional
         The network for both; when left out, each street has one that has learned from such streets.
-    stages, frames
-        Those of `write_demo`.
+    **options
+        `stages`, `frames` and `force` of `write_demo`.
 
     Returns
     -------
     Path
         The page of the real street, which leads to the other one.
     """
-    page = write_demo(real_drive(), weights or real_weights(), out, stages, frames, REAL)
-    write_demo(sample_drive(), weights or sample_weights(), Path(out) / "simulated", stages, frames, SIMULATED)
+    second = Path(out) / "simulated"
+    for folder in (out, second):  # before the first page is made
+        _check_page(folder, options.get("force"))
+    page = write_demo(real_drive(), weights or real_weights(), out, switch=REAL, **options)
+    write_demo(sample_drive(), weights or sample_weights(), second, switch=SIMULATED, **options)
     return page
+
+
+def _check_page(out: str | Path, force: bool | None) -> tuple[Path, Path]:
+    """Return where page and picture go, once it is known that nobody else's would be lost."""
+    files = Path(out) / "index.html", Path(out) / "overview.png"
+    check_ours("<h1>From a laser scan and a picture to a map with meaning</h1>", *files, force=force)
+    return files
 
 
 def _said_by_card(weights: str | Path) -> str:

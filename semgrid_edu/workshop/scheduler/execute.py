@@ -98,9 +98,7 @@ def _hopeless(waiting: list[Run], failed: dict[Run, str]) -> list[Run]:
 def _error(future: Future) -> str | None:
     """Return what went wrong in a run, or with the process that did it."""
     error = future.exception()
-    if error is None:
-        return future.result()
-    return f"the process of the run ended: {type(error).__name__}: {error}"
+    return f"the process of the run ended: {type(error).__name__}: {error}" if error else future.result()
 
 
 def run_one(run: Run, root: str | Path, device: str = "cpu", processes: int = 1) -> str | None:

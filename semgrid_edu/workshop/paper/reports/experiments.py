@@ -7,23 +7,27 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from semgrid_edu.storage.files import table_beside
-from semgrid_edu.workshop.paper.reports import pictures, tables, truth_costs
+from semgrid_edu.workshop.paper.reports import pictures, tables
 from semgrid_edu.workshop.paper.reports.ablations import ablation_runs, ablations, ablations_markdown
 from semgrid_edu.workshop.paper.reports.judging import claims_markdown, claims_picture, judge_claims
+from semgrid_edu.workshop.paper.reports.truth_costs import (
+    truth_cost_runs,
+    truth_costs,
+    truth_costs_markdown,
+    truth_costs_picture,
+)
 from semgrid_edu.workshop.paper.runs import claim_runs
 from semgrid_edu.workshop.paper.runs.paper import TABLE_1_SCORES, TABLE_2_SCORES
 from semgrid_edu.workshop.paper.runs.scales import Scale
 from semgrid_edu.workshop.scheduler.runs import Run
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Experiment:
     """One table or list of the paper.
 
     Parameters
     ----------
-    title : str
-        What it is called.
     runs : callable
         (scale, number of seeds) -> the runs that it is computed from.
     result : callable
@@ -32,6 +36,8 @@ class Experiment:
         result -> Markdown.
     picture : callable
         (result, folder of all runs) -> Figure.
+    title : str
+        What it is called.
     field : str
         On which data: "kitti", "chroma" or "synthia", as `deviations` takes it.
     seeds : str
@@ -42,11 +48,11 @@ class Experiment:
         What its command says of it.
     """
 
-    title: str
     runs: Callable[[Scale, int], Sequence[Run]]
     result: Callable[[Scale, int, Path], dict]
     markdown: Callable[[dict], str]
     picture: Callable[[dict, Path], Figure]
+    title: str
     field: str = "kitti"
     seeds: str = "seeds"
     deviations: tuple[str, ...] = ()
@@ -64,53 +70,33 @@ _WORDS = table_beside(__file__)
 def _accuracy(name: str, runs: Callable, paper: Mapping, baselines: Callable = lambda *size: ()) -> Experiment:
     """Return Table 1 or 2, from runs by image network, the paper's scores, and runs of baselines if there are any."""
     return Experiment(
+        lambda *size: _seed_by_seed([*runs(*size).values(), *filter(None, [baselines(*size)])]),
+        lambda scale, seeds, root: tables.accuracy_result(runs(scale, seeds), root, paper, baselines(scale, seeds)),
+        tables.accuracy_markdown,
+        lambda result, _: pictures.accuracy_picture(result),
         **_WORDS[name],
-        runs=lambda *size: _seed_by_seed([*runs(*size).values(), *filter(None, [baselines(*size)])]),
-        result=lambda scale, seeds, root: tables.accuracy_result(
-            runs(scale, seeds), root, paper, baselines(scale, seeds)
-        ),
-        markdown=tables.accuracy_markdown,
-        picture=lambda result, _: pictures.accuracy_picture(result),
     )
 
+
+def _table3(scale: Scale, seeds: int, root: Path) -> dict:
+    return tables.confusion_result(claim_runs.table3_runs(scale, seeds), root)
+
+
+def _of_result(picture: Callable[[dict], Figure]) -> Callable[[dict, Path], Figure]:
+    return lambda result, _: picture(result)
+
+
+_PARTS = {
+    "table3": (claim_runs.table3_runs, _table3, tables.confusion_markdown, _of_result(pictures.confusion_picture)),
+    "claims": (claim_runs.claims_plan, judge_claims, claims_markdown, _of_result(claims_picture)),
+    "ablations": (ablation_runs, ablations, ablations_markdown, _of_result(pictures.ablations_picture)),
+    "truth-costs": (truth_cost_runs, truth_costs, truth_costs_markdown, _of_result(truth_costs_picture)),
+    "figures": (claim_runs.figure_runs, claim_runs.shown_frames, pictures.figures_markdown, pictures.figures_picture),
+}
 
 EXPERIMENTS = {
     "table1": _accuracy("table1", claim_runs.table1_runs, TABLE_1_SCORES, claim_runs.table1_baselines),
     "table2": _accuracy("table2", claim_runs.table2_runs, TABLE_2_SCORES),
-    "table3": Experiment(
-        **_WORDS["table3"],
-        runs=claim_runs.table3_runs,
-        result=lambda scale, seeds, root: tables.confusion_result(claim_runs.table3_runs(scale, seeds), root),
-        markdown=tables.confusion_markdown,
-        picture=lambda result, _: pictures.confusion_picture(result),
-    ),
-    "claims": Experiment(
-        **_WORDS["claims"],
-        runs=claim_runs.claims_plan,
-        result=judge_claims,
-        markdown=claims_markdown,
-        picture=lambda result, _: claims_picture(result),
-    ),
-    "ablations": Experiment(
-        **_WORDS["ablations"],
-        runs=ablation_runs,
-        result=ablations,
-        markdown=ablations_markdown,
-        picture=lambda result, _: pictures.ablations_picture(result),
-    ),
-    "truth-costs": Experiment(
-        **_WORDS["truth-costs"],
-        runs=truth_costs.truth_cost_runs,
-        result=truth_costs.truth_costs,
-        markdown=truth_costs.truth_costs_markdown,
-        picture=lambda result, _: truth_costs.truth_costs_picture(result),
-    ),
-    "figures": Experiment(
-        **_WORDS["figures"],
-        runs=claim_runs.figure_runs,
-        result=claim_runs.shown_frames,
-        markdown=pictures.figures_markdown,
-        picture=pictures.figures_picture,
-    ),
+    **{name: Experiment(*parts, **_WORDS[name]) for name, parts in _PARTS.items()},
 }
 """Every experiment by the name of its command."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.storage.files import atomic_path, write_json, write_text
+from semgrid_edu.storage.files import atomic_path, check_ours, write_json, write_text
 from semgrid_edu.storage.locking import sole_writer
 from semgrid_edu.storage.provenance import versions
 from semgrid_edu.storage.workplace import check_workers, usable_cores, workplace
@@ -106,10 +106,12 @@ def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = F
     if started > 1:
         expected = f"{started}, by which each training run starts torchrun itself"
         raise ArgumentError("--processes", expected, f"a command that torchrun started {started} times")
-    check_workers(request.workers or 1)
+    check_workers(1 if request.workers is None else request.workers)
     if request.scheduler is None:
         choose_device(request.device, request.processes - 1)
     root = check_runs_folder(request.runs)
+    for name in request.chosen:
+        check_ours(f'"command": "semgrid-edu reproduce {name} ', *_result_files(request.out, name))
     with nullcontext() if plan_only else sole_writer(root):
         return _reproduced(request, root, echo, plan_only)
 
@@ -119,7 +121,8 @@ def _reproduced(request: Request, root: Path, echo: Callable[[str], None], plan_
     plan = request.plan()
     estimated = estimate(plan, root)
     hours = plan_hours(estimated, request.workers or usable_cores())
-    left = f"{len(estimated)} of {len(plan)} runs are left, about {60 * hours:.0f} minutes"
+    minutes = round(60 * hours)
+    left = f"{len(estimated)} of {len(plan)} runs are left, about {minutes} minute{'s' * (minutes != 1)}"
     echo(f"{plan_table(plan, estimated)}\n\n{left}" + (" on this machine" if request.scheduler else ""))
     if plan_only:
         return ""
@@ -177,14 +180,20 @@ def write_result(name: str, experiment: Experiment, scale: Scale, seeds: int, ro
     }
     result = about | experiment.result(scale, seeds, root)
     text = result_markdown(result, experiment)
-    write_json(out / f"{name}.json", result)
-    write_text(out / f"{name}.md", text)
-    write_json(out / f"{name}_times.json", _times(records))
+    scores, words, times, picture = _result_files(out, name)
+    write_json(scores, result)
+    write_text(words, text)
+    write_json(times, _times(records))
     figure = experiment.picture(result, root)
-    with atomic_path(out / f"{name}.png") as path:
+    with atomic_path(picture) as path:
         figure.savefig(path, dpi=130)
     plt.close(figure)
     return text
+
+
+def _result_files(out: Path, name: str) -> list[Path]:
+    """Return the files of an experiment's result: scores, text, times and picture."""
+    return [out / f"{name}{end}" for end in (".json", ".md", "_times.json", ".png")]
 
 
 def _times(records: dict[str, dict]) -> dict:

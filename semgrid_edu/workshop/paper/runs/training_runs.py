@@ -16,7 +16,7 @@ from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.networks import WEIGHTS, Architecture, SemanticGridNet, build_net, load_net
 from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.storage.tensors import read_tensors
-from semgrid_edu.training import CHECKPOINT, Objective, TrainingParams, train
+from semgrid_edu.training import Objective, TrainingParams, train
 from semgrid_edu.training.batches import Batch
 from semgrid_edu.training.distributed import first_process_first, process_group
 from semgrid_edu.training.loop import learn
@@ -57,9 +57,8 @@ class TrainingRun(Run):
             with first_process_first():
                 frames = self.arrays.frames(root)
             if not (folder / WEIGHTS).exists():
-                resume = (folder / CHECKPOINT).exists()
                 net = self.net(root, frames.camera)
-                train(net, self.chosen(frames), folder, self.params, self.seed, resume, chosen)
+                train(net, self.chosen(frames), folder, self.params, self.seed, True, chosen)
 
     def trained(self, root: Path, camera: Camera) -> SemanticGridNet:
         """Return the network after its last step. Parameters are those of `TrainingRun.net`."""

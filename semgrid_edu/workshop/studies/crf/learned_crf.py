@@ -19,7 +19,8 @@ from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.networks import WEIGHTS, load_net
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import made_by, short_path, write_provenance
-from semgrid_edu.training import CHECKPOINT, TrainingParams
+from semgrid_edu.training import TrainingParams
+from semgrid_edu.training.checkpoint import CHECKPOINT, check_folder
 from semgrid_edu.training.crf import CRF_TRAINING, train_crf
 from semgrid_edu.workshop.scoring.evaluate import scores_table
 from semgrid_edu.workshop.studies.crf import crf_scores
@@ -98,10 +99,11 @@ def train_crf_on(
     DataError
         When a file is missing or damaged, or the folder holds a run that would be overwritten.
     """
+    check_folder(folder, resume)
+    params, resumed = replace(params, weight_limit=variant.weight_limit), (folder / CHECKPOINT).exists()
     began, frames = datetime.now(UTC), TrainingSet(dataset_dir, variant.split)
     outputs = crf_scores.grid_outputs(load_net(weights, frames.camera), frames)
     layer = _untrained(frames, variant.label_costs)
-    params = replace(params, weight_limit=variant.weight_limit)
     train_crf(layer, *outputs, folder, params, seed, resume)
     data, out = (path.resolve().name for path in (dataset_dir, folder))
     costs = " --label-costs" if variant.label_costs else ""
@@ -113,7 +115,7 @@ def train_crf_on(
         ("torch", "numpy", "safetensors"),
         date=f"{began:%Y-%m-%d}",
         minutes=round((datetime.now(UTC) - began).total_seconds() / 60, 1),
-        resumed=resume,
+        resumed=resumed,
         # JSON has no infinity.
         params={name: str(value) if value == math.inf else value for name, value in asdict(params).items()},
         crf=layer.description(),
@@ -166,8 +168,7 @@ def compare_learned_crfs(
     for variant in VARIANTS:
         folder = runs / variant.folder
         if not (folder / WEIGHTS).exists():
-            resume = (folder / CHECKPOINT).exists()
-            train_crf_on(data[variant.split], weights, folder, variant, params, seed, resume)
+            train_crf_on(data[variant.split], weights, folder, variant, params, seed, resume=True)
         layers[variant.name] = load_crf(folder / WEIGHTS)
     named = {split: crf_scores.named_data(folder) for split, folder in data.items()}
     used = f"--data {named['train']['name']} --validation {named['validation']['name']} --weights {short_path(weights)}"

@@ -22,7 +22,7 @@ from semgrid_edu.networks import WEIGHTS, Architecture, build_net, load_net
 from semgrid_edu.pipeline import Stages
 from semgrid_edu.storage.files import check_writable, sha256, table_beside
 from semgrid_edu.storage.provenance import made_by
-from semgrid_edu.training import CHECKPOINT, TrainingParams, train
+from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions
 from semgrid_edu.workshop.scoring.counting import GridCounts, count_grids, reliability_of_sums
 from semgrid_edu.workshop.scoring.grids import NETWORK, majority_by_state, network_grids
@@ -189,7 +189,7 @@ def _trained(way: WayToTrain, training: list[Part], streets: list[TrainingSet], 
         mixture = Mixture([[_Subset(*part) for part in training], *([streets] if way.with_simulated else [])])
         net = load_net(start, mixture.camera) if start else build_net(way.architecture, mixture.camera, seed)
         params = replace(way.params, batch_size=min(way.params.batch_size, *map(len, mixture.parts)))
-        train(net, mixture, folder, params, seed, (folder / CHECKPOINT).exists())
+        train(net, mixture, folder, params, seed, resume=True)
     return file
 
 

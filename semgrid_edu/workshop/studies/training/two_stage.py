@@ -11,7 +11,7 @@ from semgrid_edu.metrics import METRICS, confusion_matrix
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, load_net
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import made_by
-from semgrid_edu.training import CHECKPOINT, TrainingParams
+from semgrid_edu.training import TrainingParams
 from semgrid_edu.training.run import train_network
 from semgrid_edu.workshop.scoring.evaluate import Scores, scores
 from semgrid_edu.workshop.scoring.grids import best_labels, learned_log_g
@@ -53,7 +53,7 @@ def compare_training(
     for (seed, method), folder in trained.items():
         if not (folder / WEIGHTS).exists():
             chosen = replace(params, end_to_end=method == "end-to-end")
-            train_network(dataset_dir, folder, "segnet", chosen, seed, (folder / CHECKPOINT).exists())
+            train_network(dataset_dir, folder, "segnet", chosen, seed, resume=True)
     scored: dict[str, list[Scores]] = {method: [] for method in METHODS}
     for (_, method), folder in trained.items():
         scored[method].append(score_grid_and_image(load_net(folder / WEIGHTS, test.camera), test))
