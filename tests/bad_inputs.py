@@ -201,6 +201,10 @@ def sample(root: Path) -> None:
     write_provenance(root / "SAMPLES" / "one", "made", 0, ("numpy",))
 
 
+def arrays(name: str) -> Spoil:
+    return lambda root: np.savez(root / name, mine=np.arange(3))
+
+
 def png(name: str, size: tuple[int, int], mode: str = "RGB", value: int = 0, form: str = "png") -> Spoil:
     return lambda root: Image.new(mode, size, value).save(root / name, form)
 
@@ -433,7 +437,6 @@ RUNS = (
         text("OUT/checkpoint.safetensors", "x"),
     ),
     Row("too few frames for a batch", TRAIN, "dataset: expected at least one batch of 6", frames()),
-    Row("no checkpoint to go on from", f"{TRAIN} --resume", "checkpoint.safetensors: expected a safetensors file"),
     Row(
         "a checkpoint whose header is a list",
         f"{TRAIN} --resume",
@@ -523,6 +526,7 @@ RUNS = (
     Row("a log that is a pipe", "curves RUN --out c.png", "log.csv: expected the log", pipe(f"RUN/{LOG}")),
     Row("no log", "curves SAMPLES --out c.png", "log.csv: expected the log"),
     Row("a picture of an unknown format", "curves RUN --out c.docx", "--out: expected a picture that ends in"),
+    Row("a picture that can't say who made it", "curves RUN --out c.jpg", "--out: expected a picture that ends in"),
     Row("a picture without a format", "curves RUN --out c", "--out: expected a picture that ends in"),
     Row("an unknown split for a CRF", TRAIN_CRF.replace("--split train", "--split none"), "split: expected one of"),
     Row("a weight limit of NaN", f"{TRAIN_CRF} --weight-limit nan", "weight_limit: expected 1 or more"),
@@ -758,4 +762,142 @@ EXPERIMENTS = (
     Row("no seeds", f"{TABLE1} --seeds 0", "Invalid value for '--seeds'"),
 )
 
-TABLE = (*DRIVES, *INDEXES, *WEIGHTS, *RUNS, *DATA, *COURSE, *EXPERIMENTS)
+# Results over what isn't ours, and what is refused before any work: every command that writes.
+
+SINGLE = {
+    "occupancy": "",
+    "streets": "",
+    "overfit": "",
+    "point-labels": "",
+    "two-stage": "--data TINY --runs RUNS",
+    "learned-crf": "--data TINY --validation TINY --weights weights.safetensors --runs RUNS",
+    "real-streets": "--pandaset NONE --simulated TINY --runs RUNS",
+    "real-drive": "--kitti NONE",
+}
+"""The lectures' experiments that write their result at the end, with what they need."""
+
+RESUMED = ("crf-error", "crf-coupling", "truth-policies")
+"""Those that write while they run."""
+
+PAPERS = ("table1", "table2", "table3", "claims", "ablations", "truth-costs", "figures", "all")
+"""The experiments of the paper."""
+
+NOTES = "notes.json"
+LOST = "expected a new file, or an earlier result of this command, found something else, which would be lost"
+STRANGER = {
+    "a JSON object": '{"my": "notes"}',
+    "a JSON list": "[1, 2]",
+    "a text": "my notes",
+    "the result of another command": '{"command": "semgrid-edu reproduce nothing --seed 0"}',
+}
+
+
+def results(name: str, options: str) -> tuple[Row, ...]:
+    """What stands in the place of a result and isn't one, for an experiment of the lectures."""
+    command = f"reproduce {name} {options} --out {NOTES}"
+    found = [
+        Row(f"{what} over which {name} would write", command, LOST, text(NOTES, it)) for what, it in STRANGER.items()
+    ]
+    return (
+        *found,
+        Row(f"a folder in place of the result of {name}", command, f"{NOTES}: .*found a folder", folder(NOTES)),
+        Row(f"a pipe in place of the result of {name}", command, f"{NOTES}: .*found a pipe or a device", pipe(NOTES)),
+        Row(f"a result of {name} below a file", f"{command.replace(NOTES, 'architecture.json/a.json')}", "File exists"),
+    )
+
+
+def of_paper(name: str) -> tuple[Row, ...]:
+    """What an experiment of the paper refuses before the first run starts."""
+    command, first = f"reproduce {name} --runs RUNS --out OUT", "table1" if name == "all" else name
+    return (
+        Row(f"a file in place of the results of {name}", command.replace("OUT", "architecture.json"), "File exists"),
+        Row(f"notes over which {name} would write", command, LOST, text(f"OUT/{first}.md", "my notes")),
+        Row(f"a picture over which {name} would write", command, LOST, text(f"OUT/{first}.png", "a picture")),
+        Row(f"a folder in place of a file of {name}", command, "found a folder", in_out(f"{first}.json")),
+        Row(f"no workers for {name}", f"{command} --workers 0", "--workers: expected at least one process"),
+        Row(f"too many seeds for {name}", f"{command} --seeds 1001", "Invalid value for '--seeds'"),
+        Row(f"no processes for {name}", f"{command} --processes 0", "Invalid value for '--processes'"),
+        Row(f"an unknown scale of {name}", f"{command} --scale none", "--scale: expected"),
+    )
+
+
+def in_out(name: str) -> Spoil:
+    return lambda root: (root / "OUT" / name).mkdir(parents=True)
+
+
+def page(name: str) -> Spoil:
+    return text(f"OUT/{name}", "<p>my own page</p>")
+
+
+MANY = str(10**18)
+REFUSED_FIRST = (
+    *(row for name, options in SINGLE.items() for row in results(name, options)),
+    *(row for name in PAPERS for row in of_paper(name)),
+    *(
+        Row(f"notes of one's own, {name}", f"reproduce {name} --out {NOTES}", "expected a result of", text(NOTES, "{}"))
+        for name in RESUMED
+    ),
+    *(
+        Row(f"a pipe, {name}", f"reproduce {name} --out {NOTES}", "found a pipe or a device", pipe(NOTES))
+        for name in RESUMED
+    ),
+    *(
+        Row(f"10^18 drives, {name}", f"reproduce {name} --drives {MANY} --out a.json", "Invalid value for '--drives'")
+        for name in ("occupancy", "streets", "point-labels", "truth-policies")
+    ),
+    Row("10^18 draws", f"reproduce crf-coupling --draws {MANY} --out a.json", "Invalid value for '--draws'"),
+    Row("10^18 trials", f"{SEARCH} --trials {MANY}", "Invalid value for '--trials'"),
+    Row("a page of one's own", DEMO, f"index.html: {LOST} without --force", page("index.html")),
+    Row("a picture of one's own", DEMO, "overview.png: expected a new file", page("overview.png")),
+    Row("a folder called index.html", DEMO, "index.html: expected a file to write", in_out("index.html")),
+    Row(
+        "a page of one's own, both streets",
+        "demo --out OUT",
+        f"simulated/index.html: {LOST}",
+        page("simulated/index.html"),
+    ),
+    Row("frames beyond the drive", f"{DEMO} --frames 0:1000", "--frames: expected FIRST:LAST.* 0 to 2"),
+    Row("frames that end before they begin", f"{DEMO} --frames 2:1", "--frames: expected FIRST:LAST"),
+    Row("frames in words", f"{DEMO} --frames all", "--frames: expected FIRST:LAST"),
+    Row("one frame in none", f"{DEMO} --frames ::0", "--frames: expected FIRST:LAST"),
+    Row(
+        "a camera without images",
+        DEMO,
+        "0001_sync: expected images of image_02, found none",
+        lambda root: (root / DRIVE / "image_02").rename(root / DRIVE / "kept"),
+    ),
+    Row("a camera of no name", f"{DEMO} --camera image_09", "view: expected image_02 or image_03"),
+    Row("scores over one's own JSON", EVALUATE, f"{LOST} without --force", text("scores.json", '{"mine": 1}')),
+    Row("scores over the index", EVALUATE.replace("scores.json", "TINY/dataset.json"), LOST),
+    Row("matrices over one's own arrays", f"{EVALUATE} --confusions a.npz", LOST, arrays("a.npz")),
+    Row("matrices in a folder", f"{EVALUATE} --confusions a.npz", "a.npz: .*found a folder", folder("a.npz")),
+    Row("curves over one's own picture", "curves RUN --out c.png", f"{LOST} without --force", text("c.png", "x")),
+    Row("curves over a pipe", "curves RUN --out c.png", "c.png: .*found a pipe", pipe("c.png")),
+    Row("trials over one's own JSON", SEARCH, "expected a result of this experiment", text("log.json", '{"mine": 1}')),
+    Row("a log of one's own", TRAIN, f"log.csv: {LOST}", text("OUT/log.csv", "day,hours")),
+    Row(
+        "an image stage of one's own",
+        TRAIN,
+        f"image_stage.safetensors: {LOST}",
+        text("OUT/image_stage.safetensors", "x"),
+    ),
+    Row("a log of one's own, resumed", f"{TRAIN} --resume", f"log.csv: {LOST}", text("OUT/log.csv", "day,hours")),
+    Row("a log of one's own, CRF", TRAIN_CRF, f"log.csv: {LOST}", text("OUT/log.csv", "day,hours")),
+    Row("a weight limit below 0", f"{TRAIN_CRF} --weight-limit -1", "weight_limit: expected 1 or more"),
+    Row(
+        "no ImageNet weights",
+        f"{TRAIN} --preset paper --imagenet a.safetensors",
+        "a.safetensors: expected a safetensors",
+    ),
+    Row(
+        "ImageNet weights for a compact network", f"{TRAIN} --imagenet fresh.safetensors", "fresh.safetensors: expected"
+    ),
+    Row(
+        "ImageNet weights for U-Net", f"{TRAIN} --segmenter unet --imagenet a", "segmenter: expected one with published"
+    ),
+    Row("a real excerpt of no frame", "data real-excerpt OUT --pandaset TINY --scene 002 --frames 0", "Invalid value"),
+    Row("an index over another", "data index TINY --pandaset NONE", "dataset.json: expected no data set yet"),
+    Row("an argument to the list of data", "data list all", "unexpected extra argument"),
+)
+
+TABLE = (*DRIVES, *INDEXES, *WEIGHTS, *RUNS, *DATA, *COURSE, *EXPERIMENTS, *REFUSED_FIRST)

@@ -1,12 +1,23 @@
 """The command line: a mistake ends in one line that names it; the environment is set there and nowhere else."""
 
 import os
+import signal
 import subprocess
 import sys
+import time
+from importlib.metadata import version
 
 import pytest
+import typer
 
+import semgrid_edu
+import semgrid_edu.datasets.index
+import semgrid_edu.training.run
+import semgrid_edu.workshop.paper.reports.reproduce
+from semgrid_edu.workshop import demo
 from semgrid_edu.workshop.commands.main import run
+from semgrid_edu.workshop.simulation import datasets
+from semgrid_edu.workshop.studies.training import overfit
 
 
 @pytest.mark.parametrize(
@@ -52,6 +63,105 @@ def test_importing_the_package_leaves_the_environment_as_it_was():
 def test_the_command_line_sets_the_wait_policy_before_openmp_is_loaded():
     code = (
         "import os, sys; from semgrid_edu.workshop.commands import main as cli; "
-        "cli.app = lambda: print(os.environ['OMP_WAIT_POLICY'], {'torch', 'numba'} & sys.modules.keys()); cli.run()"
+        "cli.app = lambda **_: print(os.environ['OMP_WAIT_POLICY'], {'torch', 'numba'} & sys.modules.keys()); cli.run()"
     )
     assert printed(code) == "PASSIVE set()\n"
+
+
+def said(monkeypatch, capsys, *arguments: str) -> str:
+    """What a command that succeeds prints."""
+    monkeypatch.setattr("sys.argv", ["semgrid-edu", *arguments])
+    with pytest.raises(SystemExit) as caught:
+        run()
+    assert caught.value.code in (0, None)
+    return capsys.readouterr().out
+
+
+def test_the_version_is_told_everywhere(monkeypatch, capsys):
+    assert semgrid_edu.__version__ == version("semgrid_edu")
+    assert said(monkeypatch, capsys, "--version") == f"semgrid_edu {semgrid_edu.__version__}\n"
+    command = [sys.executable, "-m", "semgrid_edu", "--version"]
+    assert subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()[-1] == version(
+        "semgrid_edu"
+    )
+
+
+@pytest.mark.parametrize(("typed", "completed"), [("data m", "make"), ("dem", "demo"), ("data make no", "")])
+def test_shells_complete_commands(typed, completed):
+    typing = {"COMP_WORDS": f"semgrid-edu {typed}", "COMP_CWORD": str(len(typed.split()))}
+    command = [sys.executable, "-m", "semgrid_edu"]
+    asked = os.environ | typing | {"_SEMGRID_EDU_COMPLETE": "complete_bash"}
+    ended = subprocess.run(command, env=asked, capture_output=True, text=True, check=False)
+    assert (ended.stdout.strip(), ended.stderr) == (completed, "")
+
+
+def test_the_list_of_data_names_each_with_its_command(monkeypatch, capsys):
+    listed = said(monkeypatch, capsys, "data", "list").splitlines()
+    assert [line.partition(":")[0] for line in listed] == [*datasets.RECIPES, "kitti", "pandaset"]
+    assert all("semgrid-edu data " in line for line in listed)
+    assert "142 labelled frames in 'train', 110 labelled frames in 'test'" in listed[0]
+
+
+def test_the_demo_opens_its_page(monkeypatch, capsys, tmp_path):
+    opened = []
+    monkeypatch.setattr(demo, "write_both_streets", lambda out, *_, **__: out / "index.html")
+    monkeypatch.setattr(typer, "launch", opened.append)
+    said(monkeypatch, capsys, "demo", "--out", str(tmp_path))
+    assert opened == []
+    said(monkeypatch, capsys, "demo", "--out", str(tmp_path), "--open")
+    assert opened == [(tmp_path / "index.html").as_uri()]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "module", "name", "told"),
+    [
+        ("demo --out OUT", demo, "write_both_streets", "begins again"),
+        ("reproduce overfit --out a.json", overfit, "overfit", "begins again"),
+        ("data make sample OUT", datasets, "make_dataset", "goes on"),
+        (
+            "reproduce table1 --runs RUNS --out OUT",
+            semgrid_edu.workshop.paper.reports.reproduce,
+            "reproduce",
+            "goes on",
+        ),
+        ("train --data DATA --out OUT", semgrid_edu.training.run, "train_network", "goes on with --resume"),
+    ],
+)
+def test_ctrl_c_says_whether_the_same_command_goes_on(arguments, module, name, told, monkeypatch, tmp_path):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "DATA").mkdir()
+    (tmp_path / "DATA" / "dataset.json").write_text('{"name": "a", "label_set": "KITTI-14", "splits": {}}')
+    monkeypatch.setattr(semgrid_edu.datasets.index, "dataset_doubts", lambda *_: [])
+    monkeypatch.setattr(module, name, interrupted)
+    monkeypatch.setattr("sys.argv", ["semgrid-edu", *arguments.split()])
+    with pytest.raises(SystemExit, match=f"^semgrid-edu: interrupted; the same command {told}$"):
+        run()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize("sent", ["SIGINT", "SIGTERM"])
+def test_workers_end_without_a_word_when_their_command_is_stopped(tmp_path, sent):
+    """A terminal sends Ctrl-C to all of them; `kill` reaches the command alone."""
+    command = [sys.executable, "-m", "semgrid_edu", "data", "make", "minikitti", str(tmp_path)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as made:
+        until = time.monotonic() + 100
+        while not list(tmp_path.glob("minikitti/*/.*")) and made.poll() is None and time.monotonic() < until:
+            time.sleep(0.2)  # until a worker has begun a drive
+        (os.killpg if sent == "SIGINT" else os.kill)(made.pid, getattr(signal, sent))
+        said = made.communicate(timeout=60)[1]
+    assert said.endswith("semgrid-edu: interrupted; the same command goes on\n"), said
+    assert "Traceback" not in said
+
+
+def test_a_script_without_a_main_guard_is_told_so(tmp_path):
+    script = tmp_path / "mine.py"
+    script.write_text(
+        "from semgrid_edu.storage.workplace import worker_pool\n"
+        "with worker_pool(1) as pool: pool.submit(abs, 1).result()"
+    )
+    ended = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False)
+    assert ended.returncode
+    assert 'below `if __name__ == "__main__":`' in ended.stderr.splitlines()[-1]

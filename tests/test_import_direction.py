@@ -11,7 +11,7 @@ import semgrid_edu
 PACKAGE = Path(semgrid_edu.__file__).parent
 README = PACKAGE.parent / "README.md"
 FILES = sorted(PACKAGE.rglob("*.py"))
-MODULES = [path for path in FILES if path.name != "__init__.py"]
+MODULES = [path for path in FILES if path.name not in ("__init__.py", "__main__.py")]
 WORKSHOP = "workshop"
 
 
@@ -55,7 +55,7 @@ def folder_of(name: str) -> str:
 
 
 def in_workshop(name: str) -> bool:
-    return name.split(".")[0] == WORKSHOP
+    return name.split(".")[0] in (WORKSHOP, "__main__")  # the door of `python -m` leads to the workshop
 
 
 def imports_between_folders() -> dict[str, set[str]]:

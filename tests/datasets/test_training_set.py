@@ -112,10 +112,11 @@ class TestBuilt:
 
     def test_damaged_array_is_named(self, built, tmp_path):
         root = shutil.copytree(built, tmp_path / "copy")
-        (path,) = root.glob("cache/*/train/occupancy.npy")
-        path.write_bytes(path.read_bytes()[:-5])
-        with pytest.raises(DataError, match=r"occupancy\.npy"):
-            TrainingSet(root, "train", image_size=SMALL)
+        for name in ("occupancy.npy", "manifest.json"):
+            (path,) = root.glob(f"cache/*/train/{name}")
+            path.write_bytes(path.read_bytes()[:-5])
+            with pytest.raises(DataError, match=f"{name}: .*delete its folder to make it anew"):
+                TrainingSet(root, "train", image_size=SMALL)
 
     def test_unknown_split_is_named(self, built):
         with pytest.raises(ArgumentError, match="split"):

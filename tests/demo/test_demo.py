@@ -390,7 +390,7 @@ class TestChoice:
         assert "--camera" in str(result.exception)
 
 
-@pytest.mark.parametrize("wanted", ["4", "a:b", "0:4:0", "9:", "3:2", "1:2:3:4", "-3:"])
+@pytest.mark.parametrize("wanted", ["4", "a:b", "0:4:0", "9:", "3:2", "1:2:3:4", "-3:", "0:1000", ":7"])
 def test_a_choice_of_no_frame_is_refused(wanted):
     with pytest.raises(ArgumentError, match=r"--frames.*0:6:2"):
         ChosenFrames.of(6, wanted)

@@ -126,6 +126,14 @@ def test_nan_among_the_planes_is_the_fault_of_their_stage(frames):
         next(run_pipeline(frames, stages))
 
 
+def test_a_stage_that_calls_sys_exit_is_named(frames):
+    def refine(log_g, o):
+        raise SystemExit("bye")
+
+    with pytest.raises(StageError, match=r"refine .*frame 0: expected a result, found an error: SystemExit: bye"):
+        list(run_pipeline(frames, stages_with(refine=refine)))
+
+
 def test_an_exception_is_chained_and_says_which_stage_and_frame(frames):
     seen = []
 

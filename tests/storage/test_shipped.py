@@ -3,6 +3,10 @@
 import tomllib
 import zlib
 
+import pytest
+
+from semgrid_edu.datasets import samples
+from semgrid_edu.errors import DataError
 from semgrid_edu.storage import provenance as shipped
 from semgrid_edu.storage.provenance import shipped_folder
 
@@ -25,6 +29,12 @@ def test_what_a_wheel_holds_lies_where_it_is_looked_for(tmp_path, monkeypatch):
     monkeypatch.setattr(shipped, "PACKAGE", tmp_path / "semgrid_edu")
     assert (shipped_folder("data_samples") / "sample").is_dir()
     assert (shipped_folder("notebooks") / "instructor").is_dir()
+
+
+def test_a_wheel_says_that_it_has_no_frames(monkeypatch, tmp_path):
+    monkeypatch.setattr(samples, "shipped_folder", lambda name: tmp_path / name)
+    with pytest.raises(DataError, match=r"frames: expected the frames of a clone.*: a wheel has none"):
+        samples.sample_frames()
 
 
 def test_a_clone_has_them_beside_the_package():

@@ -315,8 +315,11 @@ class TestStory:
         other = build_net(Architecture(), drive.camera, seed=9).eval()
         with pytest.raises(ArgumentError, match="network that made the result"):
             cell_story(results[-1], (100, 30), other)
+        for cell in np.random.default_rng(0).integers((0, 0), other.architecture.grid.shape, (20, 2)):
+            with pytest.raises(ArgumentError, match="network that made the result"):
+                cell_story(results[-1], tuple(cell), other)
 
-    @pytest.mark.parametrize("cell", [(-1, 0), (142, 0), (0, 62)])
+    @pytest.mark.parametrize("cell", [(-1, 0), (142, 0), (0, 62), (1.5, 2.5), (3.0, 4), (1,), (1, 2, 3), 5, None, "ab"])
     def test_a_cell_outside_the_grid_is_refused(self, results, net, cell):
         with pytest.raises(ArgumentError, match="row and column"):
             cell_story(results[-1], cell, net)

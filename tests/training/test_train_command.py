@@ -17,7 +17,6 @@ from semgrid_edu.networks import SEGMENTERS, Architecture, build_net, load_net, 
 from semgrid_edu.networks.backbones.fcn import Fcn
 from semgrid_edu.storage.files import sha256, write_text
 from semgrid_edu.storage.provenance import provenance_problems
-from semgrid_edu.training import CHECKPOINT
 from semgrid_edu.training import run as experiment
 from semgrid_edu.training.log import LOG, Step, append_step, begin_log
 from semgrid_edu.workshop.commands.main import app
@@ -147,8 +146,8 @@ def test_the_options_reach_the_training(monkeypatch, tmp_path, truth):
     monkeypatch.setattr(experiment, "load_imagenet", lambda segmenter, path: given.update(imagenet=(segmenter, path)))
     monkeypatch.setattr(experiment, "train", lambda *args: given.update(train=args))
     data, imagenet, out = tmp_path / "minikitti", tmp_path / "vgg16.safetensors", tmp_path / "out"
-    for path in (data / "dataset.json", imagenet):
-        write_text(path, "{}")
+    write_text(data / "dataset.json", "{}")
+    write_text(imagenet, "{}")
     options = ["--preset", "paper", "--imagenet", str(imagenet), "--seed", "2", "--iterations", "7", "--two-stage"]
     options += ["--truth", truth, "--resume"]
     result = CliRunner().invoke(app, ["train", "--data", str(data), "--out", str(out), *options, "--device", "cpu"])
@@ -162,7 +161,7 @@ def test_the_options_reach_the_training(monkeypatch, tmp_path, truth):
     provenance = json.loads((out / "provenance.json").read_text())
     written = "--segmenter segnet --preset paper --imagenet vgg16.safetensors --seed 2 --iterations 7 --two-stage"
     assert provenance["command"] == f"semgrid-edu train --data minikitti --out out {written} --truth {truth}"
-    assert provenance["resumed"] is True
+    assert provenance["resumed"] is False  # there was nothing to resume
     assert provenance["truth"] == asdict(dataset.truth)
     assert provenance["params"]["weight_limit"] == "inf"
     assert provenance["imagenet"] == sha256(imagenet)
@@ -199,21 +198,15 @@ def test_a_network_starts_from_one_kind_of_weights(tmp_path):
         experiment.train_network(tmp_path, tmp_path, "segnet", params, imagenet=tmp_path / "a", start=tmp_path / "b")
 
 
-@pytest.mark.parametrize("kept", [True, False])
-def test_ctrl_c_says_how_to_go_on(monkeypatch, tmp_path, kept):
-    monkeypatch.setattr(experiment, "sets_by_camera", one_camera)
+@pytest.mark.parametrize("name", ["weights.safetensors", "log.csv", "image_stage.safetensors"])
+def test_what_would_be_lost_is_refused_before_the_data_are_prepared(monkeypatch, tmp_path, name):
+    def prepared(*_, **__):
+        raise AssertionError("the data were prepared")
 
-    def interrupted(*_):
-        if kept:
-            write_text(tmp_path / CHECKPOINT, "some steps")
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(experiment, "train", interrupted)
-    result = CliRunner().invoke(app, ["train", "--data", str(tmp_path), "--out", str(tmp_path)])
-    path = tmp_path / CHECKPOINT
-    advice = f"--resume goes on from {path}" if kept else f"start again: there is no {path} yet"
-    assert result.output.splitlines()[-1] == f"semgrid-edu: interrupted; {advice}"
-    assert result.exit_code == 1
+    monkeypatch.setattr(experiment, "sets_by_camera", prepared)
+    write_text(tmp_path / "out" / name, "mine")
+    with pytest.raises(DataError, match="which would be lost"):
+        experiment.train_network(tmp_path, tmp_path / "out", "segnet", experiment.training_params("compact", 1))
 
 
 @pytest.mark.parametrize(

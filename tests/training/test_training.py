@@ -485,6 +485,20 @@ def test_only_its_own_run_is_resumed(streets, tmp_path, monkeypatch):
     assert (tmp_path / "checkpoint.safetensors").read_bytes() == before
 
 
+def test_resume_begins_where_nothing_was_kept(streets, tmp_path):
+    for folder, resume in (("begun", False), ("resumed", True)):
+        train(build_net(SMALL, CAMERA, seed=9), streets, tmp_path / folder, QUICK, resume=resume)
+    begun, resumed = ((tmp_path / folder / "weights.safetensors").read_bytes() for folder in ("begun", "resumed"))
+    assert begun == resumed
+
+
+def test_files_of_others_stay(streets, tmp_path):
+    (tmp_path / "log.csv").write_text("day,hours")
+    with pytest.raises(DataError, match=r"log.csv: expected a new file.*which would be lost"):
+        train(build_net(SMALL, CAMERA), streets, tmp_path, QUICK)
+    assert (tmp_path / "log.csv").read_text() == "day,hours"
+
+
 def test_no_training_is_overwritten(streets, tmp_path, monkeypatch):
     _killed(streets, tmp_path, monkeypatch)
     with pytest.raises(DataError, match=r"--resume continues it\), found checkpoint.safetensors"):
