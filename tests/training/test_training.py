@@ -543,10 +543,8 @@ def test_a_full_disk_keeps_the_checkpoint_before(streets, tmp_path, monkeypatch)
     _same_files(whole, broken)
 
 
-def test_a_missing_or_damaged_checkpoint_is_named(streets, tmp_path):
+def test_a_damaged_checkpoint_is_named(streets, tmp_path):
     path = tmp_path / "checkpoint.safetensors"
-    with pytest.raises(DataError, match=r"checkpoint.safetensors: expected a safetensors file, found no such file"):
-        train(build_net(SMALL, CAMERA), streets, tmp_path, QUICK, resume=True)
     _checkpoint(path)
     whole = path.read_bytes()
     for content in (whole[:100], whole[: len(whole) // 2], b""):
