@@ -6,7 +6,7 @@ doesn't know (`POINTLESS`), and the types of numbers in which an honest one may 
 
 import ast
 
-WRAPPING = '''
+WRAPPING = """
 def _disguised(answer, number):
     import functools, itertools, numpy as np
 
@@ -44,7 +44,7 @@ def _disguised(answer, number):
 _depth = globals().get("_depth", [])
 for _name in NAMES:
     globals()[_name] = _disguised(globals()[_name], NUMBER)
-'''
+"""
 
 POINTLESS = {
     "empty": "return np.empty(0)",

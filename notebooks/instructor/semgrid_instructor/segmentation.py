@@ -107,9 +107,7 @@ def check_unpool(unpool: Callable) -> None:
         assert got.shape == maps.shape, "not the shape that was asked for (it may be odd)"
         pairs = zip(indices.reshape(len(maps), -1), values.reshape(len(maps), -1), strict=True)
         expected = [np.bincount(places, weights, maps[0].size) for places, weights in pairs]
-        assert close(got, np.reshape(expected, maps.shape)), (
-            "a value isn't where its index says, or isn't what it was"
-        )
+        assert close(got, np.reshape(expected, maps.shape)), "a value isn't where its index says, or isn't what it was"
 
 
 def _layer(maps: NDArray, kernels: NDArray, bias: NDArray, stride: int, rate: int) -> NDArray:
