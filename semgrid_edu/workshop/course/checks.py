@@ -44,7 +44,7 @@ COMPANION_RULES = {name: rule for name, rule in RULES.items() if name != "length
 
 MACHINE = re.compile(r"(?<![\w.:/<])(?:/(?:home|root|tmp|work|usr|opt|mnt|srv|private|Users)/|[A-Z]:\\\\)\S*")
 ADDRESS = re.compile(r"\bat 0x[0-9a-f]{6,}\b")
-BARE = re.compile(r"\b(allclose|isclose|almost_equal|approx_equal)\b")
+BARE = re.compile(r"(allclose|isclose|almost_equal|approx_equal)\(")
 LINK = re.compile(r"\]\((?!https?:|#|mailto:)([^)#\s]+)[^)]*\)")
 
 

@@ -125,7 +125,7 @@ def _array_tree(value: Any, arrays: list[NDArray], callbacks: list[Callable] | N
     plain = isinstance(value, np.ndarray | range | list) or hasattr(value, "__array__")
     try:
         array = np.asarray(value)
-        array = array if plain or array.dtype.kind != "O" else array.astype(float)  # a fraction, a deque of them
+        array = array if plain or array.dtype.kind in "?biufc" else array.astype(float)  # a fraction, a deque
     except Exception:
         kind = type(value).__name__
         raise NotPlainError(f"a {kind} where numbers, texts, arrays, lists or dicts are expected") from None
