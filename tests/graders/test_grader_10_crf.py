@@ -897,7 +897,7 @@ def energy(x, phi, k):
         mistake(
             "prices above 10 cut off",
             task="update",
-            loses=2,
+            loses=3,
             says="on inputs you haven't seen: wrong with 6 cells",
             code=updated(price="np.minimum(phi, 10) + (1 - Q) @ others"),
         ),

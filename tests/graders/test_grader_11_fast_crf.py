@@ -910,7 +910,7 @@ def refine(log_g, o):
             "nothing of its own subtracted in the spatial kernel",
             task="refine",
             loses=3,
-            says="on inputs you haven't seen",
+            says="nearer to a mistake",
             code=crf(message="scale * blur((scale * Q).astype(np.float32)) - own * Q * (blur is lattice)"),
         ),
         right(
