@@ -97,9 +97,9 @@ def check_overlay(overlay: Callable) -> None:
 
 @hidden
 def check_find_fault(find_fault: Callable) -> None:
-    """Other frames of the drive, all of the faults in any order; two of them twice."""
+    """Other frames of the drive, all of the faults in any order, one of them twice."""
     rng, faults = generator(1360), ["none", "two frames lost", "camera turned", "LIDAR tilted", "poses backwards"]
-    for fault in rng.permutation([*faults, *rng.choice(faults, 2)]).tolist():
+    for fault in rng.permutation([*faults, rng.choice(faults)]).tolist():
         start = int(rng.integers(5, 10))
         said = find_fault(FAULTS[fault](sample_drive()[start : start + 11]))
         assert said == fault, f"in other frames {fault!r} is called {said!r}"
