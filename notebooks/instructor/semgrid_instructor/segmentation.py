@@ -158,7 +158,7 @@ def check_stride(atrous: Callable) -> None:
         maps, kernels = rng.normal(size=(1, *shape)), rng.normal(size=(1, 1, size, size))
         full, got = (answer_array(atrous(maps.copy(), kernels.copy(), np.zeros(1), s, rate)) for s in (1, stride))
         wanted = full[..., ::stride, ::stride]
-        assert np.ptp(wanted) > 0, "all outputs are the same"
+        assert full.size == 1 or np.ptp(full) > 0, "all outputs are the same"
         assert got.shape == wanted.shape, f"wrong shape with stride {stride}, N {size}, rate {rate}"
         assert close(got, wanted), f"not every output number {stride} of stride 1, with N {size}, rate {rate}"
 
