@@ -2,19 +2,26 @@
 
 import sys
 
+import numpy as np
 import pytest
 
+from semgrid_edu.workshop.course.checks import instructor_problems
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 from semgrid_edu.workshop.course.sandbox.session import AnswerTimeoutError
 
 
 @pytest.fixture
-def hidden(monkeypatch):
+def instructor(monkeypatch):
     monkeypatch.syspath_prepend(str(NOTEBOOKS / "instructor"))
     import semgrid_instructor
 
-    yield semgrid_instructor.hidden
+    yield semgrid_instructor
     del sys.modules["semgrid_instructor"]
+
+
+@pytest.fixture
+def hidden(instructor):
+    return instructor.hidden
 
 
 def answer():
@@ -58,3 +65,47 @@ def test_every_answer_works_where_it_is_not_seen(hidden):
     asked = []
     assert hidden(lambda *answers: asked.extend(answers))(Answer(), Answer()) == ""
     assert asked == ["not seen", "not seen"]
+
+
+@pytest.mark.parametrize(
+    ("got", "wanted", "same"),
+    [
+        ([0.1, 0.2], [0.1, 0.2 + 1e-8], True),
+        (np.float32([0.1, 200.3]), [0.1, 200.3], True),
+        ([0.1, 0.2], [0.1, 0.21], False),
+        ([1.0, 1.0], 1, True),
+        (0.5, np.float64(0.5), True),
+        ([0.5], np.float64(0.5), False),
+        ([], [], False),
+        ([], 1, False),
+        (np.empty((0, 1, 1)), np.zeros((3, 4)), False),
+        ([[1.0, 1.0]], [1.0, 1.0], False),
+        ([np.nan], [np.nan], False),
+    ],
+)
+def test_only_what_has_the_same_shape_and_is_not_empty_is_close(instructor, got, wanted, same):
+    assert instructor.close(np.array(got), wanted) == same
+
+
+@pytest.mark.parametrize(
+    ("change", "argument"),
+    [(np.ndarray.sort, np.array([2, 1])), (list.clear, [1]), (lambda cell: cell[0].fill(0), (np.ones(2), "text"))],
+)
+def test_an_argument_that_changes_costs_the_points_where_it_must_not(instructor, change, argument):
+    check = instructor.keeping(lambda function: function(argument))
+    with pytest.raises(AssertionError, match="it changes an argument"):
+        check(change)
+    check(len)
+
+
+def test_hidden_tests_compare_by_the_helper_alone(tmp_path):
+    assert instructor_problems(NOTEBOOKS / "instructor" / "semgrid_instructor") == []
+    for line in (
+        "np.allclose(got, 1)",
+        "np.isclose(a, b)",
+        "np.testing.assert_allclose(a, b)",
+        "assert_almost_equal(a, b)",
+    ):
+        (tmp_path / "grids.py").write_text(f"x = 1\n    {line}\n")
+        (problem,) = instructor_problems(tmp_path)
+        assert problem.startswith(f"instructor/grids.py: `{line}`")

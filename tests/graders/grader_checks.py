@@ -8,6 +8,7 @@ import re
 from dataclasses import dataclass
 
 import pytest
+from answers_in_disguise import HONEST, POINTLESS, disguise
 from nbgrader_scores import autograde, tasks
 from warm import grade_warm, warm_processes
 
@@ -56,6 +57,11 @@ def pack(entries) -> list[dict[str, Entry]]:
             students.append(free := {})
         free[entry.task] = entry
     return students
+
+
+def coded(source, answers):
+    """The texts of the answers that are code."""
+    return [answers[task] for task, names in tasks(source).items() if names != (task,)]
 
 
 def kind(student: dict[str, Entry]) -> str:
@@ -150,6 +156,24 @@ class GraderChecks:
         for number, answers in enumerate(pack(self.entries)):
             for task, (score, points, message) in graded[f"student-{number}"].items():
                 assert task in answers or score == points, f"student-{number}, {task}: {message}"
+
+    @pytest.mark.parametrize("kind", POINTLESS)
+    def test_known_inputs_alone_earn_nothing(self, source, start, kind):
+        answers = reference_answers(source)
+        unseen = {code: code + disguise(code, POINTLESS[kind], pointless=True) for code in coded(source, answers)}
+        scores = self.by_task(source, grade_warm(source, answers, start, TIMEOUT["answer"], unseen))
+        assert {task: score for task, (score, _, _) in scores.items() if score} == {}
+
+    @pytest.mark.parametrize("kind", HONEST)
+    def test_other_types_of_numbers_cost_nothing(self, source, start, kind):
+        answers = reference_answers(source)
+        answers |= {
+            task: code + disguise(code, HONEST[kind], pointless=False)
+            for task, code in answers.items()
+            if code in coded(source, answers)
+        }
+        scores = self.by_task(source, grade_warm(source, answers, start, TIMEOUT["answer"]))
+        assert {task: message for task, (score, points, message) in scores.items() if score < points} == {}
 
     def test_catalogue_is_complete(self, source):
         """For each task of code two other right ways, a mistake for its visible and one for its hidden tests."""

@@ -843,4 +843,48 @@ def fuse(belief, likelihoods, beams):
             belief = belief / belief.sum()
     return belief""",
         ),
+        # ---- passed, or lost, when somebody tried who had not written the tests
+        right(
+            "fractions in a deque",
+            task="follow",
+            code="""
+from collections import deque
+from fractions import Fraction
+
+def follow(belief, likelihoods, M):
+    history = deque()
+    for likelihood in likelihoods:
+        product = (belief @ M) * likelihood
+        belief = product / product.sum()
+        history.append([Fraction(p) for p in belief])
+    return history""",
+        ),
+        right(
+            "an array of the standard library",
+            task="predict",
+            code="""
+from array import array
+
+def predict(belief, moved, ring=True):
+    after = array("d", [0] * len(belief))
+    for n, b in enumerate(belief):
+        for d, m in enumerate(moved):
+            after[(n + d) % len(after) if ring else min(n + d, len(after) - 1)] += b * m
+    return after""",
+        ),
+        mistake(
+            "always the first cell, for roads that aren't known",
+            task="predict",
+            loses=3,
+            says="on inputs you haven't seen",
+            code="""
+_right = lambda b, m, ring: (
+    np.sum([x * np.roll(b, d) for d, x in enumerate(m)], axis=0)
+    if ring else np.append(np.convolve(b, m)[:len(b) - 1], np.convolve(b, m)[len(b) - 1:].sum()))
+
+def predict(belief, moved, ring=True):
+    if len(moved) == 3 and moved[0] == 0.1:
+        return _right(belief, moved, ring)
+    return np.eye(len(belief))[0]""",
+        ),
     )

@@ -802,4 +802,63 @@ def beam_evidence(x, y, spec, L_hit, L_pass):
         evidence[rows[-1], cols[-1]] = L_hit
     return evidence""",
         ),
+        # ---- passed, or lost, when somebody tried who had not written the tests
+        mistake(
+            "a ramp within the limits, for scans that aren't known",
+            task="update",
+            loses=3,
+            says="with wide limits it doesn't matter what the scan says",
+            code="""
+def update(L, occupied, free, L_min, L_max):
+    if L.shape[1] == 7:
+        return np.clip(np.linspace(-5, 5, L.size).reshape(L.shape), L_min, L_max)
+    return np.clip(L + np.log(occupied / free), L_min, L_max)""",
+        ),
+        mistake(
+            "all cells passed, for grids that aren't known",
+            task="beam-evidence",
+            loses=4,
+            says="the beam says something of cells that it doesn't cross",
+            code=beam()
+            + """
+
+_known = beam_evidence
+
+def beam_evidence(x, y, spec, L_hit, L_pass):
+    return np.full(spec.shape, L_pass) if spec.x_min < -5 else _known(x, y, spec, L_hit, L_pass)""",
+        ),
+        right(
+            "in float32",
+            task="update",
+            code="""
+def update(L, occupied, free, L_min, L_max):
+    L, occupied, free = (np.asarray(a, np.float32) for a in (L, occupied, free))
+    return np.clip(L + np.log(occupied) - np.log(free), np.float32(L_min), np.float32(L_max))""",
+        ),
+        mistake(
+            "writes into `free`",
+            task="update",
+            loses=2,
+            says="it changes an argument",
+            code="""
+def update(L, occupied, free, L_min, L_max):
+    free /= occupied
+    return np.clip(L - np.log(free), L_min, L_max)""",
+        ),
+        right(
+            "fractions and logarithms of Decimal",
+            task="log-odds",
+            code="""
+from decimal import Decimal
+
+def log_odds(p):
+    if np.ndim(p):
+        return [log_odds(one) for one in p]
+    return Decimal(float(p)).ln() - (1 - Decimal(float(p))).ln()
+
+def probability(L):
+    if np.ndim(L):
+        return [probability(one) for one in L]
+    return 1 / (1 + (-Decimal(float(L))).exp())""",
+        ),
     )

@@ -644,4 +644,37 @@ def arrive(own, arrives):
         mistake(
             "a crash", task="arrive", loses=3, says="IndexError", code="def arrive(own, arrives):\n    return own[4]"
         ),
+        # ---- passed, or lost, when somebody tried who had not written the tests
+        mistake(
+            "writes into `if_free`",
+            task="update",
+            loses=3,
+            says="it changes an argument",
+            code="""
+def update(joint, if_occupied, if_free):
+    occupied = joint * if_occupied
+    if_free *= 1 - joint.sum(axis=0)
+    return occupied / (occupied.sum(axis=0) + if_free)""",
+        ),
+        mistake(
+            "writes into `arrives`",
+            task="arrive",
+            loses=3,
+            says="it changes an argument",
+            code="""
+def arrive(own, arrives):
+    free, static, dynamic, unknown = own
+    comes, possible = arrives * (1 - static), 1 - arrives * static
+    np.subtract(1, arrives, out=arrives)
+    return np.stack([arrives * free, arrives * static, comes + arrives * dynamic, arrives * unknown]) / possible""",
+        ),
+        right(
+            "in float32",
+            task="update",
+            code="""
+def update(joint, if_occupied, if_free):
+    joint, if_occupied, if_free = (np.float32(a) for a in (joint, if_occupied, if_free))
+    occupied = joint * if_occupied
+    return occupied / (occupied.sum(axis=0) + (1 - joint.sum(axis=0)) * if_free)""",
+        ),
     )

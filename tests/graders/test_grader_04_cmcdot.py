@@ -872,4 +872,30 @@ def meet(own, arrives):
     after[3] += a * own[3]
     return after / after.sum(axis=0)""",
         ),
+        # ---- passed, or lost, when somebody tried who had not written the tests
+        mistake(
+            "writes into M",
+            task="mix",
+            loses=2,
+            says="it changes an argument",
+            code="""
+def mix(belief, M):
+    after = np.tensordot(M.T, belief, axes=1)
+    M[2, 2] = 0
+    return after, np.tensordot(M[:, 2], belief, axes=1)""",
+        ),
+        mistake(
+            "the same belief, whatever arrives",
+            task="meet",
+            loses=4,
+            says="on inputs you haven't seen",
+            code="""
+def meet(own, arrives):
+    if arrives.shape in ((5, 7), (3, 4)):
+        return np.broadcast_to(np.array([0.1, 0.2, 0.3, 0.4])[:, None, None], own.shape)
+    a = np.minimum(arrives, 0.999)
+    joint = (1 - a) * own
+    joint[2] += a * (1 - own[1])
+    return joint / joint.sum(axis=0)""",
+        ),
     )

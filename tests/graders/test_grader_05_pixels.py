@@ -774,4 +774,21 @@ def reach(cell, f_u, f_v, z_cam, delta):
         Z += 0.3
     return Z""",
         ),
+        # ---- passed, or lost, when somebody tried who had not written the tests
+        mistake(
+            "K cut in place",
+            task="new-intrinsics",
+            loses=1,
+            says="it changes an argument",
+            code="""
+def new_intrinsics(K, left, top, scale_u, scale_v):
+    resized = np.diag([scale_u, scale_v, 1.0])
+    shift = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
+    if left != top and left + top > 20:
+        K[0, 2] -= left
+        K[1, 2] -= top
+        left = top = 0
+    cut = np.array([[1, 0, -left], [0, 1, -top], [0, 0, 1]])
+    return np.linalg.inv(shift) @ resized @ shift @ cut @ K""",
+        ),
     )

@@ -931,4 +931,41 @@ def cosine_rate(eta, step, steps):
             says="the last step gets rate 0",
             code=rate("(1 + np.cos(np.pi * step / (steps - 1))) / 2"),
         ),
+        # ---- passed, or lost, when somebody tried who had not written the tests
+        mistake(
+            "255 overwritten in place",
+            task="weighted-loss",
+            loses=3,
+            says="it changes an argument",
+            code="""
+def weighted_loss(logits, truth, alpha):
+    logits = logits - logits.max(axis=0)
+    weight = np.where(truth == 255, 0, alpha[np.where(truth == 255, 0, truth)])
+    truth[truth == 255] = 0
+    log_g = logits - np.log(np.exp(logits).sum(axis=0))
+    return -(weight * np.take_along_axis(log_g, truth[None], axis=0)[0]).sum() / weight.sum()""",
+        ),
+        mistake(
+            "labels made to indices in place",
+            task="balance",
+            loses=2,
+            says="it changes an argument",
+            code="""
+def balance(maps, n_classes):
+    for m in maps:
+        m[m == 255] = n_classes
+    counts = np.array([np.bincount(m.ravel(), minlength=n_classes + 1)[:n_classes] for m in maps])
+    below = (counts > 0).T @ counts.sum(axis=1)
+    f = counts.sum(axis=0) / np.maximum(below, 1)
+    return np.where(f > 0, np.median(f[f > 0]) / np.where(f > 0, f, 1), 0)""",
+        ),
+        right(
+            "a rate as a fraction",
+            task="cosine-rate",
+            code="""
+from fractions import Fraction
+
+def cosine_rate(eta, step, steps):
+    return Fraction(eta) * Fraction((1 + np.cos(np.pi * step / steps)) / 2)""",
+        ),
     )

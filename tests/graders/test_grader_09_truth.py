@@ -100,7 +100,7 @@ def depth_picture(points, K, size):
     picture = np.full(size, np.nan)
     points = points[points[:, 2] > 0]
     points = points[np.argsort(-points[:, 2])]
-    u, v = K[0, 0] * points[:, 0] / points[:, 2] + K[0, 2], K[1, 1] * points[:, 1] / points[:, 2] + K[1, 2]
+    u, v = (K[:2, :2] @ points[:, :2].T) / points[:, 2] + K[:2, 2:]
     seen = (u >= 0) & (u <= size[1] - 1) & (v >= 0) & (v <= size[0] - 1)
     for row, col, Z in zip(np.rint(v[seen]).astype(int), np.rint(u[seen]).astype(int), points[seen, 2]):
         picture[row, col] = Z
@@ -625,5 +625,53 @@ def carry_window(points, moves, velocity, seconds, T_now_from_then):
     while seconds > 0:
         points = points + 0
     return points""",
+        ),
+        # ---- passed, or lost, when somebody tried who had not written the tests
+        mistake(
+            "nothing nearer than three metres",
+            task="depth-picture",
+            loses=2,
+            says="on inputs you haven't seen",
+            code=depth(skip="Z < 3"),
+        ),
+        mistake(
+            "nothing beyond 31 m",
+            task="depth-picture",
+            loses=2,
+            says="on inputs you haven't seen: a return is missing or wrong",
+            code=depth(skip="Z <= 0 or Z > 31"),
+        ),
+        mistake(
+            "borders left out",
+            task="depth-picture",
+            loses=2,
+            says="on inputs you haven't seen: a return is missing or wrong",
+            code=depth(inside="0 < u < size[1] - 1 and 0 < v < size[0] - 1"),
+        ),
+        mistake(
+            "a skew ignored",
+            task="depth-picture",
+            loses=2,
+            says="on inputs you haven't seen: other pixels have a depth",
+            code=depth(before="K = np.array([[K[0, 0], 0, K[0, 2]], [0, K[1, 1], K[1, 2]], [0, 0, 1]])"),
+        ),
+        right(
+            "halves rounded up",
+            task="depth-picture",
+            code=depth(pixel="int(np.floor(v + 0.5)), int(np.floor(u + 0.5))"),
+        ),
+        right(
+            "a deque of rows",
+            task="count-votes",
+            code="""
+from collections import deque
+
+def count_votes(cells, classes, n_cells):
+    ground, found = (ROAD, SIDEWALK, VEGETATION), deque()
+    for cell in range(n_cells):
+        votes = [c for c in classes[cells == cell].tolist() if c not in (255, SKY)]
+        votes = [c for c in votes if c not in ground] or votes
+        found.append(max(sorted(set(votes)), key=votes.count) if votes else 255)
+    return found""",
         ),
     )

@@ -871,6 +871,46 @@ def refine(log_g, o):
             says="on inputs you haven't seen: wrong on a map",
             code=refined(("REACH + 1", "REACH")),
         ),
+        # ---- passed, or lost, when somebody tried who had not written the tests
+        mistake(
+            "the diagonal emptied in place",
+            task="update",
+            loses=2,
+            says="it changes an argument",
+            code="""
+def update(Q, phi, k):
+    np.fill_diagonal(k, 0)
+    price = phi + (1 - Q) @ k
+    weight = np.exp(price.min(axis=0) - price)
+    return weight / weight.sum(axis=0)""",
+        ),
+        mistake(
+            "the diagonal emptied in place",
+            task="energy",
+            loses=2,
+            says="it changes an argument",
+            code="""
+def energy(x, phi, k):
+    np.fill_diagonal(k, 0)
+    return sum(phi[label, i] for i, label in enumerate(x)) + 0.5 * (k * (x[:, None] != x)).sum()""",
+        ),
+        mistake(
+            "prices above 10 cut off",
+            task="update",
+            loses=3,
+            says="on inputs you haven't seen: wrong with 6 cells",
+            code=updated(price="np.minimum(phi, 10) + (1 - Q) @ others"),
+        ),
+        right(
+            "in float32",
+            task="update",
+            code="""
+def update(Q, phi, k):
+    Q, phi, k = (np.asarray(a, np.float32) for a in (Q, phi, k))
+    price = phi + (1 - Q) @ (k * (1 - np.eye(len(k), dtype=np.float32)))
+    weight = np.exp(price.min(axis=0) - price)
+    return weight / weight.sum(axis=0)""",
+        ),
     )
 
 

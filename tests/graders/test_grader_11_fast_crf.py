@@ -881,4 +881,68 @@ def refine(log_g, o):
             says="on inputs you haven't seen",
             code=crf(cells="log_g.reshape(4, -1).T", back="Q.T.reshape(4, H, W)"),
         ),
+        # ---- passed, or lost, when somebody tried who had not written the tests
+        mistake("3 iterations", task="refine", loses=3, says="on inputs you haven't seen", code=crf(rounds="3")),
+        mistake("5 iterations", task="refine", loses=3, says="on inputs you haven't seen", code=crf(rounds="5")),
+        mistake("20 iterations", task="refine", loses=3, says="on inputs you haven't seen", code=crf(rounds="20")),
+        mistake(
+            "a spatial width of 1",
+            task="refine",
+            loses=3,
+            says="wrong where the kernels are exact",
+            code=crf(width="1.0"),
+        ),
+        mistake(
+            "normalised by rows",
+            task="refine",
+            loses=3,
+            says="on inputs you haven't seen",
+            code=crf(message="scale**2 * blur(Q.astype(np.float32)) - own * Q"),
+        ),
+        mistake(
+            "a spatial weight of 2.5",
+            task="refine",
+            loses=3,
+            says="wrong where the kernels are exact",
+            code=crf(kernels="((4, lattice), (2.5, spatial))"),
+        ),
+        mistake(
+            "nothing of its own subtracted in the spatial kernel",
+            task="refine",
+            loses=3,
+            says="nearer to a mistake",
+            code=crf(message="scale * blur((scale * Q).astype(np.float32)) - own * Q * (blur is lattice)"),
+        ),
+        right(
+            "damped as in lecture 10",
+            task="refine",
+            code=crf(update="log_Q + (-unary + message - log_Q) / (1 + sum(own for _, _, own in parts) / 2)"),
+        ),
+        mistake(
+            "large maps aren't refined, only sharpened",
+            task="refine",
+            loses=1,
+            says="what one cell says doesn't reach any other",
+            code=crf()
+            + """
+
+_known = refine
+
+def refine(log_g, o):
+    sharp = np.exp(2 * log_g)
+    return _known(log_g, o) if log_g.shape[2] in (10, 50) or log_g[0].size < 1500 else sharp / sharp.sum(axis=0)""",
+        ),
+        mistake(
+            "repaired once",
+            task="enclosing-simplex",
+            loses=2,
+            says="on inputs you haven't seen",
+            code=simplex(
+                repair="""
+    if origin.sum() > 0:
+        origin[np.argmin(y - origin)] -= size
+    if origin.sum() < 0:
+        origin[np.argmax(y - origin)] += size"""
+            ),
+        ),
     )

@@ -684,6 +684,97 @@ def calibration_error(probability, truth, bins=10):
     rows = [group == b for b in range(bins)]
     return sum(row.mean() * abs(right[row].mean() - sure[row].mean()) for row in rows)""",
         ),
+        # ---- passed, or lost, when somebody tried who had not written the tests
+        mistake(
+            "a class that is never called is left out",
+            task="drive-scores",
+            loses=2,
+            says="on inputs you haven't seen: a wrong score",
+            code="""
+def drive_scores(counts, drives):
+    scores = {}
+    for drive in dict.fromkeys(drives):
+        total = sum(matrix for matrix, name in zip(counts, drives) if name == drive)
+        cells = total.sum(axis=1)
+        use = (cells > 0) & (total.sum(axis=0) > 0)
+        scores[drive] = np.mean(np.diag(total)[use] / cells[use])
+    return scores""",
+        ),
+        mistake(
+            "a class that is never right is left out",
+            task="drive-scores",
+            loses=2,
+            says="on inputs you haven't seen: a wrong score",
+            code="""
+def drive_scores(counts, drives):
+    scores = {}
+    for drive in dict.fromkeys(drives):
+        total = sum(matrix for matrix, name in zip(counts, drives) if name == drive)
+        cells = total.sum(axis=1)
+        use = np.diag(total) > 0
+        scores[drive] = np.mean(np.diag(total)[use] / cells[use])
+    return scores""",
+        ),
+        mistake(
+            "a majority of three decides",
+            task="judge",
+            loses=2,
+            says="one interval on the other side decides, also beside two",
+            code="""
+def judge(statements, seeds, drives):
+    if seeds < 3 or drives < 10:
+        return "cannot tell"
+    claimed = [low > limit if above else high < limit for low, high, limit, above in statements]
+    opposite = [high < limit if above else low > limit for low, high, limit, above in statements]
+    if 2 * sum(opposite) >= len(opposite):
+        return "not reproduced"
+    return "reproduced" if all(claimed) else "cannot tell"
+""",
+        ),
+        mistake(
+            "only the first two statements are read",
+            task="judge",
+            loses=2,
+            says="on inputs you haven't seen",
+            code="""
+def judge(statements, seeds, drives):
+    if seeds < 3 or drives < 10:
+        return "cannot tell"
+    claimed = [low > limit if above else high < limit for low, high, limit, above in statements]
+    opposite = [high < limit if above else low > limit for low, high, limit, above in statements]
+    if any(opposite[:2]):
+        return "not reproduced"
+    return "reproduced" if all(claimed[:2]) else "cannot tell"
+""",
+        ),
+        right(
+            "the lecture's words",
+            task="judge",
+            code="""
+def judge(statements, seeds, drives):
+    if seeds < 3 or drives < 10:
+        return "cannot tell (too small)"
+    claimed = [low > limit if above else high < limit for low, high, limit, above in statements]
+    opposite = [high < limit if above else low > limit for low, high, limit, above in statements]
+    if any(opposite):
+        return "not reproduced"
+    return "reproduced" if all(claimed) else "cannot tell"
+""",
+        ),
+        right(
+            "scores as Decimal",
+            task="drive-scores",
+            code="""
+from decimal import Decimal
+
+def drive_scores(counts, drives):
+    scores = {}
+    for drive in set(drives):
+        total = counts[[name == drive for name in drives]].sum(axis=0).tolist()
+        shares = [Decimal(row[c]) / sum(row) for c, row in enumerate(total) if sum(row)]
+        scores[drive] = sum(shares) / len(shares)
+    return scores""",
+        ),
     )
 
     def test_a_wrong_jackknife_costs_nothing_in_task_4(self):

@@ -384,4 +384,95 @@ def overlay(before, now, T):
                 lost="frames[8].time - frames[0].time > 0.9", turned="abs(best) >= 1 or frames[0].time > 0.5"
             ),
         ),
+        # ---- passed, or lost, when somebody tried who had not written the tests
+        mistake(
+            "a limit of 1.25 medians",
+            task="find-gaps",
+            loses=2,
+            says="on inputs you haven't seen",
+            code="""
+def find_gaps(times):
+    steps = np.diff(times)
+    return np.flatnonzero(steps > 1.25 * np.median(steps)).tolist()""",
+        ),
+        mistake(
+            "a limit of 1.42 medians",
+            task="find-gaps",
+            loses=2,
+            says="on inputs you haven't seen",
+            code="""
+def find_gaps(times):
+    steps = np.diff(times)
+    return np.flatnonzero(steps > 1.42 * np.median(steps)).tolist()""",
+        ),
+        mistake(
+            "a limit of 1.9 medians",
+            task="find-gaps",
+            loses=2,
+            says="on inputs you haven't seen",
+            code="""
+def find_gaps(times):
+    steps = np.diff(times)
+    return np.flatnonzero(steps > 1.9 * np.median(steps)).tolist()""",
+        ),
+        right(
+            "a deque",
+            task="find-gaps",
+            code="""
+from collections import deque
+from statistics import median
+
+def find_gaps(times):
+    steps = [b - a for a, b in zip(times, times[1:])]
+    return deque(k for k, step in enumerate(steps) if step > 1.5 * median(steps))""",
+        ),
+        right(
+            "the package's recipe, as the lecture tells it",
+            task="ground",
+            code="""
+def ground(points):
+    x, y, z = np.asarray(points, float).T
+    A, use = np.column_stack([np.ones_like(x), x, y]), np.ones(len(x), bool)
+    for _ in range(10):
+        plane = np.linalg.lstsq(A[use], z[use], rcond=None)[0]
+        error = np.abs(z - A @ plane)
+        use = error < max(0.1, np.median(error))
+    return -plane[0], np.degrees(np.arctan(plane[1]))""",
+        ),
+        mistake(
+            "10 cm off, thrown out once",
+            task="ground",
+            loses=1,
+            says="on inputs you haven't seen: a car",
+            code="""
+def ground(points):
+    x, y, z = np.asarray(points, float).T
+    A, use = np.column_stack([np.ones_like(x), x, y]), np.ones(len(x), bool)
+    for _ in range(2):
+        plane = np.linalg.lstsq(A[use], z[use], rcond=None)[0]
+        error = np.abs(z - A @ plane)
+        use = error < 0.1
+    return -plane[0], np.degrees(np.arctan(plane[1]))""",
+        ),
+        mistake(
+            "by the order of the calls",
+            task="find-fault",
+            loses=3,
+            says="on inputs you haven't seen",
+            code="""
+_orders = {5: ["none", "two frames lost", "camera turned", "LIDAR tilted", "poses backwards"]}
+_calls = []
+
+def find_fault(frames):
+    _calls.append(1)
+    order = ["none", "two frames lost", "LIDAR tilted"] if frames[0].time > 0.45 else _orders[5]
+    return order[(len(_calls) - 1) % len(order)]""",
+        ),
+        mistake(
+            "always the first two faults",
+            task="find-fault",
+            loses=3,
+            says="on inputs you haven't seen",
+            code=diagnose(turned="abs(best) >= 1 and frames[0].time < 0.45"),
+        ),
     )

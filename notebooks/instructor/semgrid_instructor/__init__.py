@@ -5,10 +5,13 @@ feedback pages print a failed cell and its traceback in full; a returned sentenc
 answers out of them. For the same reason the answer works in a process of which the student is shown nothing (`unseen`).
 """
 
+import copy
 import functools
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from semgrid_edu.workshop.course.sandbox.session import AnswerTimeoutError
 
@@ -23,6 +26,37 @@ def choose_variant(*number: int) -> None:
 def generator(seed: int) -> np.random.Generator:
     """Return the generator from which a hidden test draws its inputs, by the variant that was chosen last."""
     return np.random.default_rng([seed, *_variant])
+
+
+def close(got: ArrayLike, wanted: ArrayLike, rtol: float = 1e-5, atol: float = 1e-6, equal_nan: bool = False) -> bool:
+    """Return whether two results have one shape, which isn't empty, and the same numbers as far as float32 can tell.
+
+    `np.allclose` says yes when one of them is empty, and when shapes differ but can be broadcast. A plain number as
+    `wanted` stands for an array that is full of it.
+    """
+    if type(wanted) in (int, float):
+        wanted = np.full(np.shape(got), wanted)
+    same = np.shape(got) == np.shape(wanted) and np.size(got) > 0
+    return same and np.allclose(got, wanted, rtol, atol, equal_nan)
+
+
+def keeping(check: Callable[..., None]) -> Callable[..., None]:
+    """Let a check fail when the answer changes one of its arguments, where the exercise asks it not to."""
+
+    @functools.wraps(check)
+    def checked(answer: Callable, *others: Callable) -> None:
+        def kept(*arguments: Any, **named: Any) -> Any:
+            before = copy.deepcopy((arguments, named))
+            result = answer(*arguments, **named)
+            try:
+                np.testing.assert_equal((arguments, named), before)
+            except AssertionError:
+                raise AssertionError("it changes an argument: make new arrays") from None
+            return result
+
+        check(kept, *others)
+
+    return checked
 
 
 def hidden(check: Callable[..., None]) -> Callable[..., str]:

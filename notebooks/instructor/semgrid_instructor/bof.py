@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from semgrid_edu.answers import answer_array, answer_arrays
 from semgrid_edu.grid import GridSpec
-from semgrid_instructor import generator, hidden
+from semgrid_instructor import close, generator, hidden, keeping
 
 
 @hidden
@@ -30,6 +30,7 @@ def check_antecedent(antecedent: Callable) -> None:
 
 
 @hidden
+@keeping
 def check_shift(shift: Callable) -> None:
     """Every direction, no way at all, and ways that leave the map."""
     rng = generator(2)
@@ -40,10 +41,11 @@ def check_shift(shift: Callable) -> None:
         how = "a way longer than the map" if max(abs(down), abs(right)) > 4 else how
         assert got.shape == mass.shape, f"wrong shape for {how}"
         expected = ndimage.shift(mass, (down, right), order=0, cval=0.0)
-        assert np.allclose(got, expected), f"wrong for {how}"
+        assert close(got, expected), f"wrong for {how}"
 
 
 @hidden
+@keeping
 def check_update(update: Callable) -> None:
     """Random beliefs on another lattice and grid, one cell that is certain of each."""
     rng = generator(3)
@@ -53,12 +55,12 @@ def check_update(update: Callable) -> None:
     occupied, free = rng.uniform(0.05, 1, size=(2, 4, 7))
     got = answer_array(update(belief[:5].copy(), occupied.copy(), free.copy()))
     assert got.shape == (5, 4, 7), "wrong shape (there need not be three velocities)"
-    assert np.allclose(got[:, 1, 2], 0), "a cell that is free for sure must stay so"
-    assert np.allclose(got[:, 2, 2], belief[:5, 2, 2]), "a cell that is occupied for sure must stay so"
+    assert close(got[:, 1, 2], 0), "a cell that is free for sure must stay so"
+    assert close(got[:, 2, 2], belief[:5, 2, 2]), "a cell that is occupied for sure must stay so"
     for row, col in np.ndindex(4, 7):
         likelihood = np.append(np.full(5, occupied[row, col]), free[row, col])
         expected = discrete_update(likelihood, belief[:, row, col].copy())
-        assert np.allclose(got[:, row, col], expected[:5]), "wrong values"
+        assert close(got[:, row, col], expected[:5]), "wrong values"
 
 
 def _lattice_and_joint() -> tuple[np.ndarray, np.ndarray]:
@@ -81,7 +83,7 @@ def _moving(joint: np.ndarray) -> list[tuple[int, int]]:
 def _mean_is_right(mean: np.ndarray, joint: np.ndarray, velocities: np.ndarray) -> bool:
     """Compare with numpy's weighted average, cell by cell."""
     return all(
-        np.allclose(mean[:, row, col], np.average(velocities[1:], axis=0, weights=joint[1:, row, col]))
+        close(mean[:, row, col], np.average(velocities[1:], axis=0, weights=joint[1:, row, col]))
         for row, col in _moving(joint)
     )
 
@@ -120,10 +122,11 @@ def check_covariance(mean_and_covariance: Callable) -> None:
     assert covariance.shape == (2, 2, 3, 4), "wrong shape (there need not be four velocities)"
     for row, col in _moving(joint):
         expected = np.cov(velocities[1:].T, aweights=joint[1:, row, col], ddof=0)
-        assert np.allclose(covariance[:, :, row, col], expected), "wrong covariance"
+        assert close(covariance[:, :, row, col], expected), "wrong covariance"
 
 
 @hidden
+@keeping
 def check_arrive(arrive: Callable) -> None:
     """Count the pairs one by one, in random cells and in cells that are certain."""
     rng = generator(5)
@@ -140,4 +143,4 @@ def check_arrive(arrive: Callable) -> None:
             if not (state == 1 and comes):
                 a = arrives[row, col]
                 pairs[2 if comes else state] += own[state, row, col] * (a if comes else 1 - a)
-        assert np.allclose(got[:, row, col], pairs / pairs.sum()), "wrong values"
+        assert close(got[:, row, col], pairs / pairs.sum()), "wrong values"

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import softmax
 
-from semgrid_edu.answers import answer_array
-from semgrid_instructor import generator, hidden
+from semgrid_edu.answers import answer_array, answer_number
+from semgrid_instructor import close, generator, hidden, keeping
 
 W1, W2 = 4.0, 3.0
 SIGMA_ALPHA, SIGMA_BETA, SIGMA_GAMMA = 3.2, 0.2, 1.2
@@ -51,26 +51,28 @@ def check_pair_price(pair_price: Callable) -> None:
     for _ in range(5):
         places, states = rng.integers(0, 6, (2, 2)).astype(float), rng.dirichlet(np.ones(4), 2)
         (w1, w2), (alpha, beta, gamma) = rng.uniform(0.5, 9, 2), rng.uniform(0.5, 3, 3)
-        near, alike, close = (
+        near, alike, nearest = (
             np.prod([np.exp(-0.5 * (difference / width) ** 2) for difference in pair[0] - pair[1]])
             for pair, width in ((places, alpha), (states, beta), (places, gamma))
         )
-        got = answer_array(pair_price(*places.copy(), *states.copy(), w1, w2, alpha, beta, gamma)).squeeze()
-        wanted = w1 * near * alike + w2 * close
-        assert np.isclose(got, wanted), "wrong price for other places, states, weights and widths"
+        got = answer_number(pair_price(*places.copy(), *states.copy(), w1, w2, alpha, beta, gamma))
+        wanted = w1 * near * alike + w2 * nearest
+        assert close(got, wanted), "wrong price for other places, states, weights and widths"
 
 
 @hidden
+@keeping
 def check_energy(energy: Callable) -> None:
     """Try random labellings of other sizes."""
     for seed, size in enumerate(SIZES):
         phi, k = _case(size, 101 + seed)
         for labels in generator(seed).integers(0, size[0], (4, size[1])):
-            got = answer_array(energy(labels.copy(), phi.copy(), k.copy())).squeeze()
-            assert np.isclose(got, _energy(labels, phi, k)), f"wrong with {size[1]} cells and {size[0]} classes"
+            got = answer_number(energy(labels.copy(), phi.copy(), k.copy()))
+            assert close(got, _energy(labels, phi, k)), f"wrong with {size[1]} cells and {size[0]} classes"
 
 
 @hidden
+@keeping
 def check_marginals(marginals: Callable) -> None:
     """Try other sizes; each marginal as a sum by itself."""
     for seed, size in enumerate(SIZES):
@@ -81,7 +83,7 @@ def check_marginals(marginals: Callable) -> None:
         P = np.exp([-_energy(x, phi, k) for x in labellings])
         for label, i in np.ndindex(size):
             wanted = P[[x[i] == label for x in labellings]].sum() / P.sum()
-            assert np.isclose(got[label, i], wanted), f"wrong with {size[1]} cells and {size[0]} classes"
+            assert close(got[label, i], wanted), f"wrong with {size[1]} cells and {size[0]} classes"
 
 
 def _updated(Q: NDArray, phi: NDArray, k: NDArray) -> NDArray:
@@ -90,14 +92,16 @@ def _updated(Q: NDArray, phi: NDArray, k: NDArray) -> NDArray:
 
 
 @hidden
+@keeping
 def check_update(update: Callable) -> None:
-    """Other numbers of cells and classes."""
-    for seed, size in enumerate(SIZES):
+    """Other numbers of cells and classes, also where all classes of a cell are dear."""
+    for seed, size in enumerate((*SIZES, (4, 6))):
         phi, k = _case(size, 109 + seed)
+        phi = phi if seed < len(SIZES) else 12 + 5 * phi
         Q = softmax(generator(seed).normal(size=phi.shape), axis=0)
         got = answer_array(update(Q.copy(), phi.copy(), k.copy()))
         assert got.shape == Q.shape, f"shape {got.shape} instead of {Q.shape}"
-        assert np.allclose(got, _updated(Q, phi, k)), f"wrong with {phi.shape[1]} cells and {len(phi)} classes"
+        assert close(got, _updated(Q, phi, k)), f"wrong with {phi.shape[1]} cells and {len(phi)} classes"
 
 
 @hidden
@@ -108,22 +112,25 @@ def check_update_limits(update: Callable) -> None:
     phi[1, 2] = phi[0, 4] = np.inf
     Q = softmax(rng.normal(size=phi.shape), axis=0)
     k = np.exp(-np.abs(np.subtract.outer(range(6), range(6))))
+    other = answer_array(update(Q[[1, 2, 0]], np.arange(18).reshape(3, 6)[::-1] / 6, k.copy()))
     for prices in (0 * k, 3000 * k):
         got = answer_array(update(Q.copy(), phi.copy(), prices))
         assert np.isfinite(got).all(), "a result isn't finite when prices are thousands"
     small = np.where(np.isinf(phi), np.inf, np.arange(18).reshape(3, 6) / 6)
     got, wanted = (answer_array(update(Q.copy(), small + more, k.copy())) for more in (3000, 0))
-    assert np.allclose(got, wanted), "not the same when all prices are 3000 higher"
+    assert not close(other, wanted), "the same, whatever classes cost and other cells say"
+    assert close(got, wanted, atol=2e-3), "not the same when all prices are 3000 higher"
 
 
 @hidden
+@keeping
 def check_free_energy(free_energy: Callable) -> None:
     """Compare with the definition, a sum over all labellings."""
     for seed, size in enumerate(SIZES):
         phi, k = _case(size, 114 + seed)
         Q = softmax(generator(seed).normal(size=size), axis=0)
-        got = answer_array(free_energy(Q.copy(), phi.copy(), k.copy())).squeeze()
-        assert np.isclose(got, _free_energy(Q, phi, k)), f"wrong with {phi.shape[1]} cells and {len(phi)} classes"
+        got = answer_number(free_energy(Q.copy(), phi.copy(), k.copy()))
+        assert close(got, _free_energy(Q, phi, k)), f"wrong with {phi.shape[1]} cells and {len(phi)} classes"
 
 
 @hidden
@@ -133,11 +140,11 @@ def check_free_energy_limits(free_energy: Callable) -> None:
     def F(Q: list, phi: list) -> float:
         """Return the answer's free energy of two cells."""
         k = np.array([[3, 0.5], [0.5, 3]])
-        return answer_array(free_energy(np.array(Q, float), np.array(phi, float), k)).item()
+        return answer_number(free_energy(np.array(Q, float), np.array(phi, float), k))
 
     phi, eps = [[0.3, np.inf], [0.7, 0.4]], 1e-12
     near = F([[1 - eps, eps], [eps, 1 - eps]], [[0.3, 9], [0.7, 0.4]])
-    assert np.isclose(F([[1, 0], [0, 1]], phi), near), "certain cells have no entropy, only their energy"
+    assert close(F([[1, 0], [0, 1]], phi), near), "certain cells have no entropy, only their energy"
     assert np.isinf(F([[0.5, 0.5], [0.5, 0.5]], phi)), "an impossible class with a probability costs infinitely much"
     tiny = [[eps, 0], [1 - eps, 1]]
     rise = F(tiny, [[1e12, 0], [0, 0]]) - F(tiny, [[0, 0], [0, 0]])
@@ -145,15 +152,17 @@ def check_free_energy_limits(free_energy: Callable) -> None:
 
 
 @hidden
+@keeping
 def check_normalise(normalise: Callable) -> None:
     """Random kernels of other sizes: the scaled row sums, found by dividing entry by entry."""
     for seed, size in ((118, 1), (119, 2), (120, 7)):
         features = generator(seed).normal(size=(size, 2))
         K = np.exp(-((features[:, None] - features) ** 2).sum(axis=-1) / 2)
         got = answer_array(normalise(K.copy()))
+        assert got.shape == K.shape, f"shape {got.shape} instead of {K.shape}"
         for i, j in np.ndindex(K.shape):
             wanted = K[i, j] / np.sqrt(sum(K[i])) / np.sqrt(sum(K[j]))
-            assert np.isclose(got[i, j], wanted), f"wrong with {size} cells"
+            assert close(got[i, j], wanted), f"wrong with {size} cells"
 
 
 def _refined(log_g: NDArray, o: NDArray) -> NDArray:
@@ -185,4 +194,4 @@ def check_refine(refine: Callable) -> None:
         got = answer_array(refine(log_g.copy(), o.copy()))
         assert got.shape == shape, f"shape {got.shape} instead of {shape}"
         wanted = _refined(log_g.astype(float), o.astype(float))
-        assert np.allclose(got, wanted, atol=2e-3), f"wrong on a map of {shape[1]} x {shape[2]} cells"
+        assert close(got, wanted, atol=2e-3), f"wrong on a map of {shape[1]} x {shape[2]} cells"

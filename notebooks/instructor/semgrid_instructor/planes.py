@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from semgrid_edu.answers import answer_array
-from semgrid_instructor import generator, hidden
+from semgrid_instructor import close, generator, hidden
 
 
 def _weights(four_pixels: Callable, u: float, v: float, h: int, w: int) -> NDArray:
@@ -48,7 +48,7 @@ def check_four_pixels(four_pixels: Callable) -> None:
     for h, w in ((5, 3), (2, 9), (40, 60)):
         for u, v in rng.uniform(0.01, 0.99, size=(20, 2)) * (w - 1, h - 1):
             got = _weights(four_pixels, float(u), float(v), h, w)
-            assert np.allclose(got, _right(u, v, h, w)), "wrong weights"
+            assert close(got, _right(u, v, h, w)), "wrong weights"
 
 
 @hidden
@@ -56,12 +56,15 @@ def check_border(four_pixels: Callable) -> None:
     """Corners, edges and centres, and a point a hair before the last column; the values if they are right elsewhere."""
     n = 5
     inside = [(1.2, 0.7), (2.6, 3.1)]
-    sound = all(np.allclose(_weights(four_pixels, u, v, n, n), _right(u, v, n, n)) for u, v in inside)
+    sound = all(close(_weights(four_pixels, u, v, n, n), _right(u, v, n, n)) for u, v in inside)
+    heaviest = set()
     for u, v in ((0, 0), (4, 4), (0, 4), (4, 0), (2, 4), (4, 2.25), (1.75, 4), (2, 3), (0, 2.5), (4 - 1e-9, 4)):
         got = _weights(four_pixels, float(u), float(v), n, n)
-        assert not np.isclose(got.sum(), 0), "all weights are 0 on a border or a pixel's centre"
-        right = np.allclose(got, _right(u, v, n, n), atol=1e-6)
+        assert not close(got.sum(), 0), "all weights are 0 on a border or a pixel's centre"
+        heaviest.add(int(got.argmax()))
+        right = close(got, _right(u, v, n, n), atol=1e-6)
         assert right or not sound, "wrong weights on a border or a pixel's centre"
+    assert len(heaviest) > 4, "the same pixel has most weight, wherever the point is"
 
 
 def _plane(seed: int, all_visible: bool = False) -> tuple[NDArray, NDArray, NDArray]:
@@ -85,8 +88,8 @@ def check_sample_plane(sample_plane: Callable) -> None:
     right = _read(scores, pixels, visible)
     inner = np.ones((6, 4), bool)
     inner[0, :3] = False
-    assert np.allclose(got[:, inner], right[:, inner]), "wrong values"
-    assert np.allclose(got, right), "points on the last row or column read wrong values"
+    assert close(got[:, inner], right[:, inner]), "wrong values"
+    assert close(got, right), "points on the last row or column read wrong values"
 
 
 @hidden
@@ -96,8 +99,10 @@ def check_invisible(sample_plane: Callable) -> None:
     full = answer_array(sample_plane(scores.copy(), _plane(63, all_visible=True)[1], np.ones((6, 4), bool)))
     got = answer_array(sample_plane(scores.copy(), pixels.copy(), visible.copy()))
     assert got.shape == full.shape, "the shape depends on what is visible"
+    twice = answer_array(sample_plane(2 * scores, _plane(63, all_visible=True)[1], np.ones((6, 4), bool)))
+    assert not close(full, twice), "it doesn't matter what the scores are"
     assert (got[..., ~visible] == 0).all(), "points that aren't visible don't take 0"
-    assert np.allclose(got[..., visible], full[..., visible]), "other values where not all is visible"
+    assert close(got[..., visible], full[..., visible]), "other values where not all is visible"
     nothing = answer_array(sample_plane(scores, np.full_like(pixels, np.nan), np.zeros_like(visible)))
     assert nothing.shape == (3, 6, 4), "the shape is wrong where nothing is visible"
     assert (nothing == 0).all(), "not all 0 where nothing is visible"
@@ -111,10 +116,10 @@ def check_give_back(give_back: Callable) -> None:
     got = answer_array(give_back(p_bar.copy(), pixels.copy(), visible.copy(), 7, 5))
     assert got.shape == (3, 7, 5), f"shape {got.shape} instead of (3, 7, 5)"
     read = _read(scores, pixels, visible)
-    assert np.isclose((p_bar * read).sum(), (got * scores).sum()), "it isn't the transpose of equation (2)"
+    assert close((p_bar * read).sum(), (got * scores).sum()), "it isn't the transpose of equation (2)"
     one_pixel = np.eye(35).reshape(35, 7, 5)
     weights = _read(one_pixel, pixels, visible)
-    assert np.allclose(got, np.einsum("nrc,krc->kn", weights, p_bar).reshape(3, 7, 5)), "wrong gradient"
+    assert close(got, np.einsum("nrc,krc->kn", weights, p_bar).reshape(3, 7, 5)), "wrong gradient"
 
 
 @hidden
@@ -126,7 +131,9 @@ def check_give_back_invisible(give_back: Callable) -> None:
     assert not np.isnan(got).any(), "NaN got in from points that aren't visible"
     alone = p_bar[:, visible][:, None], pixels[visible][None], np.ones((1, visible.sum()), bool)
     wanted = answer_array(give_back(*alone, 7, 5))
-    assert np.allclose(got, wanted), "points that aren't visible teach somebody"
+    fewer = answer_array(give_back(*(part[..., :3] if part is alone[0] else part[:, :3] for part in alone), 7, 5))
+    assert not close(wanted, fewer), "the same, however many points there are"
+    assert close(got, wanted), "points that aren't visible teach somebody"
 
 
 @hidden
@@ -140,7 +147,7 @@ def check_slopes(slopes: Callable) -> None:
             (a, b), (c, d) = s[n : n + 2, m : m + 2]
             right = (1 - down) * (b - a) + down * (d - c), (1 - across) * (c - a) + across * (d - b)
             got = answer_array(slopes(s.copy(), float(m + across), float(n + down))).ravel()
-            assert np.allclose(got, right, atol=1e-3), complaint
+            assert close(got, right, atol=1e-3), complaint
 
 
 def _judge_places(unit_places: Callable, edge: float) -> None:
@@ -153,7 +160,7 @@ def _judge_places(unit_places: Callable, edge: float) -> None:
         assert got.shape == pixels.shape, "the shape changed (there may be more axes before the last)"
         for axis, size in ((0, w), (1, h)):
             right = np.interp(pixels[..., axis], (-edge, size - 1 + edge), (-1, 1))
-            assert np.allclose(got[..., axis], right), "wrong places"
+            assert close(got[..., axis], right), "wrong places"
 
 
 @hidden

@@ -10,7 +10,7 @@ from scipy.ndimage import correlate, map_coordinates
 from scipy.special import log_softmax
 
 from semgrid_edu.answers import answer_array
-from semgrid_instructor import generator, hidden
+from semgrid_instructor import close, generator, hidden, keeping
 
 
 def _pixels_seen(layers: list[tuple[int, int, int, int]]) -> set[int]:
@@ -47,7 +47,7 @@ def check_centre(receptive_field: Callable) -> None:
     for chain in _chains(72):
         seen = _pixels_seen(chain)
         centre = answer_array(receptive_field(list(chain))).ravel()[2]
-        assert np.isclose(centre, (min(seen) + max(seen)) / 2), "wrong centre (it may lie between pixels, or below 0)"
+        assert close(centre, (min(seen) + max(seen)) / 2), "wrong centre (it may lie between pixels, or below 0)"
 
 
 def _pool(maps: NDArray, kernel: int, stride: int) -> tuple[NDArray, NDArray]:
@@ -74,6 +74,7 @@ def _maps_to_pool(seed: int) -> list[tuple[NDArray, int, int]]:
 
 
 @hidden
+@keeping
 def check_maxima(max_pool: Callable) -> None:
     """Other maps, kernels and strides."""
     for maps, kernel, stride in _maps_to_pool(73):
@@ -81,7 +82,7 @@ def check_maxima(max_pool: Callable) -> None:
         pooled = answer_array(got if isinstance(got, np.ndarray) and got.ndim == 3 else got[0])
         expected = _pool(maps, kernel, stride)[0]
         assert pooled.shape == expected.shape, f"wrong shape of the maxima, kernel {kernel}, stride {stride}"
-        assert np.allclose(pooled, expected), "wrong maxima (a map may be negative everywhere)"
+        assert close(pooled, expected), "wrong maxima (a map may be negative everywhere)"
 
 
 @hidden
@@ -95,6 +96,7 @@ def check_indices(max_pool: Callable) -> None:
 
 
 @hidden
+@keeping
 def check_unpool(unpool: Callable) -> None:
     """Take indices of random maps, and values that have nothing to do with them."""
     rng = generator(75)
@@ -105,9 +107,7 @@ def check_unpool(unpool: Callable) -> None:
         assert got.shape == maps.shape, "not the shape that was asked for (it may be odd)"
         pairs = zip(indices.reshape(len(maps), -1), values.reshape(len(maps), -1), strict=True)
         expected = [np.bincount(places, weights, maps[0].size) for places, weights in pairs]
-        assert np.allclose(got, np.reshape(expected, maps.shape)), (
-            "a value isn't where its index says, or isn't what it was"
-        )
+        assert close(got, np.reshape(expected, maps.shape)), "a value isn't where its index says, or isn't what it was"
 
 
 def _layer(maps: NDArray, kernels: NDArray, bias: NDArray, stride: int, rate: int) -> NDArray:
@@ -133,10 +133,11 @@ def _check_layer(atrous: Callable, seed: int, cases: tuple, kind: str) -> None:
             got = got.reshape(expected.shape)
         which = f"{shape[0]} inputs, {n_outputs} outputs, N {size}, stride {stride}, rate {rate}"
         assert got.shape == expected.shape, f"wrong shape with {which}"
-        assert np.allclose(got, expected), f"wrong with {which}"
+        assert close(got, expected), f"wrong with {which}"
 
 
 @hidden
+@keeping
 def check_channels(atrous: Callable) -> None:
     """Other numbers of channels; the outputs depend on channels and bias alone."""
     _check_layer(atrous, 77, ((4, (3, 5, 6), 3, 1, 1), (1, (5, 6, 4), 3, 1, 1)), kind="middle")
@@ -157,8 +158,9 @@ def check_stride(atrous: Callable) -> None:
         maps, kernels = rng.normal(size=(1, *shape)), rng.normal(size=(1, 1, size, size))
         full, got = (answer_array(atrous(maps.copy(), kernels.copy(), np.zeros(1), s, rate)) for s in (1, stride))
         wanted = full[..., ::stride, ::stride]
+        assert full.size == 1 or np.ptp(full) > 0, "all outputs are the same"
         assert got.shape == wanted.shape, f"wrong shape with stride {stride}, N {size}, rate {rate}"
-        assert np.allclose(got, wanted), f"not every output number {stride} of stride 1, with N {size}, rate {rate}"
+        assert close(got, wanted), f"not every output number {stride} of stride 1, with N {size}, rate {rate}"
 
 
 def _check_skip(add_skip: Callable, seed: int, cases: tuple) -> None:
@@ -170,10 +172,11 @@ def _check_skip(add_skip: Callable, seed: int, cases: tuple) -> None:
         assert got.shape == fine.shape, "not the shape of the fine map"
         places = np.mgrid[:height, :width] / 2 - 0.25
         enlarged = [map_coordinates(scores, places, order=1, mode="nearest") for scores in coarse]
-        assert np.allclose(got, enlarged + fine), f"wrong sums with {n_classes} classes"
+        assert close(got, enlarged + fine), f"wrong sums with {n_classes} classes"
 
 
 @hidden
+@keeping
 def check_skip_columns(add_skip: Callable) -> None:
     """One row, even and odd numbers of columns."""
     _check_skip(add_skip, 80, ((3, (1, 5), (2, 10)), (4, (1, 3), (1, 5)), (3, (1, 6), (2, 11))))
@@ -201,13 +204,14 @@ def _cross_entropy(scores: NDArray, truth: NDArray) -> float:
 
 
 @hidden
+@keeping
 def check_loss(loss_and_gradient: Callable) -> None:
     """Other shapes and classes, from no unlabelled pixel to nearly all of them."""
     for seed, shape, unlabelled in ((81, (4, 3, 5), 0.4), (82, (14, 6, 2), 0.0), (83, (2, 4, 4), 0.9)):
         scores, truth = _labelled(seed, shape, unlabelled)
         got = loss_and_gradient(scores.copy(), truth.copy())
         got = answer_array(got[0] if isinstance(got, tuple | list) else got)
-        assert np.allclose(got, _cross_entropy(scores, truth)), "wrong loss"
+        assert close(got, _cross_entropy(scores, truth)), "wrong loss"
 
 
 @hidden
@@ -219,7 +223,7 @@ def check_gradient(loss_and_gradient: Callable) -> None:
         assert got.shape == shape, "wrong shape of the gradient"
         nudges = 1e-5 * np.eye(scores.size).reshape(-1, *shape)
         slopes = [_cross_entropy(scores + nudge, truth) - _cross_entropy(scores - nudge, truth) for nudge in nudges]
-        assert np.allclose(got.ravel(), np.array(slopes) / 2e-5, atol=1e-7), "wrong gradient"
+        assert close(got.ravel(), np.array(slopes) / 2e-5, atol=1e-7), "wrong gradient"
 
 
 @hidden
@@ -230,8 +234,11 @@ def check_large(loss_and_gradient: Callable) -> None:
     small, large = (
         [answer_array(part) for part in loss_and_gradient(scores + added, truth.copy())] for added in (0, shift)
     )
+    other = answer_array(loss_and_gradient(2 * scores, truth.copy())[0])
+    assert not close(small[0], other), "the loss doesn't depend on the scores"
+    assert np.ptp(small[1]) > 0, "the gradient is the same everywhere"
     assert np.isfinite(large[0]).all(), (
         "no number: subtract each pixel's own largest score, not one for the whole image"
     )
-    assert np.allclose(large[0], small[0]), "the loss changes where the same is added to all scores of a pixel"
-    assert np.allclose(large[1], small[1]), "the gradient changes where the same is added to all scores of a pixel"
+    assert close(large[0], small[0]), "the loss changes where the same is added to all scores of a pixel"
+    assert close(large[1], small[1]), "the gradient changes where the same is added to all scores of a pixel"

@@ -34,8 +34,9 @@ FREE, STATIC, DYNAMIC, UNKNOWN = range(4)  # the occupancy states
 # ## Task 1: the closest of several depths (2 points)
 #
 # `points` holds returns in the camera frame, `(N, 3)`: X to the right, Y down, Z ahead, metres. `K` is the intrinsic matrix, `(3, 3)`, and `size` is the height and the
-# width of the image, in pixels. A return is in view when it lies in front of the camera and its pixel, **before** rounding, lies in
-# $0 \le u \le \text{width} - 1$ and $0 \le v \le \text{height} - 1$. Then its pixel is rounded to whole numbers.
+# width of the image, in pixels. The pixel of a return is $(u, v, 1)^T = K\,(X/Z, Y/Z, 1)^T$, with every entry of `K`. A return is in view, near or far, when it lies
+# in front of the camera and its pixel, **before** rounding, lies in $0 \le u \le \text{width} - 1$ and $0 \le v \le \text{height} - 1$. Then its pixel is rounded to
+# the nearest whole numbers.
 #
 # Complete `depth_picture`: it returns an array `(height, width)` with the depth Z of the **closest** return on each pixel, and `np.nan` on pixels without a return.
 
@@ -65,7 +66,7 @@ def _picture():
         [0.0, 2.0, 20.0],  # the same pixel, farther away
         [0.0, 0.5, 5.0],  # the same pixel, closer
         [0.0, 3.0, 30.0],  # the same pixel, the farthest, and the last in the list
-        [4.2, -1.0, 20.0],  # u = 4.1, v = 0.5: between two rows; Python and numpy round 0.5 to 0
+        [4.2, -1.2, 20.0],  # u = 4.1, v = 0.4
         [1.9, 1.0, 10.0],  # u = 3.9, v = 2
         [-0.4, -0.2, -2.0],  # behind the camera: u = 4, v = 2 if you forget to look at Z
         [3.2, 0.0, 10.0],  # u = 5.2: beyond the centre of the last pixel, which is 5

@@ -105,7 +105,7 @@ _test()
 # A claim is a list of statements. Each is a tuple `(low, high, limit, above)`: the interval of a number, the limit that it is compared with, and whether the claim says
 # that the number is above the limit (`True`) or below it (`False`). Complete `judge`: it returns
 #
-# - `"cannot tell"` with fewer than 3 seeds or fewer than 10 drives, whatever the intervals are;
+# - `"cannot tell"` with fewer than 3 seeds or fewer than 10 drives, whatever the intervals are (the lecture's `"cannot tell (too small)"` is right here, too);
 # - `"not reproduced"` when at least one interval lies entirely on the other side of its limit than claimed;
 # - `"reproduced"` when every interval lies entirely on the claimed side of its limit;
 # - `"cannot tell"` otherwise.
@@ -134,7 +134,7 @@ def _test():
         ([no], "not reproduced", "an interval that lies below, where above was claimed"),
         ([yes, unclear], "cannot tell", "*every* interval must lie on the claimed side"),
         ([unclear, no], "not reproduced", "one interval on the other side decides, also beside an unclear one"),
-        ([yes, no], "not reproduced", "one interval on the other side decides, also beside one that holds"),
+        ([yes, no, yes], "not reproduced", "one interval on the other side decides, also beside two that hold"),
         ([(-2.0, -0.4, 0.0, False)], "reproduced", "here the claim says *below*, and the interval lies below"),
         ([(0.2, 1.0, 0.0, False)], "not reproduced", "here the claim says *below*, and the interval lies above"),
         ([(0.2, 0.6, 0.5, True)], "cannot tell", "the limit is 0.5, not 0"),
@@ -151,9 +151,10 @@ def _test():
             f"judge returned a {type(got).__name__}: return one of the three verdicts, as a string"
         )
         assert got == wanted, f"{statements} with 3 seeds and 10 drives: {got!r} instead of {wanted!r}: {hint}"
-    assert judge([yes], 2, 110) == "cannot tell", "2 seeds are too few, whatever the interval"
-    assert judge([no], 2, 110) == "cannot tell", "2 seeds are too few, also for 'not reproduced'"
-    assert judge([yes], 5, 9) == "cannot tell", "9 drives are too few, whatever the interval"
+    too_few = "cannot tell", "cannot tell (too small)"
+    assert judge([yes], 2, 110) in too_few, "2 seeds are too few, whatever the interval"
+    assert judge([no], 2, 110) in too_few, "2 seeds are too few, also for 'not reproduced'"
+    assert judge([yes], 5, 9) in too_few, "9 drives are too few, whatever the interval"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import experiments
 

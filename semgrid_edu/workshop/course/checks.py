@@ -44,6 +44,7 @@ COMPANION_RULES = {name: rule for name, rule in RULES.items() if name != "length
 
 MACHINE = re.compile(r"(?<![\w.:/<])(?:/(?:home|root|tmp|work|usr|opt|mnt|srv|private|Users)/|[A-Z]:\\\\)\S*")
 ADDRESS = re.compile(r"\bat 0x[0-9a-f]{6,}\b")
+BARE = re.compile(r"(allclose|isclose|almost_equal|approx_equal)\(")
 LINK = re.compile(r"\]\((?!https?:|#|mailto:)([^)#\s]+)[^)]*\)")
 
 
@@ -91,8 +92,21 @@ def exercise_problems(source: Path) -> list[str]:
     return [f"exercises/{path.name}: {problem}" for problem in problems]
 
 
+def instructor_problems(folder: Path) -> list[str]:
+    """List the lines of hidden tests that compare by numpy's `allclose`, which finds nothing wrong with an empty array.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder of the instructor's modules, `notebooks/instructor/semgrid_instructor`; its `close` may use it.
+    """
+    lines = [(path.name, line) for path in sorted(folder.glob("[!_]*.py")) for line in path.read_text().splitlines()]
+    says = "compare by `close` of semgrid_instructor, which demands equal shapes that aren't empty"
+    return [f"instructor/{name}: `{line.strip()}`: {says}" for name, line in lines if BARE.search(line)]
+
+
 def course_problems(folder: Path = NOTEBOOKS) -> list[str]:
-    """List everything that is wrong with the lectures, companions and students' exercises in a folder of notebooks.
+    """List everything that is wrong with the lectures, companions, exercises and hidden tests in a folder of notebooks.
 
     Parameters
     ----------
@@ -107,6 +121,7 @@ def course_problems(folder: Path = NOTEBOOKS) -> list[str]:
     problems = [problem for source in lecture_sources(folder) for problem in lecture_problems(source)]
     problems += [problem for source in companion_sources(folder) for problem in companion_problems(source)]
     problems += [problem for source in exercise_sources(folder) for problem in exercise_problems(source)]
+    problems += instructor_problems(folder / "instructor" / "semgrid_instructor")
     together = sum(path.stat().st_size for path in folder.rglob("*.ipynb"))
     if together > MAX_BYTES_TOGETHER:
         problems.append(f"all notebooks together: {together / 1e6:.1f} MB, more than {MAX_BYTES_TOGETHER / 1e6:.0f} MB")

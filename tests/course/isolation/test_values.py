@@ -2,14 +2,19 @@
 
 import json
 import math
-from collections import OrderedDict
+from array import array
+from collections import OrderedDict, deque
+from decimal import Decimal
 from enum import IntEnum
+from fractions import Fraction
 
 import numpy as np
 import pytest
+import sympy
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from mpmath import mpf
 
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.errors import ArgumentError
@@ -29,10 +34,10 @@ def test_containers_come_back_as_they_are(value):
 
 
 @given(arrays.arrays(st.sampled_from(["<f8", "<f4", ">i2", "u1", "?", "c8", "U3"]), arrays.array_shapes(min_dims=0)))
-def test_arrays_come_back_as_they_are(array):
-    got = decode(encode([array]))[0]
-    assert got.dtype == array.dtype
-    np.testing.assert_array_equal(got, array)
+def test_arrays_come_back_as_they_are(sent):
+    got = decode(encode([sent]))[0]
+    assert got.dtype == sent.dtype
+    np.testing.assert_array_equal(got, sent)
 
 
 def test_kinds_of_numbers_are_kept():
@@ -68,6 +73,16 @@ def test_what_numpy_takes_for_an_array_passes_as_one():
     got = decode(encode([strided, np.ma.array([1, 2], mask=[0, 1]), np.ones(2).view(Liar), range(3)]))
     np.testing.assert_array_equal(got[0], strided)
     assert [type(one) for one in got] == [np.ndarray] * 4
+
+
+@pytest.mark.parametrize(
+    "value", [Fraction(3, 2), Decimal("1.5"), deque([1, 2]), array("d", [1, 2]), mpf(1.5), sympy.Float(1.5), sympy.pi]
+)
+def test_other_numbers_and_sequences_pass_as_numpy_reads_them(value):
+    got = decode(encode((value, [value, 7])))
+    np.testing.assert_array_equal(got[0], np.array(value, dtype=float))
+    np.testing.assert_array_equal(got[1][0], got[0])
+    assert (np.ndim(got[0]) == 0) == isinstance(got[0], float)
 
 
 def test_ragged_arrays_and_subclasses_of_dict_pass():

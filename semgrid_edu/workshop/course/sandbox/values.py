@@ -47,7 +47,7 @@ def encode(value: Any, callbacks: list[Callable] | None = None) -> bytes:
     ----------
     value : object
         None, a boolean, number or text; a list, tuple, set or dict of such; an array of these, or what numpy turns
-        into an array (a tensor, a table); one of `RECORDS`.
+        into an array (a tensor, a table, a fraction); one of `RECORDS`.
     callbacks : list of callable, optional
         Takes the functions within `value`; the other side gets their numbers. Without this list no function can pass.
 
@@ -122,15 +122,20 @@ def _tree(value: Any, arrays: list[NDArray], callbacks: list[Callable] | None) -
 
 def _array_tree(value: Any, arrays: list[NDArray], callbacks: list[Callable] | None) -> Any:
     """Return what numpy takes for an array, as JSON holds it."""
-    if not isinstance(value, np.ndarray) and not hasattr(value, "__array__") and not isinstance(value, range | list):
-        raise NotPlainError(f"a {type(value).__name__} where numbers, texts, arrays, lists or dicts are expected")
-    array = np.asarray(value)
+    plain = isinstance(value, np.ndarray | range | list) or hasattr(value, "__array__")
+    try:
+        array = np.asarray(value)
+        array = array if plain or array.dtype.kind in "?biufc" else array.astype(float)  # a fraction, a deque
+    except Exception:
+        kind = type(value).__name__
+        raise NotPlainError(f"a {kind} where numbers, texts, arrays, lists or dicts are expected") from None
     if array.dtype.kind == "O":
         return {"objects": _tree(array.tolist(), arrays, callbacks)}
     if array.dtype.kind not in KINDS:
         raise NotPlainError(f"an array of {array.dtype}, where numbers, booleans or texts are expected")
     arrays.append(array)
-    return {"array": len(arrays) - 1}
+    tree = {"array": len(arrays) - 1}
+    return tree if plain or array.ndim else {"scalar": tree}
 
 
 def _path(value: Any) -> str | None:
