@@ -146,9 +146,9 @@ def test_the_house_stays_small():
         modules[storey] += not module.endswith("__init__.py")
         lines[storey] += code_lines(module)
     assert modules["book"] <= 163
-    assert modules["workshop"] <= 120
-    assert lines["book"] <= 11_320
-    assert lines["workshop"] <= 10_010
+    assert modules["workshop"] <= 121
+    assert lines["book"] <= 11_370
+    assert lines["workshop"] <= 10_200
 
 
 def test_no_folder_has_more_than_18_modules():
