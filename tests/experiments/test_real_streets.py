@@ -123,6 +123,7 @@ NAMES = {
     "SegNet, then real cells": "simulated, then real",
     "SegNet, then real pixels and cells": "simulated, then real, image stage on points",
     "SegNet, then real pixels and cells, image network frozen on cells": "simulated, then real, two stages",
+    "SegNet, then real and simulated pixels and cells in turn": "simulated and real in turn, image stage on points",
     "SegNet, then real pixels and cells, each colour varied by 15 %": (
         "simulated, then real, image stage on points, tint"
     ),
