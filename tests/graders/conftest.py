@@ -8,7 +8,7 @@ from nbgrader_scores import alembic_asked_once  # noqa: F401 (a fixture for all 
 from typer.testing import CliRunner
 
 from semgrid_edu.workshop.commands.main import app
-from semgrid_edu.workshop.course.nbgrader import autograde
+from semgrid_edu.workshop.course.nbgrader import build
 
 pytest.register_assert_rewrite("grader_checks")
 
@@ -17,7 +17,7 @@ pytest.register_assert_rewrite("grader_checks")
 def exercises_read_once():
     """Let the hundreds of students here fill in copies of one student version, since no exercise changes meanwhile."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(autograde, "student_version", cache(autograde.student_version))
+        patch.setattr(build, "student_version", cache(build.student_version))
         yield
 
 
