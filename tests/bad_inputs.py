@@ -642,7 +642,7 @@ EXPERIMENTS = (
     Row("an unknown LIDAR", "reproduce truth-policies --lidar sonar --out log.json", "lidar: expected one of"),
     Row("an unknown grid", "reproduce point-labels --grid huge --out log.json", "grid: expected"),
     Row("an unknown LIDAR of labelled returns", "reproduce point-labels --lidar sonar", "lidar: expected one of"),
-    Row("no scene", "reproduce real-streets --pandaset NONE --runs RUNS --out log.json", "NONE/002"),
+    Row("no scene", "reproduce real-streets --pandaset NONE --simulated . --runs RUNS --out log.json", "NONE/002"),
     Row("a scene that isn't there", "data index OUT --pandaset TINY --scene 002", "TINY/002"),
     Row(
         "a network of another kind to start from",

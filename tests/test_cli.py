@@ -146,7 +146,9 @@ def test_ctrl_c_says_whether_the_same_command_goes_on(arguments, module, name, t
 def test_workers_end_without_a_word_when_their_command_is_stopped(tmp_path, sent):
     """A terminal sends Ctrl-C to all of them; `kill` reaches the command alone."""
     command = [sys.executable, "-m", "semgrid_edu", "data", "make", "minikitti", str(tmp_path)]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as made:
+    pipe = {"stderr": subprocess.PIPE, "text": True, "start_new_session": True}
+    # Where the tests run in the background of a shell, SIGINT is ignored, and programs that they start inherit that.
+    with subprocess.Popen(command, **pipe, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)) as made:
         until = time.monotonic() + 100
         while not list(tmp_path.glob("minikitti/*/.*")) and made.poll() is None and time.monotonic() < until:
             time.sleep(0.2)  # until a worker has begun a drive

@@ -161,7 +161,7 @@ def demo_says(tmp_path, monkeypatch, capsys) -> Callable[[], str]:
     def says() -> str:
         command = ["demo", "--kitti", str(tmp_path), "--date", DATE, "--drive", "0001"]
         monkeypatch.setattr("sys.argv", ["semgrid-edu", *command])
-        monkeypatch.setattr(demo, "write_demo", lambda drive, *_: (drive[0], Path("done").resolve() / "page")[1])
+        monkeypatch.setattr(demo, "write_demo", lambda drive, *_, **__: (drive[0], Path("done").resolve() / "page")[1])
         with pytest.raises(SystemExit) as ended:
             cli.run()
         return f"{capsys.readouterr().err}{ended.value.code or ''}"

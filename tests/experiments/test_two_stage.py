@@ -61,7 +61,7 @@ def test_what_was_interrupted_goes_on(compared, monkeypatch):
 
     monkeypatch.setattr(two_stage, "train_network", ended)
     two_stage.compare_training(root, root / "runs", 1, QUICK)
-    assert resumed == {"end-to-end-0": (True, False), "two-stage-0": (False, True)}
+    assert resumed == {"end-to-end-0": (True, True), "two-stage-0": (False, True)}
 
 
 def test_scores_are_those_of_the_grid_and_of_the_image(compared):

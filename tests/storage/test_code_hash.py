@@ -70,7 +70,7 @@ def test_a_change_of_how_labels_are_made_changes_theirs_alone(keys, before):
     ("module", "old", "new"),
     [
         (f"{READERS}/frames.py", "Read the returns of one scan.", "Read all returns of a scan."),
-        (f"{READERS}/frames.py", "metres. KITTI's HDL-64E", "metres. The HDL-64E"),
+        (f"{READERS}/drive_doubts.py", "metres. KITTI's HDL-64E", "metres. The HDL-64E"),
         (f"{READERS}/kitti_raw.py", "# a scan that was never recorded", "# what was never recorded"),
         (f"{READERS}/frames.py", "class FrameSequence", "\n\nclass FrameSequence"),
         ("networks/fusion.py", "N_REDUCED = 16", "N_REDUCED = 17"),

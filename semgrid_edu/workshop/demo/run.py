@@ -172,8 +172,8 @@ def write_demo(
     StageError
         When a stage of the file raises an error, or returns what the next one can't use.
     """
-    page, picture = _check_page(out, force)
     chosen, net, known = ChosenFrames.of(len(drive), frames), load_net(weights, drive.camera), _said_by_card(weights)
+    page, picture = _check_page(out, force)
     if drive[chosen.run[0]].image is None:
         raise DataError(drive.folder, f"images of {getattr(drive, 'view', 'its camera')}", "none")
     own, yours, comparison = Stages.of(net, keep_steps=True), (), None

@@ -30,7 +30,7 @@ from semgrid_edu.workshop.course.sandbox.taken import (
     namespace_of,
     takes_too_much,
 )
-from semgrid_edu.workshop.course.sandbox.values import MOST_BYTES, Wire, decode, encode
+from semgrid_edu.workshop.course.sandbox.values import MOST_BYTES, MOST_INPUT, Wire, decode, encode
 
 WORKER = ("-m", "semgrid_edu.workshop.course.sandbox.worker")
 """What Python is started with."""
@@ -183,7 +183,7 @@ class StudentProcess:
             When the process is no more, or sends what is no message.
         """
         callbacks = [] if callbacks is None else callbacks
-        data = encode(message, callbacks)
+        data = encode(message, callbacks, MOST_INPUT)
         while True:
             reply = self._exchange(data, deadline, callbacks)
             if "callback" not in reply:

@@ -24,7 +24,10 @@ KINDS = "?biufcUS"
 """The kinds of array that pass, numpy's letters: booleans, numbers and texts."""
 
 MOST_BYTES = 10_000_000
-"""Bytes of all arrays of a message, a hundred times what exercises send: a test may broadcast them against its own."""
+"""Bytes of all arrays of a result, a hundred times what exercises return: a test may broadcast them against its own."""
+
+MOST_INPUT = 150_000_000
+"""Bytes of all arrays that the grader sends: a drive of several frames with their images is more than a result."""
 
 MOST_JSON = 10_000_000
 """Bytes of a message outside its arrays: room for lists of half a million numbers."""
@@ -33,14 +36,14 @@ MOST_KEYS = 20_000
 """Entries of a set or dict: keys that were chosen to collide take the square of their number to put in."""
 
 LONGEST = 25_000_000
-"""Bytes of a message that are still read."""
+"""Bytes of a message that the grader still reads."""
 
 
 class NotPlainError(TypeError):
     """A value that can't pass."""
 
 
-def encode(value: Any, callbacks: list[Callable] | None = None) -> bytes:
+def encode(value: Any, callbacks: list[Callable] | None = None, most: int = MOST_BYTES) -> bytes:
     """Turn a value into bytes.
 
     Parameters
@@ -50,6 +53,8 @@ def encode(value: Any, callbacks: list[Callable] | None = None) -> bytes:
         into an array (a tensor, a table, a fraction); one of `RECORDS`.
     callbacks : list of callable, optional
         Takes the functions within `value`; the other side gets their numbers. Without this list no function can pass.
+    most : int
+        Bytes that all arrays together may have.
 
     Raises
     ------
@@ -59,7 +64,7 @@ def encode(value: Any, callbacks: list[Callable] | None = None) -> bytes:
     arrays: list[NDArray] = []
     tree = _tree(value, arrays, callbacks)
     head = json.dumps({"value": tree, "arrays": [[array.dtype.str, array.shape] for array in arrays]})
-    if len(head) > MOST_JSON or sum(array.nbytes for array in arrays) > MOST_BYTES:
+    if len(head) > MOST_JSON or sum(array.nbytes for array in arrays) > most:
         raise NotPlainError("more than can be sent: is it as long as it should be, and an array rather than a list?")
     return b"".join([head.encode(), b"\n", *(array.tobytes() for array in arrays)])
 
@@ -229,10 +234,12 @@ class Wire:
     ----------
     incoming, outgoing : binary file
         The two pipes.
+    longest : int
+        Bytes of a message that are still read.
     """
 
-    def __init__(self, incoming: BinaryIO, outgoing: BinaryIO) -> None:
-        self.incoming, self.outgoing = incoming, outgoing
+    def __init__(self, incoming: BinaryIO, outgoing: BinaryIO, longest: int = LONGEST) -> None:
+        self.incoming, self.outgoing, self.longest = incoming, outgoing, longest
 
     def send(self, message: bytes) -> None:
         """Send a message.
@@ -249,7 +256,7 @@ class Wire:
         """Return the next message; None when the other side has hung up, or sends what is no message."""
         head = self.incoming.read(8)
         length = int.from_bytes(head, "big")
-        if len(head) < 8 or length > LONGEST:
+        if len(head) < 8 or length > self.longest:
             return None
         message = self.incoming.read(length)
         return message if len(message) == length else None

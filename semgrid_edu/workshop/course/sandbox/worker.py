@@ -19,7 +19,7 @@ from IPython.utils.capture import RichOutput, capture_output
 from traitlets.config import Config
 
 from semgrid_edu.workshop.course.sandbox.limits import Limits, limit_this_process
-from semgrid_edu.workshop.course.sandbox.values import NotPlainError, Wire, decode, encode
+from semgrid_edu.workshop.course.sandbox.values import MOST_INPUT, MOST_JSON, NotPlainError, Wire, decode, encode
 
 MOST_TEXT = 20_000
 """Characters of a text that are kept."""
@@ -158,7 +158,8 @@ class Worker:
             except BaseException as error:
                 reply = {"error": _report(error)}
         before = decode(sent, self._callback)
-        if encode((before["arguments"], before["named"]), []) != encode((arguments, named), []):
+        given, now = (before["arguments"], before["named"]), (arguments, named)
+        if encode(given, [], MOST_INPUT) != encode(now, [], MOST_INPUT):
             reply["changed"] = arguments, named
         return reply | {"streams": _streams(captured)}
 
@@ -229,7 +230,7 @@ def _report(error: BaseException) -> dict[str, Any]:
 
 def _main() -> None:
     """Talk to the grader over standard input and output, which the student's code doesn't get."""
-    wire = Wire(os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb"))
+    wire = Wire(os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb"), MOST_INPUT + MOST_JSON)
     nothing = os.open(os.devnull, os.O_RDWR)
     for stream in (0, 1, 2):
         os.dup2(nothing, stream)
