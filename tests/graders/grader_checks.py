@@ -16,7 +16,7 @@ from semgrid_edu.workshop.course.nbgrader.autograde import reference_answers, su
 from semgrid_edu.workshop.course.nbgrader.preprocessors import prepared_folder
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 
-TIMEOUT = {"answer": 12, "endless loop": 2}
+TIMEOUT = {"answer": 30, "endless loop": 2}
 """Seconds for a cell: enough for any answer on a busy machine; what each call of an endless loop costs."""
 
 

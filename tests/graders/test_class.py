@@ -3,6 +3,7 @@
 import csv
 import subprocess
 import sys
+from dataclasses import replace
 from itertools import combinations
 
 import pytest
@@ -16,6 +17,9 @@ from semgrid_edu.workshop.course.nbgrader.build import course_api
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course
 from semgrid_edu.workshop.course.nbgrader.gradebook import write_graded
 from semgrid_edu.workshop.course.notebooks.build import write_notebook
+
+PATIENT = replace(SETTINGS, timeout=30)
+"""No answer here goes on for ever, and two processes grade while other tests run."""
 
 
 def with_entries(entries):
@@ -57,7 +61,7 @@ def graded(new_course):
     students = class_of_thirty()
     for student, (notebook, _) in students.items():
         write_notebook(notebook, place(course, "submitted", student, NAME))
-    seen = list(grade_course(course, SETTINGS, workers=2))
+    seen = list(grade_course(course, PATIENT, workers=2))
     assert len(seen) == len(students) == 30
     with write_graded(course).open(newline="") as file:
         table = {row["student"]: row for row in csv.DictReader(file)}
@@ -95,6 +99,6 @@ def test_everybody_gets_feedback(graded):
 
 def test_what_is_graded_is_not_graded_again_unless_it_is_handed_in_again(graded):
     course, _, _ = graded
-    assert list(grade_course(course, SETTINGS)) == []
+    assert list(grade_course(course, PATIENT)) == []
     write_notebook(handed_in(), place(course, "submitted", "untouched-0", NAME))
-    assert [(one.student, one.score) for one in grade_course(course, SETTINGS)] == [("untouched-0", 13)]
+    assert [(one.student, one.score) for one in grade_course(course, PATIENT)] == [("untouched-0", 13)]
