@@ -651,7 +651,7 @@ EXPERIMENTS = (
     ),
     Row(
         "no network to start from",
-        "train --data NONE --out OUT --from none.safetensors",
+        "train --data TINY --out OUT --from none.safetensors",
         "none.safetensors: expected a safetensors file, found no such file",
     ),
     Row("a tint that can't be", "train --data TINY --out OUT --tint -1", "tint: expected a share of at least 0"),

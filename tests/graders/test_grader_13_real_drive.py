@@ -385,35 +385,18 @@ def overlay(before, now, T):
             ),
         ),
         # ---- passed, or lost, when somebody tried who had not written the tests
-        mistake(
-            "a limit of 1.25 medians",
-            task="find-gaps",
-            loses=2,
-            says="on inputs you haven't seen",
-            code="""
+        *(
+            mistake(
+                f"a limit of {limit} medians",
+                task="find-gaps",
+                loses=2,
+                says="on inputs you haven't seen",
+                code=f"""
 def find_gaps(times):
     steps = np.diff(times)
-    return np.flatnonzero(steps > 1.25 * np.median(steps)).tolist()""",
-        ),
-        mistake(
-            "a limit of 1.42 medians",
-            task="find-gaps",
-            loses=2,
-            says="on inputs you haven't seen",
-            code="""
-def find_gaps(times):
-    steps = np.diff(times)
-    return np.flatnonzero(steps > 1.42 * np.median(steps)).tolist()""",
-        ),
-        mistake(
-            "a limit of 1.9 medians",
-            task="find-gaps",
-            loses=2,
-            says="on inputs you haven't seen",
-            code="""
-def find_gaps(times):
-    steps = np.diff(times)
-    return np.flatnonzero(steps > 1.9 * np.median(steps)).tolist()""",
+    return np.flatnonzero(steps > {limit} * np.median(steps)).tolist()""",
+            )
+            for limit in (1.25, 1.42, 1.9)
         ),
         right(
             "a deque",

@@ -344,7 +344,8 @@ _test()
 # Their first call takes some seconds, because they are compiled then.
 #
 # For one more point: no matrix of all pairs, so that it can refine the maps of a drive. Lecture 10's damping isn't needed with these settings; if you use it,
-# that is right too. (The test compares with damping by $p_i$ of lecture 10, by 0.9, by 0.95, and without.)
+# that is right too. (The test accepts the result with damping by $p_i$ as in lecture 10, by 0.9 or by 0.95, and
+# without any.)
 
 
 # %% nbgrader={"grade": false, "grade_id": "refine", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -495,7 +496,7 @@ _test()
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "three-errors", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # The kernel error (another kernel than equation (4)'s, at the same number of iterations), the convergence error (mean field stopped early), and the error of mean field itself against exact
-# inference, which no filter removes: those are the lecture's three. (Who names in its place the error of the model is right, too: even the exact minimum of equation (3) with these weights may be
+# inference, which no filter removes: those are the lecture's three. (An answer that names the error of the model instead of the third is right, too: even the exact minimum of equation (3) with these weights may be
 # wrong, because the pair terms pull a few cells towards their many neighbours.) `mean_field_accurate` removes the first and 50 iterations remove the second; neither touches mean field or the model. To find out: count the pedestrians' cells that are found by the network, by
 # `mean_field` and by `mean_field_accurate` with 10 and with 50 iterations. In the lecture the lattice and the window lose about as many, so the model costs them: then weights and widths must be
 # searched on labelled frames, with a metric that counts small classes. One point for the three errors, one for a measurement that separates them.

@@ -146,8 +146,8 @@ _test()
 # Complete `ground`: it returns the **height** $h$ of the LIDAR above the plane in metres, and the **rise ahead** of the plane in degrees, $\arctan p$.
 #
 # For one more point: up to a fifth of the returns come from cars, which stand *on* the road (never below). The height has to be right within 2 cm and the rise
-# within 0.2 degrees all the same. To throw out once what lies more than 10 cm off isn't enough: with so many cars the first plane is itself farther off. The lecture's
-# `ground_plane` throws out what lies off by more than 10 cm **and** by more than the median error, and fits again, ten times.
+# within 0.2 degrees all the same. Throwing out once what lies more than 10 cm off isn't enough, because with so many cars the first plane itself is farther off. The
+# lecture's `ground_plane` throws out what lies off by more than 10 cm **and** by more than the median error, fits again, and repeats this ten times.
 
 
 # %% nbgrader={"grade": false, "grade_id": "ground", "locked": false, "schema_version": 3, "solution": true, "task": false}

@@ -121,11 +121,8 @@ def train(
     LIDAR, with the errors of real data; other ways of making them, such as no-cleanup, have names of their own.
     """
     from semgrid_edu.datasets.index import dataset_doubts
-    from semgrid_edu.storage.tensors import read_tensors
     from semgrid_edu.training.run import chosen_truth, train_network, training_params
 
-    if start:
-        read_tensors(start)  # to refuse a missing or damaged file before the data are prepared, which takes minutes
     params = training_params(preset, iterations, not two_stage, from_imagenet=imagenet is not None, tint=tint)
     tell([line for folder in data for line in dataset_doubts(folder, "train")])
     choices = {"preset": preset, "imagenet": imagenet, "device": device, "truth": chosen_truth(truth), "start": start}

@@ -100,7 +100,9 @@ def instructor_problems(folder: Path) -> list[str]:
     folder : Path
         The folder of the instructor's modules, `notebooks/instructor/semgrid_instructor`; its `close` may use it.
     """
-    lines = [(path.name, line) for path in sorted(folder.glob("[!_]*.py")) for line in path.read_text().splitlines()]
+    lines = [
+        (path.name, line) for path in sorted(folder.glob("[!_]*.py")) for line in path.read_text("utf-8").splitlines()
+    ]
     says = "compare by `close` of semgrid_instructor, which demands equal shapes that aren't empty"
     return [f"instructor/{name}: `{line.strip()}`: {says}" for name, line in lines if BARE.search(line)]
 

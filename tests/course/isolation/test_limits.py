@@ -9,13 +9,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 import semgrid_edu
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
-from semgrid_edu.workshop.course.sandbox import linux
+from semgrid_edu.workshop.course.sandbox import linux, taken
 from semgrid_edu.workshop.course.sandbox.limits import PARTS, Limits, _all_but
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 from semgrid_edu.workshop.course.sandbox.taken import namespace_of
@@ -174,6 +175,25 @@ def test_a_folder_that_cannot_be_listed_is_gone_afterwards(session):
     folder = session.process.folder
     session.stop()
     assert not folder.exists()
+
+
+def test_a_file_that_has_just_gone_hides_no_others(tmp_path, monkeypatch):
+    """A folder is looked at to its end, although a file in it was deleted between its name and its size."""
+
+    class Gone:
+        def stat(self, follow_symlinks):
+            raise FileNotFoundError
+
+    @contextmanager
+    def scandir(path):
+        with real(path) as entries:
+            yield [Gone(), *entries]
+
+    (tmp_path / "large").write_bytes(bytes(2000))
+    real = os.scandir
+    monkeypatch.setattr(taken.os, "scandir", scandir)
+    assert taken.takes_too_much(tmp_path, 1000)
+    assert not taken.takes_too_much(tmp_path, 10**6)
 
 
 def test_a_folder_that_is_deeper_than_a_path_is_gone_afterwards(session):

@@ -29,6 +29,8 @@ from semgrid_edu.workshop.course.notebooks.build import (
 )
 
 CLEARED = steps.LockCells, steps.ClearSolutions, steps.ClearOutput, steps.ClearHiddenTests
+"""What takes out of an exercise all that students must not see."""
+
 RELEASE_STEPS = *CLEARED, steps.ComputeChecksums, steps.CheckCellMetadata
 """What nbgrader's generate_assignment does to a notebook, without its gradebook."""
 

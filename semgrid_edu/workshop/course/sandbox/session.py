@@ -13,7 +13,6 @@ from semgrid_edu.workshop.course.sandbox.values import put_back
 ALL = 20
 """How many times the time of a cell all cells and calls together may take."""
 
-
 MOST_LINES = 300
 """The last line of a cell that is named where inputs are secret: a longer cell could tell any number by its line."""
 

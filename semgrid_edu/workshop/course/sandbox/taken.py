@@ -73,10 +73,11 @@ def takes_too_much(folder: Path, most: int) -> bool:
         try:
             with os.scandir(waiting.pop()) as entries:
                 for entry in entries:
-                    found = entry.stat(follow_symlinks=False)
-                    size, count = size + (getattr(found, "st_blocks", 0) * 512 or found.st_size), count + 1
-                    if stat.S_ISDIR(found.st_mode):
-                        waiting.append(entry.path)
+                    with suppress(FileNotFoundError):  # one that has just gone must not hide the others beside it
+                        found = entry.stat(follow_symlinks=False)
+                        size, count = size + (getattr(found, "st_blocks", 0) * 512 or found.st_size), count + 1
+                        if stat.S_ISDIR(found.st_mode):
+                            waiting.append(entry.path)
                     if size > most or count > MOST_FILES:
                         return True
         except (FileNotFoundError, NotADirectoryError):
