@@ -85,7 +85,7 @@ def test_the_calibration_is_off_by_as_much_as_said():
 
 
 def test_frames_of_a_drive_share_their_calibration_but_not_their_labels():
-    flaws = TruthFlaws(outline=1.0)
+    flaws = TruthFlaws(outline=1.0, skewed=True)
     drive = flawed_drive([frame(0), frame(1), frame(2)], flaws, seed=5)
     cameras = [one.camera.T_camera_from_lidar for one in drive]
     np.testing.assert_array_equal(cameras[0], cameras[1])
@@ -102,7 +102,7 @@ def test_frames_of_a_drive_share_their_calibration_but_not_their_labels():
 
 
 def test_a_frame_alone_is_not_skewed_and_may_lack_labels():
-    (one,) = flawed_drive([replace(frame(), labels=None)], TruthFlaws(), seed=0)
+    (one,) = flawed_drive([replace(frame(), labels=None)], TruthFlaws(skewed=True), seed=0)
     assert one.labels is None
     np.testing.assert_array_equal(one.points, frame().points)
 

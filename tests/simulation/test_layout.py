@@ -5,15 +5,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from semgrid_edu.camera import KITTI_LIDAR_HEIGHT
+from semgrid_edu.workshop.simulation.street.ego import Ego
 from semgrid_edu.workshop.simulation.street.ground import (
     KERB_HEIGHT,
     ground_height,
     ground_kind,
     ground_kinds,
     lane_mark,
+    on_wheels,
 )
 from semgrid_edu.workshop.simulation.street.layout import Road, Side, to_road, to_world
 from semgrid_edu.workshop.simulation.street.terrain import Extent, ground_mesh
+from semgrid_edu.workshop.simulation.street.trajectories import Pace, Trajectory
 from semgrid_edu.workshop.simulation.things.materials import Kind
 
 SIDE = Side(edge=4.0, strip=0.0, walk=2.0, bank_rise=0.8, bank_width=3.0)
@@ -42,6 +46,42 @@ def test_cross_section_of_a_straight_road():
     assert kinds == [road, road, road, walk, walk, grass, walk, grass]
     heights = [ground_height(STRAIGHT, 5.0, d) for d in (0.0, 4.1, -4.1, 9.3)]
     assert heights == pytest.approx([0.0, KERB_HEIGHT, KERB_HEIGHT, KERB_HEIGHT + 0.8], abs=1e-9)
+
+
+HILL = STRAIGHT._replace(crown=0.02, grade_before=0.06, grade_after=-0.04, crest_start=20.0, crest_end=60.0)
+
+
+def test_a_crest_joins_two_grades_without_a_step_or_a_kink():
+    s = np.arange(-10.0, 100.0, 0.25)
+    height = np.array([ground_height(HILL, x, 0.0) for x in s])
+    slope = np.diff(height) / 0.25
+    assert height[40] == 0.0
+    assert slope[s[1:] < 20] == pytest.approx(0.06)
+    assert slope[s[:-1] > 60] == pytest.approx(-0.04)
+    assert np.diff(slope) == pytest.approx(np.where((s[1:-1] > 20) & (s[1:-1] < 60), -0.1 / 40 * 0.25, 0), abs=4e-4)
+    assert height[s == 60] == pytest.approx(0.06 * 60 - 0.1 * 20)
+
+
+def test_rain_runs_off_the_crown_to_the_kerbs():
+    heights = [ground_height(HILL, 0.0, d) for d in (0.0, 2.0, -2.0, 4.0, -4.0, 4.5)]
+    assert heights == pytest.approx([0, -0.04, -0.04, -0.08, -0.08, KERB_HEIGHT - 0.08])
+
+
+def test_a_vehicle_stands_on_its_wheels():
+    even = on_wheels(STRAIGHT, 5.0, -1.5, 0.0, 2.7, 1.5)
+    assert even == (0.0, 0.0, 0.0)
+    height, roll, pitch = on_wheels(HILL, 5.0, -1.5, 0.0, 2.7, 1.5)
+    assert (height, roll, pitch) == pytest.approx((0.3 - 0.03, np.arctan(0.02), -np.arctan(0.06)))
+    _, roll, pitch = on_wheels(HILL, 5.0, 1.5, np.pi, 2.7, 1.5)
+    assert (roll, pitch) == pytest.approx((np.arctan(0.02), np.arctan(0.06)))
+
+
+def test_the_recording_car_climbs_as_the_road_does():
+    ego = Ego(HILL, Trajectory(0.0, 0.0, 1.0, 0.0, Pace(10.0)), sway=0.0, roll=0.0, pitch=0.0, phase=0.0)
+    T = ego.T_world_from_lidar(1.0)
+    assert T[:3, 0] @ [0, 0, 1] == pytest.approx(np.sin(np.arctan(0.06)))
+    on_ground = T @ [0, 0, -KITTI_LIDAR_HEIGHT, 1]
+    assert on_ground[:3] == pytest.approx([10.0, 0.0, 0.6 - 0.02 * 1.55 / 2], abs=1e-6)
 
 
 def test_the_side_road_opens_one_side_and_rounds_its_corners():

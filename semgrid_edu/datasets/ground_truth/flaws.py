@@ -1,7 +1,7 @@
 """Errors like those of real data: a calibration that is a little off, labels drawn by hand, scans that are skewed (4).
 
 The simulator's calibration and labels are exact. Truth made from them would be better than any that can be made of
-real data.
+real data. Its scans are skewed already where its scanner turns while the vehicle drives, as in the simulated data sets.
 """
 
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ class TruthFlaws:
     missed : float
         Probability that such a small thing is missed, 0..1: an assumption.
     skewed : bool
-        Whether scans are skewed as a turning scanner on a moving vehicle records them (`skew_scan`).
+        Whether scans of one instant are skewed as a turning scanner on a moving vehicle records them (`skew_scan`).
     """
 
     rotation: float = 0.2
@@ -50,7 +50,7 @@ class TruthFlaws:
     outline: float = 0.4
     small: int = 40
     missed: float = 0.5
-    skewed: bool = True
+    skewed: bool = False
 
     def __post_init__(self) -> None:
         """Refuse sizes that are negative or infinite, and a probability above 1."""

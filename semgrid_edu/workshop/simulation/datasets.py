@@ -21,10 +21,10 @@ from semgrid_edu.storage.workplace import check_workers, workplace
 from semgrid_edu.workshop.simulation import writer
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.named_streets import SAMPLE_WISHES, wishes_of
-from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.simulation.sensors.rig import HDL64E_AHEAD, Rig
 from semgrid_edu.workshop.simulation.street.plan import ANY, Wishes
 
-FORMAT = 1
+FORMAT = 2
 """Raised whenever the simulator changes what a seed gives, so that old and new drives don't mix in one folder."""
 
 
@@ -69,12 +69,18 @@ class DatasetRecipe:
         Its drives.
     dense : bool
         Whether points come from the depth image, thinned, instead of the LIDAR.
+    rig : Rig
+        The sensors: KITTI's scanner when left out.
+    edition : int
+        The `FORMAT` with which its drives are drawn, a part of their seed.
     """
 
     name: str
     label_set: str
     routes: tuple[Route, ...]
     dense: bool = False
+    rig: Rig = Rig(lidar=HDL64E_AHEAD)
+    edition: int = FORMAT
 
 
 def read_recipes(name: str) -> dict[str, DatasetRecipe]:
@@ -90,12 +96,13 @@ def read_recipes(name: str) -> dict[str, DatasetRecipe]:
         routes: list[Route] = []
         for times, route, *each in row["routes"]:
             routes += [Route(**route, wishes=wishes_of(wishes)) for wishes in each] * times
-        recipes[data] = DatasetRecipe(data, row["label_set"], tuple(routes), row.get("dense", False))
+        rig = {"rig": Rig()} if row.get("coarse") else {}
+        recipes[data] = DatasetRecipe(data, row["label_set"], tuple(routes), row.get("dense", False), **rig)
     return recipes
 
 
 RECIPES = read_recipes("recipes")
-RECIPES["sample"] = DatasetRecipe("sample", "KITTI-14", (Route("drive", 20, True, SAMPLE_WISHES),))
+RECIPES["sample"] = DatasetRecipe("sample", "KITTI-14", (Route("drive", 20, True, SAMPLE_WISHES),), rig=Rig(), edition=1)
 """Numbers of frames as in the paper: KITTI 142 + 110 labelled frames, INRIA-Chroma 146 + 130 in 3 + 2 routes.
 "validation" has drives like minikitti's, half as many as its training split, for parameters that are chosen when the
 network is trained already. The name of a data set is part of its seed, so no seed gives a drive of minikitti."""
@@ -165,8 +172,8 @@ def make_from_recipe(
     root = Path(folder).resolve() / recipe.name  # absolute: the machines of a cluster work in other folders
     routes = {f"{k + 1:04d}": route for k, route in enumerate(recipe.routes)}
     with sole_writer(root):
-        _claim(root, {"name": recipe.name, "seed": seed, "format": FORMAT})
-        writer.write_calibration(root, Rig())
+        _claim(root, {"name": recipe.name, "seed": seed, "format": recipe.edition})
+        writer.write_calibration(root, recipe.rig)
         writer.remove_unfinished(root / writer.DATE)
         missing = [drive for drive in routes if not drive_folder(root, writer.DATE, drive).exists()]
         missing.sort(key=lambda drive: -routes[drive].n_frames)
@@ -207,8 +214,8 @@ def _make_drive(recipe: DatasetRecipe, root: Path, seed: int, drive: str) -> Non
     """Simulate and write one drive; its random numbers depend on data set, seed and number alone."""
     index = int(drive) - 1
     route = recipe.routes[index]
-    own_seed = np.random.SeedSequence([seed, FORMAT, *recipe.name.encode()], spawn_key=(index,))
-    simulated = SimulatedDrive(own_seed, route.n_frames, route.wishes)
+    own_seed = np.random.SeedSequence([seed, recipe.edition, *recipe.name.encode()], spawn_key=(index,))
+    simulated = SimulatedDrive(own_seed, route.n_frames, route.wishes, recipe.rig)
     writer.write_drive(root, drive, simulated, route.labelled, LABEL_SETS[recipe.label_set], recipe.dense)
 
 

@@ -9,7 +9,7 @@ from semgrid_edu.camera import transform_points
 from semgrid_edu.frame import LABEL_GRID, Frame
 from semgrid_edu.workshop.simulation.sensors.camera import Picture, take_picture
 from semgrid_edu.workshop.simulation.sensors.gps import Geodesy
-from semgrid_edu.workshop.simulation.sensors.lidar import labelled_scan, scan
+from semgrid_edu.workshop.simulation.sensors.lidar import labelled_scan
 from semgrid_edu.workshop.simulation.sensors.raycast import Instant, PorousMesh, RayMesh
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.sensors.truth import BirdseyeTruth, birdseye_kinds, visible_cells, world_cells
@@ -87,7 +87,8 @@ class SimulatedDrive:
         duration = (n_frames - 1) * PERIOD
         pace = Pace.random(rng, wishes.speed)
         self.plan = draw_plan(rng, pace.distance(duration), wishes)
-        self.ego = Ego.random(rng, self.plan.road, pace, wishes.ego_lane)
+        swing = (0.05, 0.2) if wishes.even else (0.3, 0.6)
+        self.ego = Ego.random(rng, self.plan.road, pace, wishes.ego_lane, swing)
         self.geodesy = Geodesy.random(rng)
         builder = build_scenery(self.plan, rng)
         traffic = Traffic(builder, self.ego.trajectory, duration)
@@ -193,10 +194,10 @@ class SimulatedDrive:
             Whether to find the bird's-eye truth too.
         """
         rng = self._noise(index)
-        t, road = index * PERIOD, self.plan.road
-        instant, pose = self.instant(t), self.pose(t)
-        picture = take_picture(instant, pose, self.rig, road, self.plan.light, rng)
-        points = scan(instant, pose, self.rig.lidar, road, rng)
+        t = index * PERIOD
+        pose = self.pose(t)
+        picture = take_picture(self.instant(t), pose, self.rig, self.plan.road, self.plan.light, rng)
+        points, _ = self._labelled_scan(t, rng)
         truth = self.truth(t, picture) if labelled else None
         return SimulatedFrame(t, pose, picture, points, truth, self.objects(t))
 
@@ -211,7 +212,7 @@ class SimulatedDrive:
             Number of the frame.
         """
         t, half = index * PERIOD, self.rig.packet_interval / 2
-        points = scan(self.instant(t), self.pose(t), self.rig.lidar, self.plan.road, self._noise(index, 1))
+        points, _ = self._labelled_scan(t, self._noise(index, 1))
         nearest = t + float(self._noise(index, 2).uniform(-half, half)) if half else t
         return Frame(None, points, self.rig.camera, self.pose(nearest), t)
 
@@ -227,8 +228,12 @@ class SimulatedDrive:
         kinds : (N,) uint8
             Members of `Kind`.
         """
-        t = index * PERIOD
-        return labelled_scan(self.instant(t), self.pose(t), self.rig.lidar, self.plan.road, self._noise(index, 1))
+        return self._labelled_scan(index * PERIOD, self._noise(index, 1))
+
+    def _labelled_scan(self, t: float, rng: np.random.Generator) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+        """Take the scan during which the LIDAR looks ahead at time t, and say what each return hit."""
+        world, pose = (lambda after: self.instant(t + after)), (lambda after: self.pose(t + after))
+        return labelled_scan(world, pose, self.rig.lidar, self.plan.road, rng)
 
     def _noise(self, *key: int) -> np.random.Generator:
         """Return the drive's own generator for a key, such as the number of a frame."""

@@ -11,6 +11,13 @@ from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, Camera, invert_rigid, lidar_f
 
 HDL64E_ELEVATIONS = tuple(np.concatenate([np.linspace(2.0, -8.33, 32), np.linspace(-8.83, -24.9, 32)]).tolist())
 """Elevations of the Velodyne HDL-64E's 64 lasers, degrees: two blocks, the upper one finer (its manual)."""
+KITTI_ELEVATIONS = (
+    2.27, 1.91, 1.70, 1.21, 0.97, 0.51, 0.34, -0.08, -0.41, -0.83, -1.12, -1.45, -1.82, -2.15, -2.46, -2.81,
+    -3.09, -3.46, -3.71, -4.07, -4.36, -4.69, -5.00, -5.32, -5.65, -5.96, -6.24, -6.49, -6.85, -7.17, -7.39, -7.72,
+    -8.33, -8.84, -9.30, -9.70, -10.16, -10.74, -11.23, -11.65, -12.09, -12.51, -13.03, -13.54, -14.12, -14.56, -15.05, -15.41,
+    -16.03, -16.56, -17.14, -17.63, -18.07, -18.45, -18.92, -19.46, -19.99, -20.52, -21.00, -21.40, -21.84, -22.47, -23.01, -23.48,
+)  # fmt: skip
+"""Those of KITTI's own scanner, degrees: for each laser the median over its returns in two scans of drive 0013."""
 
 _CAMERA_AXES = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 _KITTI_K = np.array([[721.5377, 0.0, 609.5593], [0.0, 721.5377, 172.8540], [0.0, 0.0, 1.0]])
@@ -34,6 +41,11 @@ class Lidar:
         Standard deviation of a range, metres: 2 cm according to the manual.
     drop : float
         Share of returns that are lost whatever the surface, 0..1.
+    weakest : float
+        How little light is seen: of a signal this strong 1 in e is lost. The signal is the reflectance, at 25 m and
+        straight on.
+    turn : float
+        How long it takes to turn once, clockwise, seconds; 0 for a scan that is all of one instant.
     """
 
     elevations: tuple[float, ...] = HDL64E_ELEVATIONS
@@ -43,18 +55,32 @@ class Lidar:
     range_max: float = 100.0
     range_sigma: float = 0.02
     drop: float = 0.03
+    weakest: float = 0.05
+    turn: float = 0.0
+
+    @cached_property
+    def azimuths(self) -> NDArray[np.float64]:
+        """(A,): the direction of each column of a scan, degrees, from left to right."""
+        return np.arange(self.azimuth_max, self.azimuth_min, -self.azimuth_step)
+
+    @cached_property
+    def times(self) -> NDArray[np.float64]:
+        """(A,): when each column is measured, seconds after the instant at which the LIDAR looks ahead."""
+        return -self.azimuths / 360 * self.turn
 
     @cached_property
     def directions(self) -> NDArray[np.float32]:
         """(N, 3) float32: unit vectors in the LIDAR frame, laser by laser from the top, each from left to right."""
-        azimuth = np.radians(np.arange(self.azimuth_max, self.azimuth_min, -self.azimuth_step))
+        azimuth = np.radians(self.azimuths)
         elevation = np.radians(self.elevations)[:, None]
         x, y = np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth)
         return np.stack([x, y, np.sin(elevation) + 0 * azimuth], axis=-1).reshape(-1, 3).astype(np.float32)
 
 
 HDL64E = Lidar(azimuth_min=-180.0, azimuth_max=180.0, azimuth_step=0.18)
-"""KITTI's scanner at 10 Hz: all around, with all its columns."""
+"""KITTI's scanner at 10 Hz: all around, with all its columns; all of it at one instant."""
+HDL64E_AHEAD = Lidar(KITTI_ELEVATIONS, azimuth_step=0.18, weakest=0.015, turn=0.1)
+"""KITTI's scanner as the simulated data sets have it: the half-plane ahead, measured while the vehicle drives on."""
 
 
 @dataclass(frozen=True)

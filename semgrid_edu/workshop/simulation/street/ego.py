@@ -6,8 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, rigid_transform
+from semgrid_edu.workshop.simulation.street.ground import on_wheels
 from semgrid_edu.workshop.simulation.street.layout import Road, to_world
 from semgrid_edu.workshop.simulation.street.trajectories import Pace, Trajectory
+from semgrid_edu.workshop.simulation.things.shapes import rotation_matrix
+
+_AXLES, _TRACK = 2.7, 1.55
+"""Distance between the axles of the recording car, and between the wheels of an axle, metres."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +28,7 @@ class Ego:
     sway : float
         Amplitude of its sideways drift, metres.
     roll, pitch : float
-        Amplitudes of these angles, rad: about 0.2 degrees on an even road.
+        Amplitudes of these angles about the plane below its wheels, rad.
     phase : float
         Phase of all of these oscillations, rad.
     """
@@ -36,7 +41,9 @@ class Ego:
     phase: float
 
     @classmethod
-    def random(cls, rng: np.random.Generator, road: Road, pace: Pace, lane: int | None = None) -> "Ego":
+    def random(
+        cls, rng: np.random.Generator, road: Road, pace: Pace, lane: int | None = None, swing: tuple = (0.3, 0.6)
+    ) -> "Ego":
         """Draw the recording car's lane and how it sways.
 
         Parameters
@@ -49,12 +56,14 @@ class Ego:
             How fast it drives.
         lane : int, optional
             Number of its lane, 0 beside the centre line; when left out, the outer one in two drives of three.
+        swing : (float, float)
+            Least and largest amplitude of roll and pitch, degrees.
         """
         drawn = road.lanes_right - 1 if rng.random() < 0.65 else 0
         lane = drawn if lane is None else lane
         d = -(lane + 0.5) * road.lane + float(rng.normal(0, 0.1))
         sway, phase = float(rng.uniform(0.02, 0.1)), float(rng.uniform(0, 6.28))
-        roll, pitch = (float(x) for x in np.radians(rng.uniform(0.05, 0.2, 2)))
+        roll, pitch = (float(x) for x in np.radians(rng.uniform(*swing, 2)))
         return cls(road, Trajectory(0.0, d, 1.0, 0.0, pace), sway, roll, pitch, phase)
 
     def T_world_from_lidar(self, t: float) -> NDArray[np.float64]:
@@ -72,20 +81,8 @@ class Ego:
         x, y, heading = to_world(self.road, s, d)
         drift = self.sway * np.cos(swing) * 0.045 if speed > 0 else 0.0
         yaw = heading + np.arctan(drift)
-        roll = self.roll * np.sin(5.1 * t + 2 * self.phase)
-        pitch = self.pitch * np.sin(6.7 * t + 3 * self.phase)
+        height, roll, pitch = on_wheels(self.road, s, d, yaw, _AXLES, _TRACK)
+        roll += self.roll * np.sin(5.1 * t + 2 * self.phase)
+        pitch += self.pitch * np.sin(6.7 * t + 3 * self.phase)
         R = rotation_matrix(roll, pitch, yaw)
-        return rigid_transform(R, np.array([x, y, 0.0]) + KITTI_LIDAR_HEIGHT * R[:, 2])
-
-
-def rotation_matrix(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:
-    """Return Rz(yaw) Ry(pitch) Rx(roll), (3, 3), the order of the angles in KITTI's oxts packets.
-
-    Parameters
-    ----------
-    roll, pitch, yaw : float
-        Angles about the x, y and z axes, rad.
-    """
-    cr, sr, cp, sp, cy, sy = (f(a) for a in (roll, pitch, yaw) for f in (np.cos, np.sin))
-    ahead, left = (cy * cp, sy * cp, -sp), (cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr)
-    return np.column_stack([ahead, left, (cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr)])
+        return rigid_transform(R, np.array([x, y, height]) + KITTI_LIDAR_HEIGHT * R[:, 2])

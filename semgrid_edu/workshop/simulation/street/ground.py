@@ -29,16 +29,31 @@ def ground_kind(road: Road, s: float, d: float) -> int:
 
 
 @njit(cache=True)
+def road_height(road: Road, s: float, d: float) -> float:
+    """Return how high the carriageway lies at a place, or its edge if the place is outside, metres in the world.
+
+    Along the road the height is 0 at s = 0, and its slope is the grade; across it the height falls from the crown.
+    Parameters are those of `to_world`.
+    """
+    length = road.crest_end - road.crest_start
+    along = min(max(s - road.crest_start, 0.0), length)
+    beyond = max(s - road.crest_end, 0.0)
+    turned = (road.grade_after - road.grade_before) * (along * along / (2.0 * length) + beyond)
+    edge = road.left.edge if d > 0 else road.right.edge
+    return road.grade_before * s + turned - road.crown * min(abs(d), edge)
+
+
+@njit(cache=True)
 def ground_height(road: Road, s: float, d: float) -> float:
-    """Return how high the ground lies at a place, metres above the asphalt. Parameters are those of `to_world`.
+    """Return how high the ground lies at a place, metres in the world. Parameters are those of `to_world`.
 
     All that stands, drives or walks takes its height from here, and so do the mesh and the truth.
     """
-    e = outside_asphalt(road, s, d)
+    e, height = outside_asphalt(road, s, d), road_height(road, s, d)
     if e <= 0.0:
-        return 0.0
+        return height
     side = road.left if d > 0 else road.right
-    height = KERB_HEIGHT * min(e / 0.03, 1.0)
+    height += KERB_HEIGHT * min(e / 0.03, 1.0)
     t = min(max((e - side.strip - side.walk - 0.2) / side.bank_width, 0.0), 1.0)
     height += side.bank_rise * t * t * (3.0 - 2.0 * t)
     far = max(e - 25.0, 0.0)
@@ -52,6 +67,40 @@ def on_ground(road: Road, s: float, d: float) -> tuple[NDArray[np.float64], floa
     """
     x, y, heading = to_world(road, s, d)
     return np.array([x, y, ground_height(road, s, d)]), heading
+
+
+@njit(cache=True)
+def on_wheels(
+    road: Road, s: float, d: float, yaw: float, length: float, width: float
+) -> tuple[float, float, float]:
+    """Return how a vehicle on four wheels stands on the ground. Parameters not named here are those of `to_world`.
+
+    Parameters
+    ----------
+    yaw : float
+        Its direction in the world, rad from the x axis.
+    length, width : float
+        Distance between its axles, and between the wheels of an axle, metres.
+
+    Returns
+    -------
+    height : float
+        Mean height of its wheels, metres in the world.
+    roll, pitch : float
+        Its angles, rad: positive where the left wheels, or the rear ones, stand higher.
+    """
+    x, y, _ = to_world(road, s, d)
+    along, across, total = 0.0, 0.0, 0.0
+    c, n = np.cos(yaw), np.sin(yaw)
+    for ahead in (-1, 1):
+        for left in (-1, 1):
+            u, v = ahead * length / 2, left * width / 2
+            wheel = to_road(road, x + c * u - n * v, y + n * u + c * v)
+            height = ground_height(road, wheel[0], wheel[1])
+            total += height
+            along += ahead * height
+            across += left * height
+    return total / 4, np.arctan(across / (2 * width)), -np.arctan(along / (2 * length))
 
 
 @njit(cache=True)

@@ -1,7 +1,8 @@
 """Road geometry: coordinates along the road, and how far a place lies outside the asphalt.
 
 A road runs straight, bends along an arc, and runs straight again. `s` is the distance along its centre line, `d` the
-distance to the left of the centre line, both in metres. One side road may cross it.
+distance to the left of the centre line, both in metres. One side road may cross it. In height it climbs at one grade,
+turns along a parabola, as roads are built, and goes on at another; rain runs off its crown.
 """
 
 from typing import NamedTuple
@@ -67,6 +68,12 @@ class Road(NamedTuple):
         Whether the junction has zebra crossings.
     dashed : bool
         Whether the centre line is dashed (solid otherwise).
+    crown : float
+        Fall of the carriageway from its centre line to either edge, metres per metre.
+    grade_before, grade_after : float
+        Rise along the road before and after the vertical curve, metres per metre.
+    crest_start, crest_end : float
+        Where the vertical curve, a crest or a sag, begins and ends: s, metres.
     """
 
     bend_start: float
@@ -84,6 +91,11 @@ class Road(NamedTuple):
     corner: float
     zebra: bool
     dashed: bool
+    crown: float = 0.0
+    grade_before: float = 0.0
+    grade_after: float = 0.0
+    crest_start: float = 0.0
+    crest_end: float = 1.0
 
     def side(self, sign: int) -> Side:
         """Return one side of the road.

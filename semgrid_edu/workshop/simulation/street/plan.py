@@ -47,6 +47,8 @@ class Wishes:
         Lane of the recording car; 0 is beside the centre line.
     cast : callable or None
         Function that takes the drive's `Traffic` and puts road users on the street, in place of `fill_street`.
+    even : bool
+        Whether all asphalt is one plane, on which the recording car hardly sways. Else a road has a crown and grades.
     """
 
     layout: str | None = None
@@ -59,6 +61,7 @@ class Wishes:
     speed: float | None = None
     ego_lane: int | None = None
     cast: Callable | None = None
+    even: bool = False
 
 
 ANY = Wishes()
@@ -139,6 +142,19 @@ def _road(rng: np.random.Generator, length: float, layout: str, lanes: tuple, st
     )  # fmt: skip
 
 
+def _relief(rng: np.random.Generator, length: float) -> dict[str, float]:
+    """Draw the crown and the grades of a road on which the recording car drives `length` metres, as fields of `Road`.
+
+    Town roads are built with a cross fall of 2 % or a little more, grades of up to 6 %, and vertical curves that take 4
+    to 12 m for each per cent by which the grade changes.
+    """
+    before, after = (float(grade) for grade in rng.normal(0, 0.025, 2).clip(-0.06, 0.06))
+    half = 0.5 * max(10.0, 100 * abs(after - before) * rng.uniform(4.0, 12.0))
+    middle = float(rng.uniform(-10, 60) + length)
+    ends = {"crest_start": middle - half, "crest_end": middle + half}
+    return {"crown": float(rng.uniform(0.015, 0.025)), "grade_before": before, "grade_after": after} | ends
+
+
 def draw_plan(rng: np.random.Generator, length: float, wishes: Wishes) -> Plan:
     """Draw a world's plan.
 
@@ -157,6 +173,8 @@ def draw_plan(rng: np.random.Generator, length: float, wishes: Wishes) -> Plan:
     borders = wishes.borders or tuple(map(str, rng.choice(BORDERS, 2, p=[0.2, 0.16, 0.16, 0.12, 0.24, 0.12])))
     parking = wishes.parking or tuple(bool(p) for p in rng.random(2) < 0.5)
     road = _road(rng, length, layout, lanes, styles, parking)
+    if not wishes.even:
+        road = road._replace(**_relief(rng, length))
     foliage = [(1.0, 1.0, 1.0), (1.35, 1.25, 0.9), (2.2, 1.05, 0.7)][rng.choice(3, p=[0.55, 0.3, 0.15])]
     light = wishes.light or Light.random(rng)
     drawn = float(rng.uniform(0.15, 1.0))

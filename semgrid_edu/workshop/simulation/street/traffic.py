@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from semgrid_edu.camera import transform_points
 from semgrid_edu.workshop.simulation.street import footprints
 from semgrid_edu.workshop.simulation.street.builder import OVERHEAD, Builder
+from semgrid_edu.workshop.simulation.street.ground import on_wheels
 from semgrid_edu.workshop.simulation.street.layout import Road
 from semgrid_edu.workshop.simulation.street.trajectories import Pace, Trajectory
 from semgrid_edu.workshop.simulation.things.cars import BODIES, PAINTS, car, car_size
@@ -71,7 +72,12 @@ class Actor:
             body = (bicycle() if model == "bicycle" else car(model)).recoloured(Material.PAINT, paint)
         if self.overturned:
             body = body.overturned(self.size[2])
-        return body.placed(*self.trajectory.pose(road, t))
+        (x, y, z), yaw = self.trajectory.pose(road, t)
+        if self.kind == Kind.PEDESTRIAN:
+            return body.placed((x, y, z), yaw)
+        s, d = self.trajectory.at(t)
+        height, roll, pitch = on_wheels(road, s, d, yaw, 0.6 * self.size[0], 0.8 * self.size[1])
+        return body.placed((x, y, height), yaw, tilt=(roll if self.kind == Kind.CAR else 0.0, pitch))
 
     def footprint(self, road: Road, t: float) -> footprints.Footprint:
         """Return the ground that it covers at one instant. Parameters are those of `Actor.shape`."""

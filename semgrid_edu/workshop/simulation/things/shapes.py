@@ -39,8 +39,10 @@ class Shape:
     material: NDArray[np.uint8]
     kind: NDArray[np.uint8]
 
-    def placed(self, position: ArrayLike, yaw: float = 0.0, scale: ArrayLike = 1.0) -> "Shape":
-        """Return the shape scaled, then turned about the z axis, then moved.
+    def placed(
+        self, position: ArrayLike, yaw: float = 0.0, scale: ArrayLike = 1.0, tilt: tuple[float, float] = (0.0, 0.0)
+    ) -> "Shape":
+        """Return the shape scaled, then tilted and turned about the z axis, then moved.
 
         Parameters
         ----------
@@ -50,9 +52,10 @@ class Shape:
             Angle about the z axis, counter-clockwise, rad.
         scale : float or (3,) float
             Factor for all sides, or one for each of x, y and z.
+        tilt : (float, float)
+            Roll and pitch, rad, see `rotation_matrix`.
         """
-        c, s = np.cos(yaw), np.sin(yaw)
-        rotation = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], dtype=np.float32)
+        rotation = rotation_matrix(*tilt, yaw).astype(np.float32)
         vertices = (self.vertices * np.asarray(scale, np.float32)) @ rotation.T + np.asarray(position, np.float32)
         return replace(self, vertices=vertices, normals=self.normals @ rotation.T)
 
@@ -117,6 +120,19 @@ def shape(vertices: ArrayLike, faces: ArrayLike, colour: ArrayLike, material: Ma
     n = len(faces)
     colours = np.broadcast_to(np.asarray(colour, dtype=np.float32), (n, 3))
     return Shape(vertices, faces, normals, colours, np.full(n, material, np.uint8), np.full(n, kind, np.uint8))
+
+
+def rotation_matrix(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:
+    """Return Rz(yaw) Ry(pitch) Rx(roll), (3, 3), the order of the angles in KITTI's oxts packets.
+
+    Parameters
+    ----------
+    roll, pitch, yaw : float
+        Angles about the x, y and z axes, rad.
+    """
+    cr, sr, cp, sp, cy, sy = (f(a) for a in (roll, pitch, yaw) for f in (np.cos, np.sin))
+    ahead, left = (cy * cp, sy * cp, -sp), (cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr)
+    return np.column_stack([ahead, left, (cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr)])
 
 
 def merge(shapes: Iterable[Shape]) -> Shape:

@@ -36,6 +36,10 @@ REACH = 9
 """Number of scans before, and after, the labelled one: 0.9 s. minikitti has as many before its labelled frames."""
 
 
+ERRORS = TruthFlaws(skewed=True)
+"""All errors of real data; the scans of the laboratory's drives are of one instant."""
+
+
 class Trial(NamedTuple):
     """One way to make ground truth, and from what.
 
@@ -48,14 +52,14 @@ class Trial(NamedTuple):
     """
 
     policy: TruthPolicy = TruthPolicy()
-    flaws: TruthFlaws = TruthFlaws()
+    flaws: TruthFlaws = ERRORS
 
 
 def _trial(row: dict) -> Trial:
     """Return the trial that a row of `laboratory.toml` describes."""
     policy = {name: value for name, value in row.items() if name != "errors"}
     errors = row.get("errors", [field.name for field in fields(TruthFlaws)])
-    return Trial(TruthPolicy(**policy), replace(NO_FLAWS, **{name: getattr(TruthFlaws, name) for name in errors}))
+    return Trial(TruthPolicy(**policy), replace(NO_FLAWS, **{name: getattr(ERRORS, name) for name in errors}))
 
 
 TRIALS = {name: _trial(row) for name, row in table_beside(__file__).items()}
