@@ -11,7 +11,6 @@ from semgrid_edu.workshop.simulation.street.ground import ground_kinds
 from semgrid_edu.workshop.simulation.street.layout import Road
 from semgrid_edu.workshop.simulation.things.materials import REFLECTANCE, Kind, Material
 
-
 _SECTOR = 30.0
 """Degrees of a turn in which road users count as standing; at 14 m/s they move by 12 cm meanwhile."""
 
@@ -22,8 +21,8 @@ def scan(
 ) -> NDArray[np.float32]:  # fmt: skip
     """Take one LIDAR scan.
 
-    A scanner that takes its time (`Lidar.turn`) measures each column from where it is then, and gives it in its frame of
-    that moment, as KITTI's raw scans are. A return is lost when too little light comes back. So dark, far and grazed
+    A scanner that takes its time (`Lidar.turn`) measures each column from where it is then, and gives it in its frame
+    of that moment, as KITTI's raw scans are. A return is lost when too little light comes back. So dark, far and grazed
     surfaces lose more of their returns than others. Glass reflects the light away from the sensor, and car paint
     scatters little of it.
 

@@ -12,10 +12,11 @@ from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, Camera, invert_rigid, lidar_f
 HDL64E_ELEVATIONS = tuple(np.concatenate([np.linspace(2.0, -8.33, 32), np.linspace(-8.83, -24.9, 32)]).tolist())
 """Elevations of the Velodyne HDL-64E's 64 lasers, degrees: two blocks, the upper one finer (its manual)."""
 KITTI_ELEVATIONS = (
-    2.27, 1.91, 1.70, 1.21, 0.97, 0.51, 0.34, -0.08, -0.41, -0.83, -1.12, -1.45, -1.82, -2.15, -2.46, -2.81,
-    -3.09, -3.46, -3.71, -4.07, -4.36, -4.69, -5.00, -5.32, -5.65, -5.96, -6.24, -6.49, -6.85, -7.17, -7.39, -7.72,
-    -8.33, -8.84, -9.30, -9.70, -10.16, -10.74, -11.23, -11.65, -12.09, -12.51, -13.03, -13.54, -14.12, -14.56, -15.05, -15.41,
-    -16.03, -16.56, -17.14, -17.63, -18.07, -18.45, -18.92, -19.46, -19.99, -20.52, -21.00, -21.40, -21.84, -22.47, -23.01, -23.48,
+    2.27, 1.91, 1.70, 1.21, 0.97, 0.51, 0.34, -0.08, -0.41, -0.83, -1.12, -1.45, -1.82,
+    -2.15, -2.46, -2.81, -3.09, -3.46, -3.71, -4.07, -4.36, -4.69, -5.00, -5.32, -5.65, -5.96,
+    -6.24, -6.49, -6.85, -7.17, -7.39, -7.72, -8.33, -8.84, -9.30, -9.70, -10.16, -10.74, -11.23,
+    -11.65, -12.09, -12.51, -13.03, -13.54, -14.12, -14.56, -15.05, -15.41, -16.03, -16.56, -17.14, -17.63,
+    -18.07, -18.45, -18.92, -19.46, -19.99, -20.52, -21.00, -21.40, -21.84, -22.47, -23.01, -23.48,
 )  # fmt: skip
 """Those of KITTI's own scanner, degrees: for each laser the median over its returns in two scans of drive 0013."""
 
@@ -178,3 +179,7 @@ class Rig:
         pixels = np.stack([u + du, v + dv, np.ones_like(u)], axis=-1).reshape(-1, 3)
         rays = pixels @ np.linalg.inv(self.camera.K).T @ self.T_lidar_from_camera[:3, :3].T
         return (rays / np.linalg.norm(rays, axis=1, keepdims=True)).astype(np.float32)
+
+
+KITTI_AHEAD = Rig(lidar=HDL64E_AHEAD)
+"""The sensors of the simulated data sets."""

@@ -70,9 +70,7 @@ def on_ground(road: Road, s: float, d: float) -> tuple[NDArray[np.float64], floa
 
 
 @njit(cache=True)
-def on_wheels(
-    road: Road, s: float, d: float, yaw: float, length: float, width: float
-) -> tuple[float, float, float]:
+def on_wheels(road: Road, s: float, d: float, yaw: float, length: float, width: float) -> tuple[float, float, float]:
     """Return how a vehicle on four wheels stands on the ground. Parameters not named here are those of `to_world`.
 
     Parameters
