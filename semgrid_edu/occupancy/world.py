@@ -1,6 +1,7 @@
 """What the filters assume of the world: how often cells change, how things move, what sees them (section 3.2)."""
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,29 @@ from semgrid_edu.occupancy.sensor import SensorModel
 from semgrid_edu.occupancy.state import check_part
 
 Rates = tuple[tuple[float, ...], ...]
+
+
+HALT, KEEPS = 0.4, 0.75
+"""Part of `clearing_time` after which a particle's way is looked at as well, by default two turns of a LIDAR; and by
+which part of the vehicle's speed the velocity of what keeps pace with it may differ."""
+
+
+class Pace(NamedTuple):
+    """How fast the vehicle drives, and what that means for what may keep pace with it.
+
+    Parameters
+    ----------
+    speed : float
+        Speed of the vehicle along the x axis of the map, m/s, negative backwards.
+    least : float
+        Speed from which on something leaves its place before the halt, m/s. What is slower doesn't count.
+    halt : float
+        How long ago the way of a thing is looked at as well, seconds.
+    """
+
+    speed: float
+    least: float
+    halt: float
 
 
 @dataclass(frozen=True)
@@ -78,6 +102,20 @@ class WorldModel:
         if len(self.first_sight) != 3 or min(self.first_sight) < 0 or not np.isclose(sum(self.first_sight), 1):
             raise ArgumentError("first_sight", "three probabilities that sum to 1", self.first_sight)
         check_sensor(self.sensor)
+
+    def pace(self, driven: float, dt: float, cell: float) -> Pace:
+        """Return how fast the vehicle drives, and what that means for what may keep pace with it.
+
+        Parameters
+        ----------
+        driven, dt : float
+            How far the vehicle has driven, metres, in which time, seconds.
+        cell : float
+            Side of a cell, metres.
+        """
+        halt = HALT * self.clearing_time
+        least = self.clearing_cells * cell / halt if halt > 0 else np.inf
+        return Pace(float(driven) / dt if dt > 0 else 0.0, float(least), halt)
 
 
 def transition_matrix(world: WorldModel, dt: float) -> NDArray[np.float64]:
