@@ -14,7 +14,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.cellwise import STATIC, open_space
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import OUTSIDE, Particles, cell_of
-from semgrid_edu.occupancy.world import KEEPS, Pace
+from semgrid_edu.occupancy.world import Pace
 
 SLOW = np.float32(16)
 """Beside 1, exp(-16) hardly counts in single precision, so exponentials beyond it needn't be computed."""
@@ -146,7 +146,9 @@ def _cells_at(xy, velocity, cells, time, least, shape, x_max, y_max, cell):
 
 
 def keeps_pace(vx: NDArray, vy: NDArray, pace: Pace) -> NDArray[np.bool_]:
-    """Say of velocities whether they are about the vehicle's own: the difference is at most `KEEPS` of its speed.
+    """Say of velocities whether they are at least as near to the vehicle's own as that of a standing thing is.
+
+    So the difference may be as large as the vehicle's speed.
 
     Parameters
     ----------
@@ -156,7 +158,7 @@ def keeps_pace(vx: NDArray, vy: NDArray, pace: Pace) -> NDArray[np.bool_]:
         How fast the vehicle drives, and from which speed on anything counts. Nothing keeps pace with one that stands.
     """
     slip, speed = (vx - pace.speed) ** 2 + vy**2, vx**2 + vy**2
-    return (slip <= (KEEPS * pace.speed) ** 2) & (speed >= pace.least**2) & (pace.speed != 0)
+    return (slip <= pace.speed**2) & (speed >= pace.least**2) & (pace.speed != 0)
 
 
 _keeps_pace = njit(cache=True, nogil=True)(keeps_pace)

@@ -118,10 +118,11 @@ def predict(
         for time in (-world.clearing_time, world.clearing_time)
     )
     doubt = scale_in_cells(particles.weight, origin, mixed[STATIC])
-    if driven == 0:
-        doubt -= scale_in_cells(doubt, ahead, mixed[FREE] + mixed[DYNAMIC])
+    pace = world.pace(driven, dt, spec.cell)
+    if pace.matters:
+        doubt = doubt_arrivals(particles, cells, doubt, ahead, mixed, spec, pace)
     else:
-        doubt = doubt_arrivals(particles, cells, doubt, ahead, mixed, spec, world.pace(driven, dt, spec.cell))
+        doubt -= scale_in_cells(doubt, ahead, mixed[FREE] + mixed[DYNAMIC])
     stays, arrives = weight_in_cells(particles.weight, came, (2, *spec.shape))
     doubtful = weight_in_cells(doubt, came, (2, *spec.shape))[1]
     probability, newborn, factor, less = collide(mixed, newborn, going, stays, arrives, doubtful)

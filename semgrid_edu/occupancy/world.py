@@ -15,9 +15,9 @@ from semgrid_edu.occupancy.state import check_part
 Rates = tuple[tuple[float, ...], ...]
 
 
-HALT, KEEPS = 0.4, 0.75
-"""Part of `clearing_time` after which a particle's way is looked at as well, by default two turns of a LIDAR; and by
-which part of the vehicle's speed the velocity of what keeps pace with it may differ."""
+HALT = 0.4
+"""Part of `clearing_time` before which a particle's way is looked at as well: by default two turns of a LIDAR, because
+what seems to move has been seen at least there, where it seemed to start, and once on the way."""
 
 
 class Pace(NamedTuple):
@@ -36,6 +36,11 @@ class Pace(NamedTuple):
     speed: float
     least: float
     halt: float
+
+    @property
+    def matters(self) -> bool:
+        """Whether anything can keep pace: not with a vehicle that stands or creeps."""
+        return 2 * abs(self.speed) >= self.least and self.speed != 0
 
 
 @dataclass(frozen=True)
