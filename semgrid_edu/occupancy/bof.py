@@ -6,14 +6,14 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import check_shape
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
-from semgrid_edu.occupancy.cellwise import clear_wakes, collide, mix, ratio
+from semgrid_edu.occupancy.cellwise import clear_wakes, collide, mix, open_space, ratio
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.local_belief import local_belief, observe
-from semgrid_edu.occupancy.particles import slow_down
+from semgrid_edu.occupancy.particles import keeps_pace, slow_down
 from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll
 from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import update
-from semgrid_edu.occupancy.world import WorldModel, transition_matrix
+from semgrid_edu.occupancy.world import HALT, WorldModel, transition_matrix
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
@@ -38,7 +38,7 @@ def bof_move(state: BofState, spec: GridSpec, motion: PlanarMotion) -> BofState:
     return BofState(moved[1], moved[0], moved[2:], velocity, remainder)
 
 
-def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -> BofState:
+def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float, driven: float = 0.0) -> BofState:
     """Predict: every velocity shifts its mass by its own displacement; all else is as in CMCDOT's `predict`.
 
     Some mass changes to neighbouring velocities, slow mass becomes STATIC, and the states mix by the transition matrix.
@@ -56,6 +56,8 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -
         The lattice, and how the world changes.
     dt : float
         Time since the previous instant, seconds, not negative.
+    driven : float
+        How far the vehicle has driven along the x axis in this time, metres; negative backwards.
 
     Raises
     ------
@@ -82,15 +84,17 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float) -
 
     # What arrives in a cell meets what the cell holds.
     mixed, newborn = mix(state.probability, np.zeros(spec.shape, np.float32), going, M)
-    reach = -origins(state.velocity, spec, params.world)
+    keeps = keeps_pace(*state.velocity.T, params.world.pace(driven, dt, spec.cell))
+    room = open_space(mixed)
+    ways = np.stack([origins(state.velocity, spec, params.world, part) for part in (1, HALT)], axis=1)
     came = [k for k in range(1, len(occupied)) if cells[k].any()]
     doubtful = np.zeros(spec.shape, np.float32)
     for k in came:
-        doubtful += occupied[k] * _doubt(mixed, reach[k])
+        doubtful += occupied[k] * _doubt(mixed, room, ways[k], keeps[k])
     probability, newborn, (own, arrival), (_, less) = collide(mixed, newborn, going, stays, arrives, doubtful)
     occupied[0] = probability[STATIC]
     for k in range(1, len(occupied)):
-        occupied[k] *= arrival - less * _doubt(mixed, reach[k]) if k in came else own
+        occupied[k] *= arrival - less * _doubt(mixed, room, ways[k], keeps[k]) if k in came else own
         occupied[k] += params.lattice.prior[k].astype(np.float32) * newborn
     return BofState(probability[FREE], probability[UNKNOWN], occupied, state.velocity, remainder)
 
@@ -128,7 +132,7 @@ def whole_cells(state: BofState, spec: GridSpec, dt: float) -> tuple[NDArray[np.
     return np.clip(cells, -farthest, farthest).astype(np.int64), remainder
 
 
-def origins(velocity: NDArray, spec: GridSpec, world: WorldModel) -> NDArray[np.int64]:
+def origins(velocity: NDArray, spec: GridSpec, world: WorldModel, part: float = 1.0) -> NDArray[np.int64]:
     """Return where mass of each velocity was, as seen from its cell, when it still took up another place.
 
     Parameters
@@ -139,13 +143,15 @@ def origins(velocity: NDArray, spec: GridSpec, world: WorldModel) -> NDArray[np.
         The cells.
     world : WorldModel
         How long ago: `clearing_time`, or for slow things the time that they need for `clearing_cells`.
+    part : float
+        For the `HALT`: which part of `clearing_time` ago.
 
     Returns
     -------
     (V, 2) int64
         Number of whole cells along the x and y axes of the map, to the place where it was.
     """
-    back = -world.clearing_time * velocity / spec.cell
+    back = -part * world.clearing_time * velocity / spec.cell
     length = np.linalg.norm(back, axis=1, keepdims=True)
     return np.rint(back * np.maximum(1, ratio(np.full_like(length, world.clearing_cells), length))).astype(np.int64)
 
@@ -260,19 +266,21 @@ class Bof:
         shift, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
         seen = observe(world.sensor, points_grid, pose, self.map_spec, self.spec)
         moved = bof_move(self._state, self.map_spec, shift)
-        predicted = bof_predict(moved, self.map_spec, self.params, dt)
+        predicted = bof_predict(moved, self.map_spec, self.params, dt, motion.dx)
         self._state, self._pose = bof_update(predicted, self.map_spec, seen.on_map, self.params), seen.pose
         velocity = bof_velocity(self._state)
         return local_belief(predicted.probability, velocity, seen, self.map_spec, self.spec, world)
 
 
-def _doubt(mixed: NDArray, reach: NDArray[np.int64]) -> NDArray[np.float32]:
+def _doubt(mixed: NDArray, room: NDArray, way: NDArray[np.int64], keeps: bool) -> NDArray[np.float32]:
     """Return which part of the mass of one velocity comes out of a wall and goes on along it, cell by cell.
 
-    `reach` is how far that velocity goes, in cells along x and y. A plane moved by it shows in each cell what is where
-    the mass came from; a plane moved by -reach shows what is where it goes.
+    `way` says where the mass was: its origin and its halt, in cells along x and y. A plane moved the other way shows in
+    each cell what is there; a plane moved by the origin itself, what is where the mass goes. The halt counts only
+    if the mass `keeps` pace; then the second plane of `room` is the open space, else the first.
     """
-    return _moved(mixed[STATIC], reach) * (1 - _moved(mixed[FREE] + mixed[DYNAMIC], -reach))
+    static = np.max([_moved(mixed[STATIC], -cells) for cells in (way if keeps else way[:1])], axis=0)
+    return static * (1 - _moved(room[int(keeps)], way[0]))
 
 
 def _moved(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:

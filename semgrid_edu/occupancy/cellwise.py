@@ -89,6 +89,36 @@ def mix(probability, newborn, going, M):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def open_space(mixed):
+    """Return how much of each cell is open space: to most of what moves, and to what keeps pace with the vehicle.
+
+    What stands is ragged and often porous. So beams pass through cells of its face, and yet it is there: once the
+    vehicle looks in from another place, these cells are hit.
+
+    Parameters
+    ----------
+    mixed : (4, H, W) float32
+        The four states before particles flew, from `mix`.
+
+    Returns
+    -------
+    (2, H, W) float32
+        P(FREE) + P(DYNAMIC); and the same with P(FREE) times 1 - the largest P(STATIC) of the four neighbours.
+    """
+    room, (height, width) = np.empty((2, *mixed.shape[1:]), np.float32), mixed.shape[1:]
+    for r in range(height):
+        for c in range(width):
+            free, dynamic, beside = mixed[FREE, r, c], mixed[DYNAMIC, r, c], np.float32(0)
+            if free > 0:
+                beside = max(beside, mixed[STATIC, r - 1, c] if r > 0 else beside)
+                beside = max(beside, mixed[STATIC, r + 1, c] if r + 1 < height else beside)
+                beside = max(beside, mixed[STATIC, r, c - 1] if c > 0 else beside)
+                beside = max(beside, mixed[STATIC, r, c + 1] if c + 1 < width else beside)
+            room[0, r, c], room[1, r, c] = free + dynamic, (1 - beside) * free + dynamic
+    return room
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def collide(mixed, newborn, going, stays, arrives, doubtful):
     """Let the dynamic mass that arrives in a cell meet what the cell holds, and strike out what can't both be true.
 

@@ -97,7 +97,8 @@ class Cmcdot:
         with undo_after_errors(self._rng), on_another_core(*scan) as seen:
             # One name for what is between two steps: its memory, as large as what the filter keeps, is then used again.
             state = self._noted(steps, "move", move(self._state, self.map_spec, shift), pose)
-            state = self._noted(steps, "predict", predict(state, self.map_spec, self.params, dt, self._rng), pose)
+            state = predict(state, self.map_spec, self.params, dt, self._rng, motion.dx)
+            state = self._noted(steps, "predict", state, pose)
             predicted = state.probability
             state = self._noted(steps, "update", update(state, self.map_spec, seen.result().on_map, self.params), pose)
             state = self._noted(steps, "resample", resample(state, self.map_spec, self.params, self._rng), pose)

@@ -11,8 +11,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.cellwise import STATIC, open_space
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import OUTSIDE, Particles, cell_of
+from semgrid_edu.occupancy.world import Pace
 
 SLOW = np.float32(16)
 """Beside 1, exp(-16) hardly counts in single precision, so exponentials beyond it needn't be computed."""
@@ -141,6 +143,64 @@ def _cells_at(xy, velocity, cells, time, least, shape, x_max, y_max, cell):
         then = cell_of(x, y, shape, x_max, y_max, cell)
         there[i] = then if then != cells[i] else OUTSIDE
     return there
+
+
+def keeps_pace(vx: NDArray, vy: NDArray, pace: Pace) -> NDArray[np.bool_]:
+    """Say of velocities whether they are at least as near to the vehicle's own as that of a standing thing is.
+
+    So the difference may be as large as the vehicle's speed.
+
+    Parameters
+    ----------
+    vx, vy : (N,) float
+        Velocities along the axes of the map, m/s; in compiled loops those of one particle.
+    pace : Pace
+        How fast the vehicle drives, and from which speed on anything counts. Nothing keeps pace with one that stands.
+    """
+    slip, speed = (vx - pace.speed) ** 2 + vy**2, vx**2 + vy**2
+    return (slip <= pace.speed**2) & (speed >= pace.least**2) & (pace.speed != 0)
+
+
+_keeps_pace = njit(cache=True, nogil=True)(keeps_pace)
+
+
+def doubt_arrivals(
+    particles: Particles, cells: NDArray, doubt: NDArray, ahead: NDArray, mixed: NDArray, spec: GridSpec, pace: Pace
+) -> NDArray[np.float32]:
+    """Return which part of each weight comes out of a wall and goes on along it, beside a vehicle that drives.
+
+    Parameters
+    ----------
+    particles : Particles
+        N particles after their flight.
+    cells, ahead : (N,) int32
+        The cell that each is in now, from `cells_of`, and will be in, from `cells_at`.
+    doubt : (N,) float32
+        The part of each weight that comes out of a wall, by its origin alone.
+    mixed : (4, H, W) float32
+        The four states before particles flew.
+    spec : GridSpec
+        The cells, (H, W).
+    pace : Pace
+        How fast the vehicle drives.
+    """
+    now = particles.position.ravel(), particles.velocity.ravel(), particles.weight, cells
+    grid = spec.shape, spec.x_max, spec.y_max, spec.cell
+    return _doubt_arrivals(*now, doubt, ahead, mixed[STATIC], open_space(mixed), pace, *grid)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _doubt_arrivals(xy, velocity, weight, cells, doubt, ahead, static, room, pace, shape, x_max, y_max, cell):
+    doubted, standing, rooms = np.empty_like(doubt), static.ravel(), room.reshape(2, -1)
+    for i in range(len(cells)):
+        vx, vy, solid = velocity[2 * i], velocity[2 * i + 1], doubt[i]
+        keeps = _keeps_pace(vx, vy, pace)
+        if keeps:
+            halt = cell_of(xy[2 * i] - pace.halt * vx, xy[2 * i + 1] - pace.halt * vy, shape, x_max, y_max, cell)
+            if halt != OUTSIDE and halt != cells[i]:
+                solid = max(solid, weight[i] * standing[halt])
+        doubted[i] = solid - solid * rooms[int(keeps), ahead[i]] if ahead[i] != OUTSIDE else solid
+    return doubted
 
 
 def fly(particles: Particles, max_acceleration: float, dt: float, rng: np.random.Generator) -> Particles:

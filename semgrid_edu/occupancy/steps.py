@@ -16,6 +16,7 @@ from semgrid_edu.occupancy.particles import (
     by_origin,
     cells_at,
     cells_of,
+    doubt_arrivals,
     fly,
     scale_in_cells,
     slow_down,
@@ -55,7 +56,9 @@ def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterStat
     return FilterState(probability, replace(particles, weight=weight), state.newborn)
 
 
-def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rng: np.random.Generator) -> FilterState:
+def predict(
+    state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rng: np.random.Generator, driven: float = 0.0
+) -> FilterState:
     """Step 2: predict what becomes of the belief while `dt` seconds pass without a scan.
 
     First each cell mixes by the transition matrix, and particles near zero speed become STATIC. Then the particles fly,
@@ -69,6 +72,12 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
       STATIC or UNKNOWN. (Slow particles are followed over `clearing_cells` instead.) Such an arrival may be nothing but
       the next piece of the wall that comes into view. A pedestrian who sets off also comes out of a place where
       something stood, but walks into free space; and where the side of a long vehicle comes from, the vehicle moves.
+
+    Many walls are ragged or porous, such as a hedge. As the vehicle drives on, it looks into one gap after another, so
+    what it glimpses there seems to travel with the vehicle: what keeps pace with it beside a wall is probably the next
+    piece of the wall. So more is doubted of a particle that keeps pace (`keeps_pace`): it comes out of a wall also if
+    it has come past one, at the `HALT` on its way; and it goes on along a wall also where the place ahead is FREE
+    beside something STATIC (`open_space`). To a vehicle that stands nothing of this applies.
 
     Let s and d be the cell's own static and dynamic probability, u the probability that it is UNKNOWN or that something
     has just left it, and b the part of a that comes out of a wall and goes on along it. What is left is
@@ -90,6 +99,8 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
         Time since the previous instant, seconds, not negative.
     rng : numpy.random.Generator
         Source of the particles' accelerations.
+    driven : float
+        How far the vehicle has driven along the x axis since the previous instant, metres; negative backwards.
     """
     check_shape("state", state.newborn, spec.shape)
     M = transition_matrix(world, dt)
@@ -107,7 +118,11 @@ def predict(state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rn
         for time in (-world.clearing_time, world.clearing_time)
     )
     doubt = scale_in_cells(particles.weight, origin, mixed[STATIC])
-    doubt -= scale_in_cells(doubt, ahead, mixed[FREE] + mixed[DYNAMIC])
+    pace = world.pace(driven, dt, spec.cell)
+    if pace.matters:
+        doubt = doubt_arrivals(particles, cells, doubt, ahead, mixed, spec, pace)
+    else:
+        doubt -= scale_in_cells(doubt, ahead, mixed[FREE] + mixed[DYNAMIC])
     stays, arrives = weight_in_cells(particles.weight, came, (2, *spec.shape))
     doubtful = weight_in_cells(doubt, came, (2, *spec.shape))[1]
     probability, newborn, factor, less = collide(mixed, newborn, going, stays, arrives, doubtful)

@@ -1,6 +1,7 @@
 """What the filters assume of the world: how often cells change, how things move, what sees them (section 3.2)."""
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,34 @@ from semgrid_edu.occupancy.sensor import SensorModel
 from semgrid_edu.occupancy.state import check_part
 
 Rates = tuple[tuple[float, ...], ...]
+
+
+HALT = 0.4
+"""Part of `clearing_time` before which a particle's way is looked at as well: by default two turns of a LIDAR, because
+what seems to move has been seen at least there, where it seemed to start, and once on the way."""
+
+
+class Pace(NamedTuple):
+    """How fast the vehicle drives, and what that means for what may keep pace with it.
+
+    Parameters
+    ----------
+    speed : float
+        Speed of the vehicle along the x axis of the map, m/s, negative backwards.
+    least : float
+        Speed from which on something leaves its place before the halt, m/s. What is slower doesn't count.
+    halt : float
+        How long ago the way of a thing is looked at as well, seconds.
+    """
+
+    speed: float
+    least: float
+    halt: float
+
+    @property
+    def matters(self) -> bool:
+        """Whether anything can keep pace: not with a vehicle that stands or creeps."""
+        return 2 * abs(self.speed) >= self.least and self.speed != 0
 
 
 @dataclass(frozen=True)
@@ -78,6 +107,20 @@ class WorldModel:
         if len(self.first_sight) != 3 or min(self.first_sight) < 0 or not np.isclose(sum(self.first_sight), 1):
             raise ArgumentError("first_sight", "three probabilities that sum to 1", self.first_sight)
         check_sensor(self.sensor)
+
+    def pace(self, driven: float, dt: float, cell: float) -> Pace:
+        """Return how fast the vehicle drives, and what that means for what may keep pace with it.
+
+        Parameters
+        ----------
+        driven, dt : float
+            How far the vehicle has driven, metres, in which time, seconds.
+        cell : float
+            Side of a cell, metres.
+        """
+        halt = HALT * self.clearing_time
+        least = self.clearing_cells * cell / halt if halt > 0 else np.inf
+        return Pace(float(driven) / dt if dt > 0 else 0.0, float(least), halt)
 
 
 def transition_matrix(world: WorldModel, dt: float) -> NDArray[np.float64]:

@@ -40,8 +40,9 @@ def cmcdot_stage(world: CellsInARow = FROM_BOTH_SIDES, cell: int = 2) -> StageGr
 
     The edge from x1 to o1 says: the place and the velocity of a thing tell where it came from and where it goes, and it
     may come out of a wall and go on along it (o1). The edge from o1 to one1 says: such a thing doesn't arrive in a cell
-    that is UNKNOWN, because there it says only that the wall goes on. One rule of `update` isn't in the graph: in a
-    hidden cell that something has left, nothing stands.
+    that is UNKNOWN, because there it says only that the wall goes on. Two rules aren't in the graph: in
+    a hidden cell that something has left, nothing stands (`update`); and a vehicle that drives glimpses what stands in
+    the gaps of a wall (`predict`). Here the vehicle stands.
 
     There is at most one moving thing here, so if something arrives from the left, nothing arrives from the right. The
     filter makes the same assumption when it adds up the weights of arriving particles. When the cell itself holds

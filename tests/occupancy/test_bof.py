@@ -44,6 +44,8 @@ STILL = WorldModel(rates=((0.0,) * 4,) * 4, stop_rate=0.0, max_acceleration=0.0,
 ONLY_FLIGHT = BofParams(LATTICE, STILL)
 EXACT = 0.125
 """Seconds in which 4 m/s are exactly one cell of half a metre."""
+DRIVEN = st.sampled_from([0.0, 0.6, -0.6, 2.0])
+"""How far the vehicle drives, metres."""
 
 
 def random_state(seed: int, spec: GridSpec = GRID, lattice: VelocityLattice = LATTICE) -> BofState:
@@ -82,21 +84,25 @@ def assert_sound(state: BofState) -> None:
 
 
 @settings(deadline=None, max_examples=25)
-@given(st.integers(0, 1000), st.sampled_from([0.0, 0.03, EXACT, 0.7, 30.0]), st.booleans())
-def test_fast_and_literal_prediction_agree(seed, dt, shifted):
+@given(st.integers(0, 1000), st.sampled_from([0.0, 0.03, EXACT, 0.7, 30.0]), st.booleans(), DRIVEN)
+def test_fast_and_literal_prediction_agree(seed, dt, shifted, driven):
     state = random_state(seed)
-    params = replace(PARAMS, world=replace(PARAMS.world, stop_speed=3.0)) if shifted else PARAMS
-    fast, literal = (f(state, GRID, params, dt) for f in (bof_predict, bof_predict_literal))
+    params = replace(PARAMS, world=replace(PARAMS.world, stop_speed=3.0, clearing_cells=1.0)) if shifted else PARAMS
+    fast, literal = (f(state, GRID, params, dt, driven) for f in (bof_predict, bof_predict_literal))
     for name in ("free", "unknown", "occupied", "remainder"):
         assert np.allclose(getattr(fast, name), getattr(literal, name), atol=2e-6), name
     assert literal.occupied.dtype == np.float64
 
 
 @settings(deadline=None, max_examples=25)
-@given(st.integers(0, 1000))
-def test_prediction_is_that_of_cmcdot_when_its_particles_lie_on_the_lattice(seed):
-    """One particle a cell and velocity, anywhere in its cell: in whole cells both do the same, mass by mass."""
-    rng, world = np.random.default_rng(seed), replace(WorldModel(), max_acceleration=0.0, stop_speed=3.0)
+@given(st.integers(0, 1000), DRIVEN, st.sampled_from([2.0, 5.0]))
+def test_prediction_is_that_of_cmcdot_when_its_particles_lie_on_the_lattice(seed, driven, clearing_cells):
+    """One particle a cell and velocity, anywhere in its cell: in whole cells both do the same, mass by mass.
+
+    Each was five cells away per 4 m/s when it still took up another place, and at the halt two.
+    """
+    rng, moving = np.random.default_rng(seed), WorldModel(max_acceleration=0.0, stop_speed=3.0)
+    world = replace(moving, clearing_time=5 * EXACT, clearing_cells=clearing_cells)
     state = replace(random_state(seed), remainder=np.zeros((len(LATTICE), 2)))
     velocity, row, col = (index.ravel() for index in np.indices(state.occupied[1:].shape))
     corner = np.stack([row, col], axis=1) + rng.uniform(0.05, 0.95, (len(row), 2))
@@ -104,8 +110,8 @@ def test_prediction_is_that_of_cmcdot_when_its_particles_lie_on_the_lattice(seed
     particles = Particles(position, LATTICE.velocities[1:][velocity].astype(np.float32), state.occupied[1:].ravel())
     twin = FilterState(state.probability, particles, np.zeros(GRID.shape, np.float32))
 
-    twin = predict(twin, GRID, world, EXACT, rng)
-    state = bof_predict(state, GRID, BofParams(LATTICE, world), EXACT)
+    twin = predict(twin, GRID, world, EXACT, rng, driven)
+    state = bof_predict(state, GRID, BofParams(LATTICE, world), EXACT, driven)
     assert np.allclose(state.probability, twin.probability, atol=2e-6)
     for k in range(1, len(LATTICE)):
         of_bin = velocity == k - 1

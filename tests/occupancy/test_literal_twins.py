@@ -40,8 +40,9 @@ from semgrid_edu.occupancy import (
     update_literal,
 )
 from semgrid_edu.occupancy.literal.particles import cells_at_literal, cells_of_literal, systematic_resample_literal
-from semgrid_edu.occupancy.particles import cells_at, cells_of
+from semgrid_edu.occupancy.particles import cells_at, cells_of, keeps_pace
 from semgrid_edu.occupancy.resampling import systematic_resample
+from semgrid_edu.occupancy.world import HALT
 
 GRID = GridSpec(0, 6, -2, 2, 1)
 LATTICE = VelocityLattice(max_speed=8.0, spacing=4.0)
@@ -112,14 +113,18 @@ def test_move(state, motion):
     states(),
     st.sampled_from([0.0, 0.04, 0.1, 1.0, 1e6]),
     st.sampled_from([WorldModel(), WorldModel(stop_rate=0.0, max_acceleration=0.0), WorldModel(stop_speed=3.0), SLOW]),
+    st.sampled_from([0.0, 0.1, 10.0]),
     SEEDS,
 )
-def test_predict(state, dt, world, seed):
+def test_predict(state, dt, world, driven, seed):
     state = move(state, GRID, PlanarMotion(0, 0, 0))  # makes the weights of each cell sum up to what it holds
     ours, theirs = np.random.default_rng(seed), np.random.default_rng(seed)
-    fast, literal = predict(state, GRID, world, dt, ours), predict_literal(state, GRID, world, dt, theirs)
-    for time in (-world.clearing_time, world.clearing_time):
-        then = time, world.clearing_cells
+    args = state, GRID, world, dt
+    fast, literal = predict(*args, ours, driven), predict_literal(*args, theirs, driven)
+    keeps = (keeps_pace(*p.particles.velocity.T, world.pace(driven, dt, GRID.cell)) for p in (fast, literal))
+    assume(np.array_equal(*keeps))
+    for part in (-1, -HALT, 1):
+        then = part * world.clearing_time, world.clearing_cells
         cells = cells_at(fast.particles, cells_of(fast.particles.position, GRID), GRID, *then)
         of_literal = cells_of_literal(literal.particles.position, GRID)
         assume(np.array_equal(cells, cells_at_literal(literal.particles, of_literal, GRID, *then)))

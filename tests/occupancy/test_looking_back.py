@@ -1,4 +1,4 @@
-"""Where a particle was `clearing_time` ago: what comes out of a standing thing, and what moving things leave behind."""
+"""Where a particle was: what comes out of a standing thing or past a porous one, and what a moving thing leaves."""
 
 from dataclasses import replace
 
@@ -31,8 +31,8 @@ STILL = WorldModel(rates=((0.0,) * 4,) * 4, stop_rate=0.0, max_acceleration=0.0)
 """Nothing changes its state or its velocity."""
 BLIND = replace(STILL, clearing_time=0.0)
 """The same for filters that look neither back nor ahead."""
-ORIGIN, BEFORE, TARGET, AHEAD = 13, 9, 8, 3
-"""Rows: where something at 10 m/s was half a second before it gets into the third; the second; and half a second on."""
+ORIGIN, PASSED, BEFORE, TARGET, AHEAD = 13, 10, 9, 8, 3
+"""Rows: where something at 10 m/s was 0.5 s, 0.2 s and 0.1 s before it gets into `TARGET`, and where it is 0.5 s on."""
 
 
 def flying(static: float, target: State, ahead: State = UNKNOWN, weight: float = 0.5) -> FilterState:
@@ -97,6 +97,55 @@ def test_a_cell_that_has_only_been_left_counts_as_unseen(predicted):
     state.probability[:, TARGET, 0] = 0.6, 0, 0.4, 0
     given = predicted(with_another(state, TARGET - BEFORE, 0.4), ROW, STILL, 0.1, np.random.default_rng(0))
     np.testing.assert_allclose(given.probability[DYNAMIC, TARGET, 0], 0.3 / 0.8, atol=1e-6)
+
+
+@TWINS
+@pytest.mark.parametrize("driven", [-1.0, 0.0, 0.4, 0.6, 1.0, 4.0])
+def test_what_comes_past_a_porous_hedge_is_doubted_if_it_keeps_pace_with_the_vehicle(predicted, driven):
+    """Out of a gap, past something that stands, at 10 m/s: doubtful where the vehicle drives at 5 m/s or more.
+
+    By hand, with a = 0.5, u = 1 and b = 0 or 0.5, P(DYNAMIC) = (a - b) / (1 - b).
+    """
+    state, world = flying(0.0, UNKNOWN), replace(STILL, clearing_cells=2.0)
+    state.probability[:, PASSED, 0] = 0, 1, 0, 0
+    given = predicted(state, ROW, world, 0.1, np.random.default_rng(0), driven)
+    np.testing.assert_allclose(given.probability[DYNAMIC, TARGET, 0], 0.0 if driven > 0.5 else 0.5, atol=1e-6)
+
+
+@TWINS
+@pytest.mark.parametrize(("driven", "dynamic"), [(0.0, 0.5), (0.4, 0.5), (1.0, 0.2 / 0.7)])
+def test_a_place_beside_what_stands_is_no_open_space_to_what_keeps_pace_with_the_vehicle(predicted, driven, dynamic):
+    """By hand: a = 0.5, u = 1, and b = 0.6 a because the cell beside it stands with this probability."""
+    state = flying(1.0, UNKNOWN, FREE)
+    state.probability[:, AHEAD - 1, 0] = 0.4, 0.6, 0, 0
+    given = predicted(state, ROW, replace(STILL, clearing_cells=1.0), 0.1, np.random.default_rng(0), driven)
+    np.testing.assert_allclose(given.probability[DYNAMIC, TARGET, 0], dynamic, atol=1e-6)
+
+
+@TWINS
+def test_who_steps_out_of_a_hedge_into_the_open_is_believed_although_the_vehicle_drives(predicted):
+    """A pedestrian at 1.5 m/s, straight out of a hedge: all cells that it comes from stand."""
+    street = GridSpec(0, 8, 0, 4, 0.5)  # 16 x 8 cells; the hedge fills the first three columns, the left ones
+    probability = np.zeros((4, *street.shape), np.float32)
+    probability[FREE, :, 3:] = probability[STATIC, :, :3] = 1
+    probability[:, 8, 2] = 0, 0.5, 0.5, 0
+    walker = Particles(*(np.array(a, np.float32) for a in ([[3.75, 2.55]], [[0.0, -1.5]], [0.5])))
+    state = FilterState(probability, walker, np.zeros(street.shape, np.float32))
+    given = predicted(state, street, STILL, 0.1, np.random.default_rng(0), 1.0)
+    np.testing.assert_allclose(given.probability[DYNAMIC, 8, 3], 0.5, atol=1e-6)
+
+
+@TWINS
+def test_a_car_that_drives_along_a_parked_row_is_believed_although_the_vehicle_drives(predicted):
+    """Right beside cells that stand, in space that is free before it and behind it."""
+    probability = np.zeros((4, 16, 2), np.float32)
+    probability[FREE, :, 0] = probability[STATIC, :, 1] = 1
+    probability[:, BEFORE, 0] = 0.5, 0, 0.5, 0
+    state = replace(flying(0.0, FREE), probability=probability, newborn=np.zeros((16, 2), np.float32))
+    state.particles.position[:, 1] = 1.5
+    street, world = GridSpec(0, 16, 0, 2, 1), replace(STILL, clearing_cells=1.0)
+    given = predicted(state, street, world, 0.1, np.random.default_rng(0), 1.0)
+    np.testing.assert_allclose(given.probability[:, TARGET, 0], [0.5, 0, 0.5, 0], atol=1e-6)
 
 
 @pytest.mark.parametrize("updated", [update, update_literal])

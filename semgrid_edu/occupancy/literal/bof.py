@@ -12,14 +12,15 @@ from semgrid_edu.occupancy.bof import origins, whole_cells
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
 from semgrid_edu.occupancy.cellwise import CERTAIN, ratio
 from semgrid_edu.occupancy.evidence import Evidence
-from semgrid_edu.occupancy.literal.particles import slow_down_literal
+from semgrid_edu.occupancy.literal.particles import free_beside_static, slow_down_literal
+from semgrid_edu.occupancy.particles import keeps_pace
 from semgrid_edu.occupancy.state import Particles, State
-from semgrid_edu.occupancy.world import transition_matrix
+from semgrid_edu.occupancy.world import HALT, transition_matrix
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
 
-def bof_predict_literal(state: BofState, spec: GridSpec, params: BofParams, dt: float) -> BofState:
+def bof_predict_literal(state: BofState, spec: GridSpec, params: BofParams, dt: float, driven: float = 0.0) -> BofState:
     """Predict by loops over cells and velocities: the literal twin of `bof_predict`.
 
     Parameters, result and errors are those of `bof_predict`; the arrays of the result are float64.
@@ -47,10 +48,11 @@ def bof_predict_literal(state: BofState, spec: GridSpec, params: BofParams, dt: 
                 if 0 <= to[0] < spec.shape[0] and 0 <= to[1] < spec.shape[1]:
                     arrives[k, *to] += moving * kept[k]
     stays += params.lattice.prior[:, None, None] * newborn
-    back = origins(state.velocity, spec, params.world)
-    out_of_a_wall = elsewhere_literal(own[STATIC], back)
-    along_no_wall = elsewhere_literal(1 - own[STATIC] - own[UNKNOWN], -back)
-    doubt, occupied = out_of_a_wall * (1 - along_no_wall), np.zeros(state.occupied.shape)
+    keeps = keeps_pace(*state.velocity.T, params.world.pace(driven, dt, spec.cell))[:, None, None]
+    back, halt = (origins(state.velocity, spec, params.world, part) for part in (1, HALT))
+    out_of_a_wall, past_one = (elsewhere_literal(own[STATIC], way) for way in (back, halt))
+    along_no_wall = elsewhere_literal(1 - own[STATIC] - own[UNKNOWN] - keeps * free_beside_static(own), -back)
+    doubt, occupied = np.maximum(out_of_a_wall, keeps * past_one) * (1 - along_no_wall), np.zeros(state.occupied.shape)
     for row, col in np.ndindex(spec.shape):
         here = own[:, row, col], vacated[row, col], stays[:, row, col], arrives[:, row, col], doubt[:, row, col]
         own[:, row, col], occupied[:, row, col] = collide_in_cell(*here)

@@ -20,15 +20,17 @@ from semgrid_edu.occupancy.literal.particles import (
     cells_of_literal,
     draw_newborn_literal,
     fly_literal,
+    free_beside_static,
     scale_in_cells_literal,
     slow_down_literal,
     transform_literal,
     weight_in_cells_literal,
 )
+from semgrid_edu.occupancy.particles import keeps_pace
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.resampling import SystematicResampling, draw_again
 from semgrid_edu.occupancy.state import OUTSIDE, FilterState, Particles, State
-from semgrid_edu.occupancy.world import CmcdotParams, WorldModel, transition_matrix
+from semgrid_edu.occupancy.world import HALT, CmcdotParams, WorldModel, transition_matrix
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
@@ -76,7 +78,7 @@ def look_up_literal(probability: NDArray, spec: GridSpec, motion: PlanarMotion) 
 
 
 def predict_literal(
-    state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rng: np.random.Generator
+    state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rng: np.random.Generator, driven: float = 0.0
 ) -> FilterState:
     """Step 2, predict: cells mix, particles fly, and collide with what is there. The literal twin of `predict`.
 
@@ -92,10 +94,13 @@ def predict_literal(
 
     particles = fly_literal(particles, world.max_acceleration, dt, rng)
     end = cells_of_literal(particles.position, spec)
-    origin = cells_at_literal(particles, end, spec, -world.clearing_time, world.clearing_cells)
-    ahead = cells_at_literal(particles, end, spec, world.clearing_time, world.clearing_cells)
-    doubt = scale_in_cells_literal(particles.weight, origin, mixed[STATIC])
-    doubt = doubt - scale_in_cells_literal(doubt, ahead, mixed[FREE] + mixed[DYNAMIC])
+    time, fewest = world.clearing_time, world.clearing_cells
+    back, halt, ahead = (cells_at_literal(particles, end, spec, part * time, fewest) for part in (-1, -HALT, 1))
+    keeps = keeps_pace(*particles.velocity.astype(np.float64).T, world.pace(driven, dt, spec.cell))
+    doubt = scale_in_cells_literal(particles.weight, back, mixed[STATIC])
+    doubt = np.maximum(doubt, scale_in_cells_literal(keeps * particles.weight, halt, mixed[STATIC]))
+    beside = scale_in_cells_literal(keeps * doubt, ahead, free_beside_static(mixed))
+    doubt = doubt - scale_in_cells_literal(doubt, ahead, mixed[FREE] + mixed[DYNAMIC]) + beside
     came = np.where((end != start) & (end != OUTSIDE), end + going.size, end)  # the second of two planes of cells
     stays, arrives = weight_in_cells_literal(particles.weight, came, (2, *spec.shape))
     doubtful = weight_in_cells_literal(doubt, came, (2, *spec.shape))[1]

@@ -7,7 +7,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.cellwise import ratio
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.resampling import Resampling, draw_indices, draw_velocities, equal_weights
-from semgrid_edu.occupancy.state import OUTSIDE, Particles
+from semgrid_edu.occupancy.state import OUTSIDE, Particles, State
 
 
 def cells_of_literal(position: NDArray, spec: GridSpec) -> NDArray[np.int64]:
@@ -47,9 +47,24 @@ def cells_at_literal(
     """
     path = time * particles.velocity.astype(np.float64)
     length = np.linalg.norm(path, axis=1, keepdims=True)
-    path *= np.maximum(1, ratio(np.full_like(length, fewest * spec.cell), length))
-    then = cells_of_literal(particles.position + path, spec)
+    stretch = np.maximum(1, ratio(np.full_like(length, fewest * spec.cell), length))
+    then = cells_of_literal(particles.position + stretch * path, spec)
     return np.where(then == cells, OUTSIDE, then)
+
+
+def free_beside_static(mixed: NDArray) -> NDArray[np.float64]:
+    """Return how much of P(FREE) lies beside what stands: P(FREE) times the largest P(STATIC) of the four neighbours.
+
+    This is by how much the planes of `cellwise.open_space` differ.
+
+    Parameters
+    ----------
+    mixed : (4, H, W) float
+        The four states.
+    """
+    framed = np.pad(mixed[State.STATIC], 1)
+    beside_x, beside_y = np.maximum(framed[:-2], framed[2:]), np.maximum(framed[:, :-2], framed[:, 2:])
+    return mixed[State.FREE] * np.maximum(beside_x[:, 1:-1], beside_y[1:-1])
 
 
 def transform_literal(particles: Particles, motion: PlanarMotion) -> Particles:

@@ -1,0 +1,54 @@
+"""A vehicle that drives past a wall or a hedge, with a car before it that keeps pace: scans made by hand."""
+
+import numpy as np
+import pytest
+
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import Belief, Cmcdot, PlanarMotion, State, cmcdot, predict
+
+SPEC, SPEED, PERIOD = GridSpec.compact(), 10.0, 0.1
+REAR, FRONT, RIGHT, LEFT = 12.0, 16.0, -3.4, -1.8
+"""Where the car is, seen from the vehicle: it drives at the same speed."""
+
+
+def scan(rng: np.random.Generator, depth: float) -> np.ndarray:
+    """Return the road, rear and left side of the car, and a border 5 m to the right that lets beams in so far."""
+    road = np.column_stack([rng.uniform(2, 45, 4000), rng.uniform(-4.9, 8, 4000), np.zeros(4000)])
+    x, side = np.arange(2, 45, 0.1), np.arange(REAR, FRONT, 0.1)
+    border = np.column_stack([x, -5.05 - rng.exponential(depth, len(x)), np.ones(len(x))])
+    rear, left = np.arange(RIGHT, LEFT, 0.1), np.full(len(side), LEFT)
+    car = np.column_stack([np.append(np.full(len(rear), REAR), side), np.append(rear, left)])
+    ahead = (border[:, 0] > 4) & (np.abs(border[:, 0] - 17) > 9)  # the car hides the rest
+    return np.vstack([road, border[ahead], np.column_stack([car, np.ones(len(car))])])
+
+
+def drive_past(depth: float, seed: int = 0) -> list[Belief]:
+    rng, tracker = np.random.default_rng(seed), Cmcdot(SPEC, seed=seed)
+    motion = PlanarMotion(SPEED * PERIOD, 0, 0)
+    return [tracker.step(scan(rng, depth), motion, PERIOD) for _ in range(20)]
+
+
+def called_dynamic(belief: Belief) -> np.ndarray:
+    dynamic = belief.probability[State.DYNAMIC]
+    return (dynamic > belief.probability[State.STATIC]) & (dynamic > 0.3)
+
+
+def phantoms(beliefs: list[Belief]) -> int:
+    """Return how many cells of the border are called DYNAMIC, added up over the drive."""
+    x, y = np.moveaxis(SPEC.centers(), -1, 0)
+    border = (x > 4) & (x < 40) & (y < -5) & (y > -6)
+    return sum(int((called_dynamic(belief) & border).sum()) for belief in beliefs)
+
+
+@pytest.mark.parametrize("depth", [0.01, 0.3], ids=["wall", "hedge"])
+def test_a_car_that_keeps_pace_beside_a_wall_keeps_its_speed(depth):
+    last, (x, y) = drive_past(depth)[-1], np.moveaxis(SPEC.centers(), -1, 0)
+    rear = (np.abs(x - REAR) < SPEC.cell) & (y > RIGHT) & (y < LEFT) & called_dynamic(last)
+    assert abs(np.linalg.norm(np.nanmean(last.velocity[:, rear], axis=1)) - SPEED) < 0.5
+
+
+def test_a_filter_that_knows_that_the_vehicle_drives_sees_fewer_phantoms_in_a_hedge(monkeypatch):
+    """At most 8 in 10 of those that a filter sees which takes the vehicle to stand."""
+    knows = sum(phantoms(drive_past(0.3, seed)) for seed in range(3))
+    monkeypatch.setattr(cmcdot, "predict", lambda *arguments: predict(*arguments[:5]))
+    assert 0 < knows <= 0.8 * sum(phantoms(drive_past(0.3, seed)) for seed in range(3))
