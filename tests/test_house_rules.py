@@ -147,8 +147,8 @@ def test_the_house_stays_small():
         lines[storey] += code_lines(module)
     assert modules["book"] <= 163
     assert modules["workshop"] <= 121
-    assert lines["book"] <= 11_370
-    assert lines["workshop"] <= 10_200
+    assert lines["book"] <= 11_440
+    assert lines["workshop"] <= 10_600
 
 
 def test_no_folder_has_more_than_18_modules():

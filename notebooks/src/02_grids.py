@@ -403,7 +403,7 @@ plt.show()
 # %%
 def park_street(seed):
     """Return a scan of a simulated street through a park, and where in it are bare grass, plants and road users."""
-    drive = SimulatedDrive(seed, n_frames=20, wishes=Wishes(styles=("park", "park")))
+    drive = SimulatedDrive(seed, n_frames=20, wishes=Wishes(styles=("park", "park"), even=True))
     kinds, _ = drive.birdseye(0.0)
     fine = kinds.reshape(spec.shape[0], 5, spec.shape[1], 5)  # 0.1 m cells in cells of 0.5 m
     users = np.isin(fine, (Kind.CAR, Kind.PEDESTRIAN, Kind.BICYCLE)).any(axis=(1, 3))
