@@ -189,4 +189,5 @@ def checked_confusions(path: str | Path, arrays: Mapping[str, NDArray]) -> Frame
     for name, matrices in counts.items():
         if matrices.dtype.kind not in "iu" or (matrices < 0).any():
             raise DataError(path, f"numbers of cells as {name!r}", f"{matrices.dtype}, from {matrices.min()}")
-    return FrameConfusions(tuple(drives.tolist()), {name: one.astype(np.int64) for name, one in counts.items()})
+    wide = {name: np.ascontiguousarray(matrices, np.int64) for name, matrices in counts.items()}
+    return FrameConfusions(tuple(drives.tolist()), wide)
