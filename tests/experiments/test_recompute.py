@@ -22,7 +22,7 @@ from semgrid_edu.workshop.paper.reports import reproduce as reports
 from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS
 from semgrid_edu.workshop.paper.reports.recompute import check_results
 from semgrid_edu.workshop.paper.runs.data_runs import DataRun
-from semgrid_edu.workshop.paper.runs.evidence import RECORDS, Evidence
+from semgrid_edu.workshop.paper.runs.run_counts import RECORDS, RunCounts
 from semgrid_edu.workshop.paper.runs.scales import SCALES, Scale
 from semgrid_edu.workshop.paper.runs.score_runs import BASELINES
 from semgrid_edu.workshop.scoring.confusions import DRIVES, FrameConfusions
@@ -184,12 +184,12 @@ def test_missing_and_damaged_files_are_named(results):
         found(results)
 
 
-def test_evidence_comes_back_as_it_was(tmp_path):
+def test_what_is_kept_comes_back_as_it_was(tmp_path):
     run, counts = Note("a"), np.arange(18).reshape(2, 3, 3) * 1000
     run.folder(tmp_path).mkdir()
     (run.folder(tmp_path) / "ended.json").write_text('{"seconds": 3, "commit": "abc"}')
     arrays = {"sums": np.array([0.1, 1 / 3]), "signed": np.array([-1, 300]), "none": np.zeros((0, 2), int)}
-    read = Evidence(tmp_path)
+    read = RunCounts(tmp_path)
     frames = FrameConfusions(("x", "y"), {"way": counts})
     kept = [read.confusions(run, "way", "way, true", lambda _: frames), read.of(run, tuple(arrays), lambda _: arrays)]
     record = read.record(run)
@@ -197,7 +197,7 @@ def test_evidence_comes_back_as_it_was(tmp_path):
         read.keep(tmp_path / name)
     assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
 
-    back = Evidence(tmp_path / "one.npz")
+    back = RunCounts(tmp_path / "one.npz")
     assert back.arrays["note-a/way, true"].dtype == np.uint16
     assert back.arrays["note-a/signed"].dtype == np.int16
     confusions, others = back.confusions(run, "way", "way, true", None), back.of(run, tuple(arrays), None)

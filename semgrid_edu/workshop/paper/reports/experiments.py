@@ -16,8 +16,8 @@ from semgrid_edu.workshop.paper.reports.truth_costs import (
     truth_costs_picture,
 )
 from semgrid_edu.workshop.paper.runs import claim_runs
-from semgrid_edu.workshop.paper.runs.evidence import Evidence
 from semgrid_edu.workshop.paper.runs.paper import TABLE_1_SCORES, TABLE_2_SCORES
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.scales import Scale
 from semgrid_edu.workshop.scheduler.runs import Run
 
@@ -49,9 +49,9 @@ class Experiment:
     """
 
     runs: Callable[[Scale, int], Sequence[Run]]
-    result: Callable[[Scale, int, Evidence], dict]
+    result: Callable[[Scale, int, RunCounts], dict]
     markdown: Callable[[dict], str]
-    picture: Callable[[dict, Evidence], Figure]
+    picture: Callable[[dict, RunCounts], Figure]
     title: str
     field: str = "kitti"
     seeds: str = "seeds"
@@ -70,9 +70,9 @@ _WORDS = table_beside(__file__)
 def _accuracy(name: str, runs: Callable, paper: Mapping) -> Experiment:
     """Return Table 1 or 2, from runs by image network and the paper's scores; baselines are those of SegNet."""
 
-    def result(scale: Scale, seeds: int, evidence: Evidence) -> dict:
+    def result(scale: Scale, seeds: int, counted: RunCounts) -> dict:
         networks = runs(scale, seeds)
-        return tables.accuracy_result(networks, evidence, paper, claim_runs.baselines_of(networks["segnet"]))
+        return tables.accuracy_result(networks, counted, paper, claim_runs.baselines_of(networks["segnet"]))
 
     def plan(scale: Scale, seeds: int) -> list[Run]:
         networks = runs(scale, seeds)
@@ -81,9 +81,9 @@ def _accuracy(name: str, runs: Callable, paper: Mapping) -> Experiment:
     return Experiment(plan, result, tables.accuracy_markdown, _of_result(pictures.accuracy_picture), **_WORDS[name])
 
 
-def _table3(scale: Scale, seeds: int, evidence: Evidence) -> dict:
+def _table3(scale: Scale, seeds: int, counted: RunCounts) -> dict:
     networks = claim_runs.table3_runs(scale, seeds)
-    return tables.confusion_result(networks, evidence, claim_runs.baselines_of(networks))
+    return tables.confusion_result(networks, counted, claim_runs.baselines_of(networks))
 
 
 def _table3_plan(scale: Scale, seeds: int) -> list[Run]:
@@ -91,7 +91,7 @@ def _table3_plan(scale: Scale, seeds: int) -> list[Run]:
     return _seed_by_seed([networks, claim_runs.baselines_of(networks)])
 
 
-def _of_result(picture: Callable[[dict], Figure]) -> Callable[[dict, Evidence], Figure]:
+def _of_result(picture: Callable[[dict], Figure]) -> Callable[[dict, RunCounts], Figure]:
     return lambda result, _: picture(result)
 
 

@@ -12,8 +12,8 @@ from semgrid_edu.metrics import METRICS
 from semgrid_edu.plotting import class_legend, confusion, grid_labels
 from semgrid_edu.workshop.paper.reports.forest import draw_scores, legend_entries
 from semgrid_edu.workshop.paper.runs.claim_runs import figure_runs
-from semgrid_edu.workshop.paper.runs.evidence import Evidence
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.scales import scale_named
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
 
@@ -105,21 +105,21 @@ FIGURES: dict[str, tuple[LabelSet, dict[str, str]]] = {
 """The classes of each figure, and the titles of its grids from left to right."""
 
 
-def figures_picture(result: dict, evidence: Evidence) -> Figure:
+def figures_picture(result: dict, counted: RunCounts) -> Figure:
     """Draw both figures: one row per frame, the image and its grids.
 
     Parameters
     ----------
     result : dict
         From `shown_frames`, and the scale.
-    evidence : Evidence
+    counted : RunCounts
         What is known about the runs.
     """
     figure = plt.figure(figsize=(13, 17), layout="constrained")
     runs = figure_runs(scale_named(result["scale"]), result["seeds"])
     for part, run, name in zip(figure.subfigures(2, 1), runs, result["figures"], strict=True):
         part.suptitle(name, x=0.02, ha="left")
-        _draw(part, run.grids(evidence), *FIGURES[name])
+        _draw(part, run.grids(counted), *FIGURES[name])
     return figure
 
 

@@ -15,7 +15,7 @@ from semgrid_edu.errors import DataError
 from semgrid_edu.storage.reading import read_bytes, read_json
 from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS
 from semgrid_edu.workshop.paper.reports.reproduce import computed_result, result_files, result_markdown, times_of
-from semgrid_edu.workshop.paper.runs.evidence import Evidence
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.scales import scale_named
 
 NOT_COMPARED = "versions"
@@ -65,13 +65,13 @@ def differences_in(folder: Path, name: str) -> Iterator[str]:
         A key of `EXPERIMENTS`.
     """
     scores, words, times, counts, _ = result_files(folder, name)
-    written, evidence, experiment = read_json(scores), Evidence(counts), EXPERIMENTS[name]
+    written, counted, experiment = read_json(scores), RunCounts(counts), EXPERIMENTS[name]
     size = written.get("scale"), written.get("seeds")
     if not isinstance(size[0], str) or type(size[1]) is not int or size[1] < 1:
         raise DataError(scores, "a result of `semgrid-edu reproduce` with its scale and seeds", f"{size}")
-    result = computed_result(name, experiment, scale_named(size[0]), size[1], evidence)
+    result = computed_result(name, experiment, scale_named(size[0]), size[1], counted)
     yield from _differences(written, _as_json(result), scores.name)
-    yield from _differences(read_json(times), times_of(evidence.records), times.name)
+    yield from _differences(read_json(times), times_of(counted.records), times.name)
     lines = [read_bytes(words).decode(errors="replace").splitlines(), result_markdown(result, experiment).splitlines()]
     for number, (ours, computed) in enumerate(zip_longest(*lines), start=1):
         if ours != computed:

@@ -16,7 +16,7 @@ from semgrid_edu.storage.workplace import check_workers, usable_cores, workplace
 from semgrid_edu.training.devices import choose_device
 from semgrid_edu.workshop.paper.reports.deviations import deviations, frame_counts
 from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS, Experiment
-from semgrid_edu.workshop.paper.runs.evidence import Evidence
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.scales import Scale, scale_named
 from semgrid_edu.workshop.scheduler.execute import check_runs_folder, execute_plan
 from semgrid_edu.workshop.scheduler.plan import estimate, plan_hours, plan_table, with_needs
@@ -164,31 +164,31 @@ def write_result(name: str, experiment: Experiment, scale: Scale, seeds: int, ro
     str
         The Markdown.
     """
-    evidence, (scores, words, times, counts, picture) = Evidence(root), result_files(out, name)
-    result = computed_result(name, experiment, scale, seeds, evidence)
+    counted, (scores, words, times, counts, picture) = RunCounts(root), result_files(out, name)
+    result = computed_result(name, experiment, scale, seeds, counted)
     text = result_markdown(result, experiment)
-    figure = experiment.picture(result, evidence)
+    figure = experiment.picture(result, counted)
     write_json(scores, result)
     write_text(words, text)
-    write_json(times, times_of(evidence.records))
-    evidence.keep(counts)
+    write_json(times, times_of(counted.records))
+    counted.keep(counts)
     with atomic_path(picture) as path:
         figure.savefig(path, dpi=130)
     plt.close(figure)
     return text
 
 
-def computed_result(name: str, experiment: Experiment, scale: Scale, seeds: int, evidence: Evidence) -> dict:
+def computed_result(name: str, experiment: Experiment, scale: Scale, seeds: int, counted: RunCounts) -> dict:
     """Return the result of an experiment, and what it was made by and of.
 
     Parameters
     ----------
     name, experiment, scale, seeds
         As `write_result` takes them.
-    evidence : Evidence
+    counted : RunCounts
         What is known about the runs: from their folders, or from what was kept of them.
     """
-    records = [evidence.record(run) for run in with_needs(experiment.runs(scale, seeds))]
+    records = [counted.record(run) for run in with_needs(experiment.runs(scale, seeds))]
     processes = max(record.get("processes", 1) for record in records)
     command = f"semgrid-edu reproduce {name} --scale {scale.name} --seeds {seeds} --runs RUNS --out OUT"
     about = {
@@ -203,7 +203,7 @@ def computed_result(name: str, experiment: Experiment, scale: Scale, seeds: int,
         "commits": sorted({str(record["commit"]) for record in records}),
         "versions": versions("numpy", "torch", "numba", "scipy"),
     }
-    return about | experiment.result(scale, seeds, evidence)
+    return about | experiment.result(scale, seeds, counted)
 
 
 def result_files(out: Path, name: str) -> list[Path]:

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.metrics import METRICS
-from semgrid_edu.workshop.paper.runs.evidence import Evidence
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS, TABLE_3_CONFUSION, TABLE_3_SCORES
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.score_runs import (
     BASELINES,
     FITTED_BASELINES,
@@ -37,52 +37,52 @@ CELLS = {"all": "all labelled cells", "semantic": "cells with a semantic class"}
 """On which cells."""
 
 
-def scores_by_truth(runs: Sequence[CountingRun], evidence: Evidence, method: str = NETWORK) -> dict[str, dict]:
+def scores_by_truth(runs: Sequence[CountingRun], counted: RunCounts, method: str = NETWORK) -> dict[str, dict]:
     """Return every metric of a method, by truth, cells and metric.
 
     Parameters
     ----------
     runs : sequence of S CountingRun
         One per seed.
-    evidence : Evidence
+    counted : RunCounts
         What is known about the runs.
     method : str
         One of the methods that the runs have scored.
     """
     return {
-        truth: every_metric(score_with_interval, KITTI_14, by_seed(runs, evidence, method, truth)) for truth in TRUTHS
+        truth: every_metric(score_with_interval, KITTI_14, by_seed(runs, counted, method, truth)) for truth in TRUTHS
     }
 
 
 def differences_by_truth(
-    evidence: Evidence, a: Sequence[CountingRun], b: Sequence[CountingRun], of_a: str = NETWORK, of_b: str = NETWORK
+    counted: RunCounts, a: Sequence[CountingRun], b: Sequence[CountingRun], of_a: str = NETWORK, of_b: str = NETWORK
 ) -> dict[str, dict]:
     """Return a minus b in every metric, on the same seeds and drives, by truth, cells and metric.
 
     Parameters
     ----------
-    evidence : Evidence
+    counted : RunCounts
         What is known about the runs.
     a, b : sequence of S CountingRun
         One per seed.
     of_a, of_b : str
         The method of a and that of b.
     """
-    counts = {truth: (by_seed(a, evidence, of_a, truth), by_seed(b, evidence, of_b, truth)) for truth in TRUTHS}
+    counts = {truth: (by_seed(a, counted, of_a, truth), by_seed(b, counted, of_b, truth)) for truth in TRUTHS}
     return {truth: every_metric(compared, KITTI_14, *both) for truth, both in counts.items()}
 
 
-def beside_usual(runs: Sequence[CountingRun], usual: Sequence[CountingRun], evidence: Evidence) -> dict[str, dict]:
+def beside_usual(runs: Sequence[CountingRun], usual: Sequence[CountingRun], counted: RunCounts) -> dict[str, dict]:
     """Return the "scores" of networks, and their "differences" from the usual ones.
 
     Parameters
     ----------
     runs, usual : sequence of S CountingRun
         One per seed.
-    evidence : Evidence
+    counted : RunCounts
         What is known about the runs.
     """
-    return {"scores": scores_by_truth(runs, evidence), "differences": differences_by_truth(evidence, runs, usual)}
+    return {"scores": scores_by_truth(runs, counted), "differences": differences_by_truth(counted, runs, usual)}
 
 
 def beside_usual_table(head: str, rows: Mapping[str, dict], truth: str, cells: str) -> list[list[str]]:
@@ -105,7 +105,7 @@ def beside_usual_table(head: str, rows: Mapping[str, dict], truth: str, cells: s
 
 def accuracy_result(
     runs: Mapping[str, Sequence[ScoreRun]],
-    evidence: Evidence,
+    counted: RunCounts,
     paper: Mapping[tuple[str, bool], dict],
     baselines: Sequence[BaselineRun] = (),
 ) -> dict[str, list[dict]]:
@@ -115,7 +115,7 @@ def accuracy_result(
     ----------
     runs : mapping of str to sequence of S ScoreRun
         By image network one per seed.
-    evidence : Evidence
+    counted : RunCounts
         What is known about the runs.
     paper : mapping of (str, bool) to dict
         The paper's scores by image network and whether the CRF is used.
@@ -140,24 +140,22 @@ def accuracy_result(
                 "network": name,
                 "CRF": crf,
                 "paper": paper.get((name, crf), unknown),
-                **_counted(scored, evidence, method),
+                **_counted(scored, counted, method),
             }
             for name, scored in runs.items()
             for crf, method in ((False, NETWORK), (True, WITH_CRF))
         ],
         "baselines": [
-            {"network": name, "CRF": False, "paper": unknown, **_counted(baselines, evidence, name)} for name in names
+            {"network": name, "CRF": False, "paper": unknown, **_counted(baselines, counted, name)} for name in names
         ],
-        "differences": [
-            {"what": what, "scores": differences_by_truth(evidence, *pair)} for what, pair in pairs.items()
-        ],
+        "differences": [{"what": what, "scores": differences_by_truth(counted, *pair)} for what, pair in pairs.items()],
     }
 
 
-def _counted(runs: Sequence[CountingRun], evidence: Evidence, method: str) -> dict[str, dict]:
+def _counted(runs: Sequence[CountingRun], counted: RunCounts, method: str) -> dict[str, dict]:
     """Return the scores of a method, and its confusion matrix for all seeds by truth."""
-    cells = {truth: by_seed(runs, evidence, method, truth).sum(axis=(0, 1)).tolist() for truth in TRUTHS}
-    return {"scores": scores_by_truth(runs, evidence, method), "confusion": cells}
+    cells = {truth: by_seed(runs, counted, method, truth).sum(axis=(0, 1)).tolist() for truth in TRUTHS}
+    return {"scores": scores_by_truth(runs, counted, method), "confusion": cells}
 
 
 def accuracy_markdown(result: dict) -> str:
@@ -221,7 +219,7 @@ def _beside_paper(rows: list[dict], truth: str, cells: str) -> str:
 
 
 def confusion_result(
-    runs: Sequence[ScoreRun], evidence: Evidence, baselines: Sequence[BaselineRun] = ()
+    runs: Sequence[ScoreRun], counted: RunCounts, baselines: Sequence[BaselineRun] = ()
 ) -> dict[str, object]:
     """Return our Table 3 beside the paper's.
 
@@ -229,7 +227,7 @@ def confusion_result(
     ----------
     runs : sequence of S ScoreRun
         One per seed.
-    evidence : Evidence
+    counted : RunCounts
         What is known about the runs.
     baselines : sequence of S BaselineRun
         The baselines of the same seeds, on the same frames; none when left out.
@@ -241,11 +239,11 @@ def confusion_result(
         seeds, None in the row of a class that doesn't occur. "confusion" counts the cells of all seeds. "baselines", by
         name: "scores", and "differences", ours minus the baseline's.
     """
-    found = by_seed(runs, evidence, NETWORK, "true")
+    found = by_seed(runs, counted, NETWORK, "true")
     counts = found.sum(axis=1)
     with np.errstate(invalid="ignore"):  # NaN in the row of a class that doesn't occur
         shares = np.mean(100 * counts / counts.sum(axis=2, keepdims=True), axis=0)
-    others = {name: by_seed(baselines, evidence, name, "true") for name in FITTED_BASELINES if baselines}
+    others = {name: by_seed(baselines, counted, name, "true") for name in FITTED_BASELINES if baselines}
     return {
         "classes": list(SYNTHIA_10.names),
         "paper": {"scores": TABLE_3_SCORES, "matrix": TABLE_3_CONFUSION},

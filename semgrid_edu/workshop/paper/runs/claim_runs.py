@@ -5,9 +5,9 @@ from dataclasses import replace
 from itertools import chain
 from types import SimpleNamespace
 
-from semgrid_edu.workshop.paper.runs.evidence import Evidence
 from semgrid_edu.workshop.paper.runs.other_runs import GRIDS, FigureRun, OverturnedRun, TimeRun
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.scales import Scale
 from semgrid_edu.workshop.paper.runs.score_runs import BaselineRun, ScoreRun
 from semgrid_edu.workshop.paper.runs.variants import CalibrationError, Variant
@@ -72,14 +72,14 @@ def figure_runs(scale: Scale, seeds: int) -> list[FigureRun]:
     return [FigureRun(run.network, run.frames) for (run,) in scored]
 
 
-def shown_frames(scale: Scale, seeds: int, evidence: Evidence) -> dict:
+def shown_frames(scale: Scale, seeds: int, counted: RunCounts) -> dict:
     """Return which frames the figures show, and where their grids are.
 
     Parameters
     ----------
     scale, seeds
         As `figure_runs` takes them.
-    evidence : Evidence
+    counted : RunCounts
         What is known about the runs.
 
     Returns
@@ -88,7 +88,7 @@ def shown_frames(scale: Scale, seeds: int, evidence: Evidence) -> dict:
         "figures": by name the numbers of the "frames", and where the "grids" are, as a path in the folder of all runs.
     """
     runs = dict(zip(("Figure 6", "Figure 7"), figure_runs(scale, seeds), strict=True))
-    frames = {name: run.grids(evidence)["frame"].tolist() for name, run in runs.items()}
+    frames = {name: run.grids(counted)["frame"].tolist() for name, run in runs.items()}
     return {"figures": {name: {"frames": frames[name], "grids": f"{run.name}/{GRIDS}"} for name, run in runs.items()}}
 
 

@@ -23,7 +23,7 @@ from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.storage.tensors import read_arrays, write_arrays
 from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun
-from semgrid_edu.workshop.paper.runs.evidence import Evidence
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.score_runs import CONFUSIONS
 from semgrid_edu.workshop.paper.runs.training_runs import GridStageRun, NetworkRun
 from semgrid_edu.workshop.scheduler.runs import Run
@@ -69,9 +69,9 @@ class OverturnedRun(NetworkRun):
             objects = read_json(drive_folder(index.root, date, drive) / "labels" / "objects.json")
             yield from (objects[f"{number:010d}"] for number in numbers)
 
-    def confusions(self, evidence: Evidence, method: str, truth: str, band: str | None = None) -> FrameConfusions:
+    def confusions(self, counted: RunCounts, method: str, truth: str, band: str | None = None) -> FrameConfusions:
         """Return what was counted, by the true labels. Parameters are those of `CountingRun.confusions`."""
-        return evidence.confusions(self, method, method, lambda root: load_confusions(self.folder(root) / CONFUSIONS))
+        return counted.confusions(self, method, method, lambda root: load_confusions(self.folder(root) / CONFUSIONS))
 
 
 def boxes_on(spec: GridSpec, objects: list[dict], margin: float = 0.25) -> NDArray[np.bool_]:
@@ -124,9 +124,15 @@ class TimeRun(Run):
         rounds = [[_seconds(net, samples) / len(samples) for net in nets] for _ in range(ROUNDS)]
         write_json(self.folder(root) / TIMES, {SECONDS: rounds})
 
-    def seconds_per_frame(self, evidence: Evidence) -> NDArray[np.float64]:
-        """Return the seconds per frame of both networks in each round, (R, 2). Parameters are those of `Run.record`."""
-        return evidence.of(self, (SECONDS,), lambda root: {SECONDS: self._rounds(root)})[SECONDS]
+    def seconds_per_frame(self, counted: RunCounts) -> NDArray[np.float64]:
+        """Return the seconds per frame of both networks in each round, (R, 2).
+
+        Parameters
+        ----------
+        counted : RunCounts
+            What is known about the runs.
+        """
+        return counted.of(self, (SECONDS,), lambda root: {SECONDS: self._rounds(root)})[SECONDS]
 
     def _rounds(self, root: Path) -> NDArray[np.float64]:
         """Read the seconds per frame."""
@@ -182,12 +188,12 @@ class FigureRun(NetworkRun):
         kept |= {name: classes.astype(np.uint8) for name, classes in called.items()}
         write_arrays(self.folder(root) / GRIDS, {"frame": np.array(numbers), **kept})
 
-    def grids(self, evidence: Evidence) -> dict[str, NDArray]:
+    def grids(self, counted: RunCounts) -> dict[str, NDArray]:
         """Return what was kept.
 
         Parameters
         ----------
-        evidence : Evidence
+        counted : RunCounts
             What is known about the runs.
 
         Returns
@@ -200,4 +206,4 @@ class FigureRun(NetworkRun):
         DataError
             When the run hasn't ended, or its file is damaged.
         """
-        return evidence.of(self, KEPT, lambda root: read_arrays(self.folder(root) / GRIDS))
+        return counted.of(self, KEPT, lambda root: read_arrays(self.folder(root) / GRIDS))

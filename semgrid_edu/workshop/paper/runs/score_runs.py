@@ -19,7 +19,7 @@ from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import table_beside
 from semgrid_edu.storage.tensors import read_arrays, write_arrays
 from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun
-from semgrid_edu.workshop.paper.runs.evidence import Evidence
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.training_runs import NetworkRun
 from semgrid_edu.workshop.paper.runs.variants import EXACT, CalibrationError
 from semgrid_edu.workshop.scheduler.runs import Run
@@ -86,12 +86,12 @@ class CountingRun(Run):
         write_arrays(self.folder(root) / RELIABILITY, counted.reliability)
         save_confusions(self.folder(root) / CONFUSIONS, counted.confusions)
 
-    def confusions(self, evidence: Evidence, method: str, truth: str, band: str | None = None) -> FrameConfusions:
+    def confusions(self, counted: RunCounts, method: str, truth: str, band: str | None = None) -> FrameConfusions:
         """Return the confusion matrices of one method, one per drive.
 
         Parameters
         ----------
-        evidence : Evidence
+        counted : RunCounts
             What is known about the runs.
         method, truth, band
             What to count, as `FrameConfusions.of` takes it.
@@ -111,14 +111,14 @@ class CountingRun(Run):
                     path, f"what was counted of {error}; remove the folder to count again", "none"
                 ) from error
 
-        return evidence.confusions(self, method, f"{method}, {truth} labels, {band or 'all distances'}", read)
+        return counted.confusions(self, method, f"{method}, {truth} labels, {band or 'all distances'}", read)
 
-    def reliability(self, evidence: Evidence, method: str) -> Reliability:
+    def reliability(self, counted: RunCounts, method: str) -> Reliability:
         """Return how often a method is right by its confidence, over all frames and by the true labels.
 
         Parameters
         ----------
-        evidence : Evidence
+        counted : RunCounts
             What is known about the runs.
         method : str
             Such as `NETWORK`.
@@ -129,12 +129,12 @@ class CountingRun(Run):
             When the run hasn't ended, or its file is damaged.
         """
         name = f"{method}, confidence"
-        found = evidence.of(self, (name,), lambda root: {name: read_arrays(self.folder(root) / RELIABILITY)[method]})
+        found = counted.of(self, (name,), lambda root: {name: read_arrays(self.folder(root) / RELIABILITY)[method]})
         return reliability_of_sums(found[name])
 
 
 def by_seed(
-    runs: Sequence[CountingRun], evidence: Evidence, method: str, truth: str, band: str | None = None
+    runs: Sequence[CountingRun], counted: RunCounts, method: str, truth: str, band: str | None = None
 ) -> NDArray[np.int64]:
     """Return the confusion matrices of a method, seed by seed and drive by drive.
 
@@ -142,7 +142,7 @@ def by_seed(
     ----------
     runs : sequence of S CountingRun
         The same network, trained with S seeds.
-    evidence : Evidence
+    counted : RunCounts
         What is known about the runs.
     method, truth, band
         What to count, as `FrameConfusions.of` takes it.
@@ -158,7 +158,7 @@ def by_seed(
     DataError
         When a run hasn't ended, or its file is damaged.
     """
-    return seed_confusions([run.confusions(evidence, method, truth, band) for run in runs], method)
+    return seed_confusions([run.confusions(counted, method, truth, band) for run in runs], method)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """What reports read from runs, and keep beside their results, so that every number can be computed again (section 4).
 
-A report gets all that it knows about its runs from an `Evidence`: from the folders of the runs when they have just
+A report gets all that it knows about its runs from `RunCounts`: from the folders of the runs when they have just
 ended, or later from the one file that was kept of it. So there is one way to compute a number, with runs or without.
 """
 
@@ -24,13 +24,13 @@ RECORDS = "records.json"
 """The name under which the file holds the records of all runs, as JSON. Each other array has the name RUN/WHAT."""
 
 
-class Evidence:
+class RunCounts:
     """What is known about runs that have ended. Whatever is read from their folders is remembered, to be kept.
 
     Parameters
     ----------
     source : path-like
-        The folder of all runs, or a file that `Evidence.keep` wrote.
+        The folder of all runs, or a file that `RunCounts.keep` wrote.
 
     Attributes
     ----------
@@ -100,7 +100,18 @@ class Evidence:
         return FrameConfusions(found.drives, {method: found.counts[name]})
 
     def record(self, run: Run) -> dict:
-        """Return what a run recorded when it ended. Parameters, result and errors are those of `Run.record`."""
+        """Return what a run recorded when it ended, as `Run.record` does.
+
+        Parameters
+        ----------
+        run : Run
+            The run.
+
+        Raises
+        ------
+        DataError
+            When the run hasn't ended, or its record is missing or damaged.
+        """
         if self.source.is_dir():
             self.records[run.name] = run.record(self.source)
         return checked_record(self.source, self.records.get(run.name))
