@@ -49,7 +49,7 @@ def check_results(folder: Path, echo: Callable[[str], None]) -> bool:
     differing = {name: list(differences_in(folder, name)) for name in names}
     for name, lines in differing.items():
         counts = result_files(folder, name)[3].name
-        found = f"{len(lines)} things differ" if lines else "as written"
+        found = f"differs in {len(lines)} place{'s' * (len(lines) > 1)}" if lines else "as written"
         echo("\n".join([f"{name}, computed again from {counts}: {found}", *lines]))
     return not any(differing.values())
 

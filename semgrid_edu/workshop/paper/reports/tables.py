@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.metrics import METRICS
+from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS, TABLE_3_CONFUSION, TABLE_3_SCORES
 from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.score_runs import (
@@ -31,10 +32,9 @@ from semgrid_edu.workshop.scoring.score_with_interval import (
     shown_seeds,
 )
 
-TRUTHS = {"lidar": "labels made with the LIDAR, as in the paper", "true": "true labels"}
-"""What networks are scored against."""
-CELLS = {"all": "all labelled cells", "semantic": "cells with a semantic class"}
-"""On which cells."""
+_WORDS = table_beside(__file__)
+TRUTHS, CELLS = _WORDS["truths"], _WORDS["cells"]
+"""What networks are scored against, and on which cells: in words, by name."""
 
 
 def scores_by_truth(runs: Sequence[CountingRun], counted: RunCounts, method: str = NETWORK) -> dict[str, dict]:
@@ -181,6 +181,7 @@ def accuracy_markdown(result: dict) -> str:
             f"Paired differences (same seeds, same drives), all labelled cells, against {words}, points:\n\n"
             + markdown_table([["difference", *METRICS], *gains])
         )
+    sections += [_WORDS["baselines"]["what"]] * bool(result.get("baselines"))
     return "\n\n".join(sections)
 
 
@@ -282,6 +283,7 @@ def confusion_markdown(result: dict) -> str:
         "Row: truth, column: detected, per cent of the row; mean over the seeds.",
         *("Ours:", _matrix(result["classes"], result["ours"]["matrix"])),
         *("The paper's:", _matrix(result["classes"], result["paper"]["matrix"])),
+        *[_WORDS["baselines"]["what"]] * bool(baselines),
     ]
     return "\n\n".join(sections)
 
