@@ -134,7 +134,7 @@ def test_table_shows_every_method_and_number(found):
 def test_table_shows_intervals_in_brackets():
     scores = {"network": {cells: dict.fromkeys(METRICS, 0.5) for cells in ("all", "semantic")}}
     found = {"all": [0.4, 0.5, 0.6], "semantic": [None] * 3}
-    ends = {"network": {cells: {name: value for name in METRICS} for cells, value in found.items()}}
+    ends = {"network": {cells: dict.fromkeys(METRICS, value) for cells, value in found.items()}}
     line = scores_table(scores, ends).splitlines()[-1]
     assert [cell.strip() for cell in line.split("|")[2:-1]] == ["50.0 (40.0 to 60.0)"] * 3 + ["50.0"] * 3
 
