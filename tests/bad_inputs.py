@@ -39,6 +39,7 @@ SEARCH = "search-crf --data TINY --test TINY --weights weights.safetensors --out
 LEARNED = "reproduce learned-crf --data TINY --validation TINY --weights weights.safetensors --runs RUNS --out log.json"
 FETCH = "data fetch kitti --drive 2011_09_26_0013 --folder OUT"
 TABLE1 = "reproduce table1 --runs RUNS --out OUT --plan"
+CHECK = "reproduce check OUT"
 
 Spoil = Callable[[Path], object]
 
@@ -203,6 +204,20 @@ def sample(root: Path) -> None:
 
 def arrays(name: str) -> Spoil:
     return lambda root: np.savez(root / name, mine=np.arange(3))
+
+
+def a_result(counts: bytes | dict | None = None, content: str = '{"scale": "quick", "seeds": 1}') -> Spoil:
+    """A result of Table 1, beside it the bytes or the arrays of its counts."""
+
+    def spoil(root: Path) -> None:
+        (root / "OUT").mkdir()
+        (root / "OUT" / "table1.json").write_text(content)
+        if isinstance(counts, dict):
+            np.savez(root / "OUT" / "table1_counts.npz", **counts)
+        elif counts is not None:
+            (root / "OUT" / "table1_counts.npz").write_bytes(counts)
+
+    return spoil
 
 
 def png(name: str, size: tuple[int, int], mode: str = "RGB", value: int = 0, form: str = "png") -> Spoil:
@@ -682,6 +697,14 @@ EXPERIMENTS = (
         "log.json: expected a JSON object",
         text("log.json", "[]"),
     ),
+    Row("no results to check", "reproduce check TINY", "TINY: expected results such as table1.json, found none"),
+    Row("no folder of results", "reproduce check NONE", "NONE: expected results such as table1.json, found none"),
+    Row("results without counts", CHECK, "table1_counts.npz: expected a file, found nothing there", a_result()),
+    Row("counts cut short", CHECK, "table1_counts.npz: expected an npz file of arrays", a_result(b"PK\x03\x04")),
+    Row("counts of something else", CHECK, "table1_counts.npz: expected counts that", a_result({"a": np.zeros(2)})),
+    Row("counts of no run", CHECK, "expected the record of a run", a_result({"records.json": np.array("{}")})),
+    Row("counts with damaged records", CHECK, "expected a JSON object", a_result({"records.json": np.array("{")})),
+    Row("a result without a scale", CHECK, "table1.json: expected a result of", a_result({"records.json": "{}"}, "{}")),
     Row("no real drive", "reproduce real-drive --kitti NONE --out log.json", "NONE: expected a folder of dates"),
     Row(
         "boxes of cars that are numbers",

@@ -1,6 +1,7 @@
 """Named tensors (safetensors) and named arrays (npz) on disk: written whole or not at all, and read with checks."""
 
 import io
+from lzma import LZMAError
 from pathlib import Path
 from zipfile import BadZipFile
 from zlib import error as ZlibError
@@ -55,7 +56,7 @@ def read_arrays(path: str | Path) -> dict[str, NDArray]:
     try:
         with np.load(content, allow_pickle=False) as file:
             return {name: file[name] for name in file.files}
-    except (ValueError, EOFError, AttributeError, NotImplementedError, BadZipFile, ZlibError) as error:
+    except (ValueError, EOFError, AttributeError, NotImplementedError, BadZipFile, LZMAError, ZlibError) as error:
         raise DataError(path, "an npz file of arrays", error) from error
 
 

@@ -1,19 +1,24 @@
-"""The majority, the image alone and the occupancy alone, on grids and images small enough to fill in by hand."""
+"""The majority, the image alone, the occupancy alone, and both together, on grids small enough to fill in by hand."""
 
 import numpy as np
 import pytest
+import torch
+from sklearn.naive_bayes import CategoricalNB
 
 from semgrid_edu.camera import Camera
+from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.workshop.scoring.grids import (
-    classes_of_states,
+from semgrid_edu.workshop.scoring.flat_ground import (
+    count_labels_and_states,
+    ground_labels,
     ground_pixels,
     inverse_perspective,
-    majority_by_state,
-    majority_class,
+    joint_table,
+    naive_bayes,
 )
+from semgrid_edu.workshop.scoring.grids import classes_of_states, majority_by_state, majority_class
 
 ROAD, WALK, CAR, SKY = (KITTI_14.index(name) for name in ("road", "sidewalk", "car", "sky"))
 FREE, STATIC, DYNAMIC, UNOBSERVED = 10, 11, 12, 13
@@ -71,3 +76,76 @@ def test_majority_of_each_cell():
 
 def test_majority_breaks_ties_by_the_first_class():
     assert majority_class(np.array([[[CAR]], [[ROAD]]], np.uint8)).tolist() == [[ROAD]]
+
+
+PLACES = np.array([[0, 1, 2, 2, -1]])
+IMAGES = np.array([[[ROAD, 255, CAR]], [[ROAD, WALK, CAR]]], np.uint8)
+STATES = [[0, 0, 1, 3, 3], [0, 1, 1, 0, 3]]
+TRUTHS = np.array([[[ROAD, FREE, CAR, UNOBSERVED, 255]], [[WALK, STATIC, CAR, ROAD, UNOBSERVED]]], np.uint8)
+
+
+class TwoFrames:
+    """Two frames of a row of five cells, whose ground three pixels show."""
+
+    label_set = KITTI_14
+    arrays = {"truth": TRUTHS, "occupancy": np.stack([occupancy(*states) for states in STATES])}  # noqa: RUF012
+
+    def __len__(self):
+        return 2
+
+    def __getitem__(self, k):
+        parts = (np.zeros((3, 1, 3), np.uint8), IMAGES[k], self.arrays["occupancy"][k], TRUTHS[k])
+        return Sample(*map(torch.from_numpy, parts))
+
+
+def test_a_cell_whose_ground_has_no_label_has_a_value_of_its_own():
+    assert ground_labels(IMAGES[0], PLACES, 14).tolist() == [[ROAD, 14, CAR, CAR, 14]]
+
+
+def test_cells_are_counted_by_label_state_and_class():
+    counts = count_labels_and_states(TwoFrames(), lambda sample: sample.labels.numpy(), PLACES)
+    found = {tuple(map(int, place)): int(counts[tuple(place)]) for place in np.argwhere(counts)}
+    assert found == {
+        (ROAD, 0, ROAD): 1,
+        (ROAD, 0, WALK): 1,
+        (14, 0, FREE): 1,
+        (CAR, 1, CAR): 2,
+        (CAR, 3, UNOBSERVED): 1,
+        (WALK, 1, STATIC): 1,
+        (CAR, 0, ROAD): 1,
+        (14, 3, UNOBSERVED): 1,
+    }
+
+
+def drawn_cells(n=2000):
+    """Labels, states and classes of cells, of which the first two depend on the class, each in its own way."""
+    rng = np.random.default_rng(0)
+    classes = rng.choice(14, n, p=rng.dirichlet(np.ones(14)))
+    labels, states = (classes + rng.geometric(0.6, n)) % 15, (classes // 4 + rng.geometric(0.5, n)) % 4
+    counts = np.zeros((15, 4, 14), int)
+    np.add.at(counts, (labels, states, classes), 1)
+    return counts, np.column_stack([labels, states]), classes
+
+
+EVERY_PAIR = np.indices((15, 4)).reshape(2, -1).T
+
+
+def test_naive_bayes_is_that_of_scikit_learn():
+    counts, seen, classes = drawn_cells()
+    model = CategoricalNB(alpha=1, min_categories=[15, 4]).fit(seen, classes)
+    np.testing.assert_array_equal(naive_bayes(counts).ravel(), model.predict(EVERY_PAIR))
+
+
+def test_no_rule_of_label_and_state_is_right_more_often_than_the_table_on_the_cells_that_it_was_fitted_to():
+    counts, seen, classes = drawn_cells()
+    table, other = (
+        (one[seen[:, 0], seen[:, 1]] == classes).mean() for one in (joint_table(counts), naive_bayes(counts))
+    )
+    assert table >= other
+    assert table == pytest.approx(counts.max(axis=2).sum() / counts.sum())
+
+
+def test_where_label_and_state_never_met_the_state_decides():
+    counts = np.zeros((15, 4, 14), int)
+    counts[ROAD, 0, ROAD], counts[CAR, 1, CAR], counts[CAR, 1, STATIC] = 5, 1, 2
+    assert joint_table(counts)[[ROAD, CAR], [1, 0]].tolist() == [STATIC, ROAD]

@@ -14,6 +14,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.storage.tensors import write_arrays
 from semgrid_edu.workshop.paper.runs.other_runs import boxes_on
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.score_runs import CONFUSIONS, RELIABILITY, SEARCHED, CountingRun
 from semgrid_edu.workshop.paper.runs.variants import EXACT, CalibrationError
 from semgrid_edu.workshop.scoring.confusions import BANDS, distance_band_names, save_confusions
@@ -38,7 +39,8 @@ class ThreeFrames:
 class Here(CountingRun):
     """A run whose folder is the folder of all runs. It is only read, never done."""
 
-    tag = steps = pace = grids = None
+    kind, tag = "score", "here"
+    steps = pace = grids = None
 
     def folder(self, root):
         return root
@@ -62,12 +64,12 @@ def counted(tmp_path_factory):
 @pytest.mark.parametrize("truth", ["lidar", "true"])
 def test_all_bands_together_are_the_whole_grid(counted, truth, method):
     folder, truths, probability = counted
-    found = Here().confusions(folder, method, truth)
+    found = Here().confusions(RunCounts(folder), method, truth)
     called = probability.argmax(axis=1)
-    for k in range(3):
-        expected = confusion_matrix(truths[truth][k].ravel(), called[k].ravel(), labels=range(14))
-        np.testing.assert_array_equal(found.counts[method][k], expected)
-    assert found.by_drive(method).shape == (2, 14, 14)
+    for drive, frames in enumerate((slice(0, 2), slice(2, 3))):
+        expected = confusion_matrix(truths[truth][frames].ravel(), called[frames].ravel(), labels=range(14))
+        np.testing.assert_array_equal(found.counts[method][drive], expected)
+    assert found.drives == ("a", "b")
 
 
 def test_frames_labelled_by_their_data_set_have_one_truth():
@@ -89,7 +91,8 @@ def test_a_band_holds_the_cells_at_its_distance(counted):
     x, y = np.moveaxis(SPEC.centers(), -1, 0)
     for name, low, high in zip(distance_band_names(), range(0, 70, 10), [*range(10, 70, 10), 100], strict=True):
         cells = ((x**2 + y**2 >= low**2) & (x**2 + y**2 < high**2)).sum()
-        assert Here().confusions(folder, "network", "true", name).counts["network"][0].sum() == cells
+        counted_there = Here().confusions(RunCounts(folder), "network", "true", name).counts["network"]
+        assert counted_there.sum(axis=(1, 2)).tolist() == [2 * cells, cells]
     assert distance_bands(SPEC, BANDS)[-1, SPEC.shape[1] // 2] == 0
 
 
@@ -99,7 +102,7 @@ def test_reliability_adds_up_over_the_frames(counted):
     confidence, right = probability.max(axis=1), probability.argmax(axis=1) == truths["true"]
     bins = np.ceil(confidence * 15).astype(int)
     expected = sum(abs((confidence - right)[bins == b].sum()) for b in range(1, 16)) / confidence.size
-    assert expected_calibration_error(Here().reliability(folder, "network")) == pytest.approx(expected)
+    assert expected_calibration_error(Here().reliability(RunCounts(folder), "network")) == pytest.approx(expected)
 
 
 def moved(error, x, y, z):

@@ -11,7 +11,7 @@ from semgrid_edu.camera import Camera
 from semgrid_edu.datasets import KittiRawDrive, training_cache
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.metrics import pixel_accuracy
+from semgrid_edu.metrics import METRICS, pixel_accuracy
 from semgrid_edu.networks import Architecture, build_net, save_net
 from semgrid_edu.pipeline import StageError
 from semgrid_edu.storage.files import sha256
@@ -99,6 +99,10 @@ def test_scores_are_those_counted_by_hand(found):
         "geometry, true labels, gaps closed": 0.5,  # the free and the static cell take the class of their neighbour
         "flat ground, true labels": 1.0,
         "flat ground, true labels, observed cells": 1.0,
+        "table of flat ground and state, true labels": 0.25,  # fitted to cars alone
+        "table of flat ground and state, all-road labels": 0.25,
+        "naive Bayes of flat ground and state, true labels": 0.25,
+        "naive Bayes of flat ground and state, all-road labels": 0.25,
     }
     assert found["network"]["semantic"]["class accuracy"] == 0.5
 
@@ -125,6 +129,14 @@ def test_table_shows_every_method_and_number(found):
     (line,) = (line for line in lines if line.startswith("| geometry, true labels  "))
     assert [float(cell) for cell in line.split("|")[2:-1]] == [100.0] * 6
     assert json.loads(json.dumps(found)) == found
+
+
+def test_table_shows_intervals_in_brackets():
+    scores = {"network": {cells: dict.fromkeys(METRICS, 0.5) for cells in ("all", "semantic")}}
+    found = {"all": [0.4, 0.5, 0.6], "semantic": [None] * 3}
+    ends = {"network": {cells: dict.fromkeys(METRICS, value) for cells, value in found.items()}}
+    line = scores_table(scores, ends).splitlines()[-1]
+    assert [cell.strip() for cell in line.split("|")[2:-1]] == ["50.0 (40.0 to 60.0)"] * 3 + ["50.0"] * 3
 
 
 def test_intervals_are_those_of_the_drives():

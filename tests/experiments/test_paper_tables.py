@@ -19,7 +19,7 @@ from semgrid_edu.workshop.paper.reports.tables import (
 )
 from semgrid_edu.workshop.paper.runs.paper import TABLE_1_SCORES
 from semgrid_edu.workshop.paper.runs.scales import SCALES
-from semgrid_edu.workshop.paper.runs.score_runs import WITH_CRF
+from semgrid_edu.workshop.paper.runs.score_runs import FITTED_BASELINES, WITH_CRF
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions
 
 
@@ -78,6 +78,17 @@ def test_table_3_is_in_per_cent_of_its_rows():
     text = confusion_markdown(json.loads(json.dumps(result)))
     assert all(f"| {name} " in text for name in SYNTHIA_10.names)
     plt.close(confusion_picture(result))
+
+
+def test_table_3_has_its_baselines_with_paired_differences():
+    """Ours is right in 80 and 81, then 90 and 91 of 100 cells, the baselines in 70 and 71 with both seeds."""
+    result = confusion_result([Counted(10, 80), Counted(10, 90)], None, [Counted(10, 70)] * 2)
+    assert list(result["baselines"]) == list(FITTED_BASELINES)
+    for one in result["baselines"].values():
+        assert one["scores"]["pixel accuracy"]["seeds"] == pytest.approx([0.705, 0.705])
+        assert one["differences"]["pixel accuracy"]["seeds"] == pytest.approx([0.1, 0.2])
+    first = [line.split("|")[1].strip() for line in confusion_markdown(result).splitlines() if line.startswith("|")]
+    assert {name for one in FITTED_BASELINES for name in (one, f"ours - {one}, points")} < set(first)
 
 
 def test_every_command_has_a_result():

@@ -20,6 +20,7 @@ from semgrid_edu.workshop.paper.reports.truth_costs import (
     truth_costs_picture,
 )
 from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun, DataRun
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.scales import SCALES
 from semgrid_edu.workshop.paper.runs.score_runs import LABELS, LabelsRun
 from semgrid_edu.workshop.scheduler.execute import execute_plan
@@ -102,7 +103,7 @@ def test_labels_are_counted_against_the_true_and_the_usual_ones(counted):
     bare, usual = run.labels.frames(root).arrays, run.usual.frames(root).arrays
     for against, truth in (("true", usual["true"]), ("lidar", usual["truth"])):
         expected = [confusion_matrix(one, other, 14) for one, other in zip(truth, bare["truth"], strict=True)]
-        np.testing.assert_array_equal(run.confusions(root, LABELS, against).counts[LABELS], expected)
+        np.testing.assert_array_equal(run.confusions(RunCounts(root), LABELS, against).counts[LABELS], expected)
 
 
 def test_without_clean_up_fewer_cells_have_a_label(counted):

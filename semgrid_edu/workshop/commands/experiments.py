@@ -173,6 +173,17 @@ def real_drive(
     keep_result(out, lambda: compare_drives(kitti, date, drive), real_drive_table)
 
 
+@reproduce.command()
+def check(
+    folder: Annotated[Path, typer.Argument(help="Results of the paper's experiments, such as docs/results/reduced.")],
+) -> None:
+    """Compute the paper's tables, claims and ablations again from the counts beside them, and name what differs."""
+    from semgrid_edu.workshop.paper.reports.recompute import check_results
+
+    if not check_results(folder, typer.echo):
+        raise typer.Exit(1)
+
+
 def keep_result(
     out: Path,
     compute: Callable[[], dict],

@@ -201,7 +201,7 @@ def evaluate(
         tell(dataset_doubts(data, "train", "test") + weights_doubts(weights))
         return evaluate(data, weights, confusions_file=confusions)
 
-    keep_result(out, scored, lambda result: scores_table(result["scores"]), force=force)
+    keep_result(out, scored, lambda result: scores_table(result["scores"], result["intervals"]), force=force)
 
 
 @app.command()

@@ -88,11 +88,7 @@ class Run(ABC):
             When the run hasn't ended, or the record is damaged.
         """
         path = self.folder(root) / ENDED
-        record = read_json(path)
-        try:
-            return record | {"seconds": float(record["seconds"]), "date": str(record.get("date", "unknown"))}
-        except (ValueError, KeyError, TypeError, OverflowError) as error:
-            raise DataError(path, "the record of a run that has ended", error) from error
+        return checked_record(path, read_json(path))
 
     def settings(self) -> dict:
         """Return what decides the run, as JSON gives it back.
@@ -100,6 +96,27 @@ class Run(ABC):
         Fields with their default values are left out, so that a run stays the same when a later version adds fields.
         """
         return json.loads(json.dumps(_unusual(self)))
+
+
+def checked_record(path: str | Path, record: object) -> dict:
+    """Return the record of a run, with its seconds as a number and its date as text.
+
+    Parameters
+    ----------
+    path : path-like
+        Where it comes from, for the error.
+    record : object
+        What is there in its place.
+
+    Raises
+    ------
+    DataError
+        When it is something else.
+    """
+    try:
+        return record | {"seconds": float(record["seconds"]), "date": str(record.get("date", "unknown"))}
+    except (ValueError, KeyError, TypeError, OverflowError, AttributeError) as error:
+        raise DataError(path, "the record of a run that has ended", error) from error
 
 
 def _unusual(thing: object) -> object:

@@ -1,6 +1,6 @@
 """Confusion matrices frame by frame: what all scores, intervals and comparisons are computed from (section 4.2)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -163,9 +163,31 @@ def load_confusions(path: str | Path) -> FrameConfusions:
     DataError
         When the file is missing or damaged, or holds something else.
     """
-    counts = read_arrays(path)
-    drives = counts.pop(DRIVES, np.empty(0))
+    return checked_confusions(path, read_arrays(path))
+
+
+def checked_confusions(path: str | Path, arrays: Mapping[str, NDArray]) -> FrameConfusions:
+    """Return the arrays of a file as confusion matrices.
+
+    Parameters
+    ----------
+    path : path-like
+        The file, for the error.
+    arrays : mapping of str to array
+        The drives, under the name "drives", and the matrices.
+
+    Raises
+    ------
+    DataError
+        When they are something else.
+    """
+    drives = arrays.get(DRIVES, np.empty(0))
+    counts = {name: matrices for name, matrices in arrays.items() if name != DRIVES}
     shapes = {name: matrices.shape for name, matrices in counts.items()}
     if not len(drives) or any(shape != (len(drives), *shape[-1:] * 2) for shape in shapes.values()):
         raise DataError(path, "confusion matrices (F, C, C) of the frames of F drives", f"{len(drives)} and {shapes}")
-    return FrameConfusions(tuple(drives.tolist()), counts)
+    for name, matrices in counts.items():
+        if matrices.dtype.kind not in "iu" or (matrices < 0).any():
+            raise DataError(path, f"numbers of cells as {name!r}", f"{matrices.dtype}, from {matrices.min()}")
+    wide = {name: np.ascontiguousarray(matrices, np.int64) for name, matrices in counts.items()}
+    return FrameConfusions(tuple(drives.tolist()), wide)

@@ -17,7 +17,7 @@ from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions, save_confusions
 from semgrid_edu.workshop.scoring.counting import GridCounts, count_grids, truths_of_frames
 from semgrid_edu.workshop.scoring.grids import Refine, baseline_grids, network_grids
-from semgrid_edu.workshop.scoring.score_with_interval import every_metric, markdown_table, per_cent, score_with_interval
+from semgrid_edu.workshop.scoring.score_with_interval import every_metric, markdown_table, score_with_interval, shown
 from semgrid_edu.workshop.scoring.statistics import Metric
 
 Scores = dict[str, dict[str, dict[str, float]]]
@@ -177,17 +177,22 @@ def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:
     }
 
 
-def scores_table(result: Scores) -> str:
+def scores_table(result: Scores, ends: Intervals | None = None) -> str:
     """Return the scores as a Markdown table, in per cent: one row per method.
 
     Parameters
     ----------
     result : Scores
         What `scores` returns.
+    ends : Intervals, optional
+        What `intervals` returns of the same methods, to stand in brackets; none when left out.
     """
     head = [f"{name}{cells}" for cells in ("", ", semantic cells") for name in METRICS]
-    rows = [
-        [method, *(per_cent(value) for cells in ("all", "semantic") for value in by_cells[cells].values())]
-        for method, by_cells in result.items()
-    ]
+    places = [(cells, name) for cells in ("all", "semantic") for name in METRICS]
+
+    def text(method: str, cells: str, name: str) -> str:
+        low, _, high = ends[method][cells][name] if ends else [None] * 3
+        return shown({"mean": result[method][cells][name], "low": low, "high": high, "seeds": []})
+
+    rows = [[method, *(text(method, *place) for place in places)] for method in result]
     return markdown_table([["", *head], *rows])

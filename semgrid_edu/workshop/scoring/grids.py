@@ -1,6 +1,7 @@
 """The grids that are compared: a network's own, refined or not, and those of every baseline, by name (section 4)."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 
 import numpy as np
 import torch
@@ -8,17 +9,22 @@ from numpy.typing import NDArray
 from torch import nn
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets.grid_truth import unknown_classes
 from semgrid_edu.datasets.ground_truth import carry_labels, close_gaps
 from semgrid_edu.datasets.training_set import Sample, TrainingSet
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
+from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.networks import SemanticGridNet, unit_image
-from semgrid_edu.occupancy import N_STATES, State
+from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.pipeline.checks import StageCheck
-from semgrid_edu.planes import plane_pixels
 from semgrid_edu.workshop.scoring.counting import Grids
+from semgrid_edu.workshop.scoring.flat_ground import (
+    Labeller,
+    fitted_tables,
+    ground_labels,
+    ground_pixels,
+    inverse_perspective,
+    label_and_state,
+)
 
 Refine = Callable[[NDArray, NDArray], NDArray]
 """A stage (log_g (C, H, W), o (4, H, W)) -> g (C, H, W), as `semgrid_edu.pipeline.Stages` describes it."""
@@ -28,9 +34,6 @@ NETWORK = "network"
 
 MAJORITY, OCCUPANCY_ALONE = "majority class", "occupancy alone"
 """The most frequent class of each cell, and of each cell and occupancy state."""
-
-NOT_SEEN = -1
-"""What `ground_pixels` says of a cell whose ground lies outside the image."""
 
 
 def network_grids(net: SemanticGridNet, frames: TrainingSet, refinements: Mapping[str, Refine] | None = None) -> Grids:
@@ -112,7 +115,7 @@ def baseline_grids(
     Parameters
     ----------
     training : TrainingSet
-        The frames whose truth the first two baselines learn from.
+        The frames that baselines learn from, by the labels of cells that networks learn from.
     frames : TrainingSet
         The frames to score.
     segmenters : mapping of str to Module
@@ -126,24 +129,34 @@ def baseline_grids(
     -------
     callable
         k -> classes (H, W) of frame k: "majority class" of each cell; "occupancy alone", the majority class of each
-        cell and state; and what `carried_grids` makes of "true" image labels and of those of each image network.
+        cell and state; and for "true" image labels and those of each image network what `carried_grids` makes of them,
+        and what their flat ground and the occupancy state tell together (`WAYS`).
     """
     truths, returns = training.arrays["truth"], returns or frames.returns
     majority, by_state = majority_class(truths), majority_by_state(truths, training.arrays["occupancy"])
-    ground, cell = ground_pixels(frames.spec, camera or frames.camera), frames.spec.cell
+    labellers = _labellers(segmenters)
+    tables = fitted_tables(training, labellers, ground_pixels(training.spec, training.camera))
+    ground, n_classes = ground_pixels(frames.spec, camera or frames.camera), len(frames.label_set)
 
     def grids(k: int) -> dict[str, NDArray]:
         sample = frames[k]
         o = sample.occupancy.numpy()
         found = {MAJORITY: majority, OCCUPANCY_ALONE: classes_of_states(by_state, o)}
-        if frames.label_set.n_semantic < len(frames.label_set):
-            labels = {"true": sample.labels.numpy()}
-            labels |= {name: best_labels(segmenter, sample) for name, segmenter in segmenters.items()}
-            for name, classes in labels.items():
-                found |= carried_grids(f"{name} labels", classes, o, returns(k), ground, cell)
+        for name, labeller in labellers.items():
+            labels = labeller(sample)
+            if frames.label_set.n_semantic < n_classes:
+                found |= carried_grids(f"{name} labels", labels, o, returns(k), ground, frames.spec.cell)
+            cells = ground_labels(labels, ground, n_classes), np.argmax(o, axis=0)
+            found |= {label_and_state(way, f"{name} labels"): table[cells] for way, table in tables[name].items()}
         return found
 
     return grids
+
+
+def _labellers(segmenters: Mapping[str, nn.Module]) -> dict[str, Labeller]:
+    """Return what labels images, by name: the true labels, and the networks."""
+    networks = {name: partial(best_labels, segmenter) for name, segmenter in segmenters.items()}
+    return {"true": lambda sample: sample.labels.numpy(), **networks}
 
 
 def carried_grids(
@@ -227,63 +240,3 @@ def classes_of_states(by_state: NDArray, occupancy: NDArray) -> NDArray[np.uint8
         Probability of FREE, STATIC, DYNAMIC and UNKNOWN.
     """
     return np.take_along_axis(by_state, np.argmax(occupancy, axis=0)[None], axis=0)[0]
-
-
-def ground_pixels(spec: GridSpec, camera: Camera) -> NDArray[np.int64]:
-    """Return the pixel that sees the ground at the centre of each cell: equation (1) for plane 0, to the nearest pixel.
-
-    Pixels (H, W) are numbered as row * w + column; -1 where the ground isn't in the image.
-
-    Parameters
-    ----------
-    spec : GridSpec
-        The grid, (H, W) cells.
-    camera : Camera
-        The camera at the size of the label image, (h, w) pixels.
-    """
-    (pixels,), (visible,) = plane_pixels(spec, [0.0], camera)
-    places = np.full(spec.shape, NOT_SEEN)
-    u, v = np.rint(pixels[visible]).astype(np.int64).T
-    places[visible] = v * camera.size[1] + u
-    return places
-
-
-def inverse_perspective(
-    labels: NDArray, places: NDArray, occupancy: NDArray, observed_only: bool = False
-) -> NDArray[np.uint8]:
-    """Carry image labels to the grid as if all that the camera sees were flat ground: inverse perspective mapping.
-
-    No depth is used, so whatever stands above the ground is smeared away from the camera, over all cells that it hides.
-
-    Parameters
-    ----------
-    labels : (h, w) uint8
-        The class of each pixel, KITTI-14: a network's arg-max, or the truth for an upper bound; 255 where unlabelled.
-    places : (H, W) int
-        The pixel that sees each cell's ground, from `ground_pixels`.
-    occupancy : (4, H, W) float
-        Probability of FREE, STATIC, DYNAMIC and UNKNOWN.
-    observed_only : bool
-        Whether cells that are most probably UNKNOWN, such as those behind a car, take no label.
-
-    Returns
-    -------
-    (H, W) uint8
-        The class of its pixel in each cell that the image shows; by occupancy state one of the four unknown classes in
-        the others, and where the pixel is unlabelled or sky, which doesn't lie on the ground.
-
-    Raises
-    ------
-    ArgumentError
-        When a pixel lies outside the labels, or the shapes of `places` and `occupancy` disagree.
-    """
-    labels, unknown = np.asarray(labels), unknown_classes(occupancy)
-    if places.shape != unknown.shape:
-        raise ArgumentError("places", f"one for each of {unknown.shape} cells", f"shape {places.shape}")
-    if places.max() >= labels.size:
-        raise ArgumentError("places", f"pixels below {labels.size}", places.max())
-    classes = labels.ravel()[places]
-    shown = (places != NOT_SEEN) & (classes != IGNORE) & (classes != KITTI_14.index("sky"))
-    if observed_only:
-        shown &= unknown != UNKNOWN_OF_STATE[State.UNKNOWN]
-    return np.where(shown, classes, unknown).astype(np.uint8)

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from functools import partial
 from itertools import chain
-from pathlib import Path
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from semgrid_edu.workshop.paper.reports.tables import beside_usual, beside_usual
 from semgrid_edu.workshop.paper.reports.truth_costs import learned_from
 from semgrid_edu.workshop.paper.runs.claim_runs import table1_runs
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.scales import Scale
 from semgrid_edu.workshop.paper.runs.score_runs import WITH_CRF, WITH_SEARCHED, ScoreRun, by_seed
 from semgrid_edu.workshop.paper.runs.variants import CalibrationError, Variant
@@ -76,7 +76,7 @@ def ablation_runs(scale: Scale, seeds: int) -> list[Run]:
     return [*usual, *chain(*lists)]
 
 
-def ablations(scale: Scale, seeds: int, root: Path) -> dict:
+def ablations(scale: Scale, seeds: int, counted: RunCounts) -> dict:
     """Return all ablations, from runs that have ended.
 
     Parameters
@@ -85,8 +85,8 @@ def ablations(scale: Scale, seeds: int, root: Path) -> dict:
         How large they are.
     seeds : int
         Number of seeds.
-    root : Path
-        The folder of all runs.
+    counted : RunCounts
+        What is known about the runs.
 
     Returns
     -------
@@ -96,23 +96,23 @@ def ablations(scale: Scale, seeds: int, root: Path) -> dict:
     """
     usual = table1_runs(scale, seeds)["segnet"]
     found: dict[str, list[dict]] = {
-        name: [{"what": what, **beside_usual(*pair, root)} for what, pair in rows.items()]
+        name: [{"what": what, **beside_usual(*pair, counted)} for what, pair in rows.items()]
         for name, rows in ablated_runs(scale, seeds).items()
     }
-    found["distance"] = [_band(band, usual, root) for band in distance_band_names()]
-    found["confidence"] = [_calibration(method, usual, root) for method in (NETWORK, WITH_CRF, WITH_SEARCHED)]
+    found["distance"] = [_band(band, usual, counted) for band in distance_band_names()]
+    found["confidence"] = [_calibration(method, usual, counted) for method in (NETWORK, WITH_CRF, WITH_SEARCHED)]
     return found
 
 
-def _band(band: str, usual: Sequence[ScoreRun], root: Path) -> dict:
+def _band(band: str, usual: Sequence[ScoreRun], counted: RunCounts) -> dict:
     """Return the scores of the cells in a band of distance, by the true labels."""
-    kept = on_cells(by_seed(usual, root, NETWORK, "true", band), "semantic", KITTI_14)
+    kept = on_cells(by_seed(usual, counted, NETWORK, "true", band), "semantic", KITTI_14)
     return {"what": band, "cells": int(kept.sum()), "pixel accuracy": score_with_interval(kept, pixel_accuracy)}
 
 
-def _calibration(method: str, usual: Sequence[ScoreRun], root: Path) -> dict:
+def _calibration(method: str, usual: Sequence[ScoreRun], counted: RunCounts) -> dict:
     """Return how well a method's probabilities mean what they say, seed by seed."""
-    diagrams = [run.reliability(root, method) for run in usual]
+    diagrams = [run.reliability(counted, method) for run in usual]
     return {
         "what": method,
         "expected calibration error": [expected_calibration_error(diagram) for diagram in diagrams],

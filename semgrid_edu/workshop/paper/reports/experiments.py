@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from matplotlib.figure import Figure
 
@@ -18,6 +17,7 @@ from semgrid_edu.workshop.paper.reports.truth_costs import (
 )
 from semgrid_edu.workshop.paper.runs import claim_runs
 from semgrid_edu.workshop.paper.runs.paper import TABLE_1_SCORES, TABLE_2_SCORES
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.scales import Scale
 from semgrid_edu.workshop.scheduler.runs import Run
 
@@ -31,11 +31,11 @@ class Experiment:
     runs : callable
         (scale, number of seeds) -> the runs that it is computed from.
     result : callable
-        (scale, number of seeds, folder of all runs) -> the result; JSON can hold it.
+        (scale, number of seeds, what is known about the runs) -> the result; JSON can hold it.
     markdown : callable
         result -> Markdown.
     picture : callable
-        (result, folder of all runs) -> Figure.
+        (result, what is known about the runs) -> Figure.
     title : str
         What it is called.
     field : str
@@ -49,9 +49,9 @@ class Experiment:
     """
 
     runs: Callable[[Scale, int], Sequence[Run]]
-    result: Callable[[Scale, int, Path], dict]
+    result: Callable[[Scale, int, RunCounts], dict]
     markdown: Callable[[dict], str]
-    picture: Callable[[dict, Path], Figure]
+    picture: Callable[[dict, RunCounts], Figure]
     title: str
     field: str = "kitti"
     seeds: str = "seeds"
@@ -67,27 +67,36 @@ def _seed_by_seed(runs: Iterable[Sequence[Run]]) -> list[Run]:
 _WORDS = table_beside(__file__)
 
 
-def _accuracy(name: str, runs: Callable, paper: Mapping, baselines: Callable = lambda *size: ()) -> Experiment:
-    """Return Table 1 or 2, from runs by image network, the paper's scores, and runs of baselines if there are any."""
-    return Experiment(
-        lambda *size: _seed_by_seed([*runs(*size).values(), *filter(None, [baselines(*size)])]),
-        lambda scale, seeds, root: tables.accuracy_result(runs(scale, seeds), root, paper, baselines(scale, seeds)),
-        tables.accuracy_markdown,
-        lambda result, _: pictures.accuracy_picture(result),
-        **_WORDS[name],
-    )
+def _accuracy(name: str, runs: Callable, paper: Mapping) -> Experiment:
+    """Return Table 1 or 2, from runs by image network and the paper's scores; baselines are those of SegNet."""
+
+    def result(scale: Scale, seeds: int, counted: RunCounts) -> dict:
+        networks = runs(scale, seeds)
+        return tables.accuracy_result(networks, counted, paper, claim_runs.baselines_of(networks["segnet"]))
+
+    def plan(scale: Scale, seeds: int) -> list[Run]:
+        networks = runs(scale, seeds)
+        return _seed_by_seed([*networks.values(), claim_runs.baselines_of(networks["segnet"])])
+
+    return Experiment(plan, result, tables.accuracy_markdown, _of_result(pictures.accuracy_picture), **_WORDS[name])
 
 
-def _table3(scale: Scale, seeds: int, root: Path) -> dict:
-    return tables.confusion_result(claim_runs.table3_runs(scale, seeds), root)
+def _table3(scale: Scale, seeds: int, counted: RunCounts) -> dict:
+    networks = claim_runs.table3_runs(scale, seeds)
+    return tables.confusion_result(networks, counted, claim_runs.baselines_of(networks))
 
 
-def _of_result(picture: Callable[[dict], Figure]) -> Callable[[dict, Path], Figure]:
+def _table3_plan(scale: Scale, seeds: int) -> list[Run]:
+    networks = claim_runs.table3_runs(scale, seeds)
+    return _seed_by_seed([networks, claim_runs.baselines_of(networks)])
+
+
+def _of_result(picture: Callable[[dict], Figure]) -> Callable[[dict, RunCounts], Figure]:
     return lambda result, _: picture(result)
 
 
 _PARTS = {
-    "table3": (claim_runs.table3_runs, _table3, tables.confusion_markdown, _of_result(pictures.confusion_picture)),
+    "table3": (_table3_plan, _table3, tables.confusion_markdown, _of_result(pictures.confusion_picture)),
     "claims": (claim_runs.claims_plan, judge_claims, claims_markdown, _of_result(claims_picture)),
     "ablations": (ablation_runs, ablations, ablations_markdown, _of_result(pictures.ablations_picture)),
     "truth-costs": (truth_cost_runs, truth_costs, truth_costs_markdown, _of_result(truth_costs_picture)),
@@ -95,7 +104,7 @@ _PARTS = {
 }
 
 EXPERIMENTS = {
-    "table1": _accuracy("table1", claim_runs.table1_runs, TABLE_1_SCORES, claim_runs.table1_baselines),
+    "table1": _accuracy("table1", claim_runs.table1_runs, TABLE_1_SCORES),
     "table2": _accuracy("table2", claim_runs.table2_runs, TABLE_2_SCORES),
     **{name: Experiment(*parts, **_WORDS[name]) for name, parts in _PARTS.items()},
 }

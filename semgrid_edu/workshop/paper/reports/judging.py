@@ -1,7 +1,5 @@
 """The nine claims judged: every statement with its numbers, and a verdict (section 4)."""
 
-from pathlib import Path
-
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
@@ -11,6 +9,7 @@ from semgrid_edu.workshop.paper.reports.deviations import frame_counts
 from semgrid_edu.workshop.paper.reports.forest import draw_scores
 from semgrid_edu.workshop.paper.reports.verdicts import verdict
 from semgrid_edu.workshop.paper.runs.claim_runs import runs_of_claims
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.scales import Scale
 from semgrid_edu.workshop.scoring.score_with_interval import ScoreWithInterval, markdown_table, shown
 
@@ -18,7 +17,7 @@ HOLDS = {True: "yes", False: "no", None: "cannot tell"}
 """How a statement's result is written."""
 
 
-def judge_claims(scale: Scale, seeds: int, root: Path) -> dict:
+def judge_claims(scale: Scale, seeds: int, counted: RunCounts) -> dict:
     """Return the verdicts, from runs that have ended. Parameters are those of `ablations`.
 
     Returns
@@ -30,7 +29,7 @@ def judge_claims(scale: Scale, seeds: int, root: Path) -> dict:
     runs, judged = runs_of_claims(scale, seeds), {}
     data = dict.fromkeys(CLAIMS, scale.kitti) | {3: scale.chroma_routes, 4: scale.synthia_routes, 6: scale.overturned}
     for number, texts in CLAIMS.items():
-        found, drives = STATEMENTS[number](runs, root), frame_counts(data[number])["test"][1]
+        found, drives = STATEMENTS[number](runs, counted), frame_counts(data[number])["test"][1]
         judged[str(number)] = {
             "claim": texts["claim"],
             "judged by": texts["judged_by"],

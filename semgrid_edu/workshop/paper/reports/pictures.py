@@ -1,7 +1,5 @@
 """Pictures of the tables, the paper's values beside ours with intervals and every seed; Figures 6 and 7 (section 4)."""
 
-from pathlib import Path
-
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,9 +10,11 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10, LabelSet
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.plotting import class_legend, confusion, grid_labels
-from semgrid_edu.storage.tensors import read_arrays
 from semgrid_edu.workshop.paper.reports.forest import draw_scores, legend_entries
+from semgrid_edu.workshop.paper.runs.claim_runs import figure_runs
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
+from semgrid_edu.workshop.paper.runs.scales import scale_named
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
 
 PAPERS = "#c0392b"
@@ -105,21 +105,21 @@ FIGURES: dict[str, tuple[LabelSet, dict[str, str]]] = {
 """The classes of each figure, and the titles of its grids from left to right."""
 
 
-def figures_picture(result: dict, root: Path) -> Figure:
+def figures_picture(result: dict, counted: RunCounts) -> Figure:
     """Draw both figures: one row per frame, the image and its grids.
 
     Parameters
     ----------
     result : dict
-        From `shown_frames`.
-    root : Path
-        The folder of all runs.
+        From `shown_frames`, and the scale.
+    counted : RunCounts
+        What is known about the runs.
     """
     figure = plt.figure(figsize=(13, 17), layout="constrained")
-    parts = figure.subfigures(2, 1)
-    for part, (name, shown) in zip(parts, result["figures"].items(), strict=True):
+    runs = figure_runs(scale_named(result["scale"]), result["seeds"])
+    for part, run, name in zip(figure.subfigures(2, 1), runs, result["figures"], strict=True):
         part.suptitle(name, x=0.02, ha="left")
-        _draw(part, read_arrays(root / shown["grids"]), *FIGURES[name])
+        _draw(part, run.grids(counted), *FIGURES[name])
     return figure
 
 

@@ -16,6 +16,7 @@ from semgrid_edu.storage.workplace import check_workers, usable_cores, workplace
 from semgrid_edu.training.devices import choose_device
 from semgrid_edu.workshop.paper.reports.deviations import deviations, frame_counts
 from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS, Experiment
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.scales import Scale, scale_named
 from semgrid_edu.workshop.scheduler.execute import check_runs_folder, execute_plan
 from semgrid_edu.workshop.scheduler.plan import estimate, plan_hours, plan_table, with_needs
@@ -111,7 +112,7 @@ def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = F
         choose_device(request.device, request.processes - 1)
     root = check_runs_folder(request.runs)
     for name in request.chosen:
-        check_ours(f'"command": "semgrid-edu reproduce {name} ', *_result_files(request.out, name))
+        check_ours(f'"command": "semgrid-edu reproduce {name} ', *result_files(request.out, name))
     with nullcontext() if plan_only else sole_writer(root):
         return _reproduced(request, root, echo, plan_only)
 
@@ -140,8 +141,8 @@ def _reproduced(request: Request, root: Path, echo: Callable[[str], None], plan_
 def write_result(name: str, experiment: Experiment, scale: Scale, seeds: int, root: Path, out: Path) -> str:
     """Compute the result of an experiment whose runs have ended, and write its files.
 
-    The result depends on the runs alone: computed again, its files are the same byte for byte. How long the runs took
-    stands beside it, in a file of its own.
+    The result depends on the runs alone: computed again, its files are the same byte for byte. What was read from the
+    runs stands beside it, so that it can be computed without them, and how long they took.
 
     Parameters
     ----------
@@ -156,15 +157,39 @@ def write_result(name: str, experiment: Experiment, scale: Scale, seeds: int, ro
     root : Path
         The folder of all runs.
     out : Path
-        Takes NAME.json, NAME.md, NAME.png and NAME_times.json.
+        Takes NAME.json, NAME.md, NAME_times.json, NAME_counts.npz and NAME.png.
 
     Returns
     -------
     str
         The Markdown.
     """
-    records = {run.name: run.record(root) for run in with_needs(experiment.runs(scale, seeds))}
-    processes = max(record.get("processes", 1) for record in records.values())
+    counted, (scores, words, times, counts, picture) = RunCounts(root), result_files(out, name)
+    result = computed_result(name, experiment, scale, seeds, counted)
+    text = result_markdown(result, experiment)
+    figure = experiment.picture(result, counted)
+    write_json(scores, result)
+    write_text(words, text)
+    write_json(times, times_of(counted.records))
+    counted.keep(counts)
+    with atomic_path(picture) as path:
+        figure.savefig(path, dpi=130)
+    plt.close(figure)
+    return text
+
+
+def computed_result(name: str, experiment: Experiment, scale: Scale, seeds: int, counted: RunCounts) -> dict:
+    """Return the result of an experiment, and what it was made by and of.
+
+    Parameters
+    ----------
+    name, experiment, scale, seeds
+        As `write_result` takes them.
+    counted : RunCounts
+        What is known about the runs: from their folders, or from what was kept of them.
+    """
+    records = [counted.record(run) for run in with_needs(experiment.runs(scale, seeds))]
+    processes = max(record.get("processes", 1) for record in records)
     command = f"semgrid-edu reproduce {name} --scale {scale.name} --seeds {seeds} --runs RUNS --out OUT"
     about = {
         "experiment": name,
@@ -175,29 +200,33 @@ def write_result(name: str, experiment: Experiment, scale: Scale, seeds: int, ro
         "iterations": [scale.image_iterations, scale.grid_iterations],
         "frames and drives": frame_counts(getattr(scale, experiment.field)),
         "deviations": [*deviations(scale, experiment.field), *experiment.deviations],
-        "commits": sorted({str(record["commit"]) for record in records.values()}),
+        "commits": sorted({str(record["commit"]) for record in records}),
         "versions": versions("numpy", "torch", "numba", "scipy"),
     }
-    result = about | experiment.result(scale, seeds, root)
-    text = result_markdown(result, experiment)
-    scores, words, times, picture = _result_files(out, name)
-    write_json(scores, result)
-    write_text(words, text)
-    write_json(times, _times(records))
-    figure = experiment.picture(result, root)
-    with atomic_path(picture) as path:
-        figure.savefig(path, dpi=130)
-    plt.close(figure)
-    return text
+    return about | experiment.result(scale, seeds, counted)
 
 
-def _result_files(out: Path, name: str) -> list[Path]:
-    """Return the files of an experiment's result: scores, text, times and picture."""
-    return [out / f"{name}{end}" for end in (".json", ".md", "_times.json", ".png")]
+def result_files(out: Path, name: str) -> list[Path]:
+    """Return the files of an experiment's result: scores, text, times, counts and picture.
+
+    Parameters
+    ----------
+    out : Path
+        The folder of the results.
+    name : str
+        The experiment's name.
+    """
+    return [out / f"{name}{end}" for end in (".json", ".md", "_times.json", "_counts.npz", ".png")]
 
 
-def _times(records: dict[str, dict]) -> dict:
-    """Return the hours of all runs, one after the other, the dates on which they ended, and the minutes of each."""
+def times_of(records: dict[str, dict]) -> dict:
+    """Return the hours of all runs, one after the other, the dates on which they ended, and the minutes of each.
+
+    Parameters
+    ----------
+    records : dict of str to dict
+        What `Run.record` returns, by run.
+    """
     return {
         "hours": round(sum(record["seconds"] for record in records.values()) / 3600, 2),
         "dates": sorted({record["date"] for record in records.values()}),

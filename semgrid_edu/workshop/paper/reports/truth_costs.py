@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
@@ -15,6 +14,7 @@ from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.paper.reports.forest import forest_plot
 from semgrid_edu.workshop.paper.reports.tables import TRUTHS, beside_usual, beside_usual_table
 from semgrid_edu.workshop.paper.runs.claim_runs import table1_runs
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.scales import Scale
 from semgrid_edu.workshop.paper.runs.score_runs import LABELS, LabelsRun, ScoreRun, by_seed
 from semgrid_edu.workshop.scheduler.runs import Run
@@ -100,7 +100,7 @@ def truth_cost_runs(scale: Scale, seeds: int) -> list[Run]:
     return [*label_runs(scale).values(), *(run for alike in zip(*by_truth, strict=True) for run in alike)]
 
 
-def truth_costs(scale: Scale, seeds: int, root: Path) -> dict:
+def truth_costs(scale: Scale, seeds: int, counted: RunCounts) -> dict:
     """Return what it costs to train on each kind of labels, from ended runs. Parameters are those of `ablations`.
 
     Returns
@@ -112,18 +112,18 @@ def truth_costs(scale: Scale, seeds: int, root: Path) -> dict:
         the intersection over union ("classes") and by distance the share that is right ("distances").
     """
     runs, labels = taught_runs(scale, seeds), label_runs(scale)
-    return {"rows": [_row(truth, runs, labels[truth], root) for truth in runs]}
+    return {"rows": [_row(truth, runs, labels[truth], counted) for truth in runs]}
 
 
-def _row(truth: str, runs: dict[str, list[ScoreRun]], labels: LabelsRun, root: Path) -> dict:
+def _row(truth: str, runs: dict[str, list[ScoreRun]], labels: LabelsRun, counted: RunCounts) -> dict:
     """Return the row of one kind of labels."""
     networks, usual = runs[truth], runs[USUAL_TRUTH]
-    like_usual = labels.confusions(root, LABELS, "lidar").total(LABELS)
+    like_usual = labels.confusions(counted, LABELS, "lidar").total(LABELS)
 
     def part(metric: Metric, band: str | None = None) -> dict[str, ScoreWithInterval]:
         """Return one score of labels and networks, over cells with a true semantic class."""
         of_labels, ours, theirs = (
-            on_cells(by_seed(some, root, method, "true", band), "semantic", KITTI_14)
+            on_cells(by_seed(some, counted, method, "true", band), "semantic", KITTI_14)
             for some, method in (([labels], LABELS), (networks, NETWORK), (usual, NETWORK))
         )
         found = {"labels": score_with_interval(of_labels, metric), "networks": score_with_interval(ours, metric)}
@@ -133,8 +133,8 @@ def _row(truth: str, runs: dict[str, list[ScoreRun]], labels: LabelsRun, root: P
         "truth": truth,
         "policy": asdict(POLICIES[truth]) if truth in POLICIES else None,
         "changed": 1 - pixel_accuracy(like_usual),
-        "labels": every_metric(score_with_interval, KITTI_14, by_seed([labels], root, LABELS, "true")),
-        **beside_usual(networks, usual, root),
+        "labels": every_metric(score_with_interval, KITTI_14, by_seed([labels], counted, LABELS, "true")),
+        **beside_usual(networks, usual, counted),
         "classes": {
             name: part(lambda matrix, c=c: class_iou(matrix)[c])
             for c, name in enumerate(KITTI_14.names[: KITTI_14.n_semantic])

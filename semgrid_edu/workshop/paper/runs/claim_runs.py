@@ -1,12 +1,13 @@
 """The runs of Tables 1 to 3 and of the figures, and those that the claims are judged by (sections 4.2 to 4.4)."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
-from pathlib import Path
 from types import SimpleNamespace
 
 from semgrid_edu.workshop.paper.runs.other_runs import GRIDS, FigureRun, OverturnedRun, TimeRun
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.scales import Scale
 from semgrid_edu.workshop.paper.runs.score_runs import BaselineRun, ScoreRun
 from semgrid_edu.workshop.paper.runs.variants import CalibrationError, Variant
@@ -29,9 +30,15 @@ def table1_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
     return {name: scale.scored(scale.kitti, name, seeds) for name in scale.networks}
 
 
-def table1_baselines(scale: Scale, seeds: int) -> list[BaselineRun]:
-    """Return the runs of the baselines of Table 1's SegNet, one per seed. Parameters are those of `table1_runs`."""
-    return [BaselineRun(run.network, run.frames) for run in table1_runs(scale, seeds)["segnet"]]
+def baselines_of(runs: Sequence[ScoreRun]) -> list[BaselineRun]:
+    """Return the runs of the baselines that networks are compared with: fitted to what these learn from.
+
+    Parameters
+    ----------
+    runs : sequence of ScoreRun
+        The networks, one per seed.
+    """
+    return [BaselineRun(run.network, run.frames) for run in runs]
 
 
 def table2_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
@@ -65,23 +72,23 @@ def figure_runs(scale: Scale, seeds: int) -> list[FigureRun]:
     return [FigureRun(run.network, run.frames) for (run,) in scored]
 
 
-def shown_frames(scale: Scale, seeds: int, root: Path) -> dict:
+def shown_frames(scale: Scale, seeds: int, counted: RunCounts) -> dict:
     """Return which frames the figures show, and where their grids are.
 
     Parameters
     ----------
     scale, seeds
         As `figure_runs` takes them.
-    root : Path
-        The folder of all runs.
+    counted : RunCounts
+        What is known about the runs.
 
     Returns
     -------
     dict
-        "figures": by name the numbers of the "frames", and where the "grids" are, as a path below `root`.
+        "figures": by name the numbers of the "frames", and where the "grids" are, as a path in the folder of all runs.
     """
     runs = dict(zip(("Figure 6", "Figure 7"), figure_runs(scale, seeds), strict=True))
-    frames = {name: run.grids(root)["frame"].tolist() for name, run in runs.items()}
+    frames = {name: run.grids(counted)["frame"].tolist() for name, run in runs.items()}
     return {"figures": {name: {"frames": frames[name], "grids": f"{run.name}/{GRIDS}"} for name, run in runs.items()}}
 
 
@@ -132,7 +139,7 @@ def runs_of_claims(scale: Scale, seeds: int) -> SimpleNamespace:
         overturned_blind=[OverturnedRun(run.network, lying) for run in blind],
         unreduced=unreduced,
         times=[TimeRun(usual[0].network, unreduced[0].network, usual[0].frames)],
-        baselines=[BaselineRun(run.network, run.frames) for run in usual],
+        baselines=baselines_of(usual),
         baselines_off=[BaselineRun(run.network, run.frames, WRONG_CALIBRATION) for run in usual],
         usual_off=[ScoreRun(run.network, run.frames, crf=False, calibration=WRONG_CALIBRATION) for run in usual],
     )

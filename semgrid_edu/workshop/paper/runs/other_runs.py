@@ -23,6 +23,7 @@ from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.storage.tensors import read_arrays, write_arrays
 from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.score_runs import CONFUSIONS
 from semgrid_edu.workshop.paper.runs.training_runs import GridStageRun, NetworkRun
 from semgrid_edu.workshop.scheduler.runs import Run
@@ -33,12 +34,15 @@ from semgrid_edu.workshop.scoring.score_with_interval import ScoreWithInterval
 OVERTURNED = "overturned cars"
 """The method: the network's own grid, of which only the cells of overturned cars are counted."""
 
-TIMES, ROUNDS, FRAMES_EACH = "times.json", 12, 3
-"""The file with the times, how often two networks take turns, and for how many frames each time."""
+TIMES, SECONDS, ROUNDS, FRAMES_EACH = "times.json", "seconds per frame", 12, 3
+"""The file with the times, what it holds, how often two networks take turns, and for how many frames each time."""
 
 GRIDS, SHOWN = "grids.npz", (1 / 6, 1 / 2, 5 / 6)
 """The file with the grids, and which frames they are of: at these shares of the test frames, so that nobody chose them.
 """
+
+KEPT = ("frame", "image", "truth", "true", "network", "refined")
+"""The arrays in that file, as `FigureRun.grids` returns them."""
 
 
 @dataclass(frozen=True)
@@ -65,9 +69,9 @@ class OverturnedRun(NetworkRun):
             objects = read_json(drive_folder(index.root, date, drive) / "labels" / "objects.json")
             yield from (objects[f"{number:010d}"] for number in numbers)
 
-    def confusions(self, root: str | Path, method: str, truth: str, band: str | None = None) -> FrameConfusions:
+    def confusions(self, counted: RunCounts, method: str, truth: str, band: str | None = None) -> FrameConfusions:
         """Return what was counted, by the true labels. Parameters are those of `CountingRun.confusions`."""
-        return load_confusions(self.folder(root) / CONFUSIONS)
+        return counted.confusions(self, method, method, lambda root: load_confusions(self.folder(root) / CONFUSIONS))
 
 
 def boxes_on(spec: GridSpec, objects: list[dict], margin: float = 0.25) -> NDArray[np.bool_]:
@@ -118,14 +122,23 @@ class TimeRun(Run):
         for net in nets:
             _seconds(net, samples)
         rounds = [[_seconds(net, samples) / len(samples) for net in nets] for _ in range(ROUNDS)]
-        write_json(self.folder(root) / TIMES, {"seconds per frame": rounds})
+        write_json(self.folder(root) / TIMES, {SECONDS: rounds})
 
-    def seconds_per_frame(self, root: str | Path) -> NDArray[np.float64]:
-        """Return the seconds per frame of both networks in each round, (R, 2). Parameters are those of `Run.folder`."""
+    def seconds_per_frame(self, counted: RunCounts) -> NDArray[np.float64]:
+        """Return the seconds per frame of both networks in each round, (R, 2).
+
+        Parameters
+        ----------
+        counted : RunCounts
+            What is known about the runs.
+        """
+        return counted.of(self, (SECONDS,), lambda root: {SECONDS: self._rounds(root)})[SECONDS]
+
+    def _rounds(self, root: Path) -> NDArray[np.float64]:
+        """Read the seconds per frame."""
         path = self.folder(root) / TIMES
-        rounds = read_json(path).get("seconds per frame")
         try:
-            return np.array(rounds, dtype=np.float64).reshape(-1, 2)
+            return np.array(read_json(path).get(SECONDS), dtype=np.float64).reshape(-1, 2)
         except (ValueError, TypeError) as error:
             raise DataError(path, "the seconds per frame of two networks in each round", error) from error
 
@@ -175,8 +188,13 @@ class FigureRun(NetworkRun):
         kept |= {name: classes.astype(np.uint8) for name, classes in called.items()}
         write_arrays(self.folder(root) / GRIDS, {"frame": np.array(numbers), **kept})
 
-    def grids(self, root: str | Path) -> dict[str, NDArray]:
-        """Return what was kept. Parameters are those of `Run.folder`.
+    def grids(self, counted: RunCounts) -> dict[str, NDArray]:
+        """Return what was kept.
+
+        Parameters
+        ----------
+        counted : RunCounts
+            What is known about the runs.
 
         Returns
         -------
@@ -188,4 +206,4 @@ class FigureRun(NetworkRun):
         DataError
             When the run hasn't ended, or its file is damaged.
         """
-        return read_arrays(self.folder(root) / GRIDS)
+        return counted.of(self, KEPT, lambda root: read_arrays(self.folder(root) / GRIDS))

@@ -15,14 +15,17 @@ from semgrid_edu.datasets.index import load_index
 from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
 from semgrid_edu.datasets.readers.project_lidar import seen_returns
 from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import table_beside
 from semgrid_edu.storage.tensors import read_arrays, write_arrays
 from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.training_runs import NetworkRun
 from semgrid_edu.workshop.paper.runs.variants import EXACT, CalibrationError
 from semgrid_edu.workshop.scheduler.runs import Run
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions, load_confusions, save_confusions, seed_confusions
 from semgrid_edu.workshop.scoring.counting import Grids, count_grids, reliability_of_sums
+from semgrid_edu.workshop.scoring.flat_ground import WAYS, label_and_state
 from semgrid_edu.workshop.scoring.grids import MAJORITY, NETWORK, OCCUPANCY_ALONE, Refine, baseline_grids, network_grids
 
 CONFUSIONS, RELIABILITY = "confusions.npz", "reliability.npz"
@@ -40,14 +43,22 @@ GEOMETRY, TRUE_GEOMETRY, FLAT_GROUND = "geometry", "geometry with true image lab
 """Image labels carried by the LIDAR's depth with gaps closed, from the image network and true ones; and image labels
 looked up where flat ground would be."""
 
-BASELINES = {
+FITTED_BASELINES = {
     MAJORITY: MAJORITY,
     OCCUPANCY_ALONE: OCCUPANCY_ALONE,
+    **{f"{way} of label and state": label_and_state(way, f"{NETWORK} labels") for way in WAYS},
+    **{f"{way} of true label and state": label_and_state(way, "true labels") for way in WAYS},
+}
+"""The baselines that are fitted to training frames, and what `baseline_grids` calls each. "Label" is the image's label
+where flat ground would be."""
+
+BASELINES = FITTED_BASELINES | {
     FLAT_GROUND: f"flat ground, {NETWORK} labels, observed cells",
     GEOMETRY: f"geometry, {NETWORK} labels, gaps closed",
     TRUE_GEOMETRY: "geometry, true labels, gaps closed",
 }
-"""The baselines of the paper's tables, and what `baseline_grids` calls each."""
+"""All baselines of the paper's tables. The last ones call unlabelled cells by the unknown classes of KITTI-14, and so
+are left out on data with other classes."""
 
 LABELS = "labels"
 """The method: the labels themselves, counted like the grids of a network."""
@@ -75,30 +86,40 @@ class CountingRun(Run):
         write_arrays(self.folder(root) / RELIABILITY, counted.reliability)
         save_confusions(self.folder(root) / CONFUSIONS, counted.confusions)
 
-    def confusions(self, root: str | Path, method: str, truth: str, band: str | None = None) -> FrameConfusions:
-        """Return the confusion matrices of one method.
+    def confusions(self, counted: RunCounts, method: str, truth: str, band: str | None = None) -> FrameConfusions:
+        """Return the confusion matrices of one method, one per drive.
 
         Parameters
         ----------
-        root : path-like
-            The folder of all runs.
+        counted : RunCounts
+            What is known about the runs.
         method, truth, band
             What to count, as `FrameConfusions.of` takes it.
 
         Raises
         ------
         DataError
-            When the run hasn't ended, or its file is damaged.
+            When the run hasn't ended, its file is damaged, or it hasn't counted this.
         """
-        return load_confusions(self.folder(root) / CONFUSIONS).of(method, truth, band)
 
-    def reliability(self, root: str | Path, method: str) -> Reliability:
+        def read(root: Path) -> FrameConfusions:
+            path = self.folder(root) / CONFUSIONS
+            try:
+                return load_confusions(path).of(method, truth, band)
+            except KeyError as error:
+                raise DataError(
+                    path, f"what was counted of {error}; remove the folder to count again", "none"
+                ) from error
+
+        return counted.confusions(self, method, f"{method}, {truth} labels, {band or 'all distances'}", read)
+
+    def reliability(self, counted: RunCounts, method: str) -> Reliability:
         """Return how often a method is right by its confidence, over all frames and by the true labels.
 
         Parameters
         ----------
-        root : path-like
-            The folder of all runs.
+        counted : RunCounts
+            What is known about the runs.
         method : str
             Such as `NETWORK`.
 
@@ -107,11 +128,13 @@ class CountingRun(Run):
         DataError
             When the run hasn't ended, or its file is damaged.
         """
-        return reliability_of_sums(read_arrays(self.folder(root) / RELIABILITY)[method])
+        name = f"{method}, confidence"
+        found = counted.of(self, (name,), lambda root: {name: read_arrays(self.folder(root) / RELIABILITY)[method]})
+        return reliability_of_sums(found[name])
 
 
 def by_seed(
-    runs: Sequence[CountingRun], root: str | Path, method: str, truth: str, band: str | None = None
+    runs: Sequence[CountingRun], counted: RunCounts, method: str, truth: str, band: str | None = None
 ) -> NDArray[np.int64]:
     """Return the confusion matrices of a method, seed by seed and drive by drive.
 
@@ -119,8 +142,8 @@ def by_seed(
     ----------
     runs : sequence of S CountingRun
         The same network, trained with S seeds.
-    root : path-like
-        The folder of all runs.
+    counted : RunCounts
+        What is known about the runs.
     method, truth, band
         What to count, as `FrameConfusions.of` takes it.
 
@@ -135,7 +158,7 @@ def by_seed(
     DataError
         When a run hasn't ended, or its file is damaged.
     """
-    return seed_confusions([run.confusions(root, method, truth, band) for run in runs], method)
+    return seed_confusions([run.confusions(counted, method, truth, band) for run in runs], method)
 
 
 @dataclass(frozen=True)
@@ -184,7 +207,8 @@ def _refined(temperature: float, params: CrfParams, log_g: NDArray, o: NDArray) 
 class BaselineRun(CountingRun, NetworkRun):
     """Score all of `BASELINES` on the frames of a split.
 
-    The image stage of the network labels the images, and the majority is that of the frames that it learned from.
+    The image stage of the network labels the images. What is fitted is fitted to what the network learned from: its
+    training frames, with the same labels of cells.
 
     Parameters
     ----------
@@ -217,7 +241,7 @@ class BaselineRun(CountingRun, NetworkRun):
 
         def grids(k: int) -> dict[str, NDArray]:
             found = made(k)
-            return {name: found[full_name] for name, full_name in BASELINES.items()}
+            return {name: found[full_name] for name, full_name in BASELINES.items() if full_name in found}
 
         return grids
 

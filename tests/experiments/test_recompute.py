@@ -1,0 +1,220 @@
+"""Results computed again without their runs, from the counts beside them, at the tiniest scale."""
+
+import json
+import shutil
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from tiny_notes import Note
+from tiny_runs import HandMadeData
+
+import semgrid_edu
+from semgrid_edu.datasets import training_cache
+from semgrid_edu.errors import DataError
+from semgrid_edu.storage.tensors import read_arrays, write_arrays
+from semgrid_edu.storage.workplace import Workplace
+from semgrid_edu.workshop.commands.experiments import check
+from semgrid_edu.workshop.paper.reports import reproduce as reports
+from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS
+from semgrid_edu.workshop.paper.reports.recompute import check_results
+from semgrid_edu.workshop.paper.runs.data_runs import DataRun
+from semgrid_edu.workshop.paper.runs.run_counts import RECORDS, RunCounts
+from semgrid_edu.workshop.paper.runs.scales import SCALES, Scale
+from semgrid_edu.workshop.paper.runs.score_runs import BASELINES
+from semgrid_edu.workshop.scoring.confusions import DRIVES, FrameConfusions
+
+TINY = Scale(
+    name="tiny",
+    kitti="tinytested",
+    image_iterations=1,
+    grid_iterations=1,
+    table1_seeds=2,
+    networks=("segnet",),
+    policies=("no-cleanup",),
+)
+MADE = ("table1", "truth-costs")
+COMMITTED = Path(semgrid_edu.__file__).parents[1] / "docs" / "results" / "reduced"
+
+
+@pytest.fixture(autouse=True)
+def _known(monkeypatch):
+    monkeypatch.setitem(SCALES, "tiny", TINY)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Table 1 and the costs of labels, of runs that are gone."""
+    folder = tmp_path_factory.mktemp("results")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(SCALES, "tiny", TINY)
+        patch.setattr(DataRun, "work", HandMadeData.work)
+        patch.setattr(training_cache, "WORKERS", 1)
+        patch.setattr(reports, "workplace", lambda *_: nullcontext(Workplace(ThreadPoolExecutor(1), lambda: 1)))
+        for name in MADE:
+            places = {"runs": folder / "runs", "out": folder / "out"}
+            assert reports.reproduce(reports.Request(experiment=name, scale="tiny", seeds=2, **places), print) == ""
+    shutil.rmtree(folder / "runs")
+    return folder / "out"
+
+
+@pytest.fixture
+def results(made, tmp_path):
+    return Path(shutil.copytree(made, tmp_path / "results"))
+
+
+def found(folder):
+    """Whether all is as written, and what the command says."""
+    told = []
+    return check_results(folder, told.append), "\n".join(told)
+
+
+def test_results_are_computed_again_without_their_runs(results):
+    same, said = found(results)
+    assert same, said
+    assert said.splitlines() == [f"{name}, computed again from {name}_counts.npz: as written" for name in MADE]
+    check(results)
+
+
+def test_every_network_and_baseline_is_kept_by_drive_and_seed(results):
+    arrays = read_arrays(results / "table1_counts.npz")
+    counts = {key: array for key, array in arrays.items() if key.endswith("labels, all distances")}
+    assert len(counts) == 2 * 2 * (2 + len(BASELINES))  # seeds, truths, methods
+    assert {array.shape for array in counts.values()} == {(2, 14, 14)}
+    assert {array.dtype for array in counts.values()} == {np.dtype(np.uint16)}  # 8804 cells in each of two frames
+    assert {tuple(array) for key, array in arrays.items() if key.endswith(f"/{DRIVES}")} == {
+        ("2026_01_01 0007", "2026_01_01 0008")
+    }
+
+
+def test_baselines_stand_in_the_table_with_their_differences(results):
+    table1 = json.loads((results / "table1.json").read_text())
+    assert [row["network"] for row in table1["baselines"]] == list(BASELINES)
+    first = [line.split("|")[1].strip() for line in (results / "table1.md").read_text().splitlines() if "|" in line]
+    for name in BASELINES:
+        assert first.count(name) == 5  # truths times cells, and every seed
+        assert first.count(f"SegNet - {name}") == 2  # truths
+
+
+def test_one_changed_count_is_named_wherever_it_counts(results):
+    path = results / "table1_counts.npz"
+    arrays = read_arrays(path)
+    key = next(
+        key for key in arrays if "baselines" in key and key.endswith("majority class, true labels, all distances")
+    )
+    truth, called = np.argwhere(arrays[key][0])[0]
+    arrays[key][0, truth, called] += 1
+    write_arrays(path, arrays)
+    same, said = found(results)
+    assert not same
+    assert f"table1.json, baselines, 0, confusion, true, {truth}, {called}: " in said
+    assert "table1.json, differences, SegNet - majority class, scores, true, all, pixel accuracy, mean: " in said
+    assert "rows" not in said  # no network's score
+    assert "truth-costs, computed again from truth-costs_counts.npz: as written" in said
+    with pytest.raises(typer.Exit):
+        check(results)
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "said"),
+    [
+        ("table1.json", '"seeds": 2', '"seeds": 2, "more": 1', "table1.json, more: 1 is written, nothing is computed"),
+        ("table1.json", '"CRF": true', '"CRF": false', "table1.json, rows, 1, CRF: False is written, True is computed"),
+        ("truth-costs.json", '"mean": 0.', '"mean": 1.', "truth-costs.json, rows, 0, "),
+        ("table1.md", "Scale tiny", "Scale huge", "table1.md, line 3"),
+        ("table1_times.json", '"hours": ', '"hours": 9', "table1_times.json, hours: "),
+    ],
+)
+def test_a_changed_file_is_named(name, old, new, said, results):
+    text = (results / name).read_text()
+    assert old in text
+    (results / name).write_text(text.replace(old, new, 1))
+    same, told = found(results)
+    assert not same
+    assert said in told
+
+
+def test_numbers_that_another_machine_rounds_otherwise_are_the_same(results):
+    path = results / "table1.json"
+    result = json.loads(path.read_text())
+    scores = result["rows"][0]["scores"]["true"]["all"]["pixel accuracy"]
+    scores["mean"] = float(np.nextafter(scores["mean"], 1))
+    path.write_text(json.dumps(result | {"versions": {"python": "4.0"}}))
+    assert found(results)[0]
+
+
+def without(arrays, word):
+    return {key: array for key, array in arrays.items() if word not in key}
+
+
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (lambda arrays: without(arrays, RECORDS), "expected counts that `semgrid-edu reproduce` has kept"),
+        (lambda arrays: arrays | {RECORDS: np.array("[1]")}, "expected a JSON object"),
+        (lambda arrays: arrays | {RECORDS: np.array("{}")}, "expected the record of a run that has ended"),
+        (lambda arrays: without(arrays, "majority class, lidar"), "expected the array '.*majority class, lidar labels"),
+        (
+            lambda arrays: {key: array[:1] if array.ndim == 3 else array for key, array in arrays.items()},
+            r"\(F, C, C\)",
+        ),
+        (lambda arrays: {key: array / 2 if array.ndim == 3 else array for key, array in arrays.items()}, "numbers of"),
+    ],
+)
+def test_counts_that_are_something_else_are_refused(spoil, says, results):
+    path = results / "table1_counts.npz"
+    write_arrays(path, spoil(read_arrays(path)))
+    with pytest.raises(DataError, match=rf"table1_counts.npz: .*{says}"):
+        found(results)
+
+
+def test_missing_and_damaged_files_are_named(results):
+    path = results / "table1_counts.npz"
+    path.write_bytes(path.read_bytes()[:-40])
+    with pytest.raises(DataError, match=r"table1_counts.npz: expected an npz file"):
+        found(results)
+    path.unlink()
+    with pytest.raises(DataError, match=r"table1_counts.npz: expected a file, found nothing there"):
+        found(results)
+    shutil.copy(results / "truth-costs_counts.npz", path)  # of other runs
+    with pytest.raises(DataError, match=r"table1_counts.npz: expected the record of a run"):
+        found(results)
+
+
+def test_what_is_kept_comes_back_as_it_was(tmp_path):
+    run, counts = Note("a"), np.arange(18).reshape(2, 3, 3) * 1000
+    run.folder(tmp_path).mkdir()
+    (run.folder(tmp_path) / "ended.json").write_text('{"seconds": 3, "commit": "abc"}')
+    arrays = {"sums": np.array([0.1, 1 / 3]), "signed": np.array([-1, 300]), "none": np.zeros((0, 2), int)}
+    read = RunCounts(tmp_path)
+    frames = FrameConfusions(("x", "y"), {"way": counts})
+    kept = [read.confusions(run, "way", "way, true", lambda _: frames), read.of(run, tuple(arrays), lambda _: arrays)]
+    record = read.record(run)
+    for name in ("one.npz", "two.npz"):
+        read.keep(tmp_path / name)
+    assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
+
+    back = RunCounts(tmp_path / "one.npz")
+    assert back.arrays["note-a/way, true"].dtype == np.uint16
+    assert back.arrays["note-a/signed"].dtype == np.int16
+    confusions, others = back.confusions(run, "way", "way, true", None), back.of(run, tuple(arrays), None)
+    assert confusions.drives == kept[0].drives == ("x", "y")
+    assert confusions.counts["way"].dtype == np.int64
+    np.testing.assert_array_equal(confusions.counts["way"], counts)
+    for name, array in arrays.items():
+        np.testing.assert_array_equal(others[name], kept[1][name])
+        np.testing.assert_array_equal(others[name], array)
+    assert back.record(run) == record
+    with pytest.raises(DataError, match=r"one.npz: expected the array 'note-a/other'"):
+        back.of(run, ("other",), None)
+
+
+@pytest.mark.parametrize("name", [name for name in EXPERIMENTS if (COMMITTED / f"{name}_counts.npz").exists()])
+def test_committed_counts_give_the_committed_numbers(name, tmp_path):
+    for file in reports.result_files(COMMITTED, name)[:4]:
+        shutil.copy(file, tmp_path)
+    same, said = found(tmp_path)
+    assert same, said
