@@ -229,8 +229,8 @@ plt.show()
 
 # %% [markdown]
 # **The rule does almost nothing here.** Of 3393 hidden returns in 20 scans it drops 65, because two of so few returns
-# seldom meet on one pixel. With the 64 rings of an HDL-64E a scan has five times as many returns in view, and on the
-# one that we tried the rule still leaves 390 of 487. In the picture, most hidden returns (red crosses) are at the
+# seldom meet on one pixel. With all columns of an HDL-64E, five times as many as here, a scan has five times as many
+# returns in view, and on the one that we tried the rule still leaves 390 of 487. In the picture, most hidden returns (red crosses) are at the
 # fence, others at the poles and the bicycle: the LIDAR looks between the pales and over them onto the grass and the
 # house, and the pixel shows a pale. That is the patch **A** of the opening picture.
 #
@@ -949,7 +949,7 @@ for name in ("road", "sidewalk", "car", "pedestrian", "bicycle", "signage"):
 # %% [markdown]
 # Within 25 m little more than half of the road's cells have a return. Beyond 25 m it is 2 %, so nearly all labels of
 # the far road are the clean-up's guess. Of the cells with a pedestrian, half have no return within 25 m, and three in
-# four beyond. (With 64 rings fewer would be missed; the gaps between rings would still grow with distance.)
+# four beyond. (With all columns fewer would be missed; the gaps between rings would still grow with distance.)
 #
 # **What no policy can know**
 #
