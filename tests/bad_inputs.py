@@ -589,6 +589,7 @@ DATA = (
     ),
     Row("an empty folder's name", "data make sample ''", "argument 4: expected a value"),
     Row("an unknown archive", "data fetch nuscenes --drive 2011_09_26_0013 --folder OUT", "expected kitti or pandaset"),
+    Row("a drive of scenes", "data fetch pandaset --drive 2011_09_26_0013", "--drive: expected no drive of PandaSet"),
     Row("a drive that is no date", "data fetch kitti --drive 13 --folder OUT", "drive: expected date and number"),
     Row("samples without provenance", "data verify TINY", "provenance.json: expected a file"),
     Row("no samples", "data verify OUT", "OUT: expected folders of samples"),

@@ -171,6 +171,8 @@ def load_index(dataset_dir: str | Path) -> DatasetIndex:
     dataset_dir : path-like
         The folder of the data set, such as data/minikitti.
     """
+    if not isinstance(dataset_dir, str | Path):
+        raise ArgumentError("dataset_dir", "the folder of a data set", repr(dataset_dir)[:100])
     root = Path(dataset_dir)
     path = root / INDEX_FILE
     content = read_json(path)

@@ -1,6 +1,8 @@
 """Weights on disk: safetensors files that say in their header which network they belong to (section 4.1)."""
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 
@@ -65,18 +67,33 @@ def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:
         header, or one isn't a finite number.
     """
     header, tensors = read_tensors(path)
-    try:
-        net = build_net(_architecture(parse_json(path, header["architecture"])), camera)
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
-        found = f"{str(header)[:300]}: {error}"
-        raise DataError(path, "the architecture of a network in the header", found) from error
+    with _named(path, header):
+        net = build_net(_architecture(path, header), camera)
     check_tensors(path, tensors, net.state_dict())
     net.load_state_dict(tensors)
     return net.eval()
 
 
-def _architecture(values: dict) -> Architecture:
-    """Return the architecture from the nested dictionary that `asdict` made of it."""
+def read_architecture(path: str | Path) -> Architecture:
+    """Return the architecture of a trained network. Parameter and errors are those of `load_net`."""
+    header, _ = read_tensors(path)
+    with _named(path, header):
+        return _architecture(path, header)
+
+
+@contextmanager
+def _named(path: str | Path, header: dict) -> Iterator[None]:
+    """Turn what a wrong architecture raises into an error that names the file."""
+    try:
+        yield
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        found = f"{str(header)[:300]}: {error}"
+        raise DataError(path, "the architecture of a network in the header", found) from error
+
+
+def _architecture(path: str | Path, header: dict) -> Architecture:
+    """Return the architecture from the nested dictionary in the header that `asdict` made of it."""
+    values = parse_json(path, header["architecture"])
     tuples = {name: tuple(values[name]) for name in ("image_size", "heights")}
     return Architecture(**(values | tuples | {"grid": GridSpec(**values["grid"])}))
 

@@ -103,6 +103,8 @@ def run_pipeline(
     first = next(frames, None)
     if first is None:
         return
+    if not isinstance(first, Frame):
+        raise ArgumentError("frames", "the frames of a drive", repr(first)[:100])
     for doubt in frame_doubts(known if isinstance(known, Sequence) else [first]):
         warnings.warn(doubt, stacklevel=2)
     complete = _complete(stages, first.camera, occupancy, crf, seed)

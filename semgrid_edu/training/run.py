@@ -15,9 +15,9 @@ from semgrid_edu.datasets.training_set import Mixture, TrainingSet, sets_by_came
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture, build_net, build_segmenter, load_imagenet, load_net
+from semgrid_edu.networks.weights import read_architecture
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import write_provenance
-from semgrid_edu.storage.tensors import read_tensors
 from semgrid_edu.training.checkpoint import CHECKPOINT, check_folder
 from semgrid_edu.training.distributed import first_process_first, process_group, rank, world_size
 from semgrid_edu.training.loop import train
@@ -156,7 +156,8 @@ def train_network(
     if imagenet:
         load_imagenet(like_it, imagenet)
     if start:
-        read_tensors(start)
+        found = read_architecture(start)
+        _check_alike(start, replace(found, label_set=description.label_set), description)
     folders = [data] if isinstance(data, str | Path) else list(data)
     with process_group(device) as chosen:
         with first_process_first():
@@ -198,9 +199,14 @@ def _open(folders: Sequence[str | Path], description: Architecture, truth: Lidar
 def _weights_to_start_from(path: str | Path, description: Architecture, camera: Camera) -> dict[str, Tensor]:
     """Read the weights of another training run, and refuse those of another architecture."""
     net = load_net(path, camera)
-    if net.architecture != description:
-        raise DataError(path, f"a network like the one to train, {description}", net.architecture)
+    _check_alike(path, net.architecture, description)
     return net.state_dict()
+
+
+def _check_alike(path: str | Path, found: Architecture, description: Architecture) -> None:
+    """Refuse a network of another architecture."""
+    if found != description:
+        raise DataError(path, f"a network like the one to train, {description}", found)
 
 
 def _command(

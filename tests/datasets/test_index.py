@@ -55,6 +55,11 @@ def test_says_what_is_wrong(tmp_path, content):
         load_index(write(tmp_path, content))
 
 
+def test_a_number_is_no_folder():
+    with pytest.raises(ArgumentError, match="dataset_dir: expected the folder of a data set, found 5"):
+        load_index(5)
+
+
 def test_missing_index_is_named(tmp_path):
     with pytest.raises(DataError, match=r"dataset\.json"):
         load_index(tmp_path)

@@ -132,6 +132,11 @@ def test_what_is_neither_stages_nor_a_network_is_refused(drive, stages):
         next(run_pipeline(drive, stages))
 
 
+def test_what_is_no_frame_is_refused(net):
+    with pytest.raises(ArgumentError, match="^frames: expected the frames of a drive, found 'a'"):
+        next(run_pipeline("abc", net))
+
+
 def test_no_frames_give_no_results(net):
     assert list(run_pipeline([], net)) == []
 

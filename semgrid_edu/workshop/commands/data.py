@@ -53,6 +53,8 @@ def fetch(
     """Download a drive of KITTI and its calibration, and unpack them. After an interruption, run the same command."""
     from semgrid_edu.datasets.readers.fetch import KITTI_LICENCE, PANDASET_LICENCE, fetch_kitti
 
+    if name == "pandaset" and drive:
+        raise ArgumentError("--drive", "no drive of PandaSet: its scenes aren't downloaded", drive)
     if name == "pandaset":
         typer.echo(PANDASET_LICENCE)
         return
