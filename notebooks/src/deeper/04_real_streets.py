@@ -2,14 +2,14 @@
 # # Phantoms on real streets: an assumption that breaks, and its mend
 #
 # **In one sentence.** A filter that takes each newly seen cell as independent of its neighbour believes that a wall
-# moves while the wall comes into view; two rules, which ask what moves where it comes from and where it goes, mend a
+# moves while the wall comes into view; three rules, which ask what moves where it comes from and where it goes, mend a
 # part of it, at a price.
 #
 # **You will be able to**
 # - find the cause of an error by switching one suspect off at a time;
 # - name the assumption that breaks, as an edge that is missing in a graph, and measure it;
 # - compute by hand how fast a wrong belief grows under this assumption;
-# - derive the two rules that CMCDOT uses against it, and say what they cost and what they leave.
+# - derive the rules that CMCDOT uses against it, and say what they cost and what they leave.
 #
 # **Prerequisites.** Lecture [04](../04_cmcdot.ipynb); factors and d-separation, as in
 # [graphical models](graphical_models.ipynb).
@@ -39,6 +39,7 @@ from semgrid_edu.occupancy import (
     Cmcdot, CmcdotParams, Evidence, FilterState, Particles, State, predict, update,
 )  # fmt: skip
 from semgrid_edu.occupancy.cellwise import clear_wakes, collide
+from semgrid_edu.occupancy.particles import keeps_pace
 from semgrid_edu.occupancy.planar_motion import look_up
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
@@ -539,7 +540,37 @@ np.testing.assert_array_equal(clear_wakes(cell, left, np.full((1, 1), False)), c
 print(*(f"{state.name} {p:.2f}" for state, p in zip(State, hidden, strict=True)))
 
 # %% [markdown]
-# With the two rules, STATIC's share at first sight no longer has to hold off phantoms. So it could be lowered towards
+# ### Rule three: what keeps pace with us
+#
+# A hedge is a ragged wall. As we drive past, we look into one gap after the other. So what we glimpse there comes into
+# view at our own speed, and looks like something that drives beside us. For a particle that flies along, the place
+# ahead is often a gap, and a gap is FREE. So rule one is silent. But things that drive beside us behind a hedge are
+# rare, and the next piece of the hedge is not.
+#
+# A particle **keeps pace** if its velocity $v$ is at least as near to ours, $V$, as that of a standing thing is:
+# $|v - V| \le |V|$. It must also be fast enough to leave three cells within two scans. Only what keeps pace is asked two
+# more questions. *Where were you two scans ago?* A wall there counts as one at the origin does. *Is the free place ahead
+# a gap beside something STATIC?* Then it doesn't speak for the particle.
+#
+# **Predict before you run.** We drive at 10 m/s. Which of these keep pace: a car beside us at our speed, one that
+# overtakes at 15 m/s, one that comes towards us at 10 m/s, somebody who crosses the road at 1.4 m/s?
+#
+# <details><summary>Answer</summary>The first two. The others are farther from our velocity than the ground is.
+# </details>
+
+# %%
+pace = AFTER.pace(driven=1.0, dt=0.1, cell=spec.cell)
+others = {"beside us": (10, 0), "overtakes": (15, 0), "comes towards us": (-10, 0), "crosses": (0, 1.4)}
+with_us = {name: bool(keeps_pace(*np.array([v], float).T, pace)[0]) for name, v in others.items()}
+assert [name for name, keeps in with_us.items() if keeps] == ["beside us", "overtakes"]
+
+# %% [markdown]
+# In frames 24 to 60 of drive 0013 an arrow of 6 m/s or more stood beside the road in 13.5 % of the frames before this
+# rule and in 5.9 % with it (0.5 m cells; 15.3 and 4.1 % with 0.2 m; six seeds, the drive's cars found as before). On
+# simulated streets with hedges we found no gain: on four drives, four seeds each, 36 arrows went with us before and 37
+# after. So what this rule is worth rests on one real street.
+#
+# With these rules, STATIC's share at first sight no longer has to hold off phantoms. So it could be lowered towards
 # what is measured in whole first scans, near walls and far from them together.
 #
 # ### The same street again
@@ -563,17 +594,17 @@ assert number["after"].sum() < number["before"].sum() / 2
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left, the street's map with the default filter, in which the wall at B is dark again; right, number of phantom cells over time, before and after: the line of after lies far below"
 fig, axes = plt.subplots(1, 2, figsize=(9.5, 4.8), layout="compressed", width_ratios=(1, 1.1))
-show(axes[0], after[K], f"with the two rules, at {K / 10:.1f} s", legend=True)
+show(axes[0], after[K], f"with the rules, at {K / 10:.1f} s", legend=True)
 times = np.arange(len(scenes)) / 10
 axes[1].step(times, number["before"], color="#d95f02", where="mid", label="before")
-axes[1].step(times, number["after"], color="#0072b2", where="mid", ls="--", label="with the two rules")
+axes[1].step(times, number["after"], color="#0072b2", where="mid", ls="--", label="with the rules")
 axes[1].set(xlabel="time [s]", ylabel="phantom cells", box_aspect=0.7)
 axes[1].legend(frameon=False)
 plt.show()
 
 # %% [markdown]
 # The wall at B is a wall again. Look at A to see whether you were right about it. One drive proves little, so here are
-# all test streets, with the old filter and the one with the two rules:
+# all test streets, with the old filter and the one with the rules:
 
 # %% jupyter={"source_hidden": true}
 GROUPS = {
@@ -617,7 +648,7 @@ print("worse, in per cent:", *lost, sep="\n  ")
 # %% [markdown]
 # This is no free lunch. A vehicle that meets fences all day and people now and then may accept the price, one that
 # drives past a bus stop may not. Each street on which something lost stands in the list. The parameters are yours:
-# `clearing_time=0` switches both rules off.
+# `clearing_time=0` switches all three rules off.
 #
 # ### Half a second, and at least three cells
 #
@@ -744,7 +775,8 @@ plt.show()
 # 1. The filter took each newly seen cell as independent of its neighbour; beside a wall, that is far from true.
 # 2. So each uncovered cell of a wall raised the odds of a particle that runs along with the edge by 15.
 # 3. Switching suspects off one at a time found the moving edge of shadows; transparency and poses had been wrong bets.
-# 4. What comes out of a wall and goes on along it can't claim unseen cells; what has left doesn't stand where it was.
+# 4. What comes out of a wall and goes on along it can't claim unseen cells, least of all if it keeps pace with us; and
+#    what has left doesn't stand where it was.
 # 5. What remains: cells that were held for free, walls without a past, and people who set off are found later.
 #
 # ## Further reading
