@@ -32,6 +32,7 @@ def built(tmp_path_factory):
     with FileLock(shared / "built.lock"):
         if not said.exists():
             result = CliRunner().invoke(app, ["course", "build", str(folder)], catch_exceptions=False)
+            assert result.exit_code == 0, result.output
             said.write_text(result.output, encoding="utf-8")
     return folder, said.read_text(encoding="utf-8")
 
