@@ -1,9 +1,11 @@
 """A course for each that asks for one, and a test for each entry of an exercise's catalogue."""
 
+import os
 import shutil
 from functools import cache
 
 import pytest
+from filelock import FileLock
 from nbgrader_scores import alembic_asked_once  # noqa: F401 (a fixture for all tests here)
 from typer.testing import CliRunner
 
@@ -23,9 +25,16 @@ def exercises_read_once():
 
 @pytest.fixture(scope="session")
 def built(tmp_path_factory):
-    """The folder of a course, and what the command says that builds it."""
-    folder = tmp_path_factory.mktemp("built")
-    return folder, CliRunner().invoke(app, ["course", "build", str(folder)], catch_exceptions=False)
+    """The folder of a course, and what the command says that builds it; all processes of a test run share one."""
+    alone = "PYTEST_XDIST_WORKER" not in os.environ
+    shared = tmp_path_factory.getbasetemp() if alone else tmp_path_factory.getbasetemp().parent
+    folder, said = shared / "built", shared / "built.txt"
+    with FileLock(shared / "built.lock"):
+        if not said.exists():
+            result = CliRunner().invoke(app, ["course", "build", str(folder)], catch_exceptions=False)
+            assert result.exit_code == 0, result.output
+            said.write_text(result.output, encoding="utf-8")
+    return folder, said.read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="session")

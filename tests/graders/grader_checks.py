@@ -6,18 +6,24 @@ give these three the same points and messages.
 
 import re
 from dataclasses import dataclass
+from functools import partial
+from unittest import mock
 
 import pytest
 from answers_in_disguise import HONEST, POINTLESS, disguise
 from nbgrader_scores import autograde, tasks
 from warm import grade_warm, warm_processes
 
+from semgrid_edu.workshop.course.nbgrader import preprocessors
 from semgrid_edu.workshop.course.nbgrader.autograde import reference_answers, submission
 from semgrid_edu.workshop.course.nbgrader.preprocessors import prepared_folder
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 
 TIMEOUT = {"answer": 30, "endless loop": 2}
 """Seconds for a cell: enough for any answer on a busy machine; what each call of an endless loop costs."""
+
+ENDLESS = ("before timeout", "does not come to an end")
+"""What a visible test and a hidden one say of an endless loop."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +39,7 @@ class Entry:
     @property
     def kind(self) -> str:
         """Whether the answer ends, as `TIMEOUT` names it."""
-        return "endless loop" if "before timeout" in self.says else "answer"
+        return "endless loop" if any(words in self.says for words in ENDLESS) else "answer"
 
 
 def mistake(title: str, *, task: str, loses: float, says: str, code: str) -> Entry:
@@ -116,10 +122,15 @@ class GraderChecks:
     def graded_by_nbgrader(cls, source, students, course, start):
         """The same of the reference, the stub and the first packed student, graded as a class is.
 
-        `start` comes first, because nbgrader then needn't compile again what the warm session has compiled.
+        `start` comes first, because nbgrader then needn't compile again what the warm session has compiled. The packed
+        student has processes of her own, as in a class, and before her the reference has, by which nbgrader prepares an
+        exercise. What nbgrader itself makes of the reference and the stub is seen in warm processes, too.
         """
-        notebooks = {name: submission(source, students[name]) for name in ("reference", "stub", "student-0")}
-        scores = autograde(course, cls.exercise, notebooks, timeout=TIMEOUT["answer"])
+        notebooks = {name: submission(source, students[name]) for name in ("student-0", "reference", "stub")}
+        grade = partial(autograde, course, cls.exercise, timeout=TIMEOUT["answer"])
+        scores = grade(submissions={"student-0": notebooks.pop("student-0")})
+        with mock.patch.object(preprocessors, "starter", return_value=lambda _: start()):
+            scores |= grade(submissions=notebooks)
         return {student: cls.by_task(source, cells) for student, cells in scores.items()}
 
     @staticmethod
