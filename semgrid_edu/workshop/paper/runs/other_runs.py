@@ -24,7 +24,7 @@ from semgrid_edu.storage.reading import read_json
 from semgrid_edu.storage.tensors import read_arrays, write_arrays
 from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun
 from semgrid_edu.workshop.paper.runs.score_runs import CONFUSIONS
-from semgrid_edu.workshop.paper.runs.training_runs import GridStageRun, NetworkRun
+from semgrid_edu.workshop.paper.runs.training_runs import GridStageRun, NetworkRun, seconds_per_step
 from semgrid_edu.workshop.scheduler.runs import Run
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions, load_confusions, save_confusions
 from semgrid_edu.workshop.scoring.grids import learned_log_g
@@ -33,8 +33,12 @@ from semgrid_edu.workshop.scoring.score_with_interval import ScoreWithInterval
 OVERTURNED = "overturned cars"
 """The method: the network's own grid, of which only the cells of overturned cars are counted."""
 
-TIMES, ROUNDS, FRAMES_EACH = "times.json", 12, 3
-"""The file with the times, how often two networks take turns, and for how many frames each time."""
+UPRIGHT, UPRIGHT_RANGE = "upright cars", (10.0, 22.0)
+"""The same for upright cars on the same frames, at the distances at which the overturned ones lie, metres."""
+
+TIMES, ROUNDS, FRAMES_EACH, TRAINING_ROUNDS = "times.json", 12, 3, 6
+"""The file with the times, how often two networks take turns, for how many frames each time, and how often in training.
+"""
 
 GRIDS, SHOWN = "grids.npz", (1 / 6, 1 / 2, 5 / 6)
 """The file with the grids, and which frames they are of: at these shares of the test frames, so that nobody chose them.
@@ -49,14 +53,15 @@ class OverturnedRun(NetworkRun):
 
     def work(self, root: Path, device: str) -> None:
         """Count. Parameters are those of `Run.work`."""
-        frames = self.frames.frames(root)
-        net, car, counts = self.network.trained(root, frames.camera), KITTI_14.index("car"), []
+        frames, counts = self.frames.frames(root), {OVERTURNED: [], UPRIGHT: []}
+        net, car = self.network.trained(root, frames.camera), KITTI_14.index("car")
         for k, objects in enumerate(tqdm(self._objects(root), total=len(frames), unit="frame")):
-            called = learned_log_g(net, frames[k]).argmax(axis=0)
-            lying = [one for one in objects if one["class"] == "car" and one.get("overturned", False)]
-            counted = boxes_on(frames.spec, lying) & (frames.arrays["true"][k] == car)
-            counts.append(confusion_matrix(np.where(counted, car, IGNORE), called, len(KITTI_14)))
-        save_confusions(self.folder(root) / CONFUSIONS, FrameConfusions(frames.drives, {OVERTURNED: np.stack(counts)}))
+            called, cars = learned_log_g(net, frames[k]).argmax(axis=0), cars_by_pose(objects)
+            for method, some in counts.items():
+                counted = boxes_on(frames.spec, cars[method]) & (frames.arrays["true"][k] == car)
+                some.append(confusion_matrix(np.where(counted, car, IGNORE), called, len(KITTI_14)))
+        stacked = {method: np.stack(some) for method, some in counts.items()}
+        save_confusions(self.folder(root) / CONFUSIONS, FrameConfusions(frames.drives, stacked))
 
     def _objects(self, root: Path) -> Iterator[list[dict]]:
         """Yield the road users of each frame."""
@@ -68,6 +73,21 @@ class OverturnedRun(NetworkRun):
     def confusions(self, root: str | Path, method: str, truth: str, band: str | None = None) -> FrameConfusions:
         """Return what was counted, by the true labels. Parameters are those of `CountingRun.confusions`."""
         return load_confusions(self.folder(root) / CONFUSIONS)
+
+
+def cars_by_pose(objects: list[dict]) -> dict[str, list[dict]]:
+    """Return the cars that lie on their tops, and the upright ones in `UPRIGHT_RANGE`, by method.
+
+    Parameters
+    ----------
+    objects : list of dict
+        Road users, with "class" and "centre", as a simulated drive's labels hold them.
+    """
+    cars = [one for one in objects if one["class"] == "car"]
+    lying = [one for one in cars if one.get("overturned", False)]
+    nearest, farthest = UPRIGHT_RANGE
+    within = [one for one in cars if nearest <= np.hypot(*one["centre"][:2]) <= farthest]
+    return {OVERTURNED: lying, UPRIGHT: [one for one in within if one not in lying]}
 
 
 def boxes_on(spec: GridSpec, objects: list[dict], margin: float = 0.25) -> NDArray[np.bool_]:
@@ -118,16 +138,24 @@ class TimeRun(Run):
         for net in nets:
             _seconds(net, samples)
         rounds = [[_seconds(net, samples) / len(samples) for net in nets] for _ in range(ROUNDS)]
-        write_json(self.folder(root) / TIMES, {"seconds per frame": rounds})
+        both = [(run.architecture, run.params, run.kind) for run in (self.first, self.second)]
+        steps = [[seconds_per_step(*one) for one in both] for _ in range(TRAINING_ROUNDS)]
+        write_json(self.folder(root) / TIMES, {"seconds per frame": rounds, "seconds per training step": steps})
 
     def seconds_per_frame(self, root: str | Path) -> NDArray[np.float64]:
         """Return the seconds per frame of both networks in each round, (R, 2). Parameters are those of `Run.folder`."""
+        return self._rounds(root, "seconds per frame")
+
+    def seconds_per_step(self, root: str | Path) -> NDArray[np.float64]:
+        """Return the seconds per training step, (R, 2). Parameters are those of `Run.folder`."""
+        return self._rounds(root, "seconds per training step")
+
+    def _rounds(self, root: str | Path, name: str) -> NDArray[np.float64]:
         path = self.folder(root) / TIMES
-        rounds = read_json(path).get("seconds per frame")
         try:
-            return np.array(rounds, dtype=np.float64).reshape(-1, 2)
+            return np.array(read_json(path).get(name), dtype=np.float64).reshape(-1, 2)
         except (ValueError, TypeError) as error:
-            raise DataError(path, "the seconds per frame of two networks in each round", error) from error
+            raise DataError(path, f"the {name} of two networks in each round", error) from error
 
 
 @torch.inference_mode()
@@ -155,6 +183,17 @@ def time_saved(rounds: NDArray) -> ScoreWithInterval:
     saved = 1 - rounds[:, 0] / rounds[:, 1]
     half = stats.t.ppf(0.975, len(saved) - 1) * saved.std(ddof=1) / np.sqrt(len(saved))
     return {"mean": saved.mean(), "low": saved.mean() - half, "high": saved.mean() + half, "seeds": saved.tolist()}
+
+
+def p_not_saved(rounds: NDArray) -> float:
+    """Return Student's one-sided p-value against the statement that time is saved.
+
+    Parameters
+    ----------
+    rounds : (R, 2) float
+        As `time_saved` takes them.
+    """
+    return float(stats.ttest_1samp(1 - rounds[:, 0] / rounds[:, 1], 0, alternative="less").pvalue)
 
 
 @dataclass(frozen=True)

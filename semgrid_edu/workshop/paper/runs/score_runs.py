@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from semgrid_edu.crf import CrfParams, at_temperature, mean_field, unary_from_log_probability
 from semgrid_edu.crf.temperature import Reliability
 from semgrid_edu.datasets.index import load_index
+from semgrid_edu.datasets.readers.depth_points import depth_scan
 from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
 from semgrid_edu.datasets.readers.project_lidar import seen_returns
 from semgrid_edu.datasets.training_set import TrainingSet
@@ -190,9 +191,12 @@ class BaselineRun(CountingRun, NetworkRun):
     ----------
     calibration : CalibrationError
         What geometry believes wrongly about where the camera stands.
+    dense : bool
+        Whether geometry has the true depth of every pixel in place of the LIDAR's returns.
     """
 
     calibration: CalibrationError = EXACT
+    dense: bool = False
     kind, trial_seconds = "baselines", 0.2
     pace = property(lambda self: f"baselines {self.segmenter} {self.frames.preset}")
 
@@ -201,7 +205,7 @@ class BaselineRun(CountingRun, NetworkRun):
         """Image network, labels, frames and calibration."""
         first = self.network.image_stage
         labels = f"{first.label}-{self.network.arrays.truth}-{first.iterations}-seed{first.seed}"
-        return f"{labels}-on-{self.frames.tag}{self.calibration.name}"
+        return f"{labels}-on-{self.frames.tag}{self.calibration.name}" + "-dense" * self.dense
 
     @property
     def needs(self) -> tuple[Run, ...]:
@@ -212,7 +216,8 @@ class BaselineRun(CountingRun, NetworkRun):
         """Return the grids of the baselines. Parameters are those of `CountingRun.grids`."""
         segmenters = {NETWORK: self.network.image_stage.trained(root, frames.camera).segmenter}
         camera = self.calibration.applied_to(frames.camera)
-        returns = None if self.calibration == EXACT else self._believed_returns(root, frames)
+        usual = self.calibration == EXACT and not self.dense
+        returns = None if usual else self._believed_returns(root, frames)
         made = baseline_grids(self.network.arrays.frames(root), frames, segmenters, camera, returns)
 
         def grids(k: int) -> dict[str, NDArray]:
@@ -227,7 +232,8 @@ class BaselineRun(CountingRun, NetworkRun):
         for name, numbers in index.frames_by_drive(self.frames.split).items():
             drive = KittiRawDrive(index.root, *name, images=False)
             for frame in (drive[number] for number in numbers):
-                believed = replace(frame, camera=self.calibration.applied_to(frame.camera))
+                points = depth_scan(frame.labels.depth, frame.camera, 1, 1) if self.dense else frame.points
+                believed = replace(frame, camera=self.calibration.applied_to(frame.camera), points=points)
                 found.append(seen_returns(believed, frames.spec, frames.camera.size))
         return found.__getitem__
 
