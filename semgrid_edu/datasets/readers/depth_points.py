@@ -92,8 +92,8 @@ def depth_scan(
 ) -> NDArray[np.float32]:
     """Return a depth image thinned to a LIDAR's sparsity, in the form of a scan.
 
-    As the paper says, this doesn't make it LIDAR data; it only reduces the amount of depth. By default every fourth row and every
-    second column is kept, up to 80 m. The reflectance is 0, because a depth image has none.
+    As the paper says, this doesn't make it LIDAR data; it only reduces the amount of depth. By default every fourth row
+    and every second column is kept, up to 80 m. The reflectance is 0, because a depth image has none.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ Metric = Callable[[NDArray], float]
 
 
 MIN_DRIVES = 10
-"""With fewer drives no table shows an interval and no claim has a verdict: the variance of so few drives is hardly known."""
+"""With fewer drives no table shows an interval and no claim has a verdict: too few to know how drives vary."""
 
 
 class Interval(NamedTuple):

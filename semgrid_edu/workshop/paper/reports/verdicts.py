@@ -1,8 +1,8 @@
 """Verdicts on the paper's claims, by a rule that is written down before the numbers are (section 4).
 
 A claim is split into statements about numbers, each of the form "this is above (or below) that limit". Each number has
-a 95 % interval over drives and seeds, and a one-sided p-value against its statement: how often a number would lie so far
-on the wrong side if the true value lay at the limit. Then the claim is
+a 95 % interval over drives and seeds, and a one-sided p-value against its statement: how often a number would lie so
+far on the wrong side if the true value lay at the limit. Then the claim is
 
 - **reproduced**, when every interval lies entirely on the claimed side of its limit;
 - **not reproduced**, when at least one number lies on the other side by more than chance explains. A claim with many

@@ -66,7 +66,9 @@ class ArraysRun(Run):
     preset: str = "compact"
     fine: bool = False
     kind = "arrays"
-    size = property(lambda self: f"-{self.preset}" * (self.preset != "compact") + "-fine" * self.fine)  # as names say it
+    size = property(
+        lambda self: f"-{self.preset}" * (self.preset != "compact") + "-fine" * self.fine
+    )  # as names say it
     tag = property(lambda self: f"{self.data.tag}-{self.split}-{self.truth}{self.size}")
     pace = property(lambda self: f"arrays {self.preset}{self.size}")
     trial_seconds = property(lambda self: 0.5 if self.size else 0.1)

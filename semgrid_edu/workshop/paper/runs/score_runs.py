@@ -23,7 +23,7 @@ from semgrid_edu.workshop.paper.runs.training_runs import NetworkRun
 from semgrid_edu.workshop.paper.runs.variants import EXACT, CalibrationError
 from semgrid_edu.workshop.scheduler.runs import Run
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions, load_confusions, save_confusions, seed_confusions
-from semgrid_edu.workshop.scoring.counting import Grids, count_grids, reliability_of_sums
+from semgrid_edu.workshop.scoring.counting import Grids, count_grids, reliability_key, reliability_of_sums
 from semgrid_edu.workshop.scoring.grids import MAJORITY, NETWORK, OCCUPANCY_ALONE, Refine, baseline_grids, network_grids
 
 CONFUSIONS, RELIABILITY = "confusions.npz", "reliability.npz"
@@ -32,10 +32,14 @@ CONFUSIONS, RELIABILITY = "confusions.npz", "reliability.npz"
 WITH_CRF, WITH_SEARCHED = f"{NETWORK} + CRF", f"{NETWORK} + searched CRF"
 """The network's grid, refined with the CRF's default parameters, and with those that were searched."""
 
-SEARCHED = {name: (row["temperature"], CrfParams(**row["crf"])) for name, row in table_beside(__file__).items()}
+_FOUND = table_beside(__file__)
+SEARCHED = {name: (row["temperature"], CrfParams(**row["crf"])) for name, row in _FOUND.items()}
 """For each image network the temperature and the CRF's parameters that `semgrid-edu search-crf` chose for pixel
 accuracy on validation drives, with the shipped network of that kind (docs/results/crf_search*.json). A network for
 which nothing was searched is scored without them."""
+
+WEIGHTS_FOR_CLASSES = {name: row["for_class_accuracy"] for name, row in _FOUND.items()}
+"""The CRF's weights that the same search finds for class accuracy: near 0, the CRF is switched off."""
 
 GEOMETRY, TRUE_GEOMETRY, FLAT_GROUND = "geometry", "geometry with true image labels", "flat ground"
 """Image labels carried by the LIDAR's depth with gaps closed, from the image network and true ones; and image labels
@@ -93,8 +97,8 @@ class CountingRun(Run):
         """
         return load_confusions(self.folder(root) / CONFUSIONS).of(method, truth, band)
 
-    def reliability(self, root: str | Path, method: str) -> Reliability:
-        """Return how often a method is right by its confidence, over all frames and by the true labels.
+    def reliability(self, root: str | Path, method: str, truth: str = "true") -> Reliability:
+        """Return how often a method is right by its confidence, over all frames.
 
         Parameters
         ----------
@@ -102,13 +106,15 @@ class CountingRun(Run):
             The folder of all runs.
         method : str
             Such as `NETWORK`.
+        truth : str
+            The labels, "true" or "lidar".
 
         Raises
         ------
         DataError
             When the run hasn't ended, or its file is damaged.
         """
-        return reliability_of_sums(read_arrays(self.folder(root) / RELIABILITY)[method])
+        return reliability_of_sums(read_arrays(self.folder(root) / RELIABILITY)[reliability_key(method, truth)])
 
 
 def by_seed(
