@@ -74,7 +74,7 @@ def test_every_claim_has_its_statements_readings_and_words():
 
 
 def test_labels_that_are_geometry_never_judge_geometry():
-    assert CLAIMS[9]["readings"] == [["lidar", "true"]]
+    assert CLAIMS[9]["readings"] == (("lidar", "true"),)
     assert "can't judge" in CLAIMS[9]["note"]
 
 
@@ -211,7 +211,7 @@ def test_what_is_not_judged_changes_no_verdict():
 
 
 def test_holms_own_procedure_by_hand():
-    """Four p-values at 5 %: limits 1.25, 1.67, 2.5 and 5 %. The third misses its limit, so the fourth isn't looked at."""
+    """Four p-values at 5 %, whose limits are 1.25, 1.67, 2.5 and 5 %: the third misses its limit."""
     assert holm([0.03, 0.01, 0.04, 0.016], 0.05) == [False, True, False, True]
     assert holm([None, 0.02], 0.05) == [False, True]
     assert holm([], 0.05) == []

@@ -93,13 +93,14 @@ def test_a_band_holds_the_cells_at_its_distance(counted):
     assert distance_bands(SPEC, BANDS)[-1, SPEC.shape[1] // 2] == 0
 
 
-def test_reliability_adds_up_over_the_frames(counted):
+@pytest.mark.parametrize("truth", ["true", "lidar"])
+def test_reliability_adds_up_over_the_frames(counted, truth):
     """The expected calibration error, computed from all cells at once."""
     folder, truths, probability = counted
-    confidence, right = probability.max(axis=1), probability.argmax(axis=1) == truths["true"]
+    confidence, right = probability.max(axis=1), probability.argmax(axis=1) == truths[truth]
     bins = np.ceil(confidence * 15).astype(int)
     expected = sum(abs((confidence - right)[bins == b].sum()) for b in range(1, 16)) / confidence.size
-    assert expected_calibration_error(Here().reliability(folder, "network")) == pytest.approx(expected)
+    assert expected_calibration_error(Here().reliability(folder, "network", truth)) == pytest.approx(expected)
 
 
 def moved(error, x, y, z):

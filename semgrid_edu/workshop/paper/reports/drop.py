@@ -78,8 +78,8 @@ def _other(metric: str) -> str:
 
 
 _READ = {
-    "pixel accuracy": "Here frequent classes suffer on the other routes, there rare ones: some of the paper's classes may "
-    "hardly occur on its two test routes, where each weighs as much as road in the mean over classes.",
+    "pixel accuracy": "Here frequent classes suffer on the other routes, there rare ones: some of the paper's classes "
+    "may hardly occur on its two test routes, where each weighs as much as road in the mean over classes.",
     "class accuracy": "Here rare classes suffer on the other routes, there frequent ones.",
 }
 """What it means that a metric falls most here and not in the paper."""

@@ -112,7 +112,7 @@ def runs_of_claims(scale: Scale, seeds: int) -> SimpleNamespace:
         "networks", those of Table 1 by name, and of these the "usual" one, SegNet, with as many seeds as all others,
         and "usual_of_all_seeds"; "taught_true", SegNet that learns from true labels; "new_routes", Table 2's network on
         routes that nobody has driven in training; "table2" itself; "perfect", SegNet on data without any error, cells
-        of 0.2 m; "overturned" and "overturned_blind", cars on their tops: the usual network, and one that doesn't see the
+        of 0.2 m; "overturned" and "overturned_blind", cars on their tops: the usual network, and one without the
         occupancy grid; "unreduced", without the 1x1 reduction; "times", of the usual network and of that one;
         "two_stages", "unbalanced" and "one_plane", trained so; "baselines", what learns no fusion; "baselines_off" and
         "usual_off", with the wrong calibration; "baselines_dense", with the depth of every pixel.
