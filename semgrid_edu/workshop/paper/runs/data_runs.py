@@ -70,7 +70,8 @@ class ArraysRun(Run):
         lambda self: f"-{self.preset}" * (self.preset != "compact") + "-fine" * self.fine
     )  # as names say it
     tag = property(lambda self: f"{self.data.tag}-{self.split}-{self.truth}{self.size}")
-    pace = property(lambda self: f"arrays {self.preset}{self.size}")
+    built = property(lambda self: self.preset + "-fine" * self.fine)  # what the time of a step depends on
+    pace = property(lambda self: f"arrays {self.built}")
     trial_seconds = property(lambda self: 0.5 if self.size else 0.1)
     grid = property(lambda self: GridSpec.paper() if self.fine else architecture("segnet", self.preset).grid)
     routes = property(lambda self: [route for route in self.data.recipe.routes if route.split == self.split])

@@ -160,7 +160,7 @@ class ScoreRun(CountingRun, NetworkRun):
     crf: bool = True
     calibration: CalibrationError = EXACT
     kind = "score"
-    pace = property(lambda self: f"score {self.segmenter} {self.frames.preset}" + " with CRF" * self.crf)
+    pace = property(lambda self: f"score {self.segmenter} {self.frames.built}" + " with CRF" * self.crf)
     trial_seconds = property(lambda self: (0.8 if self.crf else 0.15) * (1 if self.frames.preset == "compact" else 10))
 
     @property

@@ -117,7 +117,7 @@ class ImageStageRun(TrainingRun):
     n_frames: int | None = None
     kind = "image"
     tag = property(lambda self: f"{self.label}-{self.iterations}-seed{self.seed}")
-    pace = property(lambda self: f"image {self.segmenter} {self.arrays.preset}")
+    pace = property(lambda self: f"image {self.segmenter} {self.arrays.built}")
 
     @property
     def label(self) -> str:
@@ -176,7 +176,7 @@ class GridStageRun(TrainingRun):
     iterations: int = 500
     variant: Variant = USUAL
     kind = "grid"
-    pace = property(lambda self: f"grid {self.image_stage.segmenter} {self.arrays.preset}{self.variant.name}")
+    pace = property(lambda self: f"grid {self.image_stage.segmenter} {self.arrays.built}{self.variant.name}")
     seed = property(lambda self: self.image_stage.seed)
     chosen = property(lambda self: self.image_stage.chosen)  # the frames that its image network learned from
 
@@ -227,5 +227,5 @@ class NetworkRun(Run):
 
     tag = property(lambda self: f"{self.network.tag}-on-{self.frames.tag}")
     steps = property(lambda self: self.frames.n_labelled)
-    pace = property(lambda self: f"{self.kind} {self.frames.preset}")
+    pace = property(lambda self: f"{self.kind} {self.frames.built}")
     segmenter = property(lambda self: self.network.image_stage.segmenter)
