@@ -31,7 +31,7 @@ class Interval(NamedTuple):
     high: float
 
 
-class Estimate(NamedTuple):
+class EstimatedMean(NamedTuple):
     """A mean over seeds and drives, and how well it is known: what intervals and p-values are computed from.
 
     Parameters
@@ -84,12 +84,12 @@ class Estimate(NamedTuple):
         return float(tail if beyond > 0 else 1 - tail)
 
 
-def drive_estimate(confusions: ArrayLike, metric: Metric) -> Estimate:
+def drive_estimate(confusions: ArrayLike, metric: Metric) -> EstimatedMean:
     """Return the mean score of a method over its seeds, and its variances. Parameters are those of `drive_interval`."""
     return _estimate(*_left_out(_checked("confusions", confusions), metric))
 
 
-def paired_estimate(a: ArrayLike, b: ArrayLike, metric: Metric) -> Estimate:
+def paired_estimate(a: ArrayLike, b: ArrayLike, metric: Metric) -> EstimatedMean:
     """Return by how much method a beats method b, and its variances. Parameters are those of `paired_interval`."""
     a, b = _checked("a", a), _checked("b", b)
     if a.shape[1:] != b.shape[1:] or (len(a) != len(b) and 1 not in (len(a), len(b))):
@@ -212,12 +212,12 @@ def _left_out(confusions: NDArray, metric: Metric) -> tuple[NDArray, NDArray]:
     return scores, without
 
 
-def _estimate(scores: NDArray, without: NDArray) -> Estimate:
+def _estimate(scores: NDArray, without: NDArray) -> EstimatedMean:
     """Return the estimate from the metric of each seed on all drives (S,), and on all but one of them (S, V)."""
-    return Estimate(float(scores.mean()), _variances(scores, without), without.shape)
+    return EstimatedMean(float(scores.mean()), _variances(scores, without), without.shape)
 
 
-def _interval(estimate: Estimate, level: float) -> Interval:
+def _interval(estimate: EstimatedMean, level: float) -> Interval:
     if not 0 < level < 1:
         raise ArgumentError("level", "a share between 0 and 1, such as 0.95", level)
     half = estimate.half_width(level)

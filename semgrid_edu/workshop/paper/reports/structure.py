@@ -25,7 +25,7 @@ UNITS = ("drives", "frames")
 
 
 def structure_plan(scale: Scale, seeds: int) -> list[Run]:
-    """Return all runs. Parameters are those of `structure_runs`."""
+    """Return all runs. Parameters are those of `table1_runs`."""
     return [run for some in structure_runs(scale, seeds).values() for run in some]
 
 

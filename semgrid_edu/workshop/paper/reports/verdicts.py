@@ -53,7 +53,7 @@ class Statement(NamedTuple):
     above : bool
         Whether the claim says that it is above the limit; else below.
     p : float or None
-        The one-sided p-value against the statement, see `Estimate.p_value`; None where there is no interval.
+        The one-sided p-value against the statement, see `EstimatedMean.p_value`; None where there is no interval.
     judged : bool
         Whether the claim needs it. What the claim doesn't need is shown beside it.
     """
