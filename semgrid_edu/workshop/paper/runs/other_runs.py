@@ -160,7 +160,7 @@ class TimeRun(Run):
         return self._rounds(counted, FRAME)
 
     def seconds_per_step(self, counted: RunCounts) -> NDArray[np.float64]:
-        """Return the seconds per training step, (R, 2). Parameters are those of `seconds_per_frame`."""
+        """Return the seconds per training step, (R, 2). Parameters are those of `TimeRun.seconds_per_frame`."""
         return self._rounds(counted, STEP)
 
     def _rounds(self, counted: RunCounts, name: str) -> NDArray[np.float64]:

@@ -110,10 +110,7 @@ class CountingRun(Run):
         return counted.confusions(self, method, name, lambda root: self._counts(root, method, truth, band))
 
     def frame_confusions(self, counted: RunCounts, method: str, truth: str) -> NDArray[np.int64]:
-        """Return the confusion matrices of one method, one per frame, (N, C, C).
-
-        Parameters are those of `confusions`.
-        """
+        """Return one method's matrices, one per frame, (N, C, C). Parameters are those of `CountingRun.confusions`."""
         name = f"{method}, {truth} labels, by frame"
         return counted.of(self, (name,), lambda root: {name: self._counts(root, method, truth).counts[method]})[name]
 
@@ -136,11 +133,6 @@ class CountingRun(Run):
             Such as `NETWORK`.
         truth : str
             The labels, "true" or "lidar".
-
-        Raises
-        ------
-        DataError
-            When the run hasn't ended, or its file is damaged.
         """
         key = reliability_key(method, truth)
         name = f"{key}, confidence"
