@@ -14,7 +14,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.cellwise import STATIC, open_space
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import OUTSIDE, Particles, cell_of
-from semgrid_edu.occupancy.world import OwnPace
+from semgrid_edu.occupancy.world import Pace
 
 SLOW = np.float32(16)
 """Beside 1, exp(-16) hardly counts in single precision, so exponentials beyond it needn't be computed."""
@@ -145,7 +145,7 @@ def _cells_at(xy, velocity, cells, time, least, shape, x_max, y_max, cell):
     return there
 
 
-def keeps_pace(vx: NDArray, vy: NDArray, pace: OwnPace) -> NDArray[np.bool_]:
+def keeps_pace(vx: NDArray, vy: NDArray, pace: Pace) -> NDArray[np.bool_]:
     """Say of velocities whether they are at least as near to the vehicle's own as that of a standing thing is.
 
     So the difference may be as large as the vehicle's speed.
@@ -154,7 +154,7 @@ def keeps_pace(vx: NDArray, vy: NDArray, pace: OwnPace) -> NDArray[np.bool_]:
     ----------
     vx, vy : (N,) float
         Velocities along the axes of the map, m/s; in compiled loops those of one particle.
-    pace : OwnPace
+    pace : Pace
         How fast the vehicle drives, and from which speed on anything counts. Nothing keeps pace with one that stands.
     """
     slip, speed = (vx - pace.speed) ** 2 + vy**2, vx**2 + vy**2
@@ -165,13 +165,7 @@ _keeps_pace = njit(cache=True, nogil=True)(keeps_pace)
 
 
 def doubt_arrivals(
-    particles: Particles,
-    cells: NDArray,
-    doubt: NDArray,
-    ahead: NDArray,
-    mixed: NDArray,
-    spec: GridSpec,
-    pace: OwnPace,
+    particles: Particles, cells: NDArray, doubt: NDArray, ahead: NDArray, mixed: NDArray, spec: GridSpec, pace: Pace
 ) -> NDArray[np.float32]:
     """Return which part of each weight comes out of a wall and goes on along it, beside a vehicle that drives.
 
@@ -187,7 +181,7 @@ def doubt_arrivals(
         The four states before particles flew.
     spec : GridSpec
         The cells, (H, W).
-    pace : OwnPace
+    pace : Pace
         How fast the vehicle drives.
     """
     now = particles.position.ravel(), particles.velocity.ravel(), particles.weight, cells

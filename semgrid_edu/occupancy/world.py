@@ -20,7 +20,7 @@ HALT = 0.4
 what seems to move has been seen at least there, where it seemed to start, and once on the way."""
 
 
-class OwnPace(NamedTuple):
+class Pace(NamedTuple):
     """How fast the vehicle drives, and what that means for what may keep pace with it.
 
     Parameters
@@ -108,7 +108,7 @@ class WorldModel:
             raise ArgumentError("first_sight", "three probabilities that sum to 1", self.first_sight)
         check_sensor(self.sensor)
 
-    def pace(self, driven: float, dt: float, cell: float) -> OwnPace:
+    def pace(self, driven: float, dt: float, cell: float) -> Pace:
         """Return how fast the vehicle drives, and what that means for what may keep pace with it.
 
         Parameters
@@ -120,7 +120,7 @@ class WorldModel:
         """
         halt = HALT * self.clearing_time
         least = self.clearing_cells * cell / halt if halt > 0 else np.inf
-        return OwnPace(float(driven) / dt if dt > 0 else 0.0, float(least), halt)
+        return Pace(float(driven) / dt if dt > 0 else 0.0, float(least), halt)
 
 
 def transition_matrix(world: WorldModel, dt: float) -> NDArray[np.float64]:
