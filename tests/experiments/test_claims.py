@@ -294,6 +294,8 @@ def test_every_deviation_of_scale_is_told(scale):
     assert ("Compact networks" in told) == (scale.preset == "compact")
     assert ("chosen by its scores on the test streets" in told) == (scale.preset == "compact")
     assert "eight runs" in told
+    assert ("64 elevations" in told) == (scale.name != "quick")
+    assert "64 elevations" not in "\n".join(deviations(scale, "synthia"))  # of a depth image, without a scanner
 
 
 def drop(pixel, by_class):

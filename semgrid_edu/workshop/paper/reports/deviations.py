@@ -8,6 +8,7 @@ from semgrid_edu.workshop.paper.runs.scales import Scale
 from semgrid_edu.workshop.paper.runs.score_runs import WEIGHTS_FOR_CLASSES
 from semgrid_edu.workshop.scoring.statistics import MIN_DRIVES
 from semgrid_edu.workshop.simulation.datasets import FORMAT
+from semgrid_edu.workshop.simulation.sensors.rig import KITTI_AHEAD
 
 _TEXTS = table_beside(__file__)
 CHOSEN_ON = 1
@@ -39,7 +40,14 @@ def deviations(scale: Scale, field: str) -> list[str]:
         On which data: "kitti", "chroma" or "synthia".
     """
     labels = _TEXTS["labels"]["true" if field == "synthia" else "made"]
-    return [_data(scale, field), *labels, *_networks(scale), _training(scale), *_said_openly(scale, field)]
+    return [
+        _data(scale, field),
+        *_scanner(scale, field),
+        *labels,
+        *_networks(scale),
+        _training(scale),
+        *_said_openly(scale, field),
+    ]
 
 
 def _said_openly(scale: Scale, field: str) -> list[str]:
@@ -65,6 +73,12 @@ def _data(scale: Scale, field: str) -> str:
     ours = " and ".join(f"{frames} to {split} in {drives} drives" for split, (frames, drives) in counts)
     theirs = f" ({paper[0]} to train and {paper[1]} to test in the paper)" if paper else ""
     return f"Simulated streets, {data}, in place of {_TEXTS['replaced'][field]}: labelled frames {ours}{theirs}."
+
+
+def _scanner(scale: Scale, field: str) -> list[str]:
+    """Return what the scanner is like, where there is one, and it isn't the coarse one of small data sets."""
+    recipe = RECIPE_OF[getattr(scale, field)]
+    return [_TEXTS["labels"]["scanner"]] * (recipe.rig == KITTI_AHEAD and not recipe.dense)
 
 
 def _networks(scale: Scale) -> list[str]:
