@@ -803,7 +803,7 @@ SINGLE = {
 RESUMED = ("crf-error", "crf-coupling", "truth-policies")
 """Those that write while they run."""
 
-PAPERS = ("table1", "table2", "table3", "claims", "ablations", "truth-costs", "figures", "all")
+PAPERS = ("table1", "table2", "table3", "claims", "structure", "ablations", "truth-costs", "figures", "all")
 """The experiments of the paper."""
 
 NOTES = "notes.json"

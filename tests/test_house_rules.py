@@ -146,9 +146,9 @@ def test_the_house_stays_small():
         modules[storey] += not module.endswith("__init__.py")
         lines[storey] += code_lines(module)
     assert modules["book"] <= 163
-    assert modules["workshop"] <= 121
+    assert modules["workshop"] <= 130
     assert lines["book"] <= 11_440
-    assert lines["workshop"] <= 10_600
+    assert lines["workshop"] <= 10_860
 
 
 def test_no_folder_has_more_than_18_modules():

@@ -96,13 +96,15 @@ def test_a_band_holds_the_cells_at_its_distance(counted):
     assert distance_bands(SPEC, BANDS)[-1, SPEC.shape[1] // 2] == 0
 
 
-def test_reliability_adds_up_over_the_frames(counted):
+@pytest.mark.parametrize("truth", ["true", "lidar"])
+def test_reliability_adds_up_over_the_frames(counted, truth):
     """The expected calibration error, computed from all cells at once."""
     folder, truths, probability = counted
-    confidence, right = probability.max(axis=1), probability.argmax(axis=1) == truths["true"]
+    confidence, right = probability.max(axis=1), probability.argmax(axis=1) == truths[truth]
     bins = np.ceil(confidence * 15).astype(int)
     expected = sum(abs((confidence - right)[bins == b].sum()) for b in range(1, 16)) / confidence.size
-    assert expected_calibration_error(Here().reliability(RunCounts(folder), "network")) == pytest.approx(expected)
+    found = Here().reliability(RunCounts(folder), "network", truth)
+    assert expected_calibration_error(found) == pytest.approx(expected)
 
 
 def moved(error, x, y, z):

@@ -162,10 +162,10 @@ def test_a_loss_of_class_accuracy_is_worth_less_than_any_gain_in_pixels():
 
 def test_gains_over_several_drives_have_intervals():
     right, half = np.diag([10, 0]), np.array([[5, 5], [0, 0]])
-    a, b = np.stack([right, half, right]), np.stack([half, half, half])
+    a, b = np.stack([right, half, right] * 4), np.stack([half, half, half] * 4)
     gains = gains_by_metric(a, b)
     assert gains["pixel accuracy"] == list(paired_interval(a[None], b[None], pixel_accuracy))
     assert gains_by_metric(a[:1], b[:1])["pixel accuracy"] == [None, 0.5, None]
     text = gains_text({"CRF": gains, "one": gains_by_metric(a[:1], b[:1])})
-    assert "CRF: pixel accuracy +33.33 (-38.38 to +105.04)" in text  # t of 2 degrees of freedom, 4.30, times 50 / 3
+    assert "CRF: pixel accuracy +33.33 (+17.69 to +48.98)" in text  # t of 11 degrees of freedom, 2.201, times 7.107
     assert "one: pixel accuracy +50.00, class" in text

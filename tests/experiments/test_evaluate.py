@@ -142,11 +142,12 @@ def test_table_shows_intervals_in_brackets():
 def test_intervals_are_those_of_the_drives():
     right, wrong = np.zeros((2, 14, 14), np.int64)
     right[ROAD, ROAD], wrong[ROAD, FREE] = 10, 10
-    counts = np.stack([right + wrong, right, right + wrong, 2 * wrong])
+    counts = np.stack([right + wrong, right, right + wrong, 2 * wrong] * 5)
     counts[:, FREE, FREE] = 20
-    found = intervals(FrameConfusions(("a", "a", "b", "b"), {"network": counts}), KITTI_14)["network"]
+    drives = tuple("aabbccddeeffgghhiijj")
+    found = intervals(FrameConfusions(drives, {"network": counts}), KITTI_14)["network"]
     for cells, empty in (("all", False), ("semantic", True)):
-        by_drive = np.array([counts[:2].sum(axis=0), counts[2:].sum(axis=0)])
+        by_drive = counts.reshape(10, 2, 14, 14).sum(axis=1)
         by_drive[:, FREE] *= not empty
         assert found[cells]["pixel accuracy"] == list(drive_interval(by_drive[None], pixel_accuracy))
 

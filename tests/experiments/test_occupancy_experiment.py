@@ -15,7 +15,7 @@ from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.street.plan import Wishes
 from semgrid_edu.workshop.simulation.street.traffic import Traffic
-from semgrid_edu.workshop.simulation.street.trajectories import STAND, Pace, Trajectory
+from semgrid_edu.workshop.simulation.street.trajectories import STAND, ActorPace, Trajectory
 from semgrid_edu.workshop.simulation.things.cars import car_size
 from semgrid_edu.workshop.simulation.things.materials import Kind
 from semgrid_edu.workshop.studies.filter.cell_scores import CellScores, Estimate
@@ -34,8 +34,8 @@ def people_and_parked_cars(traffic: Traffic) -> None:
             way = Trajectory(s, sign * (side.edge - 1.06), 1, 0, STAND)
             traffic.park(Kind.CAR, car_size("estate"), way, ("estate", (0.3, 0.3, 0.3)))
         for s, along in ((10.0, 1), (16.0, -1), (21.0, 1), (24.0, -1)):
-            traffic.walk(s, sign * (side.edge + side.strip + side.walk / 2), along, 0, Pace(1.4))
-        traffic.walk(12.0 + 3 * sign, 3.0 * sign, 0, -sign, Pace(1.4))
+            traffic.walk(s, sign * (side.edge + side.strip + side.walk / 2), along, 0, ActorPace(1.4))
+        traffic.walk(12.0 + 3 * sign, 3.0 * sign, 0, -sign, ActorPace(1.4))
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ import json
 import shutil
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
+from itertools import product, starmap
 from pathlib import Path
 
 import numpy as np
@@ -15,17 +16,29 @@ from tiny_runs import HandMadeData
 import semgrid_edu
 from semgrid_edu.datasets import training_cache
 from semgrid_edu.errors import DataError
+from semgrid_edu.labels import LABEL_SETS
+from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.tensors import read_arrays, write_arrays
 from semgrid_edu.storage.workplace import Workplace
 from semgrid_edu.workshop.commands.experiments import check
 from semgrid_edu.workshop.paper.reports import reproduce as reports
 from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS
 from semgrid_edu.workshop.paper.reports.recompute import check_results
-from semgrid_edu.workshop.paper.runs.data_runs import DataRun
+from semgrid_edu.workshop.paper.runs.data_runs import RECIPE_OF, DataRun
+from semgrid_edu.workshop.paper.runs.other_runs import FRAME, OVERTURNED, STEP, TIMES, UPRIGHT, OverturnedRun, TimeRun
 from semgrid_edu.workshop.paper.runs.run_counts import RECORDS, RunCounts
 from semgrid_edu.workshop.paper.runs.scales import SCALES, Scale
-from semgrid_edu.workshop.paper.runs.score_runs import BASELINES
-from semgrid_edu.workshop.scoring.confusions import DRIVES, FrameConfusions
+from semgrid_edu.workshop.paper.runs.score_runs import BASELINES, CONFUSIONS, WITH_CRF, BaselineRun, CountingRun
+from semgrid_edu.workshop.scheduler.plan import with_needs
+from semgrid_edu.workshop.scheduler.runs import ENDED
+from semgrid_edu.workshop.scoring.confusions import (
+    DRIVES,
+    FrameConfusions,
+    confusion_key,
+    distance_band_names,
+    save_confusions,
+)
+from semgrid_edu.workshop.scoring.grids import NETWORK
 
 TINY = Scale(
     name="tiny",
@@ -210,6 +223,53 @@ def test_what_is_kept_comes_back_as_it_was(tmp_path):
     assert back.record(run) == record
     with pytest.raises(DataError, match=r"one.npz: expected the array 'note-a/other'"):
         back.of(run, ("other",), None)
+
+
+def count_by_hand(run, root, rng):
+    """Write what a run leaves behind: two frames of each of ten drives, and numbers drawn by chance."""
+    folder, drives = run.folder(root), tuple(f"2026_01_01 {k // 2:04d}" for k in range(20))
+    write_json(folder / ENDED, {"seconds": 60, "commit": "abc", "date": "2026-01-01"})
+    if isinstance(run, TimeRun):
+        write_json(folder / TIMES, {what: rng.uniform(1, 2, (4, 2)).tolist() for what in (FRAME, STEP)})
+    elif isinstance(run, (CountingRun, OverturnedRun)):
+        n_classes = len(LABEL_SETS[RECIPE_OF[run.frames.data.data].label_set])
+        methods = BASELINES if isinstance(run, BaselineRun) else (NETWORK, WITH_CRF)
+        keys = [
+            *starmap(confusion_key, product(methods, ("lidar", "true"), distance_band_names())),
+            OVERTURNED,
+            UPRIGHT,
+        ]
+        counts = {key: rng.integers(0, 9, (20, n_classes, n_classes)) for key in keys}
+        save_confusions(folder / CONFUSIONS, FrameConfusions(drives, counts))
+
+
+@pytest.mark.parametrize(
+    ("name", "first", "last", "said"),
+    [
+        ("claims", "times-", "/seconds per training step", "share of the time of a training step saved, value, mean: "),
+        ("claims", "overturned-", "/overturned cars", "called car: overturned cars - upright ones, value, mean: "),
+        ("claims", "score-", "/network, true labels, 0-10 m", "0-20 m - 20-40 m, value, mean: "),
+        ("structure", "score-", "/network, lidar labels, by frame", "rows, 0, half-width, frames: "),
+    ],
+)
+def test_claims_and_structure_are_computed_again(name, first, last, said, tmp_path):
+    """Of runs whose counts are drawn by chance, and which are gone."""
+    root, out, rng, experiment = tmp_path / "runs", tmp_path / "out", np.random.default_rng(0), EXPERIMENTS[name]
+    for run in with_needs(experiment.runs(SCALES["quick"], 3)):
+        run.folder(root).mkdir(parents=True)
+        count_by_hand(run, root, rng)
+    out.mkdir()
+    reports.write_result(name, experiment, SCALES["quick"], 3, root, out)
+    shutil.rmtree(root)
+    same, told = found(out)
+    assert same, told
+    path = out / f"{name}_counts.npz"
+    arrays = read_arrays(path)
+    key = next(key for key in arrays if key.startswith(first) and key.endswith(last))
+    write_arrays(path, arrays | {key: arrays[key][::-1] ** 2})
+    same, told = found(out)
+    assert not same
+    assert said in told
 
 
 @pytest.mark.parametrize("name", [name for name in EXPERIMENTS if (COMMITTED / f"{name}_counts.npz").exists()])

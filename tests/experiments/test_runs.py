@@ -6,9 +6,11 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from safetensors.torch import load_file
 from tiny_notes import Note, wait_for
 from tiny_runs import results, tiny_training_runs
 
@@ -21,6 +23,7 @@ from semgrid_edu.training.log import LOG, read_log
 from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS
 from semgrid_edu.workshop.paper.reports.reproduce import Request, reproduce
 from semgrid_edu.workshop.paper.runs.scales import SCALES, scale_named
+from semgrid_edu.workshop.paper.runs.variants import Variant
 from semgrid_edu.workshop.scheduler.execute import check_runs_folder, claim_folder, execute_plan, run_one
 from semgrid_edu.workshop.scheduler.plan import estimate, plan_hours, plan_table, with_needs
 from semgrid_edu.workshop.simulation.datasets import DatasetRecipe, Route, make_from_recipe
@@ -137,6 +140,18 @@ def test_the_image_stage_is_trained_once_and_both_networks_start_from_it(trained
     assert len(list(trained.glob(f"grid-*/{WEIGHTS}"))) == 2
     names = sorted(path.name for path in trained.glob("grid-*"))
     assert names == ["grid-tiny-segnet-true-2+2-seed1", "grid-tiny-segnet-true-2planes-unbalanced-2+2-seed1"]
+
+
+def test_in_two_stages_the_image_network_stays_as_it_was(trained, tmp_path):
+    """End to end, the grid's loss changes it."""
+    usual, root = tiny_training_runs()[0], shutil.copytree(trained, tmp_path / "runs")
+    apart = replace(usual, variant=Variant(end_to_end=False))
+    assert execute_plan([apart], root, here(1)) == {}
+    first, two_stage, together = (load_file(run.folder(root) / WEIGHTS) for run in (usual.image_stage, apart, usual))
+    learnt = [name for name in first if name.startswith("segmenter.") and name.endswith("weight")]
+    assert apart.name != usual.name
+    assert all(first[name].equal(two_stage[name]) for name in learnt)
+    assert not any(first[name].equal(together[name]) for name in learnt)
 
 
 def copied(trained, root, *kinds):

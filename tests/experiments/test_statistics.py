@@ -8,7 +8,7 @@ from scipy import stats
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.metrics import METRICS, class_accuracy, pixel_accuracy
 from semgrid_edu.workshop.scoring.score_with_interval import compared, score_with_interval
-from semgrid_edu.workshop.scoring.statistics import drive_interval, paired_interval
+from semgrid_edu.workshop.scoring.statistics import drive_estimate, drive_interval, paired_estimate, paired_interval
 
 
 def matrices(right):
@@ -119,9 +119,35 @@ def test_what_gives_no_interval_is_refused():
 
 
 def test_what_was_measured_is_the_interval_and_every_seed():
-    confusions = matrices(np.random.default_rng(0).uniform(60, 90, (3, 8)))
+    confusions = matrices(np.random.default_rng(0).uniform(60, 90, (3, 10)))
     for metric in METRICS.values():
         value, interval = score_with_interval(confusions, metric), drive_interval(confusions, metric)
         assert (value["low"], value["mean"], value["high"]) == interval
         assert value["seeds"] == [metric(matrix) for matrix in confusions.sum(axis=1)]
         assert np.mean(value["seeds"]) == pytest.approx(value["mean"])
+
+
+@pytest.mark.parametrize("above", [True, False])
+def test_one_seed_gives_students_p_value(above):
+    """The share that is right is the plain mean over drives of equal size, so that Student's test is exact."""
+    right, side = np.array([80.0, 84.0, 78.0, 82.0, 91.0]), "less" if above else "greater"
+    found = drive_estimate(matrices([right]), pixel_accuracy).p_value(0.85, above)
+    assert found == pytest.approx(stats.ttest_1samp(right, 85, alternative=side).pvalue)
+
+
+@pytest.mark.parametrize("level", [0.5, 0.95, 0.99])
+def test_p_values_and_intervals_never_disagree(level):
+    """At the end of an interval of level 1 - 2 p the p-value is p, with seeds and drives that both vary."""
+    rng = np.random.default_rng(0)
+    a, b = (matrices(rng.uniform(60, 80, 12) + rng.normal(size=(3, 12))) for _ in range(2))
+    low, _, high = paired_interval(a, b, pixel_accuracy, level)
+    estimate = paired_estimate(a, b, pixel_accuracy)
+    assert estimate.p_value(high, above=True) == pytest.approx((1 - level) / 2)
+    assert estimate.p_value(low, above=False) == pytest.approx((1 - level) / 2)
+    assert estimate.p_value(low, above=True) == pytest.approx((1 + level) / 2)
+
+
+def test_numbers_that_never_vary_are_certain():
+    estimate = drive_estimate(matrices(np.full((2, 5), 80.0)), pixel_accuracy)
+    assert estimate.p_value(0.9, above=True) == 0
+    assert estimate.p_value(0.7, above=True) == 1

@@ -13,7 +13,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Belief, PlanarMotion, State
 from semgrid_edu.workshop.commands.main import run
 from semgrid_edu.workshop.simulation.street.traffic import Actor
-from semgrid_edu.workshop.simulation.street.trajectories import Pace, Trajectory
+from semgrid_edu.workshop.simulation.street.trajectories import ActorPace, Trajectory
 from semgrid_edu.workshop.simulation.things.materials import Kind
 from semgrid_edu.workshop.studies.filter.detection_latency import convoy_pairs
 from semgrid_edu.workshop.studies.filter.scenes import CellTruth, KnownScene
@@ -29,11 +29,11 @@ CAMERA = Camera(np.diag([100.0, 100.0, 1.0]), np.eye(4), size=(10, 20))
 LOOK = ("sedan", (0.1, 0.1, 0.1))
 
 
-def actor(number: int, kind: Kind, s: float, pace: Pace, along: int = 1, d: float = 0.0) -> Actor:
+def actor(number: int, kind: Kind, s: float, pace: ActorPace, along: int = 1, d: float = 0.0) -> Actor:
     return Actor(number, kind, (4.0, 1.8, 1.5), Trajectory(s, d, along, 0, pace), LOOK)
 
 
-MOVING = [actor(7, Kind.CAR, 20.0, Pace(10)), actor(9, Kind.PEDESTRIAN, 5.0, Pace(1.4))]
+MOVING = [actor(7, Kind.CAR, 20.0, ActorPace(10)), actor(9, Kind.PEDESTRIAN, 5.0, ActorPace(1.4))]
 
 
 def scene(time: float, frames_in_view: int = 20, height: float = 1.0) -> KnownScene:
@@ -133,7 +133,7 @@ def test_something_in_view_for_less_than_a_second_may_stay_unfound():
 
 def test_a_follower_is_late_from_when_the_first_is_found_and_it_is_hit():
     """Car 7 is found at 0.2 s; car 8 behind it is hit from the beginning, and found at 0.6 s."""
-    scores, pace = StreetScores(ROW), Pace(10)
+    scores, pace = StreetScores(ROW), ActorPace(10)
     scores.latency.begin([actor(7, Kind.CAR, 20.0, pace), actor(8, Kind.CAR, 5.0, pace)])
     for time, first, second in ((0.0, NO, NO), (0.2, YES, NO), (0.6, YES, YES)):
         one = scene(time)
@@ -146,7 +146,7 @@ def test_a_follower_is_late_from_when_the_first_is_found_and_it_is_hit():
 
 
 def test_cars_on_one_line_at_one_pace_form_a_convoy():
-    pace, other = Pace(10), Pace(9)
+    pace, other = ActorPace(10), ActorPace(9)
     oncoming = [actor(k, Kind.CAR, s, pace, along=-1, d=3.0) for k, s in ((1, 50.0), (2, 30.0), (3, 70.0))]
     others = [actor(4, Kind.CAR, 10.0, pace, d=3.0), actor(5, Kind.CAR, 20.0, other, along=-1, d=3.0)]
     assert convoy_pairs([*oncoming, *others, actor(6, Kind.PEDESTRIAN, 40.0, pace, along=-1, d=3.0)]) == [

@@ -116,17 +116,17 @@ def test_without_clean_up_fewer_cells_have_a_label(counted):
 
 
 class Counted:
-    """A run on two drives, in each of which 100 cells of road and 10 of car lie nearby; so many are called right."""
+    """A run on ten drives, in each of which 100 cells of road and 10 of car lie nearby; so many are called right."""
 
     def __init__(self, road, car):
         self.right = road, car
 
     def confusions(self, _root, method, _truth, band=None):
-        matrices = np.zeros((2, 14, 14), int)
+        matrices = np.zeros((10, 14, 14), int)
         if band in (None, "0-10 m"):
             for c, cells, right in zip((0, 3), (100, 10), self.right, strict=True):
                 matrices[:, c, c], matrices[:, c, 13] = right, cells - right
-        return FrameConfusions(("a", "b"), {method: matrices})
+        return FrameConfusions(tuple("abcdefghij"), {method: matrices})
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from semgrid_edu.workshop.simulation.street.ground import (
 )
 from semgrid_edu.workshop.simulation.street.layout import Road, Side, to_road, to_world
 from semgrid_edu.workshop.simulation.street.terrain import Extent, ground_mesh
-from semgrid_edu.workshop.simulation.street.trajectories import Pace, Trajectory
+from semgrid_edu.workshop.simulation.street.trajectories import ActorPace, Trajectory
 from semgrid_edu.workshop.simulation.things.materials import Kind
 
 SIDE = Side(edge=4.0, strip=0.0, walk=2.0, bank_rise=0.8, bank_width=3.0)
@@ -77,7 +77,7 @@ def test_a_vehicle_stands_on_its_wheels():
 
 
 def test_the_recording_car_climbs_as_the_road_does():
-    ego = Ego(HILL, Trajectory(0.0, 0.0, 1.0, 0.0, Pace(10.0)), sway=0.0, roll=0.0, pitch=0.0, phase=0.0)
+    ego = Ego(HILL, Trajectory(0.0, 0.0, 1.0, 0.0, ActorPace(10.0)), sway=0.0, roll=0.0, pitch=0.0, phase=0.0)
     T = ego.T_world_from_lidar(1.0)
     assert T[:3, 0] @ [0, 0, 1] == pytest.approx(np.sin(np.arctan(0.06)))
     on_ground = T @ [0, 0, -KITTI_LIDAR_HEIGHT, 1]

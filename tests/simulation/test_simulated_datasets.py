@@ -177,6 +177,12 @@ def test_bad_arguments_are_named(tmp_path):
         make_dataset("minikitti", tmp_path, workers=0)
 
 
+def test_one_frame_in_so_many_is_labelled():
+    assert list(Route("train", 10, True, every=3).labelled) == [2, 5, 8]
+    assert list(Route("train", 3, True).labelled) == [0, 1, 2]
+    assert list(Route("train", 3, False).labelled) == [2]
+
+
 def test_the_recipes_have_the_papers_numbers_of_frames():
     def labelled(name, split):
         return [len(route.labelled) for route in RECIPES[name].routes if route.split == split]

@@ -87,11 +87,13 @@ def points_from_depth(
     return points, v[near], u[near]
 
 
-def depth_scan(depth: NDArray, camera: Camera) -> NDArray[np.float32]:
+def depth_scan(
+    depth: NDArray, camera: Camera, row_step: int = LIDAR_ROW_STEP, col_step: int = LIDAR_COL_STEP
+) -> NDArray[np.float32]:
     """Return a depth image thinned to a LIDAR's sparsity, in the form of a scan.
 
-    As the paper says, this doesn't make it LIDAR data; it only reduces the amount of depth. Every fourth row and every
-    second column is kept, up to 80 m. The reflectance is 0, because a depth image has none.
+    As the paper says, this doesn't make it LIDAR data; it only reduces the amount of depth. By default every fourth row
+    and every second column is kept, up to 80 m. The reflectance is 0, because a depth image has none.
 
     Parameters
     ----------
@@ -99,11 +101,13 @@ def depth_scan(depth: NDArray, camera: Camera) -> NDArray[np.float32]:
         Metres along the optical axis; NaN where there is none.
     camera : Camera
         The camera that took it, of this size.
+    row_step, col_step : int
+        As `points_from_depth` takes them.
 
     Returns
     -------
     (N, 4) float32
         x, y, z in the LIDAR frame, metres, and reflectance 0.
     """
-    points, _, _ = points_from_depth(depth, camera, LIDAR_ROW_STEP, LIDAR_COL_STEP)
+    points, _, _ = points_from_depth(depth, camera, row_step, col_step)
     return np.column_stack([points, np.zeros(len(points))]).astype(np.float32)

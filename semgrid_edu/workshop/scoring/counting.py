@@ -48,12 +48,26 @@ class GridCounts(NamedTuple):
         By method, truth and band of distance.
     reliability : dict of str to (3, B) float
         For each method that gave a distribution, by bin of confidence: the number of cells, the sum of their
-        confidence, and how many are right by the true labels.
+        confidence, and how many are right. By the true labels under the method's name, by others under that of
+        `reliability_key`.
     """
 
     methods: tuple[str, ...]
     confusions: FrameConfusions
     reliability: dict[str, NDArray[np.float64]]
+
+
+def reliability_key(method: str, truth: str) -> str:
+    """Return the key under which `GridCounts.reliability` holds a method's counts against some labels.
+
+    Parameters
+    ----------
+    method : str
+        Such as "network".
+    truth : str
+        "true" or "lidar".
+    """
+    return method if truth == "true" else f"{method}, {truth} labels"
 
 
 def reliability_of_sums(sums: NDArray) -> Reliability:
@@ -92,7 +106,9 @@ def count_grids(grids: Grids, frames: TrainingSet) -> GridCounts:
         for method, grid in grids(k).items():
             methods.setdefault(method)
             if np.ndim(grid) == 3:
-                confidence[method] = confidence.get(method, 0) + _confidence(grid, truths["true"][k])
+                for truth, classes in truths.items():
+                    key = reliability_key(method, truth)
+                    confidence[key] = confidence.get(key, 0) + _confidence(grid, classes[k])
                 grid = grid.argmax(axis=0)
             for truth, classes in truths.items():
                 for name, matrix in _by_band(classes[k], grid, band, len(frames.label_set)).items():

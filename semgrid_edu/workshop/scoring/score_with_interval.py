@@ -1,6 +1,7 @@
 """A score with its confidence interval and every seed's value, as numbers and as text (section 4.2)."""
 
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,11 +9,11 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS, semantic_cells
-from semgrid_edu.workshop.scoring.statistics import Interval, Metric, drive_interval, paired_interval
+from semgrid_edu.workshop.scoring.statistics import MIN_DRIVES, Interval, Metric, drive_interval, paired_interval
 
 ScoreWithInterval = dict[str, object]
 """The "mean" over the seeds, "low" and "high" of its 95 % interval, and the value of each of the "seeds"; None where
-it can't be computed."""
+it can't be computed. Below `MIN_DRIVES` drives there is no interval."""
 
 SHOWN_SEEDS = 5
 """With more seeds than this, `shown_seeds` shows only the lowest and the highest value."""
@@ -29,7 +30,7 @@ def score_with_interval(confusions: NDArray, metric: Metric) -> ScoreWithInterva
         Takes a confusion matrix (C, C), row: truth, and returns a number.
     """
     seeds = [float(metric(matrix)) for matrix in confusions.sum(axis=1)]
-    return _with_interval(seeds, lambda: drive_interval(confusions, metric))
+    return _with_interval(seeds, confusions.shape[1], lambda: drive_interval(confusions, metric))
 
 
 def compared(a: NDArray, b: NDArray, metric: Metric) -> ScoreWithInterval:
@@ -43,15 +44,15 @@ def compared(a: NDArray, b: NDArray, metric: Metric) -> ScoreWithInterval:
         Takes a confusion matrix (C, C), row: truth, and returns a number.
     """
     ours, theirs = np.broadcast_arrays(*([metric(matrix) for matrix in some.sum(axis=1)] for some in (a, b)))
-    return _with_interval((ours - theirs).tolist(), lambda: paired_interval(a, b, metric))
+    return _with_interval((ours - theirs).tolist(), a.shape[1], lambda: paired_interval(a, b, metric))
 
 
-def _with_interval(seeds: list[float], interval: Callable[[], Interval]) -> ScoreWithInterval:
-    """Add the interval to a score. There is none for one drive, nor where a class occurs in one drive alone."""
-    try:
-        low, mean, high = interval()
-    except ArgumentError:
-        low, mean, high = None, float(np.mean(seeds)), None
+def _with_interval(seeds: list[float], n_drives: int, interval: Callable[[], Interval]) -> ScoreWithInterval:
+    """Add the interval to a score. There is none for few drives, nor where a class occurs in one drive alone."""
+    low, mean, high = None, float(np.mean(seeds)), None
+    if n_drives >= MIN_DRIVES:
+        with suppress(ArgumentError):
+            low, mean, high = interval()
     defined = [None if np.isnan(seed) else seed for seed in seeds]
     return {"mean": None if np.isnan(mean) else mean, "low": low, "high": high, "seeds": defined}
 

@@ -5,12 +5,16 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
+from scipy import optimize, stats
 
 from semgrid_edu.errors import ArgumentError
 
 Metric = Callable[[NDArray], float]
 """A function of a confusion matrix (C, C), such as `pixel_accuracy`."""
+
+
+MIN_DRIVES = 10
+"""With fewer drives no table shows an interval and no claim has a verdict: too few to know how drives vary."""
 
 
 class Interval(NamedTuple):
@@ -25,6 +29,72 @@ class Interval(NamedTuple):
     low: float
     mean: float
     high: float
+
+
+class EstimatedMean(NamedTuple):
+    """A mean over seeds and drives, and how well it is known: what intervals and p-values are computed from.
+
+    Parameters
+    ----------
+    mean : float
+        The mean score, or the mean difference of two.
+    variances : (float, float)
+        V_s and V_d: the parts of the mean's variance that the choice of seeds and that of drives add.
+    sizes : (int, int)
+        S and V, the numbers of seeds and of drives.
+    """
+
+    mean: float
+    variances: tuple[float, float]
+    sizes: tuple[int, int]
+
+    def half_width(self, level: float) -> float:
+        """Return half the width of the interval that `drive_interval` describes.
+
+        Parameters
+        ----------
+        level : float
+            How often such intervals should hold the true value, between 0 and 1.
+        """
+        variances, freedom = np.array(self.variances), [max(n - 1, 1) for n in self.sizes]
+        t = stats.t.ppf((1 + level) / 2, freedom)
+        return float((t * variances).sum() / np.sqrt(variances.sum())) if variances.any() else 0.0
+
+    def p_value(self, limit: float, above: bool) -> float:
+        """Return the one-sided p-value of a claim that the true value lies on one side of a limit.
+
+        It is small when the mean lies far on the other side. An interval of level 1 - 2 p ends exactly at the limit
+        then, so the p-value and the intervals never contradict each other.
+
+        Parameters
+        ----------
+        limit : float
+            The limit, in the unit of the mean.
+        above : bool
+            Whether the claim says that the true value is above it; else below.
+        """
+        beyond = (limit - self.mean) if above else (self.mean - limit)
+        if not any(self.variances):
+            return 0.0 if beyond > 0 else 1.0
+        nearly = 1 - 1e-12
+        if abs(beyond) >= self.half_width(nearly):
+            tail = (1 - nearly) / 2
+        else:
+            tail = (1 - optimize.brentq(lambda level: self.half_width(level) - abs(beyond), 0, nearly)) / 2
+        return float(tail if beyond > 0 else 1 - tail)
+
+
+def drive_estimate(confusions: ArrayLike, metric: Metric) -> EstimatedMean:
+    """Return the mean score of a method over its seeds, and its variances. Parameters are those of `drive_interval`."""
+    return _estimate(*_left_out(_checked("confusions", confusions), metric))
+
+
+def paired_estimate(a: ArrayLike, b: ArrayLike, metric: Metric) -> EstimatedMean:
+    """Return by how much method a beats method b, and its variances. Parameters are those of `paired_interval`."""
+    a, b = _checked("a", a), _checked("b", b)
+    if a.shape[1:] != b.shape[1:] or (len(a) != len(b) and 1 not in (len(a), len(b))):
+        raise ArgumentError("b", f"the seeds and drives of a, shape {a.shape}", f"shape {b.shape}")
+    return _estimate(*(of_a - of_b for of_a, of_b in zip(_left_out(a, metric), _left_out(b, metric), strict=True)))
 
 
 def drive_interval(confusions: ArrayLike, metric: Metric, level: float = 0.95) -> Interval:
@@ -84,7 +154,7 @@ def drive_interval(confusions: ArrayLike, metric: Metric, level: float = 0.95) -
     >>> f"{low:.3f} {mean:.3f} {high:.3f}"
     '0.769 0.810 0.851'
     """
-    return _interval(*_left_out(_checked("confusions", confusions), metric), level)
+    return _interval(drive_estimate(confusions, metric), level)
 
 
 def paired_interval(a: ArrayLike, b: ArrayLike, metric: Metric, level: float = 0.95) -> Interval:
@@ -117,11 +187,7 @@ def paired_interval(a: ArrayLike, b: ArrayLike, metric: Metric, level: float = 0
     ArgumentError
         When a and b have other drives, or numbers of seeds that don't fit, and as in `drive_interval`.
     """
-    a, b = _checked("a", a), _checked("b", b)
-    if a.shape[1:] != b.shape[1:] or (len(a) != len(b) and 1 not in (len(a), len(b))):
-        raise ArgumentError("b", f"the seeds and drives of a, shape {a.shape}", f"shape {b.shape}")
-    differences = (of_a - of_b for of_a, of_b in zip(_left_out(a, metric), _left_out(b, metric), strict=True))
-    return _interval(*differences, level)
+    return _interval(paired_estimate(a, b, metric), level)
 
 
 def _checked(name: str, confusions: ArrayLike) -> NDArray:
@@ -146,14 +212,16 @@ def _left_out(confusions: NDArray, metric: Metric) -> tuple[NDArray, NDArray]:
     return scores, without
 
 
-def _interval(scores: NDArray, without: NDArray, level: float) -> Interval:
-    """Return the interval from the metric of each seed on all drives (S,), and on all but one of them (S, V)."""
+def _estimate(scores: NDArray, without: NDArray) -> EstimatedMean:
+    """Return the estimate from the metric of each seed on all drives (S,), and on all but one of them (S, V)."""
+    return EstimatedMean(float(scores.mean()), _variances(scores, without), without.shape)
+
+
+def _interval(estimate: EstimatedMean, level: float) -> Interval:
     if not 0 < level < 1:
         raise ArgumentError("level", "a share between 0 and 1, such as 0.95", level)
-    mean, variances = scores.mean(), np.array(_variances(scores, without))
-    t = stats.t.ppf((1 + level) / 2, [max(n - 1, 1) for n in without.shape])
-    half = (t * variances).sum() / np.sqrt(variances.sum()) if variances.any() else 0.0
-    return Interval(float(mean - half), float(mean), float(mean + half))
+    half = estimate.half_width(level)
+    return Interval(estimate.mean - half, estimate.mean, estimate.mean + half)
 
 
 def _variances(scores: NDArray, without: NDArray) -> tuple[float, float]:
@@ -162,6 +230,6 @@ def _variances(scores: NDArray, without: NDArray) -> tuple[float, float]:
     parts = (n_drives - 1) * (without.mean(axis=1, keepdims=True) - without)  # of each drive in each seed's score
     of_drives = parts.mean(axis=0).var(ddof=1) / n_drives
     if n_seeds == 1:
-        return 0.0, of_drives
+        return 0.0, float(of_drives)
     of_both = parts.var(axis=0, ddof=1).sum() / (n_drives - 1) / n_seeds / n_drives
-    return scores.var(ddof=1) / n_seeds, max(of_drives - of_both, 0.0)
+    return float(scores.var(ddof=1) / n_seeds), float(max(of_drives - of_both, 0.0))

@@ -42,17 +42,20 @@ class Route:
         Whether all frames have labels; else the last one alone.
     wishes : Wishes
         What isn't left to chance.
+    every : int
+        With `all_labelled`, the step from one labelled frame to the next; 1 labels all.
     """
 
     split: str
     n_frames: int
     all_labelled: bool
     wishes: Wishes = ANY
+    every: int = 1
 
     @property
     def labelled(self) -> range:
         """The numbers of the frames that have labels."""
-        return range(0 if self.all_labelled else self.n_frames - 1, self.n_frames)
+        return range(self.every - 1 if self.all_labelled else self.n_frames - 1, self.n_frames, self.every)
 
 
 @dataclass(frozen=True)

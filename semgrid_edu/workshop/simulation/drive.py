@@ -19,7 +19,7 @@ from semgrid_edu.workshop.simulation.street.plan import ANY, Wishes, draw_plan
 from semgrid_edu.workshop.simulation.street.road_users import fill_street
 from semgrid_edu.workshop.simulation.street.scenery import build_scenery
 from semgrid_edu.workshop.simulation.street.traffic import Traffic
-from semgrid_edu.workshop.simulation.street.trajectories import Pace
+from semgrid_edu.workshop.simulation.street.trajectories import ActorPace
 
 PERIOD = 0.1
 """Seconds between frames: KITTI's LIDAR turns ten times a second."""
@@ -85,7 +85,7 @@ class SimulatedDrive:
         rng = np.random.default_rng(seed)
         self.n_frames, self.rig = n_frames, rig or Rig()
         duration = (n_frames - 1) * PERIOD
-        pace = Pace.random(rng, wishes.speed)
+        pace = ActorPace.random(rng, wishes.speed)
         self.plan = draw_plan(rng, pace.distance(duration), wishes)
         swing = (0.05, 0.2) if wishes.even else (0.3, 0.6)
         self.ego = Ego.random(rng, self.plan.road, pace, wishes.ego_lane, swing)

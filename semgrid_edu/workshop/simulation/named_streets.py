@@ -10,7 +10,7 @@ from semgrid_edu.workshop.simulation.street import road_users as casts
 from semgrid_edu.workshop.simulation.street.light import Light
 from semgrid_edu.workshop.simulation.street.plan import Wishes
 from semgrid_edu.workshop.simulation.street.traffic import Traffic
-from semgrid_edu.workshop.simulation.street.trajectories import STAND, Pace
+from semgrid_edu.workshop.simulation.street.trajectories import STAND, ActorPace
 
 KITTI_RIG = Rig(lidar=HDL64E, packet_interval=0.01)
 """An HDL-64E at 10 Hz, and poses from packets that come every 10 ms."""
@@ -69,7 +69,7 @@ def _sample_cast(traffic: Traffic) -> None:
     """Put an overtaking and an oncoming car, a cyclist and pedestrians where the camera sees them, then others."""
     road, end = traffic.road, traffic.duration
     here = traffic.ends_at
-    overtaking, oncoming, cycling = Pace(traffic.ego.pace.mean + 6.0), Pace(9.0), Pace(5.0)
+    overtaking, oncoming, cycling = ActorPace(traffic.ego.pace.mean + 6.0), ActorPace(9.0), ActorPace(5.0)
     red, blue = ("estate", (0.35, 0.02, 0.02)), ("hatchback", (0.05, 0.12, 0.35))
     traffic.drive_car(here + 9.0 - overtaking.distance(end), -0.5 * road.lane, 1, 0, overtaking, red)
     traffic.drive_car(here + 14.0 + oncoming.distance(end), 0.5 * road.lane, -1, 0, oncoming, blue)
@@ -77,7 +77,7 @@ def _sample_cast(traffic: Traffic) -> None:
     for sign, ahead in ((-1, 12.0), (1, 17.0)):
         side = road.side(sign)
         walk = sign * (side.edge + side.strip + 0.6 * side.walk)
-        traffic.walk(here + ahead, walk, sign, 0, Pace(1.4))
+        traffic.walk(here + ahead, walk, sign, 0, ActorPace(1.4))
         traffic.walk(here + ahead + 9.0, walk, -sign, 0, STAND, 1.0)
     casts.fill_street(traffic)
 

@@ -10,7 +10,7 @@ from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import pixel_accuracy
 from semgrid_edu.storage.files import table_beside
-from semgrid_edu.workshop.paper.reports.tables import beside_usual, beside_usual_table
+from semgrid_edu.workshop.paper.reports.tables import CELLS, beside_usual, beside_usual_table
 from semgrid_edu.workshop.paper.reports.truth_costs import learned_from
 from semgrid_edu.workshop.paper.runs.claim_runs import table1_runs
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
@@ -32,6 +32,12 @@ CALIBRATION_ERRORS = [CalibrationError(**{kind: size}) for kind, sizes in _TABLE
 
 FEW = 4
 """The small training set has one frame in four."""
+
+NOTES = {"semantic": "", "all": " The truth of a cell without a semantic class is defined by the occupancy grid."}
+"""On which cells rows are compared, in order, and what has to be known of them."""
+
+CONFIDENCE = {"true": "", "lidar": ", by labels made with the LIDAR"}
+"""By which labels confidence is compared with accuracy, and how rows say so; networks learn from the second."""
 
 SECTIONS = _TABLES["sections"]
 """The lists of rows that are compared with the usual network, and what each shows."""
@@ -100,7 +106,8 @@ def ablations(scale: Scale, seeds: int, counted: RunCounts) -> dict:
         for name, rows in ablated_runs(scale, seeds).items()
     }
     found["distance"] = [_band(band, usual, counted) for band in distance_band_names()]
-    found["confidence"] = [_calibration(method, usual, counted) for method in (NETWORK, WITH_CRF, WITH_SEARCHED)]
+    methods = (NETWORK, WITH_CRF, WITH_SEARCHED)
+    found["confidence"] = [_calibration(method, usual, counted, truth) for truth in CONFIDENCE for method in methods]
     return found
 
 
@@ -110,11 +117,11 @@ def _band(band: str, usual: Sequence[ScoreRun], counted: RunCounts) -> dict:
     return {"what": band, "cells": int(kept.sum()), "pixel accuracy": score_with_interval(kept, pixel_accuracy)}
 
 
-def _calibration(method: str, usual: Sequence[ScoreRun], counted: RunCounts) -> dict:
-    """Return how well a method's probabilities mean what they say, seed by seed."""
-    diagrams = [run.reliability(counted, method) for run in usual]
+def _calibration(method: str, usual: Sequence[ScoreRun], counted: RunCounts, truth: str) -> dict:
+    """Return how well a method's probabilities mean what they say by some labels, seed by seed."""
+    diagrams = [run.reliability(counted, method, truth) for run in usual]
     return {
-        "what": method,
+        "what": method + CONFIDENCE[truth],
         "expected calibration error": [expected_calibration_error(diagram) for diagram in diagrams],
         "diagrams": [{name: column.tolist() for name, column in diagram._asdict().items()} for diagram in diagrams],
     }
@@ -129,7 +136,11 @@ def ablations_markdown(result: dict) -> str:
         From `ablations`.
     """
     rows = {words: {row["what"]: row for row in result[name]} for name, words in SECTIONS.items()}
-    tables = {words: beside_usual_table("", some, "true", "all") for words, some in rows.items()}
+    tables = {
+        f"{words} {CELLS[cells].capitalize()}, true labels.{NOTES[cells]}": beside_usual_table("", some, "true", cells)
+        for words, some in rows.items()
+        for cells in NOTES
+    }
     near = [[row["what"], shown(row["pixel accuracy"])] for row in result["distance"]]
     tables["Accuracy by distance, cells with a semantic class, true labels"] = [["distance", "pixel accuracy"], *near]
     sure = [_calibration_cells(row) for row in result["confidence"]]

@@ -9,6 +9,12 @@ from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.paper.reports import pictures, tables
 from semgrid_edu.workshop.paper.reports.ablations import ablation_runs, ablations, ablations_markdown
 from semgrid_edu.workshop.paper.reports.judging import claims_markdown, claims_picture, judge_claims
+from semgrid_edu.workshop.paper.reports.structure import (
+    structure,
+    structure_markdown,
+    structure_picture,
+    structure_plan,
+)
 from semgrid_edu.workshop.paper.reports.truth_costs import (
     truth_cost_runs,
     truth_costs,
@@ -98,6 +104,7 @@ def _of_result(picture: Callable[[dict], Figure]) -> Callable[[dict, RunCounts],
 _PARTS = {
     "table3": (_table3_plan, _table3, tables.confusion_markdown, _of_result(pictures.confusion_picture)),
     "claims": (claim_runs.claims_plan, judge_claims, claims_markdown, _of_result(claims_picture)),
+    "structure": (structure_plan, structure, structure_markdown, _of_result(structure_picture)),
     "ablations": (ablation_runs, ablations, ablations_markdown, _of_result(pictures.ablations_picture)),
     "truth-costs": (truth_cost_runs, truth_costs, truth_costs_markdown, _of_result(truth_costs_picture)),
     "figures": (claim_runs.figure_runs, claim_runs.shown_frames, pictures.figures_markdown, pictures.figures_picture),

@@ -1,5 +1,7 @@
 """Pictures of the tables, the paper's values beside ours with intervals and every seed; Figures 6 and 7 (section 4)."""
 
+from itertools import cycle
+
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,7 +13,7 @@ from semgrid_edu.labels import KITTI_14, SYNTHIA_10, LabelSet
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.plotting import class_legend, confusion, grid_labels
 from semgrid_edu.workshop.paper.reports.forest import draw_scores, legend_entries
-from semgrid_edu.workshop.paper.runs.claim_runs import figure_runs
+from semgrid_edu.workshop.paper.runs.claim_runs import FIGURES, figure_runs
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
 from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.scales import scale_named
@@ -84,7 +86,7 @@ def ablations_picture(result: dict) -> Figure:
 def _draw_reliability(ax: Axes, rows: list[dict]) -> None:
     """Draw the reliability diagram of each method, all seeds together."""
     ax.plot([0, 1], [0, 1], color="0.4", linewidth=0.8)
-    for row, marker in zip(rows, "osD", strict=True):
+    for row, marker in zip(rows, cycle("osD^vX"), strict=False):
         cells, confidence, accuracy = (
             np.array([diagram[name] for diagram in row["diagrams"]]) for name in ("cells", "confidence", "accuracy")
         )
@@ -98,15 +100,15 @@ def _draw_reliability(ax: Axes, rows: list[dict]) -> None:
 TITLES = {"true": "true labels", "network": "SegNet"}
 """The titles of the grids that both figures show."""
 
-FIGURES: dict[str, tuple[LabelSet, dict[str, str]]] = {
-    "Figure 6": (KITTI_14, {"truth": "labels made\nwith the LIDAR", **TITLES, "refined": "SegNet + CRF"}),
-    "Figure 7": (SYNTHIA_10, TITLES),
-}
-"""The classes of each figure, and the titles of its grids from left to right."""
+_FIGURE_6 = (KITTI_14, {"truth": "labels made\nwith the LIDAR", **TITLES, "refined": "SegNet + CRF"})
+PARTS: dict[str, tuple[LabelSet, dict[str, str]]] = dict(
+    zip(FIGURES, (_FIGURE_6, _FIGURE_6, (SYNTHIA_10, TITLES)), strict=True)
+)
+"""The classes of each figure's part, and the titles of its grids from left to right."""
 
 
 def figures_picture(result: dict, counted: RunCounts) -> Figure:
-    """Draw both figures: one row per frame, the image and its grids.
+    """Draw the figures: one row per frame, the image and its grids.
 
     Parameters
     ----------
@@ -115,11 +117,11 @@ def figures_picture(result: dict, counted: RunCounts) -> Figure:
     counted : RunCounts
         What is known about the runs.
     """
-    figure = plt.figure(figsize=(13, 17), layout="constrained")
-    runs = figure_runs(scale_named(result["scale"]), result["seeds"])
-    for part, run, name in zip(figure.subfigures(2, 1), runs, result["figures"], strict=True):
+    runs = dict(zip(FIGURES, figure_runs(scale_named(result["scale"]), result["seeds"]), strict=True))
+    figure = plt.figure(figsize=(13, 8.5 * len(runs)), layout="constrained")
+    for part, (name, run) in zip(figure.subfigures(len(runs), 1), runs.items(), strict=True):
         part.suptitle(name, x=0.02, ha="left")
-        _draw(part, run.grids(counted), *FIGURES[name])
+        _draw(part, run.grids(counted), *PARTS[name])
     return figure
 
 

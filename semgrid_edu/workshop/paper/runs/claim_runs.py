@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import chain
 from types import SimpleNamespace
 
@@ -58,7 +59,7 @@ def table3_runs(scale: Scale, seeds: int) -> list[ScoreRun]:
 
 
 def figure_runs(scale: Scale, seeds: int) -> list[FigureRun]:
-    """Return the runs of Figures 6 and 7: SegNet's first seed on the data of Table 1 and of Table 3.
+    """Return the runs of Figures 6 and 7: SegNet's first seed on the data of Tables 1, 2 and 3.
 
     Parameters
     ----------
@@ -67,9 +68,13 @@ def figure_runs(scale: Scale, seeds: int) -> list[FigureRun]:
     seeds : int
         Not used: pictures are of one network.
     """
-    data = {scale.kitti: "lidar", scale.synthia: "true"}
+    data = {scale.kitti: "lidar", scale.chroma: "lidar", scale.synthia: "true"}
     scored = [scale.scored(name, "segnet", 1, truth) for name, truth in data.items()]
     return [FigureRun(run.network, run.frames) for (run,) in scored]
+
+
+FIGURES = ("Figure 6", "Figure 6, INRIA-Chroma", "Figure 7")
+"""The figures' parts, each on data of its own."""
 
 
 def shown_frames(scale: Scale, seeds: int, counted: RunCounts) -> dict:
@@ -87,7 +92,7 @@ def shown_frames(scale: Scale, seeds: int, counted: RunCounts) -> dict:
     dict
         "figures": by name the numbers of the "frames", and where the "grids" are, as a path in the folder of all runs.
     """
-    runs = dict(zip(("Figure 6", "Figure 7"), figure_runs(scale, seeds), strict=True))
+    runs = dict(zip(FIGURES, figure_runs(scale, seeds), strict=True))
     frames = {name: run.grids(counted)["frame"].tolist() for name, run in runs.items()}
     return {"figures": {name: {"frames": frames[name], "grids": f"{run.name}/{GRIDS}"} for name, run in runs.items()}}
 
@@ -111,35 +116,69 @@ def runs_of_claims(scale: Scale, seeds: int) -> SimpleNamespace:
     Returns
     -------
     SimpleNamespace
-        "networks", those of Table 1 by name, and of these the "usual" one, SegNet, with as many seeds as all others;
-        "new_routes", Table 2's network on routes that nobody has driven in training; "perfect", Table 3's on such
-        routes, with data without any error; "overturned" and "overturned_blind", cars on their tops: the usual network,
-        and one that doesn't see the occupancy grid; "unreduced", without the 1x1 reduction; "times", of the usual
-        network and of that one; "baselines", what learns no fusion; "baselines_off" and "usual_off", with the wrong
-        calibration.
+        "networks", those of Table 1 by name, and of these the "usual" one, SegNet, with as many seeds as all others,
+        and "usual_of_all_seeds"; "taught_true", SegNet that learns from true labels; "new_routes", Table 2's network on
+        routes that nobody has driven in training; "table2" itself; "perfect", SegNet on data without any error, cells
+        of 0.2 m; "overturned" and "overturned_blind", cars on their tops: the usual network, and one without the
+        occupancy grid; "unreduced", without the 1x1 reduction; "times", of the usual network and of that one;
+        "two_stages", "unbalanced" and "one_plane", trained so; "baselines", what learns no fusion; "baselines_off" and
+        "usual_off", with the wrong calibration; "baselines_dense", with the depth of every pixel.
     """
-    every, all_seeds = range(seeds), max(seeds, scale.table1_seeds if seeds == scale.seeds else seeds)
+    all_seeds = max(seeds, scale.table1_seeds if seeds == scale.seeds else seeds)
     networks = table1_runs(replace(scale, networks=tuple(NETWORKS)), all_seeds)
     usual = networks["segnet"][:seeds]
-    blind, unreduced = (
-        scale.scored(scale.kitti, "segnet", seeds, variant=variant, crf=False)
-        for variant in (Variant(occupancy=False), Variant(reduces=False))
-    )
-    routes = scale.arrays(scale.chroma_routes, "test", "lidar")
-    perfect = scale.arrays(scale.synthia_routes, "test", "true")
-    lying = scale.arrays(scale.overturned, "test", "true")
     return SimpleNamespace(
         networks=networks,
         usual=usual,
-        new_routes=[ScoreRun(scale.grid_stage(scale.chroma, "segnet", seed), routes) for seed in every],
-        perfect=[
-            ScoreRun(scale.grid_stage(scale.synthia, "segnet", seed, "true"), perfect, crf=False) for seed in every
-        ],
-        overturned=[OverturnedRun(run.network, lying) for run in usual],
-        overturned_blind=[OverturnedRun(run.network, lying) for run in blind],
-        unreduced=unreduced,
-        times=[TimeRun(usual[0].network, unreduced[0].network, usual[0].frames)],
+        usual_of_all_seeds=networks["segnet"],
+        table2=table2_runs(scale, seeds)["segnet"],
+        **vars(_trained_otherwise(scale, seeds, usual, all_seeds)),
+        **vars(_on_other_frames(scale, seeds, usual)),
         baselines=baselines_of(usual),
         baselines_off=[BaselineRun(run.network, run.frames, WRONG_CALIBRATION) for run in usual],
+        baselines_dense=[BaselineRun(run.network, run.frames, dense=True) for run in usual],
         usual_off=[ScoreRun(run.network, run.frames, crf=False, calibration=WRONG_CALIBRATION) for run in usual],
     )
+
+
+def _trained_otherwise(scale: Scale, seeds: int, usual: list[ScoreRun], all_seeds: int) -> SimpleNamespace:
+    """Return the runs of networks that differ in their training from the usual one, on the same test frames."""
+    scored = partial(scale.scored, scale.kitti, "segnet", crf=False)
+    unreduced = scored(all_seeds, variant=Variant(reduces=False))
+    taught = (scale.grid_stage(scale.kitti, "segnet", seed, "true") for seed in range(seeds))
+    return SimpleNamespace(
+        taught_true=[ScoreRun(network, one.frames) for network, one in zip(taught, usual, strict=True)],
+        unreduced=unreduced,
+        times=[TimeRun(usual[0].network, unreduced[0].network, usual[0].frames)],
+        two_stages=scored(seeds, variant=Variant(end_to_end=False)),
+        unbalanced=scored(seeds, variant=Variant(balanced=False)),
+        one_plane=scored(seeds, variant=Variant(n_planes=1)),
+    )
+
+
+def _on_other_frames(scale: Scale, seeds: int, usual: list[ScoreRun]) -> SimpleNamespace:
+    """Return the runs on other frames than those of Table 1."""
+    routes, lying = scale.arrays(scale.chroma_routes, "test", "lidar"), scale.arrays(scale.overturned, "test", "true")
+    blind = [scale.grid_stage(scale.kitti, "segnet", seed, variant=Variant(occupancy=False)) for seed in range(seeds)]
+    return SimpleNamespace(
+        new_routes=[ScoreRun(scale.grid_stage(scale.chroma, "segnet", seed), routes) for seed in range(seeds)],
+        perfect=scale.fine.scored(scale.synthia_routes, "segnet", seeds, "true", crf=False),
+        overturned=[OverturnedRun(run.network, lying) for run in usual],
+        overturned_blind=[OverturnedRun(network, lying) for network in blind],
+    )
+
+
+def structure_runs(scale: Scale, seeds: int) -> dict[tuple[str, str], list[ScoreRun]]:
+    """Return SegNet's runs by what it learned from and what it is tested on: streets, or the paper's few long runs.
+
+    Parameters are those of `table1_runs`.
+    """
+    data = (scale.kitti, scale.kitti_runs)
+    return {
+        (learned, tested): [
+            ScoreRun(scale.grid_stage(learned, "segnet", seed), scale.arrays(tested, "test", "lidar"), crf=False)
+            for seed in range(seeds)
+        ]
+        for learned in data
+        for tested in data
+    }

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.grid import GridSpec
 from semgrid_edu.training.run import architecture, chosen_truth
 from semgrid_edu.workshop.scheduler.runs import Run
 from semgrid_edu.workshop.simulation.datasets import RECIPES, make_from_recipe, read_recipes
@@ -55,17 +56,24 @@ class ArraysRun(Run):
         key of `POLICIES`.
     preset : str
         "compact" or "paper": decides the grid and the size of the images, see `architecture`.
+    fine : bool
+        Whether the cells have the paper's 0.2 m in any preset.
     """
 
     data: DataRun
     split: str
     truth: str = "true"
     preset: str = "compact"
+    fine: bool = False
     kind = "arrays"
-    size = property(lambda self: f"-{self.preset}" * (self.preset != "compact"))  # as names say it
+    size = property(
+        lambda self: f"-{self.preset}" * (self.preset != "compact") + "-fine" * self.fine
+    )  # as names say it
     tag = property(lambda self: f"{self.data.tag}-{self.split}-{self.truth}{self.size}")
-    pace = property(lambda self: f"arrays {self.preset}")
-    trial_seconds = property(lambda self: 0.1 if self.preset == "compact" else 0.5)
+    built = property(lambda self: self.preset + "-fine" * self.fine)  # what the time of a step depends on
+    pace = property(lambda self: f"arrays {self.built}")
+    trial_seconds = property(lambda self: 0.5 if self.size else 0.1)
+    grid = property(lambda self: GridSpec.paper() if self.fine else architecture("segnet", self.preset).grid)
     routes = property(lambda self: [route for route in self.data.recipe.routes if route.split == self.split])
     steps = property(lambda self: sum(route.n_frames for route in self.routes))
     n_labelled = property(lambda self: sum(len(route.labelled) for route in self.routes))
@@ -83,4 +91,4 @@ class ArraysRun(Run):
             When the data set is missing or damaged.
         """
         usual, truth = architecture("segnet", self.preset), chosen_truth(self.truth)
-        return TrainingSet(self.data.dataset_dir(root), self.split, usual.grid, usual.image_size, truth=truth)
+        return TrainingSet(self.data.dataset_dir(root), self.split, self.grid, usual.image_size, truth=truth)

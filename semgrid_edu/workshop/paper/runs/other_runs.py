@@ -25,7 +25,7 @@ from semgrid_edu.storage.tensors import read_arrays, write_arrays
 from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun
 from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.score_runs import CONFUSIONS
-from semgrid_edu.workshop.paper.runs.training_runs import GridStageRun, NetworkRun
+from semgrid_edu.workshop.paper.runs.training_runs import GridStageRun, NetworkRun, seconds_per_step
 from semgrid_edu.workshop.scheduler.runs import Run
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions, load_confusions, save_confusions
 from semgrid_edu.workshop.scoring.grids import learned_log_g
@@ -34,8 +34,15 @@ from semgrid_edu.workshop.scoring.score_with_interval import ScoreWithInterval
 OVERTURNED = "overturned cars"
 """The method: the network's own grid, of which only the cells of overturned cars are counted."""
 
-TIMES, SECONDS, ROUNDS, FRAMES_EACH = "times.json", "seconds per frame", 12, 3
-"""The file with the times, what it holds, how often two networks take turns, and for how many frames each time."""
+UPRIGHT, UPRIGHT_RANGE = "upright cars", (10.0, 22.0)
+"""The same for upright cars on the same frames, at the distances at which the overturned ones lie, metres."""
+
+TIMES, ROUNDS, FRAMES_EACH, TRAINING_ROUNDS = "times.json", 12, 3, 6
+"""The file with the times, how often two networks take turns, for how many frames each time, and how often in training.
+"""
+
+FRAME, STEP = "seconds per frame", "seconds per training step"
+"""What that file holds."""
 
 GRIDS, SHOWN = "grids.npz", (1 / 6, 1 / 2, 5 / 6)
 """The file with the grids, and which frames they are of: at these shares of the test frames, so that nobody chose them.
@@ -53,14 +60,15 @@ class OverturnedRun(NetworkRun):
 
     def work(self, root: Path, device: str) -> None:
         """Count. Parameters are those of `Run.work`."""
-        frames = self.frames.frames(root)
-        net, car, counts = self.network.trained(root, frames.camera), KITTI_14.index("car"), []
+        frames, counts = self.frames.frames(root), {OVERTURNED: [], UPRIGHT: []}
+        net, car = self.network.trained(root, frames.camera), KITTI_14.index("car")
         for k, objects in enumerate(tqdm(self._objects(root), total=len(frames), unit="frame")):
-            called = learned_log_g(net, frames[k]).argmax(axis=0)
-            lying = [one for one in objects if one["class"] == "car" and one.get("overturned", False)]
-            counted = boxes_on(frames.spec, lying) & (frames.arrays["true"][k] == car)
-            counts.append(confusion_matrix(np.where(counted, car, IGNORE), called, len(KITTI_14)))
-        save_confusions(self.folder(root) / CONFUSIONS, FrameConfusions(frames.drives, {OVERTURNED: np.stack(counts)}))
+            called, cars = learned_log_g(net, frames[k]).argmax(axis=0), cars_by_pose(objects)
+            for method, some in counts.items():
+                counted = boxes_on(frames.spec, cars[method]) & (frames.arrays["true"][k] == car)
+                some.append(confusion_matrix(np.where(counted, car, IGNORE), called, len(KITTI_14)))
+        stacked = {method: np.stack(some) for method, some in counts.items()}
+        save_confusions(self.folder(root) / CONFUSIONS, FrameConfusions(frames.drives, stacked))
 
     def _objects(self, root: Path) -> Iterator[list[dict]]:
         """Yield the road users of each frame."""
@@ -72,6 +80,21 @@ class OverturnedRun(NetworkRun):
     def confusions(self, counted: RunCounts, method: str, truth: str, band: str | None = None) -> FrameConfusions:
         """Return what was counted, by the true labels. Parameters are those of `CountingRun.confusions`."""
         return counted.confusions(self, method, method, lambda root: load_confusions(self.folder(root) / CONFUSIONS))
+
+
+def cars_by_pose(objects: list[dict]) -> dict[str, list[dict]]:
+    """Return the cars that lie on their tops, and the upright ones in `UPRIGHT_RANGE`, by method.
+
+    Parameters
+    ----------
+    objects : list of dict
+        Road users, with "class" and "centre", as a simulated drive's labels hold them.
+    """
+    cars = [one for one in objects if one["class"] == "car"]
+    lying = [one for one in cars if one.get("overturned", False)]
+    nearest, farthest = UPRIGHT_RANGE
+    within = [one for one in cars if nearest <= np.hypot(*one["centre"][:2]) <= farthest]
+    return {OVERTURNED: lying, UPRIGHT: [one for one in within if one not in lying]}
 
 
 def boxes_on(spec: GridSpec, objects: list[dict], margin: float = 0.25) -> NDArray[np.bool_]:
@@ -122,7 +145,9 @@ class TimeRun(Run):
         for net in nets:
             _seconds(net, samples)
         rounds = [[_seconds(net, samples) / len(samples) for net in nets] for _ in range(ROUNDS)]
-        write_json(self.folder(root) / TIMES, {SECONDS: rounds})
+        both = [(run.architecture, run.params, run.kind) for run in (self.first, self.second)]
+        steps = [[seconds_per_step(*one) for one in both] for _ in range(TRAINING_ROUNDS)]
+        write_json(self.folder(root) / TIMES, {FRAME: rounds, STEP: steps})
 
     def seconds_per_frame(self, counted: RunCounts) -> NDArray[np.float64]:
         """Return the seconds per frame of both networks in each round, (R, 2).
@@ -132,15 +157,21 @@ class TimeRun(Run):
         counted : RunCounts
             What is known about the runs.
         """
-        return counted.of(self, (SECONDS,), lambda root: {SECONDS: self._rounds(root)})[SECONDS]
+        return self._rounds(counted, FRAME)
 
-    def _rounds(self, root: Path) -> NDArray[np.float64]:
-        """Read the seconds per frame."""
+    def seconds_per_step(self, counted: RunCounts) -> NDArray[np.float64]:
+        """Return the seconds per training step, (R, 2). Parameters are those of `TimeRun.seconds_per_frame`."""
+        return self._rounds(counted, STEP)
+
+    def _rounds(self, counted: RunCounts, name: str) -> NDArray[np.float64]:
+        return counted.of(self, (name,), lambda root: {name: self._read(root, name)})[name]
+
+    def _read(self, root: Path, name: str) -> NDArray[np.float64]:
         path = self.folder(root) / TIMES
         try:
-            return np.array(read_json(path).get(SECONDS), dtype=np.float64).reshape(-1, 2)
+            return np.array(read_json(path).get(name), dtype=np.float64).reshape(-1, 2)
         except (ValueError, TypeError) as error:
-            raise DataError(path, "the seconds per frame of two networks in each round", error) from error
+            raise DataError(path, f"the {name} of two networks in each round", error) from error
 
 
 @torch.inference_mode()
@@ -168,6 +199,17 @@ def time_saved(rounds: NDArray) -> ScoreWithInterval:
     saved = 1 - rounds[:, 0] / rounds[:, 1]
     half = stats.t.ppf(0.975, len(saved) - 1) * saved.std(ddof=1) / np.sqrt(len(saved))
     return {"mean": saved.mean(), "low": saved.mean() - half, "high": saved.mean() + half, "seeds": saved.tolist()}
+
+
+def p_not_saved(rounds: NDArray) -> float:
+    """Return Student's one-sided p-value against the statement that time is saved.
+
+    Parameters
+    ----------
+    rounds : (R, 2) float
+        As `time_saved` takes them.
+    """
+    return float(stats.ttest_1samp(1 - rounds[:, 0] / rounds[:, 1], 0, alternative="less").pvalue)
 
 
 @dataclass(frozen=True)

@@ -23,12 +23,18 @@ class Scale:
         What `--scale` calls it.
     kitti, chroma, synthia : str
         The data sets in place of the paper's three, keys of `RECIPE_OF`.
-    chroma_routes, synthia_routes : str
+    kitti_runs : str
+        The same number of frames as `kitti` in a few long runs, as in the paper.
+    chroma_routes : str
         More routes to test on, for the claims.
+    synthia_routes : str
+        More routes to learn from and to test on, for the claims.
     overturned : str
         Drives with a car that lies on its top.
     preset : str
         "compact" or "paper": networks, images and grid, see `architecture`.
+    fine_cells : bool
+        Whether cells have the paper's 0.2 m in any preset.
     image_iterations, grid_iterations : int
         Steps of the two stages of training.
     table1_seeds, seeds : int
@@ -41,18 +47,25 @@ class Scale:
 
     name: str
     kitti: str = "minikitti"
+    kitti_runs: str = "kittiruns"
     chroma: str = "minichroma"
     synthia: str = "minisynthia"
     chroma_routes: str = "chromaroutes"
     synthia_routes: str = "synthiaroutes"
     overturned: str = "overturned"
     preset: str = "compact"
+    fine_cells: bool = False
     image_iterations: int = 500
     grid_iterations: int = 500
     table1_seeds: int = 5
     seeds: int = 3
     policies: tuple[str, ...] = tuple(name for name in POLICIES if name != "lidar")
     networks: tuple[str, ...] = tuple(NETWORKS)
+
+    @property
+    def fine(self) -> "Scale":
+        """The same with cells of 0.2 m."""
+        return replace(self, fine_cells=self.preset != "paper")  # the preset "paper" has them already
 
     @property
     def frames_to_train(self) -> int:
@@ -111,7 +124,7 @@ class Scale:
 
     def arrays(self, data: str, split: str, truth: str) -> ArraysRun:
         """Return the run that makes the arrays of a split. Parameters are those of `ArraysRun`."""
-        return ArraysRun(DataRun(data), split, truth, self.preset)
+        return ArraysRun(DataRun(data), split, truth, self.preset, self.fine_cells)
 
 
 SCALES = {name: Scale(name=name, **row) for name, row in table_beside(__file__).items()}

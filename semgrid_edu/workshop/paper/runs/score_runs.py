@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from semgrid_edu.crf import CrfParams, at_temperature, mean_field, unary_from_log_probability
 from semgrid_edu.crf.temperature import Reliability
 from semgrid_edu.datasets.index import load_index
+from semgrid_edu.datasets.readers.depth_points import depth_scan
 from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
 from semgrid_edu.datasets.readers.project_lidar import seen_returns
 from semgrid_edu.datasets.training_set import TrainingSet
@@ -24,7 +25,7 @@ from semgrid_edu.workshop.paper.runs.training_runs import NetworkRun
 from semgrid_edu.workshop.paper.runs.variants import EXACT, CalibrationError
 from semgrid_edu.workshop.scheduler.runs import Run
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions, load_confusions, save_confusions, seed_confusions
-from semgrid_edu.workshop.scoring.counting import Grids, count_grids, reliability_of_sums
+from semgrid_edu.workshop.scoring.counting import Grids, count_grids, reliability_key, reliability_of_sums
 from semgrid_edu.workshop.scoring.flat_ground import WAYS, label_and_state
 from semgrid_edu.workshop.scoring.grids import MAJORITY, NETWORK, OCCUPANCY_ALONE, Refine, baseline_grids, network_grids
 
@@ -34,10 +35,14 @@ CONFUSIONS, RELIABILITY = "confusions.npz", "reliability.npz"
 WITH_CRF, WITH_SEARCHED = f"{NETWORK} + CRF", f"{NETWORK} + searched CRF"
 """The network's grid, refined with the CRF's default parameters, and with those that were searched."""
 
-SEARCHED = {name: (row["temperature"], CrfParams(**row["crf"])) for name, row in table_beside(__file__).items()}
+_FOUND = table_beside(__file__)
+SEARCHED = {name: (row["temperature"], CrfParams(**row["crf"])) for name, row in _FOUND.items()}
 """For each image network the temperature and the CRF's parameters that `semgrid-edu search-crf` chose for pixel
 accuracy on validation drives, with the shipped network of that kind (docs/results/crf_search*.json). A network for
 which nothing was searched is scored without them."""
+
+WEIGHTS_FOR_CLASSES = {name: row["for_class_accuracy"] for name, row in _FOUND.items()}
+"""The CRF's weights that the same search finds for class accuracy: near 0, the CRF is switched off."""
 
 GEOMETRY, TRUE_GEOMETRY, FLAT_GROUND = "geometry", "geometry with true image labels", "flat ground"
 """Image labels carried by the LIDAR's depth with gaps closed, from the image network and true ones; and image labels
@@ -101,20 +106,24 @@ class CountingRun(Run):
         DataError
             When the run hasn't ended, its file is damaged, or it hasn't counted this.
         """
+        name = f"{method}, {truth} labels, {band or 'all distances'}"
+        return counted.confusions(self, method, name, lambda root: self._counts(root, method, truth, band))
 
-        def read(root: Path) -> FrameConfusions:
-            path = self.folder(root) / CONFUSIONS
-            try:
-                return load_confusions(path).of(method, truth, band)
-            except KeyError as error:
-                raise DataError(
-                    path, f"what was counted of {error}; remove the folder to count again", "none"
-                ) from error
+    def frame_confusions(self, counted: RunCounts, method: str, truth: str) -> NDArray[np.int64]:
+        """Return one method's matrices, one per frame, (N, C, C). Parameters are those of `CountingRun.confusions`."""
+        name = f"{method}, {truth} labels, by frame"
+        return counted.of(self, (name,), lambda root: {name: self._counts(root, method, truth).counts[method]})[name]
 
-        return counted.confusions(self, method, f"{method}, {truth} labels, {band or 'all distances'}", read)
+    def _counts(self, root: Path, method: str, truth: str, band: str | None = None) -> FrameConfusions:
+        """Read the confusion matrices of one method, one per frame."""
+        path = self.folder(root) / CONFUSIONS
+        try:
+            return load_confusions(path).of(method, truth, band)
+        except KeyError as error:
+            raise DataError(path, f"what was counted of {error}; remove the folder to count again", "none") from error
 
-    def reliability(self, counted: RunCounts, method: str) -> Reliability:
-        """Return how often a method is right by its confidence, over all frames and by the true labels.
+    def reliability(self, counted: RunCounts, method: str, truth: str = "true") -> Reliability:
+        """Return how often a method is right by its confidence, over all frames.
 
         Parameters
         ----------
@@ -122,15 +131,17 @@ class CountingRun(Run):
             What is known about the runs.
         method : str
             Such as `NETWORK`.
-
-        Raises
-        ------
-        DataError
-            When the run hasn't ended, or its file is damaged.
+        truth : str
+            The labels, "true" or "lidar".
         """
-        name = f"{method}, confidence"
-        found = counted.of(self, (name,), lambda root: {name: read_arrays(self.folder(root) / RELIABILITY)[method]})
-        return reliability_of_sums(found[name])
+        key = reliability_key(method, truth)
+        name = f"{key}, confidence"
+
+        def read(root: Path) -> dict[str, NDArray]:
+            found = read_arrays(self.folder(root) / RELIABILITY)
+            return {name: found[key]} if key in found else {}
+
+        return reliability_of_sums(counted.of(self, (name,), read)[name])
 
 
 def by_seed(
@@ -176,7 +187,7 @@ class ScoreRun(CountingRun, NetworkRun):
     crf: bool = True
     calibration: CalibrationError = EXACT
     kind = "score"
-    pace = property(lambda self: f"score {self.segmenter} {self.frames.preset}" + " with CRF" * self.crf)
+    pace = property(lambda self: f"score {self.segmenter} {self.frames.built}" + " with CRF" * self.crf)
     trial_seconds = property(lambda self: (0.8 if self.crf else 0.15) * (1 if self.frames.preset == "compact" else 10))
 
     @property
@@ -214,9 +225,12 @@ class BaselineRun(CountingRun, NetworkRun):
     ----------
     calibration : CalibrationError
         What geometry believes wrongly about where the camera stands.
+    dense : bool
+        Whether geometry has the true depth of every pixel in place of the LIDAR's returns.
     """
 
     calibration: CalibrationError = EXACT
+    dense: bool = False
     kind, trial_seconds = "baselines", 0.2
     pace = property(lambda self: f"baselines {self.segmenter} {self.frames.preset}")
 
@@ -225,7 +239,7 @@ class BaselineRun(CountingRun, NetworkRun):
         """Image network, labels, frames and calibration."""
         first = self.network.image_stage
         labels = f"{first.label}-{self.network.arrays.truth}-{first.iterations}-seed{first.seed}"
-        return f"{labels}-on-{self.frames.tag}{self.calibration.name}"
+        return f"{labels}-on-{self.frames.tag}{self.calibration.name}" + "-dense" * self.dense
 
     @property
     def needs(self) -> tuple[Run, ...]:
@@ -236,7 +250,8 @@ class BaselineRun(CountingRun, NetworkRun):
         """Return the grids of the baselines. Parameters are those of `CountingRun.grids`."""
         segmenters = {NETWORK: self.network.image_stage.trained(root, frames.camera).segmenter}
         camera = self.calibration.applied_to(frames.camera)
-        returns = None if self.calibration == EXACT else self._believed_returns(root, frames)
+        usual = self.calibration == EXACT and not self.dense
+        returns = None if usual else self._believed_returns(root, frames)
         made = baseline_grids(self.network.arrays.frames(root), frames, segmenters, camera, returns)
 
         def grids(k: int) -> dict[str, NDArray]:
@@ -251,7 +266,8 @@ class BaselineRun(CountingRun, NetworkRun):
         for name, numbers in index.frames_by_drive(self.frames.split).items():
             drive = KittiRawDrive(index.root, *name, images=False)
             for frame in (drive[number] for number in numbers):
-                believed = replace(frame, camera=self.calibration.applied_to(frame.camera))
+                points = depth_scan(frame.labels.depth, frame.camera, 1, 1) if self.dense else frame.points
+                believed = replace(frame, camera=self.calibration.applied_to(frame.camera), points=points)
                 found.append(seen_returns(believed, frames.spec, frames.camera.size))
         return found.__getitem__
 

@@ -36,7 +36,7 @@ class TrainingRun(Run):
 
     is_training = True
     steps = property(lambda self: self.iterations)
-    trial_seconds = property(lambda self: _seconds_per_step(self.architecture, self.params, self.kind))
+    trial_seconds = property(lambda self: seconds_per_step(self.architecture, self.params, self.kind))
 
     @abstractmethod
     def net(self, root: Path, camera: Camera) -> SemanticGridNet:
@@ -65,8 +65,18 @@ class TrainingRun(Run):
         return load_net(self.folder(root) / WEIGHTS, camera)
 
 
-def _seconds_per_step(described: Architecture, params: TrainingParams, stage: str) -> float:
-    """Return how long a step of the stage "image" or "grid" takes on this machine's CPU, tried on grey frames."""
+def seconds_per_step(described: Architecture, params: TrainingParams, stage: str) -> float:
+    """Return how long a training step takes on this machine's CPU, tried on grey frames, seconds.
+
+    Parameters
+    ----------
+    described : Architecture
+        The network.
+    params : TrainingParams
+        How it is trained.
+    stage : str
+        "image" or "grid".
+    """
     net = build_net(described, Rig().camera).train()
     size, shape, n = described.image_size, described.grid.shape, params.batch_size
     image, occupancy = torch.full((n, 3, *size), 0.5), torch.full((n, N_STATES, *shape), 1 / N_STATES)
@@ -107,7 +117,7 @@ class ImageStageRun(TrainingRun):
     n_frames: int | None = None
     kind = "image"
     tag = property(lambda self: f"{self.label}-{self.iterations}-seed{self.seed}")
-    pace = property(lambda self: f"image {self.segmenter} {self.arrays.preset}")
+    pace = property(lambda self: f"image {self.segmenter} {self.arrays.built}")
 
     @property
     def label(self) -> str:
@@ -119,7 +129,7 @@ class ImageStageRun(TrainingRun):
     def architecture(self) -> Architecture:
         """The whole network, of which the image network learns."""
         usual = architecture(self.segmenter, self.arrays.preset)
-        return replace(usual, label_set=self.arrays.data.recipe.label_set)
+        return replace(usual, label_set=self.arrays.data.recipe.label_set, grid=self.arrays.grid)
 
     @property
     def params(self) -> TrainingParams:
@@ -166,7 +176,7 @@ class GridStageRun(TrainingRun):
     iterations: int = 500
     variant: Variant = USUAL
     kind = "grid"
-    pace = property(lambda self: f"grid {self.image_stage.segmenter} {self.arrays.preset}{self.variant.name}")
+    pace = property(lambda self: f"grid {self.image_stage.segmenter} {self.arrays.built}{self.variant.name}")
     seed = property(lambda self: self.image_stage.seed)
     chosen = property(lambda self: self.image_stage.chosen)  # the frames that its image network learned from
 
@@ -187,7 +197,7 @@ class GridStageRun(TrainingRun):
         """How it is trained."""
         usual = training_params(self.arrays.preset, self.iterations)
         limit = usual.weight_limit if self.variant.balanced else 1.0
-        return replace(usual, image_iterations=0, weight_limit=limit)
+        return replace(usual, image_iterations=0, weight_limit=limit, end_to_end=self.variant.end_to_end)
 
     def net(self, root: Path, camera: Camera) -> SemanticGridNet:
         """Return a network whose image network is trained already. Parameters are those of `TrainingRun.net`."""
@@ -217,5 +227,5 @@ class NetworkRun(Run):
 
     tag = property(lambda self: f"{self.network.tag}-on-{self.frames.tag}")
     steps = property(lambda self: self.frames.n_labelled)
-    pace = property(lambda self: f"{self.kind} {self.frames.preset}")
+    pace = property(lambda self: f"{self.kind} {self.frames.built}")
     segmenter = property(lambda self: self.network.image_stage.segmenter)

@@ -69,6 +69,8 @@ class Variant:
         Whether a 1x1 convolution reduces the planes.
     balanced : bool
         Whether the loss weights rare classes more (median frequency balancing).
+    end_to_end : bool
+        Whether the loss on the grid teaches the image network too; else that stays as it was after the first stage.
     """
 
     n_planes: int = 20
@@ -76,6 +78,7 @@ class Variant:
     occupancy: bool = True
     reduces: bool = True
     balanced: bool = True
+    end_to_end: bool = True
 
     @property
     def name(self) -> str:
@@ -86,6 +89,7 @@ class Variant:
             ("no-occupancy", self.occupancy),
             ("no-reduction", self.reduces),
             ("unbalanced", self.balanced),
+            ("two-stage", self.end_to_end),
         )
         return "".join(f"-{part}" for part, as_usual in parts if not as_usual)
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, rigid_transform
 from semgrid_edu.workshop.simulation.street.ground import on_wheels
 from semgrid_edu.workshop.simulation.street.layout import Road, to_world
-from semgrid_edu.workshop.simulation.street.trajectories import Pace, Trajectory
+from semgrid_edu.workshop.simulation.street.trajectories import ActorPace, Trajectory
 from semgrid_edu.workshop.simulation.things.shapes import rotation_matrix
 
 _AXLES, _TRACK = 2.7, 1.55
@@ -42,7 +42,7 @@ class Ego:
 
     @classmethod
     def random(
-        cls, rng: np.random.Generator, road: Road, pace: Pace, lane: int | None = None, swing: tuple = (0.3, 0.6)
+        cls, rng: np.random.Generator, road: Road, pace: ActorPace, lane: int | None = None, swing: tuple = (0.3, 0.6)
     ) -> "Ego":
         """Draw the recording car's lane and how it sways.
 
@@ -52,7 +52,7 @@ class Ego:
             Source of all that is drawn.
         road : Road
             The street.
-        pace : Pace
+        pace : ActorPace
             How fast it drives.
         lane : int, optional
             Number of its lane, 0 beside the centre line; when left out, the outer one in two drives of three.

@@ -7,7 +7,7 @@ import numpy as np
 
 from semgrid_edu.workshop.simulation.street.layout import Side
 from semgrid_edu.workshop.simulation.street.traffic import Traffic
-from semgrid_edu.workshop.simulation.street.trajectories import STAND, Departure, Pace, Trajectory
+from semgrid_edu.workshop.simulation.street.trajectories import STAND, ActorPace, Departure, Trajectory
 from semgrid_edu.workshop.simulation.things.cars import car_size
 from semgrid_edu.workshop.simulation.things.materials import Kind
 
@@ -61,19 +61,19 @@ def _lanes(traffic: Traffic) -> None:
     ego_lane = round(-ego.d / road.lane - 0.5)
     for index in range(road.lanes_right):
         faster = rng.uniform(2.5, 7.0) if index < ego_lane else -rng.uniform(1.0, 2.5)
-        pace = ego.pace if index == ego_lane or stands else Pace(max(ego.pace.mean + faster, 3.0))
+        pace = ego.pace if index == ego_lane or stands else ActorPace(max(ego.pace.mean + faster, 3.0))
         _fill_lane(traffic, -(index + 0.5) * road.lane, 1, pace)
     overtaken = road.lanes_right == 1 and not stands and rng.random() < 0.22
     for index in range(road.lanes_left):
         d = (index + 0.5) * road.lane
         if overtaken and index == 0:
-            at_end, pace = traffic.ends_at + rng.uniform(4, 22), Pace(ego.pace.mean + rng.uniform(4, 7))
+            at_end, pace = traffic.ends_at + rng.uniform(4, 22), ActorPace(ego.pace.mean + rng.uniform(4, 7))
             traffic.drive_car(at_end - pace.distance(traffic.duration), d, 1, 0, pace)
         else:
-            _fill_lane(traffic, d, -1, STAND if stands else Pace(rng.uniform(7, 14)))
+            _fill_lane(traffic, d, -1, STAND if stands else ActorPace(rng.uniform(7, 14)))
 
 
-def _fill_lane(traffic: Traffic, d: float, along: int, pace: Pace) -> None:
+def _fill_lane(traffic: Traffic, d: float, along: int, pace: ActorPace) -> None:
     """Put cars that drive alike into a lane, so that they are around the recording car when the drive ends."""
     road, rng, density = traffic.road, traffic.rng, traffic.plan.density
     travelled, reach = pace.distance(traffic.duration), road.side_half + road.corner
@@ -99,9 +99,9 @@ def _cross_traffic(traffic: Traffic) -> None:
             back += rng.uniform(6.0, 9.0)
         if rng.random() < 0.6:
             start = edge + rng.uniform(6, 40)
-            traffic.drive_car(away, sign * start, 0, sign, Pace(rng.uniform(4, 9)))
+            traffic.drive_car(away, sign * start, 0, sign, ActorPace(rng.uniform(4, 9)))
         if traffic.ego.pace.mean == 0 and rng.random() < 0.7:
-            pace, end = Pace(rng.uniform(5, 9)), rng.uniform(-8, 8)
+            pace, end = ActorPace(rng.uniform(5, 9)), rng.uniform(-8, 8)
             traffic.drive_car(towards, sign * (end + pace.distance(traffic.duration)), 0, -sign, pace)
 
 
@@ -109,7 +109,7 @@ def _cyclists(traffic: Traffic) -> None:
     """Let cyclists ride at the edge of the outer lanes."""
     road, rng = traffic.road, traffic.rng
     for _ in range(rng.poisson(0.5 + 1.6 * traffic.plan.density)):
-        pace, along = Pace(rng.uniform(3.5, 6.5)), int(rng.choice([1, 1, -1]))
+        pace, along = ActorPace(rng.uniform(3.5, 6.5)), int(rng.choice([1, 1, -1]))
         lanes = road.lanes_right if along > 0 else road.lanes_left
         d = -along * (lanes * road.lane - rng.uniform(0.35, 0.6))
         traffic.ride(traffic.ends_at + rng.uniform(4, 40) - along * pace.distance(traffic.duration), d, along, pace)
@@ -126,11 +126,11 @@ def _pedestrians(traffic: Traffic) -> None:
             if rng.random() < 0.15:
                 traffic.walk(s, d, 1, 0, STAND, rng.uniform(-np.pi, np.pi))
                 continue
-            pace = Pace(float(np.clip(rng.normal(1.4, 0.18), 1.0, 1.9)))
+            pace = ActorPace(float(np.clip(rng.normal(1.4, 0.18), 1.0, 1.9)))
             if traffic.walk(s, d, along, 0, pace) and rng.random() < 0.35:
                 traffic.walk(s + 0.1, d + rng.choice([-0.75, 0.75]), along, 0, pace)
     for _ in range(rng.poisson(0.4 + 0.9 * traffic.plan.density)):
-        pace, across = Pace(float(rng.normal(1.4, 0.15))), int(rng.choice([-1, 1]))
+        pace, across = ActorPace(float(rng.normal(1.4, 0.15))), int(rng.choice([-1, 1]))
         back = road.side_half + road.corner + rng.uniform(1.0, 3.2)
         s = road.junction - back if road.side_half and road.zebra else here + rng.uniform(9, 35)
         end = rng.uniform(-road.right.edge, road.left.edge)
@@ -144,16 +144,16 @@ def convoys(traffic: Traffic) -> None:
     """
     park_cars(traffic)
     road, rng, ego = traffic.road, traffic.rng, traffic.ego
-    oncoming = Pace(rng.uniform(8, 14))
+    oncoming = ActorPace(rng.uniform(8, 14))
     meets = rng.uniform(0.6, 1.1) * traffic.duration
     first = ego.at(meets)[0] + oncoming.distance(meets)
     _convoy(traffic, first, 0.5 * road.lane, -1, oncoming, int(rng.integers(2, 4)))
-    overtaking = Pace(ego.pace.mean + rng.uniform(2, 5))
+    overtaking = ActorPace(ego.pace.mean + rng.uniform(2, 5))
     ahead = traffic.ends_at + rng.uniform(20, 35) - overtaking.distance(traffic.duration)
     _convoy(traffic, ahead, -0.5 * road.lane, 1, overtaking, 2)
 
 
-def _convoy(traffic: Traffic, s: float, d: float, along: int, pace: Pace, cars: int) -> None:
+def _convoy(traffic: Traffic, s: float, d: float, along: int, pace: ActorPace, cars: int) -> None:
     """Let cars drive one behind the other, the first of them from s on."""
     for _ in range(cars):
         look = (traffic.body(), traffic.paint())
@@ -205,7 +205,7 @@ def crossing_cars(traffic: Traffic) -> None:
     park_cars(traffic)
     road, rng = traffic.road, traffic.rng
     for sign in (1, -1):
-        s, pace = road.junction - sign * road.side_half / 2, Pace(rng.uniform(5, 11))
+        s, pace = road.junction - sign * road.side_half / 2, ActorPace(rng.uniform(5, 11))
         halfway = pace.distance(rng.uniform(0.3, 0.7) * traffic.duration)
         for k in range(2):
             traffic.drive_car(s, sign * (halfway + k * rng.uniform(12, 20)), 0, -sign, pace)
@@ -226,6 +226,6 @@ def overturned_car(traffic: Traffic) -> None:
     fill_street(traffic)
 
 
-def _walking(rng: np.random.Generator) -> Pace:
+def _walking(rng: np.random.Generator) -> ActorPace:
     """Draw how fast a person walks."""
-    return Pace(float(np.clip(rng.normal(1.4, 0.2), 0.9, 2.0)))
+    return ActorPace(float(np.clip(rng.normal(1.4, 0.2), 0.9, 2.0)))

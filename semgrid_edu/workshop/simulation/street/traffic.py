@@ -10,7 +10,7 @@ from semgrid_edu.workshop.simulation.street import footprints
 from semgrid_edu.workshop.simulation.street.builder import OVERHEAD, Builder
 from semgrid_edu.workshop.simulation.street.ground import on_wheels
 from semgrid_edu.workshop.simulation.street.layout import Road
-from semgrid_edu.workshop.simulation.street.trajectories import Pace, Trajectory
+from semgrid_edu.workshop.simulation.street.trajectories import ActorPace, Trajectory
 from semgrid_edu.workshop.simulation.things.cars import BODIES, PAINTS, car, car_size
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 from semgrid_edu.workshop.simulation.things.people import Person, bicycle, rider, walker
@@ -221,7 +221,9 @@ class Traffic:
         """Draw the body of a car, one of `BODIES`."""
         return str(self.rng.choice(BODIES, p=[0.32, 0.22, 0.2, 0.16, 0.1]))
 
-    def drive_car(self, s: float, d: float, along: float, across: float, pace: Pace, look: Look | None = None) -> bool:
+    def drive_car(
+        self, s: float, d: float, along: float, across: float, pace: ActorPace, look: Look | None = None
+    ) -> bool:
         """Let a car drive, and return True, unless it would run into something.
 
         Parameters
@@ -230,7 +232,7 @@ class Traffic:
             Where it is at t = 0: distance along the road and to the left of its centre line, metres.
         along, across : float
             Direction in (s, d), as in `Trajectory`.
-        pace : Pace
+        pace : ActorPace
             How fast it moves; `STAND` if it stands.
         look : (str, (float, float, float)), optional
             Its body and paint; drawn when left out.
@@ -238,7 +240,7 @@ class Traffic:
         look = look or (self.body(), self.paint())
         return self.add(Kind.CAR, car_size(look[0]), Trajectory(s, d, along, across, pace), look, 0.3)
 
-    def walk(self, s: float, d: float, along: float, across: float, pace: Pace, turn: float = 0.0) -> bool:
+    def walk(self, s: float, d: float, along: float, across: float, pace: ActorPace, turn: float = 0.0) -> bool:
         """Let a person walk or stand, and return True, unless they would run into something.
 
         Parameters not named here are those of `Traffic.drive_car`.
@@ -251,7 +253,7 @@ class Traffic:
         person = Person.random(self.rng)
         return self.add(Kind.PEDESTRIAN, (0.7, 0.6, person.height), Trajectory(s, d, along, across, pace, turn), person)
 
-    def ride(self, s: float, d: float, along: float, pace: Pace) -> bool:
+    def ride(self, s: float, d: float, along: float, pace: ActorPace) -> bool:
         """Let a person ride a bicycle along the road, and return True, unless they would run into something.
 
         Parameters are those of `Traffic.drive_car`.

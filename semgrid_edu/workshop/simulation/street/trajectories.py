@@ -10,7 +10,7 @@ from semgrid_edu.workshop.simulation.street.layout import Road
 
 
 @dataclass(frozen=True)
-class Pace:
+class ActorPace:
     """A speed over time, mean + swing sin(rate t + phase), and the distance covered, its integral in closed form.
 
     Parameters
@@ -31,7 +31,7 @@ class Pace:
     phase: float = 0.0
 
     @classmethod
-    def random(cls, rng: np.random.Generator, mean: float | None = None) -> "Pace":
+    def random(cls, rng: np.random.Generator, mean: float | None = None) -> "ActorPace":
         """Draw how fast the recording car drives.
 
         Parameters
@@ -57,11 +57,11 @@ class Pace:
         return self.mean * t + self.swing / self.rate * (np.cos(self.phase) - np.cos(self.rate * t + self.phase))
 
     def speed(self, t: float) -> float:
-        """Return the speed at one instant, m/s. Parameters are those of `Pace.distance`."""
+        """Return the speed at one instant, m/s. Parameters are those of `ActorPace.distance`."""
         return self.mean + self.swing * np.sin(self.rate * t + self.phase)
 
 
-STAND = Pace(0.0)
+STAND = ActorPace(0.0)
 """The pace of what stands still."""
 
 
@@ -84,13 +84,13 @@ class Departure:
     acceleration: float
 
     def distance(self, t: float) -> float:
-        """Return the distance covered since t = 0, metres. Parameters are those of `Pace.distance`."""
+        """Return the distance covered since t = 0, metres. Parameters are those of `ActorPace.distance`."""
         since = max(t - self.start, 0.0)
         rising = min(since, self.mean / self.acceleration)
         return 0.5 * self.acceleration * rising**2 + self.mean * (since - rising)
 
     def speed(self, t: float) -> float:
-        """Return the speed at one instant, m/s. Parameters are those of `Pace.distance`."""
+        """Return the speed at one instant, m/s. Parameters are those of `ActorPace.distance`."""
         return min(self.acceleration * max(t - self.start, 0.0), self.mean)
 
 
@@ -104,7 +104,7 @@ class Trajectory:
         Where it begins at t = 0: distance along the road and to the left of its centre line, metres.
     along, across : float
         Direction in (s, d): (1, 0) with our traffic, (-1, 0) against it, (0, 1) across the road to the left.
-    pace : Pace or Departure
+    pace : ActorPace or Departure
         How fast the line is followed.
     turn : float
         Angle between this direction and the one that the thing points in, rad, for things that stand.
@@ -114,7 +114,7 @@ class Trajectory:
     d: float
     along: float
     across: float
-    pace: Pace | Departure
+    pace: ActorPace | Departure
     turn: float = 0.0
 
     def at(self, t: float) -> tuple[float, float]:

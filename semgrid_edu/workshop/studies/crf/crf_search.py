@@ -167,6 +167,10 @@ def search_crf(
     }
 
 
+UNCHANGED = 0.0005
+"""By less than this, a CRF hardly changes a score: 0.05 points."""
+
+
 def search_table(result: dict) -> str:
     """Return the temperature, what was chosen, and the scores on the test split as text to print.
 
@@ -188,6 +192,8 @@ def search_table(result: dict) -> str:
         accuracies = (f"{name} {100 * crf:.2f} ({100 * net:.2f} without CRF)" for name, (crf, net) in pairs.items())
         crf, net = pairs["class accuracy"]
         warning = "; none of the trials kept class accuracy" if objective == OBJECTIVES[2] and crf < net else ""
+        changed = max(abs(refined - alone) for refined, alone in pairs.values())
+        warning += "; the CRF is as good as switched off" if changed < UNCHANGED else ""
         lines.append(f"best {objective}: trial {trial['trial']}, {params}{warning}")
         lines.append(f"    on the validation drives {', '.join(accuracies)}")
     lines += ["", scores_table(result["test"]["scores"]), "", crf_scores.gains_text(result["test"]["gains"])]
