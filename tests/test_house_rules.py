@@ -147,7 +147,7 @@ def test_the_house_stays_small():
         lines[storey] += code_lines(module)
     assert modules["book"] <= 163
     assert modules["workshop"] <= 130
-    assert lines["book"] <= 11_440
+    assert lines["book"] <= 11_460
     assert lines["workshop"] <= 10_860
 
 
