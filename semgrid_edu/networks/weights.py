@@ -75,7 +75,13 @@ def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:
 
 
 def read_architecture(path: str | Path) -> Architecture:
-    """Return the architecture of a trained network. Parameter and errors are those of `load_net`."""
+    """Return the architecture of a trained network. Errors are those of `load_net`.
+
+    Parameters
+    ----------
+    path : path-like
+        A file that `save_net` wrote.
+    """
     header, _ = read_tensors(path)
     with _named(path, header):
         return _architecture(path, header)
