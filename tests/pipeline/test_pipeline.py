@@ -133,7 +133,7 @@ def test_what_is_neither_stages_nor_a_network_is_refused(drive, stages):
 
 
 def test_what_is_no_frame_is_refused(net):
-    with pytest.raises(ArgumentError, match="^frames: expected the frames of a drive, found 'a'"):
+    with pytest.raises(ArgumentError, match=r"^frames: expected the frames of a drive, found 'a'"):
         next(run_pipeline("abc", net))
 
 

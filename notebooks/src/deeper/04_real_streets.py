@@ -14,7 +14,7 @@
 # **Prerequisites.** Lecture [04](../04_cmcdot.ipynb); factors and d-separation, as in
 # [graphical models](graphical_models.ipynb).
 #
-# **Time.** 65 minutes, of which the computer needs less than one.
+# **Time.** 70 minutes, of which the computer needs less than one.
 
 # %% jupyter={"source_hidden": true}
 import json
