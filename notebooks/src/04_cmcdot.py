@@ -1104,8 +1104,8 @@ print(f"recall {both / np.sum(truth == DYNAMIC):.2f}, precision {both / np.sum(c
 
 # %% [markdown]
 # Now the filters of lectures 02, 03 and 04, on twenty simulated drives that none of them was tuned on, where the
-# truth of every cell is known. The scanner is KITTI's, the grid the paper's. `semgrid-edu reproduce occupancy` takes
-# about twenty minutes; its result lies in the repository.
+# truth of every cell is known. The scanner is KITTI's, the grid the paper's, and the roads have crowns and grades.
+# `semgrid-edu reproduce occupancy` takes about half an hour; its result lies in the repository.
 
 # %%
 result = json.loads(Path("../docs/results/occupancy.json").read_text(encoding="utf-8"))
@@ -1123,11 +1123,11 @@ Markdown(occupancy_table(result, "HDL-64E", "paper"))
 #    were left, several times as many are still occupied.
 # 2. **Particles cost little.** BOF and CMCDOT stand for the same model, and most of their rows differ by a few per
 #    cent. But the BOF stores 799 numbers a cell, 44 million, on a lattice that ends at 16 m/s; CMCDOT keeps 1.2
-#    million in all. Over all cells the exact filter finds somewhat more of what moves, far cars above all; of walking
-#    pedestrians CMCDOT finds more. CMCDOT is right somewhat more often when it says DYNAMIC.
+#    million in all. Over all cells the exact filter finds somewhat more of what moves; of walking pedestrians CMCDOT
+#    finds more, above all of far ones. CMCDOT is right somewhat more often when it says DYNAMIC.
 # 3. **Time in view decides.** Of all observed cells that move, more than a third aren't called so by CMCDOT. Of those
 #    with returns, near and in view for 1.5 s, hardly any is missed. So nearly all that is missed is new in view, far
-#    away or without returns. What stands is hardly ever called DYNAMIC. Nearly three in four of the cells that are so
+#    away or without returns. What stands is hardly ever called DYNAMIC. Nearly four in five of the cells that are so
 #    by mistake are FREE; among what is hit, banks are the worst.
 # 4. **A first hit isn't enough.** Of STATIC cells the log-odds grid finds 89 per cent, the others 82; nearly all that
 #    is missed they call FREE. A hit multiplies the odds of occupied to FREE by 0.8 / 0.05 = 16. In a cell that is seen
@@ -1148,7 +1148,7 @@ for cars, people in (("moving cars, to 25 m", "to 25 m"), ("moving cars, 25 to 5
 assert min(near[f"{mover}, to 25 m"]["dynamic"] for mover in ("moving cars", "cyclists", "walking pedestrians")) > 0.9
 assert max(near[thing]["dynamic"] for thing in ("standing cars", "walls", "fences", "foliage", "poles")) < 0.02
 mistakes = np.delete([row[DYNAMIC] for row in scores["CMCDOT"]["confusion"]], DYNAMIC)
-assert 0.7 < mistakes[FREE] / mistakes.sum() < 0.75
+assert 0.75 < mistakes[FREE] / mistakes.sum() < 0.8
 standing = np.array(scores["CMCDOT"]["confusion"][STATIC])
 assert standing[FREE] > 0.95 * (standing.sum() - standing[STATIC])
 hit = params.sensor.p_hit_occupied / params.sensor.p_hit_free
