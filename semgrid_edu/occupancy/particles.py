@@ -146,7 +146,7 @@ def _cells_at(xy, velocity, cells, time, least, shape, x_max, y_max, cell):
 
 
 def keeps_pace(vx: NDArray, vy: NDArray, pace: Pace) -> NDArray[np.bool_]:
-    """Say of velocities whether they are at least as near to the vehicle's own as that of a standing thing is.
+    """Say of velocities whether they are at least as near to the vehicle's own as that of a standing thing is, (N,).
 
     So the difference may be as large as the vehicle's speed.
 
@@ -167,7 +167,7 @@ _keeps_pace = njit(cache=True, nogil=True)(keeps_pace)
 def doubt_arrivals(
     particles: Particles, cells: NDArray, doubt: NDArray, ahead: NDArray, mixed: NDArray, spec: GridSpec, pace: Pace
 ) -> NDArray[np.float32]:
-    """Return which part of each weight comes out of a wall and goes on along it, beside a vehicle that drives.
+    """Return which part of each weight comes out of a wall and goes on along it, beside a vehicle that drives, (N,).
 
     Parameters
     ----------

@@ -32,8 +32,8 @@ class TruthPolicy:
         drive.
     deskew : bool
         Whether to undo the motion of the vehicle within a turn of the LIDAR (`deskew_scan`). It is for scans as a
-        scanner records them, such as KITTI's raw ones. Simulated scans are taken at one instant, so it would bend
-        them, unless `TruthFlaws.skewed` has bent them first.
+        scanner records them, such as KITTI's raw ones and those of the simulated data sets. Scans of one instant, such
+        as the sample drive's, it would bend, unless `TruthFlaws.skewed` has bent them first.
     vote : str
         Which class a cell takes when its returns have several. "standing": the most frequent one of those that stand,
         the ground's only if none does, as in the true grids (`LabelSet.most_voted`); a thin pole then keeps its cell,

@@ -89,7 +89,7 @@ def inverse_perspective(
 
 
 def ground_labels(labels: NDArray, places: NDArray, n_classes: int) -> NDArray[np.int64]:
-    """Return the label of each cell's ground, (H, W): C, the number of classes, where there is none.
+    """Return the label of each cell's ground, (H, W); a cell without a label gets C, the number of classes.
 
     Parameters
     ----------

@@ -48,7 +48,7 @@ def compared(a: NDArray, b: NDArray, metric: Metric) -> ScoreWithInterval:
 
 
 def _with_interval(seeds: list[float], n_drives: int, interval: Callable[[], Interval]) -> ScoreWithInterval:
-    """Add the interval to a score. There is none for few drives, nor where a class occurs in one drive alone."""
+    """Add the interval to a score; its ends are None with few drives, or if a class occurs in one drive alone."""
     low, mean, high = None, float(np.mean(seeds)), None
     if n_drives >= MIN_DRIVES:
         with suppress(ArgumentError):
